@@ -1,0 +1,1 @@
+"""Everything compiled. Arrays in, arrays out; knows none of the classes above it."""
