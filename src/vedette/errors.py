@@ -1,0 +1,31 @@
+"""The errors that this library raises; each message names the field, what was expected and what came."""
+
+from __future__ import annotations
+
+
+class VedetteError(Exception):
+    """Base of every error raised on purpose by this library."""
+
+
+class InputError(VedetteError, ValueError):
+    """An argument, scan, file or folder that cannot be used."""
+
+
+class ModelError(VedetteError):
+    """A model function raised, or returned something that is not a valid value of its kind."""
+
+
+class NumericalError(VedetteError, ArithmeticError):
+    """A computation left the domain in which it is defined, e.g. a covariance that is not positive definite."""
+
+
+class ScenarioError(VedetteError):
+    """A scenario with one or more faults.
+
+    Attributes:
+        faults: one line a fault, in file order: place, field, what was expected, what came.
+    """
+
+    def __init__(self, faults: list[str]) -> None:
+        self.faults = list(faults)
+        super().__init__("\n".join(self.faults))
