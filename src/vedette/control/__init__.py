@@ -1,0 +1,1 @@
+"""Where to send the sensors next: actions, ideal measurements, rewards, joint action search, planners."""

@@ -1,0 +1,86 @@
+"""What a planner decided, with the evidence it decided on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vedette.errors import InputError
+from vedette.kernels.types import Floats
+
+
+@dataclass(frozen=True, slots=True)
+class RewardTable:
+    """Expected reward of each action, or of each joint action, of some sensors (paper eq. 13 and 15).
+
+    Attributes:
+        sensors: the sensors whose actions are the axes of the table, in axis order.
+        mean: (num_actions of sensors[0], ...) mean reward over the samples; one axis a sensor.
+        standard_error: same shape; standard error of that mean.
+    """
+
+    sensors: tuple[int, ...]
+    mean: Floats
+    standard_error: Floats
+
+    def validate(self) -> None:
+        """Raise `InputError` unless there is one axis a sensor and every entry is finite, with errors not negative."""
+        if self.mean.ndim != len(self.sensors) or self.mean.shape != self.standard_error.shape:
+            raise InputError(
+                f"reward table: expected one axis for each of the sensors {self.sensors}; got a mean of shape "
+                f"{self.mean.shape} and a standard error of shape {self.standard_error.shape}"
+            )
+        if (
+            not np.isfinite(self.mean).all()
+            or not (np.isfinite(self.standard_error) & (self.standard_error >= 0)).all()
+        ):
+            raise InputError(
+                f"reward table of sensors {self.sensors}: expected finite rewards, and errors of 0 or more"
+            )
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """One decision: the chosen action of each sensor, and what was evaluated to choose it.
+
+    Attributes:
+        planner: name of the planner.
+        action_values: for each sensor, (num_actions,) the heading in radians of each action, in printed order.
+        chosen: for each sensor, the index of its chosen action in `action_values`.
+        tables: independent decisions: one 1-D table a sensor; joint decisions: one table with one axis a sensor;
+            random and fixed control: none.
+        counts: how many of each thing was evaluated.
+    """
+
+    planner: str
+    action_values: tuple[Floats, ...]
+    chosen: tuple[int, ...]
+    tables: tuple[RewardTable, ...]
+    counts: dict[str, int]
+
+    @property
+    def num_sensors(self) -> int:
+        return len(self.action_values)
+
+    @property
+    def chosen_headings(self) -> Floats:
+        """(num_sensors,) chosen headings in radians."""
+        return np.array([values[index] for values, index in zip(self.action_values, self.chosen, strict=True)])
+
+    def validate(self) -> None:
+        """Raise `InputError` unless choices are within the actions and the tables fit them."""
+        if len(self.chosen) != self.num_sensors:
+            raise InputError(
+                f"plan.chosen: expected one index for each of {self.num_sensors} sensors; got {self.chosen}"
+            )
+        for sensor, (values, index) in enumerate(zip(self.action_values, self.chosen, strict=True)):
+            if not 0 <= index < len(values):
+                raise InputError(f"plan.chosen[{sensor}]: expected an index of {len(values)} actions; got {index}")
+        for table in self.tables:
+            table.validate()
+            if not all(0 <= sensor < self.num_sensors for sensor in table.sensors):
+                raise InputError(f"plan.tables: expected sensors below {self.num_sensors}; got {table.sensors}")
+            expected = tuple(len(self.action_values[sensor]) for sensor in table.sensors)
+            if table.mean.shape != expected:
+                raise InputError(f"plan.tables: expected shape {expected} for {table.sensors}; got {table.mean.shape}")

@@ -1,0 +1,1 @@
+"""How good it was: OSPA, statistics over paired runs, figures and tables."""

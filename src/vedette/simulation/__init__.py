@@ -1,0 +1,1 @@
+"""The world that the program does not get to see: truth, platforms, scans, and the loop."""

@@ -1,0 +1,66 @@
+"""What a simulated run leaves behind."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from vedette.control.plan import Plan
+from vedette.densities.estimates import Estimate
+from vedette.kernels.types import Floats
+from vedette.simulation.truth import Truth
+
+
+@dataclass(frozen=True, slots=True)
+class Decision:
+    """A plan and the moment it was made.
+
+    Attributes:
+        step: index of the scan after which the plan was made.
+        time: s.
+        poses: (num_sensors, 3) poses [px, py, heading_rad] of the sensors at that moment.
+        plan: the choice and its evidence.
+    """
+
+    step: int
+    time: float
+    poses: Floats
+    plan: Plan
+
+
+@dataclass(frozen=True, slots=True)
+class RunRecord:
+    """One run of one strategy on one scenario.
+
+    Attributes:
+        scenario: name of the scenario.
+        planner: name of the strategy.
+        seed: seed of the campaign; with `run` it fixes every random number.
+        run: index of the run within the campaign.
+        times: (num_scans,) s.
+        truth: the targets, scan by scan.
+        poses: (num_scans, num_sensors, 3) sensor poses [px, py, heading_rad] at each scan.
+        estimates: one a scan.
+        decisions: in order of time.
+        ospa: (num_scans, 3) total, localisation and cardinality parts, m.
+        timings: seconds spent, by what.
+    """
+
+    scenario: str
+    planner: str
+    seed: int
+    run: int
+    times: Floats
+    truth: Truth
+    poses: Floats
+    estimates: tuple[Estimate, ...]
+    decisions: tuple[Decision, ...]
+    ospa: Floats
+    timings: dict[str, float]
+
+    @property
+    def num_scans(self) -> int:
+        return len(self.times)
+
+    @property
+    def num_sensors(self) -> int:
+        return int(self.poses.shape[1])
