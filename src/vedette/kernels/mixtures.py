@@ -47,6 +47,16 @@ def _merge_runs(values: Floats, source: Ints, low: int, middle: int, high: int, 
 
 
 @kernel
+def copy_component(means: Floats, covs: Floats, source: int, out_means: Floats, out_covs: Floats, target: int) -> None:
+    """Copy component `source` to place `target`. (Written out: array assignment takes seconds to compile.)"""
+    n = means.shape[1]
+    for i in range(n):
+        out_means[target, i] = means[source, i]
+        for j in range(n):
+            out_covs[target, i, j] = covs[source, i, j]
+
+
+@kernel
 def match_components(
     components: Ints, weights: Floats, count: int, means: Floats, covs: Floats, out_mean: Floats, out_cov: Floats
 ) -> None:
@@ -190,12 +200,11 @@ def reduce_mixture(
     out_log_weights, out_means, out_covs = np.empty(kept), np.empty((kept, n)), np.empty((kept, n, n))
     for k in range(kept):
         out_log_weights[k] = merged_log_weights[order[k]]
-        out_means[k] = merged_means[order[k]]
-        out_covs[k] = merged_covs[order[k]]
+        copy_component(merged_means, merged_covs, order[k], out_means, out_covs, k)
     shift = total - log_sum(out_log_weights)
     for k in range(kept):
         out_log_weights[k] += shift
     return out_log_weights, out_means, out_covs
 
 
-__all__ = ["descending_order", "match_components", "moment_match", "reduce_mixture"]
+__all__ = ["copy_component", "descending_order", "match_components", "moment_match", "reduce_mixture"]
