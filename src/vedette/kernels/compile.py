@@ -105,11 +105,11 @@ class _PackageLocator:
         return locator
 
 
-class _CacheImpl(CompileResultCacheImpl):
+class _CacheImpl(CompileResultCacheImpl):  # type: ignore[misc]
     _locator_classes = [_PackageLocator, *CompileResultCacheImpl._locator_classes]
 
 
-class _Cache(FunctionCache):
+class _Cache(FunctionCache):  # type: ignore[misc]
     _impl_class = _CacheImpl
 
 
@@ -160,7 +160,7 @@ class ModelFunction(CPUDispatcher):  # type: ignore[misc]
         return super().__call__(*args)
 
 
-@typeof_impl.register(ModelFunction)
+@typeof_impl.register(ModelFunction)  # type: ignore[untyped-decorator]
 def _typeof_model_function(value: ModelFunction, context: Any) -> Any:
     return types.FunctionType(value.nopython_signatures[0])
 
