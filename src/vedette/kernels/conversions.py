@@ -7,7 +7,9 @@ import math
 import numpy as np
 
 from vedette.kernels.compile import kernel
+from vedette.kernels.linalg import log_sum
 from vedette.kernels.mixtures import copy_component, descending_order, match_components, reduce_mixture
+from vedette.kernels.subsets import smallest_sums
 from vedette.kernels.types import Floats, Glmb, Ints, Lmb, Tracks
 
 _HASH_BITS = 0x7FFFFFFF
@@ -44,9 +46,9 @@ def group_by_label_set(glmb: Glmb) -> tuple[Ints, Ints]:
     table = np.full(slots, -1, np.int64)
     group_of, first, num_groups = np.empty(num_hyps, np.int64), np.empty(num_hyps, np.int64), 0
     for h in range(num_hyps):
-        code = 1
+        code = 0
         for e in range(glmb.hyp_offsets[h], glmb.hyp_offsets[h + 1]):
-            code = (code * 1000003 + key[glmb.hyp_tracks[e]]) & _HASH_BITS
+            code += key[glmb.hyp_tracks[e]]
         slot = (code ^ (code >> 15)) & (slots - 1)
         while table[slot] >= 0 and not _same_labels(glmb, first[table[slot]], h):
             slot = (slot + 1) & (slots - 1)
@@ -76,33 +78,29 @@ def _members(group_of: Ints, num_groups: int) -> tuple[Ints, Ints]:
 
 
 @kernel
-def _pool(track: int, weight: float, slot_of: Ints, pool: Ints, weights: Floats, count: int) -> int:
-    """Add `weight` to `track`'s place in the pool; the new number of distinct tracks in it."""
+def _pool(track: int, weight: float, slot_of: Ints, pool: Ints, weights: Floats, end: int) -> int:
+    """Add `weight` to `track`'s place in the open pool, or give it the place `end`; the new end of the pool."""
     slot = slot_of[track]
     if slot < 0:
-        slot_of[track] = count
-        pool[count] = track
-        weights[count] = weight
-        return count + 1
+        slot_of[track] = end
+        pool[end] = track
+        weights[end] = weight
+        return end + 1
     weights[slot] += weight
-    return count
+    return end
 
 
 @kernel
-def _close(slot_of: Ints, pool: Ints, count: int) -> None:
-    """Forget the pooled tracks, so that `slot_of` serves the next pool."""
-    for p in range(count):
-        slot_of[pool[p]] = -1
-
-
-@kernel
-def _gather(tracks: Tracks, pool: Ints, weights: Floats, components: Ints, component_weights: Floats) -> int:
-    """Components of the pooled tracks and their linear weights, into the last two arguments; their number."""
+def _gather(
+    tracks: Tracks, pool: Ints, weights: Floats, low: int, high: int, components: Ints, component_weights: Floats
+) -> int:
+    """Components of the pool `low:high` and their linear weights, into the last two arguments; their number."""
     count = 0
-    for p in range(len(pool)):
+    for p in range(low, high):
         for source in range(tracks.offsets[pool[p]], tracks.offsets[pool[p] + 1]):
             components[count] = source
-            component_weights[count] = weights[p] * math.exp(tracks.log_weights[source])
+            log_weight = tracks.log_weights[source]
+            component_weights[count] = weights[p] if log_weight == 0.0 else weights[p] * math.exp(log_weight)
             count += 1
     return count
 
@@ -143,15 +141,19 @@ def _pooled_tracks(
     num, n, used, largest, room = len(labels), tracks.means.shape[1], 0, 0, 0
     for i in range(num):
         size = 0
-        for track in pool[pool_offsets[i] : pool_offsets[i + 1]]:
-            size += tracks.offsets[track + 1] - tracks.offsets[track]
+        for p in range(pool_offsets[i], pool_offsets[i + 1]):
+            size += tracks.offsets[pool[p] + 1] - tracks.offsets[pool[p]]
         largest = max(largest, size)
         room += min(size, max_components)
     components, component_weights = np.empty(largest, np.int64), np.empty(largest)
-    offsets, log_weights, means, covs = np.zeros(num + 1, np.int64), np.zeros(room), np.empty((room, n)), np.empty((room, n, n))
+    offsets, log_weights, means, covs = (
+        np.zeros(num + 1, np.int64),
+        np.zeros(room),
+        np.empty((room, n)),
+        np.empty((room, n, n)),
+    )
     for i in range(num):
-        low, high = pool_offsets[i], pool_offsets[i + 1]
-        count = _gather(tracks, pool[low:high], weights[low:high], components, component_weights)
+        count = _gather(tracks, pool, weights, pool_offsets[i], pool_offsets[i + 1], components, component_weights)
         if max_components == 1 or count == 1:
             match_components(components, component_weights, count, tracks.means, tracks.covs, means[used], covs[used])
             used += 1
@@ -207,21 +209,148 @@ def marginalise(glmb: Glmb, log_min_weight: float, merge_distance: float, max_co
     num_tracks = hyp_offsets[num_sets]
     labels, pool_offsets = np.empty((num_tracks, 2), np.int64), np.zeros(num_tracks + 1, np.int64)
     pool, weights = np.empty(num_entries, np.int64), np.empty(num_entries)
-    slot_of, used, i = np.full(len(glmb.tracks.labels), -1, np.int64), 0, 0
+    slot_of, i = np.full(len(glmb.tracks.labels), -1, np.int64), 0
     for s in range(num_sets):
         low, high = member_offsets[order[s]], member_offsets[order[s] + 1]
         for k in range(hyp_offsets[s + 1] - hyp_offsets[s]):
-            count = 0
-            for h in members[low:high]:
-                track = glmb.hyp_tracks[glmb.hyp_offsets[h] + k]
-                count = _pool(track, relative[h], slot_of, pool[used:], weights[used:], count)
-            _close(slot_of, pool[used:], count)
-            labels[i, 0] = glmb.tracks.labels[pool[used], 0]
-            labels[i, 1] = glmb.tracks.labels[pool[used], 1]
+            end = pool_offsets[i]
+            for m in range(low, high):
+                track = glmb.hyp_tracks[glmb.hyp_offsets[members[m]] + k]
+                end = _pool(track, relative[members[m]], slot_of, pool, weights, end)
+            for p in range(pool_offsets[i], end):
+                slot_of[pool[p]] = -1
+            labels[i, 0] = glmb.tracks.labels[pool[end - 1], 0]
+            labels[i, 1] = glmb.tracks.labels[pool[end - 1], 1]
             i += 1
-            used += count
-            pool_offsets[i] = used
+            pool_offsets[i] = end
     tracks = _pooled_tracks(
         glmb.tracks, labels, pool_offsets, pool, weights, log_min_weight, merge_distance, max_components
     )
     return Glmb(tracks, hyp_offsets, np.arange(num_tracks), hyp_log_weights)
+
+
+@kernel
+def _label_place(unique: Ints, count: int, step: int, index: int) -> int:
+    """Place of the label (step, index) among the first `count` of `unique`, which are in increasing order."""
+    low, high = 0, count
+    while low < high:
+        middle = (low + high) // 2
+        if unique[middle, 0] < step or (unique[middle, 0] == step and unique[middle, 1] < index):
+            low = middle + 1
+        else:
+            high = middle
+    return low
+
+
+@kernel
+def _increasing_labels(glmb: Glmb) -> Ints:
+    """Labels that occur in the hypotheses, once each, in increasing order."""
+    labels, count = glmb.tracks.labels, 0
+    unique, seen = np.empty((len(labels), 2), np.int64), np.zeros(len(labels), np.int64)
+    for track in glmb.hyp_tracks:
+        if seen[track] == 1:
+            continue
+        seen[track] = 1
+        step, index = labels[track, 0], labels[track, 1]
+        place = _label_place(unique, count, step, index)
+        if place < count and unique[place, 0] == step and unique[place, 1] == index:
+            continue
+        for k in range(count, place, -1):
+            unique[k, 0], unique[k, 1] = unique[k - 1, 0], unique[k - 1, 1]
+        unique[place, 0], unique[place, 1] = step, index
+        count += 1
+    return unique[:count].copy()
+
+
+@kernel
+def _log_sum_where(log_weights: Floats, mark: Ints, value: int, equal: bool) -> float:
+    """log-sum-exp over the places whose mark is `value`, or over those where it is not."""
+    peak, total = -math.inf, 0.0
+    for h in range(len(log_weights)):
+        if (mark[h] == value) == equal:
+            peak = max(peak, log_weights[h])
+    if peak == -math.inf:
+        return peak
+    for h in range(len(log_weights)):
+        if (mark[h] == value) == equal:
+            total += math.exp(log_weights[h] - peak)
+    return peak + math.log(total)
+
+
+@kernel
+def glmb_to_lmb(glmb: Glmb, log_min_weight: float, merge_distance: float, max_components: int) -> Lmb:
+    """LMB of the same existence probabilities and, up to the reduction of mixtures, the same track densities.
+
+    Reuter, Vo, Vo and Dietmayer 2014, "The labeled multi-Bernoulli filter", eq. 43-45. The logit of existence is the
+    difference of the log weights with and without the label, so that nothing is lost near existence 1. A label all of
+    whose hypotheses have weight zero keeps logit -inf and the plain mean of its tracks. The limits are those of
+    `kernels.mixtures.reduce_mixture`.
+    """
+    labels, num_entries = _increasing_labels(glmb), len(glmb.hyp_tracks)
+    num_labels, log_weights = len(labels), glmb.hyp_log_weights
+    hyp_of, label_of = np.empty(num_entries, np.int64), np.empty(num_entries, np.int64)
+    for h in range(len(log_weights)):
+        for e in range(glmb.hyp_offsets[h], glmb.hyp_offsets[h + 1]):
+            track = glmb.hyp_tracks[e]
+            hyp_of[e] = h
+            label_of[e] = _label_place(labels, num_labels, glmb.tracks.labels[track, 0], glmb.tracks.labels[track, 1])
+    entry_offsets, entries = _members(label_of, num_labels)
+    pool_offsets, existence_logit = np.zeros(num_labels + 1, np.int64), np.empty(num_labels)
+    pool, weights = np.empty(num_entries, np.int64), np.empty(num_entries)
+    slot_of, mark = np.full(len(glmb.tracks.labels), -1, np.int64), np.full(len(log_weights), -1, np.int64)
+    for i in range(num_labels):
+        low, high, end = entry_offsets[i], entry_offsets[i + 1], pool_offsets[i]
+        for m in range(low, high):
+            mark[hyp_of[entries[m]]] = i
+        log_with = _log_sum_where(log_weights, mark, i, True)
+        existence_logit[i] = log_with - _log_sum_where(log_weights, mark, i, False)
+        for m in range(low, high):
+            relative = 0.0 if log_with == -math.inf else math.exp(log_weights[hyp_of[entries[m]]] - log_with)
+            end = _pool(glmb.hyp_tracks[entries[m]], relative, slot_of, pool, weights, end)
+        for p in range(pool_offsets[i], end):
+            slot_of[pool[p]] = -1
+        pool_offsets[i + 1] = end
+    tracks = _pooled_tracks(
+        glmb.tracks, labels, pool_offsets, pool, weights, log_min_weight, merge_distance, max_components
+    )
+    return Lmb(tracks, existence_logit)
+
+
+@kernel
+def lmb_to_glmb(lmb: Lmb, max_hyps: int) -> tuple[Glmb, float]:
+    """GLMB of the `max_hyps` most probable label subsets of an LMB, by descending weight, and the weight left out.
+
+    The GLMB shares the LMB's track table; its weights are normalised. Subsets of weight zero are never listed, so with
+    a large `max_hyps` all the others are there and the weight left out is zero. Equal weights come in the order in which
+    the search finds them, which is the same every time.
+    """
+    num = len(lmb.existence_logit)
+    costs, base = np.empty(num), 0.0
+    for i in range(num):
+        costs[i] = abs(lmb.existence_logit[i])
+        base -= math.log1p(math.exp(-costs[i]))
+    flips, previous, order, complete = smallest_sums(costs, max_hyps)
+    num_hyps = len(order)
+    hyp_offsets, hyp_log_weights = np.zeros(num_hyps + 1, np.int64), np.empty(num_hyps)
+    hyp_tracks, flipped = np.empty(num_hyps * num, np.int64), np.zeros(num, np.int64)
+    end = 0
+    for h in range(num_hyps):
+        hyp_log_weights[h] = base
+        node = order[h]
+        while node > 0:
+            flipped[flips[node]] = h + 1
+            hyp_log_weights[h] -= costs[flips[node]]
+            node = previous[node]
+        for i in range(num):
+            if (lmb.existence_logit[i] > 0.0) != (flipped[i] == h + 1):
+                hyp_tracks[end] = i
+                end += 1
+        hyp_offsets[h + 1] = end
+    log_kept = log_sum(hyp_log_weights)
+    for h in range(num_hyps):
+        hyp_log_weights[h] -= log_kept
+    discarded = 0.0 if complete else max(0.0, -math.expm1(log_kept))
+    return Glmb(lmb.tracks, hyp_offsets, hyp_tracks[:end].copy(), hyp_log_weights), discarded
+
+
+__all__ = ["glmb_to_lmb", "group_by_label_set", "lmb_to_glmb", "marginalise"]

@@ -75,24 +75,21 @@ def match_components(
     total = 0.0
     for c in range(count):
         total += weights[c]
-    scale = 1.0 / total if total > 0.0 else 1.0 / count
+    equal = 0.0 if total > 0.0 else 1.0
+    scale = 1.0 / (total + equal * count)
     for i in range(n):
-        out_mean[i] = 0.0
+        first_moment = 0.0
+        for c in range(count):
+            first_moment += (weights[c] + equal) * means[components[c], i]
+        out_mean[i] = scale * first_moment
+    for i in range(n):
         for j in range(i + 1):
-            out_cov[i, j] = 0.0
-    for c in range(count):
-        share = scale * weights[c] if total > 0.0 else scale
-        for i in range(n):
-            out_mean[i] += share * means[components[c], i]
-    for c in range(count):
-        share = scale * weights[c] if total > 0.0 else scale
-        item = components[c]
-        for i in range(n):
-            weighted = share * (means[item, i] - out_mean[i])
-            for j in range(i + 1):
-                out_cov[i, j] += share * covs[item, i, j] + weighted * (means[item, j] - out_mean[j])
-    for i in range(n):
-        for j in range(i):
+            second_moment = 0.0
+            for c in range(count):
+                item = components[c]
+                spread = (means[item, i] - out_mean[i]) * (means[item, j] - out_mean[j])
+                second_moment += (weights[c] + equal) * (covs[item, i, j] + spread)
+            out_cov[i, j] = scale * second_moment
             out_cov[j, i] = out_cov[i, j]
 
 
@@ -115,9 +112,7 @@ def moment_match(log_weights: Floats, means: Floats, covs: Floats, out_mean: Flo
 
 
 @kernel
-def _near(
-    heaviest: int, log_weights: Floats, means: Floats, covs: Floats, merge_distance: float, out: Ints
-) -> int:
+def _near(heaviest: int, log_weights: Floats, means: Floats, covs: Floats, merge_distance: float, out: Ints) -> int:
     """Components (-> out, `heaviest` first) still in play within `merge_distance` of `heaviest`; their number."""
     n = means.shape[1]
     factor, difference = np.empty((n, n)), np.empty(n)
