@@ -1,0 +1,98 @@
+"""Checks of plain arguments, each raising `InputError` with the field, what was expected and what came."""
+
+from __future__ import annotations
+
+import math
+import numbers
+from typing import Any
+
+import numpy as np
+
+from vedette.errors import InputError
+from vedette.kernels.types import Floats
+
+
+def reject(field: str, expected: str, got: Any) -> InputError:
+    """The error for one bad argument; a long value is cut short."""
+    text = got if isinstance(got, str) else repr(got)
+    return InputError(f"{field}: expected {expected}; got {text if len(text) <= 200 else text[:197] + '...'}")
+
+
+def real(field: str, value: Any) -> float:
+    """A finite real number."""
+    if isinstance(value, bool) or not isinstance(value, numbers.Real) or not math.isfinite(value):
+        raise reject(field, "a finite number", value)
+    return float(value)
+
+
+def positive(field: str, value: Any) -> float:
+    """A finite number above zero."""
+    if real(field, value) <= 0.0:
+        raise reject(field, "a number above 0", value)
+    return float(value)
+
+
+def non_negative(field: str, value: Any) -> float:
+    """A finite number of at least zero."""
+    if real(field, value) < 0.0:
+        raise reject(field, "a number of at least 0", value)
+    return float(value)
+
+
+def probability(field: str, value: Any) -> float:
+    """A number in [0, 1]."""
+    if not 0.0 <= real(field, value) <= 1.0:
+        raise reject(field, "a probability in [0, 1]", value)
+    return float(value)
+
+
+def dimension(field: str, value: Any) -> int:
+    """A whole number of at least one."""
+    if isinstance(value, bool) or not isinstance(value, numbers.Integral) or value < 1:
+        raise reject(field, "a whole number of at least 1", value)
+    return int(value)
+
+
+def float_array(field: str, values: Any, shape: tuple[int | None, ...], *, finite: bool = True) -> Floats:
+    """A C-contiguous, writeable float64 copy of `values` with the given shape (None: any length).
+
+    NaN is never accepted; infinities only where `finite` is false.
+    """
+    wanted = str(tuple("any" if length is None else length for length in shape)).replace("'any'", "any")
+    try:
+        array = np.array(values, dtype=np.float64, order="C")
+    except (TypeError, ValueError):
+        raise reject(field, f"numbers in an array of shape {wanted}", values) from None
+    if array.ndim != len(shape) or any(n is not None and n != m for n, m in zip(shape, array.shape, strict=True)):
+        raise reject(field, f"an array of shape {wanted}", f"shape {array.shape}")
+    if not (np.isfinite(array).all() if finite else not np.isnan(array).any()):
+        raise reject(field, "finite numbers" if finite else "numbers that are not NaN", values)
+    return array
+
+
+def params_vector(field: str, values: Any) -> Floats:
+    """A parameter vector of a model function: any length, infinities allowed."""
+    return float_array(field, values, (None,), finite=False)
+
+
+def pose_vector(field: str, values: Any) -> Floats:
+    """A sensor pose [px, py, heading_rad]."""
+    return float_array(field, values, (3,))
+
+
+def state_table(field: str, values: Any, state_dim: int | None = None) -> Floats:
+    """(n, state_dim) states; one state may stand alone as a vector."""
+    array = np.asarray(values)
+    if array.ndim == 1 and array.size:
+        return float_array(field, array[np.newaxis], (1, state_dim))
+    return float_array(field, values, (None, state_dim))
+
+
+def positive_definite(field: str, matrix: Floats) -> None:
+    """Raise unless `matrix` is symmetric positive definite."""
+    if not np.allclose(matrix, matrix.T, rtol=1e-9, atol=0.0):
+        raise reject(field, "a symmetric matrix", matrix.tolist())
+    try:
+        np.linalg.cholesky(matrix)
+    except np.linalg.LinAlgError:
+        raise reject(field, "a positive definite matrix", matrix.tolist()) from None

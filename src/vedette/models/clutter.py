@@ -1,0 +1,171 @@
+"""Poisson clutter: the model, and clutter that is uniform in the sensor's measurement space."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from vedette.errors import InputError, ModelError
+from vedette.kernels.types import Bools, Floats
+from vedette.models.arguments import dimension, float_array, non_negative, params_vector, pose_vector, reject
+from vedette.models.functions import ModelFunction, call, describe, model_function, require_kind
+from vedette.models.measurement import MeasurementModel, angular_flags
+from vedette.models.probe import probe_log_intensity
+
+# Scans of clutter that a check draws and looks up in the intensity.
+_NUM_TRIAL_SCANS = 8
+
+
+class ClutterSampler(Protocol):
+    """Draws one scan of clutter, its Poisson number included; a plain Python function or object, not compiled."""
+
+    def __call__(
+        self, pose: Floats, measurement: MeasurementModel, *, state_dim: int, rng: np.random.Generator
+    ) -> Floats:
+        """(n, meas_dim) clutter measurements of a sensor at `pose`. `state_dim`: length of the states it observes."""
+        ...
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ClutterModel:
+    """Poisson clutter of a sensor (paper: lambda_c and kappa).
+
+    Attributes:
+        rate: expected number of clutter measurements a scan.
+        log_intensity: model function of kind `log_clutter_intensity`; it integrates to `rate` over measurement space.
+        params: its parameter vector.
+        sampler: draws a scan of clutter, see `ClutterSampler`; None where no scan is ever to be simulated.
+        meas_dim: number of measurement components that it serves; None: not known.
+        angular: which of them are angles; None: not known.
+    """
+
+    rate: float
+    log_intensity: ModelFunction
+    params: Floats = field(default_factory=lambda: np.empty(0))
+    sampler: ClutterSampler | None = None
+    meas_dim: int | None = None
+    angular: Bools | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "rate", non_negative("ClutterModel.rate", self.rate))
+        require_kind("ClutterModel.log_intensity", self.log_intensity, "log_clutter_intensity")
+        object.__setattr__(self, "params", params_vector("ClutterModel.params", self.params))
+        if self.sampler is not None and not callable(self.sampler):
+            raise reject("ClutterModel.sampler", "a function or None", self.sampler)
+        if self.meas_dim is not None:
+            dimension("ClutterModel.meas_dim", self.meas_dim)
+        if self.angular is not None:
+            size = len(self.angular) if self.meas_dim is None else self.meas_dim
+            object.__setattr__(self, "angular", angular_flags("ClutterModel.angular", self.angular, size))
+            object.__setattr__(self, "meas_dim", size)
+
+    def log_intensity_at(self, measurements: ArrayLike, pose: ArrayLike) -> Floats:
+        """(n,) log intensities at (n, meas_dim) measurements."""
+        table, at = float_array("measurements", measurements, (None, self.meas_dim)), pose_vector("pose", pose)
+        return np.array([call(self.log_intensity, row, at, self.params) for row in table], dtype=np.float64)
+
+    def sample(
+        self, pose: ArrayLike, measurement: MeasurementModel, *, state_dim: int, rng: np.random.Generator
+    ) -> Floats:
+        """(n, meas_dim) clutter of one scan.
+
+        Raises:
+            InputError: this model has no sampler.
+            ModelError: the sampler raised, or gave something else than finite (n, meas_dim) measurements.
+        """
+        if self.sampler is None:
+            raise reject("ClutterModel.sampler", "a sampler, to simulate a scan", None)
+        at = pose_vector("pose", pose)
+        try:
+            drawn = self.sampler(at, measurement, state_dim=state_dim, rng=rng)
+        except (ModelError, InputError):
+            raise
+        except Exception as error:
+            raise ModelError(f"clutter sampler at pose {at}: raised {type(error).__name__}: {error}") from error
+        try:
+            return float_array("clutter sampler", drawn, (None, measurement.meas_dim))
+        except InputError as error:
+            raise ModelError(f"{error}, at pose {at}") from None
+
+    def check(self, measurements: ArrayLike, pose: ArrayLike, measurement: MeasurementModel, *, state_dim: int) -> None:
+        """Try the log intensity at each measurement and, where there is a sampler, at points that it draws.
+
+        Raises:
+            ModelError: not a log intensity, or clutter drawn where the intensity says that there is none.
+        """
+        at = pose_vector("pose", pose)
+        for row in float_array("measurements", measurements, (None, measurement.meas_dim)):
+            probe_log_intensity(self.log_intensity, (row, at, self.params))
+        if self.sampler is None:
+            return
+        rng = np.random.default_rng(0)
+        for _ in range(_NUM_TRIAL_SCANS):
+            for row in self.sample(at, measurement, state_dim=state_dim, rng=rng):
+                if probe_log_intensity(self.log_intensity, (row, at, self.params)) == -math.inf:
+                    where = describe(self.log_intensity, row, at)
+                    raise ModelError(f"{where}: expected a finite value, as the sampler drew clutter there; got -inf")
+
+
+@model_function("log_clutter_intensity")
+def _box(measurement: Floats, pose: Floats, params: Floats) -> float:
+    dim = measurement.shape[0]
+    for i in range(dim):
+        low, width, period = params[1 + i], params[1 + dim + i], params[1 + 2 * dim + i]
+        offset = measurement[i] - low
+        if period > 0.0:
+            offset -= period * math.floor(offset / period)
+        if not 0.0 <= offset <= width:
+            return -math.inf
+    return params[0]  # type: ignore[no-any-return]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _BoxSampler:
+    rate: float
+    low: Floats
+    high: Floats
+
+    def __call__(
+        self, pose: Floats, measurement: MeasurementModel, *, state_dim: int, rng: np.random.Generator
+    ) -> Floats:
+        num = int(rng.poisson(self.rate))
+        drawn = rng.uniform(self.low, self.high, size=(num, len(self.low)))
+        if measurement.meas_dim == len(self.low):
+            wrapped = math.pi - np.remainder(math.pi - drawn, 2.0 * math.pi)
+            drawn = np.where(measurement.angular & (np.abs(drawn) > math.pi), wrapped, drawn)
+        return drawn
+
+
+def log_or_minus_infinity(value: float) -> float:
+    """log(value), -inf at zero."""
+    return math.log(value) if value > 0.0 else -math.inf
+
+
+def measurement_space_clutter(
+    rate: float, low: ArrayLike, high: ArrayLike, *, angular: Sequence[bool] | Bools | None = None
+) -> ClutterModel:
+    """Clutter uniform over the box low <= z <= high of measurement space: intensity rate / volume inside, 0 outside.
+
+    Args:
+        rate: expected number a scan.
+        low, high: (meas_dim,) bounds, in the unit of each component.
+        angular: (meas_dim,) which components are angles. Their bounds may then lie anywhere on the circle, such as
+            0 to 2 pi; without it, bounds of an angle must lie in [-pi, pi], where measured angles are.
+    """
+    rate = non_negative("rate", rate)
+    lows = float_array("low", low, (None,))
+    highs = float_array("high", high, (len(lows),))
+    if len(lows) == 0 or (highs <= lows).any():
+        raise reject("high", f"numbers above low = {lows.tolist()}", highs.tolist())
+    flags = None if angular is None else angular_flags("angular", angular, len(lows))
+    periods = np.zeros(len(lows)) if flags is None else np.where(flags, 2.0 * math.pi, 0.0)
+    widths = highs - lows
+    if flags is not None and (widths[flags] > 2.0 * math.pi * (1.0 + 1e-12)).any():
+        raise reject("high", "at most 2 pi above low for an angle", highs.tolist())
+    params = np.concatenate([[log_or_minus_infinity(rate / float(np.prod(widths)))], lows, widths, periods])
+    return ClutterModel(rate, _box, params, _BoxSampler(rate, lows, highs), len(lows), flags)

@@ -1,0 +1,84 @@
+"""Model functions: the decorator that compiles a plain Python function, and how it is called from Python.
+
+A model function sees one state at a time and writes its result into the last argument, `out`, or returns a number.
+`out` comes with arbitrary contents: **every** entry must be written, zeros too.
+
+| kind | arguments | result |
+|---|---|---|
+| `transition` | state, dt, params, out | out: (state_dim,) state after `dt` seconds, without noise |
+| `transition_jacobian` | state, dt, params, out | out: (state_dim, state_dim) derivative of the transition |
+| `process_noise_cov` | state, dt, params, out | out: (state_dim, state_dim) symmetric, positive semidefinite |
+| `prob_survival` | state, dt, params | probability in [0, 1] of living through `dt` seconds |
+| `measurement` | state, pose, params, out | out: (meas_dim,) measurement without noise |
+| `measurement_jacobian` | state, pose, params, out | out: (meas_dim, state_dim) derivative of the measurement |
+| `measurement_noise_cov` | state, pose, params, out | out: (meas_dim, meas_dim) symmetric, positive definite |
+| `prob_detection` | state, pose, params | probability in [0, 1] |
+| `log_clutter_intensity` | measurement, pose, params | log of the expected clutter per unit of measurement space |
+
+`state[0:2]` is always the position in metres; `pose` is [px, py, heading_rad]; `params` is the model's own vector.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from typing import Any
+
+from vedette.errors import InputError, ModelError
+from vedette.kernels.compile import SIGNATURES, check_arguments, compile_model_function
+from vedette.models.arguments import reject
+
+ModelFunction = Callable[..., Any]
+
+
+def model_function(kind: str) -> Callable[[Callable[..., Any]], ModelFunction]:
+    """Decorator that compiles a plain Python function as a model function of `kind` (table above).
+
+    The function may use `math`, indexing, loops and other compiled functions; what Numba compiles, it may do.
+
+    Raises:
+        InputError: the kind is unknown, this is not a plain function, or its number of arguments is wrong.
+        ModelError: the body cannot be compiled; the message says where.
+    """
+    if kind not in SIGNATURES:
+        raise reject("model function kind", f"one of {', '.join(SIGNATURES)}", kind)
+
+    def decorate(function: Callable[..., Any]) -> ModelFunction:
+        if not inspect.isfunction(function) or hasattr(function, "kind"):
+            raise reject(f"{kind} function", "a plain Python function", function)
+        try:
+            check_arguments(function, kind)
+        except TypeError as error:
+            raise InputError(str(error)) from None
+        try:
+            compiled: ModelFunction = compile_model_function(function, kind)
+        except TypeError as error:
+            raise ModelError(str(error)) from error
+        return compiled
+
+    return decorate
+
+
+def require_kind(field: str, function: Any, kind: str) -> None:
+    """Raise `InputError` unless `function` was made by `@model_function(kind)`."""
+    got = getattr(function, "kind", None)
+    if got == kind and callable(function):
+        return
+    came = repr(function) if got is None else f"a function of kind {got!r}"
+    raise reject(field, f"a function decorated with @model_function({kind!r})", came)
+
+
+def describe(function: ModelFunction, *args: Any) -> str:
+    """Name, kind and arguments of a call, for messages."""
+    kind = str(getattr(function, "kind", "model"))
+    named = zip(SIGNATURES[kind][0], args, strict=False)
+    given = ", ".join(f"{name} {value}" for name, value in named if name not in ("params", "out"))
+    return f"{kind} function {getattr(function, '__name__', '?')!r} at {given}"
+
+
+def call(function: ModelFunction, *args: Any) -> Any:
+    """Call a model function; whatever it raises comes out as `ModelError` with the function and its arguments named."""
+    try:
+        return function(*args)
+    except Exception as error:
+        raise ModelError(f"{describe(function, *args)}: raised {type(error).__name__}: {error}") from error

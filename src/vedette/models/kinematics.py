@@ -1,0 +1,156 @@
+"""Built-in motions: nearly constant velocity and the coordinated turn, for any time step.
+
+States: [px, py, vx, vy] (the order of the paper's F and Q; paper-notes row 1), with a turn rate in rad/s, positive to
+the left, appended for the coordinated turn.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from vedette.kernels.compile import kernel
+from vedette.kernels.types import Floats
+from vedette.models.arguments import non_negative
+from vedette.models.functions import model_function
+from vedette.models.motion import MotionModel
+
+# Below this turned angle the derivatives use their series: the closed forms lose digits as 1e-16 / angle^2.
+_SERIES_ANGLE = 0.1
+
+
+@kernel
+def _acceleration_cov(dt: float, sigma_v: float, out: Floats) -> None:
+    """Covariance of positions and velocities under an acceleration that is constant within the step; zero elsewhere."""
+    variance = sigma_v * sigma_v
+    for i in range(out.shape[0]):
+        for j in range(out.shape[1]):
+            out[i, j] = 0.0
+    for axis in range(2):
+        out[axis, axis] = 0.25 * dt**4 * variance
+        out[axis, axis + 2] = 0.5 * dt**3 * variance
+        out[axis + 2, axis] = out[axis, axis + 2]
+        out[axis + 2, axis + 2] = dt**2 * variance
+
+
+@kernel
+def _identity(out: Floats) -> None:
+    for i in range(out.shape[0]):
+        for j in range(out.shape[1]):
+            out[i, j] = 1.0 if i == j else 0.0
+
+
+@model_function("transition")
+def _cv_transition(state: Floats, dt: float, params: Floats, out: Floats) -> None:
+    out[0] = state[0] + dt * state[2]
+    out[1] = state[1] + dt * state[3]
+    out[2] = state[2]
+    out[3] = state[3]
+
+
+@model_function("transition_jacobian")
+def _cv_jacobian(state: Floats, dt: float, params: Floats, out: Floats) -> None:
+    _identity(out)
+    out[0, 2] = dt
+    out[1, 3] = dt
+
+
+@model_function("process_noise_cov")
+def _cv_noise(state: Floats, dt: float, params: Floats, out: Floats) -> None:
+    _acceleration_cov(dt, params[0], out)
+
+
+def constant_velocity(sigma_v: float, *, method: str = "auto") -> MotionModel:
+    """Constant velocity with white acceleration that is constant within a step (paper section IV, F_k and Q_k).
+
+    Args:
+        sigma_v: standard deviation of the acceleration, m/s^2 (paper: 5).
+        method: Gaussian method, see `MotionModel`.
+    """
+    params = np.array([non_negative("sigma_v", sigma_v)])
+    return MotionModel(4, _cv_transition, _cv_noise, np.empty(0), params, _cv_jacobian, method)
+
+
+@kernel
+def _along(angle: float) -> float:
+    """sin(a) / a."""
+    return math.sin(angle) / angle if angle != 0.0 else 1.0
+
+
+@kernel
+def _across(angle: float) -> float:
+    """(1 - cos(a)) / a, without the cancellation."""
+    half = _along(0.5 * angle)
+    return 0.5 * angle * half * half
+
+
+@kernel
+def _along_slope(angle: float) -> float:
+    """Derivative of sin(a) / a."""
+    if abs(angle) > _SERIES_ANGLE:
+        return (math.cos(angle) - math.sin(angle) / angle) / angle
+    square = angle * angle
+    return angle * (-1.0 / 3.0 + square * (1.0 / 30.0 + square * (-1.0 / 840.0 + square / 45360.0)))
+
+
+@kernel
+def _across_slope(angle: float) -> float:
+    """Derivative of (1 - cos(a)) / a."""
+    if abs(angle) > _SERIES_ANGLE:
+        return (angle * math.sin(angle) - 1.0 + math.cos(angle)) / (angle * angle)
+    square = angle * angle
+    return 0.5 + square * (-1.0 / 8.0 + square * (1.0 / 144.0 - square / 5760.0))
+
+
+@model_function("transition")
+def _ct_transition(state: Floats, dt: float, params: Floats, out: Floats) -> None:
+    angle = state[4] * dt
+    sine, cosine = math.sin(angle), math.cos(angle)
+    along, across = dt * _along(angle), dt * _across(angle)
+    out[0] = state[0] + along * state[2] - across * state[3]
+    out[1] = state[1] + across * state[2] + along * state[3]
+    out[2] = cosine * state[2] - sine * state[3]
+    out[3] = sine * state[2] + cosine * state[3]
+    out[4] = state[4]
+
+
+@model_function("transition_jacobian")
+def _ct_jacobian(state: Floats, dt: float, params: Floats, out: Floats) -> None:
+    angle = state[4] * dt
+    sine, cosine = math.sin(angle), math.cos(angle)
+    along, across = dt * _along(angle), dt * _across(angle)
+    along_rate, across_rate = dt * dt * _along_slope(angle), dt * dt * _across_slope(angle)
+    _identity(out)
+    out[0, 2] = along
+    out[0, 3] = -across
+    out[0, 4] = along_rate * state[2] - across_rate * state[3]
+    out[1, 2] = across
+    out[1, 3] = along
+    out[1, 4] = across_rate * state[2] + along_rate * state[3]
+    out[2, 2] = cosine
+    out[2, 3] = -sine
+    out[2, 4] = -dt * (sine * state[2] + cosine * state[3])
+    out[3, 2] = sine
+    out[3, 3] = cosine
+    out[3, 4] = dt * (cosine * state[2] - sine * state[3])
+
+
+@model_function("process_noise_cov")
+def _ct_noise(state: Floats, dt: float, params: Floats, out: Floats) -> None:
+    _acceleration_cov(dt, params[0], out)
+    out[4, 4] = (dt * params[1]) ** 2
+
+
+def coordinated_turn(sigma_v: float, sigma_turn_rate: float, *, method: str = "auto") -> MotionModel:
+    """Exact turn at a rate that is constant within a step.
+
+    Noise B B' with B = blkdiag([dt^2/2; dt] sigma_v, the same for the other axis, dt sigma_turn_rate).
+
+    Args:
+        sigma_v: standard deviation of the acceleration on each axis, m/s^2.
+        sigma_turn_rate: standard deviation of the turn acceleration, rad/s^2.
+        method: Gaussian method, see `MotionModel`.
+    """
+    params = np.array([non_negative("sigma_v", sigma_v), non_negative("sigma_turn_rate", sigma_turn_rate)])
+    return MotionModel(5, _ct_transition, _ct_noise, np.empty(0), params, _ct_jacobian, method)

@@ -1,0 +1,111 @@
+"""Measurement and noise models: what a sensor at a pose reports of a target."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from vedette.kernels.types import Bools, Floats
+from vedette.models.arguments import dimension, params_vector, pose_vector, reject, state_table
+from vedette.models.functions import ModelFunction, call, require_kind
+from vedette.models.probe import probe_array, probe_covariance, probe_jacobian
+
+
+def angular_flags(name: str, angular: Sequence[bool] | Bools, meas_dim: int) -> Bools:
+    """(meas_dim,) flags of the components that are angles; empty means that none is."""
+    flags = np.array(angular)
+    if flags.size == 0:
+        return np.zeros(meas_dim, np.bool_)
+    if flags.dtype != np.bool_ or flags.shape != (meas_dim,):
+        raise reject(name, f"{meas_dim} booleans, one a measurement component", angular)
+    return flags
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MeasurementModel:
+    """Noise-free measurement of a target's state from a sensor's pose.
+
+    Attributes:
+        meas_dim: number of components of a measurement.
+        function: model function of kind `measurement`.
+        params: its parameter vector; anything array-like is converted.
+        jacobian: model function of kind `measurement_jacobian` (same parameters), or None: sigma points are used.
+        angular: one boolean a component, true where it is an angle in radians; () means none. Residuals of angles are
+            wrapped to (-pi, pi].
+
+    Raises:
+        InputError: a function of another kind, a bad dimension or parameter, a wrong number of angular flags.
+    """
+
+    meas_dim: int
+    function: ModelFunction
+    params: Floats = field(default_factory=lambda: np.empty(0))
+    jacobian: ModelFunction | None = None
+    angular: Bools = field(default_factory=lambda: np.empty(0, np.bool_))
+
+    def __post_init__(self) -> None:
+        dimension("MeasurementModel.meas_dim", self.meas_dim)
+        require_kind("MeasurementModel.function", self.function, "measurement")
+        if self.jacobian is not None:
+            require_kind("MeasurementModel.jacobian", self.jacobian, "measurement_jacobian")
+        object.__setattr__(self, "params", params_vector("MeasurementModel.params", self.params))
+        object.__setattr__(self, "angular", angular_flags("MeasurementModel.angular", self.angular, self.meas_dim))
+
+    def measure(self, states: ArrayLike, pose: ArrayLike) -> Floats:
+        """(n, meas_dim) noise-free measurements of (n, state_dim) states.
+
+        Raises:
+            ModelError: the function raised.
+        """
+        table, at = state_table("states", states), pose_vector("pose", pose)
+        out = np.empty((len(table), self.meas_dim))
+        for state, measurement in zip(table, out, strict=True):
+            call(self.function, state, at, self.params, measurement)
+        return out
+
+    def check(self, states: ArrayLike, pose: ArrayLike) -> None:
+        """Try the functions at each state; `ModelError` names the function, the state, the expected and the actual."""
+        at = pose_vector("pose", pose)
+        for state in state_table("states", states):
+            args = (state, at, self.params)
+            probe_array(self.function, args, (self.meas_dim,))
+            if self.jacobian is not None:
+                probe_jacobian(self.jacobian, self.function, args, (self.meas_dim, len(state)), self.angular)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class NoiseModel:
+    """Covariance of the additive Gaussian measurement noise as a function of state and pose (paper: R_k(x_k, u_k)).
+
+    Attributes:
+        function: model function of kind `measurement_noise_cov`.
+        params: its parameter vector.
+        meas_dim: number of measurement components that it serves; None: any, or not known.
+    """
+
+    function: ModelFunction
+    params: Floats = field(default_factory=lambda: np.empty(0))
+    meas_dim: int | None = None
+
+    def __post_init__(self) -> None:
+        require_kind("NoiseModel.function", self.function, "measurement_noise_cov")
+        object.__setattr__(self, "params", params_vector("NoiseModel.params", self.params))
+        if self.meas_dim is not None:
+            dimension("NoiseModel.meas_dim", self.meas_dim)
+
+    def covs(self, states: ArrayLike, pose: ArrayLike, meas_dim: int) -> Floats:
+        """(n, meas_dim, meas_dim) noise covariances at (n, state_dim) states."""
+        table, at = state_table("states", states), pose_vector("pose", pose)
+        out = np.empty((len(table), meas_dim, meas_dim))
+        for state, cov in zip(table, out, strict=True):
+            call(self.function, state, at, self.params, cov)
+        return out
+
+    def check(self, states: ArrayLike, pose: ArrayLike, meas_dim: int) -> None:
+        """Try the function at each state; `ModelError` unless it gives a positive definite covariance."""
+        at = pose_vector("pose", pose)
+        for state in state_table("states", states):
+            probe_covariance(self.function, (state, at, self.params), meas_dim, definite=True)

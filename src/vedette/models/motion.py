@@ -1,0 +1,158 @@
+"""Motion and survival models: how a target moves, and whether it goes on living."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from vedette.kernels.gaussian import CUBATURE, LINEARISED, UNSCENTED
+from vedette.kernels.types import Floats, Motion
+from vedette.models.arguments import dimension, params_vector, positive, probability, reject, state_table
+from vedette.models.functions import ModelFunction, call, model_function, require_kind
+from vedette.models.probe import probe_array, probe_covariance, probe_jacobian, probe_probability
+
+METHODS = {"ekf": LINEARISED, "ukf": UNSCENTED, "ckf": CUBATURE}
+
+
+def resolve_method(name: str, method: str, has_jacobian: bool) -> int:
+    """The kernel's number of a Gaussian method; "auto" is the EKF where there is a Jacobian, else the UKF.
+
+    Raises:
+        InputError: unknown method, or "ekf" without a Jacobian.
+    """
+    if method == "auto":
+        return LINEARISED if has_jacobian else UNSCENTED
+    if method not in METHODS:
+        raise reject(name, f"one of auto, {', '.join(METHODS)}", method)
+    if method == "ekf" and not has_jacobian:
+        raise reject(name, "auto, ukf or ckf, as no Jacobian is given", method)
+    return METHODS[method]
+
+
+@model_function("transition_jacobian")
+def _no_transition_jacobian(state: Floats, dt: float, params: Floats, out: Floats) -> None:
+    """Fills the place of a missing Jacobian in a kernel bundle whose method never asks for one."""
+    raise NotImplementedError("this motion model has no Jacobian")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MotionModel:
+    """Markov motion of one target over any time step (paper: the transition density f(x_k | x_k-1)).
+
+    Attributes:
+        state_dim: length of the state; state[0:2] is the position in metres.
+        transition: model function of kind `transition`.
+        process_noise_cov: model function of kind `process_noise_cov`.
+        transition_params, noise_params: parameter vectors of the two functions; anything array-like is converted.
+        transition_jacobian: model function of kind `transition_jacobian`, or None.
+        method: "auto" (EKF if there is a Jacobian, else UKF), "ekf", "ukf" or "ckf".
+
+    Raises:
+        InputError: a function of another kind, a bad dimension or parameter, "ekf" without a Jacobian.
+    """
+
+    state_dim: int
+    transition: ModelFunction
+    process_noise_cov: ModelFunction
+    transition_params: Floats = field(default_factory=lambda: np.empty(0))
+    noise_params: Floats = field(default_factory=lambda: np.empty(0))
+    transition_jacobian: ModelFunction | None = None
+    method: str = "auto"
+
+    def __post_init__(self) -> None:
+        dimension("MotionModel.state_dim", self.state_dim)
+        require_kind("MotionModel.transition", self.transition, "transition")
+        require_kind("MotionModel.process_noise_cov", self.process_noise_cov, "process_noise_cov")
+        if self.transition_jacobian is not None:
+            require_kind("MotionModel.transition_jacobian", self.transition_jacobian, "transition_jacobian")
+        for name in ("transition_params", "noise_params"):
+            object.__setattr__(self, name, params_vector(f"MotionModel.{name}", getattr(self, name)))
+        resolve_method("MotionModel.method", self.method, self.transition_jacobian is not None)
+
+    def propagate(self, states: ArrayLike, dt: float) -> Floats:
+        """(n, state_dim) states after `dt` seconds without process noise; one state may be given as a vector.
+
+        Raises:
+            ModelError: the transition function raised.
+        """
+        table = state_table("states", states, self.state_dim)
+        out = np.empty_like(table)
+        for state, moved in zip(table, out, strict=True):
+            call(self.transition, state, float(dt), self.transition_params, moved)
+        return out
+
+    def noise_cov(self, state: ArrayLike, dt: float) -> Floats:
+        """(state_dim, state_dim) process noise covariance over `dt` seconds from `state`."""
+        out = np.empty((self.state_dim, self.state_dim))
+        call(self.process_noise_cov, state_table("state", state, self.state_dim)[0], float(dt), self.noise_params, out)
+        return out
+
+    def check(self, states: ArrayLike, dt: float = 1.0) -> None:
+        """Try every function at each state.
+
+        Raises:
+            ModelError: names the function, the state, what was expected and what came.
+        """
+        dt = positive("dt", dt)
+        shape = (self.state_dim, self.state_dim)
+        for state in state_table("states", states, self.state_dim):
+            args = (state, dt, self.transition_params)
+            probe_array(self.transition, args, (self.state_dim,))
+            probe_covariance(self.process_noise_cov, (state, dt, self.noise_params), self.state_dim, definite=False)
+            if self.transition_jacobian is not None:
+                probe_jacobian(self.transition_jacobian, self.transition, args, shape, False)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SurvivalModel:
+    """Probability that a target lives through a time step.
+
+    Attributes:
+        function: model function of kind `prob_survival`.
+        params: its parameter vector.
+    """
+
+    function: ModelFunction
+    params: Floats = field(default_factory=lambda: np.empty(0))
+
+    def __post_init__(self) -> None:
+        require_kind("SurvivalModel.function", self.function, "prob_survival")
+        object.__setattr__(self, "params", params_vector("SurvivalModel.params", self.params))
+
+    def prob(self, states: ArrayLike, dt: float) -> Floats:
+        """(n,) survival probabilities over `dt` seconds."""
+        table = state_table("states", states)
+        return np.array([call(self.function, state, float(dt), self.params) for state in table])
+
+    def check(self, states: ArrayLike, dt: float = 1.0) -> None:
+        """Try the function at each state; `ModelError` unless it gives a probability."""
+        dt = positive("dt", dt)
+        for state in state_table("states", states):
+            probe_probability(self.function, (state, dt, self.params))
+
+
+def kernel_motion(motion: MotionModel, survival: SurvivalModel) -> Motion:
+    """The bundle of functions and parameters that prediction kernels take."""
+    jacobian = motion.transition_jacobian
+    return Motion(
+        motion.transition,
+        _no_transition_jacobian if jacobian is None else jacobian,
+        motion.process_noise_cov,
+        survival.function,
+        motion.transition_params,
+        motion.noise_params,
+        survival.params,
+        resolve_method("MotionModel.method", motion.method, jacobian is not None),
+    )
+
+
+@model_function("prob_survival")
+def _constant_survival(state: Floats, dt: float, params: Floats) -> float:
+    return params[0]  # type: ignore[no-any-return]
+
+
+def constant_survival(prob_survival: float) -> SurvivalModel:
+    """The same survival probability per prediction step everywhere (paper: 0.98), whatever the length of the step."""
+    return SurvivalModel(_constant_survival, np.array([probability("prob_survival", prob_survival)]))

@@ -1,0 +1,88 @@
+"""Built-in measurement noise: constant, and growing with the target's distance as in the paper."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from vedette.errors import InputError
+from vedette.kernels.types import Floats
+from vedette.models.arguments import float_array, non_negative, positive, reject
+from vedette.models.functions import model_function
+from vedette.models.measurement import NoiseModel
+
+
+@model_function("measurement_noise_cov")
+def _constant(state: Floats, pose: Floats, params: Floats, out: Floats) -> None:
+    for i in range(out.shape[0]):
+        for j in range(out.shape[1]):
+            out[i, j] = params[i] * params[i] if i == j else 0.0
+
+
+@model_function("measurement_noise_cov")
+def _bearing_range(state: Floats, pose: Floats, params: Floats, out: Floats) -> None:
+    dx, dy = state[0] - pose[0], state[1] - pose[1]
+    square = dx * dx + dy * dy
+    sigma_range = params[0] + params[1] * square
+    sigma_bearing = params[2] + params[3] * np.sqrt(square)
+    out[0, 0] = sigma_bearing * sigma_bearing
+    out[0, 1] = 0.0
+    out[1, 0] = 0.0
+    out[1, 1] = sigma_range * sigma_range
+
+
+@model_function("measurement_noise_cov")
+def _bearing(state: Floats, pose: Floats, params: Floats, out: Floats) -> None:
+    dx, dy = state[0] - pose[0], state[1] - pose[1]
+    sigma_bearing = params[0] + params[1] * np.sqrt(dx * dx + dy * dy)
+    out[0, 0] = sigma_bearing * sigma_bearing
+
+
+@model_function("measurement_noise_cov")
+def _range(state: Floats, pose: Floats, params: Floats, out: Floats) -> None:
+    dx, dy = state[0] - pose[0], state[1] - pose[1]
+    sigma_range = params[0] + params[1] * (dx * dx + dy * dy)
+    out[0, 0] = sigma_range * sigma_range
+
+
+def constant_noise(stds: ArrayLike) -> NoiseModel:
+    """Independent noise with the given standard deviation of each measurement component, in its own unit."""
+    values = float_array("stds", stds, (None,))
+    if len(values) == 0 or (values <= 0.0).any():
+        raise reject("stds", "one or more numbers above 0", stds)
+    return NoiseModel(_constant, values, len(values))
+
+
+def range_dependent_noise(
+    sigma_range: float | None = None,
+    eta_range: float = 0.0,
+    sigma_bearing: float | None = None,
+    eta_bearing: float = 0.0,
+) -> NoiseModel:
+    """Noise that grows with the distance d of the target (paper section IV; paper-notes row 3).
+
+    Standard deviations sigma_range + eta_range d^2 and sigma_bearing + eta_bearing d. With only `sigma_bearing` given
+    it serves a bearing-only sensor, with only `sigma_range` a range-only one, with both [bearing, range].
+
+    Args:
+        sigma_range: m, above 0 (paper: 10). eta_range: 1/m (paper: 5e-5).
+        sigma_bearing: rad, above 0 (paper: pi/180). eta_bearing: rad/m (paper: 5e-6).
+    """
+    ranges = _growth("range", sigma_range, eta_range)
+    bearings = _growth("bearing", sigma_bearing, eta_bearing)
+    if ranges and bearings:
+        return NoiseModel(_bearing_range, np.array(ranges + bearings), 2)
+    if bearings:
+        return NoiseModel(_bearing, np.array(bearings), 1)
+    if ranges:
+        return NoiseModel(_range, np.array(ranges), 1)
+    raise InputError("sigma_range, sigma_bearing: expected at least one of them; got neither")
+
+
+def _growth(component: str, sigma: float | None, eta: float) -> list[float]:
+    """[sigma, eta] of one component; empty where the sensor does not measure it."""
+    if sigma is not None:
+        return [positive(f"sigma_{component}", sigma), non_negative(f"eta_{component}", eta)]
+    if eta != 0.0:
+        raise reject(f"eta_{component}", f"0 where no sigma_{component} is given", eta)
+    return []

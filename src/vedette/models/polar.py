@@ -1,0 +1,88 @@
+"""Built-in bearing-range, bearing-only and range-only measurements.
+
+A bearing is atan2(dy, dx) from the +x axis in (-pi, pi] rad, not relative to the heading (paper-notes row 2); a range
+is in metres. A target exactly at the sensor has no bearing and no direction of range: its Jacobian rows are zero, so
+that such a measurement moves nothing.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from vedette.kernels.compile import kernel
+from vedette.kernels.types import Floats
+from vedette.models.functions import model_function
+from vedette.models.measurement import MeasurementModel
+
+
+@kernel
+def _bearing_row(state: Floats, pose: Floats, out: Floats, row: int) -> None:
+    dx, dy = state[0] - pose[0], state[1] - pose[1]
+    square = dx * dx + dy * dy
+    for j in range(out.shape[1]):
+        out[row, j] = 0.0
+    if square > 0.0:
+        out[row, 0] = -dy / square
+        out[row, 1] = dx / square
+
+
+@kernel
+def _range_row(state: Floats, pose: Floats, out: Floats, row: int) -> None:
+    dx, dy = state[0] - pose[0], state[1] - pose[1]
+    distance = math.sqrt(dx * dx + dy * dy)
+    for j in range(out.shape[1]):
+        out[row, j] = 0.0
+    if distance > 0.0:
+        out[row, 0] = dx / distance
+        out[row, 1] = dy / distance
+
+
+@model_function("measurement")
+def _bearing_range(state: Floats, pose: Floats, params: Floats, out: Floats) -> None:
+    dx, dy = state[0] - pose[0], state[1] - pose[1]
+    out[0] = math.atan2(dy, dx)
+    out[1] = math.sqrt(dx * dx + dy * dy)
+
+
+@model_function("measurement_jacobian")
+def _bearing_range_jacobian(state: Floats, pose: Floats, params: Floats, out: Floats) -> None:
+    _bearing_row(state, pose, out, 0)
+    _range_row(state, pose, out, 1)
+
+
+@model_function("measurement")
+def _bearing(state: Floats, pose: Floats, params: Floats, out: Floats) -> None:
+    out[0] = math.atan2(state[1] - pose[1], state[0] - pose[0])
+
+
+@model_function("measurement_jacobian")
+def _bearing_jacobian(state: Floats, pose: Floats, params: Floats, out: Floats) -> None:
+    _bearing_row(state, pose, out, 0)
+
+
+@model_function("measurement")
+def _range(state: Floats, pose: Floats, params: Floats, out: Floats) -> None:
+    dx, dy = state[0] - pose[0], state[1] - pose[1]
+    out[0] = math.sqrt(dx * dx + dy * dy)
+
+
+@model_function("measurement_jacobian")
+def _range_jacobian(state: Floats, pose: Floats, params: Floats, out: Floats) -> None:
+    _range_row(state, pose, out, 0)
+
+
+def bearing_range() -> MeasurementModel:
+    """[bearing, range] of the target from the sensor (paper: z_k)."""
+    return MeasurementModel(2, _bearing_range, np.empty(0), _bearing_range_jacobian, np.array([True, False]))
+
+
+def bearing_only() -> MeasurementModel:
+    """[bearing]."""
+    return MeasurementModel(1, _bearing, np.empty(0), _bearing_jacobian, np.array([True]))
+
+
+def range_only() -> MeasurementModel:
+    """[range]."""
+    return MeasurementModel(1, _range, np.empty(0), _range_jacobian, np.array([False]))

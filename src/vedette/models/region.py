@@ -1,0 +1,47 @@
+"""The surveillance region."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from vedette.kernels.types import Bools, Floats
+from vedette.models.arguments import real, reject
+
+
+@dataclass(frozen=True, slots=True)
+class Region:
+    """Rectangle [x_min, x_max] x [y_min, y_max] in metres, with a positive area."""
+
+    x_min: float
+    x_max: float
+    y_min: float
+    y_max: float
+
+    def __post_init__(self) -> None:
+        for name in ("x_min", "x_max", "y_min", "y_max"):
+            object.__setattr__(self, name, real(f"Region.{name}", getattr(self, name)))
+        for low, high in (("x_min", "x_max"), ("y_min", "y_max")):
+            if getattr(self, high) <= getattr(self, low):
+                raise reject(f"Region.{high}", f"a number above {low} = {getattr(self, low)}", getattr(self, high))
+
+    @property
+    def area(self) -> float:
+        """Area in m^2."""
+        return (self.x_max - self.x_min) * (self.y_max - self.y_min)
+
+    @property
+    def bounds(self) -> Floats:
+        """(4,) x_min, x_max, y_min, y_max."""
+        return np.array([self.x_min, self.x_max, self.y_min, self.y_max])
+
+    def contains(self, positions: ArrayLike) -> Bools:
+        """(n,) whether each of (n, 2) positions lies inside, the edge included."""
+        x, y = np.moveaxis(np.asarray(positions, dtype=np.float64), -1, 0)
+        return np.asarray((x >= self.x_min) & (x <= self.x_max) & (y >= self.y_min) & (y <= self.y_max))
+
+    def sample(self, num: int, *, rng: np.random.Generator) -> Floats:
+        """(num, 2) positions drawn uniformly."""
+        return rng.uniform([self.x_min, self.y_min], [self.x_max, self.y_max], size=(num, 2))

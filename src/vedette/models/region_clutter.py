@@ -1,0 +1,129 @@
+"""Clutter that is uniform in the surveillance region, with the Jacobian of each kind of measurement.
+
+Uniform in x, y is not uniform in bearing and range: the intensity at (bearing, range) is rate * range / area inside the
+region and 0 outside (paper-notes row 5). Bearings or ranges alone are its integrals along the ray or round the arc.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from vedette.kernels.compile import kernel
+from vedette.kernels.types import Floats
+from vedette.models.arguments import non_negative, reject
+from vedette.models.clutter import ClutterModel, log_or_minus_infinity
+from vedette.models.functions import ModelFunction, model_function
+from vedette.models.measurement import MeasurementModel
+from vedette.models.region import Region
+
+# params of every function here: log(rate / area), x_min, x_max, y_min, y_max
+
+
+@kernel
+def _inside(x: float, y: float, params: Floats) -> bool:
+    return bool(params[1] <= x <= params[2] and params[3] <= y <= params[4])
+
+
+@kernel
+def _clip_ray(start: float, slope: float, low: float, high: float, near: float, far: float) -> tuple[float, float]:
+    """The part of [near, far] in which start + slope * t lies in [low, high]; empty when near > far."""
+    if slope == 0.0:
+        return (near, far) if low <= start <= high else (1.0, 0.0)
+    first, second = (low - start) / slope, (high - start) / slope
+    return max(near, min(first, second)), min(far, max(first, second))
+
+
+@kernel
+def _arc_in_quadrant(radius: float, x_low: float, x_high: float, y_low: float, y_high: float) -> float:
+    """Angle in [0, pi/2] over which radius * (cos, sin) lies in the box; both coordinates are monotone there."""
+    if x_high < 0.0 or y_high < 0.0 or x_low > radius or y_low > radius:
+        return 0.0
+    start = max(math.acos(min(x_high / radius, 1.0)), math.asin(max(y_low / radius, 0.0)))
+    end = min(math.acos(max(x_low / radius, 0.0)), math.asin(min(y_high / radius, 1.0)))
+    return max(0.0, end - start)
+
+
+@model_function("log_clutter_intensity")
+def _position(measurement: Floats, pose: Floats, params: Floats) -> float:
+    return params[0] if _inside(measurement[0], measurement[1], params) else -math.inf
+
+
+@model_function("log_clutter_intensity")
+def _bearing_range(measurement: Floats, pose: Floats, params: Floats) -> float:
+    distance = measurement[1]
+    x = pose[0] + distance * math.cos(measurement[0])
+    y = pose[1] + distance * math.sin(measurement[0])
+    if not (distance > 0.0 and _inside(x, y, params)):
+        return -math.inf
+    return params[0] + math.log(distance)  # type: ignore[no-any-return]
+
+
+@model_function("log_clutter_intensity")
+def _bearing(measurement: Floats, pose: Floats, params: Floats) -> float:
+    near, far = _clip_ray(pose[0], math.cos(measurement[0]), params[1], params[2], 0.0, math.inf)
+    near, far = _clip_ray(pose[1], math.sin(measurement[0]), params[3], params[4], near, far)
+    if not near < far:
+        return -math.inf
+    return params[0] + math.log(0.5 * (far - near) * (far + near))  # type: ignore[no-any-return]
+
+
+@model_function("log_clutter_intensity")
+def _range(measurement: Floats, pose: Floats, params: Floats) -> float:
+    distance = measurement[0]
+    if not distance > 0.0:
+        return -math.inf
+    x_low, x_high = params[1] - pose[0], params[2] - pose[0]
+    y_low, y_high = params[3] - pose[1], params[4] - pose[1]
+    arc = (
+        _arc_in_quadrant(distance, x_low, x_high, y_low, y_high)
+        + _arc_in_quadrant(distance, -x_high, -x_low, y_low, y_high)
+        + _arc_in_quadrant(distance, x_low, x_high, -y_high, -y_low)
+        + _arc_in_quadrant(distance, -x_high, -x_low, -y_high, -y_low)
+    )
+    return params[0] + math.log(distance * arc) if arc > 0.0 else -math.inf
+
+
+_KINDS: dict[str, tuple[ModelFunction, tuple[bool, ...]]] = {
+    "bearing_range": (_bearing_range, (True, False)),
+    "bearing_only": (_bearing, (True,)),
+    "range_only": (_range, (False,)),
+    "position": (_position, (False, False)),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class _RegionSampler:
+    rate: float
+    region: Region
+
+    def __call__(
+        self, pose: Floats, measurement: MeasurementModel, *, state_dim: int, rng: np.random.Generator
+    ) -> Floats:
+        num = int(rng.poisson(self.rate))
+        states = np.zeros((num, state_dim))
+        states[:, :2] = self.region.sample(num, rng=rng)
+        return measurement.measure(states, pose)
+
+
+def region_clutter(rate: float, region: Region, kind: str) -> ClutterModel:
+    """Clutter uniform in `region` as a sensor of the given kind measures it (paper section IV; paper-notes row 5).
+
+    It is drawn by putting uniform positions, at rest, through the sensor's measurement function.
+
+    Args:
+        rate: expected number a scan (paper: 25).
+        region: the surveillance region.
+        kind: "bearing_range", "bearing_only", "range_only" or "position": what the sensor measures. Clutter of another
+            measurement is a `ClutterModel` with a log intensity and sampler of one's own.
+    """
+    if kind not in _KINDS:
+        raise reject("kind", f"one of {', '.join(_KINDS)}", kind)
+    if not isinstance(region, Region):
+        raise reject("region", "a Region", region)
+    rate = non_negative("rate", rate)
+    function, angular = _KINDS[kind]
+    params = np.concatenate([[log_or_minus_infinity(rate / region.area)], region.bounds])
+    return ClutterModel(rate, function, params, _RegionSampler(rate, region), len(angular), np.array(angular))

@@ -1,0 +1,102 @@
+"""A sensor: its measurement, noise, detection and clutter together."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from vedette.kernels.types import Floats, Sensor
+from vedette.models.arguments import pose_vector, reject, state_table
+from vedette.models.clutter import ClutterModel
+from vedette.models.detection import DetectionModel
+from vedette.models.functions import model_function
+from vedette.models.measurement import MeasurementModel, NoiseModel
+from vedette.models.motion import resolve_method
+
+
+@model_function("measurement_jacobian")
+def _no_measurement_jacobian(state: Floats, pose: Floats, params: Floats, out: Floats) -> None:
+    """Fills the place of a missing Jacobian in a kernel bundle whose method never asks for one."""
+    raise NotImplementedError("this measurement model has no Jacobian")
+
+
+_PARTS: dict[str, type] = {
+    "measurement": MeasurementModel,
+    "noise": NoiseModel,
+    "detection": DetectionModel,
+    "clutter": ClutterModel,
+}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SensorModel:
+    """All that a filter knows of a sensor, apart from where it is.
+
+    Attributes:
+        measurement, noise, detection, clutter: the four models.
+        method: "auto" (EKF if the measurement has a Jacobian, else UKF), "ekf", "ukf" or "ckf".
+
+    Raises:
+        InputError: a part of another type, parts for different numbers of measurement components or different angles,
+            "ekf" without a Jacobian.
+    """
+
+    measurement: MeasurementModel
+    noise: NoiseModel
+    detection: DetectionModel
+    clutter: ClutterModel
+    method: str = "auto"
+
+    def __post_init__(self) -> None:
+        for name, kind in _PARTS.items():
+            if not isinstance(getattr(self, name), kind):
+                raise reject(f"SensorModel.{name}", f"a {kind.__name__}", getattr(self, name))
+        for name, served in (("noise", self.noise.meas_dim), ("clutter", self.clutter.meas_dim)):
+            if served is not None and served != self.meas_dim:
+                expected = f"a model for {self.meas_dim} measurement components"
+                raise reject(f"SensorModel.{name}", expected, f"one for {served}")
+        angular = self.clutter.angular
+        if angular is not None and not np.array_equal(angular, self.measurement.angular):
+            expected = f"a model for measurements whose angular flags are {self.measurement.angular.tolist()}"
+            raise reject("SensorModel.clutter", expected, angular.tolist())
+        resolve_method("SensorModel.method", self.method, self.measurement.jacobian is not None)
+
+    @property
+    def meas_dim(self) -> int:
+        """Number of components of a measurement."""
+        return self.measurement.meas_dim
+
+    def to_kernel(self) -> Sensor:
+        """The bundle of functions and parameters that update kernels take."""
+        jacobian = self.measurement.jacobian
+        return Sensor(
+            self.measurement.function,
+            _no_measurement_jacobian if jacobian is None else jacobian,
+            self.noise.function,
+            self.detection.function,
+            self.clutter.log_intensity,
+            self.measurement.params,
+            self.noise.params,
+            self.detection.params,
+            self.clutter.params,
+            self.measurement.angular,
+            resolve_method("SensorModel.method", self.method, jacobian is not None),
+        )
+
+    def check(self, states: ArrayLike, pose: ArrayLike) -> None:
+        """Try every function of the sensor at each of (n, state_dim) states, seen from `pose`.
+
+        Call it once on typical states before a long run: a function that raises, leaves part of `out` unwritten,
+        reaches outside its arrays, or gives a value not of its kind is found here rather than as a wrong number.
+
+        Raises:
+            ModelError: names the function, the state, what was expected and what came.
+        """
+        table, at = state_table("states", states), pose_vector("pose", pose)
+        self.measurement.check(table, at)
+        self.noise.check(table, at, self.meas_dim)
+        self.detection.check(table, at)
+        measured = self.measurement.measure(table, at)
+        self.clutter.check(measured, at, self.measurement, state_dim=table.shape[1])
