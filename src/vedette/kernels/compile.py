@@ -159,6 +159,16 @@ class ModelFunction(CPUDispatcher):  # type: ignore[misc]
     def __call__(self, *args: Any) -> Any:
         return super().__call__(*args)
 
+    def _reduce_states(self) -> dict[str, Any]:
+        return {**super()._reduce_states(), "kind": self.kind}
+
+    @classmethod
+    def _rebuild(cls, kind: str, **states: Any) -> ModelFunction:
+        """What unpickling in another process calls."""
+        function: ModelFunction = super()._rebuild(**states)
+        function.kind = kind
+        return function
+
 
 @typeof_impl.register(ModelFunction)  # type: ignore[untyped-decorator]
 def _typeof_model_function(value: ModelFunction, context: Any) -> Any:
@@ -200,7 +210,17 @@ def compile_model_function(function: Callable[..., Any], kind: str) -> Any:
 
 def is_cold() -> bool:
     """Whether no kernel of this checkout has been compiled on this machine yet."""
-    return JIT_ENABLED and not any(Path(_PackageLocator(kernel, Path(__file__)).get_cache_path()).parent.glob("*/*.nbc"))
+    return JIT_ENABLED and not any(
+        Path(_PackageLocator(kernel, Path(__file__)).get_cache_path()).parent.glob("*/*.nbc")
+    )
 
 
-__all__ = ["JIT_ENABLED", "SIGNATURES", "ModelFunction", "cache_directory", "compile_model_function", "is_cold", "kernel"]
+__all__ = [
+    "JIT_ENABLED",
+    "SIGNATURES",
+    "ModelFunction",
+    "cache_directory",
+    "compile_model_function",
+    "is_cold",
+    "kernel",
+]
