@@ -1,0 +1,131 @@
+"""Strategies side by side, over runs that share their random numbers."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+
+from vedette.errors import InputError
+from vedette.evaluation.statistics import PairedDifference, Summary, paired_difference, summarise
+from vedette.kernels.types import Bools, Floats
+from vedette.simulation.records import RunRecord
+
+PARTS = ("total", "localisation", "cardinality")
+Headings: TypeAlias = tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """OSPA of several strategies on one scenario, paired run by run.
+
+    Attributes:
+        scenario: name of the scenario.
+        strategies: their names, the one to compare the others with first.
+        times: (num_scans,) s.
+        decision_times: (num_decisions,) s, of all strategies together.
+        ospa: (num_strategies, num_runs, num_scans, 3) total, localisation and cardinality parts, m.
+        since: scans after this time (s) count in the mean over time.
+        headings: for each strategy, for each run, the chosen headings of its decisions in whole degrees.
+    """
+
+    scenario: str
+    strategies: tuple[str, ...]
+    times: Floats
+    decision_times: Floats
+    ospa: Floats
+    since: float
+    headings: tuple[tuple[tuple[Headings, ...], ...], ...]
+
+    @property
+    def num_runs(self) -> int:
+        return int(self.ospa.shape[1])
+
+    @property
+    def counted(self) -> Bools:
+        """(num_scans,) whether a scan counts in the mean over time."""
+        return np.asarray(self.times > self.since)
+
+    def run_means(self, strategy: str, part: str = "total") -> Floats:
+        """(num_runs,) OSPA averaged over the counted scans of each run, m."""
+        values: Floats = self.ospa[self._index(strategy), :, :, PARTS.index(part)]
+        return np.asarray(values[:, self.counted].mean(axis=1))
+
+    def summary(self, strategy: str, part: str = "total") -> Summary:
+        """Mean over runs of `run_means`."""
+        return summarise(self.run_means(strategy, part))
+
+    def curve(self, strategy: str, part: str = "total") -> Summary:
+        """Mean over runs at each scan: arrays of shape (num_scans,)."""
+        return summarise(self.ospa[self._index(strategy), :, :, PARTS.index(part)])
+
+    def difference(self, strategy: str, reference: str | None = None) -> PairedDifference:
+        """How much more OSPA a strategy has than the reference (the first strategy unless named), run by run."""
+        return paired_difference(self.run_means(strategy), self.run_means(reference or self.strategies[0]))
+
+    def decision_shares(self, strategy: str, decision: int) -> dict[Headings, float]:
+        """Share of the runs in which each combination of headings (deg) was chosen; the most frequent first."""
+        chosen = Counter(run[decision] for run in self.headings[self._index(strategy)] if decision < len(run))
+        return {headings: count / self.num_runs for headings, count in chosen.most_common()}
+
+    def _index(self, strategy: str) -> int:
+        if strategy not in self.strategies:
+            raise InputError(f"strategy: expected one of {', '.join(self.strategies)}; got {strategy!r}")
+        return self.strategies.index(strategy)
+
+
+def compare(runs: Mapping[str, Sequence[RunRecord]], *, since: float | None = None) -> Comparison:
+    """Put the runs of several strategies side by side.
+
+    Args:
+        runs: for each strategy its runs; the n-th runs of all must be of the same scenario, seed and run number.
+        since: only scans after this time (s) count in the mean over time; by default the time of the first decision,
+            before which all strategies are alike, and every scan if none was made.
+
+    Raises `InputError` if there is no run, or the runs are not paired.
+    """
+    if not runs or not all(runs.values()):
+        raise InputError("runs: expected at least one run of each of one or more strategies")
+    strategies = tuple(runs)
+    reference = runs[strategies[0]]
+    for name in strategies:
+        _check_paired(name, runs[name], strategies[0], reference)
+    records = [record for name in strategies for record in runs[name]]
+    decision_times = np.unique([decision.time for record in records for decision in record.decisions])
+    if since is None:
+        since = float(decision_times[0]) if len(decision_times) else -np.inf
+    times = reference[0].times
+    if not (times > since).any():
+        raise InputError(f"since: expected a time before the last scan at {times[-1]} s; got {since}")
+    return Comparison(
+        scenario=reference[0].scenario,
+        strategies=strategies,
+        times=times,
+        decision_times=decision_times,
+        ospa=np.array([[record.ospa for record in runs[name]] for name in strategies]),
+        since=since,
+        headings=tuple(tuple(chosen_headings_deg(record) for record in runs[name]) for name in strategies),
+    )
+
+
+def chosen_headings_deg(record: RunRecord) -> tuple[Headings, ...]:
+    """Headings chosen at each decision of a run, in whole degrees, one a sensor."""
+    return tuple(
+        tuple(int(heading) for heading in np.rint(np.rad2deg(decision.plan.chosen_headings)))
+        for decision in record.decisions
+    )
+
+
+def _check_paired(name: str, records: Sequence[RunRecord], other: str, reference: Sequence[RunRecord]) -> None:
+    if len(records) != len(reference):
+        raise InputError(f"runs[{name!r}]: expected {len(reference)} runs, as of {other!r}; got {len(records)}")
+    for record, partner in zip(records, reference, strict=True):
+        got = (record.scenario, record.seed, record.run)
+        expected = (reference[0].scenario, partner.seed, partner.run)
+        if got != expected:
+            raise InputError(f"runs[{name!r}]: expected scenario, seed and run {expected}; got {got}")
+        if not np.array_equal(record.times, reference[0].times):
+            raise InputError(f"runs[{name!r}]: expected the scan times of {other!r}; run {record.run} has others")

@@ -1,0 +1,62 @@
+"""How the error of the strategies goes over time (paper Fig. 5)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from vedette.errors import InputError
+from vedette.evaluation.comparison import PARTS, Comparison
+from vedette.evaluation.figures.style import GREY, colour, line_style, new_figure, styled
+
+_LABELS = {"total": "OSPA (m)", "localisation": "Localisation (m)", "cardinality": "Cardinality (m)"}
+
+
+@styled
+def ospa_figure(comparison: Comparison, *, parts: Sequence[str] = ("total",)) -> Figure:
+    """Mean OSPA of each strategy against time, with bands of one standard error over the runs; decisions are marked.
+
+    Args:
+        comparison: from `vedette.evaluation.comparison.compare`.
+        parts: one panel for each of "total", "localisation", "cardinality".
+
+    Raises `InputError` for no part, or another name.
+    """
+    if not parts or not set(parts) <= set(PARTS):
+        raise InputError(f"parts: expected some of {', '.join(PARTS)}; got {', '.join(parts) or 'none'}")
+    figure = new_figure(0.55 + 1.75 * len(parts))
+    panels = figure.subplots(len(parts), 1, sharex=True, squeeze=False)[:, 0]
+    for panel, part in zip(panels, parts, strict=True):
+        _draw_panel(panel, comparison, part)
+    panels[-1].set_xlabel("Time (s)")
+    handles, labels = panels[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=min(len(labels), 4))
+    return figure
+
+
+def _draw_panel(axes: Axes, comparison: Comparison, part: str) -> None:
+    for index, strategy in enumerate(comparison.strategies):
+        curve = comparison.curve(strategy, part)
+        shade = colour(index)
+        axes.plot(comparison.times, curve.mean, color=shade, linestyle=line_style(index), label=strategy)
+        if comparison.num_runs > 1:
+            low, high = curve.mean - curve.standard_error, curve.mean + curve.standard_error
+            axes.fill_between(comparison.times, low, high, color=shade, alpha=0.2, linewidth=0)
+    for time in comparison.decision_times:
+        axes.axvline(time, color=GREY, linestyle=(0, (2, 2)), linewidth=0.8, zorder=1)
+        axes.annotate(
+            "decision",
+            (time, 1.0),
+            xycoords=("data", "axes fraction"),
+            xytext=(2, -2),
+            textcoords="offset points",
+            rotation=90,
+            va="top",
+            fontsize=6,
+            color=GREY,
+        )
+    axes.set_ylim(bottom=0.0)
+    axes.set_xlim(comparison.times[0], comparison.times[-1])
+    axes.set_ylabel(_LABELS[part])

@@ -1,0 +1,107 @@
+"""The reward of each action at one decision (paper Fig. 4)."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
+
+from vedette.control.plan import Plan, RewardTable
+from vedette.errors import InputError
+from vedette.evaluation.figures.style import COLUMN_WIDTH, HEAT_MAP, colour, line_style, new_figure, styled
+from vedette.kernels.types import Floats
+
+_MARKERS = "osD^vP"
+
+
+@styled
+def reward_figure(plan: Plan, *, pair: tuple[int, int] = (0, 1)) -> Figure:
+    """Reward against heading, one curve a sensor, with bands of one standard error over the samples.
+
+    A plan made independently has its curves as they are. A joint plan has above them a heat map of the joint table with
+    the chosen actions framed; its curves are the most that a sensor's action can bring with the best actions of the
+    others. With more than two sensors the heat map is likewise the maximum over the sensors outside `pair`.
+
+    Args:
+        plan: with reward tables.
+        pair: the sensors on the axes of the heat map.
+
+    Raises `InputError` for a plan without tables (random or fixed control), or a pair that is not two of its sensors.
+    """
+    plan.validate()
+    if not plan.tables:
+        raise InputError(f"plan: expected reward tables; got none, as planner {plan.planner!r} weighs no actions")
+    joint = [table for table in plan.tables if len(table.sensors) > 1]
+    if not joint:
+        figure = new_figure(2.3)
+        _draw_curves(figure.subplots(), plan)
+        return figure
+    figure = new_figure(COLUMN_WIDTH + 1.6)
+    upper, lower = figure.subplots(2, 1, height_ratios=(1.55, 1.0))
+    _draw_heat_map(figure, upper, plan, joint[0], pair)
+    _draw_curves(lower, plan)
+    return figure
+
+
+def _draw_curves(axes: Axes, plan: Plan) -> None:
+    for table in plan.tables:
+        for axis, sensor in enumerate(table.sensors):
+            mean, error = _best_over_others(table, axis)
+            _draw_curve(axes, plan, sensor, mean, error)
+    joint = any(len(table.sensors) > 1 for table in plan.tables)
+    axes.set_xlabel("Heading (deg)")
+    axes.set_ylabel("Largest joint reward" if joint else "Reward (CS divergence)")
+    axes.legend(loc="best")
+
+
+def _draw_curve(axes: Axes, plan: Plan, sensor: int, mean: Floats, error: Floats) -> None:
+    headings = np.rad2deg(plan.action_values[sensor])
+    chosen = plan.chosen[sensor]
+    shade = colour(sensor)
+    axes.fill_between(headings, mean - error, mean + error, color=shade, alpha=0.2, linewidth=0)
+    axes.plot(headings, mean, color=shade, linestyle=line_style(sensor), label=f"sensor {sensor + 1}")
+    axes.plot(headings, mean, color=shade, linestyle="", marker=".", markersize=3)
+    axes.plot(
+        headings[chosen],
+        mean[chosen],
+        color=shade,
+        marker=_MARKERS[sensor % len(_MARKERS)],
+        markersize=6,
+        markeredgecolor="black",
+        linestyle="",
+        label=f"chosen: {headings[chosen]:.0f}°",
+    )
+    if headings.min() >= -180.5 and headings.max() <= 180.5 and np.ptp(headings) > 180:
+        axes.set_xticks(np.arange(-180, 181, 60))
+
+
+def _best_over_others(table: RewardTable, axis: int) -> tuple[Floats, Floats]:
+    """For each action on `axis`, the largest mean over all other axes, and the standard error of that entry."""
+    mean = np.moveaxis(table.mean, axis, 0).reshape(table.mean.shape[axis], -1)
+    error = np.moveaxis(table.standard_error, axis, 0).reshape(mean.shape)
+    best = mean.argmax(axis=1)
+    rows = np.arange(len(mean))
+    return mean[rows, best], error[rows, best]
+
+
+def _draw_heat_map(figure: Figure, axes: Axes, plan: Plan, table: RewardTable, pair: tuple[int, int]) -> None:
+    if pair[0] == pair[1] or not set(pair) <= set(table.sensors):
+        raise InputError(f"pair: expected two of the sensors {table.sensors}; got {pair}")
+    positions = [table.sensors.index(sensor) for sensor in pair]
+    others = tuple(axis for axis in range(table.mean.ndim) if axis not in positions)
+    reward = table.mean.max(axis=others)
+    if positions[0] > positions[1]:
+        reward = reward.T
+    image = axes.imshow(reward.T, origin="lower", cmap=HEAT_MAP, aspect="equal", interpolation="nearest")
+    axes.grid(False)
+    for axis, sensor in zip((axes.xaxis, axes.yaxis), pair, strict=True):
+        headings = np.rad2deg(plan.action_values[sensor])
+        every = max(1, -(-len(headings) // 7))
+        axis.set_ticks(range(0, len(headings), every), [f"{value:.0f}" for value in headings[::every]])
+    axes.set_xlabel(f"Heading of sensor {pair[0] + 1} (deg)")
+    axes.set_ylabel(f"Heading of sensor {pair[1] + 1} (deg)")
+    column, row = plan.chosen[pair[0]], plan.chosen[pair[1]]
+    for shade, width in (("black", 2.6), ("white", 1.2)):  # legible on the dark and on the light end of the scale
+        axes.add_patch(Rectangle((column - 0.5, row - 0.5), 1, 1, fill=False, edgecolor=shade, linewidth=width))
+    figure.colorbar(image, ax=axes, label="Joint reward (CS divergence)", shrink=0.95)

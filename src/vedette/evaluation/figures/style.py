@@ -1,0 +1,118 @@
+"""One look for all figures: a paper's column wide, 8 pt, colours that survive colour blindness and grey print."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Callable, Sequence
+from functools import wraps
+from pathlib import Path
+from typing import Any, ParamSpec, TypeVar
+
+import matplotlib
+from matplotlib.figure import Figure
+
+from vedette.errors import InputError
+
+_P = ParamSpec("_P")
+_R = TypeVar("_R")
+
+COLUMN_WIDTH = 3.5  # inches, of an IEEE column
+TEXT_WIDTH = 7.16  # inches, of both columns
+
+# M. Okabe and K. Ito, "Color Universal Design" (2008), without the yellow that is lost on white; darkest last.
+BLUE, ORANGE, GREEN, PURPLE, SKY, VERMILION = "#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00"
+COLOURS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY)
+GREY = "#6E6E6E"
+LINE_STYLES: tuple[Any, ...] = (
+    "-",
+    (0, (5, 1.5)),
+    (0, (1.2, 1.2)),
+    (0, (5, 1.5, 1.2, 1.5)),
+    (0, (8, 2)),
+    (0, (3, 1, 1, 1, 1, 1)),
+)
+HEAT_MAP = "cividis"
+
+_SETTINGS: Any = {
+    "axes.grid": True,
+    "axes.labelsize": 8,
+    "axes.linewidth": 0.6,
+    "axes.spines.right": False,
+    "axes.spines.top": False,
+    "axes.titlesize": 8,
+    "font.family": "sans-serif",
+    "font.sans-serif": ["DejaVu Sans"],  # comes with Matplotlib, so a figure is the same everywhere
+    "font.size": 8,
+    "grid.color": "#DDDDDD",
+    "grid.linewidth": 0.4,
+    "legend.fontsize": 7,
+    "legend.framealpha": 0.9,
+    "legend.handlelength": 2.2,
+    "lines.linewidth": 1.2,
+    "pdf.fonttype": 42,  # text stays text
+    "svg.fonttype": "none",
+    "svg.hashsalt": "vedette",
+    "xtick.labelsize": 7,
+    "xtick.major.width": 0.6,
+    "ytick.labelsize": 7,
+    "ytick.major.width": 0.6,
+}
+_FORMATS = ("pdf", "svg", "png")
+_UNDATED: dict[str, dict[str, None]] = {"pdf": {"CreationDate": None}, "svg": {"Date": None}, "png": {}}
+
+
+def styled(function: Callable[_P, _R]) -> Callable[_P, _R]:
+    """Run `function` under the settings of these figures and leave Matplotlib's own as they were."""
+
+    @wraps(function)
+    def wrapper(*args: _P.args, **kwargs: _P.kwargs) -> _R:
+        with matplotlib.rc_context(_SETTINGS):
+            return function(*args, **kwargs)
+
+    return wrapper
+
+
+def new_figure(height: float, *, width: float = COLUMN_WIDTH) -> Figure:
+    """An empty figure, in inches, that keeps its labels within its edges."""
+    return Figure(figsize=(width, height), layout="constrained")
+
+
+def colour(index: int) -> str:
+    return COLOURS[index % len(COLOURS)]
+
+
+def line_style(index: int) -> Any:
+    return LINE_STYLES[index % len(LINE_STYLES)]
+
+
+@styled
+def save_figure(figure: Figure, path: Path | str, *, formats: Sequence[str] = _FORMATS) -> tuple[Path, ...]:
+    """Write a figure once for each format, beside one another; the same figure gives the same bytes.
+
+    Args:
+        path: file name without its ending, in a folder that exists or can be made.
+        formats: some of "pdf", "svg" (vector) and "png" (300 dots an inch).
+
+    Returns the files written. Raises `InputError` for another format or a path that cannot be written.
+    """
+    unknown = [name for name in formats if name not in _FORMATS]
+    if unknown:
+        raise InputError(f"formats: expected some of {', '.join(_FORMATS)}; got {', '.join(unknown)}")
+    stem = Path(path)
+    try:
+        stem.parent.mkdir(parents=True, exist_ok=True)
+        return tuple(_save(figure, stem.with_name(f"{stem.name}.{name}"), name) for name in formats)
+    except OSError as error:
+        raise InputError(f"path: expected a place to write figures; got {stem}: {error}") from error
+
+
+def _save(figure: Figure, path: Path, name: str) -> Path:
+    descriptor, partial = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    try:
+        with os.fdopen(descriptor, "wb") as handle:
+            figure.savefig(handle, format=name, dpi=300, metadata=_UNDATED[name])
+        Path(partial).replace(path)
+    finally:
+        Path(partial).unlink(missing_ok=True)
+    return path

@@ -1,0 +1,128 @@
+"""Where the targets went, where they were thought to be, and where the sensors went to see them (paper Fig. 3)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from vedette.errors import InputError
+from vedette.evaluation.figures.style import COLUMN_WIDTH, GREY, TEXT_WIDTH, colour, new_figure, styled
+from vedette.kernels.types import Floats
+from vedette.simulation.records import RunRecord
+
+_INK = "#222222"
+_SENSOR_MARKERS = "sDpP*X"
+
+
+@styled
+def tracks_figure(*records: RunRecord, titles: Sequence[str] | None = None) -> Figure:
+    """Truth, estimates, sensor paths and decisions in the plane; one panel a run, on equal axes.
+
+    Args:
+        records: one run fills a column, two fill the width of the page.
+        titles: one a run; by default the names of the strategies.
+
+    Raises `InputError` for no record, or another number of titles.
+    """
+    if not records:
+        raise InputError("records: expected at least one run; got none")
+    names = tuple(titles) if titles is not None else tuple(record.planner for record in records)
+    if len(names) != len(records):
+        raise InputError(f"titles: expected {len(records)}; got {len(names)}")
+    width = COLUMN_WIDTH if len(records) == 1 else TEXT_WIDTH * max(1.0, len(records) / 2)
+    figure = new_figure(width / len(records) + 0.45, width=width)
+    panels = figure.subplots(1, len(records), sharex=True, sharey=True, squeeze=False)[0]
+    for panel, record, name in zip(panels, records, names, strict=True):
+        draw_tracks(panel, record)
+        panel.set_title(name)
+    panels[0].set_ylabel("y (km)" if _in_km(records) else "y (m)")
+    figure.legend(handles=_legend(records[0]), loc="outside lower center", ncols=3 if len(records) == 1 else 6)
+    return figure
+
+
+def draw_tracks(axes: Axes, record: RunRecord) -> None:
+    """Draw one run into axes."""
+    scale = 1e-3 if _in_km([record]) else 1.0
+    _draw_truth(axes, record, scale)
+    _draw_estimates(axes, record, scale)
+    for sensor in range(record.num_sensors):
+        _draw_sensor(axes, record, sensor, scale)
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.set_xlabel("x (km)" if scale != 1.0 else "x (m)")
+
+
+def _in_km(records: Sequence[RunRecord]) -> bool:
+    reach = max((np.ptp(_positions(record), axis=0).max() for record in records), default=0.0)
+    return bool(reach > 5000.0)
+
+
+def _positions(record: RunRecord) -> Floats:
+    return np.concatenate([record.truth.states[:, :2], record.poses[:, :, :2].reshape(-1, 2)])
+
+
+def _draw_truth(axes: Axes, record: RunRecord, scale: float) -> None:
+    for target in np.unique(record.truth.ids):
+        path = record.truth.states[record.truth.ids == target, :2] * scale
+        axes.plot(path[:, 0], path[:, 1], color=_INK, linewidth=0.9, zorder=2)
+        axes.plot(*path[0], marker="o", color=_INK, markerfacecolor="white", markersize=5, zorder=4)
+        axes.plot(*path[-1], marker="^", color=_INK, markerfacecolor="white", markersize=5, zorder=4)
+
+
+def _draw_estimates(axes: Axes, record: RunRecord, scale: float) -> None:
+    labels = np.concatenate([estimate.labels for estimate in record.estimates])
+    points = np.concatenate([estimate.means[:, :2] for estimate in record.estimates]) * scale
+    for index, label in enumerate(np.unique(labels, axis=0)):
+        mine = points[(labels == label).all(axis=1)]
+        axes.plot(
+            mine[:, 0], mine[:, 1], linestyle="", marker=".", markersize=3.2, color=colour(index), alpha=0.8, zorder=3
+        )
+
+
+def _draw_sensor(axes: Axes, record: RunRecord, sensor: int, scale: float) -> None:
+    path = record.poses[:, sensor, :2] * scale
+    axes.plot(path[:, 0], path[:, 1], color=GREY, linewidth=1.6, linestyle=(0, (2.5, 1)), zorder=5)
+    marker = _SENSOR_MARKERS[sensor % len(_SENSOR_MARKERS)]
+    axes.plot(*path[0], marker=marker, color=_INK, markerfacecolor=GREY, markersize=6, zorder=6)
+    axes.annotate(f"S{sensor + 1}", _point(path[0]), xytext=(-4, 5), textcoords="offset points", ha="right", fontsize=7)
+    for number, decision in enumerate(record.decisions, start=1):
+        place = _point(decision.poses[sensor, :2] * scale)
+        heading = decision.plan.chosen_headings[sensor]
+        ahead = 13.0 * np.array([np.cos(heading), np.sin(heading)])
+        axes.annotate(
+            "",
+            place,
+            xytext=tuple(ahead),
+            textcoords="offset points",
+            arrowprops={"arrowstyle": "<|-", "color": _INK, "linewidth": 0.9, "shrinkA": 0, "shrinkB": 0},
+            zorder=7,
+        )
+        axes.plot(
+            *place, marker="o", markersize=6.5, color=_INK, markerfacecolor="white", markeredgewidth=0.7, zorder=8
+        )
+        axes.annotate(str(number), place, ha="center", va="center_baseline", fontsize=5, zorder=9)
+
+
+def _point(values: Floats) -> tuple[float, float]:
+    return float(values[0]), float(values[1])
+
+
+def _legend(record: RunRecord) -> list[Line2D]:
+    open_marker: dict[str, Any] = {"color": _INK, "markerfacecolor": "white", "markersize": 4.5, "linewidth": 0.9}
+    handles = [
+        Line2D([], [], marker="o", label="target start", **open_marker),
+        Line2D([], [], marker="^", label="target end", **open_marker),
+        Line2D([], [], linestyle="", marker=".", color=colour(0), label="estimates, by label"),
+        Line2D(
+            [], [], linestyle=(0, (2.5, 1)), marker="s", color=GREY, markersize=4.5, linewidth=1.6, label="sensor path"
+        ),
+    ]
+    if record.decisions:
+        handles.append(
+            Line2D([], [], linestyle="", marker="$\\rightarrow$", color=_INK, markersize=8, label="decision")
+        )
+    return handles

@@ -1,0 +1,93 @@
+"""The comparison of strategies as a table, in the forms that a terminal, a paper and a program want."""
+
+from __future__ import annotations
+
+import csv
+import io
+
+import numpy as np
+
+from vedette.evaluation.comparison import Comparison
+from vedette.evaluation.statistics import Summary
+
+HEADER = ("Strategy", "OSPA (m)", "Localisation (m)", "Cardinality (m)", "Difference (m)", "95 % interval", "Runs won")
+
+
+def strategy_rows(comparison: Comparison) -> list[tuple[str, ...]]:
+    """One row a strategy, under `HEADER`: mean OSPA with standard error, its parts, and the paired difference.
+
+    The difference is strategy minus the first strategy, so positive where the first is better; "Runs won" is the share
+    of runs that the first strategy wins. The first row has no difference.
+    """
+    return [_row(comparison, strategy) for strategy in comparison.strategies]
+
+
+def decision_rows(comparison: Comparison, strategy: str, *, at_most: int = 3) -> list[tuple[str, str]]:
+    """For each decision that a strategy took: its time, and the most frequent combinations of headings with shares."""
+    rows = []
+    for decision, time in enumerate(comparison.decision_times):
+        shares = list(comparison.decision_shares(strategy, decision).items())[:at_most]
+        if not shares:
+            continue
+        rows.append((f"{time:g} s", ", ".join(f"({_degrees(headings)}) {share:.0%}" for headings, share in shares)))
+    return rows
+
+
+def strategy_markdown(comparison: Comparison) -> str:
+    """The table as Markdown, with a line that says what was averaged."""
+    lines = ["| " + " | ".join(HEADER) + " |", "|" + " --- |" + " ---: |" * (len(HEADER) - 1)]
+    lines += ["| " + " | ".join(row) + " |" for row in strategy_rows(comparison)]
+    return "\n".join([*lines, "", caption(comparison), ""])
+
+
+def strategy_csv(comparison: Comparison) -> str:
+    """The numbers behind the table, unrounded, one row a strategy."""
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    parts = [f"{part}_{field}_m" for part in ("total", "localisation", "cardinality") for field in ("mean", "se")]
+    writer.writerow(["strategy", "runs", *parts, "difference_m", "difference_se_m", "low_m", "high_m", "share_won"])
+    for strategy in comparison.strategies:
+        summaries = [comparison.summary(strategy, part) for part in ("total", "localisation", "cardinality")]
+        numbers = [float(value) for summary in summaries for value in (summary.mean, summary.standard_error)]
+        difference = comparison.difference(strategy)
+        paired = difference.summary
+        numbers += [float(value) for value in (paired.mean, paired.standard_error, paired.low, paired.high)]
+        writer.writerow([strategy, comparison.num_runs, *numbers, difference.share_won])
+    return out.getvalue()
+
+
+def caption(comparison: Comparison) -> str:
+    """What the numbers of the table are."""
+    counted = comparison.times[comparison.counted]
+    return (
+        f"Scenario {comparison.scenario}, {comparison.num_runs} paired runs, mean over t = {counted[0]:g} to "
+        f"{counted[-1]:g} s, ± one standard error. Difference: strategy minus {comparison.strategies[0]}, run by run; "
+        f"runs won: by {comparison.strategies[0]}."
+    )
+
+
+def _row(comparison: Comparison, strategy: str) -> tuple[str, ...]:
+    total = _with_error(comparison.summary(strategy))
+    parts = [f"{float(comparison.summary(strategy, part).mean):.2f}" for part in ("localisation", "cardinality")]
+    if strategy == comparison.strategies[0]:
+        return (strategy, total, *parts, "", "", "")
+    difference = comparison.difference(strategy)
+    interval = f"{difference.summary.low:+.2f} to {difference.summary.high:+.2f}"
+    known = comparison.num_runs > 1
+    return (
+        strategy,
+        total,
+        *parts,
+        _with_error(difference.summary, sign="+"),
+        interval if known else "unknown",
+        f"{difference.share_won:.0%}",
+    )
+
+
+def _with_error(summary: Summary, sign: str = "") -> str:
+    mean = f"{float(summary.mean):{sign}.2f}"
+    return mean if np.isnan(summary.standard_error) else f"{mean} ± {float(summary.standard_error):.2f}"
+
+
+def _degrees(headings: tuple[int, ...]) -> str:
+    return ", ".join(f"{heading}°" for heading in headings)
