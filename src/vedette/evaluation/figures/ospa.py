@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from vedette.errors import InputError
 from vedette.evaluation.comparison import PARTS, Comparison
-from vedette.evaluation.figures.style import GREY, colour, line_style, new_figure, styled
+from vedette.evaluation.figures.style import GREY, colour, line_style, new_figure, strategy_label, styled
 
 _LABELS = {"total": "OSPA (m)", "localisation": "Localisation (m)", "cardinality": "Cardinality (m)"}
 
@@ -32,7 +32,9 @@ def ospa_figure(comparison: Comparison, *, parts: Sequence[str] = ("total",)) ->
         _draw_panel(panel, comparison, part)
     panels[-1].set_xlabel("Time (s)")
     handles, labels = panels[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=min(len(labels), 4))
+    figure.legend(
+        handles, labels, loc="outside upper center", ncols=min(len(labels), 5), columnspacing=1.2, handlelength=1.8
+    )
     return figure
 
 
@@ -40,23 +42,15 @@ def _draw_panel(axes: Axes, comparison: Comparison, part: str) -> None:
     for index, strategy in enumerate(comparison.strategies):
         curve = comparison.curve(strategy, part)
         shade = colour(index)
-        axes.plot(comparison.times, curve.mean, color=shade, linestyle=line_style(index), label=strategy)
+        axes.plot(
+            comparison.times, curve.mean, color=shade, linestyle=line_style(index), label=strategy_label(strategy)
+        )
         if comparison.num_runs > 1:
             low, high = curve.mean - curve.standard_error, curve.mean + curve.standard_error
             axes.fill_between(comparison.times, low, high, color=shade, alpha=0.2, linewidth=0)
-    for time in comparison.decision_times:
-        axes.axvline(time, color=GREY, linestyle=(0, (2, 2)), linewidth=0.8, zorder=1)
-        axes.annotate(
-            "decision",
-            (time, 1.0),
-            xycoords=("data", "axes fraction"),
-            xytext=(2, -2),
-            textcoords="offset points",
-            rotation=90,
-            va="top",
-            fontsize=6,
-            color=GREY,
-        )
+    for number, time in enumerate(comparison.decision_times):
+        label = "_" if number else "decision"  # named once in the legend
+        axes.axvline(time, color=GREY, linestyle=(0, (2, 2)), linewidth=0.9, zorder=1, label=label)
     axes.set_ylim(bottom=0.0)
     axes.set_xlim(comparison.times[0], comparison.times[-1])
     axes.set_ylabel(_LABELS[part])

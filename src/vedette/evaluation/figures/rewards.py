@@ -9,7 +9,15 @@ from matplotlib.patches import Rectangle
 
 from vedette.control.plan import Plan, RewardTable
 from vedette.errors import InputError
-from vedette.evaluation.figures.style import COLUMN_WIDTH, HEAT_MAP, colour, line_style, new_figure, styled
+from vedette.evaluation.figures.style import (
+    COLUMN_WIDTH,
+    HEAT_MAP,
+    colour,
+    degrees_label,
+    line_style,
+    new_figure,
+    styled,
+)
 from vedette.kernels.types import Floats
 
 _MARKERS = "osD^vP"
@@ -17,7 +25,7 @@ _MARKERS = "osD^vP"
 
 @styled
 def reward_figure(plan: Plan, *, pair: tuple[int, int] = (0, 1)) -> Figure:
-    """Reward against heading, one curve a sensor, with bands of one standard error over the samples.
+    """Reward against heading, one curve a sensor, the choice marked, with bands of one standard error over the samples.
 
     A plan made independently has its curves as they are. A joint plan has above them a heat map of the joint table with
     the chosen actions framed; its curves are the most that a sensor's action can bring with the best actions of the
@@ -37,7 +45,7 @@ def reward_figure(plan: Plan, *, pair: tuple[int, int] = (0, 1)) -> Figure:
         figure = new_figure(2.3)
         _draw_curves(figure.subplots(), plan)
         return figure
-    figure = new_figure(COLUMN_WIDTH + 1.6)
+    figure = new_figure(COLUMN_WIDTH + 1.4)
     upper, lower = figure.subplots(2, 1, height_ratios=(1.55, 1.0))
     _draw_heat_map(figure, upper, plan, joint[0], pair)
     _draw_curves(lower, plan)
@@ -52,7 +60,8 @@ def _draw_curves(axes: Axes, plan: Plan) -> None:
     joint = any(len(table.sensors) > 1 for table in plan.tables)
     axes.set_xlabel("Heading (deg)")
     axes.set_ylabel("Largest joint reward" if joint else "Reward (CS divergence)")
-    axes.legend(loc="best")
+    # Above the panel: wherever a legend would lie inside, some curve passes.
+    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2, frameon=False, handlelength=1.8)
 
 
 def _draw_curve(axes: Axes, plan: Plan, sensor: int, mean: Floats, error: Floats) -> None:
@@ -60,18 +69,18 @@ def _draw_curve(axes: Axes, plan: Plan, sensor: int, mean: Floats, error: Floats
     chosen = plan.chosen[sensor]
     shade = colour(sensor)
     axes.fill_between(headings, mean - error, mean + error, color=shade, alpha=0.2, linewidth=0)
-    axes.plot(headings, mean, color=shade, linestyle=line_style(sensor), label=f"sensor {sensor + 1}")
-    axes.plot(headings, mean, color=shade, linestyle="", marker=".", markersize=3)
     axes.plot(
-        headings[chosen],
-        mean[chosen],
+        headings,
+        mean,
         color=shade,
+        linestyle=line_style(sensor),
         marker=_MARKERS[sensor % len(_MARKERS)],
         markersize=6,
         markeredgecolor="black",
-        linestyle="",
-        label=f"chosen: {headings[chosen]:.0f}°",
+        markevery=[chosen],
+        label=f"sensor {sensor + 1}: {degrees_label(headings[chosen])}°",
     )
+    axes.plot(headings, mean, color=shade, linestyle="", marker=".", markersize=3)
     if headings.min() >= -180.5 and headings.max() <= 180.5 and np.ptp(headings) > 180:
         axes.set_xticks(np.arange(-180, 181, 60))
 
@@ -93,15 +102,15 @@ def _draw_heat_map(figure: Figure, axes: Axes, plan: Plan, table: RewardTable, p
     reward = table.mean.max(axis=others)
     if positions[0] > positions[1]:
         reward = reward.T
-    image = axes.imshow(reward.T, origin="lower", cmap=HEAT_MAP, aspect="equal", interpolation="nearest")
+    image = axes.imshow(reward.T, origin="lower", cmap=HEAT_MAP, aspect="auto", interpolation="nearest")
     axes.grid(False)
     for axis, sensor in zip((axes.xaxis, axes.yaxis), pair, strict=True):
         headings = np.rad2deg(plan.action_values[sensor])
         every = max(1, -(-len(headings) // 7))
-        axis.set_ticks(range(0, len(headings), every), [f"{value:.0f}" for value in headings[::every]])
+        axis.set_ticks(range(0, len(headings), every), [degrees_label(value) for value in headings[::every]])
     axes.set_xlabel(f"Heading of sensor {pair[0] + 1} (deg)")
     axes.set_ylabel(f"Heading of sensor {pair[1] + 1} (deg)")
     column, row = plan.chosen[pair[0]], plan.chosen[pair[1]]
     for shade, width in (("black", 2.6), ("white", 1.2)):  # legible on the dark and on the light end of the scale
         axes.add_patch(Rectangle((column - 0.5, row - 0.5), 1, 1, fill=False, edgecolor=shade, linewidth=width))
-    figure.colorbar(image, ax=axes, label="Joint reward (CS divergence)", shrink=0.95)
+    figure.colorbar(image, ax=axes, label="Joint reward (CS divergence)")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import tempfile
 from collections.abc import Callable, Sequence
 from functools import wraps
 from pathlib import Path
@@ -78,6 +77,16 @@ def new_figure(height: float, *, width: float = COLUMN_WIDTH) -> Figure:
     return Figure(figsize=(width, height), layout="constrained")
 
 
+def strategy_label(name: str) -> str:
+    """The name of a strategy as the paper writes it."""
+    return {"jdm": "JDM", "idm": "IDM", "random": "Random", "fixed": "Fixed"}.get(name, name)
+
+
+def degrees_label(value: float) -> str:
+    """A number of degrees with the minus sign that Matplotlib's own ticks have."""
+    return f"{value:.0f}".replace("-", "\N{MINUS SIGN}")
+
+
 def colour(index: int) -> str:
     return COLOURS[index % len(COLOURS)]
 
@@ -108,11 +117,10 @@ def save_figure(figure: Figure, path: Path | str, *, formats: Sequence[str] = _F
 
 
 def _save(figure: Figure, path: Path, name: str) -> Path:
-    descriptor, partial = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    partial = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
-        with os.fdopen(descriptor, "wb") as handle:
-            figure.savefig(handle, format=name, dpi=300, metadata=_UNDATED[name])
-        Path(partial).replace(path)
+        figure.savefig(partial, format=name, dpi=300, metadata=_UNDATED[name])
+        partial.replace(path)
     finally:
-        Path(partial).unlink(missing_ok=True)
+        partial.unlink(missing_ok=True)
     return path

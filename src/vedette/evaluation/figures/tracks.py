@@ -9,9 +9,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.ticker import MaxNLocator
 
 from vedette.errors import InputError
-from vedette.evaluation.figures.style import COLUMN_WIDTH, GREY, TEXT_WIDTH, colour, new_figure, styled
+from vedette.evaluation.figures.style import COLUMN_WIDTH, GREY, TEXT_WIDTH, colour, new_figure, strategy_label, styled
 from vedette.kernels.types import Floats
 from vedette.simulation.records import RunRecord
 
@@ -25,40 +26,53 @@ def tracks_figure(*records: RunRecord, titles: Sequence[str] | None = None) -> F
 
     Args:
         records: one run fills a column, two fill the width of the page.
-        titles: one a run; by default the names of the strategies.
+        titles: one a run; by default the strategies.
 
     Raises `InputError` for no record, or another number of titles.
     """
     if not records:
         raise InputError("records: expected at least one run; got none")
-    names = tuple(titles) if titles is not None else tuple(record.planner for record in records)
+    names = tuple(titles) if titles is not None else tuple(strategy_label(record.planner) for record in records)
     if len(names) != len(records):
         raise InputError(f"titles: expected {len(records)}; got {len(names)}")
     width = COLUMN_WIDTH if len(records) == 1 else TEXT_WIDTH * max(1.0, len(records) / 2)
-    figure = new_figure(width / len(records) + 0.45, width=width)
+    figure = new_figure(width / len(records) + 0.3, width=width)
     panels = figure.subplots(1, len(records), sharex=True, sharey=True, squeeze=False)[0]
     for panel, record, name in zip(panels, records, names, strict=True):
+        panel.set_aspect("equal")
         draw_tracks(panel, record)
         panel.set_title(name)
+    _frame(panels[0], records)
     panels[0].set_ylabel("y (km)" if _in_km(records) else "y (m)")
     figure.legend(handles=_legend(records[0]), loc="outside lower center", ncols=3 if len(records) == 1 else 6)
     return figure
 
 
 def draw_tracks(axes: Axes, record: RunRecord) -> None:
-    """Draw one run into axes."""
+    """Draw one run into axes; their limits and aspect are the caller's."""
     scale = 1e-3 if _in_km([record]) else 1.0
     _draw_truth(axes, record, scale)
     _draw_estimates(axes, record, scale)
     for sensor in range(record.num_sensors):
         _draw_sensor(axes, record, sensor, scale)
-    axes.set_aspect("equal", adjustable="datalim")
     axes.set_xlabel("x (km)" if scale != 1.0 else "x (m)")
 
 
 def _in_km(records: Sequence[RunRecord]) -> bool:
     reach = max((np.ptp(_positions(record), axis=0).max() for record in records), default=0.0)
     return bool(reach > 5000.0)
+
+
+def _frame(axes: Axes, records: Sequence[RunRecord]) -> None:
+    """Limits, shared by all panels, of a square around everything but a stray estimate."""
+    points = np.concatenate([_positions(record) for record in records]) * (1e-3 if _in_km(records) else 1.0)
+    low, high = points.min(axis=0), points.max(axis=0)
+    reach = 0.55 * max(float((high - low).max()), np.finfo(float).eps)
+    middle = (low + high) / 2.0
+    axes.set_xlim(middle[0] - reach, middle[0] + reach)
+    axes.set_ylim(middle[1] - reach, middle[1] + reach)
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
 
 
 def _positions(record: RunRecord) -> Floats:
@@ -87,8 +101,12 @@ def _draw_sensor(axes: Axes, record: RunRecord, sensor: int, scale: float) -> No
     path = record.poses[:, sensor, :2] * scale
     axes.plot(path[:, 0], path[:, 1], color=GREY, linewidth=1.6, linestyle=(0, (2.5, 1)), zorder=5)
     marker = _SENSOR_MARKERS[sensor % len(_SENSOR_MARKERS)]
-    axes.plot(*path[0], marker=marker, color=_INK, markerfacecolor=GREY, markersize=6, zorder=6)
-    axes.annotate(f"S{sensor + 1}", _point(path[0]), xytext=(-4, 5), textcoords="offset points", ha="right", fontsize=7)
+    axes.plot(*path[0], marker=marker, color=_INK, markerfacecolor=GREY, markersize=9, zorder=6)
+    paper = {"boxstyle": "square,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.75}
+    style: dict[str, Any] = {"textcoords": "offset points", "fontsize": 7, "zorder": 9, "bbox": paper}
+    axes.annotate(f"S{sensor + 1}", _point(path[0]), xytext=(-6, 5), ha="right", **style)
+    if (path[-1] != path[0]).any():
+        axes.annotate(f"S{sensor + 1}", _point(path[-1]), xytext=(3, 3), **style)
     for number, decision in enumerate(record.decisions, start=1):
         place = _point(decision.poses[sensor, :2] * scale)
         heading = decision.plan.chosen_headings[sensor]
@@ -102,7 +120,7 @@ def _draw_sensor(axes: Axes, record: RunRecord, sensor: int, scale: float) -> No
             zorder=7,
         )
         axes.plot(
-            *place, marker="o", markersize=6.5, color=_INK, markerfacecolor="white", markeredgewidth=0.7, zorder=8
+            *place, marker="o", markersize=6.0, color=_INK, markerfacecolor="white", markeredgewidth=0.7, zorder=8
         )
         axes.annotate(str(number), place, ha="center", va="center_baseline", fontsize=5, zorder=9)
 
