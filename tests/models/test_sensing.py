@@ -1,0 +1,141 @@
+"""Built-in measurements, noise and detection against plain formulas."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from reference.differences import central_differences
+from vedette import models
+from vedette.errors import InputError
+
+pytestmark = pytest.mark.lanes
+
+POSE = np.array([-745.0, 830.0, 0.4])
+RNG = np.random.default_rng(5)
+STATES = np.hstack([RNG.uniform(-1000, 1000, (30, 2)), RNG.normal(0, 10, (30, 2))])
+OFFSETS = STATES[:, :2] - POSE[:2]
+RANGES = np.linalg.norm(OFFSETS, axis=1)
+BEARINGS = np.arctan2(OFFSETS[:, 1], OFFSETS[:, 0])
+
+MEASUREMENTS = {
+    "bearing_range": (models.bearing_range(), np.stack([BEARINGS, RANGES], axis=1)),
+    "bearing_only": (models.bearing_only(), BEARINGS[:, None]),
+    "range_only": (models.range_only(), RANGES[:, None]),
+    "position": (models.position(), STATES[:, :2]),
+}
+
+
+def jacobian(measurement, state, pose):
+    out = np.full((measurement.meas_dim, len(state)), np.nan)
+    measurement.jacobian(state, pose, measurement.params, out)
+    return out
+
+
+@pytest.mark.parametrize("kind", MEASUREMENTS)
+def test_measurement(kind):
+    measurement, expected = MEASUREMENTS[kind]
+    np.testing.assert_allclose(measurement.measure(STATES, POSE), expected, rtol=1e-14)
+    measurement.check(STATES, POSE)
+
+
+@pytest.mark.parametrize("kind", MEASUREMENTS)
+@pytest.mark.parametrize("state_dim", [4, 5])
+def test_jacobian_is_the_derivative(kind, state_dim):
+    measurement, _ = MEASUREMENTS[kind]
+    for state in np.hstack([STATES, np.ones((30, 1))])[:, :state_dim]:
+        slopes = central_differences(lambda moved: measurement.measure(moved, POSE)[0], state, 1e-4)
+        np.testing.assert_allclose(jacobian(measurement, state, POSE), slopes, atol=1e-7)
+
+
+def test_bearings_cover_all_quadrants_and_never_minus_pi():
+    states = np.array([[1, 0, 0, 0], [0, 1, 0, 0], [-1, 0, 0, 0], [0, -1, 0, 0], [-1, -1, 0, 0]], dtype=float)
+    bearings = models.bearing_only().measure(states, np.zeros(3))[:, 0]
+    np.testing.assert_allclose(bearings, [0, math.pi / 2, math.pi, -math.pi / 2, -3 * math.pi / 4])
+
+
+@pytest.mark.parametrize("kind", ["bearing_range", "bearing_only", "range_only"])
+def test_a_target_at_the_sensor_has_a_finite_jacobian(kind):
+    measurement, _ = MEASUREMENTS[kind]
+    np.testing.assert_array_equal(jacobian(measurement, np.zeros(4), np.zeros(3)), np.zeros((measurement.meas_dim, 4)))
+
+
+def test_range_dependent_noise_is_the_papers():
+    sigma_range, sigma_bearing = 10.0 + 5e-5 * RANGES**2, math.pi / 180 + 5e-6 * RANGES
+    both = models.range_dependent_noise(10.0, 5e-5, math.pi / 180, 5e-6)
+    expected = np.zeros((30, 2, 2))
+    expected[:, 0, 0], expected[:, 1, 1] = sigma_bearing**2, sigma_range**2
+    np.testing.assert_allclose(both.covs(STATES, POSE, 2), expected, rtol=1e-13)
+    bearing = models.range_dependent_noise(sigma_bearing=math.pi / 180, eta_bearing=5e-6)
+    np.testing.assert_allclose(bearing.covs(STATES, POSE, 1)[:, 0, 0], sigma_bearing**2, rtol=1e-13)
+    ranging = models.range_dependent_noise(10.0, 5e-5)
+    np.testing.assert_allclose(ranging.covs(STATES, POSE, 1)[:, 0, 0], sigma_range**2, rtol=1e-13)
+    assert (both.meas_dim, bearing.meas_dim, ranging.meas_dim) == (2, 1, 1)
+    both.check(STATES, POSE, 2)
+
+
+def test_constant_noise():
+    noise = models.constant_noise([2.0, 3.0])
+    np.testing.assert_array_equal(noise.covs(STATES[:1], POSE, 2), [[[4.0, 0.0], [0.0, 9.0]]])
+
+
+def test_gaussian_detection_is_the_papers():
+    detection = models.gaussian_detection(500.0)
+    peak, at = (math.exp(-0.5 * (d / 500.0) ** 2) / (500.0 * math.sqrt(2 * math.pi)) for d in (0.0, RANGES[0]))
+    assert detection.prob(STATES[0], POSE)[0] == pytest.approx(at / peak, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    "detection",
+    [
+        models.constant_detection(1.0),
+        models.gaussian_detection(1e4),
+        models.limited_range(1.0, 100.0),
+        models.limited_sector(1.0, 100.0, 1.0),
+    ],
+)
+def test_certain_detection_is_kept_below_one(detection):
+    assert detection.prob([POSE[0], POSE[1], 0.0, 0.0], POSE)[0] == models.MAX_PROB_DETECTION < 1.0
+
+
+def test_limited_range():
+    np.testing.assert_array_equal(
+        models.limited_range(0.9, 800.0).prob(STATES, POSE), np.where(RANGES <= 800.0, 0.9, 0)
+    )
+
+
+@pytest.mark.parametrize("heading", [0.0, 1.0, 3.0, math.pi, -3.0, 9.0])
+def test_limited_sector(heading):
+    pose = np.array([POSE[0], POSE[1], heading])
+    off_axis = np.abs(np.angle(np.exp(1j * (BEARINGS - heading))))
+    expected = np.where((RANGES <= 900.0) & (off_axis <= 0.7), 0.9, 0.0)
+    np.testing.assert_array_equal(models.limited_sector(0.9, 900.0, 0.7).prob(STATES, pose), expected)
+
+
+def test_a_full_sector_is_a_limited_range():
+    sector = models.limited_sector(0.9, 900.0, math.pi).prob(STATES, POSE)
+    np.testing.assert_array_equal(sector, models.limited_range(0.9, 900.0).prob(STATES, POSE))
+
+
+@pytest.mark.parametrize(
+    ("make", "field"),
+    [
+        (lambda: models.range_dependent_noise(), "sigma_range, sigma_bearing"),
+        (lambda: models.range_dependent_noise(10.0, eta_bearing=1.0), "eta_bearing"),
+        (lambda: models.range_dependent_noise(0.0), "sigma_range"),
+        (lambda: models.range_dependent_noise(1.0, -1.0), "eta_range"),
+        (lambda: models.constant_noise([]), "stds"),
+        (lambda: models.constant_noise([1.0, 0.0]), "stds"),
+        (lambda: models.constant_noise([[1.0]]), "stds"),
+        (lambda: models.constant_detection(1.5), "prob_detection"),
+        (lambda: models.gaussian_detection(0.0), "sigma"),
+        (lambda: models.limited_range(0.5, -1.0), "max_range"),
+        (lambda: models.limited_sector(0.5, 10.0, 0.0), "half_width_rad"),
+        (lambda: models.limited_sector(0.5, 10.0, 3.2), "half_width_rad"),
+    ],
+)
+def test_bad_numbers_are_named(make, field):
+    with pytest.raises(InputError, match=field):
+        make()
