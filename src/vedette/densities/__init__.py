@@ -1,1 +1,41 @@
 """What is believed about the targets: labelled and unlabelled multi-target densities with Gaussian-mixture tracks."""
+
+from vedette.densities.conversions import glmb_to_lmb, lmb_to_glmb, marginalise
+from vedette.densities.estimates import Estimate, TrackHistory, map_estimate, marginal_estimate, track_histories
+from vedette.densities.files import load_density, save_density
+from vedette.densities.glmb import GLMB
+from vedette.densities.lmb import LMB
+from vedette.densities.poisson import Poisson
+from vedette.densities.samples import MultiTargetSamples, sample_glmb, sample_lmb, sample_poisson
+from vedette.densities.statistics import (
+    cardinality_distribution,
+    existence_probabilities,
+    mixture_moments,
+    track_moments,
+)
+from vedette.densities.tracks import TrackTable
+
+__all__ = [
+    "GLMB",
+    "LMB",
+    "Estimate",
+    "MultiTargetSamples",
+    "Poisson",
+    "TrackHistory",
+    "TrackTable",
+    "cardinality_distribution",
+    "existence_probabilities",
+    "glmb_to_lmb",
+    "lmb_to_glmb",
+    "load_density",
+    "map_estimate",
+    "marginal_estimate",
+    "marginalise",
+    "mixture_moments",
+    "sample_glmb",
+    "sample_lmb",
+    "sample_poisson",
+    "save_density",
+    "track_histories",
+    "track_moments",
+]

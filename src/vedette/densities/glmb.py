@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from vedette.densities.tracks import TrackTable
+from vedette.densities import checks
+from vedette.densities.tracks import TrackTable, log_weights
+from vedette.errors import InputError, NumericalError, VedetteError
 from vedette.kernels import types as kt
+from vedette.kernels.labels import group_by_label_set
 from vedette.kernels.types import Floats, Ints
 
 
@@ -31,6 +36,15 @@ class GLMB:
     def num_hyps(self) -> int:
         return len(self.hyp_log_weights)
 
+    @property
+    def state_dim(self) -> int:
+        return self.tracks.state_dim
+
+    @property
+    def is_marginalised(self) -> bool:
+        """Whether every label set occurs once."""
+        return len(group_by_label_set(self.to_kernel())[1]) == self.num_hyps
+
     def to_kernel(self) -> kt.Glmb:
         """The same arrays as the bundle that kernels take."""
         return kt.Glmb(self.tracks.to_kernel(), self.hyp_offsets, self.hyp_tracks, self.hyp_log_weights)
@@ -43,3 +57,54 @@ class GLMB:
     def empty(cls, state_dim: int) -> GLMB:
         """The density that is certain of no target."""
         return cls(TrackTable.empty(state_dim), np.zeros(2, np.int64), np.empty(0, np.int64), np.zeros(1))
+
+    @classmethod
+    def from_hypotheses(cls, tracks: TrackTable, hypotheses: Sequence[Sequence[int]], weights: Any) -> GLMB:
+        """Density from hypotheses, each a sequence of indices into `tracks` in any order, and their linear weights.
+
+        Raises `InputError` for an index that is not in the table, for a label twice in one hypothesis, and for weights
+        that are negative or do not sum to one.
+        """
+        hyp_log_weights = log_weights("weights", weights)
+        if len(hyp_log_weights) != len(hypotheses):
+            raise InputError(f"weights: expected {len(hypotheses)}, one a hypothesis; got {len(hyp_log_weights)}")
+        hyps = [checks.as_ints(f"hypotheses[{h}]", hyp, (None,)) for h, hyp in enumerate(hypotheses)]
+        for h, hyp in enumerate(hyps):
+            _check_indices(f"hypotheses[{h}]", hyp, tracks.num_tracks)
+            hyps[h] = hyp[np.lexsort(tracks.labels[hyp].T[::-1])]
+        hyp_offsets = np.cumsum([0, *(len(hyp) for hyp in hyps)])
+        glmb = cls(tracks, hyp_offsets, np.concatenate([np.empty(0, np.int64), *hyps]), hyp_log_weights)
+        glmb.validate(error=InputError)
+        return glmb
+
+    def validate(self, *, error: type[VedetteError] = NumericalError) -> None:
+        """Raise unless this is a normalised density over tracks that exist, in label order, no label twice in one.
+
+        `InputError` for faults of form; `error` for values that are not finite, not normalised to 1e-9 or covariances
+        that are not symmetric positive definite.
+        """
+        self.tracks.validate(error=error)
+        checks.check_array("hyp_log_weights", self.hyp_log_weights, np.float64, (None,))
+        if self.num_hyps == 0:
+            raise InputError("hyp_log_weights: expected at least one hypothesis; got none")
+        checks.check_array("hyp_tracks", self.hyp_tracks, np.int64, (None,))
+        num_entries = len(self.hyp_tracks)
+        checks.check_offsets("hyp_offsets", self.hyp_offsets, self.num_hyps, num_entries, empty_allowed=True)
+        _check_indices("hyp_tracks", self.hyp_tracks, self.tracks.num_tracks)
+        in_order = checks.label_step_up(self.tracks.labels[self.hyp_tracks])
+        starts = self.hyp_offsets[(self.hyp_offsets > 0) & (self.hyp_offsets < num_entries)]
+        in_order[starts - 1] = True
+        if not in_order.all():
+            place = int(np.flatnonzero(~in_order)[0])
+            hyp = int(np.searchsorted(self.hyp_offsets, place, side="right")) - 1
+            pair = self.tracks.labels[self.hyp_tracks[place : place + 2]].tolist()
+            raise InputError(f"hyp_tracks: expected distinct labels in increasing order; hypothesis {hyp} has {pair}")
+        checks.check_log_weights("hyp_log_weights", self.hyp_log_weights, error)
+        checks.check_normalised("hyp_log_weights", self.hyp_log_weights, np.array([0, self.num_hyps]), error)
+
+
+def _check_indices(field: str, indices: Ints, num_tracks: int) -> None:
+    faulty = (indices < 0) | (indices >= num_tracks)
+    if faulty.any():
+        place = int(np.flatnonzero(faulty)[0])
+        raise InputError(f"{field}[{place}]: expected an index into {num_tracks} tracks; got {indices[place]}")

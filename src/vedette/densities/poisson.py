@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
+import numpy as np
+
+from vedette.densities import checks
+from vedette.densities.tracks import log_weights
+from vedette.errors import InputError, NumericalError, VedetteError
 from vedette.kernels.types import Floats
 
 
 @dataclass(frozen=True, slots=True)
 class Poisson:
-    """Poisson density: intensity sum of exp(log_weights[i]) N(.; means[i], covs[i]); weights sum to the expected number.
+    """Poisson density of intensity sum over i of exp(log_weights[i]) N(.; means[i], covs[i]).
 
     Attributes:
-        log_weights: (num_components,) log of the expected number carried by each component.
+        log_weights: (num_components,) log of the expected number of targets that each component carries.
         means: (num_components, state_dim).
         covs: (num_components, state_dim, state_dim).
     """
@@ -20,3 +26,43 @@ class Poisson:
     log_weights: Floats
     means: Floats
     covs: Floats
+
+    @property
+    def state_dim(self) -> int:
+        return int(self.means.shape[1])
+
+    @property
+    def expected_number(self) -> float:
+        """Mean number of targets."""
+        return float(np.exp(self.log_weights).sum())
+
+    @classmethod
+    def from_gaussians(cls, expected_numbers: Any, means: Any, covs: Any) -> Poisson:
+        """Density from the expected number, mean and covariance of each component.
+
+        expected_numbers: (num_components,) linear. means: (num_components, state_dim).
+        covs: (num_components, state_dim, state_dim). Raises `InputError` for another shape, a negative number, or a
+        covariance that is not symmetric positive definite.
+        """
+        logs = log_weights("expected_numbers", expected_numbers)
+        checked_means = checks.as_floats("means", means, (len(logs), None))
+        dim = checked_means.shape[1]
+        poisson = cls(logs, checked_means, checks.as_floats("covs", covs, (len(logs), dim, dim)))
+        poisson.validate(error=InputError)
+        return poisson
+
+    def validate(self, *, error: type[VedetteError] = NumericalError) -> None:
+        """Raise unless every array has its type and shape and every component is a Gaussian.
+
+        `InputError` for faults of form; `error` for values that are not finite or covariances that are not symmetric
+        positive definite.
+        """
+        checks.check_array("means", self.means, np.float64, (None, None))
+        num_components, dim = self.means.shape
+        if dim == 0:
+            raise InputError("means: expected a state of at least 1 dimension; got 0")
+        checks.check_array("log_weights", self.log_weights, np.float64, (num_components,))
+        checks.check_array("covs", self.covs, np.float64, (num_components, dim, dim))
+        checks.check_log_weights("log_weights", self.log_weights, error)
+        checks.check_finite("means", self.means, error)
+        checks.check_covariances("covs", self.covs, error)

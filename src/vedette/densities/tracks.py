@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
+from vedette.densities import checks
+from vedette.errors import InputError, NumericalError, VedetteError
 from vedette.kernels import types as kt
 from vedette.kernels.types import Floats, Ints
 
@@ -53,3 +57,70 @@ class TrackTable:
             np.empty((0, state_dim)),
             np.empty((0, state_dim, state_dim)),
         )
+
+    @classmethod
+    def from_gaussians(cls, labels: Any, means: Any, covs: Any) -> TrackTable:
+        """Tracks of one Gaussian each.
+
+        labels: (num_tracks, 2) integers. means: (num_tracks, state_dim). covs: (num_tracks, state_dim, state_dim).
+        Raises `InputError` for another shape, or for a covariance that is not symmetric positive definite.
+        """
+        checked = checks.as_ints("labels", labels, (None, 2))
+        num = len(checked)
+        checked_means = checks.as_floats("means", means, (num, None))
+        dim = checked_means.shape[1]
+        table = cls(
+            checked, np.arange(num + 1), np.zeros(num), checked_means, checks.as_floats("covs", covs, (num, dim, dim))
+        )
+        table.validate(error=InputError)
+        return table
+
+    @classmethod
+    def from_mixtures(cls, labels: Any, mixtures: Sequence[tuple[Any, Any, Any]]) -> TrackTable:
+        """Tracks of one Gaussian mixture each, given as (weights, means, covs) with linear weights that sum to one.
+
+        Raises `InputError` for another shape, for weights that are negative or do not sum to one, or for a covariance
+        that is not symmetric positive definite.
+        """
+        checked = checks.as_ints("labels", labels, (len(mixtures), 2))
+        if not mixtures:
+            raise InputError("mixtures: expected at least one; got none (use TrackTable.empty)")
+        weights = [log_weights(f"mixtures[{i}] weights", mixture[0]) for i, mixture in enumerate(mixtures)]
+        means, covs, dim = [], [], None
+        for i, mixture in enumerate(mixtures):
+            num = len(weights[i])
+            means.append(checks.as_floats(f"mixtures[{i}] means", mixture[1], (num, dim)))
+            dim = means[0].shape[1]
+            covs.append(checks.as_floats(f"mixtures[{i}] covs", mixture[2], (num, dim, dim)))
+        offsets = np.cumsum([0, *(len(weight) for weight in weights)])
+        table = cls(checked, offsets, np.concatenate(weights), np.concatenate(means), np.concatenate(covs))
+        table.validate(error=InputError)
+        return table
+
+    def validate(self, *, error: type[VedetteError] = NumericalError) -> None:
+        """Raise unless every array has its type and shape and every track is a probability density.
+
+        `InputError` for faults of form; `error` for values that are not finite, not normalised to 1e-9 or covariances
+        that are not symmetric positive definite.
+        """
+        checks.check_array("tracks.labels", self.labels, np.int64, (None, 2))
+        checks.check_array("tracks.means", self.means, np.float64, (None, None))
+        num_components, dim = self.means.shape
+        if dim == 0:
+            raise InputError("tracks.means: expected a state of at least 1 dimension; got 0")
+        checks.check_array("tracks.log_weights", self.log_weights, np.float64, (num_components,))
+        checks.check_array("tracks.covs", self.covs, np.float64, (num_components, dim, dim))
+        checks.check_offsets("tracks.offsets", self.offsets, self.num_tracks, num_components, empty_allowed=False)
+        checks.check_log_weights("tracks.log_weights", self.log_weights, error)
+        checks.check_normalised("tracks.log_weights", self.log_weights, self.offsets, error)
+        checks.check_finite("tracks.means", self.means, error)
+        checks.check_covariances("tracks.covs", self.covs, error)
+
+
+def log_weights(field: str, weights: Any) -> Floats:
+    """Logs of a user's linear weights. Raises `InputError` for a weight that is negative or not finite."""
+    linear = checks.as_floats(field, weights, (None,))
+    if not np.all((linear >= 0.0) & (linear < np.inf)):
+        raise InputError(f"{field}: expected numbers of at least 0; got {linear.tolist()}")
+    with np.errstate(divide="ignore"):
+        return np.asarray(np.log(linear))

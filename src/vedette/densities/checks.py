@@ -1,0 +1,145 @@
+"""Checks that the containers share. Each raises with the field's name, what was expected and what came.
+
+Faults of form (type, shape, order) raise `InputError`. Faults of value (not finite, not normalised, not positive
+definite) raise the `error` given: `NumericalError` where a computation left them, `InputError` for a user's data.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vedette.errors import InputError, NumericalError, VedetteError
+from vedette.kernels.types import Bools, Floats, Ints
+
+NORMALISATION_TOLERANCE = 1e-9
+SYMMETRY_TOLERANCE = 1e-9  # of the largest variance
+
+
+def check_array(field: str, array: Any, dtype: type, shape: Sequence[int | None]) -> None:
+    """Raise `InputError` unless `array` is a C-contiguous array of this type and shape (None: any length)."""
+    if not isinstance(array, np.ndarray):
+        raise InputError(f"{field}: expected an array of {np.dtype(dtype)}; got {type(array).__name__}")
+    if array.dtype != np.dtype(dtype):
+        raise InputError(f"{field}: expected an array of {np.dtype(dtype)}; got one of {array.dtype}")
+    check_shape(field, array, shape)
+    if not array.flags.c_contiguous:
+        raise InputError(f"{field}: expected a C-contiguous array; got strides {array.strides}")
+
+
+def check_shape(field: str, array: NDArray[Any], shape: Sequence[int | None]) -> None:
+    """Raise `InputError` unless `array` has this shape (None: any length)."""
+    fits = array.ndim == len(shape) and all(want in (None, have) for want, have in zip(shape, array.shape, strict=True))
+    if not fits:
+        wanted = ", ".join("any" if length is None else str(length) for length in shape)
+        raise InputError(f"{field}: expected shape ({wanted}); got {array.shape}")
+
+
+def _first(faulty: Bools) -> int:
+    return int(np.flatnonzero(faulty)[0])
+
+
+def check_finite(field: str, array: Floats, error: type[VedetteError] = NumericalError) -> None:
+    """Raise `error` unless every entry is finite."""
+    faulty = ~np.isfinite(array)
+    if faulty.any():
+        place = tuple(int(i) for i in np.argwhere(faulty)[0])
+        raise error(f"{field}{list(place)}: expected a finite number; got {array[place]}")
+
+
+def check_log_weights(field: str, log_weights: Floats, error: type[VedetteError] = NumericalError) -> None:
+    """Raise `error` unless every entry is a log weight: a number or -inf."""
+    faulty = np.isnan(log_weights) | (log_weights == np.inf)
+    if faulty.any():
+        place = _first(faulty)
+        raise error(f"{field}[{place}]: expected a log weight (a number or -inf); got {log_weights[place]}")
+
+
+def check_offsets(field: str, offsets: Any, count: int, total: int, *, empty_allowed: bool) -> None:
+    """Raise `InputError` unless `offsets` cuts `total` entries into `count` runs."""
+    check_array(field, offsets, np.int64, (count + 1,))
+    if offsets[0] != 0 or offsets[-1] != total:
+        raise InputError(f"{field}: expected to go from 0 to {total}; got {offsets[0]} to {offsets[-1]}")
+    faulty = np.diff(offsets) < (0 if empty_allowed else 1)
+    if faulty.any():
+        place = _first(faulty)
+        expected = "no decrease" if empty_allowed else "an increase"
+        raise InputError(f"{field}[{place + 1}]: expected {expected}; got {offsets[place + 1]} after {offsets[place]}")
+
+
+def run_log_sums(log_weights: Floats, offsets: Ints) -> Floats:
+    """log-sum-exp of each run of `log_weights`; runs are not empty."""
+    if len(offsets) == 1:
+        return np.empty(0)
+    peaks = np.maximum.reduceat(log_weights, offsets[:-1])
+    safe = np.where(np.isfinite(peaks), peaks, 0.0)
+    sums = np.add.reduceat(np.exp(log_weights - np.repeat(safe, np.diff(offsets))), offsets[:-1])
+    with np.errstate(divide="ignore"):
+        return np.asarray(safe + np.log(sums))
+
+
+def check_normalised(
+    field: str, log_weights: Floats, offsets: Ints, error: type[VedetteError] = NumericalError
+) -> None:
+    """Raise `error` unless the weights of each run sum to one, to 1e-9."""
+    log_sums = run_log_sums(log_weights, offsets)
+    faulty = ~(np.abs(log_sums) <= NORMALISATION_TOLERANCE)
+    if faulty.any():
+        place = _first(faulty)
+        run = f"{field}[{offsets[place]}:{offsets[place + 1]}]"
+        raise error(f"{run}: expected weights that sum to 1; got {np.exp(log_sums[place])!r}")
+
+
+def check_covariances(field: str, covs: Floats, error: type[VedetteError] = NumericalError) -> None:
+    """Raise `error` unless every matrix is finite, symmetric and positive definite."""
+    if covs.size == 0:
+        return
+    check_finite(field, covs, error)
+    scale = np.abs(np.diagonal(covs, axis1=1, axis2=2)).max(axis=1)
+    asymmetry = np.abs(covs - covs.transpose(0, 2, 1)).max(axis=(1, 2))
+    faulty = asymmetry > SYMMETRY_TOLERANCE * scale
+    if faulty.any():
+        place = _first(faulty)
+        raise error(f"{field}[{place}]: expected a symmetric matrix; got an asymmetry of {asymmetry[place]:.3g}")
+    try:
+        np.linalg.cholesky(covs)
+    except np.linalg.LinAlgError:
+        least = np.linalg.eigvalsh(covs)[:, 0]
+        place = int(np.argmin(least / np.maximum(scale, np.finfo(float).tiny)))
+        message = f"{field}[{place}]: expected a positive definite matrix; got a least eigenvalue of {least[place]:.3g}"
+        raise error(message) from None
+
+
+def label_step_up(labels: Ints) -> Bools:
+    """(len(labels) - 1,) whether each label is followed by a greater one."""
+    before, after = labels[:-1], labels[1:]
+    return np.asarray((before[:, 0] < after[:, 0]) | ((before[:, 0] == after[:, 0]) & (before[:, 1] < after[:, 1])))
+
+
+def as_floats(field: str, values: Any, shape: Sequence[int | None]) -> Floats:
+    """A fresh float64 array of a user's numbers. Raises `InputError` for another shape or for what is no number."""
+    return np.array(_given(field, values, "fiu", "numbers", shape), dtype=np.float64, order="C")
+
+
+def as_ints(field: str, values: Any, shape: Sequence[int | None]) -> Ints:
+    """A fresh int64 array of a user's integers. Raises `InputError` for another shape or for what is no integer."""
+    given = _given(field, values, "iu", "integers", shape)
+    if given.dtype.kind == "u" and np.any(given > np.iinfo(np.int64).max):
+        raise InputError(f"{field}: expected integers below 2^63; got {given.max()}")
+    return np.array(given, dtype=np.int64, order="C")
+
+
+def _given(field: str, values: Any, kinds: str, expected: str, shape: Sequence[int | None]) -> NDArray[Any]:
+    try:
+        given = np.asarray(values)
+    except (TypeError, ValueError, OverflowError) as fault:
+        raise InputError(f"{field}: expected an array of {expected}; {fault}") from None
+    if given.size == 0 and given.ndim < len(shape):
+        given = given.reshape(0, *(0 if length is None else length for length in shape[1:]))
+    if given.size and given.dtype.kind not in kinds:
+        raise InputError(f"{field}: expected an array of {expected}; got one of {given.dtype}")
+    check_shape(field, given, shape)
+    return given

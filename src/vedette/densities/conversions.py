@@ -1,0 +1,79 @@
+"""Conversions between labelled densities."""
+
+from __future__ import annotations
+
+import math
+
+from vedette.densities.glmb import GLMB
+from vedette.densities.lmb import LMB
+from vedette.errors import InputError
+from vedette.kernels import conversions as kernels
+
+DEFAULT_LOG_MIN_WEIGHT = math.log(1e-5)
+DEFAULT_MERGE_DISTANCE = 2.0
+
+
+def _check_limits(max_components: int, log_min_weight: float, merge_distance: float) -> None:
+    if max_components < 1:
+        raise InputError(f"max_components: expected at least 1; got {max_components}")
+    if not log_min_weight <= 0.0:
+        raise InputError(f"log_min_weight: expected the log of a weight of at most 1; got {log_min_weight}")
+    if not merge_distance >= 0.0:
+        raise InputError(f"merge_distance: expected at least 0; got {merge_distance}")
+
+
+def marginalise(
+    glmb: GLMB,
+    *,
+    max_components: int = 1,
+    log_min_weight: float = DEFAULT_LOG_MIN_WEIGHT,
+    merge_distance: float = DEFAULT_MERGE_DISTANCE,
+) -> GLMB:
+    """Marginalised delta-GLMB of a delta-GLMB: one hypothesis a label set (paper eq. 8; Fantacci and Vo 2015).
+
+    Keeps the probability of every label set, and so the cardinality distribution and the existence probabilities. Each
+    track of a label set becomes the mixture of its label's tracks in the set's hypotheses. With `max_components` 1 (the
+    default) that is one Gaussian of the mixture's mean and covariance. Otherwise components lighter than
+    `log_min_weight` (log, relative to the track) are dropped, those within the Mahalanobis distance `merge_distance`
+    are merged, and the heaviest `max_components` stay; a `merge_distance` of 0 merges nothing.
+
+    Hypotheses come out by descending weight, equal weights in the order of their first occurrence.
+    Raises `InputError` for a limit outside its range.
+    """
+    _check_limits(max_components, log_min_weight, merge_distance)
+    return GLMB.from_kernel(
+        kernels.marginalise(glmb.to_kernel(), float(log_min_weight), float(merge_distance), int(max_components))
+    )
+
+
+def glmb_to_lmb(
+    glmb: GLMB,
+    *,
+    max_components: int = 1,
+    log_min_weight: float = DEFAULT_LOG_MIN_WEIGHT,
+    merge_distance: float = DEFAULT_MERGE_DISTANCE,
+) -> LMB:
+    """LMB with the existence probability and track density of every label of a GLMB (Reuter et al. 2014, eq. 43-45).
+
+    Keeps the existence probabilities and so the mean cardinality, not its whole distribution. Mixtures are reduced as
+    by `marginalise`. Raises `InputError` for a limit outside its range.
+    """
+    _check_limits(max_components, log_min_weight, merge_distance)
+    return LMB.from_kernel(
+        kernels.glmb_to_lmb(glmb.to_kernel(), float(log_min_weight), float(merge_distance), int(max_components))
+    )
+
+
+def lmb_to_glmb(lmb: LMB, *, max_hyps: int) -> tuple[GLMB, float]:
+    """GLMB of the `max_hyps` most probable label subsets of an LMB, and the weight of those left out.
+
+    The GLMB shares the LMB's track table, and its weights are normalised over the subsets kept, which come by
+    descending weight. Subsets of probability zero are not listed. Raises `InputError` for a `max_hyps` below 1.
+    """
+    if max_hyps < 1:
+        raise InputError(f"max_hyps: expected at least 1; got {max_hyps}")
+    glmb, discarded_weight = kernels.lmb_to_glmb(lmb.to_kernel(), int(max_hyps))
+    return GLMB.from_kernel(glmb), float(discarded_weight)
+
+
+__all__ = ["DEFAULT_LOG_MIN_WEIGHT", "DEFAULT_MERGE_DISTANCE", "glmb_to_lmb", "lmb_to_glmb", "marginalise"]

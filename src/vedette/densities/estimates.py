@@ -1,0 +1,167 @@
+"""Estimates read off a density, and the histories that they make under stable labels."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from vedette.densities import checks
+from vedette.densities.conversions import glmb_to_lmb
+from vedette.densities.glmb import GLMB
+from vedette.densities.lmb import LMB
+from vedette.densities.statistics import cardinality_distribution, track_moments
+from vedette.densities.tracks import TrackTable
+from vedette.errors import InputError, NumericalError, VedetteError
+from vedette.kernels.types import Floats, Ints
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """Estimated targets at one moment, in increasing label order.
+
+    Attributes:
+        labels: (num_targets, 2) birth step and birth index.
+        means: (num_targets, state_dim) mean of each track; of a mixture, the mean of the whole mixture.
+        covs: (num_targets, state_dim, state_dim) covariance of the same.
+        existence: (num_targets,) probability that the label's target exists, over the whole density.
+    """
+
+    labels: Ints
+    means: Floats
+    covs: Floats
+    existence: Floats
+
+    @property
+    def num_targets(self) -> int:
+        return len(self.labels)
+
+    @classmethod
+    def empty(cls, state_dim: int) -> Estimate:
+        return cls(
+            np.empty((0, 2), np.int64), np.empty((0, state_dim)), np.empty((0, state_dim, state_dim)), np.empty(0)
+        )
+
+    def validate(self, *, error: type[VedetteError] = NumericalError) -> None:
+        """Raise `InputError` for faults of form, `error` for what is no state, covariance or probability."""
+        checks.check_array("labels", self.labels, np.int64, (None, 2))
+        checks.check_array("means", self.means, np.float64, (self.num_targets, None))
+        dim = self.means.shape[1]
+        checks.check_array("covs", self.covs, np.float64, (self.num_targets, dim, dim))
+        checks.check_array("existence", self.existence, np.float64, (self.num_targets,))
+        if not checks.label_step_up(self.labels).all():
+            raise InputError(f"labels: expected distinct labels in increasing order; got {self.labels.tolist()}")
+        checks.check_finite("means", self.means, error)
+        checks.check_covariances("covs", self.covs, error)
+        if not np.all((self.existence >= 0.0) & (self.existence <= 1.0)):
+            raise error(f"existence: expected probabilities; got {self.existence.tolist()}")
+
+
+def map_estimate(density: GLMB | LMB) -> Estimate:
+    """The most probable number of targets, then the most probable targets of that number (paper, section V).
+
+    GLMB: the heaviest hypothesis of that cardinality. LMB: that many labels of highest existence. Ties: the smaller
+    number; the earlier hypothesis; the smaller label. A track that is a mixture is estimated by its moments.
+    """
+    if isinstance(density, GLMB):
+        return _map_of_glmb(density)
+    if isinstance(density, LMB):
+        number = int(np.argmax(cardinality_distribution(density)))
+        chosen = np.sort(np.argsort(-density.existence_logit, kind="stable")[:number])
+        return _estimate(density.tracks, chosen, density.existence[chosen])
+    raise InputError(f"density: expected a GLMB or an LMB, which have labels; got {type(density).__name__}")
+
+
+def _map_of_glmb(density: GLMB) -> Estimate:
+    weights = np.exp(density.hyp_log_weights)
+    sizes = np.diff(density.hyp_offsets)
+    number = int(np.argmax(np.bincount(sizes, weights=weights)))
+    candidates = np.flatnonzero(sizes == number)
+    best = int(candidates[np.argmax(density.hyp_log_weights[candidates])])
+    chosen = density.hyp_tracks[density.hyp_offsets[best] : density.hyp_offsets[best + 1]]
+    labels = density.tracks.labels
+    same = (labels[:, None, 0] == labels[chosen, 0]) & (labels[:, None, 1] == labels[chosen, 1])
+    entry_weights = np.repeat(weights, sizes)
+    track_weights = np.bincount(density.hyp_tracks, weights=entry_weights, minlength=len(labels))
+    return _estimate(density.tracks, chosen, np.minimum(track_weights @ same, 1.0))
+
+
+def marginal_estimate(density: GLMB | LMB, threshold: float = 0.5) -> Estimate:
+    """Every label whose probability of existence exceeds `threshold`, with the moments of its marginal density.
+
+    Raises `InputError` for a threshold outside [0, 1).
+    """
+    if not 0.0 <= threshold < 1.0:
+        raise InputError(f"threshold: expected a probability below 1; got {threshold}")
+    if isinstance(density, GLMB):
+        density = glmb_to_lmb(density)
+    if not isinstance(density, LMB):
+        raise InputError(f"density: expected a GLMB or an LMB, which have labels; got {type(density).__name__}")
+    chosen = np.flatnonzero(density.existence > threshold)
+    return _estimate(density.tracks, chosen, density.existence[chosen])
+
+
+def _estimate(tracks: TrackTable, chosen: Ints, existence: Floats) -> Estimate:
+    labels = tracks.labels[chosen]
+    if len(tracks.log_weights) == tracks.num_tracks:
+        return Estimate(labels, tracks.means[chosen], tracks.covs[chosen], existence)
+    lengths = np.diff(tracks.offsets)[chosen]
+    offsets = np.concatenate([np.zeros(1, np.int64), np.cumsum(lengths)])
+    components = np.arange(offsets[-1]) + np.repeat(tracks.offsets[chosen] - offsets[:-1], lengths)
+    selected = TrackTable(
+        labels, offsets, tracks.log_weights[components], tracks.means[components], tracks.covs[components]
+    )
+    means, covs = track_moments(selected)
+    return Estimate(labels, means, covs, existence)
+
+
+@dataclass(frozen=True, slots=True)
+class TrackHistory:
+    """All estimates of one label, in order of time; scans at which it was not estimated are left out.
+
+    Attributes:
+        label: birth step and birth index.
+        scans: (num,) indices of the scans.
+        times: (num,) s.
+        means: (num, state_dim).
+        covs: (num, state_dim, state_dim).
+        existence: (num,).
+    """
+
+    label: tuple[int, int]
+    scans: Ints
+    times: Floats
+    means: Floats
+    covs: Floats
+    existence: Floats
+
+
+def track_histories(estimates: Sequence[Estimate], times: Floats) -> tuple[TrackHistory, ...]:
+    """Estimates of successive scans at `times` (s), gathered by label; labels in increasing order.
+
+    Raises `InputError` unless there is one time an estimate.
+    """
+    if len(estimates) != len(times):
+        raise InputError(f"times: expected {len(estimates)}, one an estimate; got {len(times)}")
+    places: dict[tuple[int, int], list[tuple[int, int]]] = {}
+    for scan, estimate in enumerate(estimates):
+        for target, (step, index) in enumerate(estimate.labels.tolist()):
+            places.setdefault((step, index), []).append((scan, target))
+    histories = []
+    for label, seen in sorted(places.items()):
+        scans = np.array([scan for scan, _ in seen])
+        histories.append(
+            TrackHistory(
+                label,
+                scans,
+                np.asarray(times, np.float64)[scans],
+                np.stack([estimates[scan].means[target] for scan, target in seen]),
+                np.stack([estimates[scan].covs[target] for scan, target in seen]),
+                np.array([estimates[scan].existence[target] for scan, target in seen]),
+            )
+        )
+    return tuple(histories)
+
+
+__all__ = ["Estimate", "TrackHistory", "map_estimate", "marginal_estimate", "track_histories"]

@@ -1,0 +1,127 @@
+"""Random multi-target states drawn from a density."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vedette.densities import checks
+from vedette.densities.glmb import GLMB
+from vedette.densities.lmb import LMB
+from vedette.densities.poisson import Poisson
+from vedette.densities.tracks import TrackTable
+from vedette.errors import InputError, NumericalError, VedetteError
+from vedette.kernels.types import Floats, Ints
+
+
+@dataclass(frozen=True, slots=True)
+class MultiTargetSamples:
+    """Samples of a multi-target state.
+
+    Attributes:
+        offsets: (num_samples + 1,) targets of sample `i` are `offsets[i]:offsets[i + 1]`.
+        labels: (num_targets, 2) label of each target, in increasing order within a sample; -1, -1 where the density
+            has no labels.
+        states: (num_targets, state_dim).
+    """
+
+    offsets: Ints
+    labels: Ints
+    states: Floats
+
+    @property
+    def num_samples(self) -> int:
+        return len(self.offsets) - 1
+
+    def sample(self, index: int) -> tuple[Ints, Floats]:
+        """Labels (num, 2) and states (num, state_dim) of one sample."""
+        if not 0 <= index < self.num_samples:
+            raise InputError(f"index: expected one of {self.num_samples} samples; got {index}")
+        targets = slice(self.offsets[index], self.offsets[index + 1])
+        return self.labels[targets], self.states[targets]
+
+    def validate(self, *, error: type[VedetteError] = NumericalError) -> None:
+        """Raise `InputError` unless the arrays fit each other, `error` unless the states are finite."""
+        checks.check_array("states", self.states, np.float64, (None, None))
+        checks.check_array("labels", self.labels, np.int64, (len(self.states), 2))
+        checks.check_array("offsets", self.offsets, np.int64, (None,))
+        if len(self.offsets) == 0:
+            raise InputError("offsets: expected at least one entry; got none")
+        checks.check_offsets("offsets", self.offsets, self.num_samples, len(self.states), empty_allowed=True)
+        checks.check_finite("states", self.states, error)
+
+
+def sample_glmb(density: GLMB, num_samples: int, *, rng: np.random.Generator) -> MultiTargetSamples:
+    """Independent samples of a GLMB: a hypothesis, then a state of each of its tracks."""
+    _check_number(num_samples)
+    hyps = _choose(density.hyp_log_weights, np.array([0, density.num_hyps]), np.zeros(num_samples, np.int64), rng)
+    sizes = np.diff(density.hyp_offsets)[hyps]
+    offsets = np.concatenate([np.zeros(1, np.int64), np.cumsum(sizes)])
+    within = np.arange(offsets[-1]) - np.repeat(offsets[:-1], sizes)
+    tracks = density.hyp_tracks[np.repeat(density.hyp_offsets[hyps], sizes) + within]
+    return MultiTargetSamples(offsets, density.tracks.labels[tracks], _draw_states(density.tracks, tracks, rng))
+
+
+def sample_lmb(density: LMB, num_samples: int, *, rng: np.random.Generator) -> MultiTargetSamples:
+    """Independent samples of an LMB: each track exists or not, then a state of each that does."""
+    _check_number(num_samples)
+    exists = rng.random((num_samples, density.tracks.num_tracks)) < density.existence
+    tracks = np.nonzero(exists)[1]
+    offsets = np.concatenate([np.zeros(1, np.int64), np.cumsum(exists.sum(axis=1))])
+    return MultiTargetSamples(offsets, density.tracks.labels[tracks], _draw_states(density.tracks, tracks, rng))
+
+
+def sample_poisson(density: Poisson, num_samples: int, *, rng: np.random.Generator) -> MultiTargetSamples:
+    """Independent samples of a Poisson density: a number of targets, then independent states."""
+    _check_number(num_samples)
+    offsets = np.concatenate([np.zeros(1, np.int64), np.cumsum(rng.poisson(density.expected_number, num_samples))])
+    num_targets = int(offsets[-1])
+    labels = np.full((num_targets, 2), -1, np.int64)
+    if num_targets == 0:
+        return MultiTargetSamples(offsets, labels, np.empty((0, density.state_dim)))
+    runs = np.array([0, len(density.log_weights)])
+    components = _choose(density.log_weights, runs, np.zeros(num_targets, np.int64), rng)
+    return MultiTargetSamples(offsets, labels, _draw_gaussians(density.means, density.covs, components, rng))
+
+
+def _check_number(num_samples: int) -> None:
+    if num_samples < 0:
+        raise InputError(f"num_samples: expected at least 0; got {num_samples}")
+
+
+def _choose(log_weights: Floats, offsets: Ints, runs: Ints, rng: np.random.Generator) -> Ints:
+    """One entry of each of `runs` (indices of runs of `log_weights`), with probability proportional to its weight."""
+    lengths = np.diff(offsets)
+    peaks = np.maximum.reduceat(log_weights, offsets[:-1])
+    cumulative = np.cumsum(np.exp(log_weights - np.repeat(peaks, lengths)))
+    before = np.concatenate([np.zeros(1), cumulative])[offsets]
+    totals = np.diff(before)
+    # Run i has the interval [i, i + 1); its last entry of positive weight ends at i + 1 exactly.
+    edges = np.repeat(np.arange(len(lengths)), lengths) + np.minimum(
+        (cumulative - np.repeat(before[:-1], lengths)) / np.repeat(totals, lengths), 1.0
+    )
+    # Strictly inside the run's interval, which the sum may round out of.
+    points = np.minimum(runs + rng.random(len(runs)), np.nextafter(runs + 1.0, 0.0))
+    return np.asarray(np.searchsorted(edges, points, side="right"), np.int64)
+
+
+def _draw_states(tracks: TrackTable, chosen: Ints, rng: np.random.Generator) -> Floats:
+    """One state of each of the `chosen` tracks."""
+    if len(chosen) == 0:
+        return np.empty((0, tracks.state_dim))
+    components = _choose(tracks.log_weights, tracks.offsets, chosen, rng)
+    return _draw_gaussians(tracks.means, tracks.covs, components, rng)
+
+
+def _draw_gaussians(means: Floats, covs: Floats, components: Ints, rng: np.random.Generator) -> Floats:
+    used, which = np.unique(components, return_inverse=True)
+    try:
+        factors = np.linalg.cholesky(covs[used])
+    except np.linalg.LinAlgError:
+        raise NumericalError("covs: expected positive definite covariances to sample from; got another") from None
+    noise = rng.standard_normal((len(components), means.shape[1]))
+    return np.asarray(means[components] + np.einsum("nij,nj->ni", factors[which], noise))
+
+
+__all__ = ["MultiTargetSamples", "sample_glmb", "sample_lmb", "sample_poisson"]
