@@ -1,0 +1,149 @@
+"""Runs on disk, in open formats.
+
+A run is a folder: `manifest.json` (what ran, on which versions, and a checksum of every other file), `scans.csv`
+(OSPA), `truth.csv`, `tracks.csv` (estimates), `sensors.csv`, `decisions.json` (choices with their reward tables) and,
+where it was given, `scenario.yaml`. A folder appears whole or not at all.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import platform
+import shutil
+import tempfile
+from collections.abc import Mapping
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+from vedette.errors import InputError
+from vedette.simulation.encoding import decode_run, encode_run
+from vedette.simulation.records import RunRecord
+
+FORMAT = "vedette-run"
+FORMAT_VERSION = 1
+MANIFEST = "manifest.json"
+SCENARIO = "scenario.yaml"
+_PACKAGES = ("vedette", "numpy", "scipy", "numba")
+
+
+def save_run(
+    record: RunRecord, directory: Path | str, *, scenario_text: str | None = None, overwrite: bool = False
+) -> Path:
+    """Write a run as a folder of its own.
+
+    Args:
+        directory: the folder to make; its parents are made too.
+        scenario_text: the scenario as it was read, kept beside the results.
+        overwrite: replace a folder that holds a run; a folder that holds anything else is never replaced.
+
+    Returns the folder. Raises `InputError` if it exists already, cannot be written, or the record contradicts itself.
+    """
+    target = Path(directory)
+    _check_free(target, overwrite)
+    files = {name: text.encode() for name, text in encode_run(record).items()}
+    if scenario_text is not None:
+        files[SCENARIO] = scenario_text.encode()
+    files[MANIFEST] = json.dumps(_manifest(record, files), indent=2, sort_keys=True).encode() + b"\n"
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=target.parent, prefix=f".{target.name}.") as scratch:
+            fresh = Path(scratch) / "new"
+            fresh.mkdir()
+            for name, content in files.items():
+                (fresh / name).write_bytes(content)
+            _swap_in(fresh, target, Path(scratch) / "old")
+    except OSError as error:
+        raise InputError(f"directory: expected a place to write a run; got {target}: {error}") from error
+    return target
+
+
+def load_run(directory: Path | str) -> RunRecord:
+    """Read a run back, bit for bit.
+
+    Raises `InputError`, naming the file, if the folder holds no run, one of a newer format, or one with a file that is
+    missing, cut short or altered since it was written.
+    """
+    folder = Path(directory)
+    manifest = read_manifest(folder)
+    files = {}
+    for name, checksum in manifest["files"].items():
+        if Path(name).name != name:
+            raise InputError(f"{folder / MANIFEST}: expected plain file names; got {name!r}")
+        content = _read(folder / name)
+        if hashlib.sha256(content).hexdigest() != checksum:
+            raise InputError(f"{folder / name}: expected the file as it was written; it is cut short or altered")
+        files[name] = content.decode()
+    return decode_run(manifest["run"], files, str(folder))
+
+
+def read_manifest(directory: Path | str) -> dict[str, Any]:
+    """The manifest of a saved run: format, versions, run, checksums of its files. Raises `InputError` as `load_run`."""
+    path = Path(directory) / MANIFEST
+    try:
+        manifest = json.loads(_read(path))
+    except ValueError as error:
+        raise InputError(f"{path}: expected the manifest of a run; it is cut short or altered: {error}") from error
+    if not isinstance(manifest, dict) or manifest.get("format") != FORMAT:
+        raise InputError(f"{path}: expected the manifest of a run; got another file")
+    if manifest.get("format_version") != FORMAT_VERSION:
+        raise InputError(
+            f"{path}: expected format version {FORMAT_VERSION}; got {manifest.get('format_version')}, "
+            "written by another version of this program"
+        )
+    if not isinstance(manifest.get("files"), dict) or not isinstance(manifest.get("run"), dict):
+        raise InputError(f"{path}: expected the fields files and run; it is cut short or altered")
+    return manifest
+
+
+def _manifest(record: RunRecord, files: Mapping[str, bytes]) -> dict[str, Any]:
+    return {
+        "format": FORMAT,
+        "format_version": FORMAT_VERSION,
+        "run": {
+            "scenario": record.scenario,
+            "planner": record.planner,
+            "seed": record.seed,
+            "run": record.run,
+            "timings_s": record.timings,
+        },
+        "versions": {"python": platform.python_version(), **{name: _version(name) for name in _PACKAGES}},
+        "files": {name: hashlib.sha256(content).hexdigest() for name, content in files.items()},
+    }
+
+
+def _version(package: str) -> str:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return "unknown"
+
+
+def _read(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise InputError(f"{path}: expected a file of a saved run; {error.strerror or error}") from error
+
+
+def _check_free(target: Path, overwrite: bool) -> None:
+    if not target.exists() or (target.is_dir() and not any(target.iterdir())):
+        return
+    if not overwrite:
+        raise InputError(f"directory: expected a new folder; {target} exists (ask to overwrite it, or name another)")
+    if not (target / MANIFEST).is_file():
+        raise InputError(f"directory: expected a folder that holds a run; {target} holds something else and is kept")
+
+
+def _swap_in(fresh: Path, target: Path, old: Path) -> None:
+    if not target.exists():
+        fresh.rename(target)
+        return
+    target.rename(old)
+    try:
+        fresh.rename(target)
+    except OSError:
+        old.rename(target)
+        raise
+    shutil.rmtree(old)
