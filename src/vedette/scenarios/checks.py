@@ -1,0 +1,216 @@
+"""Checks across the parts of a scenario: what each part alone cannot know."""
+
+from __future__ import annotations
+
+import importlib.util
+import math
+from collections.abc import Callable, Iterator, Sequence
+from itertools import pairwise
+from pathlib import Path as FilePath
+from typing import Any
+
+import numpy as np
+
+from vedette.scenarios.faults import Finding, Path, describe
+from vedette.scenarios.parts import Parts
+from vedette.scenarios.schema.base import Custom, Section
+from vedette.scenarios.schema.world import BirthSite, RecordedTargets, ScriptedTarget, Time
+from vedette.scenarios.sensor_checks import sensor_findings
+
+# How far a decision time may be from the time of a scan, in scans: rounding of sums of decimal fractions.
+_TIME_TOLERANCE = 1e-6
+_WEIGHT_TOLERANCE = 1e-6
+
+
+def step_of_time(time: float, start: float, step_period: float) -> int | None:
+    """The scan at `time`, or None where there is none."""
+    position = (time - start) / step_period + 1.0
+    return round(position) if abs(position - round(position)) <= _TIME_TOLERANCE else None
+
+
+def _schedule(parts: Parts) -> Iterator[Finding]:
+    control, time = parts.control, parts.time
+    if control is None or time is None:
+        return
+    for i, step in enumerate(control.decision_steps or ()):
+        if step > time.num_steps:
+            yield ("control", "decision_steps", i), f"a step up to the last, {time.num_steps}", describe(step)
+    if control.decision_times and not _faulty(time.start, time.step_period):
+        yield from _decision_times(control.decision_times, time)
+
+
+def _faulty(*fields: Any) -> bool:
+    # Parts of a faulty file have None where the schema promises a value.
+    return any(field is None for field in fields)
+
+
+def _decision_times(moments: Sequence[float], time: Time) -> Iterator[Finding]:
+    end = time.start + (time.num_steps - 1) * time.step_period
+    for i, moment in enumerate(moments):
+        if not time.start <= moment <= end + _TIME_TOLERANCE:
+            yield ("control", "decision_times", i), f"a time from {time.start:g} to {end:g} s", describe(moment)
+        elif step_of_time(moment, time.start, time.step_period) is None:
+            wanted = f"the time of a scan: {time.start:g} s and every {time.step_period:g} s after it"
+            yield ("control", "decision_times", i), wanted, describe(moment)
+
+
+def _schedule_order(parts: Parts) -> Iterator[Finding]:
+    if parts.control is None:
+        return
+    for name in ("decision_steps", "decision_times"):
+        for i, (before, after) in enumerate(pairwise(getattr(parts.control, name) or ())):
+            if after <= before:
+                yield ("control", name, i + 1), f"more than the one before it, {before:g}", describe(after)
+
+
+def _weights(parts: Parts) -> Iterator[Finding]:
+    weights = None if parts.fusion is None else parts.fusion.weights
+    if weights is None:
+        return
+    if parts.sensors and len(weights) != len(parts.sensors):
+        yield ("fusion", "weights"), f"as many weights as sensors, {len(parts.sensors)}", describe(weights)
+    if abs(math.fsum(weights) - 1.0) > _WEIGHT_TOLERANCE:
+        yield ("fusion", "weights"), "weights with sum 1", f"a sum of {math.fsum(weights):g}"
+
+
+def _fusion(parts: Parts) -> Iterator[Finding]:
+    if parts.fusion is None or parts.filter is None:
+        return
+    if parts.fusion.kind == "none" and len(parts.sensors) > 1:
+        yield ("fusion", "kind"), f"a fusion, as there are {len(parts.sensors)} sensors", '"none"'
+    if parts.fusion.kind == "cm_delta_glmb" and parts.filter.kind == "lmb":
+        yield ("fusion", "kind"), "clmb or none, as the filters are lmb", '"cm_delta_glmb"'
+
+
+def _state_length(path: Path, values: Sequence[float] | None, dim: int | None) -> Iterator[Finding]:
+    if values is not None and dim is not None and len(values) != dim:
+        yield path, f"{dim} numbers, as a state under motion has", describe(values)
+
+
+def _covariance(path: Path, rows: Sequence[Sequence[float]], dim: int) -> Iterator[Finding]:
+    if len(rows) != dim or any(len(row) != dim for row in rows):
+        shape = f"rows of {', '.join(str(len(row)) for row in rows)}" if len(rows) == dim else describe(rows)
+        yield path, f"{dim} rows of {dim} numbers", shape
+        return
+    cov = np.array(rows)
+    if not np.allclose(cov, cov.T, rtol=1e-9, atol=0.0):
+        yield path, "a symmetric matrix", "one that is not"
+        return
+    stds = np.sqrt(np.maximum(np.diagonal(cov), 0.0))
+    if (stds == 0.0).any() or np.linalg.eigvalsh(cov / np.outer(stds, stds))[0] <= 0.0:
+        yield path, "a positive definite matrix", "one that is not"
+
+
+def _births(parts: Parts) -> Iterator[Finding]:
+    for i, site in enumerate(parts.sites):
+        if site is not None:
+            yield from _birth_site(("birth", "sites", i), site, parts)
+
+
+def _birth_site(path: Path, site: BirthSite, parts: Parts) -> Iterator[Finding]:
+    yield from _state_length((*path, "mean"), site.mean, parts.state_dim)
+    yield from _state_length((*path, "std"), site.std, parts.state_dim)
+    for j, std in enumerate(site.std or ()):
+        if std <= 0.0:
+            yield (*path, "std", j), "a number above 0", describe(std)
+    if site.cov is not None:
+        yield from _covariance((*path, "cov"), site.cov, parts.state_dim or len(site.mean))
+    for j, step in enumerate(site.steps if isinstance(site.steps, tuple) else ()):
+        if step in site.steps[:j]:
+            yield (*path, "steps", j), "each step once", f"{step} again"
+        elif parts.num_steps is not None and step > parts.num_steps:
+            yield (*path, "steps", j), f"a step up to the last, {parts.num_steps}", describe(step)
+
+
+def _targets(parts: Parts) -> Iterator[Finding]:
+    for i, target in enumerate(parts.tracks):
+        if target is not None:
+            path: Path = ("targets", "tracks", i)
+            yield from _state_length((*path, "state"), target.state, parts.state_dim)
+            yield from _lifetime(path, target, parts.num_steps)
+
+
+def _lifetime(path: Path, target: ScriptedTarget, last: int | None) -> Iterator[Finding]:
+    if last is not None:
+        for name in ("start_step", "end_step"):
+            step = getattr(target, name)
+            if step is not None and step > last:
+                yield (*path, name), f"a step up to the last, {last}", describe(step)
+    if not _faulty(target.start_step, target.end_step) and target.end_step < target.start_step:  # type: ignore[operator]
+        yield (*path, "end_step"), f"a step from start_step, {target.start_step}, on", describe(target.end_step)
+
+
+def _absent(file: str) -> str:
+    return f"{describe(file)}, which is not there"
+
+
+def _recorded(parts: Parts) -> Iterator[Finding]:
+    recorded = parts.recorded
+    if recorded is None:
+        return
+    file = (parts.folder or FilePath()) / recorded.path
+    if file.suffix.lower() not in (".csv", ".parquet"):
+        yield ("targets", "path"), "a .csv or .parquet file", describe(recorded.path)
+    elif not file.is_file():
+        yield ("targets", "path"), "a file, relative to the scenario file", _absent(recorded.path)
+    elif file.suffix.lower() == ".csv":
+        yield from _columns(recorded, file)
+
+
+def _columns(recorded: RecordedTargets, file: FilePath) -> Iterator[Finding]:
+    with file.open(encoding="utf-8-sig", errors="replace") as lines:
+        header = [name.strip().strip('"') for name in lines.readline().split(",")]
+    for field, name in recorded.columns.names().items():
+        if name not in header:
+            yield ("targets", "columns", field), f"a column of {recorded.path}: {', '.join(header)}", describe(name)
+
+
+def _score(parts: Parts) -> Iterator[Finding]:
+    ospa, last = parts.ospa, parts.num_steps
+    if ospa is None:
+        return
+    for name in ("from_step", "to_step"):
+        step = getattr(ospa, name)
+        if step is not None and last is not None and step > last:
+            yield ("ospa", name), f"a step up to the last, {last}", describe(step)
+    if ospa.from_step is not None and ospa.to_step is not None and ospa.to_step < ospa.from_step:
+        yield ("ospa", "to_step"), f"a step from from_step, {ospa.from_step}, on", describe(ospa.to_step)
+
+
+def _customs(value: Any, path: Path) -> Iterator[tuple[Path, Custom]]:
+    if isinstance(value, Custom):
+        yield path, value
+    elif isinstance(value, Section):
+        for name in type(value).model_fields:
+            yield from _customs(getattr(value, name), (*path, name))
+
+
+def _references(parts: Parts) -> Iterator[Finding]:
+    sections: list[tuple[Path, Any]] = [(("motion",), parts.motion), (("survival",), parts.survival)]
+    sections += [(("sensors", i), sensor) for i, sensor in enumerate(parts.sensors)]
+    for path, custom in (found for start, section in sections for found in _customs(section, start)):
+        module = custom.python.rpartition(":")[0]
+        if module.endswith(".py"):
+            if not ((parts.folder or FilePath()) / module).is_file():
+                yield (*path, "python"), "a file, relative to the scenario file", _absent(module)
+        elif importlib.util.find_spec(module.partition(".")[0]) is None:
+            yield (*path, "python"), "a module that Python finds", describe(module)
+
+
+_CHECKS: tuple[Callable[[Parts], Iterator[Finding]], ...] = (
+    _schedule,
+    _schedule_order,
+    _weights,
+    _fusion,
+    _births,
+    _targets,
+    _recorded,
+    lambda parts: sensor_findings(parts.sensors),
+    _score,
+    _references,
+)
+
+
+def findings(parts: Parts) -> list[Finding]:
+    """Everything wrong across the parts. No user code is imported or run."""
+    return [finding for check in _CHECKS for finding in check(parts)]

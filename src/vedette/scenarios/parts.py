@@ -1,0 +1,129 @@
+"""The parts of a scenario that are valid by themselves, so that checks across parts can run on a faulty file too."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pydantic import TypeAdapter, ValidationError
+from pydantic_core import PydanticUndefined
+
+from vedette.scenarios.schema import ScenarioModel
+from vedette.scenarios.schema.planning import Control
+from vedette.scenarios.schema.sensors import Sensor
+from vedette.scenarios.schema.tracking import Filter, Fusion, Ospa
+from vedette.scenarios.schema.world import (
+    BirthSite,
+    CoordinatedTurn,
+    CustomMotion,
+    Motion,
+    RecordedTargets,
+    ScriptedTarget,
+    Survival,
+    Time,
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Parts:
+    """What could be read of each part; None where it could not.
+
+    A section that is faulty only in keys that could have been left out is there, with None for these keys.
+    `folder` is where the scenario file is, if it is a file.
+    """
+
+    time: Time | None
+    motion: Motion | None
+    survival: Survival | None
+    sites: tuple[BirthSite | None, ...]
+    tracks: tuple[ScriptedTarget | None, ...]
+    recorded: RecordedTargets | None
+    sensors: tuple[Sensor | None, ...]
+    filter: Filter | None
+    fusion: Fusion | None
+    control: Control | None
+    ospa: Ospa | None
+    folder: Path | None
+
+    @property
+    def state_dim(self) -> int | None:
+        """Length of a state under the motion model."""
+        return None if self.motion is None else state_dim(self.motion)
+
+    @property
+    def num_steps(self) -> int | None:
+        """Number of scans."""
+        return None if self.time is None else self.time.num_steps
+
+
+def state_dim(motion: Motion) -> int:
+    """Length of a state under a motion section."""
+    if isinstance(motion, CustomMotion):
+        return motion.state_dim
+    return 5 if isinstance(motion, CoordinatedTurn) else 4
+
+
+def parts_of_model(model: ScenarioModel, folder: Path | None) -> Parts:
+    """The parts of a scenario that is valid part by part."""
+    targets = model.targets
+    return Parts(
+        time=model.time,
+        motion=model.motion,
+        survival=model.survival,
+        sites=model.birth.sites,
+        tracks=() if isinstance(targets, RecordedTargets) else targets.tracks,
+        recorded=targets if isinstance(targets, RecordedTargets) else None,
+        sensors=model.sensors,
+        filter=model.filter,
+        fusion=model.fusion,
+        control=model.control,
+        ospa=model.ospa,
+        folder=folder,
+    )
+
+
+def parts_of_data(data: Mapping[str, Any], folder: Path | None) -> Parts:
+    """The parts of faulty data, in which unknown keys have been left out and sensors have their defaults."""
+
+    def section(name: str, annotation: Any) -> Any:
+        default = ScenarioModel.model_fields[name].default
+        return _valid(annotation, data[name]) if name in data else None if default is PydanticUndefined else default
+
+    return Parts(
+        time=section("time", Time),
+        motion=section("motion", Motion),
+        survival=section("survival", Survival),
+        sites=_valid_items(BirthSite, data, "birth", "sites"),
+        tracks=_valid_items(ScriptedTarget, data, "targets", "tracks"),
+        recorded=_valid(RecordedTargets, data.get("targets")),
+        sensors=_valid_items(Sensor, data, "sensors"),
+        filter=section("filter", Filter),
+        fusion=section("fusion", Fusion),
+        control=section("control", Control),
+        ospa=section("ospa", Ospa),
+        folder=folder,
+    )
+
+
+def _valid(annotation: Any, value: Any) -> Any:
+    """The section, None in place of what is faulty but could have been left out; None if more is faulty."""
+    adapter = TypeAdapter(annotation)
+    try:
+        return adapter.validate_python(value)
+    except ValidationError as error:
+        faulty = {detail["loc"][0] for detail in error.errors(include_url=False) if detail["loc"]}
+    if not isinstance(value, Mapping) or not faulty <= value.keys():
+        return None
+    try:
+        rest = adapter.validate_python({key: item for key, item in value.items() if key not in faulty})
+    except ValidationError:
+        return None
+    return rest.model_copy(update=dict.fromkeys(faulty))
+
+
+def _valid_items(annotation: Any, data: Any, *path: str) -> tuple[Any, ...]:
+    for key in path:
+        data = data.get(key) if isinstance(data, Mapping) else None
+    return tuple(_valid(annotation, item) for item in data) if isinstance(data, list) else ()

@@ -1,0 +1,63 @@
+"""What the sections of a scenario share: the strict base model and the types of their fields.
+
+Each field's description ends with its unit in brackets; [-] is a number without a unit.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import Annotated, Any
+
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, JsonValue
+from pydantic_core import PydanticCustomError
+
+_REFERENCE = re.compile(r"([A-Za-z_]\w*(\.[A-Za-z_]\w*)*|[^:]+\.py):[A-Za-z_]\w*(\.[A-Za-z_]\w*)*")
+
+
+def expected(what: str, *, at: tuple[str | int, ...] = ()) -> PydanticCustomError:
+    """The error of a validator that finds `what` missing, at the field itself or at a place inside it."""
+    return PydanticCustomError("expected", "expected {expected}", {"expected": what, "at": at})
+
+
+def _whole(value: Any) -> Any:
+    # In YAML 1.2 `1e3` is a floating-point number; where a count is wanted it is 1000.
+    return int(value) if isinstance(value, float) and value.is_integer() else value
+
+
+def _reference(value: str) -> str:
+    if not _REFERENCE.fullmatch(value):
+        raise expected('"package.module:attribute" or "file.py:attribute"')
+    return value
+
+
+def _word(value: str) -> str:
+    if not value.strip() or not value.isprintable():
+        raise expected("a name of one or more printable characters")
+    return value
+
+
+Whole = Annotated[int, BeforeValidator(_whole)]
+Name = Annotated[str, AfterValidator(_word)]
+Probability = Annotated[float, Field(ge=0.0, le=1.0)]
+# Lists in the file are tuples here; `strict=False` admits a list and leaves the items strict.
+Numbers = Annotated[tuple[float, ...], Field(strict=False)]
+SomeNumbers = Annotated[tuple[float, ...], Field(strict=False, min_length=1)]
+Point = Annotated[tuple[float, float], Field(strict=False)]
+PythonReference = Annotated[str, AfterValidator(_reference)]
+
+
+class Section(BaseModel):
+    """A mapping of the scenario file: no unknown keys, no silent conversion of types, nothing infinite."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False, validate_default=True)
+
+
+class Custom(Section):
+    """Something of the user's own, written in Python. Imported when a scenario is built, not when checked."""
+
+    python: PythonReference = Field(
+        description="Where it is: `package.module:attribute`, or `file.py:attribute` relative to the scenario file [-]."
+    )
+    arguments: dict[str, JsonValue] = Field(
+        default={}, description="Keyword arguments, where the attribute is a function that returns the object [-]."
+    )

@@ -1,0 +1,80 @@
+"""Section about control: when to decide, between which actions, and how an action is valued."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from vedette.scenarios.schema.base import Numbers, Probability, Section, expected
+from vedette.scenarios.schema.sensors import Actions, Headings
+from vedette.scenarios.schema.tracking import Count
+from vedette.scenarios.schema.world import Steps
+
+
+class CauchySchwarzReward(Section):
+    """Cauchy-Schwarz divergence between the predicted and the updated density (paper eq. 10 to 15)."""
+
+    kind: Literal["cauchy_schwarz"] = Field(default="cauchy_schwarz", description="Kind of reward [-].")
+    unit_volume: Literal["reference"] | Annotated[float, Field(gt=0.0)] = Field(
+        default=1.0,
+        description='Unit K of hyper-volume: a number, or "reference" for (4 pi)^(d/2) sqrt(det P) of the predicted '
+        "density, under which localisation counts as much as cardinality [state units].",
+    )
+
+
+class PlanningLimits(Section):
+    """How much of the density the planner works with."""
+
+    prior_hypotheses: Count = Field(default=10, description="Most hypotheses at the start of the horizon [-].")
+    max_hypotheses: Count = Field(default=40, description="Most hypotheses after each step of the horizon [-].")
+
+
+class Control(Section):
+    """When and how the sensors decide where to go. Without decisions they keep their course."""
+
+    decision_steps: Steps | None = Field(default=None, description="Scans after which they decide [-].")
+    decision_times: Numbers | None = Field(
+        default=None, description="The same as times, instead of decision_steps; each the time of a scan [s]."
+    )
+    actions_deg: Actions = Field(
+        default=tuple(range(-180, 181, 30)),
+        description="Actions of every sensor, in the order of tables and figures [deg].",
+    )
+    headings: Headings = Field(
+        default="absolute",
+        description="Whether an action is a heading, counter-clockwise from east, or a change of heading [-].",
+    )
+    merge_equal_headings: Literal[True] = Field(
+        default=True,
+        description="Actions that are one heading (-180 and 180) are evaluated once and shown each [-].",
+    )
+    horizon_steps: Count = Field(default=5, description="Pseudo-updates over the horizon, H [-].")
+    horizon_period: float = Field(default=2.0, gt=0.0, description="Time between pseudo-updates, T [s].")
+    births_over_horizon: Literal[False] = Field(
+        default=False, description="Neither the prediction nor the pseudo-updates give birth to targets [-]."
+    )
+    deaths_over_horizon: Literal[False] = Field(
+        default=False, description="Targets survive the prediction and the pseudo-updates with probability 1 [-]."
+    )
+    num_samples: Count = Field(default=40, description="Multi-target samples of the expected reward, M [-].")
+    ideal_measurements: Literal["ideal", "expected", "sampled"] = Field(
+        default="ideal",
+        description="Pseudo-measurements of a sample: noise-free where detection is probable; the mean over "
+        "detection; or drawn with detection, noise and clutter [-].",
+    )
+    detection_threshold: Probability = Field(
+        default=0.5, description="Ideal measurements see a target when its detection is at least so probable [-]."
+    )
+    reward: CauchySchwarzReward = Field(default=CauchySchwarzReward(), description="Value of a density [-].")
+    non_finite_reward: Literal["error"] = Field(
+        default="error", description="What a reward that is not a number does: an error that names its sample [-]."
+    )
+    ties: Literal["first"] = Field(default="first", description="Which of equal rewards wins: the first action [-].")
+    limits: PlanningLimits = Field(default=PlanningLimits(), description="How much it works with [-].")
+
+    @model_validator(mode="after")
+    def _one_schedule(self) -> Control:
+        if self.decision_steps is not None and self.decision_times is not None:
+            raise expected("either decision_steps or decision_times")
+        return self

@@ -1,0 +1,66 @@
+"""The whole scenario."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, field_validator, model_validator
+
+from vedette.scenarios.schema.base import Name, Section
+from vedette.scenarios.schema.planning import Control
+from vedette.scenarios.schema.sensors import Sensor, SensorDefaults
+from vedette.scenarios.schema.tracking import Estimator, Filter, Fusion, MapEstimator, Ospa
+from vedette.scenarios.schema.world import (
+    Birth,
+    ConstantSurvival,
+    ConstantVelocity,
+    Motion,
+    RegionSection,
+    Survival,
+    Targets,
+    Time,
+)
+
+
+def merge_sensor_defaults(data: Mapping[str, Any]) -> dict[str, Any]:
+    """A copy of a scenario's data in which every sensor has what `sensor_defaults` gives and it does not say itself."""
+    merged = dict(data)
+    defaults, sensors = data.get("sensor_defaults"), data.get("sensors")
+    if isinstance(defaults, Mapping) and isinstance(sensors, list | tuple):
+        given = {key: value for key, value in defaults.items() if value is not None}
+        merged["sensors"] = [{**given, **item} if isinstance(item, Mapping) else item for item in sensors]
+    return merged
+
+
+class ScenarioModel(Section):
+    """A scenario: a world, the sensors in it, and how they track and decide."""
+
+    format: Literal[1] = Field(default=1, description="Version of this format [-].")
+    name: Name = Field(description="Short name [-].")
+    description: str = Field(default="", description="What it is, where it comes from [-].")
+    time: Time = Field(description="The scans [-].")
+    region: RegionSection = Field(description="Surveillance region [-].")
+    motion: Motion = Field(default=ConstantVelocity(), description="How targets move [-].")
+    survival: Survival = Field(default=ConstantSurvival(), description="Whether they go on living [-].")
+    birth: Birth = Field(description="Where they appear, as the filters know it [-].")
+    targets: Targets = Field(description="The true targets [-].")
+    sensor_defaults: SensorDefaults | None = Field(
+        default=None, exclude=True, description="What the sensors share; merged into them when read [-]."
+    )
+    sensors: Annotated[tuple[Sensor, ...], Field(strict=False, min_length=1)] = Field(description="The sensors [-].")
+    filter: Filter = Field(default=Filter(), description="The local filters [-].")
+    fusion: Fusion = Field(default=Fusion(), description="How their densities become one [-].")
+    estimator: Estimator = Field(default=MapEstimator(), description="How estimates are read off [-].")
+    control: Control = Field(default=Control(), description="When and how the sensors decide [-].")
+    ospa: Ospa = Field(default=Ospa(), description="How the estimates are scored [-].")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _merge(cls, data: Any) -> Any:
+        return merge_sensor_defaults(data) if isinstance(data, Mapping) else data
+
+    @field_validator("sensor_defaults")
+    @classmethod
+    def _merged(cls, _: SensorDefaults | None) -> None:
+        return None

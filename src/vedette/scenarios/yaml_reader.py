@@ -1,0 +1,224 @@
+"""YAML 1.2 (core schema) read into plain data, with the place of every key and value.
+
+Only mappings, lists, words, numbers, true/false and null come out; a tag never makes an object. Anchors and aliases
+work. Everything that is wrong but leaves the text readable (a key twice, a foreign tag) is reported together.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+from ruamel.yaml import YAML
+from ruamel.yaml.error import MarkedYAMLError, YAMLError
+from ruamel.yaml.events import (
+    AliasEvent,
+    DocumentStartEvent,
+    MappingEndEvent,
+    ScalarEvent,
+    SequenceEndEvent,
+    SequenceStartEvent,
+    StreamEndEvent,
+)
+
+from vedette.scenarios.faults import Fault, Path, Place, describe
+
+_MAX_DEPTH = 50
+_MAX_NODES = 200_000  # aliases of aliases can stand for any number of nodes
+_CORE_TAGS = {f"tag:yaml.org,2002:{name}" for name in ("null", "bool", "int", "float", "str", "seq", "map")}
+_STR_TAGS = ("tag:yaml.org,2002:str", "!")
+_INTEGER = re.compile(r"[-+]?[0-9]+")
+_BASED = re.compile(r"0o[0-7]+|0x[0-9a-fA-F]+")
+_FLOAT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
+_SPECIAL = re.compile(r"[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)")
+_WORDS: dict[str, Any] = {text: None for text in ("", "~", "null", "Null", "NULL")}
+_WORDS |= {text: True for text in ("true", "True", "TRUE")} | {text: False for text in ("false", "False", "FALSE")}
+
+
+@dataclass(frozen=True, slots=True)
+class Document:
+    """Plain data of a file, where each thing stands, and what was wrong with the text."""
+
+    file: str
+    data: Any
+    key_places: dict[Path, Place]
+    value_places: dict[Path, Place]
+    faults: list[Fault]
+
+    def place(self, path: Path) -> Place:
+        """Place of the key (or list item) at `path`, or of the nearest thing around it that stands in the file."""
+        for length in range(len(path), 0, -1):
+            found = self.key_places.get(path[:length]) or self.value_places.get(path[:length])
+            if found:
+                return found
+        return self.value_places.get((), (1, 1))
+
+    def value_place(self, path: Path) -> Place:
+        """Place of the value at `path`, or else of what is nearest around it."""
+        return self.value_places.get(path) or self.place(path)
+
+
+def plain_scalar(text: str) -> Any:
+    """Value of an unquoted scalar under the core schema of YAML 1.2: `1e3` is a number, `no` and `1_000` are words."""
+    if text in _WORDS:
+        return _WORDS[text]
+    if _INTEGER.fullmatch(text):
+        # Thousands of digits are no number of ours, and Python refuses to convert them.
+        return int(text) if len(text) <= 300 else text
+    if _BASED.fullmatch(text):
+        return int(text, 0)
+    if _FLOAT.fullmatch(text):
+        return float(text)
+    return float(text.replace(".", "")) if _SPECIAL.fullmatch(text) else text
+
+
+@dataclass(slots=True)
+class _Anchor:
+    value: Any
+    path: Path
+
+
+@dataclass(slots=True)
+class _Reader:
+    events: Iterator[Any]
+    keys: dict[Path, Place] = field(default_factory=dict)
+    values: dict[Path, Place] = field(default_factory=dict)
+    faults: list[Fault] = field(default_factory=list)
+    anchors: dict[str, _Anchor] = field(default_factory=dict)
+    size_reported: bool = False
+
+    def fault(self, place: Place, path: Path, expected: str, got: str) -> None:
+        self.faults.append(Fault(place, path, expected, got))
+
+    def node(self, event: Any, path: Path) -> Any:
+        place = _place(event)
+        self.values[path] = place
+        if isinstance(event, AliasEvent):
+            return self.alias(event, path)
+        tag = event.tag
+        if tag is not None and str(tag) not in (*_CORE_TAGS, "!"):
+            self.fault(place, path, "plain data without a tag", f"the tag {tag}")
+        if isinstance(event, ScalarEvent):
+            value = self.scalar(event)
+        elif isinstance(event, SequenceStartEvent):
+            value = self.sequence(path)
+        else:
+            value = self.mapping(path)
+        if event.anchor is not None:
+            self.anchors[event.anchor] = _Anchor(value, path)
+        return value
+
+    def scalar(self, event: Any) -> Any:
+        quoted_or_text = event.style in ("'", '"', "|", ">") or (event.tag is not None and str(event.tag) in _STR_TAGS)
+        return str(event.value) if quoted_or_text else plain_scalar(event.value)
+
+    def sequence(self, path: Path) -> list[Any]:
+        items: list[Any] = []
+        while not isinstance(event := next(self.events), SequenceEndEvent):
+            items.append(self.child(event, (*path, len(items))))
+        return items
+
+    def mapping(self, path: Path) -> dict[str, Any]:
+        entries: dict[str, Any] = {}
+        while not isinstance(event := next(self.events), MappingEndEvent):
+            key = self.key(event, path)
+            inner = (*path, key) if key is not None and key not in entries else (*path, "?")
+            if key is not None and key in entries:
+                first = self.keys[(*path, key)][0]
+                self.fault(_place(event), (*path, key), "each key once", f"it again, after line {first}")
+            elif key is not None:
+                self.keys[inner] = _place(event)
+            value = self.child(next(self.events), inner)
+            if inner[-1] == key:
+                entries[key] = value
+        return entries
+
+    def key(self, event: Any, path: Path) -> str | None:
+        if isinstance(event, ScalarEvent):
+            value = self.scalar(event)
+            if isinstance(value, str):
+                return value
+            got = describe(value)
+        else:
+            got = describe(self.child(event, (*path, "?")))
+        self.fault(_place(event), path, "a word as key", got)
+        return None
+
+    def child(self, event: Any, path: Path) -> Any:
+        if len(path) > _MAX_DEPTH:
+            raise _Unreadable(Fault(_place(event), (), f"at most {_MAX_DEPTH} levels of nesting", "more"))
+        return self.node(event, path)
+
+    def alias(self, event: Any, path: Path) -> Any:
+        anchor = self.anchors.get(event.anchor)
+        if anchor is None:
+            self.fault(_place(event), path, "an alias of a node that stands, complete, before it", f"*{event.anchor}")
+            return None
+        depth = len(anchor.path)
+        for places in (self.keys, self.values):
+            inside = [(p, place) for p, place in places.items() if len(p) > depth and p[:depth] == anchor.path]
+            if len(places) + len(inside) > _MAX_NODES:
+                raise _Unreadable(Fault(_place(event), (), f"at most {_MAX_NODES} values", "more, by aliases"))
+            places.update(((*path, *p[depth:]), place) for p, place in inside)
+        return anchor.value
+
+
+class _Unreadable(Exception):
+    """The text cannot be read further."""
+
+    def __init__(self, fault: Fault) -> None:
+        super().__init__(str(fault))
+        self.fault = fault
+
+
+def _place(event: Any) -> Place:
+    return event.start_mark.line + 1, event.start_mark.column + 1
+
+
+def _syntax(place: Place, problem: str) -> Fault:
+    hint = "indent with spaces, not tabs" if "\\t" in problem else ""
+    return Fault(place, (), "valid YAML 1.2", f"a syntax error: {problem}", hint)
+
+
+def _document_start(events: Iterator[Any]) -> Any:
+    """Skip to the first node; `None` if there is none."""
+    for event in events:
+        if isinstance(event, DocumentStartEvent):
+            if event.version is not None and tuple(event.version) != (1, 2):
+                got = ".".join(map(str, event.version))
+                raise _Unreadable(Fault(_place(event), (), "YAML 1.2", f"a %YAML {got} directive"))
+            return next(events)
+        if isinstance(event, StreamEndEvent):
+            return None
+    return None
+
+
+def _read(reader: _Reader) -> Any:
+    first = _document_start(reader.events)
+    if first is None:
+        return None
+    data = reader.node(first, ())
+    for event in reader.events:
+        if isinstance(event, DocumentStartEvent):
+            reader.fault(_place(event), (), "one document", "another after it")
+            break
+    return data
+
+
+def read_yaml(text: str, file: str) -> Document:
+    """Read YAML 1.2 text. Never raises for what is in the text: the faults are in the result."""
+    reader = _Reader(iter(YAML(typ="safe", pure=True).parse(text)))
+    data: Any = None
+    try:
+        data = _read(reader)
+    except _Unreadable as error:
+        reader.faults.append(error.fault)
+    except MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        place = (mark.line + 1, mark.column + 1) if mark else (1, 1)
+        reader.faults.append(_syntax(place, str(error.problem or error.context)))
+    except YAMLError as error:
+        reader.faults.append(_syntax((1, 1), str(error).splitlines()[0]))
+    return Document(file, data, reader.keys, reader.values, reader.faults)

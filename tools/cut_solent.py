@@ -1,0 +1,103 @@
+"""Cut the ships of the `solent` scenario out of a public AIS recording.
+
+    python tools/cut_solent.py SolentAIS_20160112_130211.csv src/vedette/scenarios/data/solent.csv
+
+The recording is `docs/demos/SolentAIS_20160112_130211.csv` in the source distribution of Stone Soup 1.9.1 (MIT).
+The steps and the numbers below are all there is to it; `src/vedette/scenarios/data/README.md` says them in words.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import itertools
+import math
+from collections import defaultdict
+from collections.abc import Iterator
+from datetime import datetime
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+Path2D = NDArray[np.float64]  # (n, 3): time in s, x east and y north in m
+
+ORIGIN_LATITUDE_DEG, ORIGIN_LONGITUDE_DEG = 50.7865, -1.1171  # middle of the box
+HALF_BOX = 3000.0  # m
+WINDOW = (1800.0, 3600.0)  # s after the first report of the file
+MAX_SPEED = 30.0  # m/s; a report that would need more since the last good one is dropped
+MAX_GAP = 90.0  # s; a longer silence ends the track
+MIN_SPEED = 1.0  # m/s, taken over SPEED_SPAN; slower is moored, anchored or drifting
+SPEED_SPAN = 120.0  # s
+MIN_DURATION = 180.0  # s; a shorter run is left out
+REPORT_SPACING = 9.0  # s; closer reports are thinned
+
+
+def read_reports(path: Path) -> dict[str, Path2D]:
+    """Reports of each ship in time order, in seconds from the first one and metres east and north of the origin."""
+    latitude = math.radians(ORIGIN_LATITUDE_DEG)
+    eccentricity_squared = 0.00669437999014  # WGS84
+    curvature = 1.0 - eccentricity_squared * math.sin(latitude) ** 2
+    radius_east = 6378137.0 / math.sqrt(curvature) * math.cos(latitude)
+    radius_north = 6378137.0 * (1.0 - eccentricity_squared) / curvature**1.5
+    ships: dict[str, list[tuple[float, float, float]]] = defaultdict(list)
+    with path.open(encoding="utf-8", newline="") as file:
+        rows = [(datetime.fromisoformat(row["Time"]), row) for row in csv.DictReader(file)]
+    first = min(time for time, _ in rows)
+    for time, row in rows:
+        x = radius_east * math.radians(float(row["Longitude_degrees"]) - ORIGIN_LONGITUDE_DEG)
+        y = radius_north * math.radians(float(row["Latitude_degrees"]) - ORIGIN_LATITUDE_DEG)
+        ships[row["MMSI"]].append(((time - first).total_seconds(), x, y))
+    return {ship: np.array(sorted(reports)) for ship, reports in ships.items()}
+
+
+def drop_jumps(reports: Path2D) -> Path2D:
+    """Leave out the reports that the ship could not have reached at `MAX_SPEED`, and the thinned ones."""
+    kept = [reports[0]]
+    for report in reports[1:]:
+        elapsed = report[0] - kept[-1][0]
+        if elapsed >= REPORT_SPACING and math.dist(report[1:], kept[-1][1:]) <= MAX_SPEED * elapsed:
+            kept.append(report)
+    return np.array(kept)
+
+
+def under_way(reports: Path2D) -> NDArray[np.bool_]:
+    """(n,) whether the ship made good at least `MIN_SPEED` over the span around each report."""
+    times = reports[:, 0]
+    early = np.clip(times - SPEED_SPAN / 2, times[0], None)
+    late = np.clip(times + SPEED_SPAN / 2, None, times[-1])
+    moved = [np.interp(late, times, reports[:, axis]) - np.interp(early, times, reports[:, axis]) for axis in (1, 2)]
+    return np.asarray(np.hypot(*moved) >= MIN_SPEED * np.maximum(late - early, REPORT_SPACING))
+
+
+def runs(reports: Path2D) -> Iterator[Path2D]:
+    """Stretches without a long silence in which the ship is under way, inside the box and the window."""
+    breaks = np.flatnonzero(np.diff(reports[:, 0]) > MAX_GAP) + 1
+    for stretch in np.split(reports, breaks):
+        inside = np.all(np.abs(stretch[:, 1:]) <= HALF_BOX, axis=1)
+        inside &= (stretch[:, 0] >= WINDOW[0]) & (stretch[:, 0] <= WINDOW[1])
+        wanted = inside & under_way(stretch)
+        for is_wanted, group in itertools.groupby(range(len(stretch)), key=wanted.__getitem__):
+            run = stretch[list(group)]
+            if is_wanted and run[-1, 0] - run[0, 0] >= MIN_DURATION:
+                yield run
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("recording", type=Path)
+    parser.add_argument("out", type=Path)
+    arguments = parser.parse_args()
+    ships = read_reports(arguments.recording)
+    found = [run for ship in sorted(ships) for run in runs(drop_jumps(ships[ship]))]
+    found.sort(key=lambda run: (run[0, 0], run[0, 1]))
+    rows = [(report[0] - WINDOW[0], number, *report[1:]) for number, run in enumerate(found, 1) for report in run]
+    rows.sort()
+    with arguments.out.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(["time", "id", "x", "y"])
+        writer.writerows((f"{time:.1f}", number, f"{x:.1f}", f"{y:.1f}") for time, number, x, y in rows)
+
+
+if __name__ == "__main__":
+    main()
