@@ -1,0 +1,38 @@
+"""Small array helpers whose written-out loops compile in a tenth of the time of their NumPy counterparts."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from vedette.kernels.compile import kernel
+from vedette.kernels.types import Floats, Ints
+
+
+@kernel
+def filled_ints(num: int, value: int) -> Ints:
+    array = np.empty(num, np.int64)
+    for i in range(num):
+        array[i] = value
+    return array
+
+
+@kernel
+def grown_floats(array: Floats, needed: int) -> Floats:
+    """`array` itself if it holds `needed` entries, else a longer one with the same beginning."""
+    if needed <= len(array):
+        return array
+    longer = np.empty(max(needed, 2 * len(array)))
+    for i in range(len(array)):
+        longer[i] = array[i]
+    return longer
+
+
+@kernel
+def grown_ints(array: Ints, needed: int) -> Ints:
+    """`array` itself if it holds `needed` entries, else a longer one with the same beginning."""
+    if needed <= len(array):
+        return array
+    longer = np.empty(max(needed, 2 * len(array)), np.int64)
+    for i in range(len(array)):
+        longer[i] = array[i]
+    return longer

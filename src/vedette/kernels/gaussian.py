@@ -1,0 +1,279 @@
+"""Single-target Gaussian prediction and update: extended, unscented and cubature Kalman filters.
+
+`method` of a model bundle: LINEARISED uses the Jacobian, UNSCENTED 2n+1 sigma points with kappa = 1 (all weights
+positive, so covariances stay positive definite), CUBATURE 2n points.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from vedette.kernels.compile import kernel
+from vedette.kernels.linalg import LOG_2PI, cholesky, log_det_from_factor, solve_lower
+from vedette.kernels.types import Bools, Floats, Motion, Sensor
+
+LINEARISED = 0
+UNSCENTED = 1
+CUBATURE = 2
+UNSCENTED_KAPPA = 1.0
+
+_TWO_PI = 2.0 * math.pi
+
+
+class Scratch(NamedTuple):
+    """Working arrays of one thread for a given state and measurement dimension."""
+
+    jacobian: Floats
+    product: Floats
+    noise: Floats
+    factor: Floats
+    points: Floats
+    images: Floats
+    measurement_jacobian: Floats
+    measurement_noise: Floats
+    innovation_cov: Floats
+    residual: Floats
+    angular_state: Bools
+
+
+class Innovation(NamedTuple):
+    """What a component expects of a scan, one entry a component; everything an update needs but the measurement.
+
+    predicted: (num, meas_dim). factor: (num, meas_dim, meas_dim) lower Cholesky factor of the innovation covariance.
+    whitened_cross: (num, meas_dim, state_dim) factor^-1 (state-measurement covariance)'. covs: posterior covariances.
+    log_norm: (num,) log of the Gaussian's normalising constant. prob_detection: (num,).
+    """
+
+    predicted: Floats
+    factor: Floats
+    whitened_cross: Floats
+    covs: Floats
+    log_norm: Floats
+    prob_detection: Floats
+
+
+@kernel
+def make_scratch(state_dim: int, meas_dim: int) -> Scratch:
+    num_points = 2 * state_dim + 1
+    return Scratch(
+        np.empty((state_dim, state_dim)),
+        np.empty((state_dim, state_dim)),
+        np.empty((state_dim, state_dim)),
+        np.empty((state_dim, state_dim)),
+        np.empty((num_points, state_dim)),
+        np.empty((num_points, max(state_dim, meas_dim))),
+        np.empty((meas_dim, state_dim)),
+        np.empty((meas_dim, meas_dim)),
+        np.empty((meas_dim, meas_dim)),
+        np.empty(meas_dim),
+        np.zeros(state_dim, np.bool_),
+    )
+
+
+@kernel
+def make_innovation(num: int, state_dim: int, meas_dim: int) -> Innovation:
+    return Innovation(
+        np.empty((num, meas_dim)),
+        np.empty((num, meas_dim, meas_dim)),
+        np.empty((num, meas_dim, state_dim)),
+        np.empty((num, state_dim, state_dim)),
+        np.empty(num),
+        np.empty(num),
+    )
+
+
+@kernel
+def wrap_angle(angle: float) -> float:
+    """The same direction in (-pi, pi]."""
+    if -math.pi < angle <= math.pi:
+        return angle
+    wrapped = angle - _TWO_PI * math.floor((angle + math.pi) / _TWO_PI)
+    return math.pi if wrapped <= -math.pi else wrapped
+
+
+@kernel
+def _sigma_points(method: int, mean: Floats, cov: Floats, points: Floats, factor: Floats) -> tuple[int, float, float]:
+    """Fill `points`; return their number and the weights of the first (the mean, or 0) and of every other."""
+    n = mean.shape[0]
+    if not cholesky(cov, factor):
+        raise ValueError("covariance of a track is not positive definite")
+    kappa = UNSCENTED_KAPPA if method == UNSCENTED else 0.0
+    spread = math.sqrt(n + kappa)
+    for j in range(n):
+        points[0, j] = mean[j]
+    for i in range(n):
+        for j in range(n):
+            step = spread * factor[j, i] if j >= i else 0.0
+            points[1 + i, j] = mean[j] + step
+            points[1 + n + i, j] = mean[j] - step
+    return 2 * n + 1, kappa / (n + kappa), 0.5 / (n + kappa)
+
+
+@kernel
+def _moments_of_images(
+    images: Floats, num: int, dim: int, first: float, other: float, angular: Bools, mean: Floats, cov: Floats
+) -> None:
+    """Weighted mean and covariance of the images; they are left as deviations from the mean.
+
+    Angles are averaged as deviations from the first image, so that a cloud across +-pi has its mean inside the cloud.
+    """
+    for j in range(dim):
+        base = images[0, j]
+        total = 0.0
+        for i in range(num):
+            images[i, j] -= base
+            if angular[j]:
+                images[i, j] = wrap_angle(images[i, j])
+            if i > 0:
+                total += other * images[i, j]
+        mean[j] = wrap_angle(base + total) if angular[j] else base + total
+        for i in range(num):
+            images[i, j] -= total
+    for a in range(dim):
+        for b in range(a + 1):
+            total = first * images[0, a] * images[0, b]
+            for i in range(1, num):
+                total += other * images[i, a] * images[i, b]
+            cov[a, b] = total
+            cov[b, a] = total
+
+
+@kernel
+def predict(
+    motion: Motion, dt: float, mean: Floats, cov: Floats, out_mean: Floats, out_cov: Floats, scratch: Scratch
+) -> None:
+    """Chapman-Kolmogorov step of one Gaussian over `dt` seconds; the process noise is taken at the prior mean."""
+    n = mean.shape[0]
+    noise = scratch.noise
+    motion.process_noise_cov(mean, dt, motion.noise_params, noise)
+    if motion.method == LINEARISED:
+        jacobian, product = scratch.jacobian, scratch.product
+        motion.transition(mean, dt, motion.transition_params, out_mean)
+        motion.transition_jacobian(mean, dt, motion.transition_params, jacobian)
+        for i in range(n):
+            for j in range(n):
+                total = 0.0
+                for k in range(n):
+                    total += jacobian[i, k] * cov[k, j]
+                product[i, j] = total
+        for i in range(n):
+            for j in range(i + 1):
+                total = 0.5 * (noise[i, j] + noise[j, i])
+                for k in range(n):
+                    total += product[i, k] * jacobian[j, k]
+                out_cov[i, j] = total
+                out_cov[j, i] = total
+    else:
+        points, images = scratch.points, scratch.images
+        num, first, other = _sigma_points(motion.method, mean, cov, points, scratch.factor)
+        for i in range(num):
+            motion.transition(points[i], dt, motion.transition_params, out_mean)
+            for j in range(n):
+                images[i, j] = out_mean[j]
+        _moments_of_images(images, num, n, first, other, scratch.angular_state, out_mean, out_cov)
+        for i in range(n):
+            for j in range(n):
+                out_cov[i, j] += 0.5 * (noise[i, j] + noise[j, i])
+    for i in range(n):
+        if not (math.isfinite(out_mean[i]) and out_cov[i, i] > 0.0 and out_cov[i, i] < math.inf):
+            raise FloatingPointError("motion model: predicted mean or covariance is not finite")
+
+
+@kernel
+def _expect_linearised(sensor: Sensor, pose: Floats, mean: Floats, cov: Floats, at: int, out: Innovation, scratch: Scratch) -> None:
+    n, m = mean.shape[0], out.predicted.shape[1]
+    jacobian, innovation, cross = scratch.measurement_jacobian, scratch.innovation_cov, out.whitened_cross[at]
+    sensor.measurement(mean, pose, sensor.measurement_params, out.predicted[at])
+    sensor.measurement_jacobian(mean, pose, sensor.measurement_params, jacobian)
+    for a in range(m):
+        for j in range(n):
+            total = 0.0
+            for k in range(n):
+                total += jacobian[a, k] * cov[k, j]
+            cross[a, j] = total
+    for a in range(m):
+        for b in range(a + 1):
+            total = 0.0
+            for k in range(n):
+                total += cross[a, k] * jacobian[b, k]
+            innovation[a, b] = total
+
+
+@kernel
+def _expect_sigma_points(sensor: Sensor, pose: Floats, mean: Floats, cov: Floats, at: int, out: Innovation, scratch: Scratch) -> None:
+    n, m = mean.shape[0], out.predicted.shape[1]
+    points, images, cross = scratch.points, scratch.images, out.whitened_cross[at]
+    num, first, other = _sigma_points(sensor.method, mean, cov, points, scratch.factor)
+    for i in range(num):
+        sensor.measurement(points[i], pose, sensor.measurement_params, scratch.residual)
+        for a in range(m):
+            images[i, a] = scratch.residual[a]
+    _moments_of_images(images, num, m, first, other, sensor.angular, out.predicted[at], scratch.innovation_cov)
+    for a in range(m):
+        for j in range(n):
+            total = 0.0
+            for i in range(1, num):
+                total += other * images[i, a] * (points[i, j] - mean[j])
+            cross[a, j] = total
+
+
+@kernel
+def expect(sensor: Sensor, pose: Floats, mean: Floats, cov: Floats, at: int, out: Innovation, scratch: Scratch) -> None:
+    """Fill entry `at` of `out`; noise and detection probability are taken at the predicted mean (paper-notes 3)."""
+    n, m = mean.shape[0], out.predicted.shape[1]
+    noise, innovation = scratch.measurement_noise, scratch.innovation_cov
+    factor, cross, posterior = out.factor[at], out.whitened_cross[at], out.covs[at]
+    if sensor.method == LINEARISED:
+        _expect_linearised(sensor, pose, mean, cov, at, out, scratch)
+    else:
+        _expect_sigma_points(sensor, pose, mean, cov, at, out, scratch)
+    sensor.measurement_noise_cov(mean, pose, sensor.noise_params, noise)
+    for a in range(m):
+        for b in range(a + 1):
+            innovation[a, b] += 0.5 * (noise[a, b] + noise[b, a])
+    if not cholesky(innovation, factor):
+        raise FloatingPointError("measurement model: innovation covariance is not positive definite or not finite")
+    for a in range(m):
+        for j in range(n):
+            total = cross[a, j]
+            for k in range(a):
+                total -= factor[a, k] * cross[k, j]
+            cross[a, j] = total / factor[a, a]
+    for i in range(n):
+        for j in range(i + 1):
+            total = cov[i, j]
+            for a in range(m):
+                total -= cross[a, i] * cross[a, j]
+            posterior[i, j] = total
+            posterior[j, i] = total
+    out.log_norm[at] = -0.5 * (log_det_from_factor(factor) + m * LOG_2PI)
+    detection = sensor.prob_detection(mean, pose, sensor.detection_params)
+    if not 0.0 <= detection <= 1.0:
+        raise FloatingPointError("detection model: probability is not in [0, 1]")
+    out.prob_detection[at] = detection
+
+
+@kernel
+def whiten(innovation: Innovation, at: int, measurement: Floats, angular: Bools, out: Floats) -> float:
+    """Whitened residual of a measurement against component `at`; returns its squared Mahalanobis distance."""
+    for a in range(measurement.shape[0]):
+        residual = measurement[a] - innovation.predicted[at, a]
+        out[a] = wrap_angle(residual) if angular[a] else residual
+    solve_lower(innovation.factor[at], out, out)
+    distance = 0.0
+    for a in range(measurement.shape[0]):
+        distance += out[a] * out[a]
+    return distance
+
+
+@kernel
+def update_mean(innovation: Innovation, at: int, whitened: Floats, mean: Floats, out: Floats) -> None:
+    """Posterior mean of component `at` given the whitened residual of its measurement."""
+    for j in range(mean.shape[0]):
+        total = mean[j]
+        for a in range(whitened.shape[0]):
+            total += innovation.whitened_cross[at, a, j] * whitened[a]
+        out[j] = total
