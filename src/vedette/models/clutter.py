@@ -14,7 +14,7 @@ from vedette.errors import InputError, ModelError
 from vedette.kernels.types import Bools, Floats
 from vedette.models.arguments import dimension, float_array, non_negative, params_vector, pose_vector, reject
 from vedette.models.functions import ModelFunction, call, describe, model_function, require_kind
-from vedette.models.measurement import MeasurementModel, angular_flags
+from vedette.models.measurement import MeasurementModel, angular_flags, wrap_angular
 from vedette.models.probe import probe_log_intensity
 
 # Scans of clutter that a check draws and looks up in the intensity.
@@ -135,10 +135,7 @@ class _BoxSampler:
     ) -> Floats:
         num = int(rng.poisson(self.rate))
         drawn = rng.uniform(self.low, self.high, size=(num, len(self.low)))
-        if measurement.meas_dim == len(self.low):
-            wrapped = math.pi - np.remainder(math.pi - drawn, 2.0 * math.pi)
-            drawn = np.where(measurement.angular & (np.abs(drawn) > math.pi), wrapped, drawn)
-        return drawn
+        return wrap_angular(drawn, measurement.angular) if measurement.meas_dim == len(self.low) else drawn
 
 
 def log_or_minus_infinity(value: float) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -22,6 +23,17 @@ def angular_flags(name: str, angular: Sequence[bool] | Bools, meas_dim: int) -> 
     if flags.dtype != np.bool_ or flags.shape != (meas_dim,):
         raise reject(name, f"{meas_dim} booleans, one a measurement component", angular)
     return flags
+
+
+def wrap_angles(angles: Floats) -> Floats:
+    """The same directions in (-pi, pi]; angles already there keep every bit."""
+    away = (angles > math.pi) | (angles <= -math.pi)
+    return np.where(away, math.pi - np.remainder(math.pi - angles, 2.0 * math.pi), angles)
+
+
+def wrap_angular(measurements: Floats, angular: Bools) -> Floats:
+    """(n, meas_dim) the same measurements with their angles in (-pi, pi]."""
+    return np.where(angular, wrap_angles(measurements), measurements)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,0 +1,94 @@
+"""What a sensor reports of the truth in one scan."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from vedette.errors import ModelError
+from vedette.kernels.types import Floats, Ints
+from vedette.models import SensorModel
+from vedette.models.arguments import float_array, pose_vector, reject
+from vedette.models.measurement import wrap_angular
+
+CLUTTER = -1
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Scan:
+    """One scan, in random order.
+
+    Attributes:
+        measurements: (num_measurements, meas_dim) all that a filter may see.
+        origins: (num_measurements,) id of the target behind each measurement, or `CLUTTER`; for evaluation only.
+    """
+
+    measurements: Floats
+    origins: Ints
+
+
+def simulate_scan(
+    truth_states: ArrayLike,
+    pose: ArrayLike,
+    sensor: SensorModel,
+    *,
+    ids: ArrayLike | None = None,
+    rng: np.random.Generator,
+) -> Scan:
+    """Detections of the targets, each with additive Gaussian noise at its true state, and clutter (paper section IV).
+
+    The numbers drawn from `rng` depend on the number of targets and on the clutter, never on the pose: sensors that go
+    different ways see the same luck.
+
+    Args:
+        truth_states: (num_targets, state_dim).
+        pose: (3,) px, py, heading_rad of the sensor.
+        sensor: the functions that the filter uses too.
+        ids: (num_targets,) ids for `Scan.origins`; None: the place in `truth_states`.
+
+    Raises:
+        InputError: states, pose or ids that cannot be used.
+        ModelError: a model function raised or gave no valid value at a target's state.
+    """
+    states, pose = float_array("truth_states", truth_states, (None, None)), pose_vector("pose", pose)
+    num = len(states)
+    names = np.arange(num) if ids is None else np.asarray(ids)
+    if names.shape != (num,):
+        raise reject("ids", f"{num} ids, one a target", names.tolist())
+    seen = rng.uniform(size=num) < _probabilities(sensor, states, pose)
+    measured = _noisy_measurements(sensor, states, pose, rng.standard_normal((num, sensor.meas_dim)))
+    clutter = sensor.clutter.sample(pose, sensor.measurement, state_dim=states.shape[1], rng=rng)
+    measurements = np.concatenate([measured, clutter])
+    origins = np.concatenate([names, np.full(len(clutter), CLUTTER)]).astype(np.int64)
+    order = np.argsort(rng.uniform(size=len(measurements)))
+    kept = order[np.concatenate([seen, np.ones(len(clutter), np.bool_)])[order]]
+    return Scan(np.ascontiguousarray(measurements[kept]), origins[kept])
+
+
+def _probabilities(sensor: SensorModel, states: Floats, pose: Floats) -> Floats:
+    probabilities = sensor.detection.prob(states, pose)
+    for state, probability in zip(states, probabilities, strict=True):
+        if not 0.0 <= probability <= 1.0:
+            raise ModelError(
+                f"detection model at state {state}, pose {pose}: expected a probability; got {probability}"
+            )
+    return probabilities
+
+
+def _noisy_measurements(sensor: SensorModel, states: Floats, pose: Floats, normals: Floats) -> Floats:
+    exact = sensor.measurement.measure(states, pose)
+    covs = sensor.noise.covs(states, pose, sensor.meas_dim)
+    measured = np.empty_like(exact)
+    for i, (state, cov) in enumerate(zip(states, covs, strict=True)):
+        try:
+            measured[i] = exact[i] + np.linalg.cholesky(cov) @ normals[i]
+        except np.linalg.LinAlgError:
+            message = f"expected a positive definite covariance; got {cov.tolist()}"
+            raise ModelError(f"noise model at state {state}, pose {pose}: {message}") from None
+        if not np.isfinite(measured[i]).all():
+            raise ModelError(
+                f"sensor model at state {state}, pose {pose}: expected a finite measurement; got {measured[i]}"
+            )
+    return wrap_angular(measured, sensor.measurement.angular)

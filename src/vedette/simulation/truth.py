@@ -1,0 +1,167 @@
+"""What the targets really do: the truth of a run, and targets that follow a motion model."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from vedette.errors import InputError, ModelError
+from vedette.kernels.types import Bools, Floats, Ints
+from vedette.models import MotionModel
+from vedette.models.arguments import float_array, reject
+
+# Start times and scan times come from different sums; they count as equal within this share of a second.
+TIME_TOLERANCE = 1e-9
+# A pivot below this share of its variance is rounding: that direction carries no noise of its own.
+_PIVOT_TOLERANCE = 1e-12
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Truth:
+    """The targets alive at each scan, scan after scan.
+
+    Attributes:
+        times: (num_scans,) s, increasing.
+        offsets: (num_scans + 1,) targets of scan `k` are the rows `offsets[k]:offsets[k + 1]`.
+        ids: (total,) which target; each at most once a scan, none negative.
+        states: (total, state_dim) its state; position first.
+    """
+
+    times: Floats
+    offsets: Ints
+    ids: Ints
+    states: Floats
+
+    @property
+    def num_scans(self) -> int:
+        return len(self.times)
+
+    def at(self, scan: int) -> tuple[Ints, Floats]:
+        """(n,) ids and (n, state_dim) states of the targets alive at scan `scan`, counted from 0."""
+        if not 0 <= scan < self.num_scans:
+            raise reject("scan", f"a scan from 0 to {self.num_scans - 1}", scan)
+        rows = slice(self.offsets[scan], self.offsets[scan + 1])
+        return self.ids[rows], self.states[rows]
+
+    def validate(self) -> None:
+        """Raise `InputError` unless the arrays fit together as described above."""
+        scan_times(self.times)
+        offsets = self.offsets
+        if len(offsets) != self.num_scans + 1 or offsets[0] != 0 or (np.diff(offsets) < 0).any():
+            raise reject("Truth.offsets", f"{self.num_scans + 1} counts from 0, never falling", offsets)
+        float_array("Truth.states", self.states, (int(offsets[-1]), None))
+        if self.ids.shape != (offsets[-1],) or (self.ids < 0).any():
+            raise reject("Truth.ids", f"{offsets[-1]} ids of at least 0", self.ids)
+        for scan in range(self.num_scans):
+            ids, _ = self.at(scan)
+            if len(np.unique(ids)) != len(ids):
+                raise reject("Truth.ids", f"each id once in scan {scan}", ids)
+
+    @classmethod
+    def from_arrays(cls, times: Floats, alive: Bools, states: Floats) -> Truth:
+        """Of (num_targets, num_scans) flags and (num_targets, num_scans, state_dim) states; row i is target i."""
+        scans, targets = np.nonzero(alive.T)
+        offsets = np.concatenate([[0], np.cumsum(alive.sum(axis=0))]).astype(np.int64)
+        return cls(times, offsets, targets.astype(np.int64), np.ascontiguousarray(states[targets, scans]))
+
+
+class TargetSource(Protocol):
+    """Where the targets of a simulated run come from."""
+
+    def truth(self, times: ArrayLike, *, rng: np.random.Generator) -> Truth:
+        """The targets at each of (num_scans,) increasing scan times in seconds."""
+        ...
+
+
+def scan_times(times: ArrayLike) -> Floats:
+    """(num_scans,) scan times, at least one, increasing."""
+    values = float_array("times", times, (None,))
+    if len(values) == 0 or (np.diff(values) <= 0.0).any():
+        raise reject("times", "one or more increasing times", values.tolist())
+    return values
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ScriptedTargets:
+    """Targets that start from given states and follow a motion model.
+
+    Attributes:
+        motion: how they move.
+        initial_states: (num_targets, state_dim) state of each at its start time.
+        start_times: (num_targets,) s; None: the first scan.
+        end_times: (num_targets,) s, the last moment of each, included; infinite or None: to the end.
+        process_noise: whether the motion's process noise disturbs them; one flag, or one a target.
+
+    Raises:
+        InputError: names the field, what was expected and what came.
+    """
+
+    motion: MotionModel
+    initial_states: Floats
+    start_times: Floats | None = None
+    end_times: Floats | None = None
+    process_noise: bool | Sequence[bool] = False
+
+    def __post_init__(self) -> None:
+        states = float_array("ScriptedTargets.initial_states", self.initial_states, (None, self.motion.state_dim))
+        num = len(states)
+        object.__setattr__(self, "initial_states", states)
+        if self.start_times is not None:
+            starts = float_array("ScriptedTargets.start_times", self.start_times, (num,))
+            object.__setattr__(self, "start_times", starts)
+        ends = np.full(num, np.inf) if self.end_times is None else self.end_times
+        ends = float_array("ScriptedTargets.end_times", ends, (num,), finite=False)
+        object.__setattr__(self, "end_times", ends)
+        if self.start_times is not None and (ends < self.start_times).any():
+            raise reject("ScriptedTargets.end_times", "times from start_times on", ends.tolist())
+        flags = np.array(self.process_noise)
+        if flags.dtype != np.bool_ or flags.shape not in ((), (num,)):
+            raise reject("ScriptedTargets.process_noise", f"one boolean, or {num}", self.process_noise)
+
+    def truth(self, times: ArrayLike, *, rng: np.random.Generator) -> Truth:
+        """Each target stepped from its start time through the scans, with process noise where it has any.
+
+        Raises:
+            InputError: the scan times do not increase.
+            ModelError: a motion function raised, or gave a state that is not finite.
+        """
+        scans = scan_times(times)
+        num = len(self.initial_states)
+        starts = np.full(num, scans[0]) if self.start_times is None else self.start_times
+        ends = np.asarray(self.end_times)
+        noisy = np.broadcast_to(np.array(self.process_noise), (num,))
+        alive = (scans >= starts[:, None] - TIME_TOLERANCE) & (scans <= ends[:, None] + TIME_TOLERANCE)
+        states = np.zeros((num, len(scans), self.motion.state_dim))
+        for target in range(num):
+            state, time = self.initial_states[target], float(starts[target])
+            for scan in np.flatnonzero(alive[target]):
+                dt = float(scans[scan]) - time
+                if dt > TIME_TOLERANCE:
+                    state, time = self._step(state, dt, bool(noisy[target]), rng), float(scans[scan])
+                states[target, scan] = state
+        return Truth.from_arrays(scans, alive, states)
+
+    def _step(self, state: Floats, dt: float, noisy: bool, rng: np.random.Generator) -> Floats:
+        moved = self.motion.propagate(state, dt)[0]
+        if noisy:
+            factor = semidefinite_factor(self.motion.noise_cov(state, dt))
+            moved = moved + factor @ rng.standard_normal(len(moved))
+        if not np.isfinite(moved).all():
+            raise ModelError(f"motion of a target at state {state}, dt {dt}: expected a finite state; got {moved}")
+        return np.asarray(moved)
+
+
+def semidefinite_factor(cov: Floats) -> Floats:
+    """Lower L with L L' = cov for a positive semidefinite covariance, such as one of fewer noises than states."""
+    factor = np.zeros_like(cov)
+    for j in range(len(cov)):
+        column = cov[j:, j] - factor[j:, :j] @ factor[j, :j]
+        if column[0] < -_PIVOT_TOLERANCE * max(1.0, cov[j, j]) or not np.isfinite(column).all():
+            raise InputError(f"covariance: expected positive semidefinite; got {cov.tolist()}")
+        if column[0] > _PIVOT_TOLERANCE * cov[j, j]:
+            factor[j:, j] = column / np.sqrt(column[0])
+    return factor
