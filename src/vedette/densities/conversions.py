@@ -29,7 +29,7 @@ def marginalise(
     log_min_weight: float = DEFAULT_LOG_MIN_WEIGHT,
     merge_distance: float = DEFAULT_MERGE_DISTANCE,
 ) -> GLMB:
-    """Marginalised delta-GLMB of a delta-GLMB: one hypothesis a label set (paper eq. 8; Fantacci and Vo 2015).
+    """Marginalised delta-GLMB of a delta-GLMB: one hypothesis a label set (paper eq. 10; Fantacci and Vo 2015).
 
     Keeps the probability of every label set, and so the cardinality distribution and the existence probabilities. Each
     track of a label set becomes the mixture of its label's tracks in the set's hypotheses. With `max_components` 1 (the

@@ -59,7 +59,7 @@ class Estimate:
 
 
 def map_estimate(density: GLMB | LMB) -> Estimate:
-    """The most probable number of targets, then the most probable targets of that number (paper, section V).
+    """The most probable number of targets, then the most probable targets of that number (paper, Algorithm 1).
 
     GLMB: the heaviest hypothesis of that cardinality. LMB: that many labels of highest existence. Ties: the smaller
     number; the earlier hypothesis; the smaller label. A track that is a mixture is estimated by its moments.

@@ -18,7 +18,7 @@ from vedette.kernels.types import Floats, Ints
 
 @dataclass(frozen=True, slots=True)
 class GLMB:
-    """delta-GLMB density (paper eq. 4); marginalised delta-GLMB (eq. 8) where every label set occurs once.
+    """delta-GLMB density (paper eq. 4); marginalised delta-GLMB (eq. 10) where every label set occurs once.
 
     Attributes:
         tracks: track table shared by all hypotheses.

@@ -34,7 +34,7 @@ def _set_weights(glmb: Glmb, group_of: Ints, num_sets: int) -> tuple[Floats, Flo
 
 @kernel
 def marginalise(glmb: Glmb, log_min_weight: float, merge_distance: float, max_components: int) -> Glmb:
-    """Marginalised GLMB: one hypothesis a label set, over all association histories (paper eq. 8).
+    """Marginalised GLMB: one hypothesis a label set, over all association histories (paper eq. 10).
 
     Each track of a label set is the mixture of that label's tracks in the set's hypotheses, weighted by them, and
     reduced by `kernels.mixtures.reduce_mixture` under the three limits; with `max_components` 1 it is one Gaussian of
