@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.stats import t as student_t
+from scipy.special import stdtrit
 
 from vedette.errors import InputError
 from vedette.kernels.types import Floats
@@ -66,7 +66,7 @@ def summarise(values: ArrayLike) -> Summary:
         unknown = np.full(mean.shape, np.nan)
         return Summary(mean, unknown, unknown, unknown, 1)
     error = np.asarray(runs.std(axis=0, ddof=1) / np.sqrt(num_runs))
-    reach = student_t.ppf(0.5 + CONFIDENCE / 2.0, num_runs - 1) * error
+    reach = stdtrit(num_runs - 1, 0.5 + CONFIDENCE / 2.0) * error
     return Summary(mean, error, np.asarray(mean - reach), np.asarray(mean + reach), num_runs)
 
 
