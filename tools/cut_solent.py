@@ -11,21 +11,22 @@ from __future__ import annotations
 import argparse
 import csv
 import itertools
-import math
-from collections import defaultdict
 from collections.abc import Iterator
-from datetime import datetime
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vedette.simulation.cleaning import longest_reachable
+from vedette.simulation.geography import to_tangent_plane
+from vedette.simulation.reports import seconds
+
 Path2D = NDArray[np.float64]  # (n, 3): time in s, x east and y north in m
 
-ORIGIN_LATITUDE_DEG, ORIGIN_LONGITUDE_DEG = 50.7865, -1.1171  # middle of the box
+ORIGIN_DEG = (-1.1171, 50.7865)  # longitude and latitude of the middle of the box
 HALF_BOX = 3000.0  # m
 WINDOW = (1800.0, 3600.0)  # s after the first report of the file
-MAX_SPEED = 30.0  # m/s; a report that would need more since the last good one is dropped
+MAX_SPEED = 30.0  # m/s; reports that would need more are dropped
 MAX_GAP = 90.0  # s; a longer silence ends the track
 MIN_SPEED = 1.0  # m/s, taken over SPEED_SPAN; slower is moored, anchored or drifting
 SPEED_SPAN = 120.0  # s
@@ -33,30 +34,25 @@ MIN_DURATION = 180.0  # s; a shorter run is left out
 REPORT_SPACING = 9.0  # s; closer reports are thinned
 
 
-def read_reports(path: Path) -> dict[str, Path2D]:
+def read_ships(recording: Path) -> dict[str, Path2D]:
     """Reports of each ship in time order, in seconds from the first one and metres east and north of the origin."""
-    latitude = math.radians(ORIGIN_LATITUDE_DEG)
-    eccentricity_squared = 0.00669437999014  # WGS84
-    curvature = 1.0 - eccentricity_squared * math.sin(latitude) ** 2
-    radius_east = 6378137.0 / math.sqrt(curvature) * math.cos(latitude)
-    radius_north = 6378137.0 * (1.0 - eccentricity_squared) / curvature**1.5
-    ships: dict[str, list[tuple[float, float, float]]] = defaultdict(list)
-    with path.open(encoding="utf-8", newline="") as file:
-        rows = [(datetime.fromisoformat(row["Time"]), row) for row in csv.DictReader(file)]
-    first = min(time for time, _ in rows)
-    for time, row in rows:
-        x = radius_east * math.radians(float(row["Longitude_degrees"]) - ORIGIN_LONGITUDE_DEG)
-        y = radius_north * math.radians(float(row["Latitude_degrees"]) - ORIGIN_LATITUDE_DEG)
-        ships[row["MMSI"]].append(((time - first).total_seconds(), x, y))
-    return {ship: np.array(sorted(reports)) for ship, reports in ships.items()}
+    with recording.open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    times = np.array([seconds(row["Time"]) for row in rows])
+    longitudes, latitudes = ([float(row[name]) for row in rows] for name in ("Longitude_degrees", "Latitude_degrees"))
+    reports = np.column_stack([times - times.min(), to_tangent_plane(longitudes, latitudes, ORIGIN_DEG)])
+    names = np.array([row["MMSI"] for row in rows])
+    order = np.lexsort((times, names))
+    ships, starts = np.unique(names[order], return_index=True)
+    return dict(zip(ships.tolist(), np.split(reports[order], starts[1:]), strict=True))
 
 
-def drop_jumps(reports: Path2D) -> Path2D:
-    """Leave out the reports that the ship could not have reached at `MAX_SPEED`, and the thinned ones."""
-    kept = [reports[0]]
-    for report in reports[1:]:
-        elapsed = report[0] - kept[-1][0]
-        if elapsed >= REPORT_SPACING and math.dist(report[1:], kept[-1][1:]) <= MAX_SPEED * elapsed:
+def thin(reports: Path2D) -> Path2D:
+    """Leave out the reports that the ship could not have made at `MAX_SPEED`, and those too close in time."""
+    good = reports[longest_reachable(reports[:, 0], reports[:, 1:], MAX_SPEED)]
+    kept = [good[0]]
+    for report in good[1:]:
+        if report[0] - kept[-1][0] >= REPORT_SPACING:
             kept.append(report)
     return np.array(kept)
 
@@ -88,8 +84,7 @@ def main() -> None:
     parser.add_argument("recording", type=Path)
     parser.add_argument("out", type=Path)
     arguments = parser.parse_args()
-    ships = read_reports(arguments.recording)
-    found = [run for ship in sorted(ships) for run in runs(drop_jumps(ships[ship]))]
+    found = [run for reports in read_ships(arguments.recording).values() for run in runs(thin(reports))]
     found.sort(key=lambda run: (run[0, 0], run[0, 1]))
     rows = [(report[0] - WINDOW[0], number, *report[1:]) for number, run in enumerate(found, 1) for report in run]
     rows.sort()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import importlib.util
 import math
 from collections.abc import Callable, Iterator, Sequence
@@ -102,6 +103,11 @@ def _covariance(path: Path, rows: Sequence[Sequence[float]], dim: int) -> Iterat
 
 
 def _births(parts: Parts) -> Iterator[Finding]:
+    for i, step in enumerate(parts.birth_steps):
+        if step in parts.birth_steps[:i]:
+            yield ("birth", "steps", i), "each step once", f"{step} again"
+        elif parts.num_steps is not None and step > parts.num_steps:
+            yield ("birth", "steps", i), f"a step up to the last, {parts.num_steps}", describe(step)
     for i, site in enumerate(parts.sites):
         if site is not None:
             yield from _birth_site(("birth", "sites", i), site, parts)
@@ -115,11 +121,6 @@ def _birth_site(path: Path, site: BirthSite, parts: Parts) -> Iterator[Finding]:
             yield (*path, "std", j), "a number above 0", describe(std)
     if site.cov is not None:
         yield from _covariance((*path, "cov"), site.cov, parts.state_dim or len(site.mean))
-    for j, step in enumerate(site.steps if isinstance(site.steps, tuple) else ()):
-        if step in site.steps[:j]:
-            yield (*path, "steps", j), "each step once", f"{step} again"
-        elif parts.num_steps is not None and step > parts.num_steps:
-            yield (*path, "steps", j), f"a step up to the last, {parts.num_steps}", describe(step)
 
 
 def _targets(parts: Parts) -> Iterator[Finding]:
@@ -158,11 +159,20 @@ def _recorded(parts: Parts) -> Iterator[Finding]:
 
 
 def _columns(recorded: RecordedTargets, file: FilePath) -> Iterator[Finding]:
-    with file.open(encoding="utf-8-sig", errors="replace") as lines:
-        header = [name.strip().strip('"') for name in lines.readline().split(",")]
-    for field, name in recorded.columns.names().items():
+    with file.open(encoding="utf-8-sig", errors="replace", newline="") as lines:
+        header = [name.strip() for name in next(csv.reader(lines), [])]
+    if _faulty(recorded.columns):
+        return
+    given = recorded.columns.given()
+    for key, name in given.items():
         if name not in header:
-            yield ("targets", "columns", field), f"a column of {recorded.path}: {', '.join(header)}", describe(name)
+            yield ("targets", "columns", key), f"a column of {recorded.path}: {', '.join(header)}", describe(name)
+    missing = [key for key in ("time", "id") if key not in given and key not in header]
+    if "x" not in given and "longitude" not in given and not {"x", "y"} <= set(header):
+        missing += [key for key in ("longitude", "latitude") if key not in header]
+    if missing:
+        wanted = f"the names of the columns of {', '.join(missing)} among {', '.join(header)}"
+        yield ("targets", "columns"), wanted, "nothing"
 
 
 def _score(parts: Parts) -> Iterator[Finding]:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import functools
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path as FilePath
@@ -126,13 +124,7 @@ def load_scenario(name_or_path: str | FilePath) -> Scenario:
     return Scenario(parse_scenario(_read_text(path), str(path), path.parent), path)
 
 
-@functools.cache
-def _schema_text() -> str:
+def json_schema() -> dict[str, Any]:
+    """JSON schema of scenario files, for editors."""
     schema = ScenarioModel.model_json_schema()
-    schema = {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema, "title": "Vedette scenario"}
-    return json.dumps(schema, indent=2) + "\n"
-
-
-def json_schema() -> str:
-    """JSON schema of scenario files, as text, for editors."""
-    return _schema_text()
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema, "title": "Vedette scenario"}

@@ -21,6 +21,7 @@ from vedette.scenarios.schema.world import (
     Motion,
     RecordedTargets,
     ScriptedTarget,
+    Steps,
     Survival,
     Time,
 )
@@ -37,6 +38,7 @@ class Parts:
     time: Time | None
     motion: Motion | None
     survival: Survival | None
+    birth_steps: tuple[int, ...]
     sites: tuple[BirthSite | None, ...]
     tracks: tuple[ScriptedTarget | None, ...]
     recorded: RecordedTargets | None
@@ -72,6 +74,7 @@ def parts_of_model(model: ScenarioModel, folder: Path | None) -> Parts:
         time=model.time,
         motion=model.motion,
         survival=model.survival,
+        birth_steps=_listed(model.birth.steps),
         sites=model.birth.sites,
         tracks=() if isinstance(targets, RecordedTargets) else targets.tracks,
         recorded=targets if isinstance(targets, RecordedTargets) else None,
@@ -91,10 +94,12 @@ def parts_of_data(data: Mapping[str, Any], folder: Path | None) -> Parts:
         default = ScenarioModel.model_fields[name].default
         return _valid(annotation, data[name]) if name in data else None if default is PydanticUndefined else default
 
+    birth = data.get("birth")
     return Parts(
         time=section("time", Time),
         motion=section("motion", Motion),
         survival=section("survival", Survival),
+        birth_steps=_listed(_valid(Steps, birth.get("steps")) if isinstance(birth, Mapping) else None),
         sites=_valid_items(BirthSite, data, "birth", "sites"),
         tracks=_valid_items(ScriptedTarget, data, "targets", "tracks"),
         recorded=_valid(RecordedTargets, data.get("targets")),
@@ -105,6 +110,10 @@ def parts_of_data(data: Mapping[str, Any], folder: Path | None) -> Parts:
         ospa=section("ospa", Ospa),
         folder=folder,
     )
+
+
+def _listed(steps: Any) -> tuple[int, ...]:
+    return steps if isinstance(steps, tuple) else ()
 
 
 def _valid(annotation: Any, value: Any) -> Any:

@@ -103,18 +103,15 @@ Steps = Annotated[tuple[Step, ...], Field(strict=False)]
 
 
 class BirthSite(Section):
-    """A place where targets appear: one Bernoulli of the birth density. Label = (birth step, place in this list)."""
+    """A place where targets appear: one Bernoulli of the birth density."""
 
-    existence: float = Field(gt=0.0, lt=1.0, description="Probability that a target appears, each time [-].")
+    existence: float = Field(gt=0.0, lt=1.0, description="Probability that a target appears, at each such scan [-].")
     mean: SomeNumbers = Field(description="Mean state [m, m/s, ...].")
     std: SomeNumbers | None = Field(
         default=None, description="Standard deviation of each state component; else give cov [m, m/s, ...]."
     )
     cov: CovRows | None = Field(
         default=None, description="Covariance of the state, row by row; else give std [m^2, m^2/s, ...]."
-    )
-    steps: Literal["every"] | Steps = Field(
-        default="every", description='Steps at which it is active: a list, or "every" [-].'
     )
 
     @model_validator(mode="after")
@@ -125,8 +122,11 @@ class BirthSite(Section):
 
 
 class Birth(Section):
-    """LMB births. The same at every sensor, so that all share one label space."""
+    """LMB births, the same at every sensor: all share one label space. Label = (birth step, index of the site)."""
 
+    steps: Literal["every"] | Steps = Field(
+        default="every", description='Scans at which targets may appear: a list, or "every" [-].'
+    )
     sites: Annotated[tuple[BirthSite, ...], Field(strict=False, min_length=1)] = Field(description="The sites [-].")
 
 
@@ -147,40 +147,34 @@ class ScriptedTargets(Section):
 
 
 class Columns(Section):
-    """Names of the columns: x and y, or longitude and latitude."""
+    """Names of the columns, where they differ from the names of these keys. Places are x, y or longitude, latitude."""
 
-    time: str = Field(default="time", description="Time: a number of seconds, or ISO 8601 [s].")
-    id: str = Field(default="id", description="Which target [-].")
-    x: str | None = Field(default=None, description="East; default x, unless longitude is given [m].")
-    y: str | None = Field(default=None, description="North; default y, unless latitude is given [m].")
+    time: str | None = Field(default=None, description="Time: a number of seconds, or ISO 8601 [s].")
+    id: str | None = Field(default=None, description="Which target [-].")
+    x: str | None = Field(default=None, description="East [m].")
+    y: str | None = Field(default=None, description="North [m].")
     longitude: str | None = Field(default=None, description="Longitude, WGS84 [deg].")
     latitude: str | None = Field(default=None, description="Latitude, WGS84 [deg].")
+    vx: str | None = Field(default=None, description="Velocity to the east, if it is recorded [m/s].")
+    vy: str | None = Field(default=None, description="Velocity to the north, if it is recorded [m/s].")
 
     @model_validator(mode="after")
     def _one_pair(self) -> Columns:
-        if (self.longitude is None) != (self.latitude is None):
-            raise expected("longitude and latitude together")
-        if self.longitude is not None and (self.x is not None or self.y is not None):
+        given = self.given()
+        for first, second in (("x", "y"), ("longitude", "latitude"), ("vx", "vy")):
+            if (first in given) != (second in given):
+                raise expected(f"{first} and {second} together")
+        if "x" in given and "longitude" in given:
             raise expected("either x and y, or longitude and latitude")
         return self
 
-    @property
-    def geographic(self) -> bool:
-        """Whether places are longitudes and latitudes."""
-        return self.longitude is not None
-
-    def names(self) -> dict[str, str]:
-        """The columns that are read: field of this section -> name in the file."""
-        places = (
-            {"longitude": self.longitude, "latitude": self.latitude}
-            if self.geographic
-            else {"x": self.x or "x", "y": self.y or "y"}
-        )
-        return {"time": self.time, "id": self.id, **{field: name for field, name in places.items() if name}}
+    def given(self) -> dict[str, str]:
+        """The names that are given: key -> name in the file."""
+        return {key: name for key in type(self).model_fields if (name := getattr(self, key)) is not None}
 
 
 class RecordedTargets(Section):
-    """Targets from a CSV or Parquet file of reports: time, which target, where. Interpolated to the scans."""
+    """Targets from a CSV or Parquet file of reports: time, which target, where. Interpolated at the scans."""
 
     kind: Literal["recorded"] = Field(default="recorded", description="Kind of targets [-].")
     path: str = Field(min_length=1, description="CSV or Parquet file, relative to the scenario file [-].")
@@ -192,11 +186,13 @@ class RecordedTargets(Section):
         default=None, description="Longitude and latitude of x = y = 0; none: the middle of the reports [deg]."
     )
     max_gap: float = Field(default=60.0, gt=0.0, description="A longer silence ends the track [s].")
-    min_speed: float = Field(default=0.0, ge=0.0, description="Slower than this is not a target (moored) [m/s].")
-    max_speed: float | None = Field(
-        default=None, gt=0.0, description="A report that would need more is dropped (a jump); none: no limit [m/s]."
+    min_speed: float = Field(
+        default=0.0, ge=0.0, description="A track slower than this on average is left out (moored) [m/s]."
     )
-    crop: bool = Field(default=True, description="Whether targets end at the edges of the region [-].")
+    max_speed: float | None = Field(
+        default=None, gt=0.0, description="Reports that would need more are dropped (jumps); none: no limit [m/s]."
+    )
+    crop: bool = Field(default=True, description="Whether tracks end at the edges of the region [-].")
 
 
 Targets = Annotated[ScriptedTargets | RecordedTargets, Field(discriminator="kind")]
