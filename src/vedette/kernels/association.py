@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vedette.errors import ModelError
 from vedette.kernels.assignment import ABSENT, MISSED, Options
 from vedette.kernels.compile import kernel
 from vedette.kernels.gaussian import Innovation, Scratch, expect, make_innovation, predict, whiten
@@ -62,7 +63,7 @@ def fill_survivors(tracks: Tracks, motion: Motion, dt: float, rows: Rows, scratc
             mean = tracks.means[c]
             survival = motion.prob_survival(mean, dt, motion.survival_params)
             if not 0.0 <= survival <= 1.0:
-                raise FloatingPointError("survival model: probability is not in [0, 1]")
+                raise ModelError("survival model: probability is not in [0, 1]")
             absent += math.exp(tracks.log_weights[c]) * (1.0 - survival)
             rows.log_weights[c] = tracks.log_weights[c] + log_or_minus_inf(survival)
             predict(motion, dt, mean, tracks.covs[c], rows.means[c], rows.covs[c], scratch)
@@ -88,18 +89,19 @@ def fill_births(birth: Lmb, first_row: int, rows: Rows) -> None:
 
 
 @kernel
-def clutter_levels(sensor: Sensor, scan: Floats, pose: Floats, floor: float, out: Floats) -> int:
-    """Log clutter intensity at each measurement, raised to `floor`; returns how often that was needed."""
-    num_raised = 0
+def clutter_levels(sensor: Sensor, scan: Floats, pose: Floats, floor: float, out: Floats) -> tuple[float, int]:
+    """Log clutter intensity at each measurement, raised to `floor`; returns their sum and how often that was needed."""
+    total, num_raised = 0.0, 0
     for j in range(len(scan)):
         level = sensor.log_clutter_intensity(scan[j], pose, sensor.clutter_params)
         if math.isnan(level) or level == math.inf:
-            raise FloatingPointError("clutter model: log intensity is not a number below infinity")
+            raise ModelError("clutter model: log intensity is not a number below infinity")
         if level < floor:
             level = floor
             num_raised += 1
         out[j] = level
-    return num_raised
+        total += level
+    return total, num_raised
 
 
 @kernel

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vedette.errors import ModelError, NumericalError
 from vedette.kernels.compile import kernel
 from vedette.kernels.linalg import LOG_2PI, cholesky, log_det_from_factor, solve_lower
 from vedette.kernels.types import Bools, Floats, Motion, Sensor
@@ -99,7 +100,7 @@ def _sigma_points(method: int, mean: Floats, cov: Floats, points: Floats, factor
     """Fill `points`; return their number and the weights of the first (the mean, or 0) and of every other."""
     n = mean.shape[0]
     if not cholesky(cov, factor):
-        raise ValueError("covariance of a track is not positive definite")
+        raise NumericalError("covariance of a track is not positive definite")
     kappa = UNSCENTED_KAPPA if method == UNSCENTED else 0.0
     spread = math.sqrt(n + kappa)
     for j in range(n):
@@ -179,7 +180,7 @@ def predict(
                 out_cov[i, j] += 0.5 * (noise[i, j] + noise[j, i])
     for i in range(n):
         if not (math.isfinite(out_mean[i]) and out_cov[i, i] > 0.0 and out_cov[i, i] < math.inf):
-            raise FloatingPointError("motion model: predicted mean or covariance is not finite")
+            raise ModelError("motion model: predicted mean or covariance is not finite")
 
 
 @kernel
@@ -235,7 +236,7 @@ def expect(sensor: Sensor, pose: Floats, mean: Floats, cov: Floats, at: int, out
         for b in range(a + 1):
             innovation[a, b] += 0.5 * (noise[a, b] + noise[b, a])
     if not cholesky(innovation, factor):
-        raise FloatingPointError("measurement model: innovation covariance is not positive definite or not finite")
+        raise ModelError("measurement model: innovation covariance is not positive definite or not finite")
     for a in range(m):
         for j in range(n):
             total = cross[a, j]
@@ -252,7 +253,7 @@ def expect(sensor: Sensor, pose: Floats, mean: Floats, cov: Floats, at: int, out
     out.log_norm[at] = -0.5 * (log_det_from_factor(factor) + m * LOG_2PI)
     detection = sensor.prob_detection(mean, pose, sensor.detection_params)
     if not 0.0 <= detection <= 1.0:
-        raise FloatingPointError("detection model: probability is not in [0, 1]")
+        raise ModelError("detection model: probability is not in [0, 1]")
     out.prob_detection[at] = detection
 
 

@@ -40,12 +40,14 @@ class Truncation(NamedTuple):
 
 
 class StepReport(NamedTuple):
-    """log_total: log of the sum of the kept unnormalised weights. log_bound: log of an upper bound on the sum of all.
+    """log_total: log of the sum of the kept weights, relative to all measurements being clutter, whose log intensities
+    sum to log_clutter. log_bound: log of an upper bound on the sum of all weights.
     num_raised: measurements whose clutter intensity was raised to the floor. cut: ranking stopped at `max_nodes`.
     """
 
     log_total: float
     log_bound: float
+    log_clutter: float
     num_raised: int
     cut: bool
 
@@ -251,22 +253,23 @@ def finish_step(
 ) -> tuple[Glmb, Ints, StepReport]:
     """Rank, truncate and assemble once the rows are prepared. Returns posterior, parent of each hypothesis, report."""
     levels = np.empty(len(scan))
-    num_raised = clutter_levels(sensor, scan, pose, truncation.log_clutter_floor, levels)
+    log_clutter, num_raised = clutter_levels(sensor, scan, pose, truncation.log_clutter_floor, levels)
     options = list_options(rows, scan, levels, sensor, truncation.gate)
     parents = _parents_with_births(prior, num_births, groups)
     children, cut = rank_children(
         options, parents, len(scan), truncation.max_hyps, truncation.max_log_gap, truncation.max_nodes
     )
-    return _conclude(children, parents, rows, options, truncation, num_raised, cut)
+    return _conclude(children, parents, rows, options, truncation, log_clutter, num_raised, cut)
 
 
 @kernel
 def _conclude(
-    children: Children, parents: Parents, rows: Rows, options: Options, truncation: Truncation, num_raised: int, cut: bool
+    children: Children, parents: Parents, rows: Rows, options: Options, truncation: Truncation,
+    log_clutter: float, num_raised: int, cut: bool,
 ) -> tuple[Glmb, Ints, StepReport]:
     kept = _keep_heaviest(children, _merge_equal(children, options.columns), truncation, parents.groups)
     posterior, log_total = _assemble(children, kept, parents, rows, options)
-    report = StepReport(log_total, _log_total_bound(options, parents), num_raised, cut)
+    report = StepReport(log_total, _log_total_bound(options, parents), log_clutter, num_raised, cut)
     origins = np.empty(len(kept), np.int64)
     for h in range(len(kept)):
         origins[h] = children.parents[kept[h]]
@@ -293,8 +296,8 @@ def step_gibbs(
     scratch = make_scratch(prior.tracks.means.shape[1], len(sensor.angular))
     rows = prepare_rows(prior.tracks, birth, pose, dt, motion, sensor, scratch)
     levels = np.empty(len(scan))
-    num_raised = clutter_levels(sensor, scan, pose, truncation.log_clutter_floor, levels)
+    log_clutter, num_raised = clutter_levels(sensor, scan, pose, truncation.log_clutter_floor, levels)
     options = list_options(rows, scan, levels, sensor, truncation.gate)
     parents = _parents_with_births(prior, len(birth.tracks.labels), np.empty(0, np.int64))
     children = sample_children(options, parents, len(scan), num_samples, rng)
-    return _conclude(children, parents, rows, options, truncation, num_raised, False)
+    return _conclude(children, parents, rows, options, truncation, log_clutter, num_raised, False)

@@ -33,11 +33,12 @@ class Reduction(NamedTuple):
 
 
 class LmbReport(NamedTuple):
-    """log_total: log of the sum of all joint weights. num_raised: measurements with clutter raised to the floor.
+    """log_total: log of the sum of all joint weights, relative to clutter alone. log_clutter: as in `StepReport`. num_raised: measurements with clutter raised to the floor.
     num_ranked: clusters summed over their heaviest choices only. dropped_existence: summed existence of dropped labels.
     """
 
     log_total: float
+    log_clutter: float
     num_raised: int
     num_ranked: int
     dropped_existence: float
@@ -157,7 +158,7 @@ def finish_lmb(
     """Associate, marginalise and reduce once the rows are prepared."""
     weigh_by_existence(existence_logit, rows)
     levels = np.empty(len(scan))
-    num_raised = clutter_levels(sensor, scan, pose, truncation.log_clutter_floor, levels)
+    log_clutter, num_raised = clutter_levels(sensor, scan, pose, truncation.log_clutter_floor, levels)
     options = list_options(rows, scan, levels, sensor, truncation.gate)
     marginals = np.empty(options.offsets[-1])
     log_total, num_ranked = option_marginals(
@@ -169,7 +170,7 @@ def finish_lmb(
     kept_logits = np.empty(len(kept))
     for i in range(len(kept)):
         kept_logits[i] = logits[kept[i]]
-    return Lmb(tracks, kept_logits), LmbReport(log_total, num_raised, num_ranked, dropped)
+    return Lmb(tracks, kept_logits), LmbReport(log_total, log_clutter, num_raised, num_ranked, dropped)
 
 
 @kernel

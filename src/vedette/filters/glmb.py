@@ -1,0 +1,115 @@
+"""The delta-GLMB ("Vo-Vo") filter: joint prediction and update, exactly ranked or Gibbs sampled."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+
+from vedette.densities import GLMB
+from vedette.errors import InputError, NumericalError
+from vedette.filters.info import FilterInfo
+from vedette.filters.inputs import births_at, check_belief, check_parts, check_period, check_pose, check_scan, model_errors
+from vedette.filters.limits import Limits
+from vedette.kernels.conversions import marginalise
+from vedette.kernels.glmb import step_gibbs, step_ranked
+from vedette.models import BirthModel, MotionModel, SensorModel, SurvivalModel, kernel_motion
+
+_NO_GROUPS = np.empty(0, np.int64)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DeltaGlmbFilter:
+    """delta-GLMB filter of one sensor (Vo, Vo, Hoang 2017; paper, Algorithm 1, local prediction and update).
+
+    Attributes:
+        motion, survival, birth, sensor: the models.
+        limits: caps and thresholds.
+        assignment: "ranked" finds the heaviest hypotheses in exact order, "gibbs" samples them.
+        num_gibbs_samples: sweeps in all, shared out over the prior hypotheses.
+        marginalised: collapse the posterior to one hypothesis a label set after each step (M-delta-GLMB filter, Fantacci
+            and Vo 2015); track mixtures are then reduced to `limits.max_components`.
+
+    Raises:
+        InputError: models of different state dimensions, or a field out of range.
+    """
+
+    motion: MotionModel
+    survival: SurvivalModel
+    birth: BirthModel
+    sensor: SensorModel
+    limits: Limits = field(default_factory=Limits)
+    assignment: Literal["ranked", "gibbs"] = "ranked"
+    num_gibbs_samples: int = 1000
+    marginalised: bool = False
+
+    def __post_init__(self) -> None:
+        check_parts(self.motion, self.birth, self.sensor)
+        if self.assignment not in ("ranked", "gibbs"):
+            raise InputError(f"assignment: expected 'ranked' or 'gibbs'; got {self.assignment!r}")
+        if not self.num_gibbs_samples >= 1:
+            raise InputError(f"num_gibbs_samples: expected at least 1; got {self.num_gibbs_samples!r}")
+
+    def initial(self) -> GLMB:
+        """The belief before the first scan: no target."""
+        return GLMB.empty(self.motion.state_dim)
+
+    def step(
+        self, belief: GLMB, scan: Any, pose: Any, dt: float, step: int, *, rng: np.random.Generator
+    ) -> tuple[GLMB, FilterInfo]:
+        """Predict over `dt` seconds and update with a scan.
+
+        Args:
+            belief: posterior of the previous step.
+            scan: (num, meas_dim) measurements in any order.
+            pose: (3,) [px, py, heading_rad] of the sensor.
+            dt: seconds since the previous step.
+            step: number of this step; births are labelled with it.
+            rng: drawn from only if `assignment` is "gibbs".
+
+        Returns:
+            The posterior, hypotheses by descending weight, and a report.
+
+        Raises:
+            InputError: a scan, pose or belief of the wrong shape or kind.
+            ModelError: a model function raised or gave a value that is none of its kind.
+            NumericalError: no hypothesis has positive weight.
+        """
+        measurements, num_duplicates = check_scan(scan, self.sensor.meas_dim)
+        check_belief(belief, GLMB, self.motion.state_dim)
+        arguments = (
+            belief.to_kernel(),
+            births_at(self.birth, step).to_kernel(),
+            measurements,
+            check_pose(pose),
+            check_period(dt),
+            kernel_motion(self.motion, self.survival),
+            self.sensor.to_kernel(),
+            self.limits.truncation(self.sensor.meas_dim),
+        )
+        with model_errors():
+            if self.assignment == "gibbs":
+                posterior, _, report = step_gibbs(*arguments, int(self.num_gibbs_samples), rng)
+            else:
+                posterior, _, report = step_ranked(*arguments, _NO_GROUPS)
+        if len(posterior.hyp_log_weights) == 0:
+            raise NumericalError(f"step {step}: no hypothesis has positive weight; do the models forbid this scan?")
+        if self.marginalised:
+            limits = self.limits
+            posterior = marginalise(
+                posterior, limits.log_min_component_weight, float(limits.merge_distance), int(limits.max_components)
+            )
+        info = FilterInfo(
+            log_likelihood=report.log_total + report.log_clutter - self.sensor.clutter.rate,
+            num_hypotheses=len(posterior.hyp_log_weights),
+            num_tracks=len(posterior.tracks.labels),
+            discarded_weight_bound=max(0.0, -math.expm1(report.log_total - report.log_bound)),
+            dropped_existence=0.0,
+            num_clutter_raised=int(report.num_raised),
+            num_duplicates=num_duplicates,
+            num_inexact_clusters=0,
+            search_cut=bool(report.cut),
+        )
+        return GLMB.from_kernel(posterior), info

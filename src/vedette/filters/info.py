@@ -1,0 +1,34 @@
+"""What a filter step reports beside its posterior."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class FilterInfo:
+    """Report of one step.
+
+    Attributes:
+        log_likelihood: log density of the scan (as a set, with the Poisson clutter's exp(-rate)) given the prior; of the
+            kept hypotheses.
+        num_hypotheses, num_tracks: size of the posterior.
+        discarded_weight_bound: upper bound on the share of the posterior weight that was left out by the caps. Attained
+            where no measurement is contested; contested ones are counted in it though they carry no weight. Weight
+            outside the gates is not in it. NaN for an LMB, which is not a sum of hypotheses.
+        dropped_existence: expected number of targets in labels that an LMB dropped.
+        num_clutter_raised: measurements whose clutter intensity was raised to `Limits.min_log_clutter`.
+        num_duplicates: measurements that repeat another to the last digit and were left out.
+        num_inexact_clusters: LMB clusters summed over their heaviest joint choices only.
+        search_cut: whether ranking stopped at `Limits.max_search_nodes` before it had found all it was asked for.
+    """
+
+    log_likelihood: float
+    num_hypotheses: int
+    num_tracks: int
+    discarded_weight_bound: float
+    dropped_existence: float
+    num_clutter_raised: int
+    num_duplicates: int
+    num_inexact_clusters: int
+    search_cut: bool

@@ -1,0 +1,99 @@
+"""Checks of what a filter step is given, and the translation of what its kernels raise."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+
+from vedette.densities import LMB, TrackTable
+from vedette.errors import InputError, ModelError, VedetteError
+from vedette.kernels.types import Floats
+from vedette.models import BirthModel, MotionModel, SensorModel
+
+
+def check_scan(scan: Any, meas_dim: int) -> tuple[Floats, int]:
+    """The scan as a contiguous (num, meas_dim) array without repeated rows, and how many rows were repeats.
+
+    Raises:
+        InputError: not an array of that shape, or a value that is not finite. A scan without measurements is an empty
+            array; None is refused, since a sensor that did not scan must not be updated at all.
+    """
+    expected = f"an array of shape (num_measurements, {meas_dim}), empty for a scan without measurements"
+    if scan is None:
+        raise InputError(f"scan: expected {expected}; got None")
+    try:
+        array = np.array(scan, dtype=np.float64, order="C")
+    except (TypeError, ValueError):
+        raise InputError(f"scan: expected {expected}; got {type(scan).__name__} that is not numbers") from None
+    if array.size == 0 and array.ndim <= 2:
+        return np.empty((0, meas_dim)), 0
+    if array.ndim != 2 or array.shape[1] != meas_dim:
+        raise InputError(f"scan: expected {expected}; got shape {array.shape}")
+    bad = np.flatnonzero(~np.isfinite(array).all(axis=1))
+    if len(bad):
+        raise InputError(f"scan: expected finite numbers; got {array[bad[0]].tolist()} in row {bad[0]}")
+    _, first = np.unique(array, axis=0, return_index=True)
+    if len(first) == len(array):
+        return array, 0
+    return np.ascontiguousarray(array[np.sort(first)]), len(array) - len(first)
+
+
+def check_pose(pose: Any) -> Floats:
+    """The pose as a contiguous (3,) array [px, py, heading_rad]; `InputError` if it is not that."""
+    try:
+        array = np.array(pose, dtype=np.float64, order="C")
+    except (TypeError, ValueError):
+        array = np.empty(0)
+    if array.shape != (3,) or not np.isfinite(array).all():
+        raise InputError(f"pose: expected three finite numbers px, py, heading_rad; got {pose!r}")
+    return array
+
+
+def check_period(dt: Any) -> float:
+    """The time step as a float; `InputError` unless it is finite and above zero."""
+    if isinstance(dt, bool) or not np.isscalar(dt) or not np.isfinite(dt) or dt <= 0:  # type: ignore[call-overload]
+        raise InputError(f"dt: expected a finite number of seconds above 0; got {dt!r}")
+    return float(dt)  # type: ignore[arg-type]
+
+
+def check_parts(motion: MotionModel, birth: BirthModel, sensor: SensorModel) -> None:
+    """`InputError` unless the models are models and speak of states of the same dimension."""
+    for name, value, kind in (("motion", motion, MotionModel), ("birth", birth, BirthModel), ("sensor", sensor, SensorModel)):
+        if not isinstance(value, kind):
+            raise InputError(f"{name}: expected a {kind.__name__}; got {type(value).__name__}")
+    if birth.state_dim != motion.state_dim:
+        raise InputError(
+            f"birth.means: expected states of dimension {motion.state_dim}, as the motion model; got {birth.state_dim}"
+        )
+
+
+def check_belief(belief: Any, kind: type, state_dim: int) -> None:
+    """`InputError` unless the belief is of the filter's kind and dimension."""
+    if not isinstance(belief, kind):
+        raise InputError(f"belief: expected a {kind.__name__}; got {type(belief).__name__}")
+    if belief.tracks.state_dim != state_dim:
+        raise InputError(f"belief: expected states of dimension {state_dim}; got {belief.tracks.state_dim}")
+
+
+def births_at(birth: BirthModel, step: int) -> LMB:
+    """The LMB of the targets that may be born at `step`, labelled (step, site)."""
+    if not birth.is_active(step):
+        return LMB.empty(birth.state_dim)
+    sites = np.arange(birth.num_sites)
+    labels = np.column_stack([np.full_like(sites, step), sites])
+    tracks = TrackTable(labels, np.arange(birth.num_sites + 1), np.zeros(birth.num_sites), birth.means, birth.covs)
+    return LMB(tracks, np.log(birth.existence) - np.log1p(-birth.existence))
+
+
+@contextmanager
+def model_errors() -> Iterator[None]:
+    """Turn what a model function raised inside a kernel into a `ModelError` that says so."""
+    try:
+        yield
+    except VedetteError:
+        raise
+    except Exception as error:
+        raise ModelError(f"a model function raised {type(error).__name__}: {error}") from error

@@ -1,0 +1,99 @@
+"""What a filter keeps and what it throws away; every cap and threshold is a named field here."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from scipy.special import logit
+from scipy.stats import chi2
+
+from vedette.errors import InputError
+from vedette.kernels.glmb import Truncation
+from vedette.kernels.lmb import Reduction
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """Caps and thresholds of the filters. `Limits.none()` switches them all off (for small exact problems).
+
+    Attributes:
+        max_hypotheses: hypotheses kept; for an LMB, joint choices summed in a cluster too large for the exact sum.
+        min_relative_weight: hypotheses lighter than this times the heaviest are dropped.
+        gate_probability: probability that a target's measurement falls inside its gate; 1 switches gating off.
+        min_log_clutter: floor on the log clutter intensity. A measurement where the model says that clutter is
+            impossible (outside the region) would otherwise forbid every hypothesis that leaves it unexplained.
+        max_search_nodes: bound on the ranking search, a guard against scenes of hopeless ambiguity.
+        min_component_weight: mixture components lighter than this share of their track are dropped.
+        merge_distance: Mahalanobis distance within which components of a track are merged; 0 merges none.
+        max_components: components a track; 1 keeps one moment-matched Gaussian.
+        min_existence: labels of an LMB less probable than this are dropped.
+        max_labels: labels of an LMB kept.
+
+    Raises:
+        InputError: a field out of range.
+    """
+
+    max_hypotheses: int = 300
+    min_relative_weight: float = 1e-6
+    gate_probability: float = 1.0 - 1e-7
+    min_log_clutter: float = -60.0
+    max_search_nodes: int = 1_000_000
+    min_component_weight: float = 1e-5
+    merge_distance: float = 2.0
+    max_components: int = 10
+    min_existence: float = 1e-4
+    max_labels: int = 200
+
+    def __post_init__(self) -> None:
+        for name in ("max_hypotheses", "max_search_nodes", "max_components", "max_labels"):
+            if not getattr(self, name) >= 1:
+                raise InputError(f"Limits.{name}: expected at least 1; got {getattr(self, name)!r}")
+        for name in ("min_relative_weight", "min_component_weight", "min_existence"):
+            if not 0.0 <= getattr(self, name) < 1.0:
+                raise InputError(f"Limits.{name}: expected a number in [0, 1); got {getattr(self, name)!r}")
+        if not 0.0 < self.gate_probability <= 1.0:
+            raise InputError(f"Limits.gate_probability: expected a number in (0, 1]; got {self.gate_probability!r}")
+        if not self.merge_distance >= 0.0:
+            raise InputError(f"Limits.merge_distance: expected a number of at least 0; got {self.merge_distance!r}")
+        if not -math.inf < self.min_log_clutter < math.inf:
+            raise InputError(f"Limits.min_log_clutter: expected a finite number; got {self.min_log_clutter!r}")
+
+    @classmethod
+    def none(cls) -> Limits:
+        """Nothing is dropped, gated or merged."""
+        return cls(
+            max_hypotheses=2**62,
+            min_relative_weight=0.0,
+            gate_probability=1.0,
+            max_search_nodes=2**62,
+            min_component_weight=0.0,
+            merge_distance=0.0,
+            max_components=2**62,
+            min_existence=0.0,
+            max_labels=2**62,
+        )
+
+    def truncation(self, meas_dim: int) -> Truncation:
+        """The fields that bound hypotheses, as kernels take them."""
+        return Truncation(
+            int(self.max_hypotheses),
+            -math.log(self.min_relative_weight) if self.min_relative_weight > 0.0 else math.inf,
+            float(chi2.ppf(self.gate_probability, meas_dim)),
+            float(self.min_log_clutter),
+            int(self.max_search_nodes),
+        )
+
+    @property
+    def log_min_component_weight(self) -> float:
+        return math.log(self.min_component_weight) if self.min_component_weight > 0.0 else -math.inf
+
+    def reduction(self) -> Reduction:
+        """The fields that bound tracks and labels, as kernels take them."""
+        return Reduction(
+            self.log_min_component_weight,
+            float(self.merge_distance),
+            int(self.max_components),
+            float(logit(self.min_existence)),
+            int(self.max_labels),
+        )

@@ -1,0 +1,78 @@
+"""The labelled multi-Bernoulli filter: one Bernoulli track a label, with exact association marginals by clusters."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from vedette.densities import LMB
+from vedette.errors import NumericalError
+from vedette.filters.info import FilterInfo
+from vedette.filters.inputs import births_at, check_belief, check_parts, check_period, check_pose, check_scan, model_errors
+from vedette.filters.limits import Limits
+from vedette.kernels.lmb import step_lmb
+from vedette.models import BirthModel, MotionModel, SensorModel, SurvivalModel, kernel_motion
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LmbFilter:
+    """LMB filter of one sensor (Reuter, Vo, Vo, Dietmayer 2014), cheaper than the delta-GLMB filter.
+
+    Attributes:
+        motion, survival, birth, sensor: the models.
+        limits: caps and thresholds.
+
+    Raises:
+        InputError: models of different state dimensions.
+    """
+
+    motion: MotionModel
+    survival: SurvivalModel
+    birth: BirthModel
+    sensor: SensorModel
+    limits: Limits = field(default_factory=Limits)
+
+    def __post_init__(self) -> None:
+        check_parts(self.motion, self.birth, self.sensor)
+
+    def initial(self) -> LMB:
+        """The belief before the first scan: no target."""
+        return LMB.empty(self.motion.state_dim)
+
+    def step(
+        self, belief: LMB, scan: Any, pose: Any, dt: float, step: int, *, rng: np.random.Generator
+    ) -> tuple[LMB, FilterInfo]:
+        """Predict over `dt` seconds and update with a scan; arguments, results and errors as `DeltaGlmbFilter.step`.
+
+        Nothing is drawn from `rng`; it is taken so that filters are interchangeable.
+        """
+        measurements, num_duplicates = check_scan(scan, self.sensor.meas_dim)
+        check_belief(belief, LMB, self.motion.state_dim)
+        with model_errors():
+            posterior, report = step_lmb(
+                belief.to_kernel(),
+                births_at(self.birth, step).to_kernel(),
+                measurements,
+                check_pose(pose),
+                check_period(dt),
+                kernel_motion(self.motion, self.survival),
+                self.sensor.to_kernel(),
+                self.limits.truncation(self.sensor.meas_dim),
+                self.limits.reduction(),
+            )
+        if not np.isfinite(report.log_total):
+            raise NumericalError(f"step {step}: no joint association has positive weight; do the models forbid this scan?")
+        info = FilterInfo(
+            log_likelihood=report.log_total + report.log_clutter - self.sensor.clutter.rate,
+            num_hypotheses=1,
+            num_tracks=len(posterior.existence_logit),
+            discarded_weight_bound=float("nan"),
+            dropped_existence=float(report.dropped_existence),
+            num_clutter_raised=int(report.num_raised),
+            num_duplicates=num_duplicates,
+            num_inexact_clusters=int(report.num_ranked),
+            search_cut=False,
+        )
+        return LMB.from_kernel(posterior), info
