@@ -37,3 +37,9 @@ def user_made_bearing_range(*, jacobian: bool = True) -> MeasurementModel:
         jacobian=my_bearing_range_jacobian if jacobian else None,
         angular=[True, False],  # type: ignore[arg-type]
     )
+
+
+@model_function("transition")
+def nothing_like_a_state(state, dt, params, out):
+    for i in range(out.shape[0]):
+        out[i] = math.nan

@@ -1,0 +1,211 @@
+"""Recorded positions of real targets: CSV and Parquet files, and tables in memory, as checked arrays."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from vedette.errors import InputError
+from vedette.kernels.types import Floats, Ints
+from vedette.simulation.geography import to_tangent_plane
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Reports:
+    """Positions of targets, sorted by target and time.
+
+    Attributes:
+        times: (n,) s; of ISO 8601 times, seconds since 1970 UTC.
+        tracks: (n,) index into `names`.
+        positions: (n, 2) m.
+        velocities: (n, 2) m/s, or None where the record has none.
+        names: the record's own name of each target.
+        origin_deg: longitude and latitude of (0, 0) where the record was geographic, else None.
+    """
+
+    times: Floats
+    tracks: Ints
+    positions: Floats
+    velocities: Floats | None
+    names: tuple[str, ...]
+    origin_deg: tuple[float, float] | None
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """Columns as they came, the row number of each entry in its file, and a name for messages."""
+
+    columns: Mapping[str, Sequence[Any]]
+    rows: Sequence[int]
+    source: str
+
+    def column(self, name: str) -> Sequence[Any]:
+        if name not in self.columns:
+            have = ", ".join(self.columns) or "none"
+            raise InputError(f"{self.source}: expected a column {name!r}; got columns {have}")
+        return self.columns[name]
+
+    def fault(self, index: int, name: str, expected: str) -> InputError:
+        got = self.columns[name][index]
+        return InputError(f"{self.source}, row {self.rows[index]}, column {name!r}: expected {expected}; got {got!r}")
+
+    def numbers(self, name: str) -> Floats:
+        """A column of finite numbers."""
+        cells = self.column(name)
+        values = np.empty(len(cells))
+        for i, cell in enumerate(cells):
+            try:
+                values[i] = float(cell)
+            except (TypeError, ValueError):
+                raise self.fault(i, name, "a finite number") from None
+        if not np.isfinite(values).all():
+            raise self.fault(int(np.argmin(np.isfinite(values))), name, "a finite number")
+        return values
+
+    def times(self, name: str) -> Floats:
+        """A column of numbers of seconds, or of ISO 8601 times."""
+        cells = self.column(name)
+        if not len(cells) or _is_number(cells[0]):
+            return self.numbers(name)
+        values = np.empty(len(cells))
+        for i, cell in enumerate(cells):
+            try:
+                values[i] = seconds(cell)
+            except (TypeError, ValueError):
+                raise self.fault(i, name, "an ISO 8601 time") from None
+        return values
+
+    def labels(self, name: str) -> list[str]:
+        """A column of names or numbers, none empty."""
+        labels = ["" if cell is None else str(cell).strip() for cell in self.column(name)]
+        if "" in labels:
+            raise self.fault(labels.index(""), name, "a name or number")
+        return labels
+
+
+def _is_number(cell: Any) -> bool:
+    try:
+        float(cell)
+    except (TypeError, ValueError):
+        return False
+    return True
+
+
+def seconds(time: Any) -> float:
+    """A number, or the seconds from 1970 UTC to an ISO 8601 time or `datetime`; without a zone it is taken as UTC."""
+    if _is_number(time):
+        return float(time)
+    moment = time if isinstance(time, datetime) else datetime.fromisoformat(str(time).strip())
+    return (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()
+
+
+def read_table(path: str | Path) -> Table:
+    """A .csv file with a header line, or a .parquet file.
+
+    Raises:
+        InputError: not there, another ending, not readable as what it says it is, rows not as long as the header.
+    """
+    file = Path(path)
+    if file.suffix.lower() not in (".csv", ".parquet"):
+        raise InputError(f"{file}: expected a .csv or .parquet file")
+    if not file.is_file():
+        raise InputError(f"{file}: expected a file; there is none")
+    return _read_csv(file) if file.suffix.lower() == ".csv" else _read_parquet(file)
+
+
+def _read_csv(file: Path) -> Table:
+    try:
+        with file.open(encoding="utf-8-sig", newline="") as lines:
+            reader = csv.reader(lines, strict=True)
+            header = [name.strip() for name in next(reader, [])]
+            rows = [(reader.line_num, cells) for cells in reader if cells]
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise InputError(f"{file}: cannot be read as CSV in UTF-8: {error}") from error
+    if len(set(header)) != len(header):
+        raise InputError(f"{file}, row 1: expected each column name once; got {', '.join(header)}")
+    for line, cells in rows:
+        if len(cells) != len(header):
+            raise InputError(f"{file}, row {line}: expected {len(header)} cells, as in the header; got {len(cells)}")
+    columns = {name: [cells[i] for _, cells in rows] for i, name in enumerate(header)}
+    return Table(columns, [line for line, _ in rows], str(file))
+
+
+def _read_parquet(file: Path) -> Table:
+    try:
+        from pyarrow import ArrowException, parquet
+    except ImportError:
+        raise InputError(f"{file}: reading Parquet needs pyarrow; install it, or save the table as CSV") from None
+    try:
+        table = parquet.read_table(file)
+        columns = {name: table.column(name).to_pylist() for name in table.column_names}
+    except (OSError, ValueError, ArrowException) as error:
+        raise InputError(f"{file}: cannot be read as Parquet: {error}") from error
+    return Table(columns, range(1, table.num_rows + 1), str(file))
+
+
+def parse_reports(
+    table: Table, *, columns: Mapping[str, str] | None = None, origin_deg: tuple[float, float] | None = None
+) -> Reports:
+    """Reports out of a table with columns time, id and x, y or longitude, latitude; vx, vy where there are any.
+
+    Args:
+        table: see `read_table`.
+        columns: names in the table where they differ: {"time": "Time", "id": "MMSI", ...}. Naming a longitude and
+            latitude makes the record geographic; otherwise x, y are used if they are there.
+        origin_deg: longitude and latitude of (0, 0) for a geographic record; None: the median of the reports.
+
+    Raises:
+        InputError: names the file, row, column, what was expected and what came.
+    """
+    given = dict(columns or {})
+    if unknown := set(given) - {"time", "id", "x", "y", "longitude", "latitude", "vx", "vy"}:
+        raise InputError(f"columns: expected time, id, x, y, longitude, latitude, vx or vy; got {', '.join(unknown)}")
+    times, labels = table.times(given.get("time", "time")), table.labels(given.get("id", "id"))
+    positions, origin = _positions(table, given, origin_deg)
+    if len(times) == 0:
+        raise InputError(f"{table.source}: expected at least one report; got none")
+    speed_columns = [given.get(name, name) for name in ("vx", "vy")]
+    has_velocity = any(name in given for name in ("vx", "vy")) or all(name in table.columns for name in speed_columns)
+    velocities = np.stack([table.numbers(name) for name in speed_columns], axis=1) if has_velocity else None
+    names, tracks = np.unique(labels, return_inverse=True)
+    order = np.lexsort((times, tracks))
+    times, tracks = times[order], tracks[order].astype(np.int64)
+    again = np.flatnonzero((np.diff(times) == 0.0) & (np.diff(tracks) == 0))
+    if again.size:
+        first, second = sorted(table.rows[row] for row in order[again[0] : again[0] + 2])
+        name = names[tracks[again[0]]]
+        raise InputError(
+            f"{table.source}, row {second}: expected one report of {name} a time; row {first} has that time"
+        )
+    velocities = None if velocities is None else velocities[order]
+    return Reports(times, tracks, positions[order], velocities, tuple(map(str, names)), origin)
+
+
+def _positions(
+    table: Table, given: Mapping[str, str], origin_deg: tuple[float, float] | None
+) -> tuple[Floats, tuple[float, float] | None]:
+    named_geographic = "longitude" in given or "latitude" in given
+    if named_geographic and ("x" in given or "y" in given):
+        raise InputError("columns: expected either x and y, or longitude and latitude; got both")
+    has_plane = all(given.get(name, name) in table.columns for name in ("x", "y"))
+    has_globe = all(given.get(name, name) in table.columns for name in ("longitude", "latitude"))
+    if not named_geographic and (has_plane or not has_globe):
+        if origin_deg is not None:
+            raise InputError("origin_deg: expected only for longitudes and latitudes; the record has x and y")
+        return np.stack([table.numbers(given.get(name, name)) for name in ("x", "y")], axis=1), None
+    degrees = []
+    for name, limit in (("longitude", 360.0), ("latitude", 90.0)):
+        column = given.get(name, name)
+        values = table.numbers(column)
+        if (wrong := np.abs(values) > limit).any():
+            raise table.fault(int(np.argmax(wrong)), column, f"a {name} in degrees, at most {limit:g}")
+        degrees.append(values)
+    if origin_deg is None:
+        origin_deg = (float(np.median(degrees[0])), float(np.median(degrees[1]))) if len(degrees[0]) else (0.0, 0.0)
+    return to_tangent_plane(degrees[0], degrees[1], origin_deg), origin_deg
