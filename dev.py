@@ -47,17 +47,24 @@ def lock_file(extent: str) -> Path:
     return ROOT / "requirements" / f"{extent}.txt"
 
 
-def fingerprint(extent: str) -> str:
-    """Changes when an environment set up for `extent` would have to be set up again."""
-    digest = hashlib.sha256(f"{platform.python_version()} {sys.platform} {ROOT}".encode())
-    for path in (lock_file(extent), ROOT / "pyproject.toml", ROOT / "dev.py"):
-        digest.update(path.read_bytes())
-    return f"{extent} {digest.hexdigest()}"
+def lock_marks(extent: str) -> set[str]:
+    """What the stamp of an environment says when it holds the present locks of `extent`, by this Python."""
+    extents = ("runtime",) if extent == "runtime" else ("runtime", "check")
+    return {f"{name} {_digest(lock_file(name), platform.python_version(), sys.platform)}" for name in extents}
 
 
-def is_ready(extent: str) -> bool:
-    """Whether the environment holds the present lock of `extent`."""
-    return PYTHON.exists() and STAMP.is_file() and fingerprint(extent) in STAMP.read_text("utf-8").splitlines()
+def project_mark() -> str:
+    """What the stamp says when the project itself is installed as pyproject.toml has it."""
+    return f"project {_digest(ROOT / 'pyproject.toml', str(ROOT))}"
+
+
+def installed() -> set[str]:
+    """The marks on the stamp; none for an environment that is missing or was left half made."""
+    return set(STAMP.read_text("utf-8").splitlines()) if PYTHON.exists() and STAMP.is_file() else set()
+
+
+def _digest(path: Path, *more: str) -> str:
+    return hashlib.sha256(path.read_bytes() + "\0".join(more).encode()).hexdigest()
 
 
 @contextlib.contextmanager
@@ -85,11 +92,27 @@ def call(arguments: list[str], advice: str) -> None:
         raise SetupError(f"{result.stdout.strip()}\n\nerror: {' '.join(arguments)}\nfailed. {advice}")
 
 
-def make_venv() -> None:
-    """Make `.venv` anew, unless what is there was made by this very Python."""
-    config = VENV / "pyvenv.cfg"
-    if PYTHON.exists() and config.is_file() and f"version = {platform.python_version()}" in config.read_text("utf-8"):
+def set_up(extent: str) -> None:
+    """Install the locked dependencies of `extent` and the project itself into `.venv`; instant when already there."""
+    wanted = lock_marks(extent) | {project_mark()}
+    if wanted <= installed():
         return
+    with exclusive(ROOT / ".venv.lock"):
+        present = installed()
+        if wanted <= present:  # another process did it while this one waited
+            return
+        print(f"Setting up {VENV} (once; a minute or two, most of it download) ...", file=sys.stderr, flush=True)
+        locks = {mark for mark in present if not mark.startswith("project ")}
+        if not locks or not locks <= lock_marks("check"):
+            make_venv()  # anew: installing a changed lock over the old one would leave what it no longer names
+            locks = set()
+        STAMP.unlink(missing_ok=True)
+        install(extent, dependencies=not lock_marks(extent) <= locks)
+        STAMP.write_text("\n".join(sorted(wanted | locks)) + "\n", "utf-8")
+
+
+def make_venv() -> None:
+    """Make an empty `.venv` in place of whatever is there."""
     interpreter = getattr(sys, "_base_executable", sys.executable)  # not the one inside the .venv to be cleared
     call(
         [interpreter, "-m", "venv", "--clear", str(VENV)],
@@ -97,24 +120,18 @@ def make_venv() -> None:
     )
 
 
-def set_up(extent: str) -> None:
-    """Install the locked dependencies of `extent` and the project itself into `.venv`; instant when already there."""
-    if is_ready(extent):
-        return
-    with exclusive(ROOT / ".venv.lock"):
-        if is_ready(extent):  # another process did it while this one waited
-            return
-        print(f"Setting up {VENV} (once; a minute or two, most of it download) ...", file=sys.stderr, flush=True)
-        make_venv()
-        STAMP.unlink(missing_ok=True)
-        pip = [str(PYTHON), "-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--no-input", "--no-user"]
+def install(extent: str, *, dependencies: bool) -> None:
+    """Install the project, and the dependencies locked for `extent` where they are asked for, into `.venv`."""
+    pip = [str(PYTHON), "-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--no-input", "--no-user"]
+    if dependencies:
         call(
             [*pip, "--require-hashes", "--only-binary", ":all:", "--requirement", str(lock_file(extent))],
             "Is a package registry within reach, and is this one of the platforms that the packages are built for?",
         )
-        call([*pip, "--no-index", "--no-deps", "--no-build-isolation", "--editable", str(ROOT)], "See above.")
-        done = [fingerprint("runtime")] if extent == "runtime" else [fingerprint("runtime"), fingerprint("check")]
-        STAMP.write_text("\n".join(done) + "\n", "utf-8")
+    call(
+        [*pip, "--no-index", "--no-deps", "--no-build-isolation", "--editable", str(ROOT)],
+        "Is pyproject.toml, and all that it names, in place?",
+    )
 
 
 def main(arguments: list[str]) -> int:

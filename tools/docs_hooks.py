@@ -19,7 +19,7 @@ def field_tables() -> str:
     """A table of fields for each section of a scenario file, from its JSON schema."""
     from vedette.scenarios import json_schema
 
-    schema = json.loads(json_schema())
+    schema = json_schema()
     sections = {"The file": schema, **schema["$defs"]}
     return "\n\n".join(_section(name, section) for name, section in sections.items() if "properties" in section)
 
