@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 import sys
+from typing import Any
 
 import numpy as np
 import pytest
@@ -40,7 +41,7 @@ def test_a_straight_track_is_exact():
 def test_a_circle_is_followed(with_velocity):
     times = np.arange(0.0, 101.0, 5.0)
     places, speeds = circling(times)
-    columns = {"time": times, "id": [4] * 21, "x": places[:, 0], "y": places[:, 1]}
+    columns: dict[str, Any] = {"time": times, "id": [4] * 21, "x": places[:, 0], "y": places[:, 1]}
     if with_velocity:
         columns |= {"vx": speeds[:, 0], "vy": speeds[:, 1]}
     scans = np.arange(10.0, 90.0, 1.7)
@@ -54,7 +55,7 @@ def test_csv_parquet_and_memory_agree(tmp_path):
     pyarrow = pytest.importorskip("pyarrow")
     from pyarrow import parquet
 
-    columns = {
+    columns: dict[str, Any] = {
         "time": [0.0, 4.0, 2.0, 8.0, 6.0],
         "id": ["b", "a", "a", "b", "b"],
         "x": [1.0, 2.0, 3.0, 4.0, 5.0],
@@ -77,7 +78,7 @@ def test_csv_parquet_and_memory_agree(tmp_path):
 
 
 def test_columns_of_other_names_and_iso_times():
-    columns = {
+    columns: dict[str, Any] = {
         "When": ["2016-01-12T13:02:11", "2016-01-12 13:02:21+00:00", "2016-01-12T14:02:31+01:00"],
         "MMSI": [235, 235, 235],
         "lon": [-1.1, -1.099, -1.098],
@@ -111,7 +112,7 @@ def test_jumps_are_removed_wherever_they_are():
     for bad in range(10):
         jumped = x.copy()
         jumped[bad] = 3.9e6
-        columns = {"time": times, "id": [1] * 10, "x": jumped, "y": np.zeros(10)}
+        columns: dict[str, Any] = {"time": times, "id": [1] * 10, "x": jumped, "y": np.zeros(10)}
         targets = RecordedTargets.from_columns(columns, cleaning=Cleaning(max_speed=20.0))
         assert targets.counts.jumps == 1
         np.testing.assert_array_equal(targets.tracks[0].positions[:, 0], np.delete(x, bad))
@@ -134,7 +135,12 @@ def test_as_few_reports_as_possible_are_removed():
 
 
 def test_a_silence_splits_a_track():
-    columns = {"time": [0.0, 10.0, 100.0, 110.0, 400.0], "id": [1] * 5, "x": np.arange(5.0), "y": np.zeros(5)}
+    columns: dict[str, Any] = {
+        "time": [0.0, 10.0, 100.0, 110.0, 400.0],
+        "id": [1] * 5,
+        "x": np.arange(5.0),
+        "y": np.zeros(5),
+    }
     targets = RecordedTargets.from_columns(columns, cleaning=Cleaning(max_gap=60.0))
     assert [(track.times[0], track.times[-1]) for track in targets.tracks] == [(0.0, 10.0), (100.0, 110.0)]
     assert (targets.counts.tracks, targets.counts.short_tracks) == (2, 1)
@@ -144,7 +150,7 @@ def test_a_silence_splits_a_track():
 
 def test_leaving_the_region_ends_a_track():
     x = [0.0, 50.0, 150.0, 160.0, 60.0, 10.0]
-    columns = {"time": np.arange(6.0), "id": [1] * 6, "x": x, "y": np.zeros(6)}
+    columns: dict[str, Any] = {"time": np.arange(6.0), "id": [1] * 6, "x": x, "y": np.zeros(6)}
     targets = RecordedTargets.from_columns(columns, cleaning=Cleaning(region=Region(-100.0, 100.0, -100.0, 100.0)))
     assert targets.counts.outside == 2
     assert [track.positions[:, 0].tolist() for track in targets.tracks] == [[0.0, 50.0], [60.0, 10.0]]
@@ -234,7 +240,7 @@ def test_bad_csv_is_named(tmp_path, text, message):
 def test_files_that_are_not_tables(tmp_path, monkeypatch):
     with pytest.raises(InputError, match="expected a file; there is none"):
         RecordedTargets.from_file(tmp_path / "none.csv")
-    with pytest.raises(InputError, match="a .csv or .parquet file"):
+    with pytest.raises(InputError, match=r"a \.csv or \.parquet file"):
         RecordedTargets.from_file(tmp_path / "tracks.xlsx")
     (tmp_path / "bytes.csv").write_bytes(b"time,id\n\xff\xfe,1\n")
     with pytest.raises(InputError, match="cannot be read as CSV in UTF-8"):
