@@ -153,10 +153,9 @@ def _append_reduced(
 
 @kernel
 def finish_lmb(
-    existence_logit: Floats, rows: Rows, scan: Floats, pose: Floats, sensor: Sensor, truncation: Truncation, reduction: Reduction
+    rows: Rows, scan: Floats, pose: Floats, sensor: Sensor, truncation: Truncation, reduction: Reduction
 ) -> tuple[Lmb, LmbReport]:
-    """Associate, marginalise and reduce once the rows are prepared."""
-    weigh_by_existence(existence_logit, rows)
+    """Associate, marginalise and reduce once the rows are prepared and weighed by existence."""
     levels = np.empty(len(scan))
     log_clutter, num_raised = clutter_levels(sensor, scan, pose, truncation.log_clutter_floor, levels)
     options = list_options(rows, scan, levels, sensor, truncation.gate)
@@ -181,4 +180,5 @@ def step_lmb(
     """One scan."""
     scratch = make_scratch(prior.tracks.means.shape[1], len(sensor.angular))
     rows = prepare_rows(prior.tracks, birth, pose, dt, motion, sensor, scratch)
-    return finish_lmb(prior.existence_logit, rows, scan, pose, sensor, truncation, reduction)
+    weigh_by_existence(prior.existence_logit, rows)
+    return finish_lmb(rows, scan, pose, sensor, truncation, reduction)
