@@ -15,6 +15,7 @@ import numpy as np
 from vedette.scenarios.faults import Finding, Path, describe
 from vedette.scenarios.parts import Parts
 from vedette.scenarios.schema.base import Custom, Section
+from vedette.scenarios.schema.tracking import GibbsAssignment
 from vedette.scenarios.schema.world import BirthSite, RecordedTargets, ScriptedTarget, Time
 from vedette.scenarios.sensor_checks import sensor_findings
 
@@ -81,6 +82,21 @@ def _fusion(parts: Parts) -> Iterator[Finding]:
         yield ("fusion", "kind"), f"a fusion, as there are {len(parts.sensors)} sensors", '"none"'
     if parts.fusion.kind == "cm_delta_glmb" and parts.filter.kind == "lmb":
         yield ("fusion", "kind"), "clmb or none, as the filters are lmb", '"cm_delta_glmb"'
+
+
+def _filter(parts: Parts) -> Iterator[Finding]:
+    if parts.filter is not None and parts.filter.kind == "lmb" and isinstance(parts.filter.assignment, GibbsAssignment):
+        yield ("filter", "assignment", "kind"), "ranked, as the filter is lmb", '"gibbs"'
+
+
+def _combinations(parts: Parts) -> Iterator[Finding]:
+    fusion = parts.fusion
+    if fusion is None or fusion.mixture_power == "moment_matched" or _faulty(fusion.mixture_power, fusion.limits):
+        return
+    limits, num_sensors = fusion.limits, len(parts.sensors)
+    if limits.max_components**num_sensors > limits.max_combinations:
+        wanted = f"a number whose power by {num_sensors} sensors is at most max_combinations, {limits.max_combinations}"
+        yield ("fusion", "limits", "max_components"), wanted, describe(limits.max_components)
 
 
 def _state_length(path: Path, values: Sequence[float] | None, dim: int | None) -> Iterator[Finding]:
@@ -212,6 +228,8 @@ _CHECKS: tuple[Callable[[Parts], Iterator[Finding]], ...] = (
     _schedule_order,
     _weights,
     _fusion,
+    _filter,
+    _combinations,
     _births,
     _targets,
     _recorded,

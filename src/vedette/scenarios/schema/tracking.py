@@ -27,27 +27,35 @@ class GibbsAssignment(Section):
 Assignment = Annotated[RankedAssignment | GibbsAssignment, Field(discriminator="kind")]
 
 
-class Limits(Section):
-    """What a filter throws away, and so how much it costs."""
+Share = Annotated[float, Field(ge=0.0, lt=1.0)]
 
-    max_hypotheses: Count = Field(default=100, description="Most hypotheses kept after a scan [-].")
-    min_hypothesis_weight: Annotated[float, Field(ge=0.0, lt=1.0)] = Field(
-        default=1e-5, description="A hypothesis lighter than this is dropped [-]."
+
+class FilterLimits(Section):
+    """Caps and thresholds of a filter: what it throws away, and so what it costs."""
+
+    max_hypotheses: Count = Field(default=300, description="Most hypotheses kept after a scan [-].")
+    min_relative_weight: Share = Field(
+        default=1e-6, description="Hypotheses lighter than this times the heaviest are dropped [-]."
     )
     gate_probability: Annotated[float, Field(gt=0.0, le=1.0)] = Field(
-        default=0.99999, description="Probability that a target's measurement falls in its gate; 1: no gate [-]."
+        default=1.0 - 1e-7, description="Probability that a target's measurement falls in its gate; 1: no gate [-]."
     )
-    max_tracks: Count = Field(default=200, description="Most tracks kept after a scan [-].")
-    min_existence: Annotated[float, Field(ge=0.0, lt=1.0)] = Field(
-        default=1e-4, description="An LMB track less probable than this is dropped [-]."
+    min_log_clutter: float = Field(
+        default=-60.0, description="Floor of the log clutter intensity, for places where clutter is impossible [-]."
     )
-    max_components: Count = Field(default=10, description="Most Gaussian components of a track [-].")
-    min_component_weight: Annotated[float, Field(ge=0.0, lt=1.0)] = Field(
-        default=1e-5, description="A component lighter than this is dropped [-]."
+    max_search_nodes: Count = Field(default=1_000_000, description="Bound on the ranking search [-].")
+    min_component_weight: Share = Field(
+        default=1e-5, description="Gaussian components lighter than this share of their track are dropped [-]."
     )
     merge_distance: float = Field(
-        default=2.0, ge=0.0, description="Components closer than this Mahalanobis distance are merged; 0: never [-]."
+        default=2.0, ge=0.0, description="Mahalanobis distance within which components are merged; 0: never [-]."
     )
+    max_components: Count = Field(default=10, description="Most Gaussian components of a track [-].")
+    min_existence: Share = Field(default=1e-4, description="LMB tracks less probable than this are dropped [-].")
+    max_labels: Count = Field(default=200, description="Most tracks of an LMB [-].")
+
+
+GaussianMethod = Literal["auto", "ekf", "ukf", "ckf"]
 
 
 class Filter(Section):
@@ -57,37 +65,61 @@ class Filter(Section):
         default="m_delta_glmb",
         description="delta-GLMB; delta-GLMB marginalised after each scan (one component a label set); or LMB [-].",
     )
-    gaussian_method: Literal["auto", "ekf", "ukf", "ckf"] = Field(
+    gaussian_method: GaussianMethod = Field(
         default="auto", description="Extended, unscented or cubature Kalman; auto: extended where Jacobians exist [-]."
     )
     assignment: Assignment = Field(default=RankedAssignment(), description="How associations are truncated [-].")
-    limits: Limits = Field(default=Limits(), description="What is thrown away [-].")
+    limits: FilterLimits = Field(default=FilterLimits(), description="What is thrown away [-].")
 
 
 Weights = Annotated[tuple[Probability, ...], Field(strict=False, min_length=1)]
+Floor = Annotated[float, Field(gt=0.0, lt=1.0)]
+
+
+class FusionLimits(Section):
+    """Caps on the cost of a fusion."""
+
+    max_hypotheses: Count = Field(default=1000, description="Most label sets of the fused density [-].")
+    max_components: Count = Field(
+        default=4, description="Most components of a track before its power is taken; unused when moment matched [-]."
+    )
+    min_component_weight: Annotated[float, Field(gt=0.0, lt=1.0)] = Field(
+        default=1e-5, description="Lighter components are dropped; unused when moment matched [-]."
+    )
+    merge_distance: Annotated[float, Field(ge=0.0)] | None = Field(
+        default=None,
+        description="Closer components are merged; none: 2 for component_wise, 1 for quadrature powers [-].",
+    )
+    max_combinations: Count = Field(
+        default=4096, description="Bound on the combinations of components of one label at all sensors [-]."
+    )
 
 
 class Fusion(Section):
-    """How the sensors' densities become one."""
+    """How the sensors' densities become one: generalised covariance intersection (paper, section III)."""
 
     kind: Literal["cm_delta_glmb", "clmb", "none"] = Field(
         default="cm_delta_glmb",
-        description="Generalised covariance intersection of marginalised delta-GLMB or of LMB densities, or none [-].",
+        description="Of marginalised delta-GLMB densities, of LMB densities, or none (a single sensor) [-].",
     )
     weights: Weights | None = Field(
         default=None, description="Weight of each sensor, with sum 1; none: equal weights [-]."
     )
-    mixture_power: Literal["component", "moment_matched"] = Field(
-        default="component",
-        description="Power of a Gaussian mixture: of each component, or of the single Gaussian with its moments [-].",
+    mixture_power: Literal["moment_matched", "component_wise", "quadrature"] = Field(
+        default="moment_matched",
+        description="Power of a Gaussian mixture: of the Gaussian with its moments; of each component, which is valid "
+        "for well separated ones; or the latter corrected by cubature [-].",
     )
-    missing_weight: Annotated[float, Field(ge=0.0, lt=1.0)] = Field(
-        default=1e-10,
-        description="Weight given to a label set that one sensor lost by truncation and another kept [-].",
+    missing_weight: Floor = Field(
+        default=1e-6, description="Weight of a label set where a sensor lost it by truncation (cm_delta_glmb) [-]."
+    )
+    missing_existence: Floor = Field(
+        default=1e-4, description="Existence of a label where a sensor lost it by truncation (clmb) [-]."
     )
     feedback: bool = Field(
-        default=False, description="Whether the fused density replaces the sensors' own; the paper does not [-]."
+        default=False, description="Whether the fused density replaces the sensors' own; the paper's does not [-]."
     )
+    limits: FusionLimits = Field(default=FusionLimits(), description="What is thrown away [-].")
 
 
 class MapEstimator(Section):
