@@ -1,7 +1,5 @@
-"""The world that the program does not get to see: truth, platforms, scans, and the loop."""
 
 from vedette.simulation.cleaning import Cleaning, CleaningCounts, RecordedTrack
-from vedette.simulation.platforms import advance
 from vedette.simulation.recorded import RecordedTargets
 from vedette.simulation.scans import CLUTTER, Scan, simulate_scan
 from vedette.simulation.truth import ScriptedTargets, TargetSource, Truth
@@ -16,6 +14,5 @@ __all__ = [
     "ScriptedTargets",
     "TargetSource",
     "Truth",
-    "advance",
     "simulate_scan",
 ]

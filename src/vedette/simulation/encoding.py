@@ -71,7 +71,8 @@ def _check(record: RunRecord) -> None:
     num_scans = record.num_scans
     if not np.array_equal(record.truth.times, record.times):
         raise InputError("record.truth: expected the scan times of the record; got others")
-    lengths = {"truth": len(record.truth.offsets) - 1, "estimates": len(record.estimates), "poses": len(record.poses)}
+    record.truth.validate()
+    lengths = {"estimates": len(record.estimates), "poses": len(record.poses)}
     for name, length in lengths.items():
         if length != num_scans:
             raise InputError(f"record.{name}: expected one entry for each of {num_scans} scans; got {length}")

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from vedette.errors import InputError
-from vedette.simulation import advance
+from vedette.models.platforms import advance
 
 
 def test_one_platform():
