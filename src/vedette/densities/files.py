@@ -69,7 +69,8 @@ def load_density(path: str | os.PathLike[str]) -> GLMB | LMB | Poisson:
     """
     source = Path(path)
     try:
-        with np.load(source, allow_pickle=False) as content:
+        # Opened here: np.load leaves a damaged archive open.
+        with source.open("rb") as file, np.load(file, allow_pickle=False) as content:
             arrays = {name: content[name] for name in content.files}
     except Exception as fault:  # a damaged file can raise nearly anything in the readers of zip and npy
         raise InputError(f"{source}: expected a density file; {fault}") from fault
