@@ -19,6 +19,8 @@ from vedette.errors import InputError
 from vedette.kernels.types import Bools, Floats
 from vedette.simulation.truth import Truth
 
+_HIGH_ORDER = 30.0
+
 
 @dataclass(frozen=True, slots=True)
 class OspaResult:
@@ -67,11 +69,11 @@ def ospa_of_run(truth: Truth, estimates: Sequence[Estimate], *, cutoff: float, o
     Raises `InputError` as `ospa` does, and if there is not one estimate a scan.
     """
     _check_parameters(cutoff, order)
-    if len(estimates) != len(truth.times):
-        raise InputError(f"estimates: expected one for each of {len(truth.times)} scans; got {len(estimates)}")
+    if len(estimates) != truth.num_scans:
+        raise InputError(f"estimates: expected one for each of {truth.num_scans} scans; got {len(estimates)}")
     parts = np.empty((len(estimates), 3))
     for scan, estimate in enumerate(estimates):
-        states = truth.states[truth.offsets[scan] : truth.offsets[scan + 1]]
+        _, states = truth.at(scan)
         found = _points(estimate.means[:, :2], f"estimates[{scan}]")
         result = _ospa(found, _points(states[:, :2], f"truth at scan {scan}"), cutoff, order)
         parts[scan] = result.total, result.localisation, result.cardinality
@@ -110,13 +112,15 @@ def _ospa(first: Floats, second: Floats, cutoff: float, order: float) -> OspaRes
 
 def _localisation(first: Floats, second: Floats, cutoff: float, order: float) -> float:
     distances = np.minimum(np.sqrt(((first[:, None, :] - second[None, :, :]) ** 2).sum(axis=2)), cutoff)
-    scale = float(distances.max())
-    if scale == 0.0:
-        return 0.0
     if math.isinf(order):
         return _bottleneck(distances)
-    # Powers of ratios: a power of metres overflows, and underflows, at a high order.
-    costs = (distances / scale) ** order
+    # Powers of ratios: powers of metres overflow, or all vanish, at a high order. There the ratio must be to what the
+    # best assignment cannot avoid, for beside a larger distance everything that matters would vanish too.
+    scale = float(distances.max()) if order <= _HIGH_ORDER else _bottleneck(distances)
+    if scale == 0.0:
+        return 0.0
+    with np.errstate(over="ignore", under="ignore"):  # an infinite cost only says: never this pair
+        costs = (distances / scale) ** order
     matched = costs[linear_sum_assignment(costs)].sum()
     return float(scale * (matched / max(distances.shape)) ** (1.0 / order))
 

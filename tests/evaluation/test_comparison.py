@@ -1,0 +1,125 @@
+from __future__ import annotations
+
+import csv
+import io
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from evaluation.synthetic import make_record
+from vedette.errors import InputError
+from vedette.evaluation import Comparison, compare, decision_rows, strategy_csv, strategy_markdown, strategy_rows
+from vedette.evaluation.tables import HEADER
+from vedette.simulation.records import RunRecord
+
+NUM_RUNS = 6
+STRATEGIES = ("jdm", "idm", "random", "fixed")
+
+
+@pytest.fixture(scope="module")
+def runs() -> dict[str, list[RunRecord]]:
+    return {name: [make_record(name, run) for run in range(NUM_RUNS)] for name in STRATEGIES}
+
+
+@pytest.fixture(scope="module")
+def comparison(runs: dict[str, list[RunRecord]]) -> Comparison:
+    return compare(runs)
+
+
+def test_means_are_taken_after_the_first_decision(comparison: Comparison, runs: dict[str, list[RunRecord]]) -> None:
+    np.testing.assert_array_equal(comparison.decision_times, [10.0, 20.0, 30.0])
+    assert comparison.since == 10.0
+    np.testing.assert_array_equal(comparison.times[comparison.counted], np.arange(11.0, 41.0))
+    expected = [record.ospa[10:, 1].mean() for record in runs["idm"]]
+    np.testing.assert_allclose(comparison.run_means("idm", "localisation"), expected)
+
+
+def test_another_time_to_count_from(runs: dict[str, list[RunRecord]]) -> None:
+    np.testing.assert_allclose(
+        compare(runs, since=30.0).run_means("jdm"), [record.ospa[30:, 0].mean() for record in runs["jdm"]]
+    )
+
+
+def test_without_decisions_every_scan_counts(runs: dict[str, list[RunRecord]]) -> None:
+    assert compare({"fixed": runs["fixed"]}).counted.all()
+
+
+def test_differences_are_to_the_first_strategy_unless_named(comparison: Comparison) -> None:
+    against_first = comparison.difference("random").summary.mean
+    assert float(against_first) == pytest.approx(
+        float(comparison.summary("random").mean - comparison.summary("jdm").mean)
+    )
+    assert float(comparison.difference("random", "random").summary.mean) == 0.0
+    assert comparison.difference("random").share_won == 1.0
+
+
+def test_decision_shares_add_up(comparison: Comparison) -> None:
+    shares = comparison.decision_shares("jdm", 0)
+    assert sum(shares.values()) == pytest.approx(1.0)
+    assert list(shares.values()) == sorted(shares.values(), reverse=True)
+    assert all(len(headings) == 2 for headings in shares)
+    assert comparison.decision_shares("fixed", 0) == {}
+
+
+def test_runs_that_are_not_paired_are_refused(runs: dict[str, list[RunRecord]]) -> None:
+    cases = {
+        "expected 6 runs": runs["idm"][1:],
+        "expected scenario, seed and run": runs["idm"][::-1],
+        "scan times": [replace(record, times=record.times + 1.0) for record in runs["idm"]],
+    }
+    for message, records in cases.items():
+        with pytest.raises(InputError, match=message):
+            compare({"jdm": runs["jdm"], "idm": records})
+
+
+@pytest.mark.parametrize("empty", [{}, {"jdm": []}])
+def test_no_runs_are_refused(empty: dict[str, list[RunRecord]]) -> None:
+    with pytest.raises(InputError, match="at least one run"):
+        compare(empty)
+
+
+def test_nothing_to_count_is_refused(runs: dict[str, list[RunRecord]]) -> None:
+    with pytest.raises(InputError, match="before the last scan at 40"):
+        compare(runs, since=40.0)
+
+
+def test_unknown_strategy_is_named(comparison: Comparison) -> None:
+    with pytest.raises(InputError, match="expected one of jdm, idm, random, fixed; got 'greedy'"):
+        comparison.summary("greedy")
+
+
+def test_table_has_a_row_a_strategy(comparison: Comparison) -> None:
+    rows = strategy_rows(comparison)
+    assert [row[0] for row in rows] == list(STRATEGIES)
+    assert all(len(row) == len(HEADER) for row in rows)
+    assert rows[0][4:] == ("", "", "")
+    assert rows[2][4].startswith("+")
+    assert rows[2][6] == "100%"
+
+
+def test_table_of_a_single_run_claims_no_error(runs: dict[str, list[RunRecord]]) -> None:
+    rows = strategy_rows(compare({name: runs[name][:1] for name in STRATEGIES}))
+    assert "±" not in "".join(rows[1])
+    assert rows[1][5] == "unknown"
+
+
+def test_markdown_is_a_table_with_a_caption(comparison: Comparison) -> None:
+    lines = strategy_markdown(comparison).splitlines()
+    table = [line for line in lines if line.startswith("|")]
+    assert len(table) == 2 + len(STRATEGIES)
+    assert len({line.count("|") for line in table}) == 1
+    assert "6 paired runs, mean over t = 11 to 40 s" in lines[-1]
+
+
+def test_csv_holds_the_unrounded_numbers(comparison: Comparison) -> None:
+    rows = list(csv.DictReader(io.StringIO(strategy_csv(comparison))))
+    assert float(rows[1]["total_mean_m"]) == float(comparison.summary("idm").mean)
+    assert float(rows[3]["share_won"]) == comparison.difference("fixed").share_won
+
+
+def test_decision_rows_skip_strategies_without_decisions(comparison: Comparison) -> None:
+    rows = decision_rows(comparison, "idm", at_most=1)
+    assert [time for time, _ in rows] == ["10 s", "20 s", "30 s"]
+    assert all(text.endswith("%") and "°" in text for _, text in rows)
+    assert decision_rows(comparison, "fixed") == []

@@ -1,0 +1,157 @@
+from __future__ import annotations
+
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
+
+from evaluation.synthetic import ACTIONS, make_plan, make_record
+from vedette.control.plan import Plan
+from vedette.densities.estimates import Estimate
+from vedette.errors import InputError
+from vedette.evaluation import Comparison, compare
+from vedette.evaluation.figures import ospa_figure, reward_figure, save_figure, tracks_figure
+
+
+def labels(figure: Figure) -> list[tuple[str, str]]:
+    return [(axes.get_xlabel(), axes.get_ylabel()) for axes in figure.axes]
+
+
+def plan(kind: str, num_sensors: int = 2) -> Plan:
+    return make_plan(kind, np.random.default_rng(5), num_sensors)
+
+
+@pytest.fixture(scope="module")
+def comparison() -> Comparison:
+    return compare({name: [make_record(name, run) for run in range(4)] for name in ("jdm", "idm", "random")})
+
+
+def test_tracks_show_every_target_label_and_sensor_on_equal_axes() -> None:
+    record = make_record()
+    (axes,) = tracks_figure(record).axes
+    assert labels(axes.figure) == [("x (m)", "y (m)")]  # type: ignore[arg-type]
+    assert axes.get_aspect() == 1.0
+    assert np.ptp(axes.get_xlim()) == pytest.approx(np.ptp(axes.get_ylim()))
+    longest = sorted(len(line.get_xdata()) for line in axes.lines)[-2:]  # type: ignore[arg-type]
+    assert longest == [record.num_scans] * 2
+    assert {text.get_text() for text in axes.texts} >= {"S1", "S2", "1", "2", "3"}
+
+
+def test_tracks_of_two_runs_share_their_axes() -> None:
+    left, right = tracks_figure(make_record("idm"), make_record("jdm")).axes
+    assert (left.get_title(), right.get_title()) == ("IDM", "JDM")
+    assert left.get_xlim() == right.get_xlim()
+
+
+def test_tracks_of_a_large_region_are_in_kilometres() -> None:
+    record = make_record("fixed")
+    truth = replace(record.truth, states=record.truth.states * 20.0)
+    assert labels(tracks_figure(replace(record, truth=truth))) == [("x (km)", "y (km)")]
+
+
+def test_tracks_without_any_target_or_estimate_can_be_drawn(tmp_path: Path) -> None:
+    record = make_record("fixed")
+    none = replace(record.truth, offsets=np.zeros(41, np.int64), ids=np.empty(0, np.int64), states=np.empty((0, 4)))
+    nothing = Estimate(np.empty((0, 2), np.int64), np.empty((0, 4)), np.empty((0, 4, 4)), np.empty(0))
+    save_figure(
+        tracks_figure(replace(record, truth=none, estimates=(nothing,) * 40)), tmp_path / "none", formats=("png",)
+    )
+
+
+def test_tracks_refuse_no_run_and_other_numbers_of_titles() -> None:
+    with pytest.raises(InputError, match="at least one run"):
+        tracks_figure()
+    with pytest.raises(InputError, match="titles: expected 1; got 2"):
+        tracks_figure(make_record(), titles=("a", "b"))
+
+
+def test_independent_rewards_are_one_curve_a_sensor_in_degrees() -> None:
+    decision = plan("idm")
+    (axes,) = reward_figure(decision).axes
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("Heading (deg)", "Reward (CS divergence)")
+    curve = axes.lines[0]
+    np.testing.assert_allclose(curve.get_xdata(), np.rad2deg(ACTIONS))  # type: ignore[arg-type]
+    np.testing.assert_allclose(curve.get_ydata(), decision.tables[0].mean)  # type: ignore[arg-type]
+    assert curve.get_markevery() == [decision.chosen[0]]
+    assert len(axes.collections) == 2  # the bands
+
+
+def test_joint_rewards_are_a_heat_map_with_the_choice_framed_and_the_best_over_the_others() -> None:
+    decision = plan("jdm")
+    upper, lower, bar = reward_figure(decision).axes
+    np.testing.assert_array_equal(upper.images[0].get_array(), decision.tables[0].mean.T)
+    frames = [patch.get_xy() for patch in upper.patches if isinstance(patch, Rectangle)]
+    assert frames == [(decision.chosen[0] - 0.5, decision.chosen[1] - 0.5)] * 2
+    np.testing.assert_allclose(lower.lines[0].get_ydata(), decision.tables[0].mean.max(axis=1))  # type: ignore[arg-type]
+    assert bar.get_ylabel() == "Joint reward (CS divergence)"
+
+
+def test_heat_map_of_any_pair_of_three_sensors() -> None:
+    decision = plan("jdm", 3)
+    joint = decision.tables[0].mean
+    for pair, expected in {(0, 1): joint.max(axis=2).T, (2, 0): joint.max(axis=1)}.items():
+        upper = reward_figure(decision, pair=pair).axes[0]
+        np.testing.assert_array_equal(upper.images[0].get_array(), expected)
+        assert upper.get_xlabel() == f"Heading of sensor {pair[0] + 1} (deg)"
+
+
+@pytest.mark.parametrize("pair", [(0, 0), (0, 2), (-1, 0)])
+def test_heat_map_refuses_what_is_no_pair(pair: tuple[int, int]) -> None:
+    with pytest.raises(InputError, match="pair: expected two of the sensors"):
+        reward_figure(plan("jdm"), pair=pair)
+
+
+def test_random_control_has_no_rewards_to_draw() -> None:
+    with pytest.raises(InputError, match="'random' weighs no actions"):
+        reward_figure(plan("random"))
+
+
+def test_ospa_has_a_curve_and_a_band_a_strategy_and_marks_decisions(comparison: Comparison) -> None:
+    (axes,) = ospa_figure(comparison).axes
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("Time (s)", "OSPA (m)")
+    assert [str(line.get_label()) for line in axes.lines[:4]] == ["JDM", "IDM", "Random", "decision"]
+    np.testing.assert_allclose(axes.lines[1].get_ydata(), comparison.curve("idm").mean)  # type: ignore[arg-type]
+    assert len(axes.collections) == 3
+    assert axes.get_ylim()[0] == 0.0
+
+
+def test_ospa_parts_are_panels(comparison: Comparison) -> None:
+    figure = ospa_figure(comparison, parts=("total", "localisation", "cardinality"))
+    assert [axes.get_ylabel() for axes in figure.axes] == ["OSPA (m)", "Localisation (m)", "Cardinality (m)"]
+    with pytest.raises(InputError, match="parts: expected some of"):
+        ospa_figure(comparison, parts=("cost",))
+
+
+def test_saving_gives_vector_and_raster_files_and_the_same_bytes_again(tmp_path: Path) -> None:
+    first = save_figure(reward_figure(plan("jdm")), tmp_path / "a" / "figure")
+    again = save_figure(reward_figure(plan("jdm")), tmp_path / "b" / "figure")
+    assert [path.suffix for path in first] == [".pdf", ".svg", ".png"]
+    assert [path.read_bytes() for path in first] == [path.read_bytes() for path in again]
+    assert sorted(path.name for path in (tmp_path / "a").iterdir()) == ["figure.pdf", "figure.png", "figure.svg"]
+    assert b"<text" in first[1].read_bytes()
+
+
+def test_saving_refuses_unknown_formats_and_places(tmp_path: Path) -> None:
+    figure = reward_figure(plan("idm"))
+    with pytest.raises(InputError, match="expected some of pdf, svg, png; got gif"):
+        save_figure(figure, tmp_path / "figure", formats=("gif",))
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match="expected a place to write figures"):
+        save_figure(figure, tmp_path / "file" / "figure")
+
+
+def test_global_settings_are_left_alone() -> None:
+    before = dict(matplotlib.rcParams)
+    reward_figure(plan("idm"))
+    assert dict(matplotlib.rcParams) == before
+
+
+def test_no_display_and_no_pyplot_is_needed() -> None:
+    code = "import sys, vedette.evaluation.figures; assert 'matplotlib.pyplot' not in sys.modules"
+    subprocess.run([sys.executable, "-c", code], check=True)

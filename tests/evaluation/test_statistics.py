@@ -1,0 +1,66 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scipy.stats
+
+from vedette.errors import InputError
+from vedette.evaluation import paired_difference, summarise
+
+
+def test_summary_equals_scipys() -> None:
+    values = np.random.default_rng(1).normal(10.0, 3.0, 25)
+    summary = summarise(values)
+    interval = scipy.stats.ttest_1samp(values, 0.0).confidence_interval(0.95)
+    assert float(summary.mean) == pytest.approx(values.mean())
+    assert float(summary.standard_error) == pytest.approx(scipy.stats.sem(values))
+    assert (float(summary.low), float(summary.high)) == pytest.approx((interval.low, interval.high))
+    assert summary.num_runs == 25
+
+
+def test_summary_of_curves_is_point_by_point() -> None:
+    values = np.random.default_rng(2).normal(size=(12, 40))
+    summary = summarise(values)
+    assert summary.mean.shape == summary.high.shape == (40,)
+    assert float(summary.standard_error[7]) == pytest.approx(float(summarise(values[:, 7]).standard_error))
+
+
+def test_a_single_run_has_no_error() -> None:
+    summary = summarise([[3.0, 4.0]])
+    np.testing.assert_array_equal(summary.mean, [3.0, 4.0])
+    for unknown in (summary.standard_error, summary.low, summary.high):
+        assert np.isnan(unknown).all()
+
+
+def test_interval_covers_the_truth_as_often_as_it_says() -> None:
+    values = np.random.default_rng(3).normal(5.0, 2.0, (8, 4000))  # 4000 campaigns of 8 runs
+    summary = summarise(values)
+    covered = ((summary.low <= 5.0) & (summary.high >= 5.0)).mean()
+    assert covered == pytest.approx(0.95, abs=4.0 * np.sqrt(0.95 * 0.05 / 4000))
+
+
+def test_paired_difference_is_sharper_than_the_difference_of_means() -> None:
+    rng = np.random.default_rng(4)
+    common = rng.normal(20.0, 5.0, 30)
+    first, second = common + 1.0 + 0.1 * rng.standard_normal(30), common
+    paired = paired_difference(first, second)
+    assert float(paired.summary.mean) == pytest.approx(1.0, abs=0.1)
+    assert float(paired.summary.standard_error) < 0.05 < float(summarise(first).standard_error)
+    assert paired.share_won == 1.0
+
+
+def test_wins_and_ties_are_counted_apart() -> None:
+    paired = paired_difference([2.0, 1.0, 1.0, 5.0], [1.0, 1.0, 3.0, 4.0])
+    assert (paired.share_won, paired.share_tied) == (0.5, 0.25)
+
+
+@pytest.mark.parametrize("values", [[], 3.0, [1.0, np.nan], [np.inf]])
+def test_bad_values_are_named(values: object) -> None:
+    with pytest.raises(InputError, match="values: expected"):
+        summarise(values)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(("first", "second"), [([1.0, 2.0], [1.0]), ([[1.0]], [[1.0]])])
+def test_unpaired_values_are_refused(first: object, second: object) -> None:
+    with pytest.raises(InputError, match="equally many"):
+        paired_difference(first, second)  # type: ignore[arg-type]
