@@ -78,17 +78,31 @@ def _probabilities(sensor: SensorModel, states: Floats, pose: Floats) -> Floats:
 
 
 def _noisy_measurements(sensor: SensorModel, states: Floats, pose: Floats, normals: Floats) -> Floats:
-    exact = sensor.measurement.measure(states, pose)
-    covs = sensor.noise.covs(states, pose, sensor.meas_dim)
-    measured = np.empty_like(exact)
-    for i, (state, cov) in enumerate(zip(states, covs, strict=True)):
-        try:
-            measured[i] = exact[i] + np.linalg.cholesky(cov) @ normals[i]
-        except np.linalg.LinAlgError:
-            message = f"expected a positive definite covariance; got {cov.tolist()}"
-            raise ModelError(f"noise model at state {state}, pose {pose}: {message}") from None
-        if not np.isfinite(measured[i]).all():
+    factors = _noise_factors(sensor, states, pose)
+    noise = (factors @ normals[:, :, np.newaxis])[:, :, 0]
+    measured = sensor.measurement.measure(states, pose) + noise
+    for state, measurement in zip(states, measured, strict=True):
+        if not np.isfinite(measurement).all():
             raise ModelError(
-                f"sensor model at state {state}, pose {pose}: expected a finite measurement; got {measured[i]}"
+                f"sensor model at state {state}, pose {pose}: expected a finite measurement; got {measurement}"
             )
     return wrap_angular(measured, sensor.measurement.angular)
+
+
+def _noise_factors(sensor: SensorModel, states: Floats, pose: Floats) -> Floats:
+    """(num_targets, meas_dim, meas_dim) lower Cholesky factors of the noise covariances."""
+    covs = sensor.noise.covs(states, pose, sensor.meas_dim)
+    try:
+        return np.asarray(np.linalg.cholesky(covs), dtype=np.float64)
+    except np.linalg.LinAlgError:
+        bad = next(i for i, cov in enumerate(covs) if not _is_positive_definite(cov))
+        message = f"expected a positive definite covariance; got {covs[bad].tolist()}"
+        raise ModelError(f"noise model at state {states[bad]}, pose {pose}: {message}") from None
+
+
+def _is_positive_definite(cov: Floats) -> bool:
+    try:
+        np.linalg.cholesky(cov)
+    except np.linalg.LinAlgError:
+        return False
+    return True
