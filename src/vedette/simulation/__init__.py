@@ -1,3 +1,4 @@
+"""The world that the program does not get to see: truth, platforms, scans, and the loop."""
 
 from vedette.simulation.cleaning import Cleaning, CleaningCounts, RecordedTrack
 from vedette.simulation.recorded import RecordedTargets
