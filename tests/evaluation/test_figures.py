@@ -16,7 +16,7 @@ from vedette.control.plan import Plan
 from vedette.densities.estimates import Estimate
 from vedette.errors import InputError
 from vedette.evaluation import Comparison, compare
-from vedette.evaluation.figures import ospa_figure, reward_figure, save_figure, tracks_figure
+from vedette.evaluation.figures import ospa_figure, overview_figure, reward_figure, save_figure, tracks_figure
 
 
 def labels(figure: Figure) -> list[tuple[str, str]]:
@@ -119,6 +119,12 @@ def test_ospa_has_a_curve_and_a_band_a_strategy_and_marks_decisions(comparison: 
     np.testing.assert_allclose(axes.lines[1].get_ydata(), comparison.curve("idm").mean)  # type: ignore[arg-type]
     assert len(axes.collections) == 3
     assert axes.get_ylim()[0] == 0.0
+
+
+def test_overview_shows_a_run_beside_the_errors(comparison: Comparison) -> None:
+    left, right = overview_figure(make_record(), comparison).axes
+    assert (left.get_title(), right.get_title()) == ("JDM, one run", "Mean of 4 runs")
+    assert (left.get_ylabel(), right.get_ylabel()) == ("y (m)", "OSPA (m)")
 
 
 def test_ospa_parts_are_panels(comparison: Comparison) -> None:

@@ -6,6 +6,6 @@ Every function returns a `matplotlib.figure.Figure`; `save_figure` writes it as 
 from vedette.evaluation.figures.ospa import ospa_figure
 from vedette.evaluation.figures.rewards import reward_figure
 from vedette.evaluation.figures.style import save_figure
-from vedette.evaluation.figures.tracks import tracks_figure
+from vedette.evaluation.figures.tracks import overview_figure, tracks_figure
 
-__all__ = ["ospa_figure", "reward_figure", "save_figure", "tracks_figure"]
+__all__ = ["ospa_figure", "overview_figure", "reward_figure", "save_figure", "tracks_figure"]

@@ -29,7 +29,7 @@ def ospa_figure(comparison: Comparison, *, parts: Sequence[str] = ("total",)) ->
     figure = new_figure(0.55 + 1.75 * len(parts))
     panels = figure.subplots(len(parts), 1, sharex=True, squeeze=False)[:, 0]
     for panel, part in zip(panels, parts, strict=True):
-        _draw_panel(panel, comparison, part)
+        draw_ospa(panel, comparison, part)
     panels[-1].set_xlabel("Time (s)")
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(
@@ -38,7 +38,8 @@ def ospa_figure(comparison: Comparison, *, parts: Sequence[str] = ("total",)) ->
     return figure
 
 
-def _draw_panel(axes: Axes, comparison: Comparison, part: str) -> None:
+def draw_ospa(axes: Axes, comparison: Comparison, part: str) -> None:
+    """Draw one part of the OSPA of every strategy into axes."""
     for index, strategy in enumerate(comparison.strategies):
         curve = comparison.curve(strategy, part)
         shade = colour(index)

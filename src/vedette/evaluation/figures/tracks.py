@@ -12,11 +12,14 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
 from vedette.errors import InputError
+from vedette.evaluation.comparison import Comparison
+from vedette.evaluation.figures.ospa import draw_ospa
 from vedette.evaluation.figures.style import COLUMN_WIDTH, GREY, TEXT_WIDTH, colour, new_figure, strategy_label, styled
 from vedette.kernels.types import Floats
 from vedette.simulation.records import RunRecord
 
 _INK = "#222222"
+_LARGE = 5000.0  # m, beyond which axes are in kilometres
 _SENSOR_MARKERS = "sDpP*X"
 
 
@@ -38,41 +41,57 @@ def tracks_figure(*records: RunRecord, titles: Sequence[str] | None = None) -> F
     width = COLUMN_WIDTH if len(records) == 1 else TEXT_WIDTH * max(1.0, len(records) / 2)
     figure = new_figure(width / len(records) + 0.3, width=width)
     panels = figure.subplots(1, len(records), sharex=True, sharey=True, squeeze=False)[0]
+    scale = 1e-3 if _reach(records) > _LARGE else 1.0
     for panel, record, name in zip(panels, records, names, strict=True):
-        panel.set_aspect("equal")
-        draw_tracks(panel, record)
+        draw_tracks(panel, record, scale)
         panel.set_title(name)
-    _frame(panels[0], records)
-    panels[0].set_ylabel("y (km)" if _in_km(records) else "y (m)")
-    figure.legend(handles=_legend(records[0]), loc="outside lower center", ncols=3 if len(records) == 1 else 6)
+    frame_tracks(panels[0], records, scale)
+    figure.legend(handles=tracks_legend(records[0]), loc="outside lower center", ncols=3 if len(records) == 1 else 6)
     return figure
 
 
-def draw_tracks(axes: Axes, record: RunRecord) -> None:
-    """Draw one run into axes; their limits and aspect are the caller's."""
-    scale = 1e-3 if _in_km([record]) else 1.0
+@styled
+def overview_figure(record: RunRecord, comparison: Comparison) -> Figure:
+    """One picture of an experiment, as wide as a page: the tracks of one run, and the errors of all strategies."""
+    figure = new_figure(TEXT_WIDTH / 2 + 0.1, width=TEXT_WIDTH)
+    left, right = figure.subplots(1, 2)
+    scale = 1e-3 if _reach([record]) > _LARGE else 1.0
+    draw_tracks(left, record, scale)
+    frame_tracks(left, [record], scale)
+    left.set_title(f"{strategy_label(record.planner)}, one run")
+    draw_ospa(right, comparison, "total")
+    right.set_xlabel("Time (s)")
+    right.set_title(f"Mean of {comparison.num_runs} runs")
+    right.legend(loc="upper right")
+    figure.legend(handles=tracks_legend(record), loc="outside lower center", ncols=6)
+    return figure
+
+
+def draw_tracks(axes: Axes, record: RunRecord, scale: float = 1.0) -> None:
+    """Draw one run into axes, in metres times `scale`."""
     _draw_truth(axes, record, scale)
     _draw_estimates(axes, record, scale)
     for sensor in range(record.num_sensors):
         _draw_sensor(axes, record, sensor, scale)
-    axes.set_xlabel("x (km)" if scale != 1.0 else "x (m)")
+    axes.set_aspect("equal")
+    axes.set_xlabel("x (m)" if scale == 1.0 else "x (km)")
 
 
-def _in_km(records: Sequence[RunRecord]) -> bool:
-    reach = max((np.ptp(_positions(record), axis=0).max() for record in records), default=0.0)
-    return bool(reach > 5000.0)
-
-
-def _frame(axes: Axes, records: Sequence[RunRecord]) -> None:
-    """Limits, shared by all panels, of a square around everything but a stray estimate."""
-    points = np.concatenate([_positions(record) for record in records]) * (1e-3 if _in_km(records) else 1.0)
+def frame_tracks(axes: Axes, records: Sequence[RunRecord], scale: float = 1.0) -> None:
+    """Limits, shared by all panels, of a square around everything but a stray estimate; a label on the y axis."""
+    points = np.concatenate([_positions(record) for record in records]) * scale
     low, high = points.min(axis=0), points.max(axis=0)
+    axes.set_ylabel("y (m)" if scale == 1.0 else "y (km)")
     reach = 0.55 * max(float((high - low).max()), np.finfo(float).eps)
     middle = (low + high) / 2.0
     axes.set_xlim(middle[0] - reach, middle[0] + reach)
     axes.set_ylim(middle[1] - reach, middle[1] + reach)
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
+
+
+def _reach(records: Sequence[RunRecord]) -> float:
+    return float(max(np.ptp(_positions(record), axis=0).max() for record in records))
 
 
 def _positions(record: RunRecord) -> Floats:
@@ -129,7 +148,8 @@ def _point(values: Floats) -> tuple[float, float]:
     return float(values[0]), float(values[1])
 
 
-def _legend(record: RunRecord) -> list[Line2D]:
+def tracks_legend(record: RunRecord) -> list[Line2D]:
+    """What the marks mean, for a legend outside the axes."""
     open_marker: dict[str, Any] = {"color": _INK, "markerfacecolor": "white", "markersize": 4.5, "linewidth": 0.9}
     handles = [
         Line2D([], [], marker="o", label="target start", **open_marker),

@@ -1,0 +1,216 @@
+"""The promises of the project about itself: set-up, locks, documentation, package."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import re
+import subprocess
+import sys
+import tomllib
+import zipfile
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+import vedette
+from vedette.kernels.compile import JIT_ENABLED, kernel
+
+ROOT = Path(__file__).resolve().parents[1]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))
+LOCKS = sorted((ROOT / "requirements").glob("*.txt"))
+
+
+def load(path: str) -> ModuleType:
+    """A script of the repository as a module."""
+    spec = importlib.util.spec_from_file_location(Path(path).stem, ROOT / path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module  # its dataclasses look their module up
+    spec.loader.exec_module(module)
+    return module
+
+
+def pins(lock: Path) -> dict[str, str]:
+    """Locked name -> version."""
+    return dict(re.findall(r"^([a-z0-9.-]+)==([^ ;\\]+)", lock.read_text("utf-8"), re.MULTILINE))
+
+
+def canonical(requirement: str) -> str:
+    """Name of a requirement as a lock writes it."""
+    matched = re.match(r"[A-Za-z0-9._-]+", requirement)
+    assert matched is not None
+    return re.sub(r"[-_.]+", "-", matched[0]).lower()
+
+
+def direct_dependencies() -> list[str]:
+    extras = PROJECT["project"]["optional-dependencies"].values()
+    groups = PROJECT["dependency-groups"].values()
+    listed = [*PROJECT["project"]["dependencies"], *(entry for group in (*extras, *groups) for entry in group)]
+    return [canonical(entry) for entry in listed if isinstance(entry, str)]
+
+
+@kernel
+def _last(values: np.ndarray, index: int) -> float:
+    return float(values[index])
+
+
+@pytest.mark.lanes
+def test_the_lane_is_the_one_that_was_asked_for() -> None:
+    assert (os.environ.get("NUMBA_DISABLE_JIT") == "1") is not JIT_ENABLED
+    assert _last(np.arange(3.0), 2) == 2.0
+    if not JIT_ENABLED or os.environ.get("NUMBA_BOUNDSCHECK") == "1":
+        with pytest.raises(IndexError):
+            _last(np.arange(3.0), 3)
+
+
+@pytest.mark.parametrize("lock", LOCKS, ids=lambda path: path.name)
+def test_locks_name_no_place_and_hash_every_file(lock: Path) -> None:
+    text = lock.read_text("utf-8")
+    assert not re.search(r"https?:|file:|--index|--extra-index|--find-links|--trusted", text)
+    blocks = re.split(r"\n(?=[a-z])", text.split("\n", 1)[1])
+    assert len(blocks) == len(pins(lock)) > 20
+    assert all("--hash=sha256:" in block for block in blocks)
+
+
+def test_the_check_runs_on_what_a_user_gets() -> None:
+    runtime, check = (pins(ROOT / "requirements" / f"{name}.txt") for name in ("runtime", "check"))
+    assert runtime.items() <= check.items()
+
+
+def test_every_direct_dependency_is_locked_and_has_its_reason() -> None:
+    locked = pins(ROOT / "requirements" / "check.txt")
+    reasons = (ROOT / "docs/decisions/0001-dependencies.md").read_text("utf-8").lower()
+    for name in direct_dependencies():
+        assert name in locked
+        assert name.removesuffix("-python").replace("-", ".") in reasons or name in reasons.replace("_", "-")
+
+
+def test_supported_pythons_agree() -> None:
+    dev = load("dev.py")
+    assert PROJECT["project"]["requires-python"] == ">={}.{},<{}.{}".format(
+        *dev.OLDEST, dev.NEWEST[0], dev.NEWEST[1] + 1
+    )
+    classifiers = [entry for entry in PROJECT["project"]["classifiers"] if re.search(r":: 3\.\d+$", entry)]
+    assert len(classifiers) == dev.NEWEST[1] - dev.OLDEST[1] + 1
+
+
+def test_an_unsupported_python_is_told_so_before_anything_else() -> None:
+    code = (
+        "import sys; sys.version_info = (3, 8, 1); sys.argv = ['dev.py'];"
+        f"exec(compile(open({str(ROOT / 'dev.py')!r}).read(), 'dev.py', 'exec'))"
+    )
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert result.returncode == 1
+    assert "needs Python 3.11 to 3.14; this is Python 3.8" in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status", "message"),
+    [(["--help"], 0, "reproduce"), ([], 2, "usage"), (["chekc"], 2, "unknown command 'chekc'")],
+)
+def test_the_set_up_script_explains_itself(arguments: list[str], status: int, message: str) -> None:
+    command = [sys.executable, str(ROOT / "dev.py"), *arguments]
+    result = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert result.returncode == status
+    assert message in result.stdout + result.stderr
+
+
+def test_an_environment_is_made_again_only_when_its_lock_changed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    dev = load("dev.py")
+    done: list[str] = []
+    (tmp_path / "requirements").mkdir()
+    for name in ("requirements/runtime.txt", "requirements/check.txt", "pyproject.toml", "python"):
+        (tmp_path / name).write_text(name)
+    places = {"ROOT": tmp_path, "VENV": tmp_path, "PYTHON": tmp_path / "python", "STAMP": tmp_path / "installed.txt"}
+    for name, path in places.items():
+        monkeypatch.setattr(dev, name, path)
+    monkeypatch.setattr(dev, "make_venv", lambda: done.append("new"))
+    monkeypatch.setattr(dev, "install", lambda extent, dependencies: done.append(f"{extent} {dependencies}"))
+
+    def steps(extent: str) -> list[str]:
+        done.clear()
+        dev.set_up(extent)
+        return list(done)
+
+    assert steps("runtime") == ["new", "runtime True"]
+    assert steps("runtime") == []
+    assert steps("check") == ["check True"]
+    assert steps("runtime") == []
+    (tmp_path / "pyproject.toml").write_text("another script")
+    assert steps("runtime") == ["runtime False"]
+    assert steps("check") == []
+    (tmp_path / "requirements/check.txt").write_text("another version")
+    assert steps("runtime") == []
+    assert steps("check") == ["new", "check True"]
+
+
+def test_a_failed_step_of_the_set_up_shows_what_it_said() -> None:
+    dev = load("dev.py")
+    with pytest.raises(dev.SetupError, match=r"(?s)no such thing.*failed\. Try another\."):
+        dev.call([sys.executable, "-c", "print('no such thing'); raise SystemExit(3)"], "Try another.")
+
+
+def test_the_check_names_its_stages_and_refuses_others() -> None:
+    check = load("tools/check.py")
+    documented = set(re.findall(r"`([a-z-]+)`", (ROOT / "CONTRIBUTING.md").read_text("utf-8")))
+    assert set(check.STAGES) <= documented
+    assert check.main(["--list"]) == 0
+    assert check.main(["everything"]) == 2
+
+
+def test_a_failed_stage_fails_the_check_and_the_rest_is_run(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    check = load("tools/check.py")
+    stages = {
+        name: check.Stage("a trial", [sys.executable, "-c", f"print('ran {name}'); raise SystemExit({status})"])
+        for name, status in {"first": 0, "second": 5, "third": 0}.items()
+    }
+    monkeypatch.setattr(check, "STAGES", stages)
+    assert check.main([]) == 1
+    output = capfd.readouterr().out
+    assert all(f"ran {name}" in output for name in stages)
+    assert output.splitlines()[-1].endswith("FAILED: second")
+    assert check.main(["first", "third"]) == 0
+
+
+def test_links_between_the_files_of_the_project_lead_somewhere() -> None:
+    for page in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md"):
+        for target in re.findall(r"\]\((?!https?:)([^)#]+)", (ROOT / page).read_text("utf-8")):
+            assert (ROOT / target).exists(), f"{page}: {target}"
+
+
+@pytest.mark.parametrize(
+    "block", re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text("utf-8"), re.DOTALL)
+)
+def test_the_example_of_the_readme_runs(block: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    exec(compile(block, "README.md", "exec"), {"__name__": "__main__"})
+
+
+def test_the_changelog_speaks_of_this_version() -> None:
+    assert vedette.__version__ in (ROOT / "CHANGELOG.md").read_text("utf-8")
+
+
+@pytest.fixture(scope="module")
+def wheel_files(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
+    target = tmp_path_factory.mktemp("wheel")
+    command = [sys.executable, "-m", "hatchling", "build", "--target", "wheel", "--directory", str(target)]
+    subprocess.run(command, cwd=ROOT, check=True, capture_output=True)
+    (wheel,) = target.glob("*.whl")
+    return zipfile.ZipFile(wheel).namelist()
+
+
+def test_the_package_holds_the_whole_library_its_types_data_and_licence(wheel_files: list[str]) -> None:
+    tracked = [path.relative_to(ROOT / "src").as_posix() for path in (ROOT / "src").rglob("*") if path.is_file()]
+    expected = {path for path in tracked if "__pycache__" not in path and not Path(path).name.startswith(".")}
+    assert "vedette/py.typed" in expected
+    assert expected <= set(wheel_files)
+    assert any(path.endswith("licenses/LICENSE") for path in wheel_files)
+    assert not [path for path in wheel_files if path.startswith(("tests/", "tools/"))]
