@@ -14,6 +14,7 @@ import numpy as np
 
 from vedette.scenarios.faults import Finding, Path, describe
 from vedette.scenarios.parts import Parts
+from vedette.scenarios.schema import ScenarioModel
 from vedette.scenarios.schema.base import Custom, Section
 from vedette.scenarios.schema.tracking import GibbsAssignment
 from vedette.scenarios.schema.world import BirthSite, RecordedTargets, ScriptedTarget, Time
@@ -28,6 +29,15 @@ def step_of_time(time: float, start: float, step_period: float) -> int | None:
     """The scan at `time`, or None where there is none."""
     position = (time - start) / step_period + 1.0
     return round(position) if abs(position - round(position)) <= _TIME_TOLERANCE else None
+
+
+def decision_steps(model: ScenarioModel) -> tuple[int, ...]:
+    """The scans after which the sensors decide, however a valid scenario says it."""
+    control, time = model.control, model.time
+    if control.decision_times is None:
+        return control.decision_steps or ()
+    steps = (step_of_time(moment, time.start, time.step_period) for moment in control.decision_times)
+    return tuple(step for step in steps if step is not None)
 
 
 def _schedule(parts: Parts) -> Iterator[Finding]:

@@ -19,7 +19,7 @@ class CauchySchwarzReward(Section):
     unit_volume: Literal["reference"] | Annotated[float, Field(gt=0.0)] = Field(
         default=1.0,
         description='Unit K of hyper-volume: a number, or "reference" for (4 pi)^(d/2) sqrt(det P) of the predicted '
-        "density, under which localisation counts as much as cardinality [state units].",
+        "density, under which localisation counts as much as cardinality [-].",
     )
 
 

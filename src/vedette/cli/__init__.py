@@ -1,0 +1,43 @@
+"""The command line: a thin face over the library. Each command imports what it needs when it runs."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from vedette import __version__
+from vedette.cli.errors import Commands
+from vedette.cli.scenario_files import check, init, list_, schema
+from vedette.cli.show import show
+
+app = typer.Typer(
+    cls=Commands,
+    no_args_is_help=True,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+    help="Track an unknown number of targets with mobile sensors, and decide where the sensors should go next.",
+)
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"vedette {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def main(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and exit.")
+    ] = False,
+) -> None:
+    """Options that come before the command."""
+
+
+app.command("list")(list_)
+app.command()(init)
+app.command()(check)
+app.command()(show)
+app.command()(schema)

@@ -1,0 +1,29 @@
+"""How errors meet a person: the message, no traceback, and an exit status that says whose fault it was.
+
+0: done. 1: faulty content (a scenario, a file, a computation). 2: wrong use of the command line.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import typer
+from typer.core import TyperGroup
+
+from vedette.errors import VedetteError
+
+
+class Commands(TyperGroup):
+    """The group of all commands; prints the library's own errors instead of raising them."""
+
+    def invoke(self, ctx: Any) -> Any:
+        try:
+            return super().invoke(ctx)
+        except VedetteError as error:
+            typer.echo(str(error), err=True)
+            raise typer.Exit(1) from None
+
+
+def usage_error(message: str, option: str) -> typer.BadParameter:
+    """Wrong use of an option: exit status 2."""
+    return typer.BadParameter(message, param_hint=option)

@@ -1,0 +1,118 @@
+"""A picture of a scenario: region, true tracks, sensors and birth sites (paper Fig. 2)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Ellipse, Rectangle
+from matplotlib.ticker import MaxNLocator
+
+from vedette.evaluation.figures.style import COLUMN_WIDTH, GREY, VERMILION, colour, line_style, new_figure, styled
+from vedette.kernels.types import Floats
+from vedette.scenarios import Scenario
+from vedette.scenarios.build import build_birth
+from vedette.scenarios.names import sensor_names
+from vedette.simulation import Truth
+
+_INK = "#222222"
+_MARGIN = 0.04  # of the drawn extent
+_KILOMETRES_FROM = 4000.0  # m of extent
+
+
+@styled
+def scenario_figure(scenario: Scenario, truth: Truth) -> Figure:
+    """Region, tracks (circle: start, triangle: end), sensors (square, with the initial heading) and birth sites."""
+    low, high = _extent(scenario, truth)
+    scale, unit = (1e-3, "km") if float((high - low).max()) > _KILOMETRES_FROM else (1.0, "m")
+    aspect = float((high[1] - low[1]) / (high[0] - low[0]))
+    figure = new_figure(float(np.clip(COLUMN_WIDTH * 0.85 * aspect, 1.5, 2.5 * COLUMN_WIDTH)) + 0.7)
+    axes = figure.subplots()
+    axes.set_aspect("equal")
+    _draw_region(axes, scenario, scale)
+    _draw_births(axes, scenario, scale)
+    _draw_tracks(axes, truth, scale)
+    _draw_sensors(axes, scenario, scale)
+    axes.set_xlim(low[0] * scale, high[0] * scale)
+    axes.set_ylim(low[1] * scale, high[1] * scale)
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_locator(MaxNLocator(6, steps=[1, 2, 5, 10]))
+    axes.set_xlabel(f"x ({unit})")
+    axes.set_ylabel(f"y ({unit})")
+    axes.set_title(scenario.name)
+    figure.legend(handles=_legend(), loc="outside lower center", ncols=3)
+    return figure
+
+
+def _extent(scenario: Scenario, truth: Truth) -> tuple[Floats, Floats]:
+    """Corners of a box around everything."""
+    region = scenario.model.region
+    corners = [[region.x_min, region.y_min], [region.x_max, region.y_max]]
+    points = np.vstack([corners, [sensor.position for sensor in scenario.model.sensors], truth.states[:, :2]])
+    low, high = points.min(axis=0), points.max(axis=0)
+    margin = _MARGIN * float((high - low).max())
+    return low - margin, high + margin
+
+
+def _draw_region(axes: Axes, scenario: Scenario, scale: float) -> None:
+    region = scenario.model.region
+    width, height = (region.x_max - region.x_min) * scale, (region.y_max - region.y_min) * scale
+    corner = (region.x_min * scale, region.y_min * scale)
+    axes.add_patch(
+        Rectangle(corner, width, height, fill=False, edgecolor=GREY, linewidth=0.8, linestyle="--", zorder=2)
+    )
+
+
+def _draw_births(axes: Axes, scenario: Scenario, scale: float) -> None:
+    """A cross at each site, and the ellipse of two standard deviations."""
+    birth = build_birth(scenario.model.birth, scenario.model.motion)
+    for mean, cov in zip(birth.means[:, :2], birth.covs[:, :2, :2], strict=True):
+        variances, axes_of = np.linalg.eigh(cov)
+        width, height = 4.0 * np.sqrt(variances) * scale
+        angle = float(np.degrees(np.arctan2(axes_of[1, 0], axes_of[0, 0])))
+        centre = (float(mean[0] * scale), float(mean[1] * scale))
+        axes.add_patch(
+            Ellipse(centre, width, height, angle=angle, facecolor=VERMILION, alpha=0.15, linewidth=0, zorder=1)
+        )
+        axes.plot(*centre, marker="+", color=VERMILION, markersize=9, markeredgewidth=0.8, zorder=2)
+
+
+def _draw_tracks(axes: Axes, truth: Truth, scale: float) -> None:
+    for index, target in enumerate(np.unique(truth.ids)):
+        path = truth.states[truth.ids == target, :2] * scale
+        style: dict[str, Any] = {"color": colour(index), "zorder": 3}
+        axes.plot(path[:, 0], path[:, 1], linestyle=line_style(index // 6), **style)
+        axes.plot(*path[0], marker="o", markersize=4.5, markerfacecolor="white", **style)
+        axes.plot(*path[-1], marker="^", markersize=5, **style)
+
+
+def _draw_sensors(axes: Axes, scenario: Scenario, scale: float) -> None:
+    model = scenario.model
+    for name, sensor in zip(sensor_names(model), model.sensors, strict=True):
+        place = (sensor.position[0] * scale, sensor.position[1] * scale)
+        if sensor.speed > 0.0:
+            _draw_heading(axes, place, np.radians(sensor.heading_deg))
+        axes.plot(*place, marker="s", markersize=6, color=_INK, zorder=5)
+        paper = {"boxstyle": "square,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.75}
+        style: dict[str, Any] = {"textcoords": "offset points", "fontsize": 7, "zorder": 4.5, "bbox": paper}
+        axes.annotate(name, place, xytext=(0, 7), ha="center", **style)
+
+
+def _draw_heading(axes: Axes, place: tuple[float, float], heading: float) -> None:
+    ahead = (14.0 * float(np.cos(heading)), 14.0 * float(np.sin(heading)))
+    arrow = {"arrowstyle": "<|-", "color": _INK, "linewidth": 0.9, "shrinkA": 0, "shrinkB": 0}
+    axes.annotate("", place, xytext=ahead, textcoords="offset points", arrowprops=arrow, zorder=4)
+
+
+def _legend() -> list[Line2D]:
+    target: dict[str, Any] = {"color": _INK, "linewidth": 1.0}
+    return [
+        Line2D([], [], marker="o", markerfacecolor="white", markersize=4.5, label="target start", **target),
+        Line2D([], [], marker="^", markersize=5, label="target end", **target),
+        Line2D([], [], linestyle="", marker="s", markersize=6, color=_INK, label="sensor"),
+        Line2D([], [], linestyle="", marker="+", markersize=6, color=VERMILION, label="birth site, 2 std"),
+        Line2D([], [], linestyle="--", color=GREY, linewidth=0.8, label="region"),
+    ]

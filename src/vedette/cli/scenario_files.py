@@ -1,0 +1,109 @@
+"""Commands about scenario files: list, init, check, schema."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from vedette.cli.errors import usage_error
+from vedette.errors import InputError, ScenarioError
+
+if TYPE_CHECKING:
+    from vedette.scenarios import Scenario
+
+SCHEMA_FILE = "vedette.schema.json"
+
+
+def list_() -> None:
+    """List the scenarios that come with Vedette."""
+    from rich.console import Console
+    from rich.table import Table
+
+    from vedette.scenarios import list_builtin, load_scenario
+
+    table = Table.grid(padding=(0, 2))
+    for name in list_builtin():
+        table.add_row(name, load_scenario(name).model.description)
+    Console(highlight=False).print(table)
+
+
+def init(
+    path: Annotated[Path, typer.Argument(help="File to write, or a folder for scenario.yaml.")] = Path("scenario.yaml"),
+    source: Annotated[str, typer.Option("--from", metavar="NAME", help="Scenario to start from.")] = "paper-a",
+    force: Annotated[bool, typer.Option("--force", help="Overwrite what is there.")] = False,
+) -> None:
+    """Write a commented scenario file to start from, with a JSON schema beside it for editors."""
+    from vedette.scenarios import list_builtin, load_scenario
+
+    builtin = list_builtin()
+    if source not in builtin:
+        raise usage_error(f"expected one of {', '.join(builtin)}; got {source}", "--from")
+    target = path if path.suffix in (".yaml", ".yml") else path / "scenario.yaml"
+    files = _starting_files(load_scenario(source), target)
+    taken = [str(file) for file in files if file.exists()]
+    if taken and not force:
+        raise InputError(f"{', '.join(taken)}: already there; --force overwrites")
+    files[target.parent / SCHEMA_FILE] = _schema_text()
+    for file, content in files.items():
+        write_text(file, content)
+        typer.echo(f"wrote {file}")
+
+
+def _starting_files(scenario: Scenario, target: Path) -> dict[Path, str]:
+    """The text of a built-in scenario for `target`; beside it its data, if it has any, and where they come from."""
+    from vedette.scenarios import list_builtin
+    from vedette.scenarios.schema.world import RecordedTargets
+
+    text = list_builtin()[scenario.name].read_text(encoding="utf-8")
+    files: dict[Path, str] = {}
+    if isinstance(targets := scenario.model.targets, RecordedTargets):
+        data = scenario.folder / targets.path
+        text = text.replace(targets.path, data.name)
+        files[target.with_name(data.name)] = data.read_text(encoding="utf-8")
+        files[target.with_name(f"{data.name}.README.md")] = data.with_name("README.md").read_text(encoding="utf-8")
+    return {target: f"# yaml-language-server: $schema={SCHEMA_FILE}\n{text}", **files}
+
+
+def check(files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Scenario files.")]) -> None:
+    """Check scenario files: name every fault by file, line and column, field, what was expected, and what came."""
+    from vedette.scenarios import load_scenario
+    from vedette.scenarios.summary import one_line
+
+    faulty = False
+    for file in files:
+        try:
+            typer.echo(f"{file}: {one_line(load_scenario(file))}")
+        except (ScenarioError, InputError) as error:
+            typer.echo(str(error))
+            faulty = True
+    if faulty:
+        raise typer.Exit(1)
+
+
+def schema(
+    out: Annotated[Path | None, typer.Option("--out", metavar="FILE", help="File to write; none: the screen.")] = None,
+) -> None:
+    """Print the JSON schema of scenario files, with a description of every field."""
+    if out is None:
+        typer.echo(_schema_text(), nl=False)
+    else:
+        write_text(out, _schema_text())
+        typer.echo(f"wrote {out}")
+
+
+def _schema_text() -> str:
+    from vedette.scenarios import json_schema
+
+    return json.dumps(json_schema(), indent=2) + "\n"
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a file, making its folder. Raises `InputError` where that cannot be."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"{path}: expected a place to write; got {error.strerror}") from None

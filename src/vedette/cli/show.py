@@ -1,0 +1,149 @@
+"""Command `show`: a scenario as tables, and as a picture."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from vedette.cli.errors import usage_error
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from vedette.scenarios import Scenario
+    from vedette.simulation import Truth
+
+PICTURE_FORMATS = ("png", "pdf", "svg")
+
+
+def show(
+    scenario: Annotated[str, typer.Argument(help="Name of a built-in scenario, or a scenario file.")],
+    out: Annotated[
+        Path | None, typer.Option("--out", metavar="FILE", help="Draw a picture: a .png, .pdf or .svg file.")
+    ] = None,
+    resolved: Annotated[
+        bool, typer.Option("--resolved", help="Print YAML instead, with every default written out.")
+    ] = False,
+) -> None:
+    """Show a scenario: its settings, sensors and targets, and a picture of them."""
+    from vedette.scenarios import load_scenario
+
+    if out is not None and out.suffix[1:].lower() not in PICTURE_FORMATS:
+        raise usage_error(f"expected a file ending in {', '.join(PICTURE_FORMATS)}; got {out}", "--out")
+    loaded = load_scenario(scenario)
+    if resolved:
+        from vedette.scenarios.dumping import dump_scenario
+
+        typer.echo(dump_scenario(loaded.model), nl=False)
+    else:
+        _print_tables(loaded)
+    if out is not None:
+        _draw(loaded, out)
+        typer.echo(f"wrote {out}", err=resolved)
+
+
+def _print_tables(scenario: Scenario) -> None:
+    from rich.console import Console
+
+    console = Console(highlight=False, soft_wrap=False)
+    console.print(f"[bold]{scenario.name}[/bold]")
+    console.print(scenario.model.description, markup=False)
+    for table in (_facts(scenario), _sensors(scenario), _sensing(scenario), _targets(scenario)):
+        console.print()
+        console.print(table)
+
+
+def _facts(scenario: Scenario) -> Table:
+    from vedette.scenarios.summary import facts
+
+    return _grid(facts(scenario.model))
+
+
+def _grid(rows: Iterable[tuple[str, str]]) -> Table:
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table.grid(padding=(0, 2))
+    table.add_column(no_wrap=True, style="dim")
+    table.add_column(overflow="fold")
+    for name, text in rows:
+        table.add_row(name, Text(text))
+    return table
+
+
+def _numbers_table(title: str, *columns: str) -> Table:
+    from rich.box import SIMPLE_HEAD
+    from rich.table import Table
+
+    table = Table(
+        title=title, title_justify="left", box=SIMPLE_HEAD, show_edge=False, padding=(0, 1, 0, 0), pad_edge=False
+    )
+    table.add_column(columns[0], overflow="fold")
+    for column in columns[1:]:
+        table.add_column(column, justify="right")
+    return table
+
+
+def _sensors(scenario: Scenario) -> Table:
+    from rich.text import Text
+
+    from vedette.scenarios.names import sensor_names
+
+    table = _numbers_table("sensors", "name", "x\n(m)", "y\n(m)", "heading\n(deg)", "speed\n(m/s)", "moves from")
+    for name, sensor in zip(sensor_names(scenario.model), scenario.model.sensors, strict=True):
+        place = (f"{sensor.position[0]:g}", f"{sensor.position[1]:g}")
+        start = "-" if sensor.speed == 0.0 else sensor.moves_from.replace("_", " ")
+        table.add_row(Text(name), *place, f"{sensor.heading_deg:g}", f"{sensor.speed:g}", start)
+    return table
+
+
+def _sensing(scenario: Scenario) -> Table:
+    """What the sensors measure: once where it is the same for all."""
+    from vedette.scenarios.names import sensor_names
+    from vedette.scenarios.summary import sensing
+
+    described = [sensing(sensor) for sensor in scenario.model.sensors]
+    if all(rows == described[0] for rows in described):
+        return _grid(described[0])
+    names = sensor_names(scenario.model)
+    return _grid((f"{name}: {key}", text) for name, rows in zip(names, described, strict=True) for key, text in rows)
+
+
+def _targets(scenario: Scenario) -> Table:
+    import numpy as np
+
+    truth = _truth(scenario)
+    table = _numbers_table("targets", "id", "from\n(s)", "to\n(s)", "x\n(m)", "y\n(m)", "vx\n(m/s)", "vy\n(m/s)")
+    scans = np.repeat(np.arange(truth.num_scans), np.diff(truth.offsets))
+    for target in np.unique(truth.ids):
+        rows = np.flatnonzero(truth.ids == target)
+        first, last = truth.times[scans[rows[0]]], truth.times[scans[rows[-1]]]
+        x, y, *velocity = truth.states[rows[0]]
+        speeds = [f"{value:.1f}" for value in velocity[:2]] + ["-"] * (2 - len(velocity))
+        table.add_row(str(target + 1), f"{first:g}", f"{last:g}", f"{x:.0f}", f"{y:.0f}", *speeds)
+    return table
+
+
+def _truth(scenario: Scenario) -> Truth:
+    """The targets as one run has them; with process noise every run has others."""
+    import numpy as np
+
+    from vedette.scenarios.build import build_motion, build_times, build_truth_source
+
+    model = scenario.model
+    motion = build_motion(model.motion, "auto", scenario.folder)
+    source = build_truth_source(model, motion, scenario.folder)
+    return source.truth(build_times(model.time), rng=np.random.default_rng(0))
+
+
+def _draw(scenario: Scenario, out: Path) -> None:
+    from vedette.cli.picture import scenario_figure
+    from vedette.evaluation.figures import save_figure
+
+    name = out.suffix[1:].lower()
+    written = save_figure(scenario_figure(scenario, _truth(scenario)), out.with_suffix(""), formats=(name,))[0]
+    if written != out:
+        written.replace(out)

@@ -1,0 +1,30 @@
+"""What a scenario describes, as the objects that filters, planners and simulations take; one function a section."""
+
+from vedette.scenarios.build.custom import build_custom
+from vedette.scenarios.build.sensors import build_poses, build_sensor
+from vedette.scenarios.build.tracking import build_estimator, build_filter, build_fusion, build_limits, fusion_weights
+from vedette.scenarios.build.world import (
+    build_birth,
+    build_motion,
+    build_region,
+    build_survival,
+    build_times,
+    build_truth_source,
+)
+
+__all__ = [
+    "build_birth",
+    "build_custom",
+    "build_estimator",
+    "build_filter",
+    "build_fusion",
+    "build_limits",
+    "build_motion",
+    "build_poses",
+    "build_region",
+    "build_sensor",
+    "build_survival",
+    "build_times",
+    "build_truth_source",
+    "fusion_weights",
+]

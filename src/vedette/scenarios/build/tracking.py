@@ -1,0 +1,68 @@
+"""The local filters of a scenario, their fusion, and the estimates."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from vedette.densities import GLMB, LMB, Estimate, map_estimate, marginal_estimate
+from vedette.filters import DeltaGlmbFilter, Limits, LmbFilter, LocalFilter
+from vedette.fusion import Clmb, CmDeltaGlmb, FusionLimits
+from vedette.models import BirthModel, MotionModel, SensorModel, SurvivalModel
+from vedette.scenarios.schema.tracking import Estimator, Filter, FilterLimits, Fusion, GibbsAssignment, MapEstimator
+
+
+def build_limits(section: FilterLimits) -> Limits:
+    """Caps and thresholds of the filters."""
+    return Limits(**section.model_dump())
+
+
+def build_filter(
+    section: Filter, motion: MotionModel, survival: SurvivalModel, birth: BirthModel, sensor: SensorModel
+) -> LocalFilter:
+    """The filter of one sensor."""
+    limits = build_limits(section.limits)
+    if section.kind == "lmb":
+        return LmbFilter(motion, survival, birth, sensor, limits)
+    gibbs = section.assignment if isinstance(section.assignment, GibbsAssignment) else GibbsAssignment()
+    return DeltaGlmbFilter(
+        motion,
+        survival,
+        birth,
+        sensor,
+        limits,
+        assignment=section.assignment.kind,
+        num_gibbs_samples=gibbs.num_samples,
+        marginalised=section.kind == "m_delta_glmb",
+    )
+
+
+def fusion_weights(section: Fusion, num_sensors: int) -> tuple[float, ...]:
+    """Weight of each sensor: equal where none are given; scaled to sum to one beyond the rounding of the file."""
+    given = section.weights or (1.0,) * num_sensors
+    return tuple(weight / math.fsum(given) for weight in given)
+
+
+def build_fusion(section: Fusion, num_sensors: int) -> CmDeltaGlmb | Clmb | None:
+    """The fusion of the sensors' densities; None where there is none."""
+    if section.kind == "none":
+        return None
+    weights, limits = fusion_weights(section, num_sensors), section.limits
+    fusion_limits = FusionLimits(
+        math.log(limits.min_component_weight),
+        limits.merge_distance,
+        limits.max_components,
+        limits.max_combinations,
+        limits.max_hypotheses,
+    )
+    if section.kind == "clmb":
+        return Clmb(weights, section.mixture_power, section.missing_existence, fusion_limits)
+    return CmDeltaGlmb(weights, section.mixture_power, math.log(section.missing_weight), fusion_limits)
+
+
+def build_estimator(section: Estimator) -> Callable[[GLMB | LMB], Estimate]:
+    """How estimates are read off a density."""
+    if isinstance(section, MapEstimator):
+        return map_estimate
+    threshold = section.threshold
+    return lambda density: marginal_estimate(density, threshold)

@@ -1,0 +1,105 @@
+"""A scenario in a few words, for people."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Literal
+
+from vedette.scenarios.checks import decision_steps
+from vedette.scenarios.loading import Scenario
+from vedette.scenarios.schema import ScenarioModel
+from vedette.scenarios.schema.base import Section
+from vedette.scenarios.schema.sensors import Sensor
+from vedette.scenarios.schema.tracking import Fusion
+from vedette.scenarios.schema.world import RecordedTargets
+
+
+def counted(number: int, thing: str) -> str:
+    """`1 sensor`, `2 sensors`."""
+    return f"{number} {thing}" if number == 1 else f"{number} {thing}s"
+
+
+def one_line(scenario: Scenario) -> str:
+    """The scenario on one line."""
+    model = scenario.model
+    targets = model.targets
+    what = "recorded targets" if isinstance(targets, RecordedTargets) else counted(len(targets.tracks), "target")
+    decisions = counted(len(decision_steps(model)), "decision")
+    return (
+        f"ok: {model.name}, {counted(model.time.num_steps, 'scan')}, {what}, {counted(len(model.sensors), 'sensor')}, "
+        f"{model.filter.kind} filter, {model.fusion.kind} fusion, {decisions}"
+    )
+
+
+def settings(section: Section) -> str:
+    """A section's kind and its plain values with their units: `constant_velocity, sigma_v 5 m/s^2`."""
+    words: list[str] = []
+    for name, field in type(section).model_fields.items():
+        value = getattr(section, name)
+        if name == "kind":
+            words.insert(0, str(value))
+        elif value is not None and not isinstance(value, Section | dict):
+            unit = (field.description or "").rpartition("[")[2].rstrip("].")
+            words.append(f"{name} {short(value)}" + (f" {unit}" if unit not in ("-", "") else ""))
+    return ", ".join(words)
+
+
+def short(value: object) -> str:
+    """A value without needless digits."""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, float):
+        return f"{value:g}"
+    if isinstance(value, tuple):
+        return ", ".join(short(item) for item in value)
+    return str(value)
+
+
+def facts(model: ScenarioModel) -> list[tuple[str, str]]:
+    """What holds for the whole scenario: name of the section and its settings."""
+    region, time, control = model.region, model.time, model.control
+    end = time.start + (time.num_steps - 1) * time.step_period
+    return [
+        ("scans", f"{time.num_steps}, every {time.step_period:g} s from {time.start:g} to {end:g} s"),
+        ("region", f"x {region.x_min:g} to {region.x_max:g} m, y {region.y_min:g} to {region.y_max:g} m"),
+        ("motion", settings(model.motion)),
+        ("survival", settings(model.survival)),
+        ("births", f"{counted(len(model.birth.sites), 'site')}, {_steps(model.birth.steps)}"),
+        ("filter", f"{settings(model.filter)}, {model.filter.assignment.kind} assignment"),
+        ("fusion", _fusion(model.fusion)),
+        ("estimate", settings(model.estimator)),
+        ("decisions", _decisions(decision_steps(model))),
+        ("actions", f"{control.headings} headings, {short(control.actions_deg)} deg"),
+        ("horizon", f"{counted(control.horizon_steps, 'step')} of {control.horizon_period:g} s"),
+        ("reward", f"{settings(control.reward)}, {counted(control.num_samples, 'sample')}"),
+        ("pseudo-scans", f"{control.ideal_measurements} measurements"),
+        ("OSPA", settings(model.ospa)),
+    ]
+
+
+def _fusion(section: Fusion) -> str:
+    if section.kind == "none":
+        return "none"
+    weights = "equal weights" if section.weights is None else f"weights {short(section.weights)}"
+    feedback = "feedback" if section.feedback else "no feedback"
+    return f"{section.kind}, {weights}, {section.mixture_power} powers, {feedback}"
+
+
+def _decisions(steps: Sequence[int]) -> str:
+    return f"after {_steps(steps)}" if steps else "none"
+
+
+def _steps(steps: Literal["every"] | Sequence[int]) -> str:
+    if steps == "every":
+        return "every step"
+    return ("step " if len(steps) == 1 else "steps ") + ", ".join(map(str, steps))
+
+
+def sensing(sensor: Sensor) -> list[tuple[str, str]]:
+    """What a sensor measures, and how well."""
+    return [
+        ("measures", sensor.measurement.kind),
+        ("noise", settings(sensor.noise)),
+        ("detection", settings(sensor.detection)),
+        ("clutter", settings(sensor.clutter)),
+    ]
