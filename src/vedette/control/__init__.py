@@ -1,1 +1,27 @@
 """Where to send the sensors next: actions, ideal measurements, rewards, joint action search, planners."""
+
+from vedette.control.actions import PAPER_HEADINGS_DEG, ActionSet, HeadingActions
+from vedette.control.evaluator import Evaluator
+from vedette.control.plan import Plan, RewardTable
+from vedette.control.planners import FixedPlanner, IndependentPlanner, JointPlanner, Planner, RandomPlanner
+from vedette.control.reward import CauchySchwarzReward, Reward
+from vedette.control.settings import MobileSensor, PlanningSettings, planning_limits
+
+__all__ = [
+    "PAPER_HEADINGS_DEG",
+    "ActionSet",
+    "CauchySchwarzReward",
+    "Evaluator",
+    "FixedPlanner",
+    "HeadingActions",
+    "IndependentPlanner",
+    "JointPlanner",
+    "MobileSensor",
+    "Plan",
+    "Planner",
+    "PlanningSettings",
+    "RandomPlanner",
+    "Reward",
+    "RewardTable",
+    "planning_limits",
+]

@@ -1,0 +1,90 @@
+"""Where a decision starts: local posteriors cut to their heaviest hypotheses, and the fused density predicted ahead."""
+
+from __future__ import annotations
+
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+
+from vedette.densities import GLMB, LMB, TrackTable, marginalise, track_moments
+from vedette.filters import LocalFilter
+from vedette.filters.inputs import model_errors
+from vedette.fusion.tracks import take_tracks
+from vedette.kernels.labels import group_by_label_set
+from vedette.kernels.linalg import log_sum
+from vedette.kernels.planning import predict_tracks
+from vedette.kernels.types import Ints
+from vedette.models import constant_survival, kernel_motion
+
+LabelSet: TypeAlias = tuple[tuple[int, int], ...]
+
+
+def heaviest_hypotheses(belief: GLMB, most: int) -> GLMB:
+    """The `most` heaviest hypotheses of positive weight, normalised; of equal weights the first."""
+    order = np.argsort(-belief.hyp_log_weights, kind="stable")[:most]
+    return _take_hypotheses(belief, order[belief.hyp_log_weights[order] > -np.inf])
+
+
+def _take_hypotheses(belief: GLMB, places: Ints) -> GLMB:
+    sizes = np.diff(belief.hyp_offsets)[places]
+    offsets = np.concatenate([np.zeros(1, np.int64), np.cumsum(sizes)])
+    entries = np.repeat(belief.hyp_offsets[places] - offsets[:-1], sizes) + np.arange(offsets[-1])
+    used, renumbered = np.unique(belief.hyp_tracks[entries], return_inverse=True)
+    log_weights = belief.hyp_log_weights[places]
+    return GLMB(
+        take_tracks(belief.tracks, used),
+        offsets,
+        np.asarray(renumbered, np.int64),
+        log_weights - log_sum(log_weights) if len(places) else log_weights,
+    )
+
+
+class LabelSets(NamedTuple):
+    """Label sets of a belief in the order of their first hypothesis; groups: (num_hyps,) set of each hypothesis."""
+
+    sets: tuple[LabelSet, ...]
+    groups: Ints
+
+
+def label_sets(belief: GLMB) -> LabelSets:
+    """The label sets of a GLMB and which of them each hypothesis has."""
+    groups, firsts = group_by_label_set(belief.to_kernel())
+    labels, offsets = belief.tracks.labels.tolist(), belief.hyp_offsets
+    sets = tuple(
+        tuple((labels[track][0], labels[track][1]) for track in belief.hyp_tracks[offsets[h] : offsets[h + 1]])
+        for h in firsts.tolist()
+    )
+    return LabelSets(sets, groups)
+
+
+def restrict(belief: GLMB | LMB, sets: frozenset[LabelSet]) -> GLMB | LMB:
+    """The belief on the given label sets only, not renormalised; of an LMB, on the labels that are in them."""
+    if isinstance(belief, GLMB):
+        found = label_sets(belief)
+        return _unnormalised(belief, np.array([h for h, g in enumerate(found.groups) if found.sets[g] in sets], np.int64))
+    labels = [(step, site) for step, site in belief.tracks.labels.tolist()]
+    places = np.array([i for i, label in enumerate(labels) if (label,) in sets], np.int64)
+    return LMB(take_tracks(belief.tracks, places), belief.existence_logit[places])
+
+
+def _unnormalised(belief: GLMB, places: Ints) -> GLMB:
+    taken = _take_hypotheses(belief, places)
+    return GLMB(taken.tracks, taken.hyp_offsets, taken.hyp_tracks, belief.hyp_log_weights[places])
+
+
+def predicted(fused: GLMB | LMB, local: LocalFilter, num_steps: int, period: float) -> GLMB | LMB:
+    """The fused density at the end of the horizon, without birth or death (paper, "pseudo-prediction").
+
+    Tracks are first collapsed to one Gaussian each (a GLMB is marginalised), as those of the pseudo-updates are.
+    """
+    single = marginalise(fused, max_components=1) if isinstance(fused, GLMB) else fused
+    means, covs = track_moments(single.tracks)
+    with model_errors():
+        means, covs = predict_tracks(
+            kernel_motion(local.motion, constant_survival(1.0)), float(period), int(num_steps), means, covs
+        )
+    num = single.tracks.num_tracks
+    tracks = TrackTable(single.tracks.labels, np.arange(num + 1), np.zeros(num), means, covs)
+    if isinstance(single, LMB):
+        return LMB(tracks, single.existence_logit)
+    return GLMB(tracks, single.hyp_offsets, single.hyp_tracks, single.hyp_log_weights)

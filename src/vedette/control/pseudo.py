@@ -1,0 +1,150 @@
+"""Pseudo-updates: what each sensor would believe at the end of the horizon, for each of its actions and each sample."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from vedette.control.priors import LabelSet, heaviest_hypotheses, label_sets
+from vedette.control.settings import IDEAL_MODES, MobileSensor, PlanningSettings
+from vedette.control.threads import run_chunks
+from vedette.densities import GLMB, LMB, TrackTable, sample_glmb, sample_lmb
+from vedette.errors import InputError
+from vedette.filters.inputs import model_errors
+from vedette.kernels.ideal import Futures, propagate_samples
+from vedette.kernels.planning import Horizon, pseudo_update_glmb, pseudo_update_lmb
+from vedette.kernels.types import Floats, Motion, Sensor
+from vedette.models import constant_survival, kernel_motion
+from vedette.models.platforms import advance
+
+
+class PseudoPosteriors(NamedTuple):
+    """Ideally updated densities of one sensor; case `action * num_samples + sample` is the first axis.
+
+    sets: label sets of the GLMB (of an LMB: one set a label). log_weights: (num_cases, num_sets) log weight of each set; of an
+    LMB the existence logit. means, covs: (num_cases, num_members, ...) one Gaussian for each label of each set, in order.
+    """
+
+    sets: tuple[LabelSet, ...]
+    log_weights: Floats
+    means: Floats
+    covs: Floats
+    is_lmb: bool
+
+
+def draw_futures(
+    fused: GLMB | LMB, sensors: Sequence[MobileSensor], settings: PlanningSettings, *, rng: np.random.Generator
+) -> tuple[Futures, ...]:
+    """Samples of the fused density carried over the horizon without noise; the same states for every sensor."""
+    motion = kernel_motion(sensors[0].filter.motion, sensors[0].filter.survival)
+    draw = sample_glmb if isinstance(fused, GLMB) else sample_lmb
+    samples = draw(fused, settings.num_samples, rng=rng)  # type: ignore[operator]
+    with model_errors():
+        states = propagate_samples(motion, samples.states, float(settings.horizon_period), int(settings.horizon_steps))
+    futures = []
+    for sensor in sensors:
+        shape = (settings.horizon_steps, len(samples.states))
+        uniforms = rng.random(shape)
+        normals = rng.standard_normal((*shape, sensor.filter.sensor.meas_dim))
+        futures.append(Futures(samples.offsets, states, uniforms, normals))
+    return tuple(futures)
+
+
+def horizon_poses(pose: Floats, headings: Floats, speed: float, settings: PlanningSettings) -> Floats:
+    """(num_actions, horizon_steps, 3) poses at the pseudo-updates under each heading."""
+    poses = np.empty((len(headings), settings.horizon_steps, 3))
+    for a, heading in enumerate(headings):
+        at = pose
+        for h in range(settings.horizon_steps):
+            at = advance(at, float(heading), speed, settings.horizon_period)
+            poses[a, h] = at
+    return poses
+
+
+class _Bundles(NamedTuple):
+    motion: Motion
+    sensor: Sensor
+    horizon: Horizon
+
+
+def pseudo_posteriors(
+    belief: GLMB | LMB, sensor: MobileSensor, pose: Floats, headings: Floats, futures: Futures, settings: PlanningSettings
+) -> PseudoPosteriors:
+    """Run the sensor's filter over the horizon for every heading and sample, without births or deaths.
+
+    Raises:
+        InputError: a belief of another kind than the filter's.
+        ModelError, NumericalError: as the filter.
+    """
+    if not isinstance(belief, GLMB | LMB):
+        raise InputError(f"beliefs: expected GLMB or LMB densities; got {type(belief).__name__}")
+    horizon = Horizon(
+        horizon_poses(pose, headings, sensor.speed, settings),
+        float(settings.horizon_period),
+        IDEAL_MODES[settings.ideal_measurements],
+        float(settings.detection_threshold),
+    )
+    motion = kernel_motion(sensor.filter.motion, constant_survival(1.0))
+    bundles = _Bundles(motion, sensor.filter.sensor.to_kernel(), horizon)
+    num_cases = len(headings) * settings.num_samples
+    run = _run_glmb if isinstance(belief, GLMB) else _run_lmb
+    return run(belief, bundles, futures, settings, num_cases)  # type: ignore[operator, no-any-return]
+
+
+def _run_glmb(
+    belief: GLMB, bundles: _Bundles, futures: Futures, settings: PlanningSettings, num_cases: int
+) -> PseudoPosteriors:
+    prior = heaviest_hypotheses(belief, settings.max_prior_hypotheses)
+    found = label_sets(prior)
+    set_offsets = np.concatenate([np.zeros(1, np.int64), np.cumsum([len(labels) for labels in found.sets])]).astype(np.int64)
+    dim, num_members = prior.tracks.state_dim, int(set_offsets[-1])
+    log_weights = np.empty((num_cases, len(found.sets)))
+    means, covs = np.empty((num_cases, num_members, dim)), np.empty((num_cases, num_members, dim, dim))
+    truncation = settings.limits.truncation(len(bundles.sensor.angular))
+    kernel_prior, no_birth = prior.to_kernel(), LMB.empty(dim).to_kernel()
+
+    def work(first: int, last: int) -> None:
+        pseudo_update_glmb(
+            kernel_prior, found.groups, no_birth, bundles.motion, bundles.sensor, bundles.horizon, futures, truncation,
+            first, last, set_offsets, log_weights, means, covs,
+        )  # fmt: skip
+
+    with model_errors():
+        run_chunks(work, num_cases, settings.threads())
+    return PseudoPosteriors(found.sets, log_weights, means, covs, False)
+
+
+def _run_lmb(
+    belief: LMB, bundles: _Bundles, futures: Futures, settings: PlanningSettings, num_cases: int
+) -> PseudoPosteriors:
+    num, dim = belief.tracks.num_tracks, belief.tracks.state_dim
+    logits = np.empty((num_cases, num))
+    means, covs = np.empty((num_cases, num, dim)), np.empty((num_cases, num, dim, dim))
+    truncation = settings.limits.truncation(len(bundles.sensor.angular))
+    reduction = settings.limits.reduction()
+    prior, no_birth = belief.to_kernel(), LMB.empty(dim).to_kernel()
+
+    def work(first: int, last: int) -> None:
+        pseudo_update_lmb(
+            prior, no_birth, bundles.motion, bundles.sensor, bundles.horizon, futures, truncation, reduction,
+            first, last, logits, means, covs,
+        )  # fmt: skip
+
+    with model_errors():
+        run_chunks(work, num_cases, settings.threads())
+    sets = tuple(((int(step), int(site)),) for step, site in belief.tracks.labels)
+    return PseudoPosteriors(sets, logits, means, covs, True)
+
+
+def case_density(posteriors: PseudoPosteriors, case: int) -> GLMB | LMB:
+    """One ideally updated density as a container: a marginalised GLMB or an LMB."""
+    labels = np.array([label for labels in posteriors.sets for label in labels], np.int64).reshape(-1, 2)
+    num = len(labels)
+    tracks_of = (labels, np.arange(num + 1), np.zeros(num), posteriors.means[case].copy(), posteriors.covs[case].copy())
+    tracks = TrackTable(*tracks_of)
+    if posteriors.is_lmb:
+        return LMB(tracks, posteriors.log_weights[case].copy())
+    offsets = np.concatenate([np.zeros(1, np.int64), np.cumsum([len(labels) for labels in posteriors.sets])])
+    return GLMB(tracks, offsets.astype(np.int64), np.arange(num), posteriors.log_weights[case].copy())
