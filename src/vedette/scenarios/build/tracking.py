@@ -9,6 +9,9 @@ from vedette.densities import GLMB, LMB, Estimate, map_estimate, marginal_estima
 from vedette.filters import DeltaGlmbFilter, Limits, LmbFilter, LocalFilter
 from vedette.fusion import Clmb, CmDeltaGlmb, FusionLimits
 from vedette.models import BirthModel, MotionModel, SensorModel, SurvivalModel
+from vedette.scenarios.build.sensors import build_sensor
+from vedette.scenarios.build.world import build_birth, build_motion, build_region, build_survival
+from vedette.scenarios.loading import Scenario
 from vedette.scenarios.schema.tracking import Estimator, Filter, FilterLimits, Fusion, GibbsAssignment, MapEstimator
 
 
@@ -35,6 +38,20 @@ def build_filter(
         num_gibbs_samples=gibbs.num_samples,
         marginalised=section.kind == "m_delta_glmb",
     )
+
+
+def build_filters(scenario: Scenario) -> tuple[LocalFilter, ...]:
+    """The filter of each sensor; they share the models of the targets.
+
+    Raises:
+        InputError: a custom model that cannot be had, or parts that do not fit together.
+    """
+    model, folder = scenario.model, scenario.folder
+    method = model.filter.gaussian_method
+    motion, survival = build_motion(model.motion, method, folder), build_survival(model.survival, folder)
+    birth, region = build_birth(model.birth, model.motion), build_region(model.region)
+    sensors = (build_sensor(sensor, region, method, folder) for sensor in model.sensors)
+    return tuple(build_filter(model.filter, motion, survival, birth, sensor) for sensor in sensors)
 
 
 def fusion_weights(section: Fusion, num_sensors: int) -> tuple[float, ...]:

@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 
 from vedette.scenarios.schema.base import Numbers, Probability, Section, expected
 from vedette.scenarios.schema.sensors import Actions, Headings
-from vedette.scenarios.schema.tracking import Count
+from vedette.scenarios.schema.tracking import Count, Share
 from vedette.scenarios.schema.world import Steps
 
 
@@ -28,6 +28,9 @@ class PlanningLimits(Section):
 
     prior_hypotheses: Count = Field(default=10, description="Most hypotheses at the start of the horizon [-].")
     max_hypotheses: Count = Field(default=40, description="Most hypotheses after each step of the horizon [-].")
+    min_relative_weight: Share = Field(
+        default=1e-5, description="Hypotheses lighter than this times the heaviest are dropped [-]."
+    )
 
 
 class Control(Section):
