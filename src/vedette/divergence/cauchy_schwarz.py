@@ -1,0 +1,163 @@
+"""Cauchy-Schwarz divergence of multi-target densities, in closed form."""
+
+from __future__ import annotations
+
+import math
+from typing import Literal, TypeAlias
+
+import numpy as np
+from scipy.special import log_expit
+
+from vedette.densities import GLMB, LMB, Poisson
+from vedette.errors import InputError, NumericalError
+from vedette.kernels.inner_products import log_glmbs, log_lmbs, log_tracks
+from vedette.kernels.labels import group_by_label_set
+from vedette.kernels.stacking import stack_glmbs, stack_tracks
+from vedette.kernels.types import Glmb, Tracks
+
+Density: TypeAlias = GLMB | LMB | Poisson
+Support = Literal["full", "common"]
+
+# Of the magnitude of the logs: rounding of sums over a million pairs of hypotheses stays below.
+_ROUNDING = 1e-11
+
+
+def cauchy_schwarz(a: Density, b: Density, *, unit_volume: float = 1.0, support: Support = "full") -> float:
+    """Cauchy-Schwarz divergence of two densities (paper eqs. 5, 8 and 9), at least 0, 0 for equal ones, symmetric.
+
+    GLMB (Beard et al. 2017, "Void probabilities and Cauchy-Schwarz divergence for generalized labeled multi-Bernoulli
+    models"): all pairs of hypotheses that share a label set. LMB: the sum over labels of the Bernoulli divergences.
+    An LMB and a GLMB: the LMB is taken on the GLMB's label sets. Two Poisson densities (Hoang et al. 2015): K / 2
+    times the squared L2 distance of the intensities.
+
+    unit_volume: K, the unit of hyper-volume of a state (units of the state multiplied), which weighs cardinalities
+        against each other; see `reference_unit_volume`.
+    support: "full" as in the paper. "common" leaves out, in all three terms, the label sets that one of the densities
+        lacks (two LMBs: the labels), because a set that was only cut off by a cap is no difference of belief; with
+        it, the divergence is 0 too for densities that are proportional on what they share.
+
+    Infinite where the densities have no label set in common. A result below 0 by rounding (1e-11 of the logs'
+    magnitude) is 0. Raises `InputError` for densities that cannot be compared (labelled with unlabelled, other state
+    dimensions, support "common" for Poisson or with nothing in common) or are not valid, and `NumericalError` where
+    the inner products contradict the Cauchy-Schwarz inequality.
+    """
+    log_unit_volume = _check(a, b, unit_volume)
+    if support not in ("full", "common"):
+        raise InputError(f"support: expected 'full' or 'common'; got {support!r}")
+    if isinstance(a, Poisson) and isinstance(b, Poisson):
+        if support == "common":
+            raise InputError("support: 'common' is for densities with label sets; got two Poisson densities")
+        return _poisson(a, b, log_unit_volume)
+    cross, own_a, own_b = _log_inner_products(a, b, log_unit_volume, support == "common", self_terms=True)
+    if support == "common" and -math.inf in (own_a, own_b):
+        raise InputError("support: 'common' is for densities that share a label set; got two that share none")
+    if cross == -math.inf:
+        return math.inf
+    return _at_least_zero(0.5 * (own_a + own_b) - cross, max(abs(own_a), abs(own_b)))
+
+
+def log_inner_product(a: Density, b: Density, *, unit_volume: float = 1.0) -> float:
+    """log zeta(a, b), zeta the set integral of K^|X| a(X) b(X) (paper eq. 9); -inf where nothing is shared.
+
+    Raises `InputError` for densities that cannot be compared or are not valid.
+    """
+    log_unit_volume = _check(a, b, unit_volume)
+    if isinstance(a, Poisson) and isinstance(b, Poisson):
+        shared = math.exp(log_unit_volume + log_tracks(_intensities(a, b), 0, 1))
+        return shared - a.expected_number - b.expected_number
+    return _log_inner_products(a, b, log_unit_volume, False, self_terms=False)[0]
+
+
+def _check(a: Density, b: Density, unit_volume: float) -> float:
+    """Raise `InputError` for what cannot be compared; returns the log of the unit volume."""
+    if not 0.0 < unit_volume < math.inf:
+        raise InputError(f"unit_volume: expected a finite number above 0; got {unit_volume}")
+    for name, density in (("a", a), ("b", b)):
+        if not isinstance(density, GLMB | LMB | Poisson):
+            raise InputError(f"{name}: expected a GLMB, an LMB or a Poisson; got {type(density).__name__}")
+        try:
+            density.validate(error=InputError)
+        except InputError as fault:
+            raise InputError(f"{name}: {fault}") from None
+    if isinstance(a, Poisson) != isinstance(b, Poisson):
+        kinds = f"{type(a).__name__} and {type(b).__name__}"
+        raise InputError(f"a, b: expected two labelled or two unlabelled densities; got {kinds}")
+    if a.state_dim != b.state_dim:
+        raise InputError(f"a, b: expected one state dimension; got {a.state_dim} and {b.state_dim}")
+    return math.log(unit_volume)
+
+
+def _log_inner_products(
+    a: Density, b: Density, log_unit_volume: float, common: bool, *, self_terms: bool
+) -> tuple[float, float, float]:
+    """log zeta(a, b), zeta(a, a), zeta(b, b) of labelled densities; the last two may be -inf unless `self_terms`."""
+    if isinstance(a, GLMB) and isinstance(b, GLMB):
+        return _glmbs(a.to_kernel(), b.to_kernel(), log_unit_volume, common, self_terms)
+    if isinstance(a, LMB) and isinstance(b, LMB):
+        return _lmbs(a, b, log_unit_volume, common)
+    if isinstance(a, LMB) and isinstance(b, GLMB):
+        cross, own_b, own_a = _log_inner_products(b, a, log_unit_volume, common, self_terms=self_terms)
+        return cross, own_a, own_b
+    assert isinstance(a, GLMB)
+    assert isinstance(b, LMB)
+    cross, own_a, own_b = _glmbs(a.to_kernel(), _on_label_sets(b, a), log_unit_volume, common, self_terms)
+    return cross, own_a, own_b if common else _lmbs(b, b, log_unit_volume, False)[0]
+
+
+def _glmbs(a: Glmb, b: Glmb, log_unit_volume: float, common: bool, self_terms: bool) -> tuple[float, float, float]:
+    split = len(a.hyp_log_weights)
+    cross, own_a, own_b = log_glmbs(stack_glmbs([a, b]), split, log_unit_volume, common, self_terms)
+    return float(cross), float(own_a), float(own_b)
+
+
+def _lmbs(a: LMB, b: LMB, log_unit_volume: float, common: bool) -> tuple[float, float, float]:
+    tracks = stack_tracks([a.tracks.to_kernel(), b.tracks.to_kernel()])
+    logits = np.concatenate([a.existence_logit, b.existence_logit])
+    cross, own_a, own_b = log_lmbs(tracks, logits, len(a.existence_logit), log_unit_volume, common)
+    return float(cross), float(own_a), float(own_b)
+
+
+def _on_label_sets(lmb: LMB, glmb: GLMB) -> Glmb:
+    """The LMB's hypotheses on those label sets of `glmb` that it has; their weights do not sum to one."""
+    bundle = glmb.to_kernel()
+    place = {(int(label[0]), int(label[1])): i for i, label in enumerate(lmb.tracks.labels)}
+    log_present, log_absent = log_expit(lmb.existence_logit), log_expit(-lmb.existence_logit)
+    hyps: list[list[int]] = []
+    for first in group_by_label_set(bundle)[1].tolist():
+        members = glmb.hyp_tracks[glmb.hyp_offsets[first] : glmb.hyp_offsets[first + 1]]
+        hyp = [place.get((int(label[0]), int(label[1])), -1) for label in glmb.tracks.labels[members]]
+        if -1 not in hyp:
+            hyps.append(hyp)
+    log_weights = np.empty(len(hyps))
+    for h, hyp in enumerate(hyps):
+        exists = np.zeros(len(place), np.bool_)
+        exists[hyp] = True
+        log_weights[h] = np.where(exists, log_present, log_absent).sum()
+    hyp_offsets = np.cumsum([0, *(len(hyp) for hyp in hyps)])
+    hyp_tracks = np.array([track for hyp in hyps for track in hyp], np.int64)
+    return Glmb(lmb.tracks.to_kernel(), hyp_offsets, hyp_tracks, log_weights)
+
+
+def _intensities(a: Poisson, b: Poisson) -> Tracks:
+    """The two intensities as tracks 0 and 1."""
+    sizes = [len(a.log_weights), len(b.log_weights)]
+    return Tracks(
+        np.zeros((2, 2), np.int64),
+        np.cumsum([0, *sizes]),
+        np.concatenate([a.log_weights, b.log_weights]),
+        np.concatenate([a.means, b.means]),
+        np.concatenate([a.covs, b.covs]),
+    )
+
+
+def _poisson(a: Poisson, b: Poisson, log_unit_volume: float) -> float:
+    tracks = _intensities(a, b)
+    own_a, own_b, cross = (math.exp(log_unit_volume + log_tracks(tracks, i, j)) for i, j in ((0, 0), (1, 1), (0, 1)))
+    return _at_least_zero(0.5 * (own_a + own_b) - cross, max(own_a, own_b))
+
+
+def _at_least_zero(divergence: float, magnitude: float) -> float:
+    """`divergence`, or 0 where it is below by rounding. Raises `NumericalError` where it is further below or NaN."""
+    if not divergence >= -_ROUNDING * max(1.0, magnitude):
+        raise NumericalError(f"Cauchy-Schwarz divergence: expected at least 0; got {divergence}")
+    return max(divergence, 0.0)

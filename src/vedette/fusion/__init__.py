@@ -1,0 +1,7 @@
+"""How several sensors' beliefs become one: generalized covariance intersection (GCI) of labelled densities."""
+
+from vedette.fusion.base import MIXTURE_POWERS, Fusion, FusionInfo, FusionLimits, MixturePower
+from vedette.fusion.clmb import Clmb
+from vedette.fusion.cm_delta_glmb import CmDeltaGlmb
+
+__all__ = ["MIXTURE_POWERS", "Clmb", "CmDeltaGlmb", "Fusion", "FusionInfo", "FusionLimits", "MixturePower"]

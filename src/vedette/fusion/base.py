@@ -1,0 +1,143 @@
+"""What all fusions share: the protocol, what they report, their limits, and the checks of what they are given."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, NamedTuple, Protocol, TypeVar
+
+import numpy as np
+
+from vedette.errors import InputError
+from vedette.fusion.cubature import MAX_DIM, fifth_degree_rule
+from vedette.kernels.types import Floats
+
+MixturePower = Literal["moment_matched", "component_wise", "quadrature"]
+MIXTURE_POWERS: tuple[MixturePower, ...] = ("moment_matched", "component_wise", "quadrature")
+
+# Below these distances one merged Gaussian is nearer to the truth than the power is: docs/decisions/0003.
+_MERGE_DISTANCE = {"moment_matched": 0.0, "component_wise": 2.0, "quadrature": 1.0}
+
+_BeliefT_contra = TypeVar("_BeliefT_contra", contravariant=True)
+_FusedT_co = TypeVar("_FusedT_co", covariant=True)
+
+
+@dataclass(frozen=True, slots=True)
+class FusionInfo:
+    """What a fusion had to repair and what it threw away.
+
+    Attributes:
+        num_missing_sets: (label set, sensor) pairs in which a floor stood in for the weight of a label set that
+        another
+            sensor has and this one does not; of an LMB, (label, sensor) pairs with a floor for the existence.
+        num_missing_labels: (label, sensor) pairs in which the sensor does not know the label at all, so that its
+        density
+            was left out of that label.
+        empty_intersection: no label set (LMB: no label) is held by every sensor. False where there is none at all.
+        log_normaliser: log of the set integral of the product of the powers, at most 0 but for the floors and the
+            inflation of component-wise powers; far below 0 the sensors contradict each other.
+        discarded_weight: probability of the fused label sets beyond the cap.
+    """
+
+    num_missing_sets: int
+    num_missing_labels: int
+    empty_intersection: bool
+    log_normaliser: float
+    discarded_weight: float
+
+
+class Fusion(Protocol[_BeliefT_contra, _FusedT_co]):
+    """One belief of all the sensors'. The order of `beliefs` is that of the fusion weights."""
+
+    def fuse(self, beliefs: Sequence[_BeliefT_contra]) -> tuple[_FusedT_co, FusionInfo]: ...
+
+
+class FusionLimits(NamedTuple):
+    """Caps on the cost of a fusion.
+
+    log_min_component_weight, merge_distance, max_components: reduction of a track's mixture before it is raised to a
+    power and after the fusion (dropped below the weight; merged within the Mahalanobis distance; the heaviest kept).
+    A `merge_distance` of None is 2 for component-wise powers and 1 for quadrature. Not used with moment matching.
+    max_combinations: bound on the combinations of components of one label, max_components^sensors.
+    max_hyps: label sets kept in a fused GLMB.
+    """
+
+    log_min_component_weight: float = math.log(1e-5)
+    merge_distance: float | None = None
+    max_components: int = 4
+    max_combinations: int = 4096
+    max_hyps: int = 1000
+
+
+class PowerRule(NamedTuple):
+    """How powers of mixtures of one state dimension are taken.
+
+    limits: log of the least weight, merge distance and most components, for `kernels.mixtures.reduce_mixture`.
+    points, point_weights: cubature rule, empty without quadrature.
+    """
+
+    limits: tuple[float, float, int]
+    points: Floats
+    point_weights: Floats
+
+
+def check_weights(weights: Sequence[float] | Floats) -> tuple[float, ...]:
+    """The fusion weights as a tuple. Raises `InputError` unless they are non-negative and sum to one within 1e-9."""
+    checked = tuple(float(weight) for weight in weights)
+    if not checked or not all(weight >= 0.0 for weight in checked) or not abs(math.fsum(checked) - 1.0) <= 1e-9:
+        raise InputError(f"fusion weights: expected non-negative numbers that sum to 1, one a sensor; got {checked}")
+    return checked
+
+
+def check_power(mixture_power: str, limits: FusionLimits, num_sensors: int) -> None:
+    """Raise `InputError` for an unknown power of mixtures or limits that cannot be kept."""
+    if mixture_power not in MIXTURE_POWERS:
+        raise InputError(f"mixture_power: expected one of {', '.join(MIXTURE_POWERS)}; got {mixture_power!r}")
+    for name in ("max_components", "max_hyps"):
+        if getattr(limits, name) < 1:
+            raise InputError(f"limits.{name}: expected at least 1; got {getattr(limits, name)}")
+    combinations = limits.max_components**num_sensors
+    if mixture_power != "moment_matched" and combinations > limits.max_combinations:
+        raise InputError(
+            f"limits.max_components: expected {limits.max_components}^{num_sensors} (components to the power of the "
+            f"number of sensors) to be at most max_combinations = {limits.max_combinations}; got {combinations}; "
+            f"lower max_components or use moment_matched"
+        )
+
+
+def check_floor(name: str, log_floor: float) -> None:
+    """Raise `InputError` unless the floor is the log of a probability in (0, 1)."""
+    if not -math.inf < log_floor < 0.0:
+        raise InputError(f"{name}: expected a probability above 0 and below 1; got {math.exp(log_floor)}")
+
+
+def power_rule(mixture_power: str, limits: FusionLimits, state_dim: int) -> PowerRule:
+    """The limits and the cubature rule of a power of mixtures. Raises `InputError` where there is no rule."""
+    points, point_weights = np.empty((0, state_dim)), np.empty(0)
+    if mixture_power == "moment_matched":
+        return PowerRule((-math.inf, 0.0, 1), points, point_weights)
+    if mixture_power == "quadrature":
+        if state_dim > MAX_DIM:
+            raise InputError(f"mixture_power: quadrature needs at most {MAX_DIM} state dimensions; got {state_dim}")
+        points, point_weights = fifth_degree_rule(state_dim)
+    distance = limits.merge_distance if limits.merge_distance is not None else _MERGE_DISTANCE[mixture_power]
+    return PowerRule((limits.log_min_component_weight, distance, limits.max_components), points, point_weights)
+
+
+def check_beliefs(beliefs: Sequence[Any], kinds: tuple[type, ...], num_sensors: int) -> None:
+    """Raise `InputError` unless there is one belief a sensor, all of the given kinds and of one state dimension."""
+    if len(beliefs) != num_sensors:
+        raise InputError(f"beliefs: expected {num_sensors}, one for each fusion weight; got {len(beliefs)}")
+    expected = " or ".join(kind.__name__ for kind in kinds)
+    for i, belief in enumerate(beliefs):
+        if not isinstance(belief, kinds):
+            raise InputError(f"beliefs[{i}]: expected {expected}; got {type(belief).__name__}")
+    dims = [belief.state_dim for belief in beliefs]
+    if len(set(dims)) > 1:
+        raise InputError(f"beliefs: expected one state dimension at all sensors; got {dims}")
+    for i, belief in enumerate(beliefs):
+        try:
+            belief.validate(error=InputError)
+        except InputError as fault:
+            raise InputError(f"beliefs[{i}]: {fault}") from None

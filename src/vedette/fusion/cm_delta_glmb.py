@@ -1,0 +1,113 @@
+"""Generalized covariance intersection of marginalised delta-GLMB densities."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.special import expit
+
+from vedette.densities import GLMB, TrackTable
+from vedette.fusion.alignment import Aligned, align
+from vedette.fusion.base import (
+    FusionInfo,
+    FusionLimits,
+    MixturePower,
+    PowerRule,
+    check_beliefs,
+    check_floor,
+    check_power,
+    check_weights,
+    power_rule,
+)
+from vedette.fusion.tracks import fused_tracks, take_tracks
+from vedette.kernels.conversions import marginalise
+from vedette.kernels.linalg import log_sum
+from vedette.kernels.types import Floats, Glmb
+
+
+@dataclass(frozen=True, slots=True)
+class CmDeltaGlmb:
+    """Consensus marginalised delta-GLMB fusion (paper eq. 11; Fantacci et al. 2015): GCI by label set and label.
+
+    The fused label sets are those that any sensor of positive weight has, not only those that all have, because a set
+    is missing where a cap cut it off as well as where the evidence speaks against it. Where a sensor lacks a set, its
+    weight there is a floor, the least of `missing_log_weight` and the weights of the sets that it has, and each
+    label's density is the sensor's marginal density of the label over the sets that it has. Where it does not know
+    the label at all, it is left out of the label's density and the other sensors' weights there are scaled to sum to
+    one. A hypothesis of weight zero counts as missing. All this is counted in the `FusionInfo`.
+
+    Attributes:
+        weights: fusion weights, one a sensor, in the order of the beliefs; non-negative, sum 1. A sensor of weight 0
+            takes no part.
+        mixture_power: how a power of a mixture is taken. "moment_matched": of the Gaussian of each mixture's mean and
+            covariance, as in the M-delta-GLMB; exact for single Gaussians. "component_wise": as the mixture of all
+            products of component powers; valid for well separated components, an upper bound of the integral
+            otherwise. "quadrature": the same with each Gaussian's mass and moments corrected by cubature.
+            docs/decisions/0003-power-of-mixtures.md has their errors.
+        missing_log_weight: log of the floor for the weight of a label set that a sensor lacks.
+        limits: caps on the cost.
+
+    Raises `InputError` for weights, a floor or limits that cannot be used.
+    """
+
+    weights: Sequence[float] | Floats
+    mixture_power: MixturePower = "moment_matched"
+    missing_log_weight: float = math.log(1e-6)
+    limits: FusionLimits = field(default_factory=FusionLimits)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "weights", check_weights(self.weights))
+        check_power(self.mixture_power, self.limits, len(self.weights))
+        check_floor("missing_log_weight", self.missing_log_weight)
+
+    def fuse(self, beliefs: Sequence[GLMB]) -> tuple[GLMB, FusionInfo]:
+        """Fused marginalised GLMB of the sensors' GLMBs (delta or marginalised), heaviest set first, and what was done.
+
+        Label sets of equal weight come in the order of their first occurrence. Raises `InputError` for another number
+        or kind of beliefs, for state dimensions that differ or a density that is not valid, and `NumericalError`
+        where a product of track densities cannot be integrated.
+        """
+        check_beliefs(beliefs, (GLMB,), len(self.weights))
+        rule = power_rule(self.mixture_power, self.limits, beliefs[0].state_dim)
+        active = [i for i, weight in enumerate(self.weights) if weight > 0.0]
+        weights = np.array([self.weights[i] for i in active])
+        aligned = align([_marginalised(beliefs[i], rule) for i in active], self.missing_log_weight, rule)
+        tracks, log_overlaps = fused_tracks(aligned.labels, aligned.chosen, weights, aligned.tracks, rule)
+        log_weights = aligned.log_weights @ weights
+        log_weights = log_weights + np.bincount(aligned.set_of_member, log_overlaps, len(log_weights))
+        fused, discarded_weight = _heaviest(aligned, tracks, log_weights, self.limits.max_hyps)
+        return fused, FusionInfo(
+            num_missing_sets=int(np.count_nonzero(~aligned.held)),
+            num_missing_labels=aligned.num_missing_labels,
+            empty_intersection=not bool(aligned.held.all(axis=1).any()),
+            log_normaliser=float(log_sum(log_weights)),
+            discarded_weight=discarded_weight,
+        )
+
+
+def _marginalised(belief: GLMB, rule: PowerRule) -> Glmb:
+    """One hypothesis a label set, of positive weight, with reduced mixtures."""
+    glmb = marginalise(belief.to_kernel(), *rule.limits)
+    held = int(np.count_nonzero(glmb.hyp_log_weights > -math.inf))
+    # They come by descending weight, so those of weight zero are the last.
+    return Glmb(
+        glmb.tracks,
+        glmb.hyp_offsets[: held + 1],
+        glmb.hyp_tracks[: glmb.hyp_offsets[held]],
+        glmb.hyp_log_weights[:held],
+    )
+
+
+def _heaviest(aligned: Aligned, tracks: TrackTable, log_weights: Floats, max_hyps: int) -> tuple[GLMB, float]:
+    """Normalised GLMB of the `max_hyps` heaviest label sets, and the weight of the others."""
+    order = np.argsort(-log_weights, kind="stable")
+    kept, cut = order[:max_hyps], order[max_hyps:]
+    log_kept = log_sum(log_weights[kept])
+    sizes = np.diff(aligned.set_offsets)[kept]
+    hyp_offsets = np.concatenate([np.zeros(1, np.int64), np.cumsum(sizes)])
+    members = np.repeat(aligned.set_offsets[kept] - hyp_offsets[:-1], sizes) + np.arange(hyp_offsets[-1])
+    fused = GLMB(take_tracks(tracks, members), hyp_offsets, np.arange(len(members)), log_weights[kept] - log_kept)
+    return fused, float(expit(log_sum(log_weights[cut]) - log_kept))
