@@ -39,11 +39,13 @@ def lane(purpose: str, name: str, **environment: str) -> Stage:
 
 
 STAGES = {
-    "format": Stage("the layout of the source", python("ruff", "format", "--check", ".")),
-    "lint": Stage("likely mistakes", python("ruff", "check", ".")),
+    "format": Stage("the layout of the source", python("ruff", "format", "--check", "--output-format=concise", ".")),
+    "lint": Stage("likely mistakes", python("ruff", "check", "--output-format=concise", ".")),
     "types": Stage("strict types of the library", python("mypy")),
     "types-tests": Stage("types of the tests", python("mypy", "--config-file", "tests/mypy.ini")),
-    "imports": Stage("which package may import which", [str(Path(sys.executable).with_name("lint-imports"))]),
+    "imports": Stage(
+        "which package may import which", [str(Path(sys.executable).with_name("lint-imports")), "--no-logo"]
+    ),
     "docs": Stage(
         "the documentation, without warnings", python("mkdocs", "build", "--strict", "-q", "-d", "build/site")
     ),
