@@ -16,8 +16,8 @@ from vedette.kernels.types import Floats
 MixturePower = Literal["moment_matched", "component_wise", "quadrature"]
 MIXTURE_POWERS: tuple[MixturePower, ...] = ("moment_matched", "component_wise", "quadrature")
 
-# Below these distances one merged Gaussian is nearer to the truth than the power is: docs/decisions/0003.
-_MERGE_DISTANCE = {"moment_matched": 0.0, "component_wise": 2.0, "quadrature": 1.0}
+# Within these distances a merged Gaussian is as near to the truth as the power is: docs/decisions/0003.
+_MERGE_DISTANCE = {"moment_matched": 0.0, "component_wise": 2.0, "quadrature": 0.5}
 
 _BeliefT_contra = TypeVar("_BeliefT_contra", contravariant=True)
 _FusedT_co = TypeVar("_FusedT_co", covariant=True)
@@ -58,7 +58,7 @@ class FusionLimits(NamedTuple):
 
     log_min_component_weight, merge_distance, max_components: reduction of a track's mixture before it is raised to a
     power and after the fusion (dropped below the weight; merged within the Mahalanobis distance; the heaviest kept).
-    A `merge_distance` of None is 2 for component-wise powers and 1 for quadrature. Not used with moment matching.
+    A `merge_distance` of None is 2 for component-wise powers and 0.5 for quadrature. Not used with moment matching.
     max_combinations: bound on the combinations of components of one label, max_components^sensors.
     max_hyps: label sets kept in a fused GLMB.
     """
