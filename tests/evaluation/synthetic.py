@@ -8,7 +8,7 @@ import numpy as np
 
 from vedette.control.plan import Plan, RewardTable
 from vedette.densities.estimates import Estimate
-from vedette.evaluation.ospa import ospa_of_run
+from vedette.evaluation.metrics import ospa_of_run
 from vedette.kernels.types import Floats
 from vedette.simulation.records import Decision, RunRecord
 from vedette.simulation.truth import Truth

@@ -1,7 +1,7 @@
 """How good it was: OSPA, statistics over paired runs, tables; figures are in `vedette.evaluation.figures`."""
 
 from vedette.evaluation.comparison import Comparison, chosen_headings_deg, compare
-from vedette.evaluation.ospa import OspaResult, ospa, ospa_of_run
+from vedette.evaluation.metrics import OspaResult, ospa, ospa_of_run
 from vedette.evaluation.statistics import PairedDifference, Summary, paired_difference, summarise
 from vedette.evaluation.tables import decision_rows, strategy_csv, strategy_markdown, strategy_rows
 
