@@ -31,6 +31,12 @@ def test_descending_order_is_a_stable_sort(values):
     assert descending_order(array).tolist() == np.argsort(-array, kind="stable").tolist()
 
 
+@pytest.mark.parametrize("num", [0, 1, 16, 17, 40, 100, 1000])
+def test_long_lists_are_sorted_stably_too(num):
+    values = np.random.default_rng(num).integers(0, 5, num).astype(float)
+    assert descending_order(values).tolist() == np.argsort(-values, kind="stable").tolist()
+
+
 @given(st.integers(0, 10**6), st.integers(1, 6))
 def test_moment_match_keeps_mean_and_covariance(seed, num):
     log_weights, means, covs = _mixture(seed, num)
@@ -103,6 +109,17 @@ def test_pruning_merging_and_capping_by_hand():
     np.testing.assert_allclose(np.exp(log_weights), np.array([0.5, 0.3]) / 0.8, rtol=1e-12)
     np.testing.assert_allclose(kept_means, [[0.2], [10.0]], rtol=1e-12)
     np.testing.assert_allclose(kept_covs, [[[1.16]], [[1.0]]], rtol=1e-12)
+
+
+def test_the_heaviest_stays_however_light():
+    means = np.arange(100.0).reshape(100, 1)
+    weights = np.full(100, 0.01)
+    weights[70] = 0.0101
+    log_weights, kept_means, _ = reduce_mixture(
+        np.log(weights / weights.sum()), means, np.ones((100, 1, 1)), np.log(0.02), 0.0, MANY
+    )
+    np.testing.assert_allclose(log_weights, [0.0], atol=1e-12)
+    assert kept_means.tolist() == [[70.0]]
 
 
 def test_the_distance_is_measured_by_the_heaviest():

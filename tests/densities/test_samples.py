@@ -112,6 +112,22 @@ def test_what_has_no_weight_is_never_drawn():
     assert np.abs(samples.states).max() < 10.0
 
 
+class _Highest(np.random.Generator):
+    """Draws the largest number below one, which the sum with a track's number rounds up."""
+
+    def random(self, size=None, dtype=np.float64, out=None):  # type: ignore[override]
+        return np.full(size, np.nextafter(1.0, 0.0))
+
+
+def test_the_largest_draw_stays_with_its_track():
+    num = 40
+    labels = [(0, i) for i in range(num)]
+    tracks = TrackTable.from_gaussians(labels, 1e6 * np.arange(num).reshape(num, 1), np.ones((num, 1, 1)))
+    glmb = GLMB.from_hypotheses(tracks, [range(num)], [1.0])
+    states = sample_glmb(glmb, 1, rng=_Highest(np.random.PCG64(0))).states
+    assert np.abs(states - tracks.means).max() < 10.0
+
+
 def test_certain_and_impossible_targets():
     lmb = LMB.from_bernoullis([[0, 0], [0, 1]], [1.0, 0.0], np.zeros((2, 1)), [np.eye(1)] * 2)
     samples = sample_lmb(lmb, 1000, rng=np.random.default_rng(0))
