@@ -115,7 +115,7 @@ def test_what_has_no_weight_is_never_drawn():
 class _Highest(np.random.Generator):
     """Draws the largest number below one, which the sum with a track's number rounds up."""
 
-    def random(self, size=None, dtype=np.float64, out=None):  # type: ignore[override]
+    def random(self, size=None, dtype=np.float64, out=None):
         return np.full(size, np.nextafter(1.0, 0.0))
 
 
