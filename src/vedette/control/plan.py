@@ -12,7 +12,7 @@ from vedette.kernels.types import Floats
 
 @dataclass(frozen=True, slots=True)
 class RewardTable:
-    """Expected reward of each action, or of each joint action, of some sensors (paper eq. 13 and 15).
+    """Expected reward of each action, or of each joint action, of some sensors (paper eq. 15 and 17).
 
     Attributes:
         sensors: the sensors whose actions are the axes of the table, in axis order.
