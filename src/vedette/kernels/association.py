@@ -13,7 +13,7 @@ import numpy as np
 
 from vedette.errors import ModelError
 from vedette.kernels.assignment import ABSENT, MISSED, Options
-from vedette.kernels.compile import kernel
+from vedette.kernels.compile import inlined, kernel
 from vedette.kernels.gaussian import Innovation, Scratch, expect, make_innovation, predict, whiten
 from vedette.kernels.linalg import log_add
 from vedette.kernels.mixtures import copy_component
@@ -36,7 +36,7 @@ class Rows(NamedTuple):
     innovation: Innovation
 
 
-@kernel
+@inlined
 def log_or_minus_inf(value: float) -> float:
     return math.log(value) if value > 0.0 else -math.inf
 
@@ -110,7 +110,7 @@ def expect_rows(sensor: Sensor, pose: Floats, rows: Rows, scratch: Scratch) -> N
         expect(sensor, pose, rows.means[c], rows.covs[c], c, rows.innovation, scratch)
 
 
-@kernel
+@inlined
 def _sort_row(start: int, stop: int, columns: Ints, log_weights: Floats, entries: Ints) -> None:
     for i in range(start + 1, stop):
         column, weight, entry = columns[i], log_weights[i], entries[i]
@@ -121,7 +121,7 @@ def _sort_row(start: int, stop: int, columns: Ints, log_weights: Floats, entries
         columns[slot], log_weights[slot], entries[slot] = column, weight, entry
 
 
-@kernel
+@inlined
 def _detection_option(
     rows: Rows, row: int, scan: Floats, j: int, level: float, sensor: Sensor, gate: float, entry: int, opts: Options
 ) -> float:
@@ -142,7 +142,7 @@ def _detection_option(
     return _total_from_peak(opts.component_log_weights, entry, count, peak)
 
 
-@kernel
+@inlined
 def _total_from_peak(values: Floats, start: int, count: int, peak: float) -> float:
     if peak == -math.inf or count == 1:
         return peak

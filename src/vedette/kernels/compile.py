@@ -126,9 +126,21 @@ def _attach_cache(dispatcher: Any) -> None:
 
 def kernel(function: _F) -> _F:
     """Compile a kernel lazily, without the interpreter lock, cached on disk under a stamp of all the sources it reaches."""
+    return _compiled(function, _OPTIONS)
+
+
+def inlined(function: _F) -> _F:
+    """Compile a small kernel that is always inlined into its caller.
+
+    A bundle of arrays is passed as dozens of words, which costs more than a small kernel's own work.
+    """
+    return _compiled(function, {**_OPTIONS, "forceinline": True})
+
+
+def _compiled(function: _F, options: dict[str, Any]) -> _F:
     if not JIT_ENABLED:
         return function
-    dispatcher = numba.njit(**{k: v for k, v in _OPTIONS.items() if k != "nopython"})(function)
+    dispatcher = numba.njit(**{k: v for k, v in options.items() if k != "nopython"})(function)
     _attach_cache(dispatcher)
     return cast(_F, dispatcher)
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vedette.errors import ModelError, NumericalError
-from vedette.kernels.compile import kernel
+from vedette.kernels.compile import inlined, kernel
 from vedette.kernels.linalg import LOG_2PI, cholesky, log_det_from_factor, solve_lower
 from vedette.kernels.types import Bools, Floats, Motion, Sensor
 
@@ -86,7 +86,7 @@ def make_innovation(num: int, state_dim: int, meas_dim: int) -> Innovation:
     )
 
 
-@kernel
+@inlined
 def wrap_angle(angle: float) -> float:
     """The same direction in (-pi, pi]."""
     if -math.pi < angle <= math.pi:
@@ -183,7 +183,7 @@ def predict(
             raise ModelError("motion model: predicted mean or covariance is not finite")
 
 
-@kernel
+@inlined
 def _expect_linearised(sensor: Sensor, pose: Floats, mean: Floats, cov: Floats, at: int, out: Innovation, scratch: Scratch) -> None:
     n, m = mean.shape[0], out.predicted.shape[1]
     jacobian, innovation, cross = scratch.measurement_jacobian, scratch.innovation_cov, out.whitened_cross[at]
@@ -257,7 +257,7 @@ def expect(sensor: Sensor, pose: Floats, mean: Floats, cov: Floats, at: int, out
     out.prob_detection[at] = detection
 
 
-@kernel
+@inlined
 def whiten(innovation: Innovation, at: int, measurement: Floats, angular: Bools, out: Floats) -> float:
     """Whitened residual of a measurement against component `at`; returns its squared Mahalanobis distance."""
     for a in range(measurement.shape[0]):
@@ -270,7 +270,7 @@ def whiten(innovation: Innovation, at: int, measurement: Floats, angular: Bools,
     return distance
 
 
-@kernel
+@inlined
 def update_mean(innovation: Innovation, at: int, whitened: Floats, mean: Floats, out: Floats) -> None:
     """Posterior mean of component `at` given the whitened residual of its measurement."""
     for j in range(mean.shape[0]):

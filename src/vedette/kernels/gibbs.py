@@ -13,7 +13,7 @@ import numpy as np
 from vedette.kernels.arrays import filled_ints
 from vedette.kernels.assignment import DualWork, Options, make_dual_work, solve_assignment
 from vedette.kernels.compile import kernel
-from vedette.kernels.ranked import Children, Parents, append_child
+from vedette.kernels.ranked import Children, Parents, append_child, grown_children, is_full
 from vedette.kernels.types import Floats, Ints
 
 
@@ -112,8 +112,9 @@ def sample_children(
                 log_weight = parents.log_weights[parent]
                 for option in choice:
                     log_weight += options.log_weights[option]
-                start = used[1]
-                children = append_child(children, used, parent, len(rows), log_weight)
+                if is_full(children, used, len(rows)):
+                    children = grown_children(children, used, len(rows))
+                start = append_child(children, used, parent, len(rows), log_weight)
                 for i in range(len(rows)):
                     children.options[start + i] = choice[i]
     num = used[0]

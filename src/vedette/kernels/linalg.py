@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import math
 
-from vedette.kernels.compile import kernel
+from vedette.kernels.compile import inlined, kernel
 from vedette.kernels.types import Floats
 
 LOG_2PI = math.log(2.0 * math.pi)
 
 
-@kernel
+@inlined
 def cholesky(matrix: Floats, factor: Floats) -> bool:
     """Lower Cholesky factor of `matrix` (its lower triangle is read). False where it is not positive definite."""
     n = matrix.shape[0]
@@ -46,7 +46,7 @@ def log_det_from_factor(factor: Floats) -> float:
     return 2.0 * total
 
 
-@kernel
+@inlined
 def solve_lower(factor: Floats, vector: Floats, out: Floats) -> None:
     """out = L^-1 vector; `out` may be `vector`."""
     for i in range(factor.shape[0]):
@@ -88,7 +88,7 @@ def inverse_from_factor(factor: Floats, out: Floats) -> None:
             out[j, i] = out[i, j]
 
 
-@kernel
+@inlined
 def log_add(a: float, b: float) -> float:
     """log(exp(a) + exp(b)), exact for -inf."""
     if a < b:

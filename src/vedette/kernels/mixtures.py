@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from vedette.kernels.compile import kernel
+from vedette.kernels.compile import inlined, kernel
 from vedette.kernels.linalg import cholesky, log_sum, solve_lower
 from vedette.kernels.types import Floats, Ints
 
@@ -46,7 +46,7 @@ def _merge_runs(values: Floats, source: Ints, low: int, middle: int, high: int, 
             j += 1
 
 
-@kernel
+@inlined
 def copy_component(means: Floats, covs: Floats, source: int, out_means: Floats, out_covs: Floats, target: int) -> None:
     """Copy component `source` to place `target`. (Written out: array assignment takes seconds to compile.)"""
     n = means.shape[1]

@@ -15,7 +15,7 @@ import numpy as np
 
 from vedette.kernels.arrays import filled_ints, grown_floats, grown_ints
 from vedette.kernels.assignment import DualWork, Options, make_dual_work, solve_assignment
-from vedette.kernels.compile import kernel
+from vedette.kernels.compile import inlined, kernel
 from vedette.kernels.types import Floats, Ints
 
 
@@ -76,10 +76,7 @@ class _Nodes(NamedTuple):
 
 
 @kernel
-def _reserve_nodes(nodes: _Nodes, extra: int) -> _Nodes:
-    needed = nodes.used[0] + extra
-    if needed <= len(nodes.bound):
-        return nodes
+def _grown_nodes(nodes: _Nodes, needed: int) -> _Nodes:
     return _Nodes(
         grown_floats(nodes.bound, needed),
         grown_ints(nodes.parent, needed),
@@ -91,11 +88,18 @@ def _reserve_nodes(nodes: _Nodes, extra: int) -> _Nodes:
     )
 
 
+@inlined
+def _has_room(layouts: _Layouts, num_rows: int, num_options: int, num_columns: int) -> bool:
+    return (
+        layouts.used[0] + num_rows < len(layouts.rows)
+        and layouts.used[1] + num_options <= len(layouts.options)
+        and layouts.used[2] + num_columns <= len(layouts.penalty_columns)
+    )
+
+
 @kernel
-def _reserve_layout(layouts: _Layouts, num_rows: int, num_options: int, num_columns: int) -> _Layouts:
+def _grown_layouts(layouts: _Layouts, num_rows: int, num_options: int, num_columns: int) -> _Layouts:
     rows, opts, pens = layouts.used[0] + num_rows + 1, layouts.used[1] + num_options, layouts.used[2] + num_columns
-    if rows <= len(layouts.rows) and opts <= len(layouts.options) and pens <= len(layouts.penalty_columns):
-        return layouts
     return _Layouts(
         layouts.starts,
         layouts.penalty_starts,
@@ -110,7 +114,7 @@ def _reserve_layout(layouts: _Layouts, num_rows: int, num_options: int, num_colu
     )
 
 
-@kernel
+@inlined
 def _push(nodes: _Nodes, bound: float, parent: int, depth: int, rank: int, previous: int) -> None:
     node = nodes.used[0]
     nodes.used[0] += 1
@@ -122,7 +126,7 @@ def _push(nodes: _Nodes, bound: float, parent: int, depth: int, rank: int, previ
     _sift_up(nodes, node)
 
 
-@kernel
+@inlined
 def _sift_up(nodes: _Nodes, node: int) -> None:
     heap = nodes.heap
     slot = nodes.used[1]
@@ -136,7 +140,7 @@ def _sift_up(nodes: _Nodes, node: int) -> None:
     heap[slot] = node
 
 
-@kernel
+@inlined
 def _pop(nodes: _Nodes) -> int:
     heap = nodes.heap
     top = heap[0]
@@ -159,7 +163,7 @@ def _pop(nodes: _Nodes) -> int:
     return top
 
 
-@kernel
+@inlined
 def _open_parent(parent: int, rows: Ints, options: Options, layouts: _Layouts, work: DualWork) -> None:
     """Lay out a parent whose assignment problem has just been solved: rows with the firmest best option first."""
     num = len(rows)
@@ -204,14 +208,14 @@ def _open_parent(parent: int, rows: Ints, options: Options, layouts: _Layouts, w
     layouts.used[0], layouts.used[1], layouts.used[2] = first_row + num + 1, filled, penalties
 
 
-@kernel
+@inlined
 def _reduced_cost(options: Options, option: int, row: int, work: DualWork) -> float:
     cost = -options.log_weights[option] - work.row_dual[row]
     column = options.columns[option]
     return cost - work.column_dual[column] if column >= 0 else cost
 
 
-@kernel
+@inlined
 def _next_free(layouts: _Layouts, columns: Ints, position: int, rank: int, taken: Ints, stamp: int) -> int:
     """Rank of the first option at `position`, from `rank` on, whose column is free; -1 for none."""
     start, stop = layouts.offsets[position], layouts.offsets[position + 1]
@@ -223,7 +227,7 @@ def _next_free(layouts: _Layouts, columns: Ints, position: int, rank: int, taken
     return -1
 
 
-@kernel
+@inlined
 def _mark_path(nodes: _Nodes, node: int, first_row: int, layouts: _Layouts, columns: Ints, taken: Ints, stamp: int) -> None:
     while nodes.depth[node] >= 0:
         column = columns[layouts.options[layouts.offsets[first_row + nodes.depth[node]] + nodes.rank[node]]]
@@ -232,7 +236,7 @@ def _mark_path(nodes: _Nodes, node: int, first_row: int, layouts: _Layouts, colu
         node = nodes.previous[node]
 
 
-@kernel
+@inlined
 def _unused_penalty(layouts: _Layouts, parent: int, taken: Ints, stamp: int) -> float:
     first = layouts.penalty_starts[parent]
     total = 0.0
@@ -242,7 +246,7 @@ def _unused_penalty(layouts: _Layouts, parent: int, taken: Ints, stamp: int) -> 
     return total
 
 
-@kernel
+@inlined
 def _descend(
     nodes: _Nodes, node: int, num_rows: int, layouts: _Layouts, columns: Ints, taken: Ints, stamp: int, limit: float
 ) -> int:
@@ -286,13 +290,13 @@ def _descend(
         node = child
 
 
-@kernel
-def _write_choice(nodes: _Nodes, node: int, layouts: _Layouts, out: Ints) -> None:
+@inlined
+def _write_choice(nodes: _Nodes, node: int, layouts: _Layouts, out: Ints, start: int) -> None:
     first_row = layouts.starts[nodes.parent[node]]
     node = nodes.previous[node]
     while nodes.depth[node] >= 0:
         position = first_row + nodes.depth[node]
-        out[layouts.rows[position]] = layouts.options[layouts.offsets[position] + nodes.rank[node]]
+        out[start + layouts.rows[position]] = layouts.options[layouts.offsets[position] + nodes.rank[node]]
         node = nodes.previous[node]
 
 
@@ -341,22 +345,32 @@ def _num_options(options: Options, rows: Ints) -> int:
 
 
 @kernel
-def append_child(children: Children, used: Ints, parent: int, num_rows: int, log_weight: float) -> Children:
-    """Room for one more child, its parent and weight written; its options are to be written by the caller."""
-    num = used[0]
-    if num == len(children.parents) or used[1] + num_rows > len(children.options):
-        children = Children(
-            grown_ints(children.parents, num + 1),
-            grown_ints(children.offsets, 2 * (num + 2)),
-            grown_ints(children.options, used[1] + num_rows),
-            grown_floats(children.log_weights, num + 1),
-        )
+def grown_children(children: Children, used: Ints, num_rows: int) -> Children:
+    """Room for at least one more child of `num_rows` rows."""
+    return Children(
+        grown_ints(children.parents, used[0] + 1),
+        grown_ints(children.offsets, 2 * (used[0] + 2)),
+        grown_ints(children.options, used[1] + num_rows),
+        grown_floats(children.log_weights, used[0] + 1),
+    )
+
+
+@inlined
+def is_full(children: Children, used: Ints, num_rows: int) -> bool:
+    """Whether one more child of `num_rows` rows needs room first. used: (2,) number of children and of their options."""
+    return used[0] == len(children.parents) or used[1] + num_rows > len(children.options)
+
+
+@inlined
+def append_child(children: Children, used: Ints, parent: int, num_rows: int, log_weight: float) -> int:
+    """Enter one more child; returns where its options are to be written."""
+    num, start = used[0], used[1]
     children.parents[num] = parent
-    children.offsets[num + 1] = used[1] + num_rows
+    children.offsets[num + 1] = start + num_rows
     children.log_weights[num] = log_weight
     used[0] += 1
     used[1] += num_rows
-    return children
+    return start
 
 
 @kernel
@@ -378,8 +392,9 @@ def _add_missing_groups(
             continue
         rows = parents.rows[parents.offsets[best_parent] : parents.offsets[best_parent + 1]]
         solve_assignment(options, rows, work)
-        start = used[1]
-        children = append_child(children, used, best_parent, len(rows), -best)
+        if is_full(children, used, len(rows)):
+            children = grown_children(children, used, len(rows))
+        start = append_child(children, used, best_parent, len(rows), -best)
         for i in range(len(rows)):
             children.options[start + i] = work.row_option[i]
     return children
@@ -425,20 +440,24 @@ def rank_children(
             optimum = solve_assignment(options, rows, work) - parents.log_weights[parent]
             if optimum == math.inf:
                 continue
-            layouts = _reserve_layout(layouts, len(rows), _num_options(options, rows), num_columns)
+            num_options = _num_options(options, rows)
+            if not _has_room(layouts, len(rows), num_options, num_columns):
+                layouts = _grown_layouts(layouts, len(rows), num_options, num_columns)
             _open_parent(parent, rows, options, layouts, work)
             nodes.bound[node] = optimum
             if nodes.used[1] > 0 and nodes.bound[nodes.heap[0]] < optimum:
                 _sift_up(nodes, node)
                 continue
-        nodes = _reserve_nodes(nodes, 2 * len(rows) + 4)
+        if nodes.used[0] + 2 * len(rows) + 4 > len(nodes.bound):
+            nodes = _grown_nodes(nodes, nodes.used[0] + 2 * len(rows) + 4)
         stamp += 1
         full = _descend(nodes, node, len(rows), layouts, options.columns, taken, stamp, limit)
         if full < 0:
             continue
-        start = used[1]
-        children = append_child(children, used, parent, len(rows), -nodes.bound[full])
-        _write_choice(nodes, full, layouts, children.options[start : start + len(rows)])
+        if is_full(children, used, len(rows)):
+            children = grown_children(children, used, len(rows))
+        start = append_child(children, used, parent, len(rows), -nodes.bound[full])
+        _write_choice(nodes, full, layouts, children.options, start)
         if used[0] == 1:
             limit = nodes.bound[full] + max_log_gap
         if len(seen):
