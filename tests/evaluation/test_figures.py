@@ -82,6 +82,18 @@ def test_independent_rewards_are_one_curve_a_sensor_in_degrees() -> None:
     assert len(axes.collections) == 2  # the bands
 
 
+def test_curves_run_from_west_to_west_whatever_the_order_of_the_actions() -> None:
+    decision = plan("idm")
+    turned = np.roll(ACTIONS[:12], 5)
+    table = replace(decision.tables[0], mean=decision.tables[0].mean[:12], standard_error=np.zeros(12))
+    decision = replace(decision, action_values=(turned,) * 2, chosen=(3, 3), tables=(table,))
+    curve = reward_figure(decision).axes[0].lines[0]
+    headings = np.asarray(curve.get_xdata())
+    np.testing.assert_allclose(headings, np.rad2deg(ACTIONS[:12]))
+    (marked,) = curve.get_markevery()  # type: ignore[misc]
+    assert np.deg2rad(headings[marked]) == pytest.approx(turned[3])
+
+
 def test_joint_rewards_are_a_heat_map_with_the_choice_framed_and_the_best_over_the_others() -> None:
     decision = plan("jdm")
     upper, lower, bar = reward_figure(decision).axes

@@ -65,8 +65,10 @@ def _draw_curves(axes: Axes, plan: Plan) -> None:
 
 
 def _draw_curve(axes: Axes, plan: Plan, sensor: int, mean: Floats, error: Floats) -> None:
-    headings = np.rad2deg(plan.action_values[sensor])
-    chosen = plan.chosen[sensor]
+    # Changes of heading come in another order than the headings that they lead to.
+    order = np.argsort(plan.action_values[sensor], kind="stable")
+    headings, mean, error = np.rad2deg(plan.action_values[sensor])[order], mean[order], error[order]
+    chosen = int(np.flatnonzero(order == plan.chosen[sensor])[0])
     shade = colour(sensor)
     axes.fill_between(headings, mean - error, mean + error, color=shade, alpha=0.2, linewidth=0)
     axes.plot(
