@@ -10,17 +10,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.special import log_expit
 
-from densities.examples import random_glmb, random_lmb
+from densities.examples import plain_moments, random_glmb, random_lmb
 from vedette.densities import GLMB, LMB, marginalise
 from vedette.divergence import cauchy_schwarz, log_inner_product
 from vedette.fusion import Clmb, CmDeltaGlmb
-from vedette.kernels.fused_divergence import (
-    Cases,
-    Prediction,
-    fill_missing_sets,
-    fused_glmb_divergence,
-    fused_lmb_divergence,
-)
+from vedette.kernels.fused_divergence import Cases, Prediction, fused_glmb_divergence, fused_lmb_divergence
 from vedette.kernels.information import row_size, to_information
 
 pytestmark = pytest.mark.lanes
@@ -44,28 +38,25 @@ def _sets_of(density: GLMB):
     return found
 
 
-def _glmb_case(density: GLMB, weight: float, sets, labels):
-    """One sensor's belief laid out on `sets`, as a planner lays it out."""
-    own, sizes = _sets_of(density), [len(s) for s in sets]
-    offsets = np.cumsum([0, *sizes])
-    members = [labels.index(label) for s in sets for label in s]
-    log_weights, held = np.full(len(sets), -math.inf), np.zeros(len(sets), np.bool_)
-    means, covs = np.zeros((offsets[-1], DIM)), np.zeros((offsets[-1], DIM, DIM))
-    for i, s in enumerate(sets):
-        if s in own:
-            h, tracks = own[s]
-            log_weights[i], held[i] = density.hyp_log_weights[h], True
-            means[offsets[i] : offsets[i + 1]] = density.tracks.means[tracks]
-            covs[offsets[i] : offsets[i + 1]] = density.tracks.covs[tracks]
-    known = np.ones(offsets[-1], np.bool_)
-    counts = fill_missing_sets(
-        offsets, np.array(members, np.int64), len(labels), LOG_FLOOR, log_weights, means, covs, known
-    )
-    rows = np.zeros((offsets[-1], row_size(DIM)))
-    for m in range(offsets[-1]):
-        if known[m]:
-            rows[m] = _row(means[m], covs[m], weight)
-    return offsets, weight * log_weights, held, rows, counts
+def _glmb_case(density: GLMB, weight: float, sets):
+    """One sensor's belief laid out on `sets`, as a planner lays it out: scaled log weights, held, rows."""
+    own = _sets_of(density)
+    floor = min(LOG_FLOOR, float(density.hyp_log_weights.min()))
+    log_weights = np.array([density.hyp_log_weights[own[s][0]] if s in own else floor for s in sets])
+    rows = []
+    for s in sets:
+        for i, label in enumerate(s):
+            if s in own:
+                versions = [(1.0, own[s][1][i])]
+            else:
+                versions = [
+                    (float(np.exp(density.hyp_log_weights[h])), tracks[other.index(label)])
+                    for other, (h, tracks) in own.items()
+                    if label in other
+                ]
+            mixture = [(share, density.tracks.means[t], density.tracks.covs[t]) for share, t in versions]
+            rows.append(_row(*plain_moments(mixture), weight) if mixture else np.zeros(row_size(DIM)))
+    return weight * log_weights, np.array([s in own for s in sets]), np.reshape(rows, (-1, row_size(DIM)))
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(1, 3))
@@ -78,16 +69,16 @@ def test_cm_delta_glmb(seed, num_sensors):
     beliefs, predicted = [_with_labels(b, labels) for b in beliefs], _with_labels(predicted, labels)
     weights = rng.dirichlet(np.ones(num_sensors))
     sets = sorted({s for belief in beliefs for s in _sets_of(belief)})
-    laid_out = [_glmb_case(b, w, sets, labels) for b, w in zip(beliefs, weights, strict=True)]
-    offsets = laid_out[0][0]
+    laid_out = [_glmb_case(b, w, sets) for b, w in zip(beliefs, weights, strict=True)]
+    offsets = np.cumsum([0, *(len(s) for s in sets)])
     fused, info = CmDeltaGlmb(weights).fuse(beliefs)
-    assert sum(item[4][0] for item in laid_out) == info.num_missing_sets
+    assert sum(int((~held).sum()) for _, held, _ in laid_out) == info.num_missing_sets
     cases = Cases(
         offsets,
-        np.array([item[1] for item in laid_out]),
+        np.array([log_present for log_present, _, _ in laid_out]),
         np.empty((0, 0)),
-        np.array([item[2] for item in laid_out]),
-        np.array([item[3] for item in laid_out]),
+        np.array([held for _, held, _ in laid_out]),
+        np.array([rows for _, _, rows in laid_out]),
     )
     own = _sets_of(predicted)
     log_present, rows = np.full(len(sets), -math.inf), np.zeros((offsets[-1], row_size(DIM)))

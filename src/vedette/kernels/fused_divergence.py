@@ -12,12 +12,9 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numpy as np
-
 from vedette.kernels.compile import kernel
 from vedette.kernels.information import log_integral
 from vedette.kernels.linalg import log_add
-from vedette.kernels.mixtures import match_components
 from vedette.kernels.types import Bools, Floats, Ints
 
 _LOG_2 = math.log(2.0)
@@ -147,60 +144,4 @@ def fused_lmb_divergence(
     return total
 
 
-@kernel
-def fill_missing_sets(
-    set_offsets: Ints,
-    member_labels: Ints,
-    num_labels: int,
-    missing_log_weight: float,
-    log_weights: Floats,
-    means: Floats,
-    covs: Floats,
-    known: Bools,
-) -> tuple[int, int]:
-    """Stand-ins, written in place, for the label sets that a marginalised GLMB lacks; as in `fusion.CmDeltaGlmb`.
-
-    set_offsets: (num_sets + 1,) into members. member_labels: (num_members,) number of each member's label.
-    log_weights: (num_sets,) -inf where the set is missing; becomes the least of `missing_log_weight` and the weights
-    that are there. means, covs: one Gaussian a member; those of missing sets become the label's marginal over the
-    sets that are there. known: (num_members,) becomes false where the label is in no set that is there. Returns the
-    numbers of missing sets and of labels in no set that is there.
-    """
-    num_members, num_sets = len(member_labels), len(log_weights)
-    weights, shares, components = np.zeros(num_members), np.empty(num_members), np.empty(num_members, np.int64)
-    source, sources_of_label = np.zeros(num_members, np.bool_), np.zeros(num_labels, np.int64)
-    peak, floor = -math.inf, missing_log_weight
-    for at in range(num_sets):
-        peak = max(peak, log_weights[at])
-        if log_weights[at] > -math.inf:
-            floor = min(floor, log_weights[at])
-    for at in range(num_sets):
-        for m in range(set_offsets[at], set_offsets[at + 1]):
-            if log_weights[at] > -math.inf:
-                source[m] = True
-                weights[m] = math.exp(log_weights[at] - peak)
-                sources_of_label[member_labels[m]] += 1
-    missing, unknown = 0, 0
-    for at in range(num_sets):
-        if log_weights[at] > -math.inf:
-            continue
-        missing += 1
-        log_weights[at] = floor
-        for m in range(set_offsets[at], set_offsets[at + 1]):
-            count = 0
-            for other in range(num_members):
-                if source[other] and member_labels[other] == member_labels[m]:
-                    components[count] = other
-                    shares[count] = weights[other]
-                    count += 1
-            if count > 0:
-                match_components(components, shares, count, means, covs, means[m], covs[m])
-    for m in range(num_members):
-        known[m] = sources_of_label[member_labels[m]] > 0
-    for label in range(num_labels):
-        if sources_of_label[label] == 0:
-            unknown += 1
-    return missing, unknown
-
-
-__all__ = ["Cases", "Prediction", "fill_missing_sets", "fused_glmb_divergence", "fused_lmb_divergence"]
+__all__ = ["Cases", "Prediction", "fused_glmb_divergence", "fused_lmb_divergence"]

@@ -27,28 +27,38 @@ def row_size(dim: int) -> int:
 
 @kernel
 def to_information(
-    mean: Floats, cov: Floats, reference: Floats, power: float, row: Floats, factor: Floats, precision: Floats
+    mean: Floats, cov: Floats, reference: Floats, power: float, row: Floats, factor: Floats, inverse: Floats
 ) -> bool:
-    """Information row of N(mean, cov)^power about `reference`, into `row`. False where `cov` is not positive
-    definite.
+    """Information row of N(mean, cov)^power about `reference`, into `row`. False where `cov` is not positive definite.
 
-    factor, precision: (dim, dim) working arrays.
+    factor, inverse: (dim, dim) working arrays; they hold the Cholesky factor L and L^-1 afterwards.
     """
     n = mean.shape[0]
     if not cholesky(cov, factor):
         return False
-    inverse_from_factor(factor, precision)
-    at, quadratic, last = 0, 0.0, n * (n + 1) // 2
+    at, squared, last = 0, 0.0, n * (n + 1) // 2
     for i in range(n):
-        vector = 0.0
-        for j in range(n):
-            vector += precision[i, j] * (mean[j] - reference[j])
-            if j <= i:
-                row[at] = power * precision[i, j]
-                at += 1
-        row[last + i] = power * vector
-        quadratic += vector * (mean[i] - reference[i])
-    row[last + n] = power * (quadratic + log_det_from_factor(factor) + n * LOG_2PI)
+        row[last + i] = 0.0
+        scale, whitened = 1.0 / factor[i, i], 0.0
+        for j in range(i):
+            total = 0.0
+            for k in range(j, i):
+                total -= factor[i, k] * inverse[k, j]
+            inverse[i, j] = total * scale
+            whitened += inverse[i, j] * (mean[j] - reference[j])
+        inverse[i, i] = scale
+        whitened += scale * (mean[i] - reference[i])
+        squared += whitened * whitened
+        for j in range(i + 1):
+            row[last + j] += power * inverse[i, j] * whitened
+    for i in range(n):
+        for j in range(i + 1):
+            total = 0.0
+            for k in range(i, n):
+                total += inverse[k, i] * inverse[k, j]
+            row[at] = power * total
+            at += 1
+    row[last + n] = power * (squared + log_det_from_factor(factor) + n * LOG_2PI)
     row[last + n + 1] = power
     return True
 
@@ -82,7 +92,7 @@ def log_integral(row: Floats, dim: int) -> float:
         for k in range(dim):
             log_det += math.log(row[at])
             at += k + 2
-    return 0.5 * (dim * LOG_2PI - log_det - row[diagonal])
+    return float(0.5 * (dim * LOG_2PI - log_det - row[diagonal]))
 
 
 @kernel
@@ -97,7 +107,7 @@ def log_value(row: Floats, offset: Floats) -> float:
         quadratic += total * offset[i]
         linear += row[last + i] * offset[i]
         at += i + 1
-    return linear - quadratic - 0.5 * row[last + n]
+    return float(linear - quadratic - 0.5 * row[last + n])
 
 
 @kernel
