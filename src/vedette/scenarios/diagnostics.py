@@ -162,11 +162,11 @@ def _translate(error: ErrorDetails) -> tuple[Path, str, str, str]:
         case "literal_error" if isinstance(error["input"], str):
             hint = suggestion(error["input"], _literals(annotation))
             return path, _expected(error, annotation), describe(error["input"]), hint
-    at = error.get("ctx", {}).get("at", ())
-    value = error["input"]
+    context = error.get("ctx", {})
+    at, value = context.get("at", ()), error["input"]
     for part in at:
         value = value[part]
-    return (*path, *at), _expected(error, annotation), describe(value), ""
+    return (*path, *at), _expected(error, annotation), context.get("got") or describe(value), ""
 
 
 def _written_path(path: Path, data: Any) -> Path:

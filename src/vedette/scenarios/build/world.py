@@ -126,5 +126,5 @@ def _scripted(section: ScriptedTargets, model: ScenarioModel, motion: MotionMode
         states[:, grouped_order(model.motion, motion.state_dim)],
         np.array([times[track.start_step - 1] for track in tracks]),
         np.array([times[(track.end_step or model.time.num_steps) - 1] for track in tracks]),
-        [track.process_noise for track in tracks],
+        [track.process_noise for track in tracks] or False,
     )

@@ -14,9 +14,9 @@ from pydantic_core import PydanticCustomError
 _REFERENCE = re.compile(r"([A-Za-z_]\w*(\.[A-Za-z_]\w*)*|[^:]+\.py):[A-Za-z_]\w*(\.[A-Za-z_]\w*)*")
 
 
-def expected(what: str, *, at: tuple[str | int, ...] = ()) -> PydanticCustomError:
-    """The error of a validator that finds `what` missing, at the field itself or at a place inside it."""
-    return PydanticCustomError("expected", "expected {expected}", {"expected": what, "at": at})
+def expected(what: str, *, at: tuple[str | int, ...] = (), got: str = "") -> PydanticCustomError:
+    """The error of a validator that wants `what`, at the field itself or a place inside it, where `got` is."""
+    return PydanticCustomError("expected", "expected {expected}", {"expected": what, "at": at, "got": got})
 
 
 def _whole(value: Any) -> Any:

@@ -79,5 +79,5 @@ class Control(Section):
     @model_validator(mode="after")
     def _one_schedule(self) -> Control:
         if self.decision_steps is not None and self.decision_times is not None:
-            raise expected("either decision_steps or decision_times")
+            raise expected("either decision_steps or decision_times", got="both")
         return self

@@ -117,7 +117,7 @@ class BirthSite(Section):
     @model_validator(mode="after")
     def _one_spread(self) -> BirthSite:
         if (self.std is None) == (self.cov is None):
-            raise expected("either std or cov")
+            raise expected("either std or cov", got="both" if self.std else "neither")
         return self
 
 
@@ -163,9 +163,9 @@ class Columns(Section):
         given = self.given()
         for first, second in (("x", "y"), ("longitude", "latitude"), ("vx", "vy")):
             if (first in given) != (second in given):
-                raise expected(f"{first} and {second} together")
+                raise expected(f"{first} and {second} together", got=f"only {first if first in given else second}")
         if "x" in given and "longitude" in given:
-            raise expected("either x and y, or longitude and latitude")
+            raise expected("either x and y, or longitude and latitude", got="both")
         return self
 
     def given(self) -> dict[str, str]:

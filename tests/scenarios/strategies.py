@@ -1,0 +1,166 @@
+"""Random valid scenarios, section by section."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from hypothesis import strategies as st
+
+Data = dict[str, Any]
+
+finite = st.floats(-1e9, 1e9, allow_nan=False)
+positive = st.floats(1e-9, 1e9)
+zero_or_more = st.floats(0.0, 1e9)
+probability = st.floats(0.0, 1.0)
+inner = st.floats(1e-6, 1.0 - 1e-6)
+counts = st.integers(1, 10**6)
+# Among them words that YAML could take for something else.
+words = st.sampled_from(
+    ["no", "yes", "1e3", "~", "null", "true", "0x1F", "- a", "a: b", "#c", "2016-01-12", "1_0", " é", "'q'"]
+)
+names = words | st.text(st.characters(categories=["L", "N", "P", "S"]), min_size=1, max_size=12)
+references = st.sampled_from(["json:loads", "os.path:join", "collections:abc.Mapping"])
+arguments = st.dictionaries(
+    names, st.none() | st.booleans() | finite | names | st.lists(st.integers(), max_size=3), max_size=2
+)
+
+
+def vector(length: int, of: st.SearchStrategy[float] = finite) -> st.SearchStrategy[list[float]]:
+    return st.lists(of, min_size=length, max_size=length)
+
+
+def section(kind: str | None = None, **fields: st.SearchStrategy[Any]) -> st.SearchStrategy[Data]:
+    """A mapping in which every field may be left out, so that its default stands in."""
+    fixed = {} if kind is None else {"kind": st.just(kind)}
+    return st.fixed_dictionaries(fixed, optional=fields)
+
+
+def needed(kind: str | None = None, **fields: st.SearchStrategy[Any]) -> st.SearchStrategy[Data]:
+    """A mapping with all of its fields."""
+    fixed = {} if kind is None else {"kind": st.just(kind)}
+    return st.fixed_dictionaries({**fixed, **fields})
+
+
+def custom(**fields: st.SearchStrategy[Any]) -> st.SearchStrategy[Data]:
+    return needed("custom", python=references, arguments=arguments, **fields)
+
+
+order = st.sampled_from(["grouped", "interleaved"])
+motions = {
+    4: section("constant_velocity", sigma_v=zero_or_more, state_order=order),
+    5: section("coordinated_turn", sigma_v=zero_or_more, sigma_turn_rate_deg=zero_or_more, state_order=order),
+    3: custom(state_dim=st.just(3)),
+}
+angles = st.lists(finite, min_size=1, max_size=5)
+headings = st.sampled_from(["absolute", "relative"])
+detections = st.one_of(
+    section("gaussian", sigma=positive),
+    needed("constant", probability=probability),
+    needed("limited_range", probability=probability, max_range=positive),
+    needed("limited_sector", probability=probability, max_range=positive, half_width_deg=st.floats(0.1, 180.0)),
+    custom(),
+)
+MEASUREMENT_DIM = {"bearing_range": 2, "bearing_only": 1, "range_only": 1, "position": 2}
+
+
+@st.composite
+def sensors(draw: st.DrawFn) -> Data:
+    kind = draw(st.sampled_from(list(MEASUREMENT_DIM)))
+    dim = MEASUREMENT_DIM[kind]
+    grown = section("range_dependent", sigma_range=positive, eta_range=zero_or_more, sigma_bearing_deg=positive)
+    noises = [needed("constant", std=vector(dim, positive)), custom(), *([] if kind == "position" else [grown])]
+    low = draw(vector(dim, st.floats(-100.0, 0.0)))
+    boxes = needed("measurement_space", rate=zero_or_more, low=st.just(low), high=vector(dim, st.floats(1.0, 100.0)))
+    clutters = st.one_of(section("region", rate=zero_or_more), boxes, custom())
+    fixed = {"position": draw(vector(2)), "measurement": {"kind": kind}, "noise": draw(st.one_of(noises))}
+    optional = section(
+        heading_deg=finite,
+        speed=zero_or_more,
+        moves_from=st.sampled_from(["first_decision", "start"]),
+        actions_deg=angles,
+        headings=headings,
+        detection=detections,
+        clutter=clutters,
+    )
+    return {**fixed, **draw(optional)}
+
+
+def steps(last: int) -> st.SearchStrategy[list[int]]:
+    return st.lists(st.integers(1, last), unique=True, max_size=4).map(sorted)
+
+
+@st.composite
+def targets(draw: st.DrawFn, dim: int, last: int) -> Data:
+    tracks = []
+    for _ in range(draw(st.integers(0, 3))):
+        first, final = sorted(draw(st.tuples(st.integers(1, last), st.integers(1, last))))
+        extent = section(start_step=st.just(first), end_step=st.just(final), process_noise=st.booleans())
+        tracks.append({"state": draw(vector(dim)), **draw(extent)} | ({"end_step": final}))
+    return {"kind": "scripted", "tracks": tracks}
+
+
+def sites(dim: int) -> st.SearchStrategy[list[Data]]:
+    diagonal = vector(dim, positive).map(lambda v: [[v[i] if i == j else 0.0 for j in range(dim)] for i in range(dim)])
+    by_std = needed(existence=inner, mean=vector(dim), std=vector(dim, positive))
+    by_cov = needed(existence=inner, mean=vector(dim), cov=diagonal)
+    return st.lists(by_std | by_cov, min_size=1, max_size=3)
+
+
+@st.composite
+def tracking(draw: st.DrawFn, num_sensors: int) -> Data:
+    kind = draw(st.sampled_from(["delta_glmb", "m_delta_glmb", "lmb"]))
+    gibbs = st.just({"kind": "ranked"}) if kind == "lmb" else section("gibbs", num_samples=counts)
+    limits = section(max_hypotheses=counts, min_relative_weight=st.floats(0.0, 0.5), gate_probability=inner)
+    method = st.sampled_from(["auto", "ekf", "ukf", "ckf"])
+    weights = [1.0 / num_sensors] * num_sensors
+    fusion = section(
+        weights=st.just(weights),
+        mixture_power=st.sampled_from(["moment_matched", "component_wise", "quadrature"]),
+        missing_weight=inner,
+        missing_existence=inner,
+        feedback=st.booleans(),
+        limits=section(
+            max_hypotheses=counts, max_components=st.integers(1, 4), merge_distance=st.none() | zero_or_more
+        ),
+    )
+    return {
+        "filter": {"kind": kind, **draw(section(gaussian_method=method, assignment=gibbs, limits=limits))},
+        "fusion": {"kind": "clmb" if kind == "lmb" else "cm_delta_glmb", **draw(fusion)},
+        "estimator": draw(st.just({"kind": "map"}) | section("marginal", threshold=inner)),
+    }
+
+
+@st.composite
+def scenarios(draw: st.DrawFn) -> Data:
+    """The data of a valid scenario file."""
+    last, dim = draw(st.integers(1, 500)), draw(st.sampled_from(list(motions)))
+    x, y = draw(vector(2)), draw(vector(2, st.floats(1.0, 1e6)))
+    platforms = draw(st.lists(sensors(), min_size=1, max_size=4))
+    control = section(
+        decision_steps=steps(last),
+        actions_deg=angles,
+        headings=headings,
+        horizon_steps=counts,
+        horizon_period=positive,
+        num_samples=counts,
+        ideal_measurements=st.sampled_from(["ideal", "expected", "sampled"]),
+        detection_threshold=probability,
+        reward=section("cauchy_schwarz", unit_volume=st.just("reference") | positive),
+        limits=section(prior_hypotheses=counts, max_hypotheses=counts),
+    )
+    return {
+        "name": draw(names),
+        "description": draw(st.text(st.characters(exclude_categories=["Cs", "Cc"]), max_size=30)),
+        "time": {"num_steps": last, **draw(section(step_period=positive, start=finite))},
+        "region": {"x_min": x[0], "x_max": x[0] + y[0], "y_min": x[1], "y_max": x[1] + y[1]},
+        "motion": draw(motions[dim]),
+        "survival": draw(section("constant", probability=probability) | custom()),
+        "birth": {"sites": draw(sites(dim)), **draw(section(steps=st.just("every") | steps(last)))},
+        "targets": draw(targets(dim, last)),
+        "sensors": [{**item, "name": f"{draw(names)}{number}"} for number, item in enumerate(platforms)],
+        **draw(tracking(len(platforms))),
+        "control": draw(control),
+        "ospa": draw(
+            section(cutoff=positive, order=st.floats(1.0, 100.0), from_step=st.just(1), to_step=st.just(last))
+        ),
+    }

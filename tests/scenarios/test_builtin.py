@@ -1,0 +1,163 @@
+"""The scenarios that come with the library: valid, with the numbers of the notes, and with every choice a field."""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import Any
+
+import numpy as np
+import pytest
+
+from vedette.scenarios import list_builtin, load_scenario
+from vedette.scenarios.build import build_filters, build_times, build_truth_source
+from vedette.scenarios.loading import Scenario
+from vedette.scenarios.schema import ScenarioModel
+from vedette.scenarios.schema.sensors import BearingRange, GaussianDetection, RangeDependentNoise, RegionClutter
+from vedette.scenarios.schema.world import ConstantVelocity, RecordedTargets, ScriptedTargets
+from vedette.simulation import Truth
+
+LAYOUTS: dict[str, dict[str, Any]] = {
+    "paper-a": {
+        "targets": [(-55, 875, 15, -6), (-180, -205, -5.5, -19), (-320, 485, 5.5, -5.5), (340, -5, 10, 6)],
+        "sensors": [(-745, 830), (-580, 220)],
+        "speed": 50,
+    },
+    "paper-e": {
+        "targets": [(60, -260, 5, -7), (580, -190, 3, 17), (-270, -100, -1, 8), (-180, 280, 3, -8)],
+        "sensors": [(-520, 280), (-590, -190)],
+        "speed": 40,
+    },
+}
+
+# Row of the notes on the paper -> field, the default asked for.
+NOTE_ROWS = {
+    1: ("motion.state_order", "grouped"),
+    2: ("sensors.0.measurement.bearing_function", "atan2"),
+    3: ("sensors.0.noise", RangeDependentNoise()),
+    4: ("sensors.0.detection", GaussianDetection()),
+    5: ("sensors.0.clutter", RegionClutter()),
+    6: ("birth.steps", "every"),
+    7: ("fusion.missing_weight", 1e-6),
+    8: ("fusion.mixture_power", "moment_matched"),
+    9: ("fusion.feedback", False),
+    10: ("control.horizon_period", 2.0),
+    11: ("control.deaths_over_horizon", False),
+    12: ("control.ideal_measurements", "ideal"),
+    13: ("control.merge_equal_headings", True),
+    14: ("control.headings", "absolute"),
+    15: ("control.reward.unit_volume", 1.0),
+    16: ("control.non_finite_reward", "error"),
+    17: ("ospa.cutoff", 100.0),
+    18: ("control.ties", "first"),
+}
+
+
+def truth_of(scenario: Scenario) -> Truth:
+    motion = build_filters(scenario)[0].motion
+    source = build_truth_source(scenario.model, motion, scenario.folder)
+    return source.truth(build_times(scenario.model.time), rng=np.random.default_rng(0))
+
+
+def test_they_are_all_there_and_valid() -> None:
+    assert list(list_builtin()) == ["linear-10", "paper-a", "paper-e", "solent"]
+    for name in list_builtin():
+        assert load_scenario(name).name == name
+
+
+@pytest.mark.parametrize("name", LAYOUTS)
+def test_the_papers_scenario_has_the_numbers_of_the_notes(name: str) -> None:
+    model, layout = load_scenario(name).model, LAYOUTS[name]
+    assert isinstance(model.targets, ScriptedTargets)
+    assert [track.state for track in model.targets.tracks] == layout["targets"]
+    assert not any(track.process_noise for track in model.targets.tracks)
+    assert [sensor.position for sensor in model.sensors] == layout["sensors"]
+    assert {sensor.speed for sensor in model.sensors} == {layout["speed"]}
+    assert {sensor.moves_from for sensor in model.sensors} == {"first_decision"}
+    assert [site.mean for site in model.birth.sites] == [(x, y, 0.0, 0.0) for x, y, *_ in layout["targets"]]
+    assert {(site.existence, site.std) for site in model.birth.sites} == {(0.02, (50.0, 50.0, 25.0, 25.0))}
+    assert model.birth.steps == (1,)
+
+
+@pytest.mark.parametrize("name", LAYOUTS)
+def test_the_papers_scenario_has_the_papers_numbers(name: str) -> None:
+    model = load_scenario(name).model
+    assert (model.time.num_steps, model.time.step_period, model.time.start) == (40, 1.0, 1.0)
+    assert model.motion == ConstantVelocity(sigma_v=5.0)
+    assert model.survival.model_dump() == {"kind": "constant", "probability": 0.98}
+    for sensor in model.sensors:
+        assert sensor.measurement == BearingRange()
+        noise = RangeDependentNoise(sigma_range=10.0, eta_range=5e-5, sigma_bearing_deg=1.0, eta_bearing=5e-6)
+        assert sensor.noise == noise
+        assert sensor.detection == GaussianDetection(sigma=10000.0)
+        assert sensor.clutter == RegionClutter(rate=25.0)
+    assert model.region.model_dump() == {"x_min": -1000.0, "x_max": 1000.0, "y_min": -1000.0, "y_max": 1000.0}
+    assert model.fusion.weights == (0.5, 0.5)
+    control = model.control
+    assert control.decision_steps == (10, 20, 30)
+    assert control.actions_deg == tuple(range(-180, 181, 30))
+    assert (control.horizon_steps, control.horizon_period, control.num_samples) == (5, 2.0, 40)
+    assert (control.limits.prior_hypotheses, control.limits.max_hypotheses) == (10, 40)
+    assert model.ospa.model_dump() == {"cutoff": 100.0, "order": 1.0, "from_step": 11, "to_step": 40}
+
+
+def field_at(model: Any, path: str) -> Any:
+    for part in path.split("."):
+        model = model[int(part)] if part.isdigit() else getattr(model, part)
+    return model
+
+
+@pytest.mark.parametrize("row", NOTE_ROWS)
+def test_every_choice_that_the_paper_leaves_open_is_a_field_with_its_default(row: int) -> None:
+    path, default = NOTE_ROWS[row]
+    least = {
+        "name": "least",
+        "time": {"num_steps": 3},
+        "region": {"x_min": 0.0, "x_max": 1.0, "y_min": 0.0, "y_max": 1.0},
+        "birth": {"sites": [{"existence": 0.1, "mean": [0.0] * 4, "std": [1.0] * 4}]},
+        "targets": {"kind": "scripted", "tracks": []},
+        "sensors": [{"position": [0.0, 0.0]}],
+    }
+    assert field_at(ScenarioModel.model_validate(least), path) == default
+
+
+def test_linear_10_has_ten_targets_inside_the_region_and_as_many_at_once() -> None:
+    scenario = load_scenario("linear-10")
+    truth = truth_of(scenario)
+    assert len(np.unique(truth.ids)) == 10
+    assert np.diff(truth.offsets).max() == 10
+    assert np.abs(truth.states[:, :2]).max() < 1000.0
+    sensor = scenario.model.sensors[0]
+    assert (sensor.measurement.kind, sensor.speed) == ("position", 0.0)
+    assert len(scenario.model.birth.sites) == 4
+
+
+def test_linear_10s_targets_are_likely_births_of_its_sites() -> None:
+    model = load_scenario("linear-10").model
+    assert isinstance(model.targets, ScriptedTargets)
+    for track in model.targets.tracks:
+        distances = [
+            math.sqrt(sum(((x - m) / s) ** 2 for x, m, s in zip(track.state, site.mean, site.std or (), strict=True)))
+            for site in model.birth.sites
+        ]
+        assert min(distances) < 3.0
+
+
+def test_solent_has_three_to_twelve_real_ships_under_way_at_every_scan() -> None:
+    scenario = load_scenario("solent")
+    assert isinstance(scenario.model.targets, RecordedTargets)
+    truth = truth_of(scenario)
+    alive = np.diff(truth.offsets)
+    assert (alive.min(), alive.max()) == (3, 10)
+    assert np.abs(truth.states[:, :2]).max() <= 3000.0
+    assert np.hypot(truth.states[:, 2], truth.states[:, 3]).max() < 20.0
+
+
+def test_the_ships_come_with_their_origin_and_licence() -> None:
+    data = list_builtin()["solent"].parents[1] / "data"
+    assert (data / "solent.csv").stat().st_size < 100_000
+    text = (data / "README.md").read_text(encoding="utf-8")
+    assert "SolentAIS_20160112_130211.csv" in text
+    assert re.search(r"MIT License.*Crown Copyright.*Permission is hereby granted", text, re.DOTALL)
+    ids = {line.split(",")[1] for line in (data / "solent.csv").read_text(encoding="utf-8").splitlines()[1:]}
+    assert ids == {str(number) for number in range(1, 22)}

@@ -1,0 +1,115 @@
+# ruff: noqa: E501
+"""The words and places of the faults of the sensors."""
+
+from __future__ import annotations
+
+import pytest
+
+from scenarios.minimal import changed
+from vedette.errors import ScenarioError
+from vedette.scenarios import parse_scenario
+
+CASES = [
+    (
+        "  kind: scripted\n  tracks:\n    - {state: [1.0, 2.0, 0.5, -0.5], start_step: 2, end_step: 18}",
+        "  {kind: recorded, path: ships.txt, columns: {longitude: lon}}",
+        [
+            'f.yaml:11:26: targets.path: expected a .csv or .parquet file, got "ships.txt"',
+            "f.yaml:11:46: targets.columns: expected longitude and latitude together, got only longitude",
+        ],
+    ),
+    (
+        "std: [0.02, 3.0]",
+        "std: [0.02]",
+        [
+            "f.yaml:15:32: sensor_defaults.noise.std: expected 2 numbers, as a bearing_range measurement has, got a list of 1"
+        ],
+    ),
+    (
+        "std: [0.02, 3.0]",
+        "std: [0.02, -3.0]",
+        ["f.yaml:15:39: sensor_defaults.noise.std[1]: expected a number above 0, got -3.0"],
+    ),
+    (
+        "kind: constant, std: [0.02, 3.0]",
+        "kind: range_dependent, sigma_bearing: 1",
+        [
+            "f.yaml:15:34: sensor_defaults.noise.sigma_bearing: expected one of eta_bearing, eta_range, kind, sigma_bearing_deg, sigma_range, got an unknown key (did you mean sigma_bearing_deg?)"
+        ],
+    ),
+    (
+        "  noise: {",
+        "  nose: {",
+        [
+            "f.yaml:15:3: sensor_defaults.nose: expected one of actions_deg, clutter, detection, heading_deg, headings, measurement, moves_from, noise, speed, got an unknown key (did you mean noise?)"
+        ],
+    ),
+    (
+        "position: [0.0, 40.0]",
+        "position: [0.0, 40.0, 1.0]",
+        ["f.yaml:17:29: sensors[0].position: expected a list of 2, got a list of 3"],
+    ),
+    (
+        "position: [0.0, 40.0], ",
+        "",
+        ["f.yaml:17:5: sensors[0].position: expected a value, as it is required, got nothing"],
+    ),
+    ("name: south", "name: north", ['f.yaml:18:12: sensors[1].name: expected each name once, got "north" again']),
+    ("speed: 4.0", "speed: -4.0", ["f.yaml:17:49: sensors[0].speed: expected a number of at least 0, got -4.0"]),
+    (
+        "speed: 4.0",
+        "actions_deg: []",
+        ["f.yaml:17:55: sensors[0].actions_deg: expected a list of at least 1, got an empty list"],
+    ),
+    (
+        "speed: 4.0",
+        "headings: relativ",
+        [
+            'f.yaml:17:52: sensors[0].headings: expected one of absolute, relative, got "relativ" (did you mean relative?)'
+        ],
+    ),
+    (
+        "speed: 4.0",
+        "measurement: {kind: position}, noise: {kind: range_dependent}",
+        [
+            "f.yaml:17:80: sensors[0].noise: expected constant or custom noise for a position measurement, got range_dependent noise"
+        ],
+    ),
+    (
+        "speed: 4.0",
+        "measurement: {kind: range_only}",
+        [
+            "f.yaml:15:32: sensor_defaults.noise.std: expected 1 number, as a range_only measurement has, got a list of 2"
+        ],
+    ),
+    (
+        "speed: 4.0",
+        "detection: {kind: limited_sector, probability: 0.9, max_range: 50.0, half_width_deg: 0}",
+        ["f.yaml:17:127: sensors[0].detection.half_width_deg: expected a number above 0, got 0"],
+    ),
+    (
+        "speed: 4.0",
+        "detection: {kind: limited_range, probability: 1.1, max_range: -1}",
+        [
+            "f.yaml:17:88: sensors[0].detection.probability: expected a number of at most 1, got 1.1",
+            "f.yaml:17:104: sensors[0].detection.max_range: expected a number above 0, got -1",
+        ],
+    ),
+    (
+        "speed: 4.0",
+        "clutter: {kind: measurement_space, rate: 5, low: [-3.0, 0.0], high: [3.0, -1.0]}",
+        ["f.yaml:17:116: sensors[0].clutter.high[1]: expected a number above low, 0, got -1.0"],
+    ),
+    (
+        "speed: 4.0",
+        "clutter: {kind: region, rate: lots}",
+        ['f.yaml:17:72: sensors[0].clutter.rate: expected a number, got "lots"'],
+    ),
+]
+
+
+@pytest.mark.parametrize(("old", "new", "faults"), CASES, ids=[f"{old[:20]} -> {new[:40]}" for old, new, _ in CASES])
+def test_faults_are_named_with_their_places(old: str, new: str, faults: list[str]) -> None:
+    with pytest.raises(ScenarioError) as error:
+        parse_scenario(changed((old, new)), "f.yaml")
+    assert error.value.faults == faults

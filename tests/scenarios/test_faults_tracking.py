@@ -1,0 +1,151 @@
+# ruff: noqa: E501
+"""The words and places of the faults of filter, fusion, estimates, control and score."""
+
+from __future__ import annotations
+
+import pytest
+
+from scenarios.minimal import changed
+from vedette.errors import ScenarioError
+from vedette.scenarios import parse_scenario
+
+CASES = [
+    (
+        "sensors:\n  - {name: north, position: [0.0, 40.0], speed: 4.0}\n  - {name: south, position: [0.0, -40.0]}",
+        "sensors: []",
+        ["f.yaml:16:10: sensors: expected a list of at least 1, got an empty list"],
+    ),
+    (
+        "kind: m_delta_glmb",
+        "kind: m-delta-glmb",
+        [
+            'f.yaml:19:16: filter.kind: expected one of delta_glmb, m_delta_glmb, lmb, got "m-delta-glmb" (did you mean m_delta_glmb?)'
+        ],
+    ),
+    (
+        "kind: m_delta_glmb",
+        "kind: m_delta_glmb, limits: {max_hypotheses: 0, gate_probability: 0}",
+        [
+            "f.yaml:19:55: filter.limits.max_hypotheses: expected a number of at least 1, got 0",
+            "f.yaml:19:76: filter.limits.gate_probability: expected a number above 0, got 0",
+        ],
+    ),
+    (
+        "kind: m_delta_glmb",
+        "kind: lmb, assignment: {kind: gibbs, num_samples: 10}",
+        [
+            'f.yaml:19:40: filter.assignment.kind: expected ranked, as the filter is lmb, got "gibbs"',
+            'f.yaml:20:16: fusion.kind: expected clmb or none, as the filters are lmb, got "cm_delta_glmb"',
+        ],
+    ),
+    (
+        "kind: m_delta_glmb",
+        "kind: m_delta_glmb, assignment: murty",
+        ['f.yaml:19:42: filter.assignment: expected a mapping, got "murty"'],
+    ),
+    (
+        "weights: [0.5, 0.5]",
+        "weights: [0.5, 0.4]",
+        ["f.yaml:20:40: fusion.weights: expected weights with sum 1, got a sum of 0.9"],
+    ),
+    (
+        "weights: [0.5, 0.5]",
+        "weights: [1.0]",
+        ["f.yaml:20:40: fusion.weights: expected as many weights as sensors, 2, got a list of 1"],
+    ),
+    (
+        "weights: [0.5, 0.5]",
+        "weights: [1.5, -0.5]",
+        [
+            "f.yaml:20:41: fusion.weights[0]: expected a number of at most 1, got 1.5",
+            "f.yaml:20:46: fusion.weights[1]: expected a number of at least 0, got -0.5",
+        ],
+    ),
+    (
+        "kind: cm_delta_glmb, weights: [0.5, 0.5]",
+        "kind: none",
+        ['f.yaml:20:16: fusion.kind: expected a fusion, as there are 2 sensors, got "none"'],
+    ),
+    (
+        "weights: [0.5, 0.5]",
+        "mixture_power: quadrature, limits: {max_components: 100}",
+        [
+            "f.yaml:20:83: fusion.limits.max_components: expected a number whose power by 2 sensors is at most max_combinations, 4096, got 100"
+        ],
+    ),
+    ("threshold: 0.6", "threshold: 1.0", ["f.yaml:21:40: estimator.threshold: expected a number below 1, got 1.0"]),
+    (
+        "decision_steps: [4, 8]",
+        "decision_steps: [4, 25]",
+        ["f.yaml:22:31: control.decision_steps[1]: expected a step up to the last, 20, got 25"],
+    ),
+    (
+        "decision_steps: [4, 8]",
+        "decision_steps: [8, 4]",
+        ["f.yaml:22:31: control.decision_steps[1]: expected more than the one before it, 8, got 4"],
+    ),
+    (
+        "decision_steps: [4, 8]",
+        "decision_times: [3.0, 3.2, 100]",
+        [
+            "f.yaml:22:33: control.decision_times[1]: expected the time of a scan: 2 s and every 0.5 s after it, got 3.2",
+            "f.yaml:22:38: control.decision_times[2]: expected a time from 2 to 11.5 s, got 100.0",
+        ],
+    ),
+    (
+        "decision_steps: [4, 8]",
+        "decision_steps: [4], decision_times: [3.0]",
+        ["f.yaml:22:10: control: expected either decision_steps or decision_times, got both"],
+    ),
+    (
+        "decision_steps: [4, 8]",
+        "horizon_steps: 0, horizon_period: 0.0",
+        [
+            "f.yaml:22:26: control.horizon_steps: expected a number of at least 1, got 0",
+            "f.yaml:22:45: control.horizon_period: expected a number above 0, got 0.0",
+        ],
+    ),
+    (
+        "decision_steps: [4, 8]",
+        "actions_deg: [], headings: compass",
+        [
+            "f.yaml:22:24: control.actions_deg: expected a list of at least 1, got an empty list",
+            'f.yaml:22:38: control.headings: expected one of absolute, relative, got "compass"',
+        ],
+    ),
+    (
+        "decision_steps: [4, 8]",
+        "reward: {kind: cauchy_schwarz, unit_volume: 0}",
+        ["f.yaml:22:55: control.reward.unit_volume: expected reference or a number above 0, got 0"],
+    ),
+    (
+        "decision_steps: [4, 8]",
+        "reward: {kind: entropy}",
+        ['f.yaml:22:26: control.reward.kind: expected cauchy_schwarz, got "entropy"'],
+    ),
+    (
+        "decision_steps: [4, 8]",
+        "ideal_measurements: perfect, detection_threshold: 2",
+        [
+            'f.yaml:22:31: control.ideal_measurements: expected one of ideal, expected, sampled, got "perfect"',
+            "f.yaml:22:61: control.detection_threshold: expected a number of at most 1, got 2",
+        ],
+    ),
+    ("to_step: 20", "to_step: 4", ["f.yaml:23:45: ospa.to_step: expected a step from from_step, 5, on, got 4"]),
+    ("to_step: 20", "to_step: 30", ["f.yaml:23:45: ospa.to_step: expected a step up to the last, 20, got 30"]),
+    (
+        "cutoff: 50.0",
+        "cutoff: 0, order: 0.5",
+        [
+            "f.yaml:23:16: ospa.cutoff: expected a number above 0, got 0",
+            "f.yaml:23:26: ospa.order: expected a number of at least 1, got 0.5",
+        ],
+    ),
+]
+
+
+@pytest.mark.parametrize(("old", "new", "faults"), CASES, ids=[f"{old[:20]} -> {new[:40]}" for old, new, _ in CASES])
+def test_faults_are_named_with_their_places(old: str, new: str, faults: list[str]) -> None:
+    with pytest.raises(ScenarioError) as error:
+        parse_scenario(changed((old, new)), "f.yaml")
+    assert error.value.faults == faults

@@ -1,0 +1,70 @@
+"""The schema: every field described, kinds that cannot be confused with keys, and defaults that are the library's."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import Any
+
+import pytest
+from pydantic import BaseModel
+
+from vedette.control import PlanningSettings
+from vedette.filters import Limits
+from vedette.fusion import Clmb, CmDeltaGlmb
+from vedette.scenarios import json_schema
+from vedette.scenarios.build import build_fusion, build_limits, build_planning_settings
+from vedette.scenarios.diagnostics import kind_of, locate
+from vedette.scenarios.schema.base import Section
+from vedette.scenarios.schema.planning import Control
+from vedette.scenarios.schema.tracking import FilterLimits, Fusion
+
+
+def sections(base: type[BaseModel] = Section) -> list[type[BaseModel]]:
+    return [base, *(found for child in base.__subclasses__() for found in sections(child))]
+
+
+@pytest.mark.parametrize("section", sections()[1:], ids=lambda section: section.__name__)
+def test_every_field_says_what_it_is_and_in_which_unit(section: type[BaseModel]) -> None:
+    assert section.__doc__
+    for name, field in section.model_fields.items():
+        assert field.description, name
+        assert field.description.rstrip().endswith("]."), name
+
+
+def test_no_kind_is_also_a_key_of_its_section() -> None:
+    for section in sections():
+        assert kind_of(section) not in section.model_fields
+
+
+def test_locations_lose_the_kinds_of_unions() -> None:
+    assert locate(("sensors", 1, "noise", "constant", "std", 0))[0] == ("sensors", 1, "noise", "std", 0)
+    assert locate(("control", "reward", "unit_volume", "float"))[0] == ("control", "reward", "unit_volume")
+    assert locate(("motion", "custom", "arguments", "custom"))[0] == ("motion", "arguments", "custom")
+
+
+def test_json_schema_describes_fields_and_forbids_others() -> None:
+    schema = json_schema()
+    assert schema["additionalProperties"] is False
+    assert {"name", "time", "region", "birth", "targets", "sensors"} == set(schema["required"])
+    assert "sensor_defaults" in schema["properties"]
+    for section in schema["$defs"].values():
+        for name, field in section.get("properties", {}).items():
+            assert "description" in field, name
+
+
+def test_default_limits_are_those_of_the_library() -> None:
+    assert build_limits(FilterLimits()) == Limits()
+
+
+def test_default_planning_settings_are_those_of_the_library() -> None:
+    assert build_planning_settings(Control()) == PlanningSettings()
+
+
+@pytest.mark.parametrize(("kind", "library"), [("cm_delta_glmb", CmDeltaGlmb), ("clmb", Clmb)])
+def test_default_fusions_are_those_of_the_library(kind: Any, library: Any) -> None:
+    built, expected = build_fusion(Fusion(kind=kind), 2), library((0.5, 0.5))
+    assert type(built) is library
+    for field in dataclasses.fields(library):
+        got, wanted = getattr(built, field.name), getattr(expected, field.name)
+        assert got == wanted or math.isclose(got, wanted), field.name
