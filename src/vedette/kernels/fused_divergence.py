@@ -21,12 +21,12 @@ _LOG_2 = math.log(2.0)
 
 
 class Cases(NamedTuple):
-    """Beliefs of all sensors in all their cases on common label sets (LMB: a set is one label); w: the sensor's
-    weight.
+    """Beliefs of all sensors in all their cases on common label sets (LMB: a set is one label).
 
-    set_offsets: (num_sets + 1,) into members, which are (label set, label). log_present: (num_cases, num_sets) w
-    times the log weight of the set (LMB: of existence). log_absent: (num_cases, num_sets) w times the log probability
-    of absence, LMB only. held: (num_cases, num_sets) false where the case lacks the set and a floor stands in.
+    Below, w is the positive fusion weight of the case's sensor. set_offsets: (num_sets + 1,) into members, which are
+    (label set, label). log_present: (num_cases, num_sets) w times the log weight of the set (LMB: of existence).
+    log_absent: (num_cases, num_sets) w times the log probability of absence, LMB only. held: (num_cases, num_sets)
+    false where the case lacks the set and a floor stands in.
     rows: (num_cases, num_members, row_size) of p^w; zeros where the case does not know the label.
     """
 
@@ -99,10 +99,9 @@ def _weight(cases: Cases, chosen: Ints, at: int) -> tuple[float, bool]:
 def fused_glmb_divergence(
     cases: Cases, chosen: Ints, prediction: Prediction, dim: int, log_unit_volume: float, work: Floats
 ) -> float:
-    """Cauchy-Schwarz divergence of the CM-delta-GLMB fusion of the `chosen` cases (S,) from the prediction (eqs. 6,
-    11).
+    """Cauchy-Schwarz divergence from the prediction of the CM-delta-GLMB fusion of the `chosen` cases (eqs. 8, 11).
 
-    work: (2, row_size). NaN where a fused precision is not positive definite.
+    chosen: (S,) one case of each sensor. work: (2, row_size). NaN where a fused precision is not positive definite.
     """
     cross, own = -math.inf, -math.inf
     for at in range(cases.set_offsets.shape[0] - 1):
@@ -123,9 +122,9 @@ def fused_glmb_divergence(
 def fused_lmb_divergence(
     cases: Cases, chosen: Ints, prediction: Prediction, dim: int, log_unit_volume: float, work: Floats
 ) -> float:
-    """Cauchy-Schwarz divergence of the CLMB fusion of the `chosen` cases (S,) from the prediction (eqs. 8, 12).
+    """Cauchy-Schwarz divergence from the prediction of the CLMB fusion of the `chosen` cases (eqs. 8, 12).
 
-    work: (2, row_size). NaN where a fused precision is not positive definite.
+    chosen: (S,) one case of each sensor. work: (2, row_size). NaN where a fused precision is not positive definite.
     """
     total = 0.5 * prediction.log_self - prediction.log_rest
     for at in range(cases.set_offsets.shape[0] - 1):
