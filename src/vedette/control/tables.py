@@ -210,11 +210,12 @@ def joint_rewards(
     num_actions = np.array([len(own.log_weights) // num_samples for own in posteriors], np.int64)
     first_cases = np.concatenate([np.zeros(1, np.int64), np.cumsum(num_actions * num_samples)[:-1]]).astype(np.int64)
     rewards = np.empty((int(np.prod(num_actions)), num_samples))
+    actions = np.ascontiguousarray(np.indices(num_actions).reshape(len(num_actions), -1).T)
     dim, log_volume = int(prediction.tracks.state_dim), math.log(unit_volume)
 
     def work(first: int, last: int) -> None:
         reward_table(
-            cases, first_cases, num_actions, num_samples, target, dim, log_volume, is_lmb, first, last, rewards
+            cases, first_cases, actions, num_samples, target, dim, log_volume, is_lmb, first, last, rewards
         )  # fmt: skip
 
     run_chunks(work, len(rewards), num_threads)

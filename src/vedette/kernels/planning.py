@@ -217,21 +217,20 @@ def fill_missing(
 
 @kernel
 def reward_table(
-    cases: Cases, first_cases: Ints, num_actions: Ints, num_samples: int, prediction: Prediction, dim: int,
+    cases: Cases, first_cases: Ints, actions: Ints, num_samples: int, prediction: Prediction, dim: int,
     log_unit_volume: float, is_lmb: bool, first: int, last: int, rewards: Floats,
 ) -> None:
-    """Rewards (num_joint, num_samples) of joint actions `first:last`, numbered with the last sensor's action fastest."""
-    num_sensors = len(num_actions)
-    chosen, actions = np.empty(num_sensors, np.int64), np.empty(num_sensors, np.int64)
+    """Rewards (num_joint, num_samples) of joint actions `first:last`.
+
+    actions: (num_joint, num_sensors) one action of each sensor. first_cases: (num_sensors,) its first case.
+    """
+    num_sensors = actions.shape[1]
+    chosen = np.empty(num_sensors, np.int64)
     work = np.empty((2, cases.rows.shape[2]))
     for joint in range(first, last):
-        rest = joint
-        for s in range(num_sensors - 1, -1, -1):
-            actions[s] = rest % num_actions[s]
-            rest //= num_actions[s]
         for sample in range(num_samples):
             for s in range(num_sensors):
-                chosen[s] = first_cases[s] + actions[s] * num_samples + sample
+                chosen[s] = first_cases[s] + actions[joint, s] * num_samples + sample
             if is_lmb:
                 rewards[joint, sample] = fused_lmb_divergence(cases, chosen, prediction, dim, log_unit_volume, work)
             else:
