@@ -6,6 +6,7 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
+from vedette.control.inputs import Belief
 from vedette.densities import GLMB, LMB, TrackTable, marginalise, track_moments
 from vedette.filters import LocalFilter
 from vedette.filters.inputs import model_errors
@@ -16,27 +17,32 @@ from vedette.kernels.planning import predict_tracks
 from vedette.kernels.types import Ints
 from vedette.models import constant_survival, kernel_motion
 
-LabelSet: TypeAlias = tuple[tuple[int, int], ...]
+Label: TypeAlias = tuple[int, int]
+LabelSet: TypeAlias = tuple[Label, ...]
 
 
 def heaviest_hypotheses(belief: GLMB, most: int) -> GLMB:
     """The `most` heaviest hypotheses of positive weight, normalised; of equal weights the first."""
     order = np.argsort(-belief.hyp_log_weights, kind="stable")[:most]
-    return _take_hypotheses(belief, order[belief.hyp_log_weights[order] > -np.inf])
+    taken = take_hypotheses(belief, order[belief.hyp_log_weights[order] > -np.inf])
+    log_weights = taken.hyp_log_weights - log_sum(taken.hyp_log_weights)
+    return GLMB(taken.tracks, taken.hyp_offsets, taken.hyp_tracks, log_weights)
 
 
-def _take_hypotheses(belief: GLMB, places: Ints) -> GLMB:
+def take_hypotheses(belief: GLMB, places: Ints) -> GLMB:
+    """The hypotheses at `places`, in that order, with their tracks only; their weights are not normalised."""
     sizes = np.diff(belief.hyp_offsets)[places]
-    offsets = np.concatenate([np.zeros(1, np.int64), np.cumsum(sizes)])
+    offsets = offsets_of(sizes)
     entries = np.repeat(belief.hyp_offsets[places] - offsets[:-1], sizes) + np.arange(offsets[-1])
     used, renumbered = np.unique(belief.hyp_tracks[entries], return_inverse=True)
-    log_weights = belief.hyp_log_weights[places]
     return GLMB(
-        take_tracks(belief.tracks, used),
-        offsets,
-        np.asarray(renumbered, np.int64),
-        log_weights - log_sum(log_weights) if len(places) else log_weights,
+        take_tracks(belief.tracks, used), offsets, np.asarray(renumbered, np.int64), belief.hyp_log_weights[places]
     )
+
+
+def offsets_of(sizes: list[int] | Ints) -> Ints:
+    """(len(sizes) + 1,) offsets of runs of these sizes."""
+    return np.concatenate([np.zeros(1, np.int64), np.cumsum(sizes, dtype=np.int64)])
 
 
 class LabelSets(NamedTuple):
@@ -57,22 +63,12 @@ def label_sets(belief: GLMB) -> LabelSets:
     return LabelSets(sets, groups)
 
 
-def restrict(belief: GLMB | LMB, sets: frozenset[LabelSet]) -> GLMB | LMB:
-    """The belief on the given label sets only, not renormalised; of an LMB, on the labels that are in them."""
-    if isinstance(belief, GLMB):
-        found = label_sets(belief)
-        return _unnormalised(belief, np.array([h for h, g in enumerate(found.groups) if found.sets[g] in sets], np.int64))
-    labels = [(step, site) for step, site in belief.tracks.labels.tolist()]
-    places = np.array([i for i, label in enumerate(labels) if (label,) in sets], np.int64)
-    return LMB(take_tracks(belief.tracks, places), belief.existence_logit[places])
+def single_labels(belief: LMB) -> tuple[LabelSet, ...]:
+    """Each label of an LMB as a set of its own."""
+    return tuple(((step, site),) for step, site in belief.tracks.labels.tolist())
 
 
-def _unnormalised(belief: GLMB, places: Ints) -> GLMB:
-    taken = _take_hypotheses(belief, places)
-    return GLMB(taken.tracks, taken.hyp_offsets, taken.hyp_tracks, belief.hyp_log_weights[places])
-
-
-def predicted(fused: GLMB | LMB, local: LocalFilter, num_steps: int, period: float) -> GLMB | LMB:
+def predicted(fused: Belief, local: LocalFilter, num_steps: int, period: float) -> Belief:
     """The fused density at the end of the horizon, without birth or death (paper, "pseudo-prediction").
 
     Tracks are first collapsed to one Gaussian each (a GLMB is marginalised), as those of the pseudo-updates are.
