@@ -16,7 +16,7 @@ inner = st.floats(1e-6, 1.0 - 1e-6)
 counts = st.integers(1, 10**6)
 # Among them words that YAML could take for something else.
 words = st.sampled_from(
-    ["no", "yes", "1e3", "~", "null", "true", "0x1F", "- a", "a: b", "#c", "2016-01-12", "1_0", " é", "'q'"]
+    ["no", "yes", "1e3", "~", "null", "true", "0x1F", "- a", "a: b", "#c", "2016-01-12", ":0", "1_0", " é", "'q'"]
 )
 names = words | st.text(st.characters(categories=["L", "N", "P", "S"]), min_size=1, max_size=12)
 references = st.sampled_from(["json:loads", "os.path:join", "collections:abc.Mapping"])

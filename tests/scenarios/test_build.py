@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -41,7 +42,7 @@ def test_births_are_in_the_librarys_state_order() -> None:
     birth = build.build_birth(model.birth, model.motion)
     np.testing.assert_array_equal(birth.means, [[1, 3, 2, 4]])
     np.testing.assert_array_equal(birth.covs, [np.diag([25.0, 49.0, 36.0, 64.0])])
-    assert birth.steps == {1, 5}
+    assert birth.steps == frozenset({1, 5})
 
 
 def test_a_covariance_of_births_is_reordered_both_ways() -> None:
@@ -134,7 +135,8 @@ def test_models_of_the_users_own_from_a_file_beside_the_scenario() -> None:
     assert north.survival.prob([[0.0, 0.0, 0.0]], 1.0) == 0.75
     assert (north.sensor.clutter.rate, south.sensor.clutter.rate) == (3.0, 25.0)
     np.testing.assert_allclose(north.sensor.noise.covs([0.0, 0.0, 0.0], [0.0, 0.0, 0.0], 1), [[[4.0]]])
-    belief, _ = north.step(north.initial(), [[5.0]], [0.0, 0.0, 0.0], 1.0, 1, rng=np.random.default_rng(0))
+    step: Any = north.step
+    belief, _ = step(north.initial(), [[5.0]], [0.0, 0.0, 0.0], 1.0, 1, rng=np.random.default_rng(0))
     assert belief.tracks.means.shape[1] == 3
 
 
@@ -207,39 +209,36 @@ def test_an_unknown_planner() -> None:
         build.build_planner(loaded.model, build.build_filters(loaded), "greedy")
 
 
-@pytest.mark.parametrize("name", list_builtin())
-def test_built_in_scenarios_run(name: str) -> None:
-    loaded, rng = load_scenario(name), np.random.default_rng(1)
-    model, filters, poses = loaded.model, build.build_filters(loaded), build.build_poses(loaded.model)
+def tracked(loaded: Scenario, num_steps: int, rng: np.random.Generator) -> tuple[Any, Any, Any, Any]:
+    """Filters, their beliefs after some scans with the sensors at rest, the fused belief, and the truth."""
+    model, poses = loaded.model, build.build_poses(loaded.model)
+    filters: Any = build.build_filters(loaded)
     source = build.build_truth_source(model, filters[0].motion, loaded.folder)
     truth = source.truth(build.build_times(model.time), rng=rng)
-    fusion, estimate = build.build_fusion(model.fusion, len(filters)), build.build_estimator(model.estimator)
+    fusion: Any = build.build_fusion(model.fusion, len(filters))
     beliefs = [local.initial() for local in filters]
-    for step in range(1, 13):
+    for step in range(1, num_steps + 1):
         for i, local in enumerate(filters):
             scan = simulate_scan(truth.at(step - 1)[1], poses[i], local.sensor, rng=rng).measurements
             beliefs[i], _ = local.step(beliefs[i], scan, poses[i], model.time.step_period, step, rng=rng)
-    fused = beliefs[0] if fusion is None else fusion.fuse(beliefs)[0]
-    assert abs(len(estimate(fused).labels) - len(truth.at(11)[0])) <= 1
+    return filters, beliefs, beliefs[0] if fusion is None else fusion.fuse(beliefs)[0], truth
+
+
+@pytest.mark.parametrize("name", list_builtin())
+def test_built_in_scenarios_run(name: str) -> None:
+    loaded, rng = load_scenario(name), np.random.default_rng(1)
+    filters, beliefs, fused, truth = tracked(loaded, 12, rng)
+    estimate = build.build_estimator(loaded.model.estimator)(fused)
+    assert abs(len(estimate.labels) - len(truth.at(11)[0])) <= 1
     for planner in ("random", "fixed"):
-        plan = build.build_planner(model, filters, planner).plan(beliefs, fused, poses, rng=rng)
-        assert plan.num_sensors == len(filters)
+        plan = build.build_planner(loaded.model, filters, planner)
+        assert plan.plan(beliefs, fused, build.build_poses(loaded.model), rng=rng).num_sensors == len(filters)
 
 
 def test_decisions_of_the_papers_scenario_are_the_printed_ones() -> None:
     loaded, rng = load_scenario("paper-e"), np.random.default_rng(3)
-    filters, poses = build.build_filters(loaded), build.build_poses(loaded.model)
-    truth = build.build_truth_source(loaded.model, filters[0].motion, loaded.folder).truth(
-        np.arange(1.0, 11.0), rng=rng
-    )
-    beliefs = [local.initial() for local in filters]
-    for step in range(1, 11):
-        for i, local in enumerate(filters):
-            scan = simulate_scan(truth.at(step - 1)[1], poses[i], local.sensor, rng=rng).measurements
-            beliefs[i], _ = local.step(beliefs[i], scan, poses[i], 1.0, step, rng=rng)
-    fusion = build.build_fusion(loaded.model.fusion, 2)
-    assert fusion is not None
-    fused, _ = fusion.fuse(beliefs)
+    filters, beliefs, fused, _ = tracked(loaded, 10, rng)
     for planner in ("jdm", "idm"):
-        plan = build.build_planner(loaded.model, filters, planner).plan(beliefs, fused, poses, rng=rng)
+        built = build.build_planner(loaded.model, filters, planner)
+        plan = built.plan(beliefs, fused, build.build_poses(loaded.model), rng=rng)
         np.testing.assert_allclose(np.degrees(plan.chosen_headings), [-30.0, 30.0])

@@ -14,7 +14,7 @@ from vedette.scenarios.dumping import dump_scenario
 from vedette.scenarios.schema import ScenarioModel
 
 
-@settings(max_examples=100)
+@settings(max_examples=60)
 @given(scenarios())
 def test_valid_scenarios_round_trip(data: dict[str, Any]) -> None:
     model = ScenarioModel.model_validate(data)

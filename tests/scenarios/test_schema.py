@@ -64,6 +64,7 @@ def test_default_planning_settings_are_those_of_the_library() -> None:
 @pytest.mark.parametrize(("kind", "library"), [("cm_delta_glmb", CmDeltaGlmb), ("clmb", Clmb)])
 def test_default_fusions_are_those_of_the_library(kind: Any, library: Any) -> None:
     built, expected = build_fusion(Fusion(kind=kind), 2), library((0.5, 0.5))
+    assert isinstance(built, CmDeltaGlmb | Clmb)
     assert type(built) is library
     for field in dataclasses.fields(library):
         got, wanted = getattr(built, field.name), getattr(expected, field.name)

@@ -115,7 +115,7 @@ def _sensing(scenario: Scenario) -> Table:
 def _targets(scenario: Scenario) -> Table:
     import numpy as np
 
-    truth = _truth(scenario)
+    truth = truth_of(scenario)
     table = _numbers_table("targets", "id", "from\n(s)", "to\n(s)", "x\n(m)", "y\n(m)", "vx\n(m/s)", "vy\n(m/s)")
     scans = np.repeat(np.arange(truth.num_scans), np.diff(truth.offsets))
     for target in np.unique(truth.ids):
@@ -127,7 +127,7 @@ def _targets(scenario: Scenario) -> Table:
     return table
 
 
-def _truth(scenario: Scenario) -> Truth:
+def truth_of(scenario: Scenario) -> Truth:
     """The targets as one run has them; with process noise every run has others."""
     import numpy as np
 
@@ -144,6 +144,6 @@ def _draw(scenario: Scenario, out: Path) -> None:
     from vedette.evaluation.figures import save_figure
 
     name = out.suffix[1:].lower()
-    written = save_figure(scenario_figure(scenario, _truth(scenario)), out.with_suffix(""), formats=(name,))[0]
+    written = save_figure(scenario_figure(scenario, truth_of(scenario)), out.with_suffix(""), formats=(name,))[0]
     if written != out:
         written.replace(out)

@@ -3,20 +3,25 @@
 from __future__ import annotations
 
 import io
+import re
 from typing import Any
 
 from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
+from ruamel.yaml.scalarstring import DoubleQuotedScalarString
 
 from vedette.scenarios.schema import ScenarioModel
+from vedette.scenarios.yaml_reader import plain_scalar
 
 _LONGEST_LINE = 100
+# What stays without quotes: words of letters, digits, dots and dashes that YAML 1.2 takes for nothing else.
+_PLAIN = re.compile(r"[A-Za-z][\w.-]*( [A-Za-z0-9][\w.-]*)*")
 
 
 def dump_scenario(model: ScenarioModel) -> str:
     """YAML text of a scenario with every default written out; it reads back as the same scenario."""
     yaml = YAML(typ="rt", pure=True)
-    yaml.width = 120
+    yaml.width = 10_000
     yaml.indent(mapping=2, sequence=4, offset=2)
     out = io.StringIO()
     yaml.dump(_laid_out(model.model_dump(mode="json")), out)
@@ -25,8 +30,10 @@ def dump_scenario(model: ScenarioModel) -> str:
 
 def _laid_out(value: Any) -> Any:
     """The data with small collections on one line."""
+    if isinstance(value, str):
+        return value if _PLAIN.fullmatch(value) and plain_scalar(value) == value else DoubleQuotedScalarString(value)
     if isinstance(value, dict):
-        mapping = CommentedMap((key, _laid_out(item)) for key, item in value.items())
+        mapping = CommentedMap((_laid_out(key), _laid_out(item)) for key, item in value.items())
         if value and len(repr(value)) <= _LONGEST_LINE and not any(isinstance(v, dict | list) for v in value.values()):
             mapping.fa.set_flow_style()
         return mapping

@@ -8,7 +8,7 @@ from pydantic import Field
 
 from vedette.scenarios.schema.base import Probability, Section, Whole
 
-Count = Annotated[Whole, Field(ge=1)]
+Count = Annotated[Whole, Field(ge=1, le=1_000_000_000)]
 
 
 class RankedAssignment(Section):

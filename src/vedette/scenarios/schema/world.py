@@ -23,7 +23,7 @@ Step = Annotated[Whole, Field(ge=1)]
 class Time(Section):
     """The scans: step k of 1 .. num_steps is at start + (k - 1) * step_period."""
 
-    num_steps: Annotated[Whole, Field(ge=1, description="Number of scans [-].")]
+    num_steps: Annotated[Whole, Field(ge=1, le=1_000_000, description="Number of scans [-].")]
     step_period: float = Field(default=1.0, gt=0.0, description="Time between scans [s].")
     start: float = Field(default=1.0, description="Time of the first scan [s].")
 
@@ -78,7 +78,7 @@ class CustomMotion(Custom):
     """A user's `MotionModel`."""
 
     kind: Literal["custom"] = Field(default="custom", description="Kind of motion [-].")
-    state_dim: Annotated[Whole, Field(ge=2, description="Number of components of its state [-].")]
+    state_dim: Annotated[Whole, Field(ge=2, le=100, description="Number of components of its state [-].")]
 
 
 Motion = Annotated[ConstantVelocity | CoordinatedTurn | CustomMotion, Field(discriminator="kind")]

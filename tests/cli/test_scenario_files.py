@@ -1,0 +1,144 @@
+"""The commands about scenario files, as a person would give them."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner, Result
+
+from scenarios.minimal import MINIMAL
+from vedette import __version__
+from vedette.cli import app
+from vedette.scenarios import json_schema, list_builtin, load_scenario
+
+
+def vedette(*words: str) -> Result:
+    return CliRunner().invoke(app, list(words), env={"COLUMNS": "80"})
+
+
+def test_version() -> None:
+    result = vedette("--version")
+    assert (result.exit_code, result.stdout) == (0, f"vedette {__version__}\n")
+
+
+def test_help_names_every_command() -> None:
+    result = vedette("--help")
+    assert result.exit_code == 0
+    for command in ("list", "init", "check", "show", "schema"):
+        assert f"  {command} " in result.stdout
+
+
+def test_help_imports_nothing_heavy() -> None:
+    code = (
+        "import sys; from vedette.cli import app\n"
+        "try: app(['--help'])\n"
+        "except SystemExit: pass\n"
+        "heavy = {'numpy', 'numba', 'scipy', 'pydantic', 'matplotlib', 'ruamel.yaml'} & set(sys.modules)\n"
+        "sys.exit(', '.join(heavy) or 0)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_check_imports_no_compiler() -> None:
+    code = (
+        "import sys; from vedette.cli import app\n"
+        "try: app(['check', 'paper-a'])\n"
+        "except SystemExit: pass\n"
+        "sys.exit(', '.join({'numba', 'matplotlib'} & set(sys.modules)) or 0)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_list_names_every_scenario() -> None:
+    result = vedette("list")
+    assert result.exit_code == 0
+    assert [line.split()[0] for line in result.stdout.splitlines() if not line.startswith(" ")] == list(list_builtin())
+
+
+@pytest.mark.parametrize("name", list_builtin())
+def test_init_writes_a_commented_file_that_passes_check(name: str, tmp_path: Path) -> None:
+    file = tmp_path / "new" / "mine.yaml"
+    result = vedette("init", str(file), "--from", name)
+    assert (result.exit_code, result.stderr) == (0, "")
+    text = file.read_text(encoding="utf-8")
+    assert text.startswith("# yaml-language-server: $schema=vedette.schema.json\n")
+    assert text.count("#") > 8
+    assert json.loads((file.parent / "vedette.schema.json").read_text(encoding="utf-8")) == json_schema()
+    checked = vedette("check", str(file))
+    assert checked.exit_code == 0
+    assert checked.stdout.startswith(f"{file}: ok: {name}, ")
+    assert checked.stdout.count("\n") == 1
+
+
+def test_init_starts_from_paper_a_in_a_folder(tmp_path: Path) -> None:
+    assert vedette("init", str(tmp_path)).exit_code == 0
+    assert load_scenario(tmp_path / "scenario.yaml").model == load_scenario("paper-a").model
+
+
+def test_init_brings_recorded_data_and_its_licence_along(tmp_path: Path) -> None:
+    assert vedette("init", str(tmp_path), "--from", "solent").exit_code == 0
+    scenario = load_scenario(tmp_path / "scenario.yaml")
+    assert scenario.model.targets.model_dump()["path"] == "solent.csv"
+    assert "MIT License" in (tmp_path / "solent.csv.README.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("taken", ["scenario.yaml", "solent.csv"])
+def test_init_never_overwrites_without_force(taken: str, tmp_path: Path) -> None:
+    (tmp_path / taken).write_text("mine", encoding="utf-8")
+    result = vedette("init", str(tmp_path), "--from", "solent")
+    assert (result.exit_code, result.stdout) == (1, "")
+    assert result.stderr == f"{tmp_path / taken}: already there; --force overwrites\n"
+    assert (tmp_path / taken).read_text(encoding="utf-8") == "mine"
+    assert [file.name for file in tmp_path.iterdir()] == [taken]
+    assert vedette("init", str(tmp_path), "--from", "solent", "--force").exit_code == 0
+    assert load_scenario(tmp_path / "scenario.yaml").name == "solent"
+
+
+def test_init_from_what_is_not_there_is_wrong_use(tmp_path: Path) -> None:
+    result = vedette("init", str(tmp_path / "a.yaml"), "--from", "paper-z")
+    assert result.exit_code == 2
+    assert "expected one of linear-10, paper-a, paper-e, solent; got paper-z" in result.stderr.replace("\n", " ")
+
+
+def test_check_tells_all_faults_of_all_files(tmp_path: Path) -> None:
+    good, bad, absent = (tmp_path / name for name in ("good.yaml", "bad.yaml", "absent.yaml"))
+    good.write_text(MINIMAL, encoding="utf-8")
+    broken = MINIMAL.replace("num_steps: 20", "num_steps: x").replace("cutoff: 50.0", "cutof: 50.0")
+    bad.write_text(broken, encoding="utf-8")
+    result = vedette("check", str(bad), str(good), str(absent))
+    assert (result.exit_code, result.stderr) == (1, "")
+    first, second, third, fourth = result.stdout.splitlines()
+    assert first == f'{bad}:2:19: time.num_steps: expected a whole number, got "x"'
+    assert second.startswith(f"{bad}:23:8: ospa.cutof: expected one of")
+    assert third == (
+        f"{good}: ok: small, 20 scans, 1 target, 2 sensors, m_delta_glmb filter, cm_delta_glmb fusion, 2 decisions"
+    )
+    assert fourth.startswith("scenario: expected a YAML file")
+
+
+def test_check_without_files_is_wrong_use() -> None:
+    assert vedette("check").exit_code == 2
+
+
+def test_an_unknown_command_is_wrong_use() -> None:
+    assert vedette("chekc").exit_code == 2
+
+
+def test_schema_goes_to_the_screen_or_to_a_file(tmp_path: Path) -> None:
+    shown = vedette("schema")
+    assert json.loads(shown.stdout) == json_schema()
+    assert vedette("schema", "--out", str(tmp_path / "deep" / "s.json")).exit_code == 0
+    assert (tmp_path / "deep" / "s.json").read_text(encoding="utf-8") == shown.stdout
+
+
+def test_a_place_that_cannot_be_written(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("", encoding="utf-8")
+    result = vedette("schema", "--out", str(tmp_path / "file" / "s.json"))
+    assert result.exit_code == 1
+    assert result.stderr.startswith(f"{tmp_path / 'file' / 's.json'}: expected a place to write; got ")

@@ -1,0 +1,101 @@
+"""`vedette show`: tables that fit the terminal, a picture with everything in it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import matplotlib.image
+import numpy as np
+import pytest
+from typer.testing import CliRunner, Result
+
+from scenarios.minimal import changed
+from vedette.cli import app
+from vedette.cli.picture import scenario_figure
+from vedette.cli.show import truth_of
+from vedette.scenarios import list_builtin, load_scenario, parse_scenario
+
+
+def show(*words: str, columns: int = 80) -> Result:
+    return CliRunner().invoke(app, ["show", *words], env={"COLUMNS": str(columns)})
+
+
+@pytest.mark.parametrize("name", list_builtin())
+@pytest.mark.parametrize("columns", [60, 100])
+def test_the_tables_fit_the_terminal(name: str, columns: int) -> None:
+    result = show(name, columns=columns)
+    assert (result.exit_code, result.stderr) == (0, "")
+    assert max(len(line) for line in result.stdout.splitlines()) <= columns
+    assert "\u2026" not in result.stdout
+    assert result.stdout.startswith(name)
+
+
+def test_the_tables_have_the_numbers() -> None:
+    text = show("paper-a").stdout
+    for line in (
+        "scans 40, every 1 s from 1 to 40 s",
+        "sensor 1 -745 830 0 50 first decision",
+        "clutter region, rate 25",
+        "2 1 40 -180 -205 -5.5 -19.0",
+    ):
+        assert line in [" ".join(row.split()) for row in text.splitlines()]
+
+
+def test_sensors_that_differ_are_each_described(tmp_path: Path) -> None:
+    file = tmp_path / "two.yaml"
+    file.write_text(
+        changed(("speed: 4.0", "measurement: {kind: range_only}, noise: {kind: range_dependent}")), encoding="utf-8"
+    )
+    text = show(str(file)).stdout
+    assert "north: measures" in text
+    assert "south: measures" in text
+
+
+def test_resolved_prints_yaml_that_reads_back() -> None:
+    result = show("paper-e", "--resolved")
+    assert parse_scenario(result.stdout) == load_scenario("paper-e").model
+
+
+@pytest.mark.parametrize("ending", ["png", "pdf", "svg"])
+def test_a_picture_is_written_where_it_is_wanted(ending: str, tmp_path: Path) -> None:
+    out = tmp_path / "deep" / f"picture.{ending}"
+    result = show("linear-10", "--out", str(out))
+    assert result.exit_code == 0
+    assert result.stdout.endswith(f"wrote {out}\n")
+    assert [file.name for file in out.parent.iterdir()] == [out.name]
+    if ending == "png":
+        assert matplotlib.image.imread(out).std() > 0.05
+
+
+def test_a_picture_of_another_format_is_wrong_use(tmp_path: Path) -> None:
+    result = show("paper-a", "--out", str(tmp_path / "picture.gif"))
+    assert (result.exit_code, result.stdout) == (2, "")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("name", list_builtin())
+def test_the_picture_has_every_track_sensor_and_site(name: str) -> None:
+    scenario = load_scenario(name)
+    truth = truth_of(scenario)
+    (axes,) = scenario_figure(scenario, truth).axes
+    markers = [line.get_marker() for line in axes.lines]
+    num_targets = len(np.unique(truth.ids))
+    assert (markers.count("o"), markers.count("^")) == (num_targets, num_targets)
+    assert markers.count("s") == len(scenario.model.sensors)
+    assert markers.count("+") == len(scenario.model.birth.sites)
+    unit = "km" if name == "solent" else "m"
+    assert (axes.get_xlabel(), axes.get_ylabel()) == (f"x ({unit})", f"y ({unit})")
+
+
+def test_an_unknown_scenario_is_told_without_a_traceback() -> None:
+    result = show("paper-b")
+    assert (result.exit_code, result.stdout) == (1, "")
+    assert result.stderr.startswith("scenario: expected a YAML file or one of linear-10")
+
+
+def test_a_faulty_scenario_is_told_without_a_traceback(tmp_path: Path) -> None:
+    file = tmp_path / "bad.yaml"
+    file.write_text(changed(("sigma_v: 1.0", "sigma_v: quick")), encoding="utf-8")
+    result = show(str(file))
+    assert (result.exit_code, result.stdout) == (1, "")
+    assert result.stderr == f'{file}:4:44: motion.sigma_v: expected a number, got "quick"\n'
