@@ -8,6 +8,7 @@ import typer
 
 from vedette import __version__
 from vedette.cli.errors import Commands
+from vedette.cli.running import reproduce, run
 from vedette.cli.scenario_files import check, init, list_, schema
 from vedette.cli.show import show
 
@@ -41,3 +42,5 @@ app.command()(init)
 app.command()(check)
 app.command()(show)
 app.command()(schema)
+app.command()(run)
+app.command()(reproduce)

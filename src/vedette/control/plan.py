@@ -16,8 +16,9 @@ class RewardTable:
 
     Attributes:
         sensors: the sensors whose actions are the axes of the table, in axis order.
-        mean: (num_actions of sensors[0], ...) mean reward over the samples; one axis a sensor.
-        standard_error: same shape; standard error of that mean.
+        mean: (num_actions of sensors[0], ...) mean reward over the samples; one axis a sensor. NaN where a search did
+            not evaluate the action.
+        standard_error: same shape; standard error of that mean, 0 with a single sample; NaN where the mean is.
     """
 
     sensors: tuple[int, ...]
@@ -25,18 +26,18 @@ class RewardTable:
     standard_error: Floats
 
     def validate(self) -> None:
-        """Raise `InputError` unless there is one axis a sensor and every entry is finite, with errors not negative."""
+        """Raise `InputError` unless there is one axis a sensor, and every entry is a reward with its error or a gap."""
         if self.mean.ndim != len(self.sensors) or self.mean.shape != self.standard_error.shape:
             raise InputError(
                 f"reward table: expected one axis for each of the sensors {self.sensors}; got a mean of shape "
                 f"{self.mean.shape} and a standard error of shape {self.standard_error.shape}"
             )
-        if (
-            not np.isfinite(self.mean).all()
-            or not (np.isfinite(self.standard_error) & (self.standard_error >= 0)).all()
-        ):
+        evaluated = np.isfinite(self.mean) & np.isfinite(self.standard_error) & (self.standard_error >= 0.0)
+        gap = np.isnan(self.mean) & np.isnan(self.standard_error)
+        if not (evaluated | gap).all() or not evaluated.any():
             raise InputError(
-                f"reward table of sensors {self.sensors}: expected finite rewards, and errors of 0 or more"
+                f"reward table of sensors {self.sensors}: expected finite rewards with errors of 0 or more, "
+                "NaN in both where nothing was evaluated, and at least one that was"
             )
 
 
@@ -48,7 +49,8 @@ class Plan:
         planner: name of the planner.
         action_values: for each sensor, (num_actions,) the heading in radians of each action, in printed order.
         chosen: for each sensor, the index of its chosen action in `action_values`.
-        tables: independent decisions: one 1-D table a sensor; joint decisions: one table with one axis a sensor;
+        tables: independent decisions: one 1-D table a sensor; joint decisions: one table with one axis a sensor (where
+            that would be too large to hold, one 1-D table a sensor, the others at their chosen actions);
             random and fixed control: none.
         counts: how many of each thing was evaluated.
     """
@@ -68,8 +70,17 @@ class Plan:
         """(num_sensors,) chosen headings in radians."""
         return np.array([values[index] for values, index in zip(self.action_values, self.chosen, strict=True)])
 
+    @property
+    def expected_rewards(self) -> tuple[tuple[float, float], ...]:
+        """Mean reward of the choice and its standard error, one a table: one a sensor, or one for a joint decision."""
+        at = [tuple(self.chosen[sensor] for sensor in table.sensors) for table in self.tables]
+        return tuple(
+            (float(table.mean[index]), float(table.standard_error[index]))
+            for table, index in zip(self.tables, at, strict=True)
+        )
+
     def validate(self) -> None:
-        """Raise `InputError` unless choices are within the actions and the tables fit them."""
+        """Raise `InputError` unless choices are within the actions, and the tables fit them and hold the choice."""
         if len(self.chosen) != self.num_sensors:
             raise InputError(
                 f"plan.chosen: expected one index for each of {self.num_sensors} sensors; got {self.chosen}"
@@ -78,9 +89,15 @@ class Plan:
             if not 0 <= index < len(values):
                 raise InputError(f"plan.chosen[{sensor}]: expected an index of {len(values)} actions; got {index}")
         for table in self.tables:
-            table.validate()
-            if not all(0 <= sensor < self.num_sensors for sensor in table.sensors):
-                raise InputError(f"plan.tables: expected sensors below {self.num_sensors}; got {table.sensors}")
-            expected = tuple(len(self.action_values[sensor]) for sensor in table.sensors)
-            if table.mean.shape != expected:
-                raise InputError(f"plan.tables: expected shape {expected} for {table.sensors}; got {table.mean.shape}")
+            self._check_table(table)
+
+    def _check_table(self, table: RewardTable) -> None:
+        table.validate()
+        if not all(0 <= sensor < self.num_sensors for sensor in table.sensors):
+            raise InputError(f"plan.tables: expected sensors below {self.num_sensors}; got {table.sensors}")
+        expected = tuple(len(self.action_values[sensor]) for sensor in table.sensors)
+        if table.mean.shape != expected:
+            raise InputError(f"plan.tables: expected shape {expected} for {table.sensors}; got {table.mean.shape}")
+        choice = tuple(self.chosen[sensor] for sensor in table.sensors)
+        if np.isnan(table.mean[choice]):
+            raise InputError(f"plan.tables: expected a reward of the chosen actions {choice} of {table.sensors}; got none")

@@ -28,7 +28,7 @@ class Comparison:
         times: (num_scans,) s.
         decision_times: (num_decisions,) s, of all strategies together.
         ospa: (num_strategies, num_runs, num_scans, 3) total, localisation and cardinality parts, m.
-        since: scans after this time (s) count in the mean over time.
+        since, until: scans after `since` (s) and up to `until` (s) count in the mean over time.
         headings: for each strategy, for each run, the chosen headings of its decisions in whole degrees.
     """
 
@@ -38,6 +38,7 @@ class Comparison:
     decision_times: Floats
     ospa: Floats
     since: float
+    until: float
     headings: tuple[tuple[tuple[Headings, ...], ...], ...]
 
     @property
@@ -47,7 +48,7 @@ class Comparison:
     @property
     def counted(self) -> Bools:
         """(num_scans,) whether a scan counts in the mean over time."""
-        return np.asarray(self.times > self.since)
+        return np.asarray((self.times > self.since) & (self.times <= self.until))
 
     def run_means(self, strategy: str, part: str = "total") -> Floats:
         """(num_runs,) OSPA averaged over the counted scans of each run, m."""
@@ -77,13 +78,16 @@ class Comparison:
         return self.strategies.index(strategy)
 
 
-def compare(runs: Mapping[str, Sequence[RunRecord]], *, since: float | None = None) -> Comparison:
+def compare(
+    runs: Mapping[str, Sequence[RunRecord]], *, since: float | None = None, until: float = np.inf
+) -> Comparison:
     """Put the runs of several strategies side by side.
 
     Args:
         runs: for each strategy its runs; the n-th runs of all must be of the same scenario, seed and run number.
         since: only scans after this time (s) count in the mean over time; by default the time of the first decision,
             before which all strategies are alike, and every scan if none was made.
+        until: only scans up to this time (s) count.
 
     Raises `InputError` if there is no run, or the runs are not paired.
     """
@@ -98,8 +102,8 @@ def compare(runs: Mapping[str, Sequence[RunRecord]], *, since: float | None = No
     if since is None:
         since = float(decision_times[0]) if len(decision_times) else -np.inf
     times = reference[0].times
-    if not (times > since).any():
-        raise InputError(f"since: expected a time before the last scan at {times[-1]} s; got {since}")
+    if not ((times > since) & (times <= until)).any():
+        raise InputError(f"since, until: expected a scan of {times[0]} to {times[-1]} s between; got {since} to {until}")
     return Comparison(
         scenario=reference[0].scenario,
         strategies=strategies,
@@ -107,6 +111,7 @@ def compare(runs: Mapping[str, Sequence[RunRecord]], *, since: float | None = No
         decision_times=decision_times,
         ospa=np.array([[record.ospa for record in runs[name]] for name in strategies]),
         since=since,
+        until=until,
         headings=tuple(tuple(chosen_headings_deg(record) for record in runs[name]) for name in strategies),
     )
 

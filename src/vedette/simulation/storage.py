@@ -41,7 +41,7 @@ def save_run(
     Returns the folder. Raises `InputError` if it exists already, cannot be written, or the record contradicts itself.
     """
     target = Path(directory)
-    _check_free(target, overwrite)
+    check_free(target, overwrite)
     files = {name: text.encode() for name, text in encode_run(record).items()}
     if scenario_text is not None:
         files[SCENARIO] = scenario_text.encode()
@@ -127,7 +127,8 @@ def _read(path: Path) -> bytes:
         raise InputError(f"{path}: expected a file of a saved run; {error.strerror or error}") from error
 
 
-def _check_free(target: Path, overwrite: bool) -> None:
+def check_free(target: Path, overwrite: bool) -> None:
+    """`InputError` unless a run may be saved there: nothing is there, or a run that may be overwritten."""
     if not target.exists() or (target.is_dir() and not any(target.iterdir())):
         return
     if not overwrite:

@@ -1,0 +1,199 @@
+"""Commands that simulate: run, reproduce."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from vedette.cli.errors import usage_error
+
+if TYPE_CHECKING:
+    from vedette.evaluation import Comparison
+    from vedette.simulation.records import RunRecord
+
+INTERRUPTED = 130
+STRATEGY_NAMES = ("jdm", "idm", "random", "fixed", "still")
+
+
+def say_if_cold() -> None:
+    """The first start compiles for about a minute; say so before it happens."""
+    from vedette.kernels.compile import cache_directory, is_cold
+
+    if is_cold():
+        typer.echo(
+            f"Compiling the kernels: once on this machine, about a minute. They are kept in {cache_directory()}.", err=True
+        )
+
+
+@contextmanager
+def interruptible(advice: str) -> Iterator[None]:
+    """Ctrl-C ends with a line that says what is left behind, and the shell's usual status."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        typer.echo(f"\ninterrupted: {advice}", err=True)
+        raise typer.Exit(INTERRUPTED) from None
+
+
+def _check_planner(name: str, option: str) -> None:
+    if name not in STRATEGY_NAMES:
+        raise usage_error(f"expected one of {', '.join(STRATEGY_NAMES)}; got {name}", option)
+
+
+def run(
+    scenario: Annotated[str, typer.Argument(help="Name of a built-in scenario, or a scenario file.")],
+    planner: Annotated[
+        str, typer.Option("--planner", help="jdm (joint), idm (independent), random, fixed (first heading), still.")
+    ] = "jdm",
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed; with --run it fixes every random number.")] = 0,
+    run_number: Annotated[int, typer.Option("--run", min=0, help="Number of the run.")] = 0,
+    out: Annotated[
+        Path | None, typer.Option("--out", metavar="DIR", help="Folder for the results and figures; none: only print.")
+    ] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an earlier run in that folder.")] = False,
+    threads: Annotated[int, typer.Option("--threads", min=0, help="Threads a decision; 0: one a processor.")] = 0,
+) -> None:
+    """Run a scenario once: tracks, decisions with their rewards, errors, figures."""
+    _check_planner(planner, "--planner")
+    say_if_cold()
+    from vedette.evaluation.runs import run_scenario
+    from vedette.scenarios import load_scenario
+    from vedette.scenarios.dumping import dump_scenario
+
+    loaded = load_scenario(scenario)
+    if out is not None:
+        from vedette.simulation.storage import check_free
+
+        check_free(out, overwrite)
+    with interruptible("nothing was written"):
+        record = run_scenario(loaded, planner, seed=seed, run=run_number, num_threads=threads)
+        _print_run(record)
+        if out is not None:
+            from vedette.simulation.storage import save_run
+
+            save_run(record, out, scenario_text=dump_scenario(loaded.model), overwrite=overwrite)
+            _draw_run(record, out / "figures")
+            typer.echo(f"wrote {out}")
+
+
+def _print_run(record: RunRecord) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    console = Console(highlight=False)
+    console.print(f"{record.scenario}, {record.planner}, seed {record.seed}, run {record.run}: {record.num_scans} scans")
+    if record.decisions:
+        table = Table(box=None, pad_edge=False)
+        for heading in ("time", "headings", "expected reward"):
+            table.add_column(heading)
+        for decision in record.decisions:
+            plan = decision.plan
+            degrees = ", ".join(f"{round(float(h * 57.29577951308232))}°" for h in plan.chosen_headings)
+            rewards = ", ".join(f"{mean:.3f} ± {error:.3f}" for mean, error in plan.expected_rewards)
+            table.add_row(f"{decision.time:g} s", degrees, rewards)
+        console.print(table)
+    total, localisation, cardinality = record.ospa.mean(axis=0)
+    console.print(f"mean OSPA {total:.2f} m (localisation {localisation:.2f}, cardinality {cardinality:.2f})")
+    spent = ", ".join(f"{what} {seconds:.2f} s" for what, seconds in record.timings.items())
+    console.print(f"time spent: {spent}")
+
+
+def _draw_run(record: RunRecord, folder: Path) -> None:
+    from vedette.evaluation.figures import save_figure, tracks_figure
+    from vedette.evaluation.reproduction import draw_rewards
+
+    save_figure(tracks_figure(record), folder / "tracks")
+    draw_rewards(record, folder, "rewards")
+
+
+def reproduce(
+    scenario: Annotated[str, typer.Argument(help="Name of a built-in scenario, or a scenario file.")] = "paper-a",
+    planners: Annotated[
+        str, typer.Option("--planners", metavar="LIST", help="Strategies to compare; the first is the reference.")
+    ] = "jdm,idm,random",
+    runs: Annotated[int, typer.Option("--runs", min=1, help="Paired runs of each strategy.")] = 30,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of all runs.")] = 0,
+    workers: Annotated[int, typer.Option("--workers", min=0, help="Processes; 0: one a processor.")] = 0,
+    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for runs, tables and figures.")] = Path(
+        "reproduction"
+    ),
+) -> None:
+    """Compare strategies over paired runs, as the paper does: tables, figures 3 to 5, and every run in open formats."""
+    names = [name.strip() for name in planners.split(",")]
+    for name in names:
+        _check_planner(name, "--planners")
+    if len(set(names)) != len(names):
+        raise usage_error(f"expected each strategy once; got {planners}", "--planners")
+    say_if_cold()
+    from vedette.evaluation.reproduction import check_target, write_reproduction
+    from vedette.evaluation.runs import run_paired
+    from vedette.scenarios import load_scenario
+
+    loaded = load_scenario(scenario)
+    check_target(out)
+    with interruptible("nothing was written"):
+        with _progress(len(names) * runs) as progress:
+            records = run_paired(
+                loaded, names, runs, seed=seed, num_workers=workers or _processors(), progress=progress.advance
+            )
+        comparison = write_reproduction(loaded, records, seed, out)
+    _print_comparison(comparison)
+    typer.echo(f"wrote {out}")
+
+
+def _processors() -> int:
+    affinity = getattr(os, "sched_getaffinity", None)
+    return len(affinity(0)) if affinity else os.cpu_count() or 1
+
+
+class _Progress:
+    """Runs done, time left, and the running mean error of each strategy."""
+
+    def __init__(self, total: int) -> None:
+        from rich.console import Console
+        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+        console = Console(stderr=True)
+        self.bar = Progress(
+            BarColumn(bar_width=20), MofNCompleteColumn(), TimeRemainingColumn(), TextColumn("{task.description}"),
+            console=console, disable=not console.is_terminal, transient=True,
+        )  # fmt: skip
+        self.task = self.bar.add_task("starting", total=total)
+        self.errors: dict[str, list[float]] = {}
+
+    def advance(self, record: RunRecord) -> None:
+        self.errors.setdefault(record.planner, []).append(float(record.ospa[:, 0].mean()))
+        means = "  ".join(f"{name} {sum(values) / len(values):.1f} m" for name, values in sorted(self.errors.items()))
+        self.bar.update(self.task, advance=1, description=means)
+
+
+@contextmanager
+def _progress(total: int) -> Iterator[_Progress]:
+    progress = _Progress(total)
+    with progress.bar:
+        yield progress
+
+
+def _print_comparison(comparison: Comparison) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    from vedette.evaluation import decision_rows, strategy_rows
+    from vedette.evaluation.tables import HEADER, caption
+
+    console = Console(highlight=False)
+    table = Table(box=None, pad_edge=False)
+    for i, heading in enumerate(HEADER):
+        table.add_column(heading, justify="right" if i else "left")
+    for row in strategy_rows(comparison):
+        table.add_row(*row)
+    console.print(table)
+    console.print(caption(comparison), style="dim")
+    for strategy in comparison.strategies:
+        for when, shares in decision_rows(comparison, strategy):
+            console.print(f"{strategy} at {when}: {shares}")
