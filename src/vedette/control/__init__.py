@@ -5,17 +5,22 @@ from vedette.control.evaluator import Evaluator
 from vedette.control.plan import Plan, RewardTable
 from vedette.control.planners import FixedPlanner, IndependentPlanner, JointPlanner, Planner, RandomPlanner
 from vedette.control.reward import CauchySchwarzReward, Reward
+from vedette.control.search import CoordinateAscent, ExhaustiveSearch, JointProblem, JointSearch
 from vedette.control.settings import MobileSensor, PlanningSettings, planning_limits
 
 __all__ = [
     "PAPER_HEADINGS_DEG",
     "ActionSet",
     "CauchySchwarzReward",
+    "CoordinateAscent",
     "Evaluator",
+    "ExhaustiveSearch",
     "FixedPlanner",
     "HeadingActions",
     "IndependentPlanner",
     "JointPlanner",
+    "JointProblem",
+    "JointSearch",
     "MobileSensor",
     "Plan",
     "Planner",

@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from vedette.control.actions import distinct_headings
-from vedette.control.plan import RewardTable
-from vedette.control.priors import predicted, restrict
-from vedette.control.pseudo import PseudoPosteriors, case_density, draw_futures, pseudo_posteriors
+from vedette.control.inputs import Belief, check_beliefs, check_headings, check_poses, check_sensors
+from vedette.control.plain import PlainRewards, can_be_laid_out
+from vedette.control.priors import predicted
+from vedette.control.pseudo import PseudoPosteriors, draw_futures, pseudo_posteriors
 from vedette.control.reward import CauchySchwarzReward, Reward
+from vedette.control.search import all_joint_actions
 from vedette.control.settings import MobileSensor, PlanningSettings
-from vedette.control.tables import joint_rewards
-from vedette.densities import GLMB, LMB
-from vedette.errors import InputError, NumericalError
+from vedette.control.tables import fused_rewards
+from vedette.densities import LMB
+from vedette.errors import NumericalError
 from vedette.fusion import Clmb, CmDeltaGlmb, Fusion
 from vedette.kernels.types import Floats, Ints
+
+SampleRewards: TypeAlias = Callable[[Ints], Floats]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,7 +46,7 @@ class Evaluator:
     headings: tuple[Floats, ...]
     distinct: tuple[Floats, ...]
     which: tuple[Ints, ...]
-    prediction: GLMB | LMB
+    prediction: Belief
     posteriors: tuple[PseudoPosteriors, ...]
     counts: dict[str, int] = field(default_factory=dict)
 
@@ -53,23 +57,24 @@ class Evaluator:
         fusion: Fusion[Any, Any],
         settings: PlanningSettings,
         reward: Reward,
-        beliefs: Sequence[GLMB | LMB],
-        fused: GLMB | LMB,
-        poses: Floats,
+        beliefs: Sequence[Belief],
+        fused: Belief,
+        poses: Any,
         *,
         rng: np.random.Generator,
     ) -> Evaluator:
-        """Draw the samples, predict, and run the pseudo-updates of every sensor (paper, Algorithm 2, steps 1 to 4)."""
-        headings = tuple(sensor.actions.headings(pose) for sensor, pose in zip(sensors, poses, strict=True))
-        for s, values in enumerate(headings):
-            if len(values) == 0:
-                raise InputError(f"sensors[{s}].actions: expected at least one action; got none")
+        """Draw the samples, predict, and run the pseudo-updates of every sensor (paper, Algorithm 2, steps 1 to 4).
+
+        Targets move as the first sensor's filter has it. Raises as `JointPlanner.plan`.
+        """
+        headings, at = check_situation(sensors, poses)
+        check_beliefs(sensors, beliefs, fused)
         pairs = [distinct_headings(values) for values in headings]
         prediction = predicted(fused, sensors[0].filter, settings.horizon_steps, settings.horizon_period)
         futures = draw_futures(fused, sensors, settings, rng=rng)
         posteriors = tuple(
             pseudo_posteriors(belief, sensor, pose, pair[0], future, settings)
-            for belief, sensor, pose, pair, future in zip(beliefs, sensors, poses, pairs, futures, strict=True)
+            for belief, sensor, pose, pair, future in zip(beliefs, sensors, at, pairs, futures, strict=True)
         )
         steps = sum(len(pair[0]) for pair in pairs) * settings.num_samples * settings.horizon_steps
         counts = {"filter_steps": steps, "fusions": 0, "divergences": 0}
@@ -82,80 +87,65 @@ class Evaluator:
         """Number of distinct directions of each sensor."""
         return tuple(len(values) for values in self.distinct)
 
-    def sample_rewards(self, which: Sequence[int], fusion: Fusion[Any, Any] | None) -> Floats:
-        """(num_joint, num_samples) rewards of all joint actions of the sensors `which`, the last one's fastest.
+    def rewards(self, which: Sequence[int], fusion: Fusion[Any, Any] | None) -> SampleRewards:
+        """The function that gives (num_joint, num_samples) rewards of joint actions (num_joint, num of `which`).
 
-        fusion: None for a single sensor, whose own density is then compared with the prediction.
-
-        Raises:
-            NumericalError: a reward is not finite; names the action and the sample.
+        which: the sensors that act. Their actions are numbers of distinct directions. fusion: None for a single sensor,
+        whose own density is then compared with the prediction. The function raises `NumericalError` where a reward is
+        not finite, which names the action and the sample.
         """
-        posteriors = [self.posteriors[s] for s in which]
-        prediction = restrict(self.prediction, frozenset(labels for own in posteriors for labels in own.sets))
-        if isinstance(prediction, GLMB) and prediction.num_hyps == 0:
-            raise InputError("fused belief: expected a label set in common with the local beliefs; got none")
-        if self._is_fast(fusion, posteriors):
-            assert isinstance(self.reward, CauchySchwarzReward)
-            single = CmDeltaGlmb((1.0,)) if isinstance(prediction, GLMB) else Clmb((1.0,))
-            chosen = fusion if isinstance(fusion, CmDeltaGlmb | Clmb) else single
-            volume = self.reward.volume(self.prediction)
-            rewards = joint_rewards(
-                posteriors, prediction, chosen, self.settings.num_samples, volume, self.settings.threads()
-            )
-        else:
-            rewards = self._plain_rewards(posteriors, fusion)
-        self.counts["divergences"] += rewards.size
-        self.counts["fusions"] += rewards.size if fusion is not None else 0
-        self._check_finite(rewards, which)
-        return rewards
+        compute = self._compute([self.posteriors[s] for s in which], fusion)
 
-    def _is_fast(self, fusion: Fusion[Any, Any] | None, posteriors: Sequence[PseudoPosteriors]) -> bool:
-        if not isinstance(self.reward, CauchySchwarzReward):
-            return False
-        kinds = {own.is_lmb for own in posteriors} | {isinstance(self.prediction, LMB)}
-        if len(kinds) != 1:
-            return False
-        if fusion is None:
-            return True
-        if not isinstance(fusion, Clmb if kinds == {True} else CmDeltaGlmb) or min(fusion.weights) <= 0.0:
-            return False
-        num_sets = sum(len(own.sets) for own in posteriors)
-        return fusion.mixture_power == "moment_matched" and num_sets <= fusion.limits.max_hyps
+        def evaluate(actions: Ints) -> Floats:
+            rewards = compute(actions)
+            self.counts["divergences"] += rewards.size
+            self.counts["fusions"] += rewards.size if fusion is not None else 0
+            self._check_finite(which, actions, rewards)
+            return rewards
 
-    def _plain_rewards(self, posteriors: Sequence[PseudoPosteriors], fusion: Fusion[Any, Any] | None) -> Floats:
-        """The same by the public functions, one joint action and sample at a time: for any reward and any fusion."""
+        return evaluate
+
+    def _compute(self, posteriors: Sequence[PseudoPosteriors], fusion: Fusion[Any, Any] | None) -> SampleRewards:
         num_samples = self.settings.num_samples
-        shape = tuple(len(own.log_weights) // num_samples for own in posteriors)
-        rewards = np.empty((int(np.prod(shape)), num_samples))
-        for joint, actions in enumerate(np.ndindex(*shape)):
-            for sample in range(num_samples):
-                densities = [
-                    case_density(own, action * num_samples + sample)
-                    for own, action in zip(posteriors, actions, strict=True)
-                ]
-                updated = densities[0] if fusion is None else fusion.fuse(densities)[0]
-                rewards[joint, sample] = self.reward(self.prediction, updated)
-        return rewards
+        if not can_be_laid_out(posteriors, self.prediction, fusion, self.reward):
+            return PlainRewards(posteriors, self.prediction, fusion, self.reward, num_samples)
+        assert isinstance(self.reward, CauchySchwarzReward)
+        alone = Clmb((1.0,)) if isinstance(self.prediction, LMB) else CmDeltaGlmb((1.0,))
+        rule = fusion if isinstance(fusion, CmDeltaGlmb | Clmb) else alone
+        volume = self.reward.volume(self.prediction)
+        return fused_rewards(posteriors, self.prediction, rule, num_samples, volume, self.settings.threads())
 
-    def _check_finite(self, rewards: Floats, which: Sequence[int]) -> None:
+    def sample_rewards(self, which: Sequence[int], fusion: Fusion[Any, Any] | None) -> Floats:
+        """(num_joint, num_samples) rewards of all joint actions of the sensors `which`, the last one's fastest."""
+        shape = self.joint_shape()
+        return self.rewards(which, fusion)(all_joint_actions(tuple(shape[s] for s in which)))
+
+    def independent_choice(self) -> tuple[int, ...]:
+        """The direction that is best for each sensor alone (paper, Algorithm 3); of equal ones the first."""
+        everyone = range(len(self.sensors))
+        return tuple(int(self.sample_rewards((s,), None).mean(axis=1).argmax()) for s in everyone)
+
+    def _check_finite(self, which: Sequence[int], actions: Ints, rewards: Floats) -> None:
         bad = np.argwhere(~np.isfinite(rewards))
         if len(bad):
-            joint, sample = bad[0]
-            actions = np.unravel_index(joint, [len(self.distinct[s]) for s in which])
-            degrees = [round(float(np.degrees(self.distinct[s][a])), 6) for s, a in zip(which, actions, strict=True)]
+            joint, sample = bad[0].tolist()
+            radians = [self.distinct[s][action] for s, action in zip(which, actions[joint].tolist(), strict=True)]
             raise NumericalError(
-                f"reward of headings {degrees} degrees of sensors {list(which)}, sample {sample}: expected a finite number; "
-                f"got {rewards[joint, sample]}"
+                f"reward of headings {np.degrees(radians).round(6).tolist()} degrees of sensors {list(which)}, "
+                f"sample {sample}: expected a finite number; got {rewards[joint, sample]}"
             )
-
-    def table(self, which: Sequence[int], rewards: Floats) -> RewardTable:
-        """Mean and standard error over the samples, spread over the headings in printed order (equal ones share a value)."""
-        shape = tuple(len(self.distinct[s]) for s in which)
-        num = rewards.shape[1]
-        spread = rewards.std(axis=1, ddof=1) / np.sqrt(num) if num > 1 else np.zeros(len(rewards))
-        full = np.ix_(*(self.which[s] for s in which))
-        return RewardTable(tuple(which), rewards.mean(axis=1).reshape(shape)[full], spread.reshape(shape)[full])
 
     def first_heading(self, sensor: int, direction: int) -> int:
         """Index in printed order of the first heading that is this distinct direction."""
         return int(np.flatnonzero(self.which[sensor] == direction)[0])
+
+
+def check_situation(sensors: Sequence[MobileSensor], poses: Any) -> tuple[tuple[Floats, ...], Floats]:
+    """For each sensor its headings in printed order, and the poses (num_sensors, 3); `InputError` for unfit ones."""
+    check_sensors(sensors)
+    at = check_poses(poses, len(sensors))
+    headings = tuple(
+        check_headings(f"sensors[{s}].actions", sensor.actions.headings(pose.copy()))
+        for s, (sensor, pose) in enumerate(zip(sensors, at, strict=True))
+    )
+    return headings, at

@@ -100,4 +100,6 @@ class Plan:
             raise InputError(f"plan.tables: expected shape {expected} for {table.sensors}; got {table.mean.shape}")
         choice = tuple(self.chosen[sensor] for sensor in table.sensors)
         if np.isnan(table.mean[choice]):
-            raise InputError(f"plan.tables: expected a reward of the chosen actions {choice} of {table.sensors}; got none")
+            raise InputError(
+                f"plan.tables: expected a reward of the chosen actions {choice} of {table.sensors}; got none"
+            )

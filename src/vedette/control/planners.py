@@ -1,4 +1,4 @@
-"""Planners: joint decision making, independent decision making, random and fixed courses (paper, Algorithms 2 and 3)."""
+"""Planners: joint and independent decision making (paper, Algorithms 2 and 3), random and fixed courses."""
 
 from __future__ import annotations
 
@@ -9,12 +9,13 @@ from typing import Any, Protocol
 import numpy as np
 
 from vedette.control.actions import distinct_headings
-from vedette.control.evaluator import Evaluator
-from vedette.control.plan import Plan
+from vedette.control.evaluator import Evaluator, check_situation
+from vedette.control.evidence import Evidence
+from vedette.control.inputs import Belief, check_choice, check_headings, check_poses
+from vedette.control.plan import Plan, RewardTable
 from vedette.control.reward import CauchySchwarzReward, Reward
+from vedette.control.search import ExhaustiveSearch, JointProblem, JointSearch, all_joint_actions
 from vedette.control.settings import MobileSensor, PlanningSettings
-from vedette.densities import GLMB, LMB
-from vedette.errors import InputError
 from vedette.fusion import Fusion
 from vedette.kernels.types import Floats
 
@@ -27,71 +28,57 @@ class Planner(Protocol):
         """Name of the strategy, as in `Plan.planner`."""
         ...
 
-    def plan(
-        self, beliefs: Sequence[GLMB | LMB], fused: GLMB | LMB, poses: Floats, *, rng: np.random.Generator
-    ) -> Plan:
+    def plan(self, beliefs: Sequence[Belief], fused: Belief, poses: Floats, *, rng: np.random.Generator) -> Plan:
         """Decide from the local posteriors, the fused one and the poses (num_sensors, 3)."""
         ...
 
 
-def _check_inputs(sensors: Sequence[MobileSensor], beliefs: Sequence[Any], poses: Any) -> Floats:
-    if len(beliefs) != len(sensors):
-        raise InputError(f"beliefs: expected {len(sensors)}, one a sensor; got {len(beliefs)}")
-    array = np.asarray(poses, dtype=np.float64)
-    if array.shape != (len(sensors), 3) or not np.isfinite(array).all():
-        raise InputError(f"poses: expected finite numbers of shape ({len(sensors)}, 3); got {poses!r}")
-    return array
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class JointPlanner:
-    """Joint decision making: the reward of every combination of actions, after fusion (paper, Algorithm 2).
+    """Joint decision making: the reward of combinations of actions, after fusion (paper, Algorithm 2).
 
     Attributes:
         sensors: the sensors, in the order of the beliefs and of the fusion weights.
         fusion: how their pseudo-updated densities become one.
         settings: horizon, samples, caps.
         reward: Cauchy-Schwarz divergence, or a reward of the user's own.
-        max_joint_actions: bound on the size of the joint table.
+        search: which joint actions are evaluated: all of them, as in the paper, or fewer.
     """
 
     sensors: tuple[MobileSensor, ...]
     fusion: Fusion[Any, Any]
     settings: PlanningSettings = field(default_factory=PlanningSettings)
     reward: Reward = field(default_factory=CauchySchwarzReward)
-    max_joint_actions: int = 1_000_000
+    search: JointSearch = field(default_factory=ExhaustiveSearch)
 
     @property
     def name(self) -> str:
         return "jdm"
 
-    def plan(
-        self, beliefs: Sequence[GLMB | LMB], fused: GLMB | LMB, poses: Floats, *, rng: np.random.Generator
-    ) -> Plan:
-        """The joint action of largest mean reward; of equal ones the first in printed order.
+    def plan(self, beliefs: Sequence[Belief], fused: Belief, poses: Floats, *, rng: np.random.Generator) -> Plan:
+        """The joint action of largest mean reward that the search finds; of equal ones the first in printed order.
 
         Args:
             beliefs: local posterior of each sensor, as its filter left it.
             fused: their fusion, from which samples and prediction are taken.
             poses: (num_sensors, 3) present poses.
-            rng: draws the samples.
+            rng: draws the samples, then whatever the search draws.
 
         Raises:
-            InputError: inputs that do not fit, or more joint actions than `max_joint_actions`.
+            InputError: inputs that do not fit, or more joint actions than the search takes.
             ModelError, NumericalError: as the filters; a reward that is not finite.
         """
-        at = _check_inputs(self.sensors, beliefs, poses)
         evaluator = Evaluator.prepare(
-            self.sensors, self.fusion, self.settings, self.reward, beliefs, fused, at, rng=rng
+            self.sensors, self.fusion, self.settings, self.reward, beliefs, fused, poses, rng=rng
         )
-        shape = evaluator.joint_shape()
-        if int(np.prod(shape)) > self.max_joint_actions:
-            raise InputError(f"joint actions: expected at most {self.max_joint_actions}; got {' x '.join(map(str, shape))}")
-        everyone = range(len(self.sensors))
-        rewards = evaluator.sample_rewards(everyone, self.fusion)
-        best = np.unravel_index(int(rewards.mean(axis=1).argmax()), shape)
-        chosen = tuple(evaluator.first_heading(s, int(direction)) for s, direction in enumerate(best))
-        return Plan(self.name, evaluator.headings, chosen, (evaluator.table(everyone, rewards),), dict(evaluator.counts))
+        everyone = tuple(range(len(self.sensors)))
+        evidence = Evidence(evaluator, everyone, evaluator.rewards(everyone, self.fusion))
+        problem = JointProblem(evidence.shape, evidence.evaluate, evaluator.independent_choice)
+        best = check_choice("search", self.search.search(problem, rng=rng), evidence.shape)
+        if not evidence.holds(best):
+            evidence.evaluate(np.array([best]))
+        chosen = tuple(evaluator.first_heading(s, direction) for s, direction in enumerate(best))
+        return Plan(self.name, evaluator.headings, chosen, evidence.tables(best), dict(evaluator.counts))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -110,19 +97,18 @@ class IndependentPlanner:
     def name(self) -> str:
         return "idm"
 
-    def plan(
-        self, beliefs: Sequence[GLMB | LMB], fused: GLMB | LMB, poses: Floats, *, rng: np.random.Generator
-    ) -> Plan:
+    def plan(self, beliefs: Sequence[Belief], fused: Belief, poses: Floats, *, rng: np.random.Generator) -> Plan:
         """Each sensor's action of largest mean reward; arguments, ties and errors as `JointPlanner.plan`."""
-        at = _check_inputs(self.sensors, beliefs, poses)
         evaluator = Evaluator.prepare(
-            self.sensors, self.fusion, self.settings, self.reward, beliefs, fused, at, rng=rng
+            self.sensors, self.fusion, self.settings, self.reward, beliefs, fused, poses, rng=rng
         )
-        chosen, tables = [], []
-        for s in range(len(self.sensors)):
-            rewards = evaluator.sample_rewards((s,), None)
-            chosen.append(evaluator.first_heading(s, int(rewards.mean(axis=1).argmax())))
-            tables.append(evaluator.table((s,), rewards))
+        chosen: list[int] = []
+        tables: list[RewardTable] = []
+        for s, num_directions in enumerate(evaluator.joint_shape()):
+            evidence = Evidence(evaluator, (s,), evaluator.rewards((s,), None))
+            best = int(evidence.evaluate(all_joint_actions((num_directions,))).argmax())
+            chosen.append(evaluator.first_heading(s, best))
+            tables.extend(evidence.tables((best,)))
         return Plan(self.name, evaluator.headings, tuple(chosen), tuple(tables), dict(evaluator.counts))
 
 
@@ -136,12 +122,9 @@ class RandomPlanner:
     def name(self) -> str:
         return "random"
 
-    def plan(
-        self, beliefs: Sequence[GLMB | LMB], fused: GLMB | LMB, poses: Floats, *, rng: np.random.Generator
-    ) -> Plan:
+    def plan(self, beliefs: Sequence[Belief], fused: Belief, poses: Floats, *, rng: np.random.Generator) -> Plan:
         """Drawn from `rng`; the beliefs are not looked at."""
-        at = _check_inputs(self.sensors, beliefs, poses)
-        headings = tuple(sensor.actions.headings(pose) for sensor, pose in zip(self.sensors, at, strict=True))
+        headings, _ = check_situation(self.sensors, poses)
         chosen = []
         for values in headings:
             distinct, which = distinct_headings(values)
@@ -155,19 +138,22 @@ class FixedPlanner:
 
     Attributes:
         headings_deg: absolute heading of each sensor in degrees.
+
+    Raises:
+        InputError: no heading, or one that is not finite.
     """
 
     headings_deg: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        check_headings("headings_deg", self.headings_deg)
 
     @property
     def name(self) -> str:
         return "fixed"
 
-    def plan(
-        self, beliefs: Sequence[GLMB | LMB], fused: GLMB | LMB, poses: Floats, *, rng: np.random.Generator
-    ) -> Plan:
+    def plan(self, beliefs: Sequence[Belief], fused: Belief, poses: Floats, *, rng: np.random.Generator) -> Plan:
         """The set courses, whatever is believed."""
-        if len(poses) != len(self.headings_deg):
-            raise InputError(f"headings_deg: expected {len(poses)}, one a sensor; got {len(self.headings_deg)}")
+        check_poses(poses, len(self.headings_deg))
         headings = tuple(np.radians([float(heading)]) for heading in self.headings_deg)
         return Plan(self.name, headings, (0,) * len(headings), (), {})

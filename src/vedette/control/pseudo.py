@@ -7,12 +7,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vedette.control.priors import LabelSet, heaviest_hypotheses, label_sets
+from vedette.control.inputs import Belief
+from vedette.control.priors import LabelSet, heaviest_hypotheses, label_sets, offsets_of, single_labels, take_hypotheses
 from vedette.control.settings import IDEAL_MODES, MobileSensor, PlanningSettings
 from vedette.control.threads import run_chunks
 from vedette.densities import GLMB, LMB, TrackTable, sample_glmb, sample_lmb
-from vedette.errors import InputError
 from vedette.filters.inputs import model_errors
+from vedette.fusion.tracks import take_tracks
 from vedette.kernels.ideal import Futures, propagate_samples
 from vedette.kernels.planning import Horizon, pseudo_update_glmb, pseudo_update_lmb
 from vedette.kernels.types import Floats, Motion, Sensor
@@ -23,8 +24,9 @@ from vedette.models.platforms import advance
 class PseudoPosteriors(NamedTuple):
     """Ideally updated densities of one sensor; case `action * num_samples + sample` is the first axis.
 
-    sets: label sets of the GLMB (of an LMB: one set a label). log_weights: (num_cases, num_sets) log weight of each set; of an
-    LMB the existence logit. means, covs: (num_cases, num_members, ...) one Gaussian for each label of each set, in order.
+    sets: label sets of the GLMB (of an LMB: one set a label). log_weights: (num_cases, num_sets) log weight of each
+    set; of an LMB the existence logit. means, covs: (num_cases, num_members, ...) one Gaussian for each label of each
+    set, in order; of no meaning where the log weight is -inf.
     """
 
     sets: tuple[LabelSet, ...]
@@ -35,12 +37,15 @@ class PseudoPosteriors(NamedTuple):
 
 
 def draw_futures(
-    fused: GLMB | LMB, sensors: Sequence[MobileSensor], settings: PlanningSettings, *, rng: np.random.Generator
+    fused: Belief, sensors: Sequence[MobileSensor], settings: PlanningSettings, *, rng: np.random.Generator
 ) -> tuple[Futures, ...]:
-    """Samples of the fused density carried over the horizon without noise; the same states for every sensor."""
+    """Samples of the fused density carried over the horizon without noise; the same states for every sensor.
+
+    The random numbers of detections and noise are each sensor's own, and the same for all its actions.
+    """
     motion = kernel_motion(sensors[0].filter.motion, sensors[0].filter.survival)
-    draw = sample_glmb if isinstance(fused, GLMB) else sample_lmb
-    samples = draw(fused, settings.num_samples, rng=rng)  # type: ignore[operator]
+    num = settings.num_samples
+    samples = sample_glmb(fused, num, rng=rng) if isinstance(fused, GLMB) else sample_lmb(fused, num, rng=rng)
     with model_errors():
         states = propagate_samples(motion, samples.states, float(settings.horizon_period), int(settings.horizon_steps))
     futures = []
@@ -55,11 +60,10 @@ def draw_futures(
 def horizon_poses(pose: Floats, headings: Floats, speed: float, settings: PlanningSettings) -> Floats:
     """(num_actions, horizon_steps, 3) poses at the pseudo-updates under each heading."""
     poses = np.empty((len(headings), settings.horizon_steps, 3))
-    for a, heading in enumerate(headings):
-        at = pose
-        for h in range(settings.horizon_steps):
-            at = advance(at, float(heading), speed, settings.horizon_period)
-            poses[a, h] = at
+    at = np.tile(pose, (len(headings), 1))
+    for h in range(settings.horizon_steps):
+        at = advance(at, headings, speed, settings.horizon_period)
+        poses[:, h] = at
     return poses
 
 
@@ -70,16 +74,12 @@ class _Bundles(NamedTuple):
 
 
 def pseudo_posteriors(
-    belief: GLMB | LMB, sensor: MobileSensor, pose: Floats, headings: Floats, futures: Futures, settings: PlanningSettings
+    belief: Belief, sensor: MobileSensor, pose: Floats, headings: Floats, futures: Futures, settings: PlanningSettings
 ) -> PseudoPosteriors:
     """Run the sensor's filter over the horizon for every heading and sample, without births or deaths.
 
-    Raises:
-        InputError: a belief of another kind than the filter's.
-        ModelError, NumericalError: as the filter.
+    The belief is one of the filter's kind. Raises `ModelError` and `NumericalError` as the filter.
     """
-    if not isinstance(belief, GLMB | LMB):
-        raise InputError(f"beliefs: expected GLMB or LMB densities; got {type(belief).__name__}")
     horizon = Horizon(
         horizon_poses(pose, headings, sensor.speed, settings),
         float(settings.horizon_period),
@@ -89,8 +89,9 @@ def pseudo_posteriors(
     motion = kernel_motion(sensor.filter.motion, constant_survival(1.0))
     bundles = _Bundles(motion, sensor.filter.sensor.to_kernel(), horizon)
     num_cases = len(headings) * settings.num_samples
-    run = _run_glmb if isinstance(belief, GLMB) else _run_lmb
-    return run(belief, bundles, futures, settings, num_cases)  # type: ignore[operator, no-any-return]
+    if isinstance(belief, GLMB):
+        return _run_glmb(belief, bundles, futures, settings, num_cases)
+    return _run_lmb(belief, bundles, futures, settings, num_cases)
 
 
 def _run_glmb(
@@ -98,7 +99,7 @@ def _run_glmb(
 ) -> PseudoPosteriors:
     prior = heaviest_hypotheses(belief, settings.max_prior_hypotheses)
     found = label_sets(prior)
-    set_offsets = np.concatenate([np.zeros(1, np.int64), np.cumsum([len(labels) for labels in found.sets])]).astype(np.int64)
+    set_offsets = offsets_of([len(labels) for labels in found.sets])
     dim, num_members = prior.tracks.state_dim, int(set_offsets[-1])
     log_weights = np.empty((num_cases, len(found.sets)))
     means, covs = np.empty((num_cases, num_members, dim)), np.empty((num_cases, num_members, dim, dim))
@@ -123,7 +124,7 @@ def _run_lmb(
     logits = np.empty((num_cases, num))
     means, covs = np.empty((num_cases, num, dim)), np.empty((num_cases, num, dim, dim))
     truncation = settings.limits.truncation(len(bundles.sensor.angular))
-    reduction = settings.limits.reduction()
+    reduction = settings.limits.reduction()._replace(max_labels=max(num, 1))
     prior, no_birth = belief.to_kernel(), LMB.empty(dim).to_kernel()
 
     def work(first: int, last: int) -> None:
@@ -134,17 +135,18 @@ def _run_lmb(
 
     with model_errors():
         run_chunks(work, num_cases, settings.threads())
-    sets = tuple(((int(step), int(site)),) for step, site in belief.tracks.labels)
-    return PseudoPosteriors(sets, logits, means, covs, True)
+    return PseudoPosteriors(single_labels(belief), logits, means, covs, True)
 
 
-def case_density(posteriors: PseudoPosteriors, case: int) -> GLMB | LMB:
-    """One ideally updated density as a container: a marginalised GLMB or an LMB."""
+def case_density(posteriors: PseudoPosteriors, case: int) -> Belief:
+    """One ideally updated density as a container: a marginalised GLMB or an LMB, without sets of weight zero."""
     labels = np.array([label for labels in posteriors.sets for label in labels], np.int64).reshape(-1, 2)
     num = len(labels)
-    tracks_of = (labels, np.arange(num + 1), np.zeros(num), posteriors.means[case].copy(), posteriors.covs[case].copy())
-    tracks = TrackTable(*tracks_of)
+    means, covs = posteriors.means[case].copy(), posteriors.covs[case].copy()
+    tracks = TrackTable(labels, np.arange(num + 1), np.zeros(num), means, covs)
+    log_weights = posteriors.log_weights[case].copy()
+    held = np.flatnonzero(log_weights > -np.inf)
     if posteriors.is_lmb:
-        return LMB(tracks, posteriors.log_weights[case].copy())
-    offsets = np.concatenate([np.zeros(1, np.int64), np.cumsum([len(labels) for labels in posteriors.sets])])
-    return GLMB(tracks, offsets.astype(np.int64), np.arange(num), posteriors.log_weights[case].copy())
+        return LMB(take_tracks(tracks, held), log_weights[held])
+    offsets = offsets_of([len(labels) for labels in posteriors.sets])
+    return take_hypotheses(GLMB(tracks, offsets, np.arange(num), log_weights), held)

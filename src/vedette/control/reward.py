@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
-from vedette.densities import GLMB, LMB
+from vedette.densities import GLMB, LMB, existence_probabilities
 from vedette.divergence import cauchy_schwarz, reference_unit_volume
 from vedette.errors import InputError
 
@@ -14,7 +14,9 @@ from vedette.errors import InputError
 class Reward(Protocol):
     """Value of an ideally updated density over the predicted one; larger is better, and it must be finite.
 
-    Both are of the kind that the planner's filters hold: marginalised GLMB (one Gaussian a track) or LMB.
+    The prediction is of the fused density's kind, the update of the fusion's (or, for a sensor alone, of its filter's):
+    a marginalised GLMB or an LMB. Tracks are single Gaussians, but in what a fusion of the user's own makes. A label
+    set of weight zero is left out of the update.
     """
 
     def __call__(self, predicted: GLMB | LMB, updated: GLMB | LMB) -> float: ...
@@ -26,17 +28,23 @@ class CauchySchwarzReward:
 
     Attributes:
         unit_volume: K of eq. 5; or "reference", under which K <p, p> of the prediction is about 1 (paper-notes 15).
+
+    Raises:
+        InputError: another word, or a number that is not finite and above 0.
     """
 
     unit_volume: float | Literal["reference"] = 1.0
 
     def __post_init__(self) -> None:
-        if self.unit_volume != "reference" and not 0.0 < float(self.unit_volume) < math.inf:
-            raise InputError(f"unit_volume: expected a finite number above 0 or 'reference'; got {self.unit_volume!r}")
+        value = self.unit_volume
+        if value != "reference" and (isinstance(value, bool | str) or not 0.0 < value < math.inf):
+            raise InputError(f"unit_volume: expected a finite number above 0 or 'reference'; got {value!r}")
 
     def volume(self, predicted: GLMB | LMB) -> float:
-        """K for this prediction."""
-        return reference_unit_volume(predicted) if self.unit_volume == "reference" else float(self.unit_volume)
+        """K for this prediction; "reference" is 1 for one that expects no target, where K has no say."""
+        if self.unit_volume != "reference":
+            return float(self.unit_volume)
+        return reference_unit_volume(predicted) if existence_probabilities(predicted)[1].sum() > 0.0 else 1.0
 
     def __call__(self, predicted: GLMB | LMB, updated: GLMB | LMB) -> float:
         return cauchy_schwarz(predicted, updated, unit_volume=self.volume(predicted), support="common")

@@ -8,8 +8,9 @@ from typing import Literal
 
 from vedette.control.actions import ActionSet, HeadingActions
 from vedette.errors import InputError
-from vedette.filters import Limits, LocalFilter
+from vedette.filters import DeltaGlmbFilter, Limits, LmbFilter, LocalFilter
 from vedette.kernels.ideal import EXPECTED, IDEAL, SAMPLED
+from vedette.models.arguments import dimension, non_negative, positive, probability, reject
 
 IDEAL_MODES = {"ideal": IDEAL, "expected": EXPECTED, "sampled": SAMPLED}
 
@@ -29,9 +30,10 @@ class PlanningSettings:
         ideal_measurements: "ideal": noise-free, of the sampled targets whose detection probability is at least
             `detection_threshold`; "expected": noise-free, each target seen with its detection probability, so that the
             mean over samples is the expectation over detections; "sampled": seen likewise, with measurement noise.
-        max_prior_hypotheses: heaviest hypotheses of each local posterior that enter the pseudo-updates. An LMB enters whole.
-        limits: caps of the pseudo-updates, which are ranked, not Gibbs sampled, whatever the filter does. Every label set of
-            the prior keeps its heaviest hypothesis beyond these caps.
+        max_prior_hypotheses: heaviest hypotheses of each local posterior that enter the pseudo-updates. An LMB enters
+            whole.
+        limits: caps of the pseudo-updates, which are ranked, not Gibbs sampled, whatever the filter does. Every label
+            set of the prior keeps its heaviest hypothesis beyond these caps, and an LMB keeps all its labels.
         num_threads: threads that share a decision; 0: one a processor. The result does not depend on it.
 
     Raises:
@@ -49,18 +51,15 @@ class PlanningSettings:
 
     def __post_init__(self) -> None:
         for name in ("horizon_steps", "num_samples", "max_prior_hypotheses"):
-            if not getattr(self, name) >= 1:
-                raise InputError(f"{name}: expected at least 1; got {getattr(self, name)!r}")
-        if not self.horizon_period > 0.0:
-            raise InputError(f"horizon_period: expected seconds above 0; got {self.horizon_period!r}")
+            dimension(name, getattr(self, name))
+        positive("horizon_period", self.horizon_period)
+        probability("detection_threshold", self.detection_threshold)
+        if self.num_threads != 0:
+            dimension("num_threads", self.num_threads)
         if self.ideal_measurements not in IDEAL_MODES:
-            raise InputError(f"ideal_measurements: expected one of {', '.join(IDEAL_MODES)}; got {self.ideal_measurements!r}")
-        if not 0.0 <= self.detection_threshold <= 1.0:
-            raise InputError(f"detection_threshold: expected a probability; got {self.detection_threshold!r}")
+            raise reject("ideal_measurements", f"one of {', '.join(IDEAL_MODES)}", self.ideal_measurements)
         if self.limits.max_components != 1 or self.limits.min_existence != 0.0:
-            raise InputError("limits: expected max_components 1 and min_existence 0 for planning, see planning_limits()")
-        if not self.num_threads >= 0:
-            raise InputError(f"num_threads: expected 0 or more; got {self.num_threads!r}")
+            raise InputError("limits: expected max_components 1 and min_existence 0, as in planning_limits()")
 
     def threads(self) -> int:
         """Number of threads to use."""
@@ -78,6 +77,9 @@ class MobileSensor:
         filter: its local filter, with the models of the targets and of the sensor.
         speed: m/s, constant along its heading once it moves.
         actions: the headings it may take.
+
+    Raises:
+        InputError: something else than a filter, a speed that is negative or not finite, actions without headings.
     """
 
     filter: LocalFilter
@@ -85,5 +87,8 @@ class MobileSensor:
     actions: ActionSet = field(default_factory=HeadingActions)
 
     def __post_init__(self) -> None:
-        if not 0.0 <= self.speed < float("inf"):
-            raise InputError(f"speed: expected a finite number of m/s of at least 0; got {self.speed!r}")
+        if not isinstance(self.filter, DeltaGlmbFilter | LmbFilter):
+            raise reject("filter", "a DeltaGlmbFilter or an LmbFilter", self.filter)
+        non_negative("speed", self.speed)
+        if not callable(getattr(self.actions, "headings", None)):
+            raise reject("actions", "an ActionSet, with a method headings(pose)", self.actions)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
 
 
 def run_chunks(work: Callable[[int, int], None], num_items: int, num_threads: int) -> None:
@@ -17,5 +18,5 @@ def run_chunks(work: Callable[[int, int], None], num_items: int, num_threads: in
         return
     bounds = [num_items * i // num_chunks for i in range(num_chunks + 1)]
     with ThreadPoolExecutor(num_chunks) as pool:
-        for done in [pool.submit(work, first, last) for first, last in zip(bounds, bounds[1:], strict=False)]:
+        for done in [pool.submit(work, first, last) for first, last in pairwise(bounds)]:
             done.result()

@@ -1,0 +1,91 @@
+"""The rewards that a decision was made on, kept as tables over the headings in printed order."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from vedette.control.evaluator import Evaluator, SampleRewards
+from vedette.control.plan import RewardTable
+from vedette.errors import InputError
+from vedette.kernels.types import Floats, Ints
+
+# A joint table of more entries is not formed: it would take more memory than all that was evaluated.
+MAX_TABLE = 2_000_000
+
+# Joint actions are evaluated so many rewards at a time, to bound the memory of an exhaustive search.
+_BLOCK = 4_000_000
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Evidence:
+    """Mean rewards of the joint actions of some sensors, and every one that was ever asked for.
+
+    Attributes:
+        evaluator: that gives the rewards.
+        which: the sensors.
+        rewards: their sample rewards.
+    """
+
+    evaluator: Evaluator
+    which: tuple[int, ...]
+    rewards: SampleRewards
+    _actions: list[Ints] = field(default_factory=list)
+    _means: list[Floats] = field(default_factory=list)
+    _errors: list[Floats] = field(default_factory=list)
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Number of different directions of each of the sensors."""
+        shape = self.evaluator.joint_shape()
+        return tuple(shape[s] for s in self.which)
+
+    def evaluate(self, actions: Ints) -> Floats:
+        """(num,) mean rewards of joint actions (num, num_sensors); `InputError` for what are none."""
+        checked = np.array(actions, order="C")
+        fits = checked.ndim == 2 and checked.shape[1] == len(self.which) and checked.dtype.kind in "iu"
+        if not fits or not ((checked >= 0) & (checked < self.shape)).all():
+            raise InputError(f"joint actions: expected rows of whole numbers below {self.shape}; got {actions!r}")
+        checked = checked.astype(np.int64)
+        size = max(1, _BLOCK // self.evaluator.settings.num_samples)
+        means = [self._evaluate_block(checked[i : i + size]) for i in range(0, len(checked), size)]
+        return np.asarray(np.concatenate([np.empty(0), *means]))
+
+    def _evaluate_block(self, actions: Ints) -> Floats:
+        rewards = self.rewards(actions)
+        mean, num = np.asarray(rewards.mean(axis=1)), rewards.shape[1]
+        error = rewards.std(axis=1, ddof=1) / math.sqrt(num) if num > 1 else np.zeros(len(rewards))
+        self._actions.append(actions)
+        self._means.append(mean)
+        self._errors.append(error)
+        return mean
+
+    def holds(self, choice: Sequence[int]) -> bool:
+        """Whether this joint action has been evaluated."""
+        return any((actions == np.array(choice)).all(axis=1).any() for actions in self._actions)
+
+    def tables(self, choice: Sequence[int]) -> tuple[RewardTable, ...]:
+        """One table of all that was evaluated, gaps elsewhere; or, where it would be too large, a line a sensor.
+
+        A line holds one sensor's actions with the others at their `choice`.
+        """
+        if math.prod(len(self.evaluator.headings[s]) for s in self.which) <= MAX_TABLE:
+            return (self._table(self.which, range(len(self.which)), choice),)
+        return tuple(self._table((s,), (axis,), choice) for axis, s in enumerate(self.which))
+
+    def _table(self, sensors: tuple[int, ...], axes: Sequence[int], choice: Sequence[int]) -> RewardTable:
+        """Rewards over the directions on `axes` where all others are chosen, spread over the headings."""
+        actions = np.concatenate(self._actions)
+        others = [axis for axis in range(len(self.which)) if axis not in axes]
+        rows = (actions[:, others] == np.array(choice, np.int64)[others]).all(axis=1)
+        place = tuple(actions[rows][:, axis] for axis in axes)
+        spread = np.ix_(*(self.evaluator.which[s] for s in sensors))
+        filled = []
+        for values in (self._means, self._errors):
+            table = np.full([self.shape[axis] for axis in axes], math.nan)
+            table[place] = np.concatenate(values)[rows]
+            filled.append(table[spread])
+        return RewardTable(sensors, *filled)

@@ -1,0 +1,71 @@
+"""Checks of what a planner is given."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from vedette.control.settings import MobileSensor
+from vedette.densities import GLMB, LMB
+from vedette.errors import InputError
+from vedette.filters import DeltaGlmbFilter
+from vedette.kernels.types import Floats
+from vedette.models.arguments import float_array, reject
+
+Belief: TypeAlias = GLMB | LMB
+
+
+def check_sensors(sensors: Sequence[MobileSensor]) -> None:
+    """`InputError` unless there is at least one sensor, and all track states of one dimension."""
+    if len(sensors) == 0 or not all(isinstance(sensor, MobileSensor) for sensor in sensors):
+        raise reject("sensors", "at least one MobileSensor", sensors)
+    dims = [sensor.filter.motion.state_dim for sensor in sensors]
+    if len(set(dims)) > 1:
+        raise InputError(f"sensors: expected filters of one state dimension; got {dims}")
+
+
+def check_poses(poses: Any, num_sensors: int) -> Floats:
+    """The poses as a (num_sensors, 3) array; `InputError` if they are not that or not finite."""
+    return float_array("poses", poses, (num_sensors, 3))
+
+
+def check_beliefs(sensors: Sequence[MobileSensor], beliefs: Sequence[Any], fused: Any) -> None:
+    """`InputError` unless there is a valid belief of the right kind for each sensor's filter, and a valid fused one."""
+    if len(beliefs) != len(sensors):
+        raise InputError(f"beliefs: expected {len(sensors)}, one a sensor; got {len(beliefs)}")
+    state_dim = sensors[0].filter.motion.state_dim
+    for i, (belief, sensor) in enumerate(zip(beliefs, sensors, strict=True)):
+        kind = GLMB if isinstance(sensor.filter, DeltaGlmbFilter) else LMB
+        _check_density(f"beliefs[{i}]", belief, (kind,), state_dim)
+    _check_density("fused", fused, (GLMB, LMB), state_dim)
+
+
+def _check_density(name: str, density: Any, kinds: tuple[type[Belief], ...], state_dim: int) -> None:
+    if not isinstance(density, kinds):
+        expected = " or ".join(kind.__name__ for kind in kinds)
+        raise InputError(f"{name}: expected {expected}; got {type(density).__name__}")
+    if density.state_dim != state_dim:
+        raise InputError(f"{name}: expected states of dimension {state_dim}, as its filter; got {density.state_dim}")
+    try:
+        density.validate(error=InputError)
+    except InputError as fault:
+        raise InputError(f"{name}: {fault}") from None
+
+
+def check_headings(name: str, headings: Any) -> Floats:
+    """The headings of an action set as an array; `InputError` unless there is at least one and all are finite."""
+    values = float_array(name, headings, (None,))
+    if len(values) == 0:
+        raise InputError(f"{name}: expected at least one heading; got none")
+    return values
+
+
+def check_choice(name: str, choice: Any, shape: tuple[int, ...]) -> tuple[int, ...]:
+    """A joint action as plain numbers; `InputError` unless it has one action a sensor, each within `shape`."""
+    array = np.asarray(choice)
+    fits = array.shape == (len(shape),) and array.dtype.kind in "iu" and bool(((array >= 0) & (array < shape)).all())
+    if not fits:
+        raise InputError(f"{name}: expected one action of each sensor, numbers below {shape}; got {choice!r}")
+    return tuple(int(action) for action in array)
