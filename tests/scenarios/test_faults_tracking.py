@@ -73,6 +73,11 @@ CASES = [
             "f.yaml:20:83: fusion.limits.max_components: expected a number whose power by 2 sensors is at most max_combinations, 4096, got 100"
         ],
     ),
+    (
+        "kind: cm_delta_glmb, weights",
+        "kind: clmb, feedback: true, weights",
+        ["f.yaml:20:32: fusion.feedback: expected false, as m_delta_glmb filters cannot go on from an LMB, got true"],
+    ),
     ("threshold: 0.6", "threshold: 1.0", ["f.yaml:21:40: estimator.threshold: expected a number below 1, got 1.0"]),
     (
         "decision_steps: [4, 8]",

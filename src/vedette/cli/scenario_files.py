@@ -35,7 +35,10 @@ def init(
     source: Annotated[str, typer.Option("--from", metavar="NAME", help="Scenario to start from.")] = "paper-a",
     force: Annotated[bool, typer.Option("--force", help="Overwrite what is there.")] = False,
 ) -> None:
-    """Write a commented scenario file to start from, with a JSON schema beside it for editors."""
+    """Write a scenario file to start from.
+
+    It is commented; a JSON schema for editors is written beside it.
+    """
     from vedette.scenarios import list_builtin, load_scenario
 
     builtin = list_builtin()
@@ -68,7 +71,10 @@ def _starting_files(scenario: Scenario, target: Path) -> dict[Path, str]:
 
 
 def check(files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Scenario files.")]) -> None:
-    """Check scenario files: name every fault by file, line and column, field, what was expected, and what came."""
+    """Name every fault of scenario files.
+
+    Each by file, line, column and field, with what was expected and what came.
+    """
     from vedette.scenarios import load_scenario
     from vedette.scenarios.summary import one_line
 
@@ -86,7 +92,10 @@ def check(files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="S
 def schema(
     out: Annotated[Path | None, typer.Option("--out", metavar="FILE", help="File to write; none: the screen.")] = None,
 ) -> None:
-    """Print the JSON schema of scenario files, with a description of every field."""
+    """Print the JSON schema of scenario files.
+
+    It describes every field, and editors that know it complete and check as one writes.
+    """
     if out is None:
         typer.echo(_schema_text(), nl=False)
     else:

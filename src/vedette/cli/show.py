@@ -28,7 +28,10 @@ def show(
         bool, typer.Option("--resolved", help="Print YAML instead, with every default written out.")
     ] = False,
 ) -> None:
-    """Show a scenario: its settings, sensors and targets, and a picture of them."""
+    """Show a scenario as tables and as a picture.
+
+    The picture has the region, the true tracks, the sensors and the birth sites.
+    """
     from vedette.scenarios import load_scenario
 
     if out is not None and out.suffix[1:].lower() not in PICTURE_FORMATS:

@@ -92,6 +92,8 @@ def _fusion(parts: Parts) -> Iterator[Finding]:
         yield ("fusion", "kind"), f"a fusion, as there are {len(parts.sensors)} sensors", '"none"'
     if parts.fusion.kind == "cm_delta_glmb" and parts.filter.kind == "lmb":
         yield ("fusion", "kind"), "clmb or none, as the filters are lmb", '"cm_delta_glmb"'
+    if parts.fusion.kind == "clmb" and parts.fusion.feedback and parts.filter.kind not in ("lmb", None):
+        yield ("fusion", "feedback"), f"false, as {parts.filter.kind} filters cannot go on from an LMB", "true"
 
 
 def _filter(parts: Parts) -> Iterator[Finding]:

@@ -1,6 +1,7 @@
 """What a scenario describes, as the objects that filters, planners and simulations take; one function a section."""
 
 from vedette.scenarios.build.custom import build_custom
+from vedette.scenarios.build.experiment import build_experiment
 from vedette.scenarios.build.planning import (
     PLANNERS,
     build_actions,
@@ -34,6 +35,7 @@ __all__ = [
     "build_birth",
     "build_custom",
     "build_estimator",
+    "build_experiment",
     "build_filter",
     "build_filters",
     "build_fusion",
