@@ -13,7 +13,6 @@ from vedette.control.settings import IDEAL_MODES, MobileSensor, PlanningSettings
 from vedette.control.threads import run_chunks
 from vedette.densities import GLMB, LMB, TrackTable, sample_glmb, sample_lmb
 from vedette.filters.inputs import model_errors
-from vedette.fusion.tracks import take_tracks
 from vedette.kernels.ideal import Futures, propagate_samples
 from vedette.kernels.planning import Horizon, pseudo_update_glmb, pseudo_update_lmb
 from vedette.kernels.types import Floats, Motion, Sensor
@@ -26,7 +25,7 @@ class PseudoPosteriors(NamedTuple):
 
     sets: label sets of the GLMB (of an LMB: one set a label). log_weights: (num_cases, num_sets) log weight of each
     set; of an LMB the existence logit. means, covs: (num_cases, num_members, ...) one Gaussian for each label of each
-    set, in order; of no meaning where the log weight is -inf.
+    set, in order; of a GLMB's set of log weight -inf without meaning.
     """
 
     sets: tuple[LabelSet, ...]
@@ -139,14 +138,13 @@ def _run_lmb(
 
 
 def case_density(posteriors: PseudoPosteriors, case: int) -> Belief:
-    """One ideally updated density as a container: a marginalised GLMB or an LMB, without sets of weight zero."""
+    """One ideally updated density as a container: an LMB, or a marginalised GLMB without sets of weight zero."""
     labels = np.array([label for labels in posteriors.sets for label in labels], np.int64).reshape(-1, 2)
     num = len(labels)
     means, covs = posteriors.means[case].copy(), posteriors.covs[case].copy()
     tracks = TrackTable(labels, np.arange(num + 1), np.zeros(num), means, covs)
     log_weights = posteriors.log_weights[case].copy()
-    held = np.flatnonzero(log_weights > -np.inf)
     if posteriors.is_lmb:
-        return LMB(take_tracks(tracks, held), log_weights[held])
+        return LMB(tracks, log_weights)
     offsets = offsets_of([len(labels) for labels in posteriors.sets])
-    return take_hypotheses(GLMB(tracks, offsets, np.arange(num), log_weights), held)
+    return take_hypotheses(GLMB(tracks, offsets, np.arange(num), log_weights), np.flatnonzero(log_weights > -np.inf))

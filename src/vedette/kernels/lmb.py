@@ -120,6 +120,12 @@ def _posterior_tracks(kept: Ints, rows: Rows, options: Options, marginals: Float
             for c in range(width, end):
                 wide_weights[c] += marginals[option] - options.log_weights[option]
             width = end
+        if width == 0:
+            # Existence 0: any density will do, as long as it is one.
+            for c in range(rows.offsets[row], rows.offsets[row + 1]):
+                copy_component(rows.means, rows.covs, c, wide_means, wide_covs, width)
+                wide_weights[width] = 0.0
+                width += 1
         if reduction.max_components == 1:
             moment_match(wide_weights[:width], wide_means[:width], wide_covs[:width], means[filled], covs[filled])
             log_weights[filled] = 0.0
