@@ -26,7 +26,8 @@ def say_if_cold() -> None:
 
     if is_cold():
         typer.echo(
-            f"Compiling the kernels: once on this machine, about a minute. They are kept in {cache_directory()}.", err=True
+            f"Compiling the kernels: once on this machine, about a minute. They are kept in {cache_directory()}.",
+            err=True,
         )
 
 
@@ -76,7 +77,7 @@ def run(
         if out is not None:
             from vedette.simulation.storage import save_run
 
-            save_run(record, out, scenario_text=dump_scenario(loaded.model), overwrite=overwrite)
+            save_run(record, out, scenario_text=dump_scenario(loaded.model, folder=loaded.folder), overwrite=overwrite)
             _draw_run(record, out / "figures")
             typer.echo(f"wrote {out}")
 
@@ -86,7 +87,9 @@ def _print_run(record: RunRecord) -> None:
     from rich.table import Table
 
     console = Console(highlight=False)
-    console.print(f"{record.scenario}, {record.planner}, seed {record.seed}, run {record.run}: {record.num_scans} scans")
+    console.print(
+        f"{record.scenario}, {record.planner}, seed {record.seed}, run {record.run}: {record.num_scans} scans"
+    )
     if record.decisions:
         table = Table(box=None, pad_edge=False)
         for heading in ("time", "headings", "expected reward"):

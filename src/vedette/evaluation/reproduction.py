@@ -77,7 +77,7 @@ def write_reproduction(
 def _write_files(
     scenario: Scenario, runs: Mapping[str, Sequence[RunRecord]], comparison: Comparison, seed: int, folder: Path
 ) -> None:
-    text = dump_scenario(scenario.model)
+    text = dump_scenario(scenario.model, folder=scenario.folder)
     for records in runs.values():
         for record in records:
             save_run(record, folder / "runs" / f"{record.planner}-{record.run:04d}", scenario_text=text)

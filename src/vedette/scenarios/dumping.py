@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import re
+from pathlib import Path
 from typing import Any
 
 from ruamel.yaml import YAML
@@ -18,14 +19,33 @@ _LONGEST_LINE = 100
 _PLAIN = re.compile(r"[A-Za-z][\w.-]*( [A-Za-z0-9][\w.-]*)*")
 
 
-def dump_scenario(model: ScenarioModel) -> str:
-    """YAML text of a scenario with every default written out; it reads back as the same scenario."""
+def dump_scenario(model: ScenarioModel, *, folder: Path | None = None) -> str:
+    """YAML text of a scenario with every default written out; it reads back as the same scenario.
+
+    Args:
+        folder: what the files that it names are relative to; with it, the text can be kept anywhere.
+    """
     yaml = YAML(typ="rt", pure=True)
     yaml.width = 10_000
     yaml.indent(mapping=2, sequence=4, offset=2)
     out = io.StringIO()
-    yaml.dump(_laid_out(model.model_dump(mode="json")), out)
+    data = model.model_dump(mode="json")
+    yaml.dump(_laid_out(data if folder is None else _anchored(data, folder.resolve())), out)
     return out.getvalue()
+
+
+def _anchored(value: Any, folder: Path) -> Any:
+    """The data with the files of recorded targets and of custom models as absolute paths."""
+    if isinstance(value, list):
+        return [_anchored(item, folder) for item in value]
+    if not isinstance(value, dict):
+        return value
+    anchored = {key: _anchored(item, folder) for key, item in value.items()}
+    if value.get("kind") == "recorded":
+        anchored["path"] = str((folder / value["path"]).resolve())
+    elif value.get("kind") == "custom" and ".py:" in value["python"]:
+        anchored = {**value, "python": str(folder / value["python"])}
+    return anchored
 
 
 def _laid_out(value: Any) -> Any:

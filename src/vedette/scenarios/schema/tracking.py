@@ -37,6 +37,10 @@ class FilterLimits(Section):
     min_relative_weight: Share = Field(
         default=1e-6, description="Hypotheses lighter than this times the heaviest are dropped [-]."
     )
+    min_track_weight: Annotated[float, Field(ge=0.0, le=1.0)] = Field(
+        default=1e-5,
+        description="The heaviest hypothesis of each track is kept unless lighter than this times the heaviest [-].",
+    )
     gate_probability: Annotated[float, Field(gt=0.0, le=1.0)] = Field(
         default=1.0 - 1e-7, description="Probability that a target's measurement falls in its gate; 1: no gate [-]."
     )
