@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 import pytest
@@ -90,6 +92,13 @@ def test_columns_that_are_not_there(ships: Path, targets: str, fault: str) -> No
     with pytest.raises(ScenarioError) as error:
         load_scenario(file)
     assert error.value.faults == [f"{file}:{fault}"]
+
+
+def test_the_running_program_is_no_module_to_take_models_from(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "typed_at_a_prompt", ModuleType("typed_at_a_prompt"))
+    custom = "{kind: custom, python: 'typed_at_a_prompt:motion', state_dim: 4}"
+    with pytest.raises(ScenarioError, match=r"motion\.python: expected a module that Python finds"):
+        parse_scenario(changed(("{kind: constant_velocity, sigma_v: 1.0}", custom)))
 
 
 def test_a_recorded_file_that_is_no_table(ships: Path) -> None:

@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-import csv
-import importlib.util
 import math
 from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise
-from pathlib import Path as FilePath
 from typing import Any
 
 import numpy as np
 
 from vedette.scenarios.faults import Finding, Path, describe
+from vedette.scenarios.file_checks import recorded_findings, reference_findings
 from vedette.scenarios.parts import Parts
 from vedette.scenarios.schema import ScenarioModel
-from vedette.scenarios.schema.base import Custom, Section
 from vedette.scenarios.schema.tracking import GibbsAssignment
-from vedette.scenarios.schema.world import BirthSite, RecordedTargets, ScriptedTarget, Time
+from vedette.scenarios.schema.world import BirthSite, ScriptedTarget, Time
 from vedette.scenarios.sensor_checks import sensor_findings
 
 # How far a decision time may be from the time of a scan, in scans: rounding of sums of decimal fractions.
@@ -169,40 +166,6 @@ def _lifetime(path: Path, target: ScriptedTarget, last: int | None) -> Iterator[
         yield (*path, "end_step"), f"a step from start_step, {target.start_step}, on", describe(target.end_step)
 
 
-def _absent(file: str) -> str:
-    return f"{describe(file)}, which is not there"
-
-
-def _recorded(parts: Parts) -> Iterator[Finding]:
-    recorded = parts.recorded
-    if recorded is None:
-        return
-    file = (parts.folder or FilePath()) / recorded.path
-    if file.suffix.lower() not in (".csv", ".parquet"):
-        yield ("targets", "path"), "a .csv or .parquet file", describe(recorded.path)
-    elif not file.is_file():
-        yield ("targets", "path"), "a file, relative to the scenario file", _absent(recorded.path)
-    elif file.suffix.lower() == ".csv":
-        yield from _columns(recorded, file)
-
-
-def _columns(recorded: RecordedTargets, file: FilePath) -> Iterator[Finding]:
-    with file.open(encoding="utf-8-sig", errors="replace", newline="") as lines:
-        header = [name.strip() for name in next(csv.reader(lines), [])]
-    if _faulty(recorded.columns):
-        return
-    given = recorded.columns.given()
-    for key, name in given.items():
-        if name not in header:
-            yield ("targets", "columns", key), f"a column of {recorded.path}: {', '.join(header)}", describe(name)
-    missing = [key for key in ("time", "id") if key not in given and key not in header]
-    if "x" not in given and "longitude" not in given and not {"x", "y"} <= set(header):
-        missing += [key for key in ("longitude", "latitude") if key not in header]
-    if missing:
-        wanted = f"the names of the columns of {', '.join(missing)} among {', '.join(header)}"
-        yield ("targets", "columns"), wanted, "nothing"
-
-
 def _score(parts: Parts) -> Iterator[Finding]:
     ospa, last = parts.ospa, parts.num_steps
     if ospa is None:
@@ -215,26 +178,6 @@ def _score(parts: Parts) -> Iterator[Finding]:
         yield ("ospa", "to_step"), f"a step from from_step, {ospa.from_step}, on", describe(ospa.to_step)
 
 
-def _customs(value: Any, path: Path) -> Iterator[tuple[Path, Custom]]:
-    if isinstance(value, Custom):
-        yield path, value
-    elif isinstance(value, Section):
-        for name in type(value).model_fields:
-            yield from _customs(getattr(value, name), (*path, name))
-
-
-def _references(parts: Parts) -> Iterator[Finding]:
-    sections: list[tuple[Path, Any]] = [(("motion",), parts.motion), (("survival",), parts.survival)]
-    sections += [(("sensors", i), sensor) for i, sensor in enumerate(parts.sensors)]
-    for path, custom in (found for start, section in sections for found in _customs(section, start)):
-        module = custom.python.rpartition(":")[0]
-        if module.endswith(".py"):
-            if not ((parts.folder or FilePath()) / module).is_file():
-                yield (*path, "python"), "a file, relative to the scenario file", _absent(module)
-        elif importlib.util.find_spec(module.partition(".")[0]) is None:
-            yield (*path, "python"), "a module that Python finds", describe(module)
-
-
 _CHECKS: tuple[Callable[[Parts], Iterator[Finding]], ...] = (
     _schedule,
     _schedule_order,
@@ -244,10 +187,10 @@ _CHECKS: tuple[Callable[[Parts], Iterator[Finding]], ...] = (
     _combinations,
     _births,
     _targets,
-    _recorded,
+    recorded_findings,
     lambda parts: sensor_findings(parts.sensors),
     _score,
-    _references,
+    reference_findings,
 )
 
 

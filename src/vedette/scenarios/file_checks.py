@@ -1,0 +1,79 @@
+"""Checks of what a scenario names outside of itself: files of recorded targets, and models of the user's own."""
+
+from __future__ import annotations
+
+import csv
+import importlib.util
+from collections.abc import Iterator
+from pathlib import Path as FilePath
+from typing import Any
+
+from vedette.scenarios.faults import Finding, Path, describe
+from vedette.scenarios.parts import Parts
+from vedette.scenarios.schema.base import Custom, Section
+from vedette.scenarios.schema.world import RecordedTargets
+
+
+def _absent(file: str) -> str:
+    return f"{describe(file)}, which is not there"
+
+
+def recorded_findings(parts: Parts) -> Iterator[Finding]:
+    """What is wrong with the file of recorded targets, as far as its header tells."""
+    recorded = parts.recorded
+    if recorded is None:
+        return
+    file = (parts.folder or FilePath()) / recorded.path
+    if file.suffix.lower() not in (".csv", ".parquet"):
+        yield ("targets", "path"), "a .csv or .parquet file", describe(recorded.path)
+    elif not file.is_file():
+        yield ("targets", "path"), "a file, relative to the scenario file", _absent(recorded.path)
+    elif file.suffix.lower() == ".csv" and recorded.columns is not None:
+        yield from _columns(recorded, file)
+
+
+def _columns(recorded: RecordedTargets, file: FilePath) -> Iterator[Finding]:
+    try:
+        with file.open(encoding="utf-8-sig", errors="replace", newline="") as lines:
+            header = [name.strip() for name in next(csv.reader(lines), [])]
+    except (OSError, csv.Error) as error:
+        yield ("targets", "path"), "a readable CSV file", f"{describe(recorded.path)}: {error}"
+        return
+    given = recorded.columns.given()
+    for key, name in given.items():
+        if name not in header:
+            yield ("targets", "columns", key), f"a column of {recorded.path}: {', '.join(header)}", describe(name)
+    missing = [key for key in ("time", "id") if key not in given and key not in header]
+    if "x" not in given and "longitude" not in given and not {"x", "y"} <= set(header):
+        missing += [key for key in ("longitude", "latitude") if key not in header]
+    if missing:
+        wanted = f"the names of the columns of {', '.join(missing)} among {', '.join(header)}"
+        yield ("targets", "columns"), wanted, "nothing"
+
+
+def _customs(value: Any, path: Path) -> Iterator[tuple[Path, Custom]]:
+    if isinstance(value, Custom):
+        yield path, value
+    elif isinstance(value, Section):
+        for name in type(value).model_fields:
+            yield from _customs(getattr(value, name), (*path, name))
+
+
+def _is_findable(package: str) -> bool:
+    try:
+        return importlib.util.find_spec(package) is not None
+    except ValueError:  # of a module without a specification, such as the running program
+        return False
+
+
+def reference_findings(parts: Parts) -> Iterator[Finding]:
+    """Which models of the user's own are not there. Nothing is imported."""
+    sections: list[tuple[Path, Any]] = [(("motion",), parts.motion), (("survival",), parts.survival)]
+    sections += [(("sensors", i), sensor) for i, sensor in enumerate(parts.sensors)]
+    for path, custom in (found for start, section in sections for found in _customs(section, start)):
+        module = custom.python.rpartition(":")[0]
+        if module.endswith(".py"):
+            if not ((parts.folder or FilePath()) / module).is_file():
+                yield (*path, "python"), "a file, relative to the scenario file", _absent(module)
+        elif not _is_findable(module.partition(".")[0]):
+            yield (*path, "python"), "a module that Python finds", describe(module)
