@@ -34,11 +34,10 @@ class Layout(NamedTuple):
 
 
 def common_layout(prediction: Belief, posteriors: Sequence[PseudoPosteriors]) -> Layout:
-    """The layout of a marginalised prediction of one Gaussian a track; sets of weight zero are left out."""
+    """The layout of a marginalised prediction of one Gaussian a track and no set of weight zero."""
     known = {labels for own in posteriors for labels in own.sets}
     sets = label_sets(prediction).sets if isinstance(prediction, GLMB) else single_labels(prediction)
-    weights = prediction.hyp_log_weights if isinstance(prediction, GLMB) else np.zeros(len(sets))
-    places = np.array([i for i, labels in enumerate(sets) if labels in known and weights[i] > -math.inf], np.int64)
+    places = np.array([i for i, labels in enumerate(sets) if labels in known], np.int64)
     common: Belief
     if isinstance(prediction, GLMB):
         common = take_hypotheses(prediction, places)

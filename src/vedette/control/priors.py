@@ -71,9 +71,13 @@ def single_labels(belief: LMB) -> tuple[LabelSet, ...]:
 def predicted(fused: Belief, local: LocalFilter, num_steps: int, period: float) -> Belief:
     """The fused density at the end of the horizon, without birth or death (paper, "pseudo-prediction").
 
-    Tracks are first collapsed to one Gaussian each (a GLMB is marginalised), as those of the pseudo-updates are.
+    Tracks are first collapsed to one Gaussian each (a GLMB is marginalised), as those of the pseudo-updates are. Label
+    sets of weight zero are left out.
     """
-    single = marginalise(fused, max_components=1) if isinstance(fused, GLMB) else fused
+    single = fused
+    if isinstance(fused, GLMB):
+        marginal = marginalise(fused, max_components=1)
+        single = take_hypotheses(marginal, np.flatnonzero(marginal.hyp_log_weights > -np.inf))
     means, covs = track_moments(single.tracks)
     with model_errors():
         means, covs = predict_tracks(

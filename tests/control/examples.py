@@ -1,0 +1,143 @@
+"""Small situations to plan in: a few targets, two or three sensors, beliefs that differ between them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from vedette import models
+from vedette.control import (
+    CauchySchwarzReward,
+    Evaluator,
+    HeadingActions,
+    MobileSensor,
+    PlanningSettings,
+    planning_limits,
+)
+from vedette.densities import GLMB, LMB, TrackTable
+from vedette.filters import DeltaGlmbFilter, LmbFilter
+from vedette.fusion import Clmb, CmDeltaGlmb
+
+Label = tuple[int, int]
+LabelSet = tuple[Label, ...]
+
+A, B, C = (0, 0), (0, 1), (3, 0)
+STATES: dict[Label, list[float]] = {
+    A: [-60.0, 250.0, 8.0, -3.0],
+    B: [180.0, -120.0, -4.0, 9.0],
+    C: [-220.0, -300.0, 0.0, 5.0],
+}
+POSES = np.array([[-500.0, 300.0, 0.2], [-450.0, -350.0, -0.4], [400.0, 350.0, 2.0]])
+STD = np.array([25.0, 25.0, 4.0, 4.0, 0.03])  # of the states above, and of a turn rate
+HEADINGS = (-90.0, 0.0, 45.0)
+EXACT_LIMITS = replace(planning_limits(), max_hypotheses=1_000_000, min_relative_weight=0.0)
+SETTINGS = PlanningSettings(
+    horizon_steps=2, horizon_period=4.0, num_samples=3, max_prior_hypotheses=50, limits=EXACT_LIMITS, num_threads=1
+)
+
+
+def sensor_model(**parts: Any) -> models.SensorModel:
+    """Bearing and range, noise and detection that depend on the distance; any part may be another."""
+    standard = {
+        "measurement": models.bearing_range(),
+        "noise": models.range_dependent_noise(5.0, 5e-5, 0.02, 2e-5),
+        "detection": models.gaussian_detection(500.0),
+        "clutter": models.region_clutter(5.0, models.Region(-1000.0, 1000.0, -1000.0, 1000.0), "bearing_range"),
+    }
+    return models.SensorModel(**(standard | parts))
+
+
+def mobile_sensor(kind: str, speed: float = 30.0, actions: Any = None, dim: int = 4, **parts: Any) -> MobileSensor:
+    """A sensor with a filter of a `kind`: lmb, or else delta-GLMB. dim: 4, or 5 with a turn rate."""
+    build = LmbFilter if kind == "lmb" else DeltaGlmbFilter
+    motion = models.constant_velocity(2.0) if dim == 4 else models.coordinated_turn(2.0, 0.02)
+    birth = models.BirthModel([0.05], np.zeros((1, dim)), [2.0 * np.diag(STD[:dim]) ** 2])
+    local = build(motion, models.constant_survival(0.9), birth, sensor_model(**parts))
+    return MobileSensor(local, speed, HeadingActions(HEADINGS) if actions is None else actions)
+
+
+def mixture(label: Label, num_components: int, dim: int, rng: np.random.Generator) -> tuple[Any, Any, Any]:
+    """A Gaussian mixture near the label's place: weights, means, covariances."""
+    means = np.array([*STATES[label], 0.1])[:dim] + rng.normal(size=(num_components, dim)) * STD[:dim]
+    factors = np.diag(STD[:dim]) @ (np.eye(dim) + 0.2 * rng.normal(size=(num_components, dim, dim)))
+    return rng.dirichlet(np.full(num_components, 3.0)), means, factors @ factors.transpose(0, 2, 1)
+
+
+def glmb(sets: Sequence[LabelSet], rng: np.random.Generator, num_components: int = 1, dim: int = 4) -> GLMB:
+    """One hypothesis a given label set, which may be given more than once; each has tracks of its own."""
+    labels = [label for labels in sets for label in labels]
+    if not labels:
+        return GLMB.empty(dim)
+    tracks = TrackTable.from_mixtures(labels, [mixture(label, num_components, dim, rng) for label in labels])
+    ends = np.cumsum([len(labels) for labels in sets]).tolist()
+    hyps = [list(range(end - len(labels), end)) for end, labels in zip(ends, sets, strict=True)]
+    return GLMB.from_hypotheses(tracks, hyps, rng.dirichlet(np.ones(len(sets))))
+
+
+def lmb(labels: Sequence[Label], rng: np.random.Generator, num_components: int = 1, dim: int = 4) -> LMB:
+    """One track a label, of existence between 0.3 and 0.99."""
+    if not labels:
+        return LMB.empty(dim)
+    tracks = TrackTable.from_mixtures(labels, [mixture(label, num_components, dim, rng) for label in labels])
+    existence = rng.uniform(0.3, 0.99, len(labels))
+    return LMB(tracks, np.log(existence) - np.log1p(-existence))
+
+
+@dataclass(frozen=True)
+class Situation:
+    """What a planner is given."""
+
+    sensors: tuple[MobileSensor, ...]
+    fusion: Any
+    settings: PlanningSettings
+    beliefs: tuple[Any, ...]
+    fused: Any
+    poses: Any
+
+    @property
+    def arguments(self) -> tuple[Any, Any, Any]:
+        """Of `Planner.plan`."""
+        return self.beliefs, self.fused, self.poses
+
+
+# Sensor by sensor: sets and labels that all have, that one lacks, and a label that only one knows.
+_SETS = (
+    ((A, B), (A,), (A, B), (B,), ()),
+    ((A, B), (A,), (A, B, C), (A, B)),
+    ((B,), (A, B), (), (A, B)),
+)
+_LABELS = ((A, B), (A, C), (A, B))
+
+
+def situation(
+    kind: str, num_sensors: int = 2, seed: int = 0, settings: PlanningSettings = SETTINGS, dim: int = 4, **sensor: Any
+) -> Situation:
+    """Beliefs of a `kind`: delta (sets repeat), marginal (sets do not, tracks are mixtures), lmb."""
+    rng = np.random.default_rng(seed)
+    sensors = tuple(mobile_sensor(kind, dim=dim, **sensor) for _ in range(num_sensors))
+    weights = np.arange(2.0, 2.0 + num_sensors)
+    weights /= weights.sum()
+    beliefs: tuple[Any, ...]
+    fusion: Any = Clmb(weights) if kind == "lmb" else CmDeltaGlmb(weights)
+    if kind == "lmb":
+        beliefs = tuple(lmb(labels, rng, 2, dim) for labels in _LABELS[:num_sensors])
+    elif kind == "delta":
+        beliefs = tuple(glmb(sets, rng, 1, dim) for sets in _SETS[:num_sensors])
+    else:
+        beliefs = tuple(glmb(sorted(set(sets)), rng, 2, dim) for sets in _SETS[:num_sensors])
+    return Situation(sensors, fusion, settings, beliefs, fusion.fuse(beliefs)[0], POSES[:num_sensors])
+
+
+def evaluator_of(situation: Situation, reward: Any = None, seed: int = 5) -> Evaluator:
+    """The evaluator of a situation, by default with K = 1."""
+    return Evaluator.prepare(
+        situation.sensors,
+        situation.fusion,
+        situation.settings,
+        CauchySchwarzReward() if reward is None else reward,
+        *situation.arguments,
+        rng=np.random.default_rng(seed),
+    )

@@ -1,0 +1,127 @@
+"""Rewards of a decision by plain loops over the library's public filter, fusion and divergence: the slow oracle."""
+
+from __future__ import annotations
+
+import itertools
+from typing import Any
+
+import numpy as np
+
+from control.examples import Situation
+from vedette import models
+from vedette.control import MobileSensor, PlanningSettings
+from vedette.densities import GLMB, LMB, marginalise, sample_glmb, sample_lmb, track_moments
+from vedette.divergence import cauchy_schwarz, reference_unit_volume
+from vedette.filters import DeltaGlmbFilter, LmbFilter
+
+
+def plain_rewards(situation: Situation, unit_volume: Any, seed: int) -> tuple[Any, list[Any]]:
+    """Joint rewards (num_joint, num_samples), the last sensor's action fastest, and (num_actions, num_samples) of each
+    sensor alone."""
+    settings, num_samples = situation.settings, situation.settings.num_samples
+    motion = situation.sensors[0].filter.motion
+    futures = _draw(situation, np.random.default_rng(seed))
+    updated = [
+        [
+            [
+                _updated(belief, sensor, _path(pose, heading, sensor.speed, settings), *future, sample, settings)
+                for sample in range(num_samples)
+            ]
+            for heading in sensor.actions.headings(pose)
+        ]
+        for belief, sensor, pose, future in zip(
+            situation.beliefs, situation.sensors, situation.poses, futures, strict=True
+        )
+    ]
+    predicted = _predicted(situation.fused, motion, settings)
+    volume = reference_unit_volume(predicted) if unit_volume == "reference" else unit_volume
+
+    def reward(density: Any) -> float:
+        return cauchy_schwarz(predicted, density, unit_volume=volume, support="common")
+
+    alone = [np.array([[reward(density) for density in action] for action in actions]) for actions in updated]
+    joint = [
+        [reward(situation.fusion.fuse([action[m] for action in actions])[0]) for m in range(num_samples)]
+        for actions in itertools.product(*updated)
+    ]
+    return np.array(joint), alone
+
+
+def _draw(situation: Situation, rng: np.random.Generator) -> list[tuple[Any, Any, Any]]:
+    """For each sensor: the states of each sample at each step, and the uniforms and normals of its measurements."""
+    settings, fused = situation.settings, situation.fused
+    draw: Any = sample_glmb if isinstance(fused, GLMB) else sample_lmb
+    samples = draw(fused, settings.num_samples, rng=rng)
+    states, at = [], samples.states
+    for _ in range(settings.horizon_steps):
+        at = situation.sensors[0].filter.motion.propagate(at, settings.horizon_period)
+        states.append([at[samples.offsets[m] : samples.offsets[m + 1]] for m in range(settings.num_samples)])
+    drawn = []
+    for sensor in situation.sensors:
+        shape = settings.horizon_steps, len(at)
+        uniforms = np.split(rng.random(shape), samples.offsets[1:-1], axis=1)
+        normals = rng.standard_normal((*shape, sensor.filter.sensor.meas_dim))
+        drawn.append((states, uniforms, np.split(normals, samples.offsets[1:-1], axis=1)))
+    return drawn
+
+
+def _path(pose: Any, heading: float, speed: float, settings: PlanningSettings) -> list[Any]:
+    away = np.array([np.cos(heading), np.sin(heading)]) * speed * settings.horizon_period
+    return [np.array([*(pose[:2] + (h + 1) * away), heading]) for h in range(settings.horizon_steps)]
+
+
+def _scan(sensor: models.SensorModel, pose: Any, states: Any, uniforms: Any, normals: Any, settings: Any) -> Any:
+    """The ideal measurements of one sample at one step."""
+    probabilities = sensor.detection.prob(states, pose)
+    ideal = settings.ideal_measurements == "ideal"
+    seen = probabilities >= settings.detection_threshold if ideal else uniforms < probabilities
+    scan = sensor.measurement.measure(states[seen], pose)
+    if settings.ideal_measurements == "sampled":
+        factors = np.linalg.cholesky(sensor.noise.covs(states[seen], pose, sensor.meas_dim))
+        scan = scan + np.einsum("nij,nj->ni", factors, normals[seen])
+        angles = sensor.measurement.angular
+        scan[:, angles] = np.arctan2(np.sin(scan[:, angles]), np.cos(scan[:, angles]))
+    return scan
+
+
+def _updated(
+    belief: Any, sensor: MobileSensor, path: Any, states: Any, uniforms: Any, normals: Any, m: int, settings: Any
+) -> Any:
+    """The belief after the pseudo-updates of one sample, one Gaussian a track."""
+    own: Any = sensor.filter
+    kind: Any = LmbFilter if isinstance(belief, LMB) else DeltaGlmbFilter
+    if isinstance(belief, GLMB):
+        belief = _cut(belief, settings.max_prior_hypotheses)
+    immortal = models.constant_survival(1.0), models.BirthModel.none(belief.state_dim)
+    local = kind(own.motion, *immortal, own.sensor, settings.limits)
+    for h, pose in enumerate(path):
+        scan = _scan(own.sensor, pose, states[h][m], uniforms[m][h], normals[m][h], settings)
+        belief, _ = local.step(belief, scan, pose, settings.horizon_period, h, rng=np.random.default_rng(0))
+    return marginalise(belief, max_components=1) if isinstance(belief, GLMB) else belief
+
+
+def _cut(belief: GLMB, most: int) -> GLMB:
+    heaviest = sorted(range(belief.num_hyps), key=lambda h: -belief.hyp_log_weights[h])[:most]
+    hyps = [belief.hyp_tracks[belief.hyp_offsets[h] : belief.hyp_offsets[h + 1]] for h in heaviest]
+    weights = np.exp(belief.hyp_log_weights[heaviest])
+    return GLMB.from_hypotheses(belief.tracks, [hyp.tolist() for hyp in hyps], weights / weights.sum())
+
+
+def _predicted(fused: Any, motion: models.MotionModel, settings: PlanningSettings) -> Any:
+    """The fused belief, one Gaussian a track, after scans of a sensor that never sees anything."""
+    if isinstance(fused, LMB):
+        belief = LMB.from_bernoullis(fused.tracks.labels, fused.existence, *track_moments(fused.tracks))
+    else:
+        belief = marginalise(fused, max_components=1)
+    kind: Any = LmbFilter if isinstance(fused, LMB) else DeltaGlmbFilter
+    blind = models.SensorModel(
+        models.position(),
+        models.constant_noise([1.0, 1.0]),
+        models.constant_detection(0.0),
+        models.measurement_space_clutter(0.0, [-1.0, -1.0], [1.0, 1.0]),
+    )
+    immortal = models.constant_survival(1.0), models.BirthModel.none(fused.state_dim)
+    local = kind(motion, *immortal, blind, settings.limits)
+    for h in range(settings.horizon_steps):
+        belief, _ = local.step(belief, [], np.zeros(3), settings.horizon_period, h, rng=np.random.default_rng(0))
+    return belief

@@ -1,0 +1,205 @@
+"""The tables of rewards, sample by sample, against plain loops over the public filter, fusion and divergence."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from control.examples import (
+    EXACT_LIMITS,
+    SETTINGS,
+    A,
+    B,
+    Situation,
+    evaluator_of,
+    glmb,
+    lmb,
+    mobile_sensor,
+    situation,
+)
+from control.plain_loop import plain_rewards
+from vedette import models
+from vedette.control import CauchySchwarzReward, HeadingActions
+from vedette.control.plain import PlainRewards, can_be_laid_out
+from vedette.control.search import all_joint_actions
+from vedette.densities import GLMB, LMB
+from vedette.fusion import Clmb, CmDeltaGlmb, FusionLimits
+
+SEED = 5
+
+
+@models.model_function("prob_detection")
+def certain(state: Any, pose: Any, params: Any) -> float:
+    return 1.0
+
+
+def assert_equals_plain_loop(example: Situation, unit_volume: Any = 1.0, *, laid_out: bool = True) -> Any:
+    """Joint and independent tables are those of the plain loop, by the path expected; returns the joint one."""
+    joint, alone = plain_rewards(example, unit_volume, SEED)
+    evaluator = evaluator_of(example, CauchySchwarzReward(unit_volume), SEED)
+    assert can_be_laid_out(evaluator.posteriors, evaluator.prediction, example.fusion, evaluator.reward) == laid_out
+    everyone = range(len(example.sensors))
+    np.testing.assert_allclose(evaluator.sample_rewards(everyone, example.fusion), joint, rtol=1e-9, atol=1e-9)
+    for s, expected in enumerate(alone):
+        np.testing.assert_allclose(evaluator.sample_rewards((s,), None), expected, rtol=1e-9, atol=1e-9)
+    assert np.ptp(joint, axis=0).max() > 0.01
+    return joint
+
+
+@pytest.mark.parametrize("kind", ["delta", "marginal", "lmb"])
+@pytest.mark.parametrize(
+    ("num_sensors", "mode", "unit_volume"),
+    [(2, "ideal", 1.0), (3, "ideal", "reference"), (2, "expected", 1e6), (2, "sampled", "reference")],
+)
+def test_tables_equal_the_plain_loop(kind: str, num_sensors: int, mode: Any, unit_volume: Any) -> None:
+    settings = replace(SETTINGS, ideal_measurements=mode, num_threads=2)
+    assert_equals_plain_loop(situation(kind, num_sensors, settings=settings), unit_volume)
+
+
+@pytest.mark.parametrize("kind", ["marginal", "lmb"])
+def test_a_turning_motion(kind: str) -> None:
+    assert_equals_plain_loop(situation(kind, dim=5, seed=1), "reference")
+
+
+@pytest.mark.parametrize("kind", ["delta", "lmb"])
+def test_sensors_of_other_kinds_speeds_and_actions(kind: str) -> None:
+    sensors = (
+        mobile_sensor(
+            kind,
+            speed=10.0,
+            actions=HeadingActions((20.0,)),
+            measurement=models.bearing_only(),
+            noise=models.range_dependent_noise(sigma_bearing=0.01, eta_bearing=1e-5),
+            clutter=models.measurement_space_clutter(2.0, [-np.pi], [np.pi]),
+            method="ukf",
+        ),
+        mobile_sensor(
+            kind,
+            speed=60.0,
+            actions=HeadingActions((-30.0, 30.0, 90.0, 180.0), relative=True),
+            measurement=models.position(),
+            noise=models.constant_noise([10.0, 20.0]),
+            detection=models.limited_range(0.9, 800.0),
+            clutter=models.measurement_space_clutter(3.0, [-2000.0, -2000.0], [2000.0, 2000.0]),
+            method="ckf",
+        ),
+        mobile_sensor(kind, actions=HeadingActions((0.0, 120.0))),
+    )
+    settings = replace(SETTINGS, ideal_measurements="sampled")
+    joint = assert_equals_plain_loop(replace(situation(kind, 3, settings=settings), sensors=sensors), "reference")
+    assert joint.shape == (1 * 4 * 2, SETTINGS.num_samples)
+
+
+def test_only_the_heaviest_prior_hypotheses_are_updated() -> None:
+    example = situation("delta", settings=replace(SETTINGS, max_prior_hypotheses=2))
+    assert_equals_plain_loop(example, "reference")
+
+
+def test_caps_of_the_pseudo_updates_are_the_filters_own() -> None:
+    # One label set, so that none needs to be kept beyond the caps.
+    rng = np.random.default_rng(2)
+    limits = replace(EXACT_LIMITS, max_hypotheses=3, min_relative_weight=1e-3, gate_probability=0.9)
+    example = situation("delta", settings=replace(SETTINGS, limits=limits))
+    beliefs = (glmb([(A, B)] * 4, rng), glmb([(A, B)] * 3, rng))
+    example = replace(example, beliefs=beliefs, fused=example.fusion.fuse(beliefs)[0])
+    capped = assert_equals_plain_loop(example, "reference")
+    free = evaluator_of(replace(example, settings=SETTINGS), CauchySchwarzReward("reference"), SEED)
+    assert not np.allclose(free.sample_rewards((0, 1), example.fusion), capped, rtol=1e-6)
+
+
+def test_an_lmb_keeps_all_its_labels() -> None:
+    example = situation("lmb")
+    expected = evaluator_of(example).sample_rewards((0, 1), example.fusion)
+    few = replace(example, settings=replace(SETTINGS, limits=replace(EXACT_LIMITS, max_labels=1)))
+    np.testing.assert_array_equal(evaluator_of(few).sample_rewards((0, 1), example.fusion), expected)
+
+
+@pytest.mark.parametrize("kind", ["delta", "marginal", "lmb"])
+def test_label_sets_that_certain_detection_rules_out(kind: str) -> None:
+    example = situation(kind, seed=3, detection=models.DetectionModel(certain))
+    assert_equals_plain_loop(example, laid_out=False)
+
+
+@pytest.mark.parametrize("kind", ["delta", "lmb"])
+@pytest.mark.parametrize(
+    ("changed", "laid_out"),
+    [
+        ({"mixture_power": "component_wise"}, False),
+        ({"mixture_power": "quadrature"}, False),
+        ({"weights": (0.0, 1.0)}, False),
+        ({"limits": FusionLimits(max_hyps=3)}, False),
+        ({"limits": FusionLimits(max_hyps=8)}, True),
+    ],
+)
+def test_fusions_of_all_sorts(kind: str, changed: dict[str, Any], laid_out: bool) -> None:
+    if kind == "lmb" and "limits" in changed:
+        pytest.skip("an LMB has no hypotheses to cap")
+    example = situation(kind)
+    assert_equals_plain_loop(replace(example, fusion=replace(example.fusion, **changed)), laid_out=laid_out)
+
+
+@pytest.mark.parametrize("kind", ["marginal", "lmb"])
+def test_powers_of_single_gaussians_are_exact(kind: str) -> None:
+    example, rng = situation(kind), np.random.default_rng(4)
+    beliefs: Any
+    if kind == "lmb":
+        beliefs = lmb((A, B), rng), lmb((A, B), rng)
+    else:
+        beliefs = glmb([(), (A,), (A, B)], rng), glmb([(), (A,), (A, B)], rng)
+    fusion = replace(example.fusion, mixture_power="component_wise")
+    example = replace(example, beliefs=beliefs, fusion=fusion, fused=fusion.fuse(beliefs)[0])
+    assert_equals_plain_loop(example, laid_out=True)
+
+
+def test_glmbs_may_be_fused_to_an_lmb() -> None:
+    example = situation("delta")
+    fusion = Clmb((0.4, 0.6))
+    example = replace(example, fusion=fusion, fused=fusion.fuse(example.beliefs)[0])
+    assert isinstance(example.fused, LMB)
+    joint, _ = plain_rewards(example, 1.0, SEED)
+    np.testing.assert_allclose(evaluator_of(example).sample_rewards((0, 1), fusion), joint, rtol=1e-9, atol=1e-9)
+
+
+def test_a_prediction_may_have_sets_of_weight_zero() -> None:
+    example = situation("marginal")
+    fused = example.fused
+    log_weights = fused.hyp_log_weights.copy()
+    log_weights[0] = -np.inf
+    log_weights -= np.logaddexp.reduce(log_weights)
+    fused = GLMB(fused.tracks, fused.hyp_offsets, fused.hyp_tracks, log_weights)
+    assert_equals_plain_loop(replace(example, fused=fused), "reference")
+
+
+@pytest.mark.parametrize("kind", ["marginal", "lmb"])
+@pytest.mark.parametrize("num_sensors", [1, 2, 3])
+def test_the_general_path_gives_the_same_rewards(kind: str, num_sensors: int) -> None:
+    example = situation(kind, num_sensors)
+    evaluator = evaluator_of(example)
+    for which, fusion in ((tuple(range(num_sensors)), example.fusion), ((0,), None)):
+        actions = all_joint_actions(tuple(evaluator.joint_shape()[s] for s in which))
+        posteriors = [evaluator.posteriors[s] for s in which]
+        general = PlainRewards(posteriors, evaluator.prediction, fusion, evaluator.reward, SETTINGS.num_samples)
+        laid_out = evaluator.rewards(which, fusion)
+        np.testing.assert_allclose(laid_out(actions), general(actions), rtol=1e-9, atol=1e-9)
+
+
+def test_a_subclass_is_asked_itself() -> None:
+    class Doubled(CauchySchwarzReward):
+        def __call__(self, predicted: Any, updated: Any) -> float:
+            return 2.0 * CauchySchwarzReward.__call__(self, predicted, updated)
+
+    class Fused(CmDeltaGlmb):
+        def fuse(self, beliefs: Any) -> Any:
+            return CmDeltaGlmb((1.0,)).fuse(beliefs[:1])
+
+    example = situation("marginal")
+    evaluator = evaluator_of(example)
+    expected = evaluator.sample_rewards((0, 1), example.fusion)
+    doubled = evaluator_of(example, Doubled())
+    np.testing.assert_allclose(doubled.sample_rewards((0, 1), example.fusion), 2.0 * expected, rtol=1e-9, atol=1e-9)
+    fused = evaluator.sample_rewards((0, 1), Fused((0.5, 0.5)))
+    first = evaluator.sample_rewards((0,), None)
+    np.testing.assert_allclose(fused, np.repeat(first, 3, axis=0), rtol=1e-9, atol=1e-9)
