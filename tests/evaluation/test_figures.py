@@ -113,6 +113,24 @@ def test_heat_map_of_any_pair_of_three_sensors() -> None:
         assert upper.get_xlabel() == f"Heading of sensor {pair[0] + 1} (deg)"
 
 
+def test_what_a_search_did_not_evaluate_is_left_blank() -> None:
+    decision = plan("jdm", 3)
+    gaps = np.ones(decision.tables[0].mean.shape, bool)
+    gaps[decision.chosen[0], :, decision.chosen[2]] = False
+    gaps[:, decision.chosen[1], decision.chosen[2]] = False
+    mean, error = (
+        np.where(gaps, np.nan, values) for values in (decision.tables[0].mean, decision.tables[0].standard_error)
+    )
+    decision = replace(decision, tables=(replace(decision.tables[0], mean=mean, standard_error=error),))
+    upper, lower, _ = reward_figure(decision).axes
+    np.testing.assert_array_equal(upper.images[0].get_array(), mean[:, :, decision.chosen[2]].T)
+    line = np.asarray(lower.lines[0].get_ydata())
+    np.testing.assert_array_equal(line, np.nanmax(mean, axis=(1, 2)))
+    assert np.isfinite(lower.lines[2].get_ydata()).all()  # type: ignore[arg-type]
+    third = np.asarray(lower.lines[4].get_ydata())
+    np.testing.assert_array_equal(np.isfinite(third), np.arange(len(third)) == decision.chosen[2])
+
+
 @pytest.mark.parametrize("pair", [(0, 0), (0, 2), (-1, 0)])
 def test_heat_map_refuses_what_is_no_pair(pair: tuple[int, int]) -> None:
     with pytest.raises(InputError, match="pair: expected two of the sensors"):

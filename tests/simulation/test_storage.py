@@ -58,6 +58,20 @@ def test_awkward_numbers_read_back(tmp_path: Path) -> None:
     assert_same(load_run(save_run(record, tmp_path / "run")), record)
 
 
+def test_tables_with_gaps_read_back(tmp_path: Path) -> None:
+    record = make_record()
+    decision = record.decisions[0]
+    table = decision.plan.tables[0]
+    gaps = np.arange(table.mean.shape[0]) != decision.plan.chosen[0]
+    mean, error = table.mean.copy(), table.standard_error.copy()
+    mean[gaps], error[gaps] = np.nan, np.nan
+    plan = replace(decision.plan, tables=(replace(table, mean=mean, standard_error=error),))
+    record = replace(record, decisions=(replace(decision, plan=plan),))
+    save_run(record, tmp_path / "run")
+    assert_same(load_run(tmp_path / "run"), record)
+    assert "null" in (tmp_path / "run" / "decisions.json").read_text()
+
+
 def test_runs_without_any_target_estimate_or_scan_read_back(tmp_path: Path) -> None:
     record = make_record("fixed")
     nothing = Estimate(np.empty((0, 2), np.int64), np.empty((0, 4)), np.empty((0, 4, 4)), np.empty(0))

@@ -14,7 +14,7 @@ from vedette.control.plain import PlainRewards, can_be_laid_out
 from vedette.control.priors import predicted
 from vedette.control.pseudo import PseudoPosteriors, draw_futures, pseudo_posteriors
 from vedette.control.reward import CauchySchwarzReward, Reward
-from vedette.control.search import all_joint_actions
+from vedette.control.search import all_joint_actions, first_best
 from vedette.control.settings import MobileSensor, PlanningSettings
 from vedette.control.tables import fused_rewards
 from vedette.densities import LMB
@@ -123,7 +123,7 @@ class Evaluator:
     def independent_choice(self) -> tuple[int, ...]:
         """The direction that is best for each sensor alone (paper, Algorithm 3); of equal ones the first."""
         everyone = range(len(self.sensors))
-        return tuple(int(self.sample_rewards((s,), None).mean(axis=1).argmax()) for s in everyone)
+        return tuple(first_best(self.sample_rewards((s,), None).mean(axis=1)) for s in everyone)
 
     def _check_finite(self, which: Sequence[int], actions: Ints, rewards: Floats) -> None:
         bad = np.argwhere(~np.isfinite(rewards))

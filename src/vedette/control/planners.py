@@ -14,7 +14,7 @@ from vedette.control.evidence import Evidence
 from vedette.control.inputs import Belief, check_choice, check_headings, check_poses
 from vedette.control.plan import Plan, RewardTable
 from vedette.control.reward import CauchySchwarzReward, Reward
-from vedette.control.search import ExhaustiveSearch, JointProblem, JointSearch, all_joint_actions
+from vedette.control.search import ExhaustiveSearch, JointProblem, JointSearch, all_joint_actions, first_best
 from vedette.control.settings import MobileSensor, PlanningSettings
 from vedette.fusion import Fusion
 from vedette.kernels.types import Floats
@@ -57,6 +57,8 @@ class JointPlanner:
 
     def plan(self, beliefs: Sequence[Belief], fused: Belief, poses: Floats, *, rng: np.random.Generator) -> Plan:
         """The joint action of largest mean reward that the search finds; of equal ones the first in printed order.
+
+        Rewards are equal within 1e-9, relative to the best or to 1.
 
         Args:
             beliefs: local posterior of each sensor, as its filter left it.
@@ -106,7 +108,7 @@ class IndependentPlanner:
         tables: list[RewardTable] = []
         for s, num_directions in enumerate(evaluator.joint_shape()):
             evidence = Evidence(evaluator, (s,), evaluator.rewards((s,), None))
-            best = int(evidence.evaluate(all_joint_actions((num_directions,))).argmax())
+            best = first_best(evidence.evaluate(all_joint_actions((num_directions,))))
             chosen.append(evaluator.first_heading(s, best))
             tables.extend(evidence.tables((best,)))
         return Plan(self.name, evaluator.headings, tuple(chosen), tuple(tables), dict(evaluator.counts))

@@ -14,6 +14,19 @@ from vedette.kernels.types import Floats, Ints
 from vedette.models.arguments import dimension
 
 
+# Rewards nearer than this, relative to the best or to 1, are equal: rounding tells them apart, not what they are worth.
+_TIE = 1e-9
+
+
+def first_best(rewards: Floats) -> int:
+    """The first of the largest rewards; those within 1e-9 of the largest, relative to it or to 1, are equal to it.
+
+    In a symmetric layout mirrored actions differ by rounding only; the decision must not hang on that (paper-notes 18).
+    """
+    best = float(rewards.max())
+    return int(np.argmax(rewards >= best - _TIE * max(1.0, abs(best))))
+
+
 class JointProblem(NamedTuple):
     """What a search may ask for. An action is a number, in printed order, among a sensor's different directions.
 
@@ -57,7 +70,7 @@ class ExhaustiveSearch:
                 f"joint actions: expected at most {self.max_joint_actions} for an exhaustive search; got {sizes} = "
                 f"{num_joint}; allow more, or search by CoordinateAscent"
             )
-        best = int(problem.evaluate(all_joint_actions(problem.shape)).argmax())
+        best = first_best(problem.evaluate(all_joint_actions(problem.shape)))
         return tuple(int(action) for action in np.unravel_index(best, problem.shape))
 
 
@@ -79,12 +92,13 @@ class CoordinateAscent:
             dimension("num_restarts", self.num_restarts)
 
     def search(self, problem: JointProblem, *, rng: np.random.Generator) -> tuple[int, ...]:
-        """The best end of all ascents; of equal ones the first in printed order."""
+        """The best of all ascents; of equal ones that were evaluated the first in printed order."""
         known = _Known(problem)
-        ends = [_ascend(known, problem.independent())]
+        _ascend(known, problem.independent())
         for _ in range(self.num_restarts):
-            ends.append(_ascend(known, tuple(int(action) for action in rng.integers(problem.shape))))
-        return min(ends, key=lambda end: (-known.values[end], end))
+            _ascend(known, tuple(int(action) for action in rng.integers(problem.shape)))
+        evaluated = sorted(known.values)
+        return evaluated[first_best(np.array([known.values[joint] for joint in evaluated]))]
 
 
 @dataclass(slots=True)
@@ -105,15 +119,14 @@ class _Known:
         return joint_actions
 
 
-def _ascend(known: _Known, start: tuple[int, ...]) -> tuple[int, ...]:
-    """The end of one ascent. Along a line the first of equal actions is taken, so that no ascent goes in circles."""
+def _ascend(known: _Known, start: tuple[int, ...]) -> None:
+    """One ascent. Along a line the first of the largest is taken, to the last digit, so that none goes in circles."""
     at, settled, sensor, num_sensors = start, 0, 0, len(start)
     while settled < num_sensors:
         line = known.line(at, sensor)
         best = max(line, key=known.values.__getitem__)
         settled = settled + 1 if best == at else 1
         at, sensor = best, (sensor + 1) % num_sensors
-    return at
 
 
 def all_joint_actions(shape: tuple[int, ...]) -> Ints:

@@ -160,12 +160,19 @@ def _encode_decision(decision: Decision) -> dict[str, Any]:
         "reward_tables": [
             {
                 "sensors": [int(sensor) for sensor in table.sensors],
-                "mean": table.mean.tolist(),
-                "standard_error": table.standard_error.tolist(),
+                "mean": _with_gaps(table.mean),
+                "standard_error": _with_gaps(table.standard_error),
             }
             for table in plan.tables
         ],
     }
+
+
+def _with_gaps(values: Floats) -> Any:
+    """Nested lists, null where there is no number."""
+    numbers = values.astype(object)
+    numbers[np.isnan(values)] = None
+    return numbers.tolist()
 
 
 def _decode_decision(entry: Mapping[str, Any]) -> Decision:

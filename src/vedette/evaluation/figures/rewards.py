@@ -29,7 +29,8 @@ def reward_figure(plan: Plan, *, pair: tuple[int, int] = (0, 1)) -> Figure:
 
     A plan made independently has its curves as they are. A joint plan has above them a heat map of the joint table with
     the chosen actions framed; its curves are the most that a sensor's action can bring with the best actions of the
-    others. With more than two sensors the heat map is likewise the maximum over the sensors outside `pair`.
+    others. With more than two sensors the heat map is likewise the maximum over the sensors outside `pair`. What a
+    search did not evaluate is left blank.
 
     Args:
         plan: with reward tables.
@@ -91,7 +92,7 @@ def _best_over_others(table: RewardTable, axis: int) -> tuple[Floats, Floats]:
     """For each action on `axis`, the largest mean over all other axes, and the standard error of that entry."""
     mean = np.moveaxis(table.mean, axis, 0).reshape(table.mean.shape[axis], -1)
     error = np.moveaxis(table.standard_error, axis, 0).reshape(mean.shape)
-    best = mean.argmax(axis=1)
+    best = np.where(np.isnan(mean), -np.inf, mean).argmax(axis=1)
     rows = np.arange(len(mean))
     return mean[rows, best], error[rows, best]
 
@@ -101,7 +102,7 @@ def _draw_heat_map(figure: Figure, axes: Axes, plan: Plan, table: RewardTable, p
         raise InputError(f"pair: expected two of the sensors {table.sensors}; got {pair}")
     positions = [table.sensors.index(sensor) for sensor in pair]
     others = tuple(axis for axis in range(table.mean.ndim) if axis not in positions)
-    reward = table.mean.max(axis=others)
+    reward = np.fmax.reduce(table.mean, axis=others) if others else table.mean
     if positions[0] > positions[1]:
         reward = reward.T
     image = axes.imshow(reward.T, origin="lower", cmap=HEAT_MAP, aspect="auto", interpolation="nearest")
