@@ -34,7 +34,9 @@ def scored(scenario: Scenario, runs: Mapping[str, Sequence[RunRecord]]) -> Compa
 def check_target(folder: Path) -> None:
     """`InputError` unless the folder is new, empty, or an earlier reproduction, which may be replaced."""
     if folder.is_file() or (folder.is_dir() and any(folder.iterdir()) and not (folder / MARK).is_file()):
-        raise InputError(f"{folder}: expected a new folder or an earlier reproduction; it holds something else and is kept")
+        raise InputError(
+            f"{folder}: expected a new folder or an earlier reproduction; it holds something else and is kept"
+        )
 
 
 def typical_run(comparison: Comparison, records: Sequence[RunRecord]) -> RunRecord:

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import signal
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import replace
 from functools import partial
 from multiprocessing import get_context
 
 from vedette.control import IndependentPlanner, JointPlanner, Planner
+from vedette.errors import VedetteError
 from vedette.evaluation.metrics import ospa_of_run
 from vedette.scenarios import Scenario
 from vedette.scenarios.build import build_filters, build_planner
@@ -62,22 +65,39 @@ def run_paired(
     """
     tasks = [(planner, run) for run in range(num_runs) for planner in planners]
     records: dict[tuple[str, int], RunRecord] = {}
-    if num_workers <= 1:
-        for planner, run in tasks:
-            records[planner, run] = run_scenario(scenario, planner, seed=seed, run=run, num_threads=1)
-            progress(records[planner, run])
-    else:
-        # Spawned, not forked: a forked child would inherit the locks of threads that it does not have.
-        with ProcessPoolExecutor(num_workers, mp_context=get_context("spawn")) as pool:
-            pending = {
-                pool.submit(run_scenario, scenario, planner, seed=seed, run=run, num_threads=1): (planner, run)
-                for planner, run in tasks
-            }
-            try:
-                for done in as_completed(pending):
-                    records[pending[done]] = done.result()
-                    progress(records[pending[done]])
-            except BaseException:
-                pool.shutdown(wait=False, cancel_futures=True)
-                raise
+    # The first run is this process's own even then, so that kernels are compiled once and not once a worker.
+    here, shared = (tasks, []) if num_workers <= 1 else (tasks[:1], tasks[1:])
+    for planner, run in here:
+        records[planner, run] = run_scenario(scenario, planner, seed=seed, run=run, num_threads=1)
+        progress(records[planner, run])
+    if shared:
+        for task, record in _shared_runs(scenario, shared, seed, num_workers):
+            records[task] = record
+            progress(record)
     return {planner: [records[planner, run] for run in range(num_runs)] for planner in planners}
+
+
+def _shared_runs(
+    scenario: Scenario, tasks: Sequence[tuple[str, int]], seed: int, num_workers: int
+) -> Iterator[tuple[tuple[str, int], RunRecord]]:
+    """Each task and its record, in the order of finishing."""
+    # Spawned, not forked: a forked child would inherit the locks of threads that it does not have.
+    with ProcessPoolExecutor(num_workers, mp_context=get_context("spawn"), initializer=_leave_interrupts) as pool:
+        pending = {
+            pool.submit(run_scenario, scenario, planner, seed=seed, run=run, num_threads=1): (planner, run)
+            for planner, run in tasks
+        }
+        try:
+            for done in as_completed(pending):
+                yield pending[done], done.result()
+        except BrokenProcessPool:
+            raise VedetteError(
+                "a worker process died (out of memory?); nothing was lost but the runs of this call"
+            ) from None
+        finally:
+            pool.shutdown(wait=False, cancel_futures=True)
+
+
+def _leave_interrupts() -> None:
+    """Ctrl-C is for the main process, which then stops the workers."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
