@@ -1,0 +1,107 @@
+"""What goes into a decision: samples, ideal measurements, label sets kept beyond the caps."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from control.examples import EXACT_LIMITS, POSES, SETTINGS, evaluator_of, mobile_sensor, situation
+from vedette import models
+from vedette.control.priors import label_sets
+from vedette.control.pseudo import draw_futures, pseudo_posteriors
+from vedette.densities import GLMB, sample_glmb
+from vedette.filters import DeltaGlmbFilter
+from vedette.models.platforms import advance
+
+
+def test_every_label_set_keeps_its_heaviest_hypothesis_beyond_the_caps() -> None:
+    """With room for one hypothesis only, each label set goes its own way as under a filter with room for one."""
+    limits = replace(EXACT_LIMITS, max_hypotheses=1)
+    example = situation("delta", seed=1, settings=replace(SETTINGS, limits=limits))
+    evaluator = evaluator_of(example)
+    for belief, sensor, pose, own in zip(
+        example.beliefs, example.sensors, example.poses, evaluator.posteriors, strict=True
+    ):
+        sets, groups = label_sets(belief)
+        assert set(own.sets) == set(sets)
+        rng = np.random.default_rng(5)
+        (futures, *_) = draw_futures(example.fused, example.sensors, example.settings, rng=rng)
+        for case, (heading, sample) in enumerate(np.ndindex(len(sensor.actions.headings(pose)), SETTINGS.num_samples)):
+            angle = float(sensor.actions.headings(pose)[heading])
+            weights, start = {}, 0
+            for group, labels in enumerate(sets):
+                hyps = np.flatnonzero(groups == group)
+                log_weight, end = _alone(belief, hyps, sensor, pose, angle, futures, sample, limits)
+                weights[labels] = log_weight
+                place = own.sets.index(labels)
+                start = sum(len(other) for other in own.sets[:place])
+                np.testing.assert_allclose(own.means[case, start : start + len(labels)], end.tracks.means, rtol=1e-9)
+            total = np.logaddexp.reduce(list(weights.values()))
+            expected = [weights[labels] - total for labels in own.sets]
+            np.testing.assert_allclose(own.log_weights[case], expected, rtol=1e-9, atol=1e-9)
+
+
+def _alone(
+    belief: GLMB, hyps: Any, sensor: Any, pose: Any, heading: float, futures: Any, sample: int, limits: Any
+) -> tuple[float, GLMB]:
+    """Log weight and end of one label set's hypotheses, followed by a filter of their own."""
+    own = sensor.filter
+    local = DeltaGlmbFilter(own.motion, models.constant_survival(1.0), models.BirthModel.none(4), own.sensor, limits)
+    chosen = [belief.hyp_tracks[belief.hyp_offsets[h] : belief.hyp_offsets[h + 1]].tolist() for h in hyps]
+    total = float(np.logaddexp.reduce(belief.hyp_log_weights[hyps]))
+    at = GLMB.from_hypotheses(belief.tracks, chosen, np.exp(belief.hyp_log_weights[hyps] - total))
+    targets = slice(futures.offsets[sample], futures.offsets[sample + 1])
+    for h in range(SETTINGS.horizon_steps):
+        pose = advance(pose, heading, sensor.speed, SETTINGS.horizon_period)
+        states = futures.states[h, targets]
+        seen = own.sensor.detection.prob(states, pose) >= SETTINGS.detection_threshold
+        scan = own.sensor.measurement.measure(states[seen], pose)
+        at, info = local.step(at, scan, pose, SETTINGS.horizon_period, h, rng=np.random.default_rng(0))
+        total += info.log_likelihood
+    return total, at
+
+
+def test_all_sensors_are_told_of_the_same_targets() -> None:
+    example = situation("delta", 3)
+    futures = draw_futures(example.fused, example.sensors, SETTINGS, rng=np.random.default_rng(9))
+    samples = sample_glmb(example.fused, SETTINGS.num_samples, rng=np.random.default_rng(9))
+    for one in futures:
+        np.testing.assert_array_equal(one.offsets, samples.offsets)
+        np.testing.assert_array_equal(one.states, futures[0].states)
+    assert not np.array_equal(futures[0].uniforms, futures[1].uniforms)
+    # No noise on the way.
+    moved = samples.states.copy()
+    for states in futures[0].states:
+        moved[:, :2] += SETTINGS.horizon_period * moved[:, 2:]
+        np.testing.assert_allclose(states, moved)
+
+
+@pytest.mark.parametrize("kind", ["marginal", "lmb"])
+@pytest.mark.parametrize("mode", ["ideal", "expected", "sampled"])
+def test_an_action_is_updated_alike_whatever_the_others_are(kind: str, mode: Any) -> None:
+    settings = replace(SETTINGS, ideal_measurements=mode)
+    example = situation(kind, settings=settings)
+    (futures, *_) = draw_futures(example.fused, example.sensors, settings, rng=np.random.default_rng(2))
+    given = example.beliefs[0], example.sensors[0], example.poses[0]
+    together = pseudo_posteriors(*given, np.array([0.0, 1.0, -2.0]), futures, settings)
+    alone = pseudo_posteriors(*given, np.array([1.0]), futures, settings)
+    cases = slice(SETTINGS.num_samples, 2 * SETTINGS.num_samples)
+    for several, one in zip(together[1:4], alone[1:4], strict=True):
+        np.testing.assert_array_equal(several[cases], one)
+
+
+@pytest.mark.parametrize("mode", ["ideal", "expected"])
+def test_a_target_is_seen_with_or_above_its_detection_probability(mode: Any) -> None:
+    """Existence rises where the one target is seen, and falls where it is not."""
+    settings = replace(SETTINGS, ideal_measurements=mode, num_samples=40, detection_threshold=0.6, horizon_steps=1)
+    for probability, share in ((0.55, {"ideal": 0.0, "expected": 0.55}), (0.65, {"ideal": 1.0, "expected": 0.65})):
+        sensor = mobile_sensor("lmb", detection=models.constant_detection(probability))
+        example = situation("lmb", settings=settings)
+        certain = type(example.fused)(example.fused.tracks, np.full(example.fused.tracks.num_tracks, 40.0))
+        (futures,) = draw_futures(certain, (sensor,), settings, rng=np.random.default_rng(0))
+        own = pseudo_posteriors(example.beliefs[0], sensor, POSES[0], np.zeros(1), futures, settings)
+        rose = own.log_weights > example.beliefs[0].existence_logit
+        assert abs(rose.mean() - share[mode]) < 0.15
