@@ -1,0 +1,92 @@
+"""The commands that simulate."""
+
+from __future__ import annotations
+
+import pytest
+from typer.testing import CliRunner
+
+from vedette.cli import app
+from vedette.scenarios import list_builtin
+from vedette.simulation.storage import load_run
+
+
+@pytest.fixture
+def scenario_file(tmp_path):
+    text = list_builtin()["paper-e"].read_text(encoding="utf-8")
+    for old, new in (
+        ("num_steps: 40", "num_steps: 10"),
+        ("decision_steps: [10, 20, 30]", "decision_steps: [8]"),
+        ("num_samples: 40", "num_samples: 2"),
+        ("from_step: 11, to_step: 40", "from_step: 9, to_step: 10"),
+    ):
+        text = text.replace(old, new)
+    path = tmp_path / "short.yaml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def call(*arguments):
+    return CliRunner().invoke(app, [str(argument) for argument in arguments])
+
+
+def test_run_prints_and_saves(scenario_file, tmp_path):
+    out = tmp_path / "results"
+    result = call("run", scenario_file, "--planner", "jdm", "--seed", 4, "--out", out)
+    assert result.exit_code == 0, result.output
+    assert "mean OSPA" in result.output
+    assert load_run(out).seed == 4
+    assert (out / "figures" / "tracks.pdf").exists()
+    assert (out / "figures" / "rewards-8s.png").exists()
+    again = call("run", scenario_file, "--planner", "idm", "--out", out)
+    assert again.exit_code == 1
+    assert "exists" in again.output
+    assert load_run(out).planner == "jdm"
+    replaced = call("run", scenario_file, "--planner", "idm", "--out", out, "--overwrite")
+    assert replaced.exit_code == 0, replaced.output
+    assert load_run(out).planner == "idm"
+
+
+def test_run_without_a_folder_writes_nothing(scenario_file, tmp_path):
+    assert call("run", scenario_file, "--planner", "random").exit_code == 0
+    assert [path.name for path in tmp_path.iterdir()] == ["short.yaml"]
+
+
+def test_reproduce(scenario_file, tmp_path):
+    out = tmp_path / "all"
+    result = call("reproduce", scenario_file, "--runs", 2, "--planners", "idm,still", "--workers", 1, "--out", out)
+    assert result.exit_code == 0, result.output
+    assert "idm at 8 s" in result.output
+    assert sorted(path.name for path in (out / "runs").iterdir()) == [
+        "idm-0000",
+        "idm-0001",
+        "still-0000",
+        "still-0001",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status", "message"),
+    [
+        (("run", "paper-z"), 1, "paper-z"),
+        (("run", "paper-a", "--planner", "clever"), 2, "jdm, idm, random, fixed, still"),
+        (("reproduce", "--planners", "jdm,jdm"), 2, "each strategy once"),
+        (("reproduce", "--runs", "0"), 2, "--runs"),
+        (("run", "paper-a", "--seed", "-1"), 2, "--seed"),
+    ],
+)
+def test_mistakes(arguments, status, message):
+    result = call(*arguments)
+    assert result.exit_code == status
+    assert message in result.output
+    assert "Traceback" not in result.output
+
+
+def test_a_folder_of_someone_elses_is_kept(scenario_file, tmp_path):
+    precious = tmp_path / "thesis"
+    precious.mkdir()
+    (precious / "a.tex").write_text("x")
+    for arguments in (("run", scenario_file), ("reproduce", scenario_file, "--runs", 1)):
+        result = call(*arguments, "--out", precious)
+        assert result.exit_code == 1
+        assert "kept" in result.output or "exists" in result.output
+    assert [path.name for path in precious.iterdir()] == ["a.tex"]

@@ -1,0 +1,102 @@
+"""The loop: what a run records, and that its random numbers are those of its seed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from vedette.control import FixedPlanner, RandomPlanner
+from vedette.errors import InputError
+from vedette.models.platforms import advance
+from vedette.scenarios import load_scenario
+from vedette.scenarios.build import build_experiment
+from vedette.simulation.loop import simulate
+
+
+def no_score(truth, estimates):
+    return np.zeros((truth.num_scans, 3))
+
+
+@pytest.fixture(scope="module")
+def shortened():
+    """paper-e, fourteen scans, one decision."""
+    whole = build_experiment(load_scenario("paper-e"))
+    return replace(whole, times=whole.times[:14], decision_steps=(10,))
+
+
+def run(experiment, planner, **overrides):
+    return simulate(experiment, planner, **{"seed": 3, "run": 0, "score": no_score, **overrides})
+
+
+def test_without_a_planner_sensors_never_move(shortened):
+    record = run(shortened, None)
+    np.testing.assert_array_equal(record.poses, np.broadcast_to(shortened.poses, record.poses.shape))
+    assert record.planner == "still"
+    assert record.decisions == ()
+    assert len(record.estimates) == record.num_scans == 14
+
+
+def test_sensors_lie_still_until_the_first_decision_and_then_keep_its_course(shortened):
+    record = run(shortened, FixedPlanner((-30.0, 45.0)))
+    (decision,) = record.decisions
+    assert (decision.step, decision.time) == (10, 10.0)
+    np.testing.assert_array_equal(record.poses[9], shortened.poses)
+    speeds = np.array([sensor.speed for sensor in shortened.sensors])
+    for later in range(10, 14):
+        expected = advance(shortened.poses, np.radians([-30.0, 45.0]), speeds, later - 9.0)
+        np.testing.assert_allclose(record.poses[later], expected, atol=1e-9)
+
+
+def test_a_sensor_may_be_under_way_from_the_start(shortened):
+    record = run(replace(shortened, moving=np.array([True, False])), FixedPlanner((0.0, 0.0)))
+    assert record.poses[1, 0, 0] == pytest.approx(shortened.poses[0, 0] + shortened.sensors[0].speed)
+    np.testing.assert_array_equal(record.poses[1, 1], shortened.poses[1])
+
+
+def test_equal_seeds_give_equal_runs_and_other_run_numbers_other_ones(shortened):
+    first, again, other = run(shortened, None), run(shortened, None), run(shortened, None, run=1)
+    for mine, same in zip(first.estimates, again.estimates, strict=True):
+        assert mine.means.tobytes() == same.means.tobytes()
+        assert mine.labels.tobytes() == same.labels.tobytes()
+    assert any(
+        mine.means.shape != another.means.shape or not np.array_equal(mine.means, another.means)
+        for mine, another in zip(first.estimates, other.estimates, strict=True)
+    )
+
+
+def test_strategies_are_alike_until_they_decide(shortened):
+    still, random = run(shortened, None), run(shortened, RandomPlanner(shortened.sensors))
+    for k in range(10):
+        np.testing.assert_array_equal(still.estimates[k].means, random.estimates[k].means)
+    np.testing.assert_array_equal(still.truth.states, random.truth.states)
+
+
+def test_feedback_gives_every_sensor_the_fused_belief(shortened):
+    plain, fed = run(shortened, None), run(replace(shortened, feedback=True), None)
+    assert any(
+        len(mine.means) != len(other.means) or not np.array_equal(mine.means, other.means)
+        for mine, other in zip(plain.estimates[3:], fed.estimates[3:], strict=True)
+    )
+
+
+def test_unequal_scan_times_move_sensors_by_the_time_between(shortened):
+    times = np.array([1.0, 2.0, 4.0, 4.5])
+    uneven = replace(shortened, times=times, decision_steps=(1,))
+    record = run(uneven, FixedPlanner((0.0, 0.0)))
+    np.testing.assert_allclose(np.diff(record.poses[:, 0, 0]), np.diff(times) * uneven.sensors[0].speed)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"fusion": None}, "fusion: expected one for 2 sensors"),
+        ({"decision_steps": (99,)}, "decision_steps: expected scans from 1 to 14; got 99"),
+        ({"poses": np.zeros((3, 3))}, "poses: expected finite numbers"),
+        ({"moving": np.zeros(3, bool)}, "moving: expected 2 flags"),
+    ],
+)
+def test_parts_that_do_not_fit(shortened, change, message):
+    with pytest.raises(InputError, match=message):
+        replace(shortened, **change)
