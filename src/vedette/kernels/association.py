@@ -13,7 +13,7 @@ import numpy as np
 
 from vedette.errors import ModelError
 from vedette.kernels.assignment import ABSENT, MISSED, Options
-from vedette.kernels.compile import inlined, kernel
+from vedette.kernels.compile import borrowing, inlined, kernel
 from vedette.kernels.gaussian import Innovation, Scratch, expect, make_innovation, predict, whiten
 from vedette.kernels.linalg import log_add
 from vedette.kernels.mixtures import copy_component
@@ -54,7 +54,7 @@ def make_rows(num_rows: int, num_components: int, state_dim: int, meas_dim: int)
     )
 
 
-@kernel
+@borrowing
 def fill_survivors(tracks: Tracks, motion: Motion, dt: float, rows: Rows, scratch: Scratch) -> None:
     """Predict every track into the first rows."""
     for i in range(len(tracks.labels)):
@@ -72,7 +72,7 @@ def fill_survivors(tracks: Tracks, motion: Motion, dt: float, rows: Rows, scratc
         rows.offsets[i + 1] = tracks.offsets[i + 1]
 
 
-@kernel
+@borrowing
 def fill_births(birth: Lmb, first_row: int, rows: Rows) -> None:
     """Append the birth sites after `first_row` survivors."""
     sites = birth.tracks
@@ -88,7 +88,7 @@ def fill_births(birth: Lmb, first_row: int, rows: Rows) -> None:
             copy_component(sites.means, sites.covs, c, rows.means, rows.covs, shift + c)
 
 
-@kernel
+@borrowing
 def clutter_levels(sensor: Sensor, scan: Floats, pose: Floats, floor: float, out: Floats) -> tuple[float, int]:
     """Log clutter intensity at each measurement, raised to `floor`; returns their sum and how often that was needed."""
     total, num_raised = 0.0, 0
@@ -104,7 +104,7 @@ def clutter_levels(sensor: Sensor, scan: Floats, pose: Floats, floor: float, out
     return total, num_raised
 
 
-@kernel
+@borrowing
 def expect_rows(sensor: Sensor, pose: Floats, rows: Rows, scratch: Scratch) -> None:
     for c in range(len(rows.log_weights)):
         expect(sensor, pose, rows.means[c], rows.covs[c], c, rows.innovation, scratch)
@@ -132,7 +132,7 @@ def _detection_option(
     count = rows.offsets[row + 1] - first
     for i in range(count):
         c = first + i
-        distance = whiten(innovation, c, scan[j], sensor.angular, opts.whitened[entry + i])
+        distance = whiten(innovation, c, scan[j], sensor.angular, gate, opts.whitened[entry + i])
         weight = -math.inf
         if distance <= gate:
             weight = rows.log_weights[c] + innovation.log_norm[c] - 0.5 * distance - level
@@ -153,21 +153,25 @@ def _total_from_peak(values: Floats, start: int, count: int, peak: float) -> flo
 
 
 @kernel
-def list_options(rows: Rows, scan: Floats, levels: Floats, sensor: Sensor, gate: float) -> Options:
-    """Options of every row, heaviest first; options of weight zero are left out."""
-    num_rows, num_components = len(rows.log_absent), len(rows.log_weights)
-    most_options = num_rows * (len(scan) + 2)
-    most_entries = num_components * (len(scan) + 1)
-    opts = Options(
+def make_options(num_rows: int, num_components: int, num_measurements: int, meas_dim: int) -> Options:
+    """Room for every option that there can be."""
+    most_options, most_entries = num_rows * (num_measurements + 2), num_components * (num_measurements + 1)
+    return Options(
         np.zeros(num_rows + 1, np.int64),
         np.empty(most_options, np.int64),
         np.empty(most_options),
         np.empty(most_options, np.int64),
         np.empty(most_entries),
-        np.empty((most_entries, scan.shape[1])),
+        np.empty((most_entries, meas_dim)),
     )
+
+
+@borrowing
+def fill_options(rows: Rows, scan: Floats, levels: Floats, sensor: Sensor, gate: float, opts: Options) -> None:
+    """Options of every row, heaviest first; options of weight zero are left out."""
     filled, entry = 0, 0
-    for row in range(num_rows):
+    opts.offsets[0] = 0
+    for row in range(len(rows.log_absent)):
         start = filled
         first = rows.offsets[row]
         count = rows.offsets[row + 1] - first
@@ -192,4 +196,11 @@ def list_options(rows: Rows, scan: Floats, levels: Floats, sensor: Sensor, gate:
                 entry += count
         _sort_row(start, filled, opts.columns, opts.log_weights, opts.entries)
         opts.offsets[row + 1] = filled
+
+
+@kernel
+def list_options(rows: Rows, scan: Floats, levels: Floats, sensor: Sensor, gate: float) -> Options:
+    """As `fill_options`, into arrays of its own."""
+    opts = make_options(len(rows.log_absent), len(rows.log_weights), len(scan), scan.shape[1])
+    fill_options(rows, scan, levels, sensor, gate, opts)
     return opts

@@ -31,6 +31,7 @@ JIT_ENABLED = not config.DISABLE_JIT
 
 # No fastmath: -inf is a legal log weight. NumPy's error model: division by zero is inf, not an exception branch.
 _OPTIONS: dict[str, Any] = {"nopython": True, "nogil": True, "error_model": "numpy"}
+_BORROWING: dict[str, Any] = {**_OPTIONS, "_nrt": False}
 
 
 def cache_directory() -> Path:
@@ -129,12 +130,22 @@ def kernel(function: _F) -> _F:
     return _compiled(function, _OPTIONS)
 
 
+def borrowing(function: _F) -> _F:
+    """Compile a kernel that makes no array and only borrows those of its caller, so that no references are counted.
+
+    Counting costs two atomic operations for every array of a bundle and every slice: more than the arithmetic of small
+    matrices. Such a kernel may return arrays (views of its arguments) only to another such kernel, and may call only
+    such kernels and model functions.
+    """
+    return _compiled(function, _BORROWING)
+
+
 def inlined(function: _F) -> _F:
-    """Compile a small kernel that is always inlined into its caller.
+    """As `borrowing`, and always inlined into its caller.
 
     A bundle of arrays is passed as dozens of words, which costs more than a small kernel's own work.
     """
-    return _compiled(function, {**_OPTIONS, "forceinline": True})
+    return _compiled(function, {**_BORROWING, "forceinline": True})
 
 
 def _compiled(function: _F, options: dict[str, Any]) -> _F:

@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from vedette.errors import ModelError, NumericalError
-from vedette.kernels.compile import inlined, kernel
-from vedette.kernels.linalg import LOG_2PI, cholesky, log_det_from_factor, solve_lower
+from vedette.kernels.compile import borrowing, inlined, kernel
+from vedette.kernels.linalg import LOG_2PI, cholesky, cholesky_of_size, log_det_from_factor
 from vedette.kernels.types import Bools, Floats, Motion, Sensor
 
 LINEARISED = 0
@@ -95,7 +95,7 @@ def wrap_angle(angle: float) -> float:
     return math.pi if wrapped <= -math.pi else wrapped
 
 
-@kernel
+@borrowing
 def _sigma_points(method: int, mean: Floats, cov: Floats, points: Floats, factor: Floats) -> tuple[int, float, float]:
     """Fill `points`; return their number and the weights of the first (the mean, or 0) and of every other."""
     n = mean.shape[0]
@@ -113,7 +113,7 @@ def _sigma_points(method: int, mean: Floats, cov: Floats, points: Floats, factor
     return 2 * n + 1, kappa / (n + kappa), 0.5 / (n + kappa)
 
 
-@kernel
+@borrowing
 def _moments_of_images(
     images: Floats, num: int, dim: int, first: float, other: float, angular: Bools, mean: Floats, cov: Floats
 ) -> None:
@@ -142,77 +142,77 @@ def _moments_of_images(
             cov[b, a] = total
 
 
-@kernel
+@inlined
+def _sandwich(jacobian: Floats, cov: Floats, noise: Floats, product: Floats, out: Floats, n: int) -> None:
+    """out = jacobian cov jacobian' + noise."""
+    for i in range(n):
+        for j in range(n):
+            total = 0.0
+            for k in range(n):
+                total += jacobian[i, k] * cov[k, j]
+            product[i, j] = total
+    for i in range(n):
+        for j in range(i + 1):
+            total = 0.5 * (noise[i, j] + noise[j, i])
+            for k in range(n):
+                total += product[i, k] * jacobian[j, k]
+            out[i, j] = total
+            out[j, i] = total
+
+
+@borrowing
+def _predict_sigma_points(
+    motion: Motion, dt: float, mean: Floats, cov: Floats, out_mean: Floats, out_cov: Floats, scratch: Scratch
+) -> None:
+    n = mean.shape[0]
+    points, images, noise = scratch.points, scratch.images, scratch.noise
+    num, first, other = _sigma_points(motion.method, mean, cov, points, scratch.factor)
+    for i in range(num):
+        motion.transition(points[i], dt, motion.transition_params, out_mean)
+        for j in range(n):
+            images[i, j] = out_mean[j]
+    _moments_of_images(images, num, n, first, other, scratch.angular_state, out_mean, out_cov)
+    for i in range(n):
+        for j in range(n):
+            out_cov[i, j] += 0.5 * (noise[i, j] + noise[j, i])
+
+
+@inlined
 def predict(
     motion: Motion, dt: float, mean: Floats, cov: Floats, out_mean: Floats, out_cov: Floats, scratch: Scratch
 ) -> None:
     """Chapman-Kolmogorov step of one Gaussian over `dt` seconds; the process noise is taken at the prior mean."""
     n = mean.shape[0]
-    noise = scratch.noise
-    motion.process_noise_cov(mean, dt, motion.noise_params, noise)
+    motion.process_noise_cov(mean, dt, motion.noise_params, scratch.noise)
     if motion.method == LINEARISED:
-        jacobian, product = scratch.jacobian, scratch.product
         motion.transition(mean, dt, motion.transition_params, out_mean)
-        motion.transition_jacobian(mean, dt, motion.transition_params, jacobian)
-        for i in range(n):
-            for j in range(n):
-                total = 0.0
-                for k in range(n):
-                    total += jacobian[i, k] * cov[k, j]
-                product[i, j] = total
-        for i in range(n):
-            for j in range(i + 1):
-                total = 0.5 * (noise[i, j] + noise[j, i])
-                for k in range(n):
-                    total += product[i, k] * jacobian[j, k]
-                out_cov[i, j] = total
-                out_cov[j, i] = total
+        motion.transition_jacobian(mean, dt, motion.transition_params, scratch.jacobian)
+        # A constant size is unrolled by the compiler, which halves the cost of the two usual ones.
+        if n == 4:
+            _sandwich(scratch.jacobian, cov, scratch.noise, scratch.product, out_cov, 4)
+        elif n == 5:
+            _sandwich(scratch.jacobian, cov, scratch.noise, scratch.product, out_cov, 5)
+        else:
+            _sandwich(scratch.jacobian, cov, scratch.noise, scratch.product, out_cov, n)
     else:
-        points, images = scratch.points, scratch.images
-        num, first, other = _sigma_points(motion.method, mean, cov, points, scratch.factor)
-        for i in range(num):
-            motion.transition(points[i], dt, motion.transition_params, out_mean)
-            for j in range(n):
-                images[i, j] = out_mean[j]
-        _moments_of_images(images, num, n, first, other, scratch.angular_state, out_mean, out_cov)
-        for i in range(n):
-            for j in range(n):
-                out_cov[i, j] += 0.5 * (noise[i, j] + noise[j, i])
+        _predict_sigma_points(motion, dt, mean, cov, out_mean, out_cov, scratch)
     for i in range(n):
         if not (math.isfinite(out_mean[i]) and out_cov[i, i] > 0.0 and out_cov[i, i] < math.inf):
             raise ModelError("motion model: predicted mean or covariance is not finite")
 
 
-@inlined
-def _expect_linearised(sensor: Sensor, pose: Floats, mean: Floats, cov: Floats, at: int, out: Innovation, scratch: Scratch) -> None:
-    n, m = mean.shape[0], out.predicted.shape[1]
-    jacobian, innovation, cross = scratch.measurement_jacobian, scratch.innovation_cov, out.whitened_cross[at]
-    sensor.measurement(mean, pose, sensor.measurement_params, out.predicted[at])
-    sensor.measurement_jacobian(mean, pose, sensor.measurement_params, jacobian)
-    for a in range(m):
-        for j in range(n):
-            total = 0.0
-            for k in range(n):
-                total += jacobian[a, k] * cov[k, j]
-            cross[a, j] = total
-    for a in range(m):
-        for b in range(a + 1):
-            total = 0.0
-            for k in range(n):
-                total += cross[a, k] * jacobian[b, k]
-            innovation[a, b] = total
-
-
-@kernel
-def _expect_sigma_points(sensor: Sensor, pose: Floats, mean: Floats, cov: Floats, at: int, out: Innovation, scratch: Scratch) -> None:
-    n, m = mean.shape[0], out.predicted.shape[1]
-    points, images, cross = scratch.points, scratch.images, out.whitened_cross[at]
+@borrowing
+def _expect_sigma_points(
+    sensor: Sensor, pose: Floats, mean: Floats, cov: Floats, predicted: Floats, cross: Floats, scratch: Scratch
+) -> None:
+    n, m = mean.shape[0], predicted.shape[0]
+    points, images = scratch.points, scratch.images
     num, first, other = _sigma_points(sensor.method, mean, cov, points, scratch.factor)
     for i in range(num):
         sensor.measurement(points[i], pose, sensor.measurement_params, scratch.residual)
         for a in range(m):
             images[i, a] = scratch.residual[a]
-    _moments_of_images(images, num, m, first, other, sensor.angular, out.predicted[at], scratch.innovation_cov)
+    _moments_of_images(images, num, m, first, other, sensor.angular, predicted, scratch.innovation_cov)
     for a in range(m):
         for j in range(n):
             total = 0.0
@@ -221,21 +221,31 @@ def _expect_sigma_points(sensor: Sensor, pose: Floats, mean: Floats, cov: Floats
             cross[a, j] = total
 
 
-@kernel
-def expect(sensor: Sensor, pose: Floats, mean: Floats, cov: Floats, at: int, out: Innovation, scratch: Scratch) -> None:
-    """Fill entry `at` of `out`; noise and detection probability are taken at the predicted mean (paper-notes 3)."""
-    n, m = mean.shape[0], out.predicted.shape[1]
-    noise, innovation = scratch.measurement_noise, scratch.innovation_cov
-    factor, cross, posterior = out.factor[at], out.whitened_cross[at], out.covs[at]
-    if sensor.method == LINEARISED:
-        _expect_linearised(sensor, pose, mean, cov, at, out, scratch)
-    else:
-        _expect_sigma_points(sensor, pose, mean, cov, at, out, scratch)
-    sensor.measurement_noise_cov(mean, pose, sensor.noise_params, noise)
+@inlined
+def _project(jacobian: Floats, cov: Floats, cross: Floats, innovation: Floats, n: int, m: int) -> None:
+    """cross = jacobian cov; innovation = cross jacobian', its lower triangle."""
+    for a in range(m):
+        for j in range(n):
+            total = 0.0
+            for k in range(n):
+                total += jacobian[a, k] * cov[k, j]
+            cross[a, j] = total
+        for b in range(a + 1):
+            total = 0.0
+            for k in range(n):
+                total += cross[a, k] * jacobian[b, k]
+            innovation[a, b] = total
+
+
+@inlined
+def _condition(
+    cov: Floats, noise: Floats, innovation: Floats, factor: Floats, cross: Floats, posterior: Floats, n: int, m: int
+) -> None:
+    """Add the noise to `innovation` and factor it; whiten `cross`; posterior = cov - cross' cross."""
     for a in range(m):
         for b in range(a + 1):
             innovation[a, b] += 0.5 * (noise[a, b] + noise[b, a])
-    if not cholesky(innovation, factor):
+    if not cholesky_of_size(innovation, factor, m):
         raise ModelError("measurement model: innovation covariance is not positive definite or not finite")
     for a in range(m):
         for j in range(n):
@@ -250,6 +260,28 @@ def expect(sensor: Sensor, pose: Floats, mean: Floats, cov: Floats, at: int, out
                 total -= cross[a, i] * cross[a, j]
             posterior[i, j] = total
             posterior[j, i] = total
+
+
+@inlined
+def expect(sensor: Sensor, pose: Floats, mean: Floats, cov: Floats, at: int, out: Innovation, scratch: Scratch) -> None:
+    """Fill entry `at` of `out`; noise and detection probability are taken at the predicted mean (paper-notes 3)."""
+    n, m = mean.shape[0], out.predicted.shape[1]
+    jacobian, noise, innovation = scratch.measurement_jacobian, scratch.measurement_noise, scratch.innovation_cov
+    factor, cross, posterior = out.factor[at], out.whitened_cross[at], out.covs[at]
+    linearised = sensor.method == LINEARISED
+    if linearised:
+        sensor.measurement(mean, pose, sensor.measurement_params, out.predicted[at])
+        sensor.measurement_jacobian(mean, pose, sensor.measurement_params, jacobian)
+    else:
+        _expect_sigma_points(sensor, pose, mean, cov, out.predicted[at], cross, scratch)
+    sensor.measurement_noise_cov(mean, pose, sensor.noise_params, noise)
+    if linearised and n == 4 and m == 2:
+        _project(jacobian, cov, cross, innovation, 4, 2)
+        _condition(cov, noise, innovation, factor, cross, posterior, 4, 2)
+    else:
+        if linearised:
+            _project(jacobian, cov, cross, innovation, n, m)
+        _condition(cov, noise, innovation, factor, cross, posterior, n, m)
     out.log_norm[at] = -0.5 * (log_det_from_factor(factor) + m * LOG_2PI)
     detection = sensor.prob_detection(mean, pose, sensor.detection_params)
     if not 0.0 <= detection <= 1.0:
@@ -258,15 +290,23 @@ def expect(sensor: Sensor, pose: Floats, mean: Floats, cov: Floats, at: int, out
 
 
 @inlined
-def whiten(innovation: Innovation, at: int, measurement: Floats, angular: Bools, out: Floats) -> float:
-    """Whitened residual of a measurement against component `at`; returns its squared Mahalanobis distance."""
-    for a in range(measurement.shape[0]):
-        residual = measurement[a] - innovation.predicted[at, a]
-        out[a] = wrap_angle(residual) if angular[a] else residual
-    solve_lower(innovation.factor[at], out, out)
+def whiten(innovation: Innovation, at: int, measurement: Floats, angular: Bools, gate: float, out: Floats) -> float:
+    """Whitened residual of a measurement against component `at`; returns its squared Mahalanobis distance.
+
+    Once that is known to be above `gate` the rest is left undone and a lower bound of it is returned.
+    """
+    factor = innovation.factor[at]
     distance = 0.0
     for a in range(measurement.shape[0]):
+        total = measurement[a] - innovation.predicted[at, a]
+        if angular[a]:
+            total = wrap_angle(total)
+        for k in range(a):
+            total -= factor[a, k] * out[k]
+        out[a] = total / factor[a, a]
         distance += out[a] * out[a]
+        if distance > gate:
+            break
     return distance
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from vedette.kernels.compile import inlined, kernel
+from vedette.kernels.compile import borrowing, inlined
 from vedette.kernels.types import Floats
 
 LOG_2PI = math.log(2.0 * math.pi)
@@ -17,7 +17,12 @@ LOG_2PI = math.log(2.0 * math.pi)
 @inlined
 def cholesky(matrix: Floats, factor: Floats) -> bool:
     """Lower Cholesky factor of `matrix` (its lower triangle is read). False where it is not positive definite."""
-    n = matrix.shape[0]
+    return cholesky_of_size(matrix, factor, matrix.shape[0])
+
+
+@inlined
+def cholesky_of_size(matrix: Floats, factor: Floats, n: int) -> bool:
+    """As `cholesky`; the loops are unrolled where the caller's `n` is a constant."""
     for i in range(n):
         for j in range(i + 1):
             total = matrix[i, j]
@@ -32,7 +37,7 @@ def cholesky(matrix: Floats, factor: Floats) -> bool:
     return True
 
 
-@kernel
+@inlined
 def log_det_from_factor(factor: Floats) -> float:
     """log det(L L') of a lower factor L."""
     product = 1.0
@@ -56,7 +61,7 @@ def solve_lower(factor: Floats, vector: Floats, out: Floats) -> None:
         out[i] = total / factor[i, i]
 
 
-@kernel
+@borrowing
 def solve_upper(factor: Floats, vector: Floats, out: Floats) -> None:
     """out = L^-T vector; `out` may be `vector`."""
     n = factor.shape[0]
@@ -67,7 +72,7 @@ def solve_upper(factor: Floats, vector: Floats, out: Floats) -> None:
         out[i] = total / factor[i, i]
 
 
-@kernel
+@borrowing
 def inverse_from_factor(factor: Floats, out: Floats) -> None:
     """out = (L L')^-1, symmetric."""
     n = factor.shape[0]
@@ -98,7 +103,7 @@ def log_add(a: float, b: float) -> float:
     return a + math.log1p(math.exp(b - a))
 
 
-@kernel
+@borrowing
 def log_sum(values: Floats) -> float:
     """log of the sum of exponentials; -inf for no values."""
     peak = -math.inf
