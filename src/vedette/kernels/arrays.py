@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vedette.kernels.compile import kernel
+from vedette.kernels.compile import inlined, kernel
 from vedette.kernels.types import Floats, Ints
 
 
@@ -36,3 +36,10 @@ def grown_ints(array: Ints, needed: int) -> Ints:
     for i in range(len(array)):
         longer[i] = array[i]
     return longer
+
+
+@inlined
+def hashed(key: int, value: int) -> int:
+    """A hash of what `key` is a hash of, and `value`; below 2^32. (Products stay below 2^62: overflow warns without JIT.)"""
+    key = ((key ^ value) & 0x7FFFFFFF) * 1103515245 + 12345
+    return (key ^ (key >> 31)) & 0xFFFFFFFF

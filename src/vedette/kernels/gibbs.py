@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from vedette.kernels.arrays import filled_ints
+from vedette.kernels.arrays import filled_ints, hashed
 from vedette.kernels.assignment import DualWork, Options, make_dual_work, solve_assignment
 from vedette.kernels.compile import kernel
 from vedette.kernels.ranked import Children, Parents, append_child, grown_children, is_full
@@ -48,10 +48,9 @@ def _sweep(options: Options, rows: Ints, weights: Floats, work: DualWork, rng: n
 def _is_new(choice: Ints, num: int, children: Children, table: Ints) -> bool:
     """Look the choice up in the hash table of this parent's children; enter it as child `num` where it is new."""
     mask = len(table) - 1
-    key = 1469598103934665603
+    key = 0
     for option in choice:
-        key = (key ^ option) * 1099511628211
-        key ^= key >> 29
+        key = hashed(key, option)
     slot = key & mask
     while table[slot] >= 0:
         start = children.offsets[table[slot]]
