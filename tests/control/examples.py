@@ -41,7 +41,7 @@ SETTINGS = PlanningSettings(
 
 def sensor_model(**parts: Any) -> models.SensorModel:
     """Bearing and range, noise and detection that depend on the distance; any part may be another."""
-    standard = {
+    standard: dict[str, Any] = {
         "measurement": models.bearing_range(),
         "noise": models.range_dependent_noise(5.0, 5e-5, 0.02, 2e-5),
         "detection": models.gaussian_detection(500.0),
@@ -54,7 +54,7 @@ def mobile_sensor(kind: str, speed: float = 30.0, actions: Any = None, dim: int 
     """A sensor with a filter of a `kind`: lmb, or else delta-GLMB. dim: 4, or 5 with a turn rate."""
     build = LmbFilter if kind == "lmb" else DeltaGlmbFilter
     motion = models.constant_velocity(2.0) if dim == 4 else models.coordinated_turn(2.0, 0.02)
-    birth = models.BirthModel([0.05], np.zeros((1, dim)), [2.0 * np.diag(STD[:dim]) ** 2])
+    birth = models.BirthModel(np.full(1, 0.05), np.zeros((1, dim)), 2.0 * np.diag(STD[:dim] ** 2)[np.newaxis])
     local = build(motion, models.constant_survival(0.9), birth, sensor_model(**parts))
     return MobileSensor(local, speed, HeadingActions(HEADINGS) if actions is None else actions)
 

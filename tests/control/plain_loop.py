@@ -109,6 +109,7 @@ def _cut(belief: GLMB, most: int) -> GLMB:
 
 def _predicted(fused: Any, motion: models.MotionModel, settings: PlanningSettings) -> Any:
     """The fused belief, one Gaussian a track, after scans of a sensor that never sees anything."""
+    belief: Any
     if isinstance(fused, LMB):
         belief = LMB.from_bernoullis(fused.tracks.labels, fused.existence, *track_moments(fused.tracks))
     else:

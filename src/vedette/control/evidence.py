@@ -16,6 +16,9 @@ from vedette.kernels.types import Floats, Ints
 # A joint table of more entries is not formed: it would take more memory than all that was evaluated.
 MAX_TABLE = 2_000_000
 
+# NumPy's arrays have no more axes than this.
+_MAX_AXES = 32
+
 # Joint actions are evaluated so many rewards at a time, to bound the memory of an exhaustive search.
 _BLOCK = 4_000_000
 
@@ -72,7 +75,8 @@ class Evidence:
 
         A line holds one sensor's actions with the others at their `choice`.
         """
-        if math.prod(len(self.evaluator.headings[s]) for s in self.which) <= MAX_TABLE:
+        num_entries = math.prod(len(self.evaluator.headings[s]) for s in self.which)
+        if num_entries <= MAX_TABLE and len(self.which) <= _MAX_AXES:
             return (self._table(self.which, range(len(self.which)), choice),)
         return tuple(self._table((s,), (axis,), choice) for axis, s in enumerate(self.which))
 

@@ -1,0 +1,135 @@
+"""Rewards, actions and fusions of the user's own, made without touching the library."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from control.examples import SETTINGS, evaluator_of, situation
+from vedette.control import CauchySchwarzReward, IndependentPlanner, JointPlanner
+from vedette.control.pseudo import case_density
+from vedette.densities import cardinality_distribution
+from vedette.divergence import cauchy_schwarz
+from vedette.errors import InputError, NumericalError
+
+
+def minus_cardinality_variance(predicted: Any, updated: Any) -> float:
+    """How sure one would be of the number of targets."""
+    distribution = cardinality_distribution(updated)
+    numbers = np.arange(len(distribution))
+    return -float(distribution @ numbers**2 - (distribution @ numbers) ** 2)
+
+
+@pytest.mark.parametrize("kind", ["delta", "lmb"])
+def test_a_reward_of_the_users_own(kind: str) -> None:
+    example = situation(kind)
+    given = example.sensors, example.fusion, example.settings, minus_cardinality_variance
+    joint = JointPlanner(*given).plan(*example.arguments, rng=np.random.default_rng(5))
+    alone = IndependentPlanner(*given).plan(*example.arguments, rng=np.random.default_rng(5))
+    evaluator = evaluator_of(example)
+    densities = [
+        [
+            case_density(own, action * SETTINGS.num_samples + m)
+            for action in range(3)
+            for m in range(SETTINGS.num_samples)
+        ]
+        for own in evaluator.posteriors
+    ]
+    for s, table in enumerate(alone.tables):
+        rewards = np.reshape([minus_cardinality_variance(None, one) for one in densities[s]], (3, -1))
+        np.testing.assert_allclose(table.mean, rewards.mean(axis=1))
+        assert alone.chosen[s] == rewards.mean(axis=1).argmax()
+    expected = np.empty((3, 3, SETTINGS.num_samples))
+    for first, second, m in np.ndindex(expected.shape):
+        pair = densities[0][first * SETTINGS.num_samples + m], densities[1][second * SETTINGS.num_samples + m]
+        expected[first, second, m] = minus_cardinality_variance(None, example.fusion.fuse(pair)[0])
+    np.testing.assert_allclose(joint.tables[0].mean, expected.mean(axis=2))
+    assert joint.counts["fusions"] == expected.size
+
+
+@dataclass(frozen=True)
+class TurnsAtMost:
+    """Actions of the user's own: as many headings as the sensor can turn to, more of them further out."""
+
+    turn_rad: float
+
+    def headings(self, pose: Any) -> Any:
+        number = 2 + int(np.hypot(pose[0], pose[1]) > 510.0)
+        return pose[2] + np.linspace(-self.turn_rad, self.turn_rad, number)
+
+
+def test_actions_of_the_users_own() -> None:
+    example = situation("marginal", actions=TurnsAtMost(0.6))
+    plan = JointPlanner(example.sensors, example.fusion, SETTINGS).plan(
+        *example.arguments, rng=np.random.default_rng(5)
+    )
+    np.testing.assert_allclose(plan.action_values[0], example.poses[0, 2] + np.array([-0.6, 0.0, 0.6]))
+    np.testing.assert_allclose(plan.action_values[1], example.poses[1, 2] + np.array([-0.6, 0.0, 0.6]))
+    near = replace(example, poses=example.poses * [[1.0, 1.0, 1.0], [0.5, 0.5, 1.0]])
+    plan = JointPlanner(example.sensors, example.fusion, SETTINGS).plan(*near.arguments, rng=np.random.default_rng(5))
+    assert plan.tables[0].mean.shape == (3, 2)
+    plan.validate()
+
+
+class TrustsTheFirst:
+    """A fusion of the user's own: the first sensor is right."""
+
+    def fuse(self, beliefs: Any) -> Any:
+        return beliefs[0], None
+
+
+@pytest.mark.parametrize("kind", ["marginal", "lmb"])
+def test_a_fusion_of_the_users_own(kind: str) -> None:
+    example = replace(situation(kind), fusion=TrustsTheFirst())
+    evaluator = evaluator_of(example)
+    rewards = evaluator.sample_rewards((0, 1), example.fusion)
+    alone = evaluator.sample_rewards((0,), None)
+    np.testing.assert_allclose(rewards, np.repeat(alone, 3, axis=0), rtol=1e-9)
+    plan = JointPlanner(example.sensors, example.fusion, SETTINGS).plan(
+        *example.arguments, rng=np.random.default_rng(5)
+    )
+    assert plan.chosen == (int(alone.mean(axis=1).argmax()), 0)
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+def test_a_reward_that_is_not_finite_is_named_with_action_and_sample(bad: float) -> None:
+    example, calls = situation("marginal"), []
+
+    def reward(predicted: Any, updated: Any) -> float:
+        calls.append(updated)
+        return bad if len(calls) == 5 * SETTINGS.num_samples + 3 else 1.0
+
+    planner = JointPlanner(example.sensors, example.fusion, SETTINGS, reward)
+    with pytest.raises(NumericalError) as error:
+        planner.plan(*example.arguments, rng=np.random.default_rng(5))
+    assert str(error.value) == (
+        f"reward of headings [0.0, 45.0] degrees of sensors [0, 1], sample 2: expected a finite number; got {bad}"
+    )
+
+
+def test_a_reward_that_is_no_number() -> None:
+    example = situation("marginal")
+    planner = IndependentPlanner(example.sensors, example.fusion, SETTINGS, lambda predicted, updated: "high")  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="reward: expected a number; got str 'high'"):
+        planner.plan(*example.arguments, rng=np.random.default_rng(5))
+
+
+def test_a_reward_gets_valid_single_gaussian_densities() -> None:
+    example = situation("delta")
+
+    def reward(predicted: Any, updated: Any) -> float:
+        for density in (predicted, updated):
+            density.validate()
+            assert len(density.tracks.log_weights) == density.tracks.num_tracks
+            assert density.is_marginalised
+        return cauchy_schwarz(predicted, updated, support="common")
+
+    for planner in (JointPlanner, IndependentPlanner):
+        given = example.sensors, example.fusion, SETTINGS
+        own = planner(*given, reward).plan(*example.arguments, rng=np.random.default_rng(5))
+        builtin = planner(*given, CauchySchwarzReward()).plan(*example.arguments, rng=np.random.default_rng(5))
+        for a, b in zip(own.tables, builtin.tables, strict=True):
+            np.testing.assert_allclose(a.mean, b.mean, rtol=1e-9, atol=1e-9)

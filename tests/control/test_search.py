@@ -1,0 +1,259 @@
+"""Searches of the joint actions: the exhaustive one is the oracle of the others."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from control.examples import SETTINGS, Situation, situation
+from vedette.control import (
+    CauchySchwarzReward,
+    CoordinateAscent,
+    ExhaustiveSearch,
+    HeadingActions,
+    IndependentPlanner,
+    JointPlanner,
+    JointProblem,
+    JointSearch,
+    Plan,
+    evidence,
+)
+from vedette.control.search import all_joint_actions, first_best
+from vedette.errors import InputError
+
+
+@dataclass
+class Table:
+    """A problem of known rewards that keeps what it was asked for."""
+
+    rewards: Any
+    asked: list[tuple[int, ...]] = field(default_factory=list)
+
+    def problem(self, independent: tuple[int, ...] | None = None) -> JointProblem:
+        start = independent or (0,) * self.rewards.ndim
+        return JointProblem(self.rewards.shape, self.evaluate, lambda: start)
+
+    def evaluate(self, actions: Any) -> Any:
+        self.asked.extend(tuple(row) for row in actions.tolist())
+        return self.rewards[tuple(actions.T)]
+
+
+def rng() -> np.random.Generator:
+    return np.random.default_rng(7)
+
+
+SHAPES = st.lists(st.integers(1, 5), min_size=1, max_size=4).map(tuple)
+
+
+@given(SHAPES, st.integers(0, 2**32 - 1))
+def test_the_exhaustive_search_finds_the_first_of_the_best(shape: tuple[int, ...], seed: int) -> None:
+    table = Table(np.random.default_rng(seed).integers(0, 4, shape).astype(float))
+    found = ExhaustiveSearch().search(table.problem(), rng=rng())
+    assert found == min(index for index in np.ndindex(*shape) if table.rewards[index] == table.rewards.max())
+    assert sorted(table.asked) == list(np.ndindex(*shape))
+
+
+@given(SHAPES, st.integers(0, 2**32 - 1), st.integers(0, 3), st.booleans())
+def test_coordinate_ascent_ends_where_no_sensor_alone_does_better(
+    shape: tuple[int, ...], seed: int, num_restarts: int, coarse: bool
+) -> None:
+    draw = np.random.default_rng(seed)
+    table = Table(draw.integers(0, 3, shape).astype(float) if coarse else draw.random(shape))
+    start = tuple(int(action) for action in draw.integers(shape))
+    found = CoordinateAscent(num_restarts).search(table.problem(start), rng=draw)
+    value = table.rewards[found]
+    assert table.rewards[start] <= value <= table.rewards.max()
+    assert len(set(table.asked)) == len(table.asked)
+    assert found in table.asked
+    for axis, size in enumerate(shape):
+        for action in range(size):
+            assert table.rewards[(*found[:axis], action, *found[axis + 1 :])] <= value
+    assert value == max(table.rewards[joint] for joint in table.asked)
+
+
+@given(SHAPES, st.integers(0, 2**32 - 1))
+def test_coordinate_ascent_is_exact_where_sensors_do_not_interact(shape: tuple[int, ...], seed: int) -> None:
+    draw = np.random.default_rng(seed)
+    own = [draw.random(size) for size in shape]
+    table = Table(sum(np.ix_(*own), start=np.zeros(shape)))
+    found = CoordinateAscent().search(table.problem(), rng=draw)
+    assert found == tuple(int(values.argmax()) for values in own)
+    assert len(table.asked) <= 1 + 2 * sum(shape)
+
+
+def test_restarts_leave_a_local_maximum() -> None:
+    rewards = np.zeros((6, 6))
+    rewards[0, 0], rewards[4, 5] = 1.0, 2.0
+    problem = Table(rewards).problem()
+    assert CoordinateAscent().search(problem, rng=rng()) == (0, 0)
+    assert CoordinateAscent(40).search(problem, rng=rng()) == (4, 5)
+
+
+def test_rounding_does_not_decide() -> None:
+    assert first_best(np.array([1.0, 3.0, 3.0 + 1e-10, 2.0])) == 1
+    assert first_best(np.array([1.0, 3.0, 3.0 + 1e-7, 2.0])) == 2
+    assert first_best(np.array([1e6, 1e6 + 1e-4])) == 0
+    assert first_best(np.array([-5.0])) == 0
+
+
+def test_more_joint_actions_than_allowed() -> None:
+    table = Table(np.zeros((3, 4)))
+    assert ExhaustiveSearch(12).search(table.problem(), rng=rng()) == (0, 0)
+    with pytest.raises(InputError, match=r"at most 11 for an exhaustive search; got 3 x 4 = 12; .*CoordinateAscent"):
+        ExhaustiveSearch(11).search(table.problem(), rng=rng())
+    many = JointProblem((12,) * 40, table.evaluate, lambda: (0,) * 40)
+    with pytest.raises(InputError, match="12 x 12"):
+        ExhaustiveSearch().search(many, rng=rng())
+
+
+@pytest.mark.parametrize("number", [0, -1, 1.5, True, "many"])
+def test_numbers_that_are_none(number: Any) -> None:
+    with pytest.raises(InputError, match="max_joint_actions: expected a whole number"):
+        ExhaustiveSearch(number)
+    if number != 0:
+        with pytest.raises(InputError, match="num_restarts: expected a whole number"):
+            CoordinateAscent(number)
+
+
+def joint_plan(example: Situation, search: JointSearch) -> Plan:
+    planner = JointPlanner(example.sensors, example.fusion, example.settings, CauchySchwarzReward("reference"), search)
+    plan = planner.plan(*example.arguments, rng=np.random.default_rng(5))
+    plan.validate()
+    return plan
+
+
+ACTIONS = HeadingActions((-180.0, -90.0, 0.0, 45.0, 90.0, 180.0))
+
+
+@pytest.mark.parametrize("kind", ["delta", "marginal", "lmb"])
+@pytest.mark.parametrize("seed", range(3))
+def test_a_partial_search_has_the_rewards_of_the_exhaustive_one(kind: str, seed: int) -> None:
+    example = situation(kind, 3, seed, actions=ACTIONS)
+    full, partial = joint_plan(example, ExhaustiveSearch()), joint_plan(example, CoordinateAscent())
+    (table,), (some,) = full.tables, partial.tables
+    evaluated = np.isfinite(some.mean)
+    np.testing.assert_array_equal(some.mean[evaluated], table.mean[evaluated])
+    np.testing.assert_array_equal(some.standard_error[evaluated], table.standard_error[evaluated])
+    assert table.mean[partial.chosen] == some.mean[evaluated].max()
+    alone = IndependentPlanner(example.sensors, example.fusion, SETTINGS, CauchySchwarzReward("reference")).plan(
+        *example.arguments, rng=np.random.default_rng(5)
+    )
+    assert table.mean[alone.chosen] <= table.mean[partial.chosen] <= table.mean[full.chosen]
+    # -180 and 180 degrees are one direction, counted once.
+    num_evaluated = int(evaluated[1:, 1:, 1:].sum())
+    assert partial.counts["fusions"] == num_evaluated * SETTINGS.num_samples
+    assert partial.counts["divergences"] == (num_evaluated + 3 * 5) * SETTINGS.num_samples
+    assert num_evaluated < 5**3 == full.counts["fusions"] // SETTINGS.num_samples
+
+
+def test_restarts_are_drawn_from_the_planners_generator() -> None:
+    example = situation("lmb", 3, actions=ACTIONS)
+    first, again = (joint_plan(example, CoordinateAscent(3)) for _ in range(2))
+    np.testing.assert_array_equal(first.tables[0].mean, again.tables[0].mean)
+    more = np.isfinite(first.tables[0].mean).sum()
+    assert more > np.isfinite(joint_plan(example, CoordinateAscent()).tables[0].mean).sum()
+
+
+def test_a_table_too_large_to_hold_is_kept_as_a_line_a_sensor(monkeypatch: pytest.MonkeyPatch) -> None:
+    example = situation("marginal", 3, actions=ACTIONS)
+    whole = joint_plan(example, CoordinateAscent())
+    monkeypatch.setattr(evidence, "MAX_TABLE", 6**3 - 1)
+    lines = joint_plan(example, CoordinateAscent())
+    assert lines.chosen == whole.chosen
+    assert [table.sensors for table in lines.tables] == [(0,), (1,), (2,)]
+    for s, table in enumerate(lines.tables):
+        through = tuple(slice(None) if axis == s else action for axis, action in enumerate(whole.chosen))
+        np.testing.assert_array_equal(table.mean, whole.tables[0].mean[through])
+        assert np.isfinite(table.mean).all()
+
+
+def test_many_sensors() -> None:
+    """Eight sensors of twelve directions have 4e8 joint actions."""
+    four = situation("lmb", 2)
+    example = Situation(
+        sensors=four.sensors * 4,
+        fusion=replace(four.fusion, weights=(0.125,) * 8),
+        settings=four.settings,
+        beliefs=four.beliefs * 4,
+        fused=four.fused,
+        poses=np.concatenate([four.poses + np.array([0.0, 40.0 * i, 0.0]) for i in range(4)]),
+    )
+    example = replace(example, sensors=tuple(replace(sensor, actions=HeadingActions()) for sensor in example.sensors))
+    with pytest.raises(InputError, match="CoordinateAscent"):
+        joint_plan(example, ExhaustiveSearch())
+    plan = joint_plan(example, CoordinateAscent())
+    assert len(plan.tables) == 8
+    assert max(float(table.mean.max()) for table in plan.tables) == plan.tables[0].mean[plan.chosen[0]]
+
+
+class FirstOfTwo:
+    """A search of the user's own: two joint actions at random, the better one."""
+
+    def search(self, problem: JointProblem, *, rng: np.random.Generator) -> tuple[int, ...]:
+        two = rng.integers(problem.shape, size=(2, len(problem.shape)))
+        return tuple(int(action) for action in two[problem.evaluate(two).argmax()])
+
+
+@dataclass
+class Says:
+    """A search that says what it was told to say, and evaluates what it was told to evaluate."""
+
+    answer: Any
+    rows: Any = None
+
+    def search(self, problem: JointProblem, *, rng: np.random.Generator) -> Any:
+        if self.rows is not None:
+            problem.evaluate(self.rows)
+        return self.answer
+
+
+def test_a_search_of_the_users_own() -> None:
+    plan = joint_plan(situation("marginal"), FirstOfTwo())
+    assert 1 <= np.isfinite(plan.tables[0].mean).sum() <= 2
+
+
+def test_a_choice_that_the_search_did_not_evaluate_is_evaluated() -> None:
+    example = situation("marginal")
+    full = joint_plan(example, ExhaustiveSearch()).tables[0].mean
+    plan = joint_plan(example, Says(np.array([2, 1])))
+    assert plan.chosen == (2, 1)
+    expected = np.full((3, 3), np.nan)
+    expected[2, 1] = full[2, 1]
+    np.testing.assert_array_equal(plan.tables[0].mean, expected)
+
+
+@pytest.mark.parametrize("answer", [(0,), (0, 3), (-1, 0), (0.0, 1.0), None, "no", ((0, 1),)])
+def test_a_search_that_answers_with_no_joint_action(answer: Any) -> None:
+    with pytest.raises(InputError, match=r"search: expected one action of each sensor, numbers below \(3, 3\)"):
+        joint_plan(situation("marginal"), Says(answer))
+
+
+@pytest.mark.parametrize("rows", [[[0, 3]], [[-1, 0]], [[0]], [0, 1], [[0.5, 0.0]]])
+def test_a_search_that_asks_for_no_joint_action(rows: Any) -> None:
+    with pytest.raises(InputError, match="joint actions: expected rows of whole numbers below"):
+        joint_plan(situation("marginal"), Says((0, 0), np.array(rows)))
+
+
+def test_blocks_of_an_exhaustive_search_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    example = situation("marginal", 3)
+    whole = joint_plan(example, ExhaustiveSearch())
+    monkeypatch.setattr(evidence, "_BLOCK", 5 * SETTINGS.num_samples)
+    blocks = joint_plan(example, ExhaustiveSearch())
+    np.testing.assert_array_equal(blocks.tables[0].mean, whole.tables[0].mean)
+    assert blocks.counts == whole.counts
+
+
+def test_all_joint_actions_have_the_last_sensor_fastest() -> None:
+    shape = (2, 1, 3)
+    expected = list(itertools.product(*map(range, shape)))
+    actions = all_joint_actions(shape)
+    assert actions.tolist() == [list(joint) for joint in expected]
+    assert actions.flags.c_contiguous
+    assert len(actions) == math.prod(shape)
