@@ -23,8 +23,8 @@ class Estimate:
 
     Attributes:
         labels: (num_targets, 2) birth step and birth index.
-        means: (num_targets, state_dim) mean of each track; of a mixture, the mean of the whole mixture.
-        covs: (num_targets, state_dim, state_dim) covariance of the same.
+        means: (num_targets, state_dim) estimated states.
+        covs: (num_targets, state_dim, state_dim) their covariances.
         existence: (num_targets,) probability that the label's target exists, over the whole density.
     """
 
@@ -62,14 +62,15 @@ def map_estimate(density: GLMB | LMB) -> Estimate:
     """The most probable number of targets, then the most probable targets of that number (paper, Algorithm 1).
 
     GLMB: the heaviest hypothesis of that cardinality. LMB: that many labels of highest existence. Ties: the smaller
-    number; the earlier hypothesis; the smaller label. A track that is a mixture is estimated by its moments.
+    number; the earlier hypothesis; the smaller label. A track that is a mixture is estimated by its heaviest component,
+    as the mean of two rival components may lie where the target cannot be.
     """
     if isinstance(density, GLMB):
         return _map_of_glmb(density)
     if isinstance(density, LMB):
         number = int(np.argmax(cardinality_distribution(density)))
         chosen = np.sort(np.argsort(-density.existence_logit, kind="stable")[:number])
-        return _estimate(density.tracks, chosen, density.existence[chosen])
+        return _peaks(density.tracks, chosen, density.existence[chosen])
     raise InputError(f"density: expected a GLMB or an LMB, which have labels; got {type(density).__name__}")
 
 
@@ -84,7 +85,7 @@ def _map_of_glmb(density: GLMB) -> Estimate:
     same = (labels[:, None, 0] == labels[chosen, 0]) & (labels[:, None, 1] == labels[chosen, 1])
     entry_weights = np.repeat(weights, sizes)
     track_weights = np.bincount(density.hyp_tracks, weights=entry_weights, minlength=len(labels))
-    return _estimate(density.tracks, chosen, np.minimum(track_weights @ same, 1.0))
+    return _peaks(density.tracks, chosen, np.minimum(track_weights @ same, 1.0))
 
 
 def marginal_estimate(density: GLMB | LMB, threshold: float = 0.5) -> Estimate:
@@ -99,10 +100,18 @@ def marginal_estimate(density: GLMB | LMB, threshold: float = 0.5) -> Estimate:
     if not isinstance(density, LMB):
         raise InputError(f"density: expected a GLMB or an LMB, which have labels; got {type(density).__name__}")
     chosen = np.flatnonzero(density.existence > threshold)
-    return _estimate(density.tracks, chosen, density.existence[chosen])
+    return _moments(density.tracks, chosen, density.existence[chosen])
 
 
-def _estimate(tracks: TrackTable, chosen: Ints, existence: Floats) -> Estimate:
+def _peaks(tracks: TrackTable, chosen: Ints, existence: Floats) -> Estimate:
+    """The heaviest component of each chosen track."""
+    starts, stops = tracks.offsets[chosen], tracks.offsets[chosen + 1]
+    heaviest = [int(low + np.argmax(tracks.log_weights[low:high])) for low, high in zip(starts, stops, strict=True)]
+    return Estimate(tracks.labels[chosen], tracks.means[heaviest], tracks.covs[heaviest], existence)
+
+
+def _moments(tracks: TrackTable, chosen: Ints, existence: Floats) -> Estimate:
+    """Mean and covariance of each chosen track."""
     labels = tracks.labels[chosen]
     if len(tracks.log_weights) == tracks.num_tracks:
         return Estimate(labels, tracks.means[chosen], tracks.covs[chosen], existence)

@@ -8,14 +8,21 @@ from typing import Any, Literal
 
 import numpy as np
 
-from vedette.densities import GLMB
+from vedette.densities import GLMB, LMB
 from vedette.errors import InputError, NumericalError
 from vedette.filters.info import FilterInfo
-from vedette.filters.inputs import births_at, check_belief, check_parts, check_period, check_pose, check_scan, model_errors
+from vedette.filters.inputs import (
+    births_at,
+    check_belief,
+    check_parts,
+    check_scan,
+    model_errors,
+)
 from vedette.filters.limits import Limits
 from vedette.kernels.conversions import marginalise
 from vedette.kernels.glmb import step_gibbs, step_ranked
 from vedette.models import BirthModel, MotionModel, SensorModel, SurvivalModel, kernel_motion
+from vedette.models.arguments import dimension, pose_vector, positive
 
 _NO_GROUPS = np.empty(0, np.int64)
 
@@ -29,8 +36,8 @@ class DeltaGlmbFilter:
         limits: caps and thresholds.
         assignment: "ranked" finds the heaviest hypotheses in exact order, "gibbs" samples them.
         num_gibbs_samples: sweeps in all, shared out over the prior hypotheses.
-        marginalised: collapse the posterior to one hypothesis a label set after each step (M-delta-GLMB filter, Fantacci
-            and Vo 2015); track mixtures are then reduced to `limits.max_components`.
+        marginalised: collapse the posterior to one hypothesis a label set after each step (M-delta-GLMB filter,
+            Fantacci and Vo 2015); track mixtures are then reduced to `limits.max_components`.
 
     Raises:
         InputError: models of different state dimensions, or a field out of range.
@@ -49,15 +56,14 @@ class DeltaGlmbFilter:
         check_parts(self.motion, self.birth, self.sensor)
         if self.assignment not in ("ranked", "gibbs"):
             raise InputError(f"assignment: expected 'ranked' or 'gibbs'; got {self.assignment!r}")
-        if not self.num_gibbs_samples >= 1:
-            raise InputError(f"num_gibbs_samples: expected at least 1; got {self.num_gibbs_samples!r}")
+        dimension("num_gibbs_samples", self.num_gibbs_samples)
 
     def initial(self) -> GLMB:
         """The belief before the first scan: no target."""
         return GLMB.empty(self.motion.state_dim)
 
     def step(
-        self, belief: GLMB, scan: Any, pose: Any, dt: float, step: int, *, rng: np.random.Generator
+        self, belief: GLMB | LMB, scan: Any, pose: Any, dt: float, step: int, *, rng: np.random.Generator
     ) -> tuple[GLMB, FilterInfo]:
         """Predict over `dt` seconds and update with a scan.
 
@@ -78,13 +84,13 @@ class DeltaGlmbFilter:
             NumericalError: no hypothesis has positive weight.
         """
         measurements, num_duplicates = check_scan(scan, self.sensor.meas_dim)
-        check_belief(belief, GLMB, self.motion.state_dim)
+        prior = check_belief(belief, GLMB, self.motion.state_dim)
         arguments = (
-            belief.to_kernel(),
+            prior.to_kernel(),
             births_at(self.birth, step).to_kernel(),
             measurements,
-            check_pose(pose),
-            check_period(dt),
+            pose_vector("pose", pose),
+            positive("dt", dt),
             kernel_motion(self.motion, self.survival),
             self.sensor.to_kernel(),
             self.limits.truncation(self.sensor.meas_dim),

@@ -10,8 +10,8 @@ class FilterInfo:
     """Report of one step.
 
     Attributes:
-        log_likelihood: log density of the scan (as a set, with the Poisson clutter's exp(-rate)) given the prior; of the
-            kept hypotheses.
+        log_likelihood: log density of the scan (as a set, with the Poisson clutter's exp(-rate)) given the prior; of
+            the kept hypotheses.
         num_hypotheses, num_tracks: size of the posterior.
         discarded_weight_bound: upper bound on the share of the posterior weight that was left out by the caps. Attained
             where no measurement is contested; contested ones are counted in it though they carry no weight. Weight

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
-from vedette.densities import LMB, TrackTable
+from vedette.densities import GLMB, LMB, TrackTable
 from vedette.errors import InputError, ModelError, VedetteError
 from vedette.kernels.types import Floats
 from vedette.models import BirthModel, MotionModel, SensorModel
+
+_Density = TypeVar("_Density", GLMB, LMB)
 
 
 def check_scan(scan: Any, meas_dim: int) -> tuple[Floats, int]:
@@ -41,27 +43,10 @@ def check_scan(scan: Any, meas_dim: int) -> tuple[Floats, int]:
     return np.ascontiguousarray(array[np.sort(first)]), len(array) - len(first)
 
 
-def check_pose(pose: Any) -> Floats:
-    """The pose as a contiguous (3,) array [px, py, heading_rad]; `InputError` if it is not that."""
-    try:
-        array = np.array(pose, dtype=np.float64, order="C")
-    except (TypeError, ValueError):
-        array = np.empty(0)
-    if array.shape != (3,) or not np.isfinite(array).all():
-        raise InputError(f"pose: expected three finite numbers px, py, heading_rad; got {pose!r}")
-    return array
-
-
-def check_period(dt: Any) -> float:
-    """The time step as a float; `InputError` unless it is finite and above zero."""
-    if isinstance(dt, bool) or not np.isscalar(dt) or not np.isfinite(dt) or dt <= 0:  # type: ignore[call-overload]
-        raise InputError(f"dt: expected a finite number of seconds above 0; got {dt!r}")
-    return float(dt)  # type: ignore[arg-type]
-
-
 def check_parts(motion: MotionModel, birth: BirthModel, sensor: SensorModel) -> None:
     """`InputError` unless the models are models and speak of states of the same dimension."""
-    for name, value, kind in (("motion", motion, MotionModel), ("birth", birth, BirthModel), ("sensor", sensor, SensorModel)):
+    kinds = (("motion", motion, MotionModel), ("birth", birth, BirthModel), ("sensor", sensor, SensorModel))
+    for name, value, kind in kinds:
         if not isinstance(value, kind):
             raise InputError(f"{name}: expected a {kind.__name__}; got {type(value).__name__}")
     if birth.state_dim != motion.state_dim:
@@ -70,12 +55,13 @@ def check_parts(motion: MotionModel, birth: BirthModel, sensor: SensorModel) -> 
         )
 
 
-def check_belief(belief: Any, kind: type, state_dim: int) -> None:
-    """`InputError` unless the belief is of the filter's kind and dimension."""
+def check_belief(belief: object, kind: type[_Density], state_dim: int) -> _Density:
+    """The belief; `InputError` unless it is of the filter's kind and dimension."""
     if not isinstance(belief, kind):
         raise InputError(f"belief: expected a {kind.__name__}; got {type(belief).__name__}")
-    if belief.tracks.state_dim != state_dim:
-        raise InputError(f"belief: expected states of dimension {state_dim}; got {belief.tracks.state_dim}")
+    if belief.state_dim != state_dim:
+        raise InputError(f"belief: expected states of dimension {state_dim}; got {belief.state_dim}")
+    return belief
 
 
 def births_at(birth: BirthModel, step: int) -> LMB:

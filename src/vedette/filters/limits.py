@@ -20,6 +20,10 @@ class Limits:
     Attributes:
         max_hypotheses: hypotheses kept; for an LMB, joint choices summed in a cluster too large for the exact sum.
         min_relative_weight: hypotheses lighter than this times the heaviest are dropped.
+        min_track_weight: for every label and what the scan may have done to it (missed, or detected as this
+            measurement), the heaviest such hypothesis is kept, in up to half of `max_hypotheses`, while it weighs at
+            least this times the heaviest of all; 1 switches this off. Without it a target whose first measurements fit
+            its birth badly is crowded out by variations of the heaviest hypotheses, and lost for good.
         gate_probability: probability that a target's measurement falls inside its gate; 1 switches gating off.
         min_log_clutter: floor on the log clutter intensity. A measurement where the model says that clutter is
             impossible (outside the region) would otherwise forbid every hypothesis that leaves it unexplained.
@@ -36,6 +40,7 @@ class Limits:
 
     max_hypotheses: int = 300
     min_relative_weight: float = 1e-6
+    min_track_weight: float = 1e-5
     gate_probability: float = 1.0 - 1e-7
     min_log_clutter: float = -60.0
     max_search_nodes: int = 1_000_000
@@ -52,6 +57,8 @@ class Limits:
         for name in ("min_relative_weight", "min_component_weight", "min_existence"):
             if not 0.0 <= getattr(self, name) < 1.0:
                 raise InputError(f"Limits.{name}: expected a number in [0, 1); got {getattr(self, name)!r}")
+        if not 0.0 <= self.min_track_weight <= 1.0:
+            raise InputError(f"Limits.min_track_weight: expected a number in [0, 1]; got {self.min_track_weight!r}")
         if not 0.0 < self.gate_probability <= 1.0:
             raise InputError(f"Limits.gate_probability: expected a number in (0, 1]; got {self.gate_probability!r}")
         if not self.merge_distance >= 0.0:
@@ -65,6 +72,7 @@ class Limits:
         return cls(
             max_hypotheses=2**62,
             min_relative_weight=0.0,
+            min_track_weight=0.0,
             gate_probability=1.0,
             max_search_nodes=2**62,
             min_component_weight=0.0,
@@ -82,6 +90,7 @@ class Limits:
             float(chi2.ppf(self.gate_probability, meas_dim)),
             float(self.min_log_clutter),
             int(self.max_search_nodes),
+            -math.log(self.min_track_weight) if self.min_track_weight > 0.0 else math.inf,
         )
 
     @property

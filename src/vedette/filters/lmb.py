@@ -7,13 +7,20 @@ from typing import Any
 
 import numpy as np
 
-from vedette.densities import LMB
+from vedette.densities import GLMB, LMB
 from vedette.errors import NumericalError
 from vedette.filters.info import FilterInfo
-from vedette.filters.inputs import births_at, check_belief, check_parts, check_period, check_pose, check_scan, model_errors
+from vedette.filters.inputs import (
+    births_at,
+    check_belief,
+    check_parts,
+    check_scan,
+    model_errors,
+)
 from vedette.filters.limits import Limits
 from vedette.kernels.lmb import step_lmb
 from vedette.models import BirthModel, MotionModel, SensorModel, SurvivalModel, kernel_motion
+from vedette.models.arguments import pose_vector, positive
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,28 +49,28 @@ class LmbFilter:
         return LMB.empty(self.motion.state_dim)
 
     def step(
-        self, belief: LMB, scan: Any, pose: Any, dt: float, step: int, *, rng: np.random.Generator
+        self, belief: GLMB | LMB, scan: Any, pose: Any, dt: float, step: int, *, rng: np.random.Generator
     ) -> tuple[LMB, FilterInfo]:
         """Predict over `dt` seconds and update with a scan; arguments, results and errors as `DeltaGlmbFilter.step`.
 
         Nothing is drawn from `rng`; it is taken so that filters are interchangeable.
         """
         measurements, num_duplicates = check_scan(scan, self.sensor.meas_dim)
-        check_belief(belief, LMB, self.motion.state_dim)
+        prior = check_belief(belief, LMB, self.motion.state_dim)
         with model_errors():
             posterior, report = step_lmb(
-                belief.to_kernel(),
+                prior.to_kernel(),
                 births_at(self.birth, step).to_kernel(),
                 measurements,
-                check_pose(pose),
-                check_period(dt),
+                pose_vector("pose", pose),
+                positive("dt", dt),
                 kernel_motion(self.motion, self.survival),
                 self.sensor.to_kernel(),
                 self.limits.truncation(self.sensor.meas_dim),
                 self.limits.reduction(),
             )
         if not np.isfinite(report.log_total):
-            raise NumericalError(f"step {step}: no joint association has positive weight; do the models forbid this scan?")
+            raise NumericalError(f"step {step}: no association has positive weight; do the models forbid this scan?")
         info = FilterInfo(
             log_likelihood=report.log_total + report.log_clutter - self.sensor.clutter.rate,
             num_hypotheses=1,

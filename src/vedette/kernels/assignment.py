@@ -100,7 +100,7 @@ def solve_assignment(options: Options, rows: Ints, work: DualWork) -> float:
 
 @kernel
 def _augment(options: Options, rows: Ints, start: int, work: DualWork) -> bool:
-    """Assign row `start` along a shortest alternating path, which ends in a free column or a row's own negative column."""
+    """Assign row `start` along a shortest alternating path, which ends in a free or in a negative column."""
     num_columns = len(work.column_dual)
     for column in range(num_columns):
         work.slack[column] = math.inf

@@ -23,8 +23,8 @@ from vedette.kernels.types import Floats, Ints, Lmb, Motion, Sensor, Tracks
 class Rows(NamedTuple):
     """Predicted tracks of a scan, ready to be updated.
 
-    log_absent: (num_rows,) log probability of not being there. log_weights: (num_components,) log of mixture weight times
-    probability of being there. means, covs: predicted moments.
+    log_absent: (num_rows,) log probability of not being there. log_weights: (num_components,) log of mixture weight
+    times probability of being there. means, covs: predicted moments.
     """
 
     labels: Ints
@@ -116,7 +116,11 @@ def _sort_row(start: int, stop: int, columns: Ints, log_weights: Floats, entries
         column, weight, entry = columns[i], log_weights[i], entries[i]
         slot = i
         while slot > start and log_weights[slot - 1] < weight:
-            columns[slot], log_weights[slot], entries[slot] = columns[slot - 1], log_weights[slot - 1], entries[slot - 1]
+            columns[slot], log_weights[slot], entries[slot] = (
+                columns[slot - 1],
+                log_weights[slot - 1],
+                entries[slot - 1],
+            )
             slot -= 1
         columns[slot], log_weights[slot], entries[slot] = column, weight, entry
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vedette.kernels.arrays import filled_ints
+from vedette.kernels.arrays import filled_ints, hashed
 from vedette.kernels.assignment import ABSENT, MISSED, Options
 from vedette.kernels.association import (
     Rows,
@@ -19,6 +19,7 @@ from vedette.kernels.association import (
     make_rows,
 )
 from vedette.kernels.compile import kernel
+from vedette.kernels.coverage import add_uncovered, mark_heaviest, themes_of_options
 from vedette.kernels.gaussian import Scratch, make_scratch, update_mean
 from vedette.kernels.gibbs import sample_children
 from vedette.kernels.linalg import log_sum
@@ -29,7 +30,8 @@ from vedette.kernels.types import Floats, Glmb, Ints, Lmb, Motion, Sensor, Track
 
 class Truncation(NamedTuple):
     """What is kept. max_hyps: number of hypotheses. max_log_gap: log weight below the best. gate: squared Mahalanobis
-    distance. log_clutter_floor: least log clutter intensity. max_nodes: bound on the ranking search.
+    distance. log_clutter_floor: least log clutter intensity. max_nodes: bound on the ranking search. max_track_gap: log
+    weight below the best to which a hypothesis is kept as the only one of a track; 0: none is.
     """
 
     max_hyps: int
@@ -37,6 +39,7 @@ class Truncation(NamedTuple):
     gate: float
     log_clutter_floor: float
     max_nodes: int
+    max_track_gap: float
 
 
 class StepReport(NamedTuple):
@@ -112,11 +115,10 @@ def _merge_equal(children: Children, columns: Ints) -> Ints:
     firsts = np.empty(num, np.int64)
     num_firsts = 0
     for child in range(num):
-        key = 1469598103934665603
+        key = 0
         for i in range(children.offsets[child], children.offsets[child + 1]):
             if columns[children.options[i]] != ABSENT:
-                key = (key ^ children.options[i]) * 1099511628211
-                key ^= key >> 29
+                key = hashed(key, children.options[i])
         slot = key & (size - 1)
         while table[slot] >= 0 and not _same_tracks(table[slot], child, children, columns):
             slot = (slot + 1) & (size - 1)
@@ -132,19 +134,34 @@ def _merge_equal(children: Children, columns: Ints) -> Ints:
 
 
 @kernel
-def _keep_heaviest(children: Children, firsts: Ints, truncation: Truncation, groups: Ints) -> Ints:
-    """The children to keep, heaviest first (ties by order of discovery): by number, by gap, and the best of each group."""
+def _heaviest_first(children: Children, firsts: Ints) -> Ints:
+    """The children `firsts` by descending weight, ties by order of discovery."""
     log_weights = np.empty(len(firsts))
     for i in range(len(firsts)):
         log_weights[i] = children.log_weights[firsts[i]]
     order = descending_order(log_weights)
-    kept = np.empty(len(firsts), np.int64)
+    for i in range(len(order)):
+        order[i] = firsts[order[i]]
+    return order
+
+
+@kernel
+def _keep_heaviest(children: Children, order: Ints, needed: Ints, truncation: Truncation, groups: Ints) -> Ints:
+    """The children to keep of those in `order`, heaviest first: those needed; of the others, by number and gap; and the
+    heaviest of each group.
+    """
+    others = truncation.max_hyps
+    for child in order:
+        others -= needed[child]
+    kept = np.empty(len(order), np.int64)
     num_kept = 0
     seen = filled_ints(num_groups(groups), 0)
-    for i in order:
-        child = firsts[i]
-        gap = log_weights[order[0]] - log_weights[i]
-        wanted = num_kept < truncation.max_hyps and gap <= truncation.max_log_gap
+    for child in order:
+        wanted = needed[child] == 1
+        gap = children.log_weights[order[0]] - children.log_weights[child]
+        if not wanted and others > 0 and gap <= truncation.max_log_gap:
+            wanted = True
+            others -= 1
         if len(groups):
             group = groups[children.parents[child]]
             wanted = wanted or seen[group] == 0
@@ -249,7 +266,14 @@ def prepare_rows(
 
 @kernel
 def finish_step(
-    prior: Glmb, num_births: int, rows: Rows, scan: Floats, pose: Floats, sensor: Sensor, truncation: Truncation, groups: Ints
+    prior: Glmb,
+    num_births: int,
+    rows: Rows,
+    scan: Floats,
+    pose: Floats,
+    sensor: Sensor,
+    truncation: Truncation,
+    groups: Ints,
 ) -> tuple[Glmb, Ints, StepReport]:
     """Rank, truncate and assemble once the rows are prepared. Returns posterior, parent of each hypothesis, report."""
     levels = np.empty(len(scan))
@@ -259,15 +283,38 @@ def finish_step(
     children, cut = rank_children(
         options, parents, len(scan), truncation.max_hyps, truncation.max_log_gap, truncation.max_nodes
     )
-    return _conclude(children, parents, rows, options, truncation, log_clutter, num_raised, cut)
+    # A search that ran dry has left nothing out.
+    is_covered = len(children.parents) < truncation.max_hyps and not cut
+    return _conclude(children, parents, rows, options, len(scan), truncation, log_clutter, num_raised, cut, is_covered)
 
 
 @kernel
 def _conclude(
-    children: Children, parents: Parents, rows: Rows, options: Options, truncation: Truncation,
-    log_clutter: float, num_raised: int, cut: bool,
+    children: Children,
+    parents: Parents,
+    rows: Rows,
+    options: Options,
+    num_columns: int,
+    truncation: Truncation,
+    log_clutter: float,
+    num_raised: int,
+    cut: bool,
+    is_covered: bool,
 ) -> tuple[Glmb, Ints, StepReport]:
-    kept = _keep_heaviest(children, _merge_equal(children, options.columns), truncation, parents.groups)
+    """Truncate and assemble. is_covered: nothing that `max_track_gap` would keep has been left out."""
+    covering = truncation.max_track_gap > 0.0 and not is_covered
+    themes, num_themes = np.empty(0, np.int64), 0
+    if covering:
+        themes, num_themes = themes_of_options(rows.labels, options, num_columns)
+        children = add_uncovered(options, themes, num_themes, parents, children, num_columns, truncation.max_track_gap)
+    order = _heaviest_first(children, _merge_equal(children, options.columns))
+    needed = filled_ints(len(children.parents), 0)
+    if covering:
+        half = truncation.max_hyps // 2
+        mark_heaviest(
+            children, order, themes, num_themes, truncation.max_hyps - half, half, truncation.max_track_gap, needed
+        )
+    kept = _keep_heaviest(children, order, needed, truncation, parents.groups)
     posterior, log_total = _assemble(children, kept, parents, rows, options)
     report = StepReport(log_total, _log_total_bound(options, parents), log_clutter, num_raised, cut)
     origins = np.empty(len(kept), np.int64)
@@ -278,8 +325,15 @@ def _conclude(
 
 @kernel
 def step_ranked(
-    prior: Glmb, birth: Lmb, scan: Floats, pose: Floats, dt: float,
-    motion: Motion, sensor: Sensor, truncation: Truncation, groups: Ints,
+    prior: Glmb,
+    birth: Lmb,
+    scan: Floats,
+    pose: Floats,
+    dt: float,
+    motion: Motion,
+    sensor: Sensor,
+    truncation: Truncation,
+    groups: Ints,
 ) -> tuple[Glmb, Ints, StepReport]:
     """One scan with the exactly ranked hypotheses. groups: label-set number of each prior hypothesis, or empty."""
     scratch = make_scratch(prior.tracks.means.shape[1], len(sensor.angular))
@@ -289,8 +343,16 @@ def step_ranked(
 
 @kernel
 def step_gibbs(
-    prior: Glmb, birth: Lmb, scan: Floats, pose: Floats, dt: float,
-    motion: Motion, sensor: Sensor, truncation: Truncation, num_samples: int, rng: np.random.Generator,
+    prior: Glmb,
+    birth: Lmb,
+    scan: Floats,
+    pose: Floats,
+    dt: float,
+    motion: Motion,
+    sensor: Sensor,
+    truncation: Truncation,
+    num_samples: int,
+    rng: np.random.Generator,
 ) -> tuple[Glmb, Ints, StepReport]:
     """One scan with hypotheses found by Gibbs sampling."""
     scratch = make_scratch(prior.tracks.means.shape[1], len(sensor.angular))
@@ -300,4 +362,4 @@ def step_gibbs(
     options = list_options(rows, scan, levels, sensor, truncation.gate)
     parents = _parents_with_births(prior, len(birth.tracks.labels), np.empty(0, np.int64))
     children = sample_children(options, parents, len(scan), num_samples, rng)
-    return _conclude(children, parents, rows, options, truncation, log_clutter, num_raised, False)
+    return _conclude(children, parents, rows, options, len(scan), truncation, log_clutter, num_raised, False, False)

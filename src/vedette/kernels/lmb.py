@@ -33,8 +33,9 @@ class Reduction(NamedTuple):
 
 
 class LmbReport(NamedTuple):
-    """log_total: log of the sum of all joint weights, relative to clutter alone. log_clutter: as in `StepReport`. num_raised: measurements with clutter raised to the floor.
-    num_ranked: clusters summed over their heaviest choices only. dropped_existence: summed existence of dropped labels.
+    """log_total: log of the sum of all joint weights, relative to clutter alone. log_clutter, num_raised: as in
+    `StepReport`. num_ranked: clusters summed over their heaviest choices only. dropped_existence: summed existence
+    of dropped labels.
     """
 
     log_total: float
@@ -140,12 +141,23 @@ def _posterior_tracks(kept: Ints, rows: Rows, options: Options, marginals: Float
 
 @kernel
 def _append_reduced(
-    wide_weights: Floats, wide_means: Floats, wide_covs: Floats, reduction: Reduction, filled: int,
-    log_weights: Floats, means: Floats, covs: Floats,
+    wide_weights: Floats,
+    wide_means: Floats,
+    wide_covs: Floats,
+    reduction: Reduction,
+    filled: int,
+    log_weights: Floats,
+    means: Floats,
+    covs: Floats,
 ) -> int:
     """Append the reduced mixture, its weights normalised to one; returns the new end."""
     few_weights, few_means, few_covs = reduce_mixture(
-        wide_weights, wide_means, wide_covs, reduction.log_min_weight, reduction.merge_distance, reduction.max_components
+        wide_weights,
+        wide_means,
+        wide_covs,
+        reduction.log_min_weight,
+        reduction.merge_distance,
+        reduction.max_components,
     )
     total = -math.inf
     for c in range(len(few_weights)):
@@ -180,8 +192,15 @@ def finish_lmb(
 
 @kernel
 def step_lmb(
-    prior: Lmb, birth: Lmb, scan: Floats, pose: Floats, dt: float,
-    motion: Motion, sensor: Sensor, truncation: Truncation, reduction: Reduction,
+    prior: Lmb,
+    birth: Lmb,
+    scan: Floats,
+    pose: Floats,
+    dt: float,
+    motion: Motion,
+    sensor: Sensor,
+    truncation: Truncation,
+    reduction: Reduction,
 ) -> tuple[Lmb, LmbReport]:
     """One scan."""
     scratch = make_scratch(prior.tracks.means.shape[1], len(sensor.angular))

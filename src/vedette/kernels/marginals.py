@@ -1,7 +1,7 @@
 """Marginal probability of every option of every row, by clusters of rows that contend for the same measurements.
 
-Within a cluster the sum over all joint choices is exact: a forward-backward pass over the rows whose state is the set of
-measurements already taken. A cluster too large for that is summed over its heaviest joint choices, in exact order.
+Within a cluster the sum over all joint choices is exact: a forward-backward pass over the rows whose state is the set
+of measurements already taken. A cluster too large for that is summed over its heaviest joint choices, in exact order.
 """
 
 from __future__ import annotations
@@ -70,9 +70,7 @@ def _single_row(options: Options, row: int, out: Floats) -> float:
 
 
 @kernel
-def _transfer(
-    options: Options, row: int, bit_of: Ints, source: Floats, target: Floats, forward: bool
-) -> None:
+def _transfer(options: Options, row: int, bit_of: Ints, source: Floats, target: Floats, forward: bool) -> None:
     """One row's step of the pass over sets of taken measurements; weights relative to the row's heaviest option."""
     for mask in range(len(target)):
         target[mask] = 0.0
@@ -152,8 +150,9 @@ def _ranked_cluster(
 def option_marginals(
     options: Options, num_columns: int, max_choices: int, max_log_gap: float, max_nodes: int, out: Floats
 ) -> tuple[float, int]:
-    """Log marginal probability of each option in `out`. Returns the log total weight of all joint choices and the number
-    of clusters that were summed over their `max_choices` heaviest choices only. The total is -inf if none is possible.
+    """Log marginal probability of each option in `out`. Returns the log total weight of all joint choices and the
+    number of clusters that were summed over their `max_choices` heaviest choices only. The total is -inf if none is
+    possible.
     """
     num_rows = len(options.offsets) - 1
     cluster, num_clusters = _clusters(options, num_columns)

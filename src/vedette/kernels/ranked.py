@@ -20,7 +20,7 @@ from vedette.kernels.types import Floats, Ints
 
 
 class Children(NamedTuple):
-    """Joint choices. Options of child `c` are `options[offsets[c]:offsets[c + 1]]`, one a row, in the parent's row order."""
+    """Joint choices. Options of child `c` are `options[offsets[c]:offsets[c + 1]]`, one a row, in the parent's."""
 
     parents: Ints
     offsets: Ints
@@ -29,9 +29,9 @@ class Children(NamedTuple):
 
 
 class Parents(NamedTuple):
-    """Prior hypotheses. Rows of parent `p` are `rows[offsets[p]:offsets[p + 1]]`. group: (num,) label-set number or empty.
+    """Prior hypotheses. Rows of parent `p` are `rows[offsets[p]:offsets[p + 1]]`.
 
-    Of each group at least one child is kept whatever its weight.
+    groups: (num,) label-set number, or empty. Of each group at least one child is kept whatever its weight.
     """
 
     offsets: Ints
@@ -44,8 +44,9 @@ class _Layouts(NamedTuple):
     """The opened parents: their rows in search order, options by reduced cost, and what an unused column costs.
 
     starts, penalty_starts: (num_parents,) first position in `rows` (-1 before the parent is opened) and in
-    `penalty_columns`. penalties: (num_parents,) number of penalised columns. rows, offsets: original row position and first option of each
-    search position. options, costs: options sorted by reduced cost. used: (3,) filled length of the three arenas.
+    `penalty_columns`. penalties: (num_parents,) number of penalised columns. rows, offsets: original row position and
+    first option of each search position. options, costs: options sorted by reduced cost.
+    used: (3,) filled length of the three arenas.
     """
 
     starts: Ints
@@ -228,7 +229,9 @@ def _next_free(layouts: _Layouts, columns: Ints, position: int, rank: int, taken
 
 
 @inlined
-def _mark_path(nodes: _Nodes, node: int, first_row: int, layouts: _Layouts, columns: Ints, taken: Ints, stamp: int) -> None:
+def _mark_path(
+    nodes: _Nodes, node: int, first_row: int, layouts: _Layouts, columns: Ints, taken: Ints, stamp: int
+) -> None:
     while nodes.depth[node] >= 0:
         column = columns[layouts.options[layouts.offsets[first_row + nodes.depth[node]] + nodes.rank[node]]]
         if column >= 0:
@@ -250,12 +253,14 @@ def _unused_penalty(layouts: _Layouts, parent: int, taken: Ints, stamp: int) -> 
 def _descend(
     nodes: _Nodes, node: int, num_rows: int, layouts: _Layouts, columns: Ints, taken: Ints, stamp: int, limit: float
 ) -> int:
-    """Visit `node` and dive along first choices while nothing waiting is better. Node number of a full choice, or -1."""
+    """Visit `node` and dive along first choices while nothing waiting is better; a full choice's number, or -1."""
     parent = nodes.parent[node]
     first_row = layouts.starts[parent]
     if nodes.depth[node] == num_rows:
         return node
-    _mark_path(nodes, nodes.previous[node] if nodes.depth[node] >= 0 else node, first_row, layouts, columns, taken, stamp)
+    _mark_path(
+        nodes, nodes.previous[node] if nodes.depth[node] >= 0 else node, first_row, layouts, columns, taken, stamp
+    )
     while True:
         depth, bound = nodes.depth[node], nodes.bound[node]
         if depth >= 0:
@@ -357,7 +362,7 @@ def grown_children(children: Children, used: Ints, num_rows: int) -> Children:
 
 @inlined
 def is_full(children: Children, used: Ints, num_rows: int) -> bool:
-    """Whether one more child of `num_rows` rows needs room first. used: (2,) number of children and of their options."""
+    """Whether one more child of `num_rows` rows needs room first. used: (2,) number of children, of their options."""
     return used[0] == len(children.parents) or used[1] + num_rows > len(children.options)
 
 

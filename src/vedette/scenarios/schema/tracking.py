@@ -39,7 +39,7 @@ class FilterLimits(Section):
     )
     min_track_weight: Annotated[float, Field(ge=0.0, le=1.0)] = Field(
         default=1e-5,
-        description="The heaviest hypothesis of each track is kept unless lighter than this times the heaviest [-].",
+        description="Each label's heaviest hypothesis is kept unless lighter than this times the heaviest of all [-].",
     )
     gate_probability: Annotated[float, Field(gt=0.0, le=1.0)] = Field(
         default=1.0 - 1e-7, description="Probability that a target's measurement falls in its gate; 1: no gate [-]."
