@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vedette.kernels.compile import kernel
+from vedette.kernels.compile import borrowing, inlined, kernel
 from vedette.kernels.types import Floats, Ints
 
 ABSENT = -2
@@ -61,7 +61,7 @@ def make_dual_work(num_rows: int, num_columns: int) -> DualWork:
     )
 
 
-@kernel
+@borrowing
 def solve_assignment(options: Options, rows: Ints, work: DualWork) -> float:
     """Cost of the best joint choice, minus its log weight; +inf where none exists.
 
@@ -98,9 +98,9 @@ def solve_assignment(options: Options, rows: Ints, work: DualWork) -> float:
     return total
 
 
-@kernel
+@inlined
 def _augment(options: Options, rows: Ints, start: int, work: DualWork) -> bool:
-    """Assign row `start` along a shortest alternating path, which ends in a free or in a negative column."""
+    """Assign row `start` along a shortest alternating path, to a free column or a row's own negative column."""
     num_columns = len(work.column_dual)
     for column in range(num_columns):
         work.slack[column] = math.inf
@@ -144,7 +144,7 @@ def _augment(options: Options, rows: Ints, start: int, work: DualWork) -> bool:
         row = work.column_row[best_column]
 
 
-@kernel
+@inlined
 def _flip(options: Options, row: int, option: int, start: int, num_rows: int, work: DualWork) -> None:
     """Give `row` its new option and pass its old column back along the path to `start`."""
     while row != start:
