@@ -1,8 +1,8 @@
 """The one place that configures Numba: how kernels and model functions are compiled and cached.
 
-Kernels are compiled at their first call and kept in a disk cache. Numba stamps a cache entry with the source file of the
-function itself and so misses an edit in a file it imports; the stamp used here covers the file and every `vedette.kernels`
-module it reaches.
+Kernels are compiled at their first call and kept in a disk cache. Numba stamps a cache entry with the source file of
+the function itself and so misses an edit in a file it imports; the stamp used here covers the file and every
+`vedette.kernels` module it reaches.
 """
 
 from __future__ import annotations
@@ -14,14 +14,13 @@ import os
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
-from typing import Any, TypeVar, cast
+from typing import Any, ClassVar, TypeVar, cast
 
 import numba
 from numba import types
-from numba.core import config
+from numba.core import cgutils, config
 from numba.core.caching import CompileResultCacheImpl, FunctionCache
 from numba.core.registry import CPUDispatcher
-from numba.core import cgutils
 from numba.experimental.function_type import FunctionModel
 from numba.extending import NativeValue, register_model, typeof_impl, unbox
 
@@ -110,7 +109,7 @@ class _PackageLocator:
 
 
 class _CacheImpl(CompileResultCacheImpl):  # type: ignore[misc]
-    _locator_classes = [_PackageLocator, *CompileResultCacheImpl._locator_classes]
+    _locator_classes: ClassVar[list[Any]] = [_PackageLocator, *CompileResultCacheImpl._locator_classes]
 
 
 class _Cache(FunctionCache):  # type: ignore[misc]
@@ -126,7 +125,7 @@ def _attach_cache(dispatcher: Any) -> None:
 
 
 def kernel(function: _F) -> _F:
-    """Compile a kernel lazily, without the interpreter lock, cached on disk under a stamp of all the sources it reaches."""
+    """Compile a kernel lazily, without the interpreter lock, cached under a stamp of all the sources it reaches."""
     return _compiled(function, _OPTIONS)
 
 

@@ -26,7 +26,8 @@ class Experiment:
         targets: where the true targets come from.
         sensors: the sensors with their local filters.
         poses: (num_sensors, 3) poses at the first scan.
-        moving: (num_sensors,) whether a sensor is under way from the start; the others lie still until the first decision.
+        moving: (num_sensors,) whether a sensor is under way from the start; the others lie still until the first
+            decision.
         fusion: of the local beliefs; None for a single sensor.
         feedback: whether the fused belief replaces the local ones (paper-notes 9).
         estimate: reads the targets off the fused belief.
