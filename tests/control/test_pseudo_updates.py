@@ -17,6 +17,7 @@ from vedette.filters import DeltaGlmbFilter
 from vedette.models.platforms import advance
 
 
+@pytest.mark.lanes
 def test_every_label_set_keeps_its_heaviest_hypothesis_beyond_the_caps() -> None:
     """With room for one hypothesis only, each label set goes its own way as under a filter with room for one."""
     limits = replace(EXACT_LIMITS, max_hypotheses=1)
