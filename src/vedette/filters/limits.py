@@ -9,8 +9,8 @@ from scipy.special import logit
 from scipy.stats import chi2
 
 from vedette.errors import InputError
-from vedette.kernels.glmb import Truncation
 from vedette.kernels.lmb import Reduction
+from vedette.kernels.truncation import Truncation
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,14 +7,16 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vedette.kernels.assembly import write_updated
 from vedette.kernels.assignment import ABSENT, Options
 from vedette.kernels.association import Rows, clutter_levels, list_options
 from vedette.kernels.compile import kernel
 from vedette.kernels.gaussian import make_scratch
-from vedette.kernels.glmb import Truncation, prepare_rows, write_updated
+from vedette.kernels.glmb import prepare_rows
 from vedette.kernels.linalg import log_add
 from vedette.kernels.marginals import option_marginals
 from vedette.kernels.mixtures import copy_component, descending_order, moment_match, reduce_mixture
+from vedette.kernels.truncation import Truncation
 from vedette.kernels.types import Floats, Ints, Lmb, Motion, Sensor, Tracks
 
 

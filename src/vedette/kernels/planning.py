@@ -17,11 +17,12 @@ from vedette.kernels.compile import kernel
 from vedette.kernels.conversions import marginalise
 from vedette.kernels.fused_divergence import Cases, Prediction, fused_glmb_divergence, fused_lmb_divergence
 from vedette.kernels.gaussian import make_scratch, predict
-from vedette.kernels.glmb import Truncation, finish_step, prepare_rows
+from vedette.kernels.glmb import finish_step, prepare_rows
 from vedette.kernels.ideal import Futures, ideal_scan
 from vedette.kernels.information import to_information
 from vedette.kernels.lmb import Reduction, finish_lmb, weigh_by_existence
 from vedette.kernels.mixtures import copy_component, match_components
+from vedette.kernels.truncation import Truncation
 from vedette.kernels.types import Floats, Glmb, Ints, Lmb, Motion, Sensor
 
 
