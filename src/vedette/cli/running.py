@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from vedette.simulation.records import RunRecord
 
 INTERRUPTED = 130
+# Of `vedette.evaluation.tables.HEADER`, for a terminal of 80 columns; the caption under the table says the rest.
+_SHORT_HEADER = ("", "OSPA (m)", "loc.", "card.", "difference", "95 %", "won")
 STRATEGY_NAMES = ("jdm", "idm", "random", "fixed", "still")
 
 
@@ -187,12 +189,12 @@ def _print_comparison(comparison: Comparison) -> None:
     from rich.table import Table
 
     from vedette.evaluation import decision_rows, strategy_rows
-    from vedette.evaluation.tables import HEADER, caption
+    from vedette.evaluation.tables import caption
 
     console = Console(highlight=False)
     table = Table(box=None, pad_edge=False)
-    for i, heading in enumerate(HEADER):
-        table.add_column(heading, justify="right" if i else "left")
+    for i, heading in enumerate(_SHORT_HEADER):
+        table.add_column(heading, justify="right" if i else "left", no_wrap=True)
     for row in strategy_rows(comparison):
         table.add_row(*row)
     console.print(table)
