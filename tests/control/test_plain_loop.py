@@ -13,6 +13,7 @@ from control.examples import (
     SETTINGS,
     A,
     B,
+    C,
     Situation,
     evaluator_of,
     glmb,
@@ -45,7 +46,7 @@ def assert_equals_plain_loop(example: Situation, unit_volume: Any = 1.0, *, laid
     np.testing.assert_allclose(evaluator.sample_rewards(everyone, example.fusion), joint, rtol=1e-9, atol=1e-9)
     for s, expected in enumerate(alone):
         np.testing.assert_allclose(evaluator.sample_rewards((s,), None), expected, rtol=1e-9, atol=1e-9)
-    assert np.ptp(joint, axis=0).max() > 0.01
+    assert np.ptp(joint, axis=0).max() > 1e-5
     return joint
 
 
@@ -172,6 +173,22 @@ def test_a_prediction_may_have_sets_of_weight_zero() -> None:
     log_weights -= np.logaddexp.reduce(log_weights)
     fused = GLMB(fused.tracks, fused.hyp_offsets, fused.hyp_tracks, log_weights)
     assert_equals_plain_loop(replace(example, fused=fused), "reference")
+
+
+@pytest.mark.parametrize("kind", ["delta", "marginal"])
+@pytest.mark.parametrize("most", [1, 2, 3, 4])
+def test_a_prediction_may_lack_label_sets_of_the_sensors(kind: str, most: int) -> None:
+    """Stand-ins for what a sensor lacks draw on sets that are not compared."""
+    example = situation(kind, 3)
+    fused, _ = replace(example.fusion, limits=FusionLimits(max_hyps=most)).fuse(example.beliefs)
+    assert fused.num_hyps == most
+    assert_equals_plain_loop(replace(example, fused=fused), "reference")
+
+
+@pytest.mark.parametrize("labels", [(A,), (C,), (A, C), (B, C)])
+def test_a_prediction_may_lack_labels_of_the_sensors(labels: Any) -> None:
+    example = situation("lmb", 3)
+    assert_equals_plain_loop(replace(example, fused=lmb(labels, np.random.default_rng(3))), "reference")
 
 
 @pytest.mark.parametrize("kind", ["marginal", "lmb"])
