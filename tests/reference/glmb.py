@@ -100,16 +100,21 @@ def step(hypotheses: Hypotheses, births: Lmb, scan: Sequence[Floats], model: Mod
     for key, (prior_weight, tracks) in hypotheses.items():
         rows = [(label, history, *survive(tracks[label], model)) for label, history in key]
         rows += [(label, (), existence, mixture) for label, (existence, mixture) in births.items()]
+        columns = [MISSED, *range(len(scan))]
+        outcomes = [
+            {column: observe(mixture, None if column == MISSED else scan[column], model) for column in columns}
+            for _, _, _, mixture in rows
+        ]
         for choice in associations(len(rows), len(scan)):
             weight, new_key, new_tracks = prior_weight, [], {}
-            for (label, history, presence, mixture), column in zip(rows, choice, strict=True):
+            for (label, history, presence, _), outcome, column in zip(rows, outcomes, choice, strict=True):
                 if column == ABSENT:
                     weight *= 1.0 - presence
                     continue
                 if weight == 0.0 or presence == 0.0:
                     weight = 0.0
                     break
-                factor, new_tracks[label] = observe(mixture, None if column == MISSED else scan[column], model)
+                factor, new_tracks[label] = outcome[column]
                 weight *= presence * factor
                 new_key.append((label, (*history, column)))
             if weight > 0.0:

@@ -91,7 +91,7 @@ def sample_children(
     used = np.zeros(2, np.int64)
     for parent in range(len(parents.log_weights)):
         rows = parents.rows[parents.offsets[parent] : parents.offsets[parent + 1]]
-        if solve_assignment(options, rows, work) == math.inf:
+        if parents.log_weights[parent] == -math.inf or solve_assignment(options, rows, work) == math.inf:
             continue
         for column in range(num_columns):
             work.column_row[column] = -1
