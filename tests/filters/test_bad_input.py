@@ -14,6 +14,8 @@ from vedette.densities import GLMB, LMB, existence_probabilities
 from vedette.errors import InputError, ModelError, NumericalError
 from vedette.filters import DeltaGlmbFilter, Limits, LmbFilter
 
+pytestmark = pytest.mark.lanes
+
 POSE = np.zeros(3)
 REGION = models.Region(-100.0, 100.0, -100.0, 100.0)
 NEAR = [[10.0, 10.0]]
