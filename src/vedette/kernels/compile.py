@@ -180,9 +180,21 @@ class ModelFunction(CPUDispatcher):  # type: ignore[misc]
     """
 
     kind: str
-    numba_type: Any
     c_address: int
     jit_address: int
+    _numba_type: Any = None
+
+    @property
+    def numba_type(self) -> Any:
+        """The type by which kernels know it; asking for it compiles the function."""
+        if self._numba_type is None:
+            self.bind()
+        return self._numba_type
+
+    def __call__(self, *args: Any) -> Any:
+        if self._numba_type is None:
+            self.bind()
+        return super().__call__(*args)
 
     def bind(self) -> None:
         """Compile to the signature of the kind and note where the machine code lies."""
@@ -191,7 +203,7 @@ class ModelFunction(CPUDispatcher):  # type: ignore[misc]
             self.compile(signature)
             self.disable_compile()
         compiled = self.get_compile_result(signature)
-        self.numba_type = _ModelFunctionType(compiled.signature)
+        self._numba_type = _ModelFunctionType(compiled.signature)
         self.c_address = compiled.library.get_pointer_to_function(compiled.fndesc.llvm_cfunc_wrapper_name)
         self.jit_address = compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name)
 
@@ -203,7 +215,6 @@ class ModelFunction(CPUDispatcher):  # type: ignore[misc]
         """What unpickling in another process calls."""
         function: ModelFunction = super()._rebuild(**states)
         function.kind = kind
-        function.bind()
         return function
 
 
@@ -249,6 +260,9 @@ def check_arguments(function: Callable[..., Any], kind: str) -> None:
 def compile_model_function(function: Callable[..., Any], kind: str) -> Any:
     """Compile `function` as a model function of `kind`.
 
+    The library's own functions are known to compile and wait until a model uses them, which saves seconds at the first
+    start; a user's is compiled here, where its faults can be told.
+
     Raises `TypeError` for a wrong kind, a wrong number of arguments, or a body that Numba cannot compile.
     """
     check_arguments(function, kind)
@@ -258,6 +272,8 @@ def compile_model_function(function: Callable[..., Any], kind: str) -> Any:
     dispatcher = ModelFunction(function, targetoptions=dict(_OPTIONS))
     dispatcher.kind = kind
     _attach_cache(dispatcher)
+    if function.__module__.startswith("vedette."):
+        return dispatcher
     try:
         dispatcher.bind()
     except numba.core.errors.NumbaError as error:
