@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,7 @@ import numpy as np
 from control.examples import Situation
 from vedette import models
 from vedette.control import MobileSensor, PlanningSettings
-from vedette.densities import GLMB, LMB, marginalise, sample_glmb, sample_lmb, track_moments
+from vedette.densities import GLMB, LMB, TrackTable, marginalise, sample_glmb, sample_lmb, track_moments
 from vedette.divergence import cauchy_schwarz, reference_unit_volume
 from vedette.filters import DeltaGlmbFilter, LmbFilter
 
@@ -92,6 +93,7 @@ def _updated(
     kind: Any = LmbFilter if isinstance(belief, LMB) else DeltaGlmbFilter
     if isinstance(belief, GLMB):
         belief = _cut(belief, settings.max_prior_hypotheses)
+    belief = replace(belief, tracks=TrackTable.from_gaussians(belief.tracks.labels, *track_moments(belief.tracks)))
     immortal = models.constant_survival(1.0), models.BirthModel.none(belief.state_dim)
     local = kind(own.motion, *immortal, own.sensor, settings.limits)
     for h, pose in enumerate(path):

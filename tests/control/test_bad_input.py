@@ -248,8 +248,9 @@ def test_models_that_give_nonsense_on_the_way(kind: str) -> None:
         ({"ideal_measurements": "perfect"}, "ideal_measurements: expected one of ideal, expected, sampled"),
         ({"num_threads": -1}, "num_threads: expected a whole number"),
         ({"num_threads": 1.5}, "num_threads: expected a whole number"),
-        ({"limits": Limits()}, "limits: expected max_components 1 and min_existence 0"),
+        ({"limits": Limits()}, "limits: expected max_components 1, min_existence 0 and min_track_weight 1"),
         ({"limits": replace(planning_limits(), max_components=2)}, "limits: expected max_components 1"),
+        ({"limits": replace(planning_limits(), min_track_weight=0.1)}, "limits: expected max_components 1"),
     ],
 )
 def test_settings(changes: dict[str, Any], message: str) -> None:

@@ -29,6 +29,14 @@ def heaviest_hypotheses(belief: GLMB, most: int) -> GLMB:
     return GLMB(taken.tracks, taken.hyp_offsets, taken.hyp_tracks, log_weights)
 
 
+def single_gaussians(tracks: TrackTable) -> TrackTable:
+    """The tracks with each mixture replaced by one Gaussian of its moments."""
+    num = tracks.num_tracks
+    if len(tracks.log_weights) == num:
+        return tracks
+    return TrackTable(tracks.labels, np.arange(num + 1), np.zeros(num), *track_moments(tracks))
+
+
 def take_hypotheses(belief: GLMB, places: Ints) -> GLMB:
     """The hypotheses at `places`, in that order, with their tracks only; their weights are not normalised."""
     sizes = np.diff(belief.hyp_offsets)[places]

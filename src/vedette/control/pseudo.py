@@ -8,14 +8,23 @@ from typing import NamedTuple
 import numpy as np
 
 from vedette.control.inputs import Belief
-from vedette.control.priors import LabelSet, heaviest_hypotheses, label_sets, offsets_of, single_labels, take_hypotheses
+from vedette.control.priors import (
+    LabelSet,
+    heaviest_hypotheses,
+    label_sets,
+    offsets_of,
+    single_gaussians,
+    single_labels,
+    take_hypotheses,
+)
 from vedette.control.settings import IDEAL_MODES, MobileSensor, PlanningSettings
 from vedette.control.threads import run_chunks
 from vedette.densities import GLMB, LMB, TrackTable, sample_glmb, sample_lmb
 from vedette.filters.inputs import model_errors
-from vedette.kernels.ideal import Futures, propagate_samples
-from vedette.kernels.planning import Horizon, pseudo_update_glmb, pseudo_update_lmb
-from vedette.kernels.types import Floats, Motion, Sensor
+from vedette.kernels.ideal import Decision, Futures, Horizon, propagate_samples
+from vedette.kernels.pseudo_glmb import GlmbResults, pseudo_update_glmb
+from vedette.kernels.pseudo_lmb import LmbResults, pseudo_update_lmb
+from vedette.kernels.types import Floats
 from vedette.models import constant_survival, kernel_motion
 from vedette.models.platforms import advance
 
@@ -66,12 +75,6 @@ def horizon_poses(pose: Floats, headings: Floats, speed: float, settings: Planni
     return poses
 
 
-class _Bundles(NamedTuple):
-    motion: Motion
-    sensor: Sensor
-    horizon: Horizon
-
-
 def pseudo_posteriors(
     belief: Belief, sensor: MobileSensor, pose: Floats, headings: Floats, futures: Futures, settings: PlanningSettings
 ) -> PseudoPosteriors:
@@ -85,56 +88,55 @@ def pseudo_posteriors(
         IDEAL_MODES[settings.ideal_measurements],
         float(settings.detection_threshold),
     )
-    motion = kernel_motion(sensor.filter.motion, constant_survival(1.0))
-    bundles = _Bundles(motion, sensor.filter.sensor.to_kernel(), horizon)
+    decision = Decision(
+        kernel_motion(sensor.filter.motion, constant_survival(1.0)),
+        sensor.filter.sensor.to_kernel(),
+        horizon,
+        futures,
+        settings.limits.truncation(sensor.filter.sensor.meas_dim),
+    )
     num_cases = len(headings) * settings.num_samples
     if isinstance(belief, GLMB):
-        return _run_glmb(belief, bundles, futures, settings, num_cases)
-    return _run_lmb(belief, bundles, futures, settings, num_cases)
+        return _run_glmb(belief, decision, settings, num_cases)
+    return _run_lmb(belief, decision, settings, num_cases)
 
 
-def _run_glmb(
-    belief: GLMB, bundles: _Bundles, futures: Futures, settings: PlanningSettings, num_cases: int
-) -> PseudoPosteriors:
-    prior = heaviest_hypotheses(belief, settings.max_prior_hypotheses)
-    found = label_sets(prior)
+def _run_glmb(belief: GLMB, decision: Decision, settings: PlanningSettings, num_cases: int) -> PseudoPosteriors:
+    heaviest = heaviest_hypotheses(belief, settings.max_prior_hypotheses)
+    prior = GLMB(single_gaussians(heaviest.tracks), heaviest.hyp_offsets, heaviest.hyp_tracks, heaviest.hyp_log_weights)
+    found, dim = label_sets(prior), prior.tracks.state_dim
     set_offsets = offsets_of([len(labels) for labels in found.sets])
-    dim, num_members = prior.tracks.state_dim, int(set_offsets[-1])
-    log_weights = np.empty((num_cases, len(found.sets)))
-    means, covs = np.empty((num_cases, num_members, dim)), np.empty((num_cases, num_members, dim, dim))
-    truncation = settings.limits.truncation(len(bundles.sensor.angular))
-    kernel_prior, no_birth = prior.to_kernel(), LMB.empty(dim).to_kernel()
+    results = GlmbResults(
+        set_offsets,
+        np.empty((num_cases, len(found.sets))),
+        np.empty((num_cases, int(set_offsets[-1]), dim)),
+        np.empty((num_cases, int(set_offsets[-1]), dim, dim)),
+    )
+    kernel_prior = prior.to_kernel()
 
     def work(first: int, last: int) -> None:
-        pseudo_update_glmb(
-            kernel_prior, found.groups, no_birth, bundles.motion, bundles.sensor, bundles.horizon, futures, truncation,
-            first, last, set_offsets, log_weights, means, covs,
-        )  # fmt: skip
+        pseudo_update_glmb(kernel_prior, found.groups, decision, first, last, results)
 
     with model_errors():
         run_chunks(work, num_cases, settings.threads())
-    return PseudoPosteriors(found.sets, log_weights, means, covs, False)
+    return PseudoPosteriors(found.sets, results.log_weights, results.means, results.covs, False)
 
 
-def _run_lmb(
-    belief: LMB, bundles: _Bundles, futures: Futures, settings: PlanningSettings, num_cases: int
-) -> PseudoPosteriors:
+def _run_lmb(belief: LMB, decision: Decision, settings: PlanningSettings, num_cases: int) -> PseudoPosteriors:
     num, dim = belief.tracks.num_tracks, belief.tracks.state_dim
-    logits = np.empty((num_cases, num))
-    means, covs = np.empty((num_cases, num, dim)), np.empty((num_cases, num, dim, dim))
-    truncation = settings.limits.truncation(len(bundles.sensor.angular))
+    results = LmbResults(
+        np.empty((num_cases, num)), np.empty((num_cases, num, dim)), np.empty((num_cases, num, dim, dim))
+    )
     reduction = settings.limits.reduction()._replace(max_labels=max(num, 1))
-    prior, no_birth = belief.to_kernel(), LMB.empty(dim).to_kernel()
+    prior = LMB(single_gaussians(belief.tracks), belief.existence_logit).to_kernel()
+    no_birth = LMB.empty(dim).to_kernel()
 
     def work(first: int, last: int) -> None:
-        pseudo_update_lmb(
-            prior, no_birth, bundles.motion, bundles.sensor, bundles.horizon, futures, truncation, reduction,
-            first, last, logits, means, covs,
-        )  # fmt: skip
+        pseudo_update_lmb(prior, no_birth, decision, reduction, first, last, results)
 
     with model_errors():
         run_chunks(work, num_cases, settings.threads())
-    return PseudoPosteriors(single_labels(belief), logits, means, covs, True)
+    return PseudoPosteriors(single_labels(belief), results.logits, results.means, results.covs, True)
 
 
 def case_density(posteriors: PseudoPosteriors, case: int) -> Belief:

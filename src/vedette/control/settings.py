@@ -35,7 +35,8 @@ class PlanningSettings:
         max_prior_hypotheses: heaviest hypotheses of each local posterior that enter the pseudo-updates. An LMB enters
             whole.
         limits: caps of the pseudo-updates, which are ranked, not Gibbs sampled, whatever the filter does. Every label
-            set of the prior keeps its heaviest hypothesis beyond these caps, and an LMB keeps all its labels.
+            set of the prior keeps its heaviest hypothesis beyond these caps, and an LMB keeps all its labels. Tracks
+            that are mixtures are replaced by one Gaussian of their moments beforehand.
         num_threads: threads that share a decision; 0: one a processor. The result does not depend on it.
 
     Raises:
@@ -60,8 +61,11 @@ class PlanningSettings:
             dimension("num_threads", self.num_threads)
         if self.ideal_measurements not in IDEAL_MODES:
             raise reject("ideal_measurements", f"one of {', '.join(IDEAL_MODES)}", self.ideal_measurements)
-        if self.limits.max_components != 1 or self.limits.min_existence != 0.0:
-            raise InputError("limits: expected max_components 1 and min_existence 0, as in planning_limits()")
+        own = self.limits
+        if own.max_components != 1 or own.min_existence != 0.0 or own.min_track_weight != 1.0:
+            raise InputError(
+                "limits: expected max_components 1, min_existence 0 and min_track_weight 1, as in planning_limits()"
+            )
 
     def threads(self) -> int:
         """Number of threads to use."""

@@ -54,9 +54,32 @@ def make_rows(num_rows: int, num_components: int, state_dim: int, meas_dim: int)
     )
 
 
+@inlined
+def view_rows(rows: Rows, first: int, num: int) -> Rows:
+    """Room for `num` rows of one component each, from row `first` on."""
+    last, innovation = first + num, rows.innovation
+    return Rows(
+        rows.labels[first:last],
+        rows.offsets[first : last + 1],
+        rows.log_absent[first:last],
+        rows.log_weights[first:last],
+        rows.means[first:last],
+        rows.covs[first:last],
+        Innovation(
+            innovation.predicted[first:last],
+            innovation.factor[first:last],
+            innovation.whitened_cross[first:last],
+            innovation.covs[first:last],
+            innovation.log_norm[first:last],
+            innovation.prob_detection[first:last],
+        ),
+    )
+
+
 @borrowing
 def fill_survivors(tracks: Tracks, motion: Motion, dt: float, rows: Rows, scratch: Scratch) -> None:
     """Predict every track into the first rows."""
+    rows.offsets[0] = 0
     for i in range(len(tracks.labels)):
         absent = 0.0
         for c in range(tracks.offsets[i], tracks.offsets[i + 1]):
@@ -167,6 +190,19 @@ def make_options(num_rows: int, num_components: int, num_measurements: int, meas
         np.empty(most_options, np.int64),
         np.empty(most_entries),
         np.empty((most_entries, meas_dim)),
+    )
+
+
+@inlined
+def view_options(options: Options, num_rows: int) -> Options:
+    """Room for the options of the first `num_rows` rows."""
+    return Options(
+        options.offsets[: num_rows + 1],
+        options.columns,
+        options.log_weights,
+        options.entries,
+        options.component_log_weights,
+        options.whitened,
     )
 
 

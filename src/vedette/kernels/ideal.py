@@ -7,9 +7,10 @@ from typing import NamedTuple
 import numpy as np
 
 from vedette.errors import ModelError
-from vedette.kernels.compile import kernel
-from vedette.kernels.gaussian import wrap_angle
+from vedette.kernels.compile import borrowing, inlined, kernel
+from vedette.kernels.gaussian import Scratch, wrap_angle
 from vedette.kernels.linalg import cholesky
+from vedette.kernels.truncation import Truncation
 from vedette.kernels.types import Floats, Ints, Motion, Sensor
 
 IDEAL = 0
@@ -42,33 +43,65 @@ def propagate_samples(motion: Motion, states: Floats, dt: float, horizon_steps: 
     return out
 
 
-@kernel
-def ideal_scan(
-    sensor: Sensor, pose: Floats, futures: Futures, sample: int, step: int, mode: int, threshold: float, out: Floats
-) -> int:
-    """Write the ideal measurements of a sample at a horizon step into `out`; returns their number.
-
-    IDEAL: without noise, of the targets whose detection probability is at least `threshold`. EXPECTED: without noise, each
-    target seen with its detection probability. SAMPLED: seen likewise, with measurement noise. Never any clutter.
+class Horizon(NamedTuple):
+    """poses: (num_actions, horizon_steps, 3) where each action takes the sensor. dt: seconds a step.
+    mode, threshold: of the ideal measurements.
     """
-    dim = out.shape[1]
-    count = 0
+
+    poses: Floats
+    dt: float
+    mode: int
+    threshold: float
+
+
+class Decision(NamedTuple):
+    """What the pseudo-updates of one sensor depend on besides its prior. futures: as this sensor sees them."""
+
+    motion: Motion
+    sensor: Sensor
+    horizon: Horizon
+    futures: Futures
+    truncation: Truncation
+
+
+@borrowing
+def most_targets(futures: Futures) -> int:
+    """Number of targets of the sample that has most."""
+    most = 0
+    for sample in range(len(futures.offsets) - 1):
+        most = max(most, futures.offsets[sample + 1] - futures.offsets[sample])
+    return most
+
+
+@inlined
+def _add_noise(sensor: Sensor, state: Floats, pose: Floats, normals: Floats, scratch: Scratch, out: Floats) -> None:
+    noise, factor = scratch.measurement_noise, scratch.innovation_cov
+    sensor.measurement_noise_cov(state, pose, sensor.noise_params, noise)
+    if not cholesky(noise, factor):
+        raise ModelError("measurement noise model: covariance is not positive definite or not finite")
+    for a in range(out.shape[0]):
+        for b in range(a + 1):
+            out[a] += factor[a, b] * normals[b]
+        if sensor.angular[a]:
+            out[a] = wrap_angle(out[a])
+
+
+@borrowing
+def ideal_scan(decision: Decision, action: int, sample: int, step: int, scratch: Scratch, out: Floats) -> int:
+    """Write the ideal measurements of a sample at a step of an action into `out`; returns their number.
+
+    IDEAL: without noise, of the targets whose detection probability is at least the threshold. EXPECTED: without noise,
+    each target seen with its detection probability. SAMPLED: seen likewise, with measurement noise. Never any clutter.
+    """
+    sensor, horizon, futures = decision.sensor, decision.horizon, decision.futures
+    pose, count = horizon.poses[action, step], 0
     for i in range(futures.offsets[sample], futures.offsets[sample + 1]):
         state = futures.states[step, i]
         detection = sensor.prob_detection(state, pose, sensor.detection_params)
-        seen = detection >= threshold if mode == IDEAL else futures.uniforms[step, i] < detection
-        if not seen:
-            continue
-        sensor.measurement(state, pose, sensor.measurement_params, out[count])
-        if mode == SAMPLED:
-            noise, factor = np.empty((dim, dim)), np.empty((dim, dim))
-            sensor.measurement_noise_cov(state, pose, sensor.noise_params, noise)
-            if not cholesky(noise, factor):
-                raise ModelError("measurement noise model: covariance is not positive definite or not finite")
-            for a in range(dim):
-                for b in range(a + 1):
-                    out[count, a] += factor[a, b] * futures.normals[step, i, b]
-                if sensor.angular[a]:
-                    out[count, a] = wrap_angle(out[count, a])
-        count += 1
+        seen = detection >= horizon.threshold if horizon.mode == IDEAL else futures.uniforms[step, i] < detection
+        if seen:
+            sensor.measurement(state, pose, sensor.measurement_params, out[count])
+            if horizon.mode == SAMPLED:
+                _add_noise(sensor, state, pose, futures.normals[step, i], scratch, out[count])
+            count += 1
     return count

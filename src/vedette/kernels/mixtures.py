@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from vedette.kernels.compile import inlined, kernel
+from vedette.kernels.compile import borrowing, inlined, kernel
 from vedette.kernels.linalg import cholesky, log_sum, solve_lower
 from vedette.kernels.types import Floats, Ints
 
@@ -56,7 +56,7 @@ def copy_component(means: Floats, covs: Floats, source: int, out_means: Floats, 
             out_covs[target, i, j] = covs[source, i, j]
 
 
-@kernel
+@borrowing
 def match_components(
     components: Ints, weights: Floats, count: int, means: Floats, covs: Floats, out_mean: Floats, out_cov: Floats
 ) -> None:

@@ -6,12 +6,12 @@ import math
 
 import numpy as np
 
-from vedette.kernels.compile import kernel
+from vedette.kernels.compile import inlined, kernel
 from vedette.kernels.mixtures import copy_component, match_components, reduce_mixture
 from vedette.kernels.types import Floats, Ints, Tracks
 
 
-@kernel
+@inlined
 def add_to_pool(track: int, weight: float, slot_of: Ints, pool: Ints, weights: Floats, end: int) -> int:
     """Add `weight` to `track`'s place in the open pool, or give it the place `end`; the new end of the pool."""
     slot = slot_of[track]
