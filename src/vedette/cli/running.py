@@ -14,6 +14,7 @@ from vedette.cli.errors import usage_error
 
 if TYPE_CHECKING:
     from vedette.evaluation import Comparison
+    from vedette.scenarios import Scenario
     from vedette.simulation.records import RunRecord
 
 INTERRUPTED = 130
@@ -22,15 +23,16 @@ _SHORT_HEADER = ("", "OSPA (m)", "loc.", "card.", "difference", "95 %", "won")
 STRATEGY_NAMES = ("jdm", "idm", "random", "fixed", "still")
 
 
-def say_if_cold() -> None:
+def compile_if_cold(scenario: Scenario) -> None:
     """The first start compiles for about a minute; say so before it happens."""
     from vedette.kernels.compile import cache_directory, is_cold
 
     if is_cold():
-        typer.echo(
-            f"Compiling the kernels: once on this machine, about a minute. They are kept in {cache_directory()}.",
-            err=True,
-        )
+        where = cache_directory()
+        typer.echo(f"Compiling the kernels: once on this machine, about a minute. They are kept in {where}.", err=True)
+        from vedette.evaluation.precompile import precompile
+
+        precompile(scenario)
 
 
 @contextmanager
@@ -63,7 +65,6 @@ def run(
 ) -> None:
     """Run a scenario once: tracks, decisions with their rewards, errors, figures."""
     _check_planner(planner, "--planner")
-    say_if_cold()
     from vedette.evaluation.runs import run_scenario
     from vedette.scenarios import load_scenario
     from vedette.scenarios.dumping import dump_scenario
@@ -74,6 +75,7 @@ def run(
 
         check_free(out, overwrite)
     with interruptible("nothing was written"):
+        compile_if_cold(loaded)
         record = run_scenario(loaded, planner, seed=seed, run=run_number, num_threads=threads)
         _print_run(record)
         if out is not None:
@@ -134,7 +136,6 @@ def reproduce(
         _check_planner(name, "--planners")
     if len(set(names)) != len(names):
         raise usage_error(f"expected each strategy once; got {planners}", "--planners")
-    say_if_cold()
     from vedette.evaluation.reproduction import check_target, write_reproduction
     from vedette.evaluation.runs import run_paired
     from vedette.scenarios import load_scenario
@@ -142,6 +143,7 @@ def reproduce(
     loaded = load_scenario(scenario)
     check_target(out)
     with interruptible("nothing was written"):
+        compile_if_cold(loaded)
         with _progress(len(names) * runs) as progress:
             records = run_paired(
                 loaded, names, runs, seed=seed, num_workers=workers or _processors(), progress=progress.advance

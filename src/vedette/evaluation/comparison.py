@@ -103,7 +103,9 @@ def compare(
         since = float(decision_times[0]) if len(decision_times) else -np.inf
     times = reference[0].times
     if not ((times > since) & (times <= until)).any():
-        raise InputError(f"since, until: expected a scan of {times[0]} to {times[-1]} s between; got {since} to {until}")
+        raise InputError(
+            f"since: expected scans after it and up to until, of {times[0]} to {times[-1]} s; got {since} to {until}"
+        )
     return Comparison(
         scenario=reference[0].scenario,
         strategies=strategies,

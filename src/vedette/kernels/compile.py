@@ -282,10 +282,9 @@ def compile_model_function(function: Callable[..., Any], kind: str) -> Any:
 
 
 def is_cold() -> bool:
-    """Whether no kernel of this checkout has been compiled on this machine yet."""
-    return JIT_ENABLED and not any(
-        Path(_PackageLocator(kernel, Path(__file__)).get_cache_path()).parent.glob("*/*.nbc")
-    )
+    """Whether no kernel of this checkout has been compiled on this machine yet (model functions do not count)."""
+    cache = Path(_PackageLocator(kernel, Path(__file__)).get_cache_path()).parent
+    return JIT_ENABLED and not any(cache.glob("kernels_*/*.nbc"))
 
 
 __all__ = [
