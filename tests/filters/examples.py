@@ -111,7 +111,7 @@ def linear_scene(existence: float = 0.3, prob_survival: float = 0.9, prob_detect
     return Scene(
         models.constant_velocity(3.0),
         models.constant_survival(prob_survival),
-        models.BirthModel([existence, 0.2], means, covs, steps={0, 1}),
+        models.BirthModel(np.array([existence, 0.2]), means, covs, steps=frozenset({0, 1})),
         models.SensorModel(
             models.position(),
             models.constant_noise([12.0, 9.0]),
@@ -166,8 +166,8 @@ def polar_scene(method: str) -> Scene:
     ]
     return Scene(
         motion,
-        models.SurvivalModel(surviving_near_the_origin, [0.97, 2000.0]),
-        models.BirthModel([0.3, 0.2], means[:, :dim], covs[:, :dim, :dim], steps={0, 1}),
+        models.SurvivalModel(surviving_near_the_origin, np.array([0.97, 2000.0])),
+        models.BirthModel(np.array([0.3, 0.2]), means[:, :dim], covs[:, :dim, :dim], steps=frozenset({0, 1})),
         models.SensorModel(
             models.bearing_range(),
             models.range_dependent_noise(8.0, 2e-5, 0.02, 5e-5),
@@ -216,9 +216,7 @@ def plain_glmb(glmb: GLMB) -> reference.Glmb:
     tracks = plain_tracks(glmb.tracks)
     return [
         (float(np.exp(log_weight)), dict(tracks[t] for t in glmb.hyp_tracks[low:high]))
-        for log_weight, low, high in zip(
-            glmb.hyp_log_weights, glmb.hyp_offsets[:-1], glmb.hyp_offsets[1:], strict=True
-        )
+        for log_weight, low, high in zip(glmb.hyp_log_weights, glmb.hyp_offsets[:-1], glmb.hyp_offsets[1:], strict=True)
     ]
 
 
@@ -236,6 +234,16 @@ def assert_same_mixtures(got: reference.Mixture, expected: reference.Mixture, to
         assert abs(w - expected_w) <= tolerance
         np.testing.assert_allclose(m / stds, expected_m / stds, rtol=0.0, atol=10.0 * tolerance)
         np.testing.assert_allclose(c / np.outer(stds, stds), expected_c / np.outer(stds, stds), atol=10.0 * tolerance)
+
+
+def together(mixture: reference.Mixture) -> reference.Mixture:
+    """The same mixture with equal components added up."""
+    places: dict[tuple[float, ...], tuple[float, Floats, Floats]] = {}
+    for component in mixture:
+        weight, mean, cov = component
+        place = _place(component)
+        places[place] = (weight + places[place][0] if place in places else weight, mean, cov)
+    return list(places.values())
 
 
 def _place(component: tuple[float, Floats, Floats]) -> tuple[float, ...]:

@@ -40,7 +40,7 @@ def seeds(family: str) -> list[int]:
 
 @dataclass(frozen=True)
 class Recording:
-    """One file: its scans, the true positions at each of them, and the models' parameters as `numpy.load` gives them."""
+    """One file: its scans, the true positions at each, and the models' parameters as `numpy.load` gives them."""
 
     scans: tuple[Any, ...]
     positions: tuple[Any, ...]
@@ -94,7 +94,10 @@ def sensor_model(parameters: dict[str, Any], method: str) -> models.SensorModel:
     measurement = models.position()
     if polar:
         measurement = models.MeasurementModel(
-            2, bearing_from_north_and_range, jacobian=bearing_from_north_and_range_jacobian, angular=[True, False]
+            2,
+            bearing_from_north_and_range,
+            jacobian=bearing_from_north_and_range_jacobian,
+            angular=np.array([True, False]),
         )
     return models.SensorModel(
         measurement,
@@ -107,9 +110,7 @@ def sensor_model(parameters: dict[str, Any], method: str) -> models.SensorModel:
 
 def motion_model(parameters: dict[str, Any], method: str) -> models.MotionModel:
     if "sigma_turn" in parameters:
-        return models.coordinated_turn(
-            float(parameters["sigma_vel"]), float(parameters["sigma_turn"]), method=method
-        )
+        return models.coordinated_turn(float(parameters["sigma_vel"]), float(parameters["sigma_turn"]), method=method)
     return models.constant_velocity(math.sqrt(float(parameters["Q"][1, 1])))
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from vedette import models
-from vedette.densities import GLMB, LMB, existence_probabilities
+from vedette.densities import GLMB, LMB, TrackTable, existence_probabilities
 from vedette.errors import InputError, ModelError, NumericalError
 from vedette.filters import DeltaGlmbFilter, Limits, LmbFilter
 
@@ -168,10 +168,28 @@ def test_poses(kind: Any, pose: Any) -> None:
 
 
 @each_kind
-@pytest.mark.parametrize("dt", [0.0, -1.0, math.nan, math.inf, True, np.ones(2)])
+@pytest.mark.parametrize("dt", [0.0, -1.0, math.nan, math.inf, True, np.ones(2), "1", None])
 def test_time_steps(kind: Any, dt: Any) -> None:
     with pytest.raises(InputError, match=r"dt: expected a .*number.*; got"):
         step(make(kind), dt=dt)
+
+
+@each_kind
+@pytest.mark.parametrize("number", [1.5, None, True, "1"])
+def test_steps(kind: Any, number: Any) -> None:
+    with pytest.raises(InputError, match="step: expected a whole number; got"):
+        step(make(kind), number=number)
+
+
+@each_kind
+def test_a_step_whose_labels_are_in_use(kind: Any) -> None:
+    tracker = make(kind)
+    belief, _ = step(tracker, number=3)
+    for number in (3, 2):
+        with pytest.raises(InputError, match=rf"step: expected a step after those of the labels .* is 3; got {number}"):
+            step(tracker, belief=belief, number=number)
+    # Without births no label is given.
+    step(make(kind, birth=models.BirthModel.none(4)), belief=belief, number=3)[0].validate()
 
 
 def first_belief(kind: Any) -> Any:
@@ -205,6 +223,28 @@ def test_probabilities_that_are_none(kind: Any, value: float) -> None:
 def test_noise_that_is_none(kind: Any, noise: Any) -> None:
     with pytest.raises(ModelError, match="innovation covariance is not positive definite or not finite"):
         step(make(kind, noise=models.NoiseModel(noise)))
+
+
+@models.model_function("measurement")
+def nowhere(state, pose, params, out):
+    for i in range(out.shape[0]):
+        out[i] = math.inf
+
+
+@each_kind
+def test_a_measurement_that_is_none(kind: Any) -> None:
+    with pytest.raises(ModelError, match="measurement model: "):
+        step(make(kind, measurement=models.MeasurementModel(2, nowhere)))
+
+
+@each_kind
+def test_a_belief_that_is_no_density(kind: Any) -> None:
+    tracks = TrackTable(np.zeros((1, 2), np.int64), np.arange(2), np.zeros(1), np.zeros((1, 4)), -np.eye(4)[None])
+    glmb = GLMB(tracks, np.arange(2), np.zeros(1, np.int64), np.zeros(1))
+    belief = glmb if kind is DeltaGlmbFilter else LMB(tracks, np.zeros(1))
+    tracker = make(kind, motion=models.constant_velocity(1.0, method="ukf"))
+    with pytest.raises(NumericalError, match="covariance of a track is not positive definite"):
+        step(tracker, belief=belief, number=1)
 
 
 @each_kind
@@ -287,7 +327,7 @@ def test_more_targets_than_caps(kind: Any) -> None:
 @pytest.mark.parametrize(
     ("field", "values"),
     [
-        ("max_hypotheses", (0, -1)),
+        ("max_hypotheses", (0, -1, 2.5, "many")),
         ("max_search_nodes", (0,)),
         ("max_components", (0,)),
         ("max_labels", (0,)),
@@ -314,8 +354,12 @@ def test_parts_that_do_not_fit(kind: Any) -> None:
         make(kind, motion="straight on")
     with pytest.raises(InputError, match="birth: expected a BirthModel; got NoneType"):
         make(kind, birth=None)
+    with pytest.raises(InputError, match="survival: expected a SurvivalModel; got float"):
+        make(kind, survival=0.9)
     with pytest.raises(InputError, match="sensor: expected a SensorModel"):
         kind(models.constant_velocity(1.0), models.constant_survival(0.9), birth(), None)
+    with pytest.raises(InputError, match="limits: expected a Limits; got int"):
+        dataclasses.replace(make(kind), limits=300)
 
 
 def test_options_of_the_delta_glmb_filter() -> None:

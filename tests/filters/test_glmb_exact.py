@@ -15,10 +15,10 @@ from filters.examples import (
     assert_same_mixtures,
     linear_scene,
     plain_glmb,
+    together,
 )
 from reference import glmb as oracle
 from vedette.densities import GLMB, TrackTable
-from vedette.filters import Limits
 from vedette.kernels.compile import JIT_ENABLED
 
 pytestmark = pytest.mark.lanes
@@ -70,10 +70,10 @@ def prior_of_mixtures(scene: Scene) -> tuple[GLMB, oracle.Hypotheses]:
     tracks = TrackTable.from_mixtures([[-2, 0], [-1, 1], [-2, 0]], mixtures)
     glmb = GLMB.from_hypotheses(tracks, [[0, 1], [2], []], [0.5, 0.3, 0.2])
     # Histories that tell the two versions of the first label apart.
-    names = {0: (0,), 1: (0,), 2: (1,)}
+    names: dict[int, oracle.History] = {0: (0,), 1: (0,), 2: (1,)}
     labels = [(-2, 0), (-1, 1), (-2, 0)]
     plain = [[(float(w), m, c) for w, m, c in zip(*mixture, strict=True)] for mixture in mixtures]
-    hypotheses = {
+    hypotheses: oracle.Hypotheses = {
         tuple((labels[t], names[t]) for t in members): (weight, {labels[t]: plain[t] for t in members})
         for members, weight in (((0, 1), 0.5), ((2,), 0.3), ((), 0.2))
     }
@@ -120,12 +120,3 @@ def test_marginalised_keeps_the_weight_of_each_label_set():
     for _, tracks in plain_glmb(posterior):
         for label, mixture in tracks.items():
             assert_same_mixtures(mixture, oracle.normalised(together(pools[tuple(sorted(tracks)), label]))[1])
-
-
-def together(pool):
-    """The same mixture with equal components added up."""
-    places: dict = {}
-    for weight, mean, cov in pool:
-        place = tuple(mean.round(6))
-        places[place] = (weight + places.get(place, (0.0,))[0], mean, cov)
-    return list(places.values())

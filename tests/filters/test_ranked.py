@@ -166,7 +166,9 @@ def test_a_theme_is_a_label_and_what_the_scan_did_to_it():
     themes, num_themes = themes_of_options(np.array([[3, 1], [3, 1], [4, 0]]), options, 2)
     assert num_themes == 6
     assert themes[options.columns == ABSENT].tolist() == [-1]
-    first, second, third = (themes[low:high] for low, high in zip(options.offsets[:-1], options.offsets[1:], strict=True))
+    first, second, third = (
+        themes[low:high] for low, high in zip(options.offsets[:-1], options.offsets[1:], strict=True)
+    )
     assert set(first[first >= 0]) == set(second)
     assert not set(second) & set(third)
     assert len(set(themes[themes >= 0].tolist())) == 4

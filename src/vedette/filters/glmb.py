@@ -16,6 +16,7 @@ from vedette.filters.inputs import (
     check_belief,
     check_parts,
     check_scan,
+    check_step,
     model_errors,
 )
 from vedette.filters.limits import Limits
@@ -53,7 +54,7 @@ class DeltaGlmbFilter:
     marginalised: bool = False
 
     def __post_init__(self) -> None:
-        check_parts(self.motion, self.birth, self.sensor)
+        check_parts(self.motion, self.survival, self.birth, self.sensor, self.limits)
         if self.assignment not in ("ranked", "gibbs"):
             raise InputError(f"assignment: expected 'ranked' or 'gibbs'; got {self.assignment!r}")
         dimension("num_gibbs_samples", self.num_gibbs_samples)
@@ -87,7 +88,7 @@ class DeltaGlmbFilter:
         prior = check_belief(belief, GLMB, self.motion.state_dim)
         arguments = (
             prior.to_kernel(),
-            births_at(self.birth, step).to_kernel(),
+            births_at(self.birth, check_step(step, self.birth, prior)).to_kernel(),
             measurements,
             pose_vector("pose", pose),
             positive("dt", dt),

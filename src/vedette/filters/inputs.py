@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numbers
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any, TypeVar
@@ -10,8 +11,10 @@ import numpy as np
 
 from vedette.densities import GLMB, LMB, TrackTable
 from vedette.errors import InputError, ModelError, VedetteError
+from vedette.filters.limits import Limits
 from vedette.kernels.types import Floats
-from vedette.models import BirthModel, MotionModel, SensorModel
+from vedette.models import BirthModel, MotionModel, SensorModel, SurvivalModel
+from vedette.models.arguments import reject
 
 _Density = TypeVar("_Density", GLMB, LMB)
 
@@ -43,10 +46,20 @@ def check_scan(scan: Any, meas_dim: int) -> tuple[Floats, int]:
     return np.ascontiguousarray(array[np.sort(first)]), len(array) - len(first)
 
 
-def check_parts(motion: MotionModel, birth: BirthModel, sensor: SensorModel) -> None:
-    """`InputError` unless the models are models and speak of states of the same dimension."""
-    kinds = (("motion", motion, MotionModel), ("birth", birth, BirthModel), ("sensor", sensor, SensorModel))
-    for name, value, kind in kinds:
+_PARTS: dict[str, type] = {
+    "motion": MotionModel,
+    "survival": SurvivalModel,
+    "birth": BirthModel,
+    "sensor": SensorModel,
+    "limits": Limits,
+}
+
+
+def check_parts(
+    motion: MotionModel, survival: SurvivalModel, birth: BirthModel, sensor: SensorModel, limits: Limits
+) -> None:
+    """`InputError` unless each part of a filter is of its kind, and states are of the same dimension in all."""
+    for (name, kind), value in zip(_PARTS.items(), (motion, survival, birth, sensor, limits), strict=True):
         if not isinstance(value, kind):
             raise InputError(f"{name}: expected a {kind.__name__}; got {type(value).__name__}")
     if birth.state_dim != motion.state_dim:
@@ -62,6 +75,16 @@ def check_belief(belief: object, kind: type[_Density], state_dim: int) -> _Densi
     if belief.state_dim != state_dim:
         raise InputError(f"belief: expected states of dimension {state_dim}; got {belief.state_dim}")
     return belief
+
+
+def check_step(step: Any, birth: BirthModel, belief: GLMB | LMB) -> int:
+    """The step; `InputError` unless it is a whole number, later than the belief's labels where targets may be born."""
+    if isinstance(step, bool) or not isinstance(step, numbers.Integral):
+        raise reject("step", "a whole number", step)
+    newest = belief.tracks.labels[:, 0].max(initial=np.iinfo(np.int64).min)
+    if newest >= step and birth.is_active(int(step)):
+        raise reject("step", f"a step after those of the labels in the belief, of which the last is {newest}", step)
+    return int(step)
 
 
 def births_at(birth: BirthModel, step: int) -> LMB:

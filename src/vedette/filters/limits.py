@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from scipy.special import logit
 from scipy.stats import chi2
 
-from vedette.errors import InputError
 from vedette.kernels.lmb import Reduction
 from vedette.kernels.truncation import Truncation
+from vedette.models.arguments import dimension, non_negative, probability, real, reject
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,19 +52,15 @@ class Limits:
 
     def __post_init__(self) -> None:
         for name in ("max_hypotheses", "max_search_nodes", "max_components", "max_labels"):
-            if not getattr(self, name) >= 1:
-                raise InputError(f"Limits.{name}: expected at least 1; got {getattr(self, name)!r}")
+            dimension(f"Limits.{name}", getattr(self, name))
         for name in ("min_relative_weight", "min_component_weight", "min_existence"):
-            if not 0.0 <= getattr(self, name) < 1.0:
-                raise InputError(f"Limits.{name}: expected a number in [0, 1); got {getattr(self, name)!r}")
-        if not 0.0 <= self.min_track_weight <= 1.0:
-            raise InputError(f"Limits.min_track_weight: expected a number in [0, 1]; got {self.min_track_weight!r}")
-        if not 0.0 < self.gate_probability <= 1.0:
-            raise InputError(f"Limits.gate_probability: expected a number in (0, 1]; got {self.gate_probability!r}")
-        if not self.merge_distance >= 0.0:
-            raise InputError(f"Limits.merge_distance: expected a number of at least 0; got {self.merge_distance!r}")
-        if not -math.inf < self.min_log_clutter < math.inf:
-            raise InputError(f"Limits.min_log_clutter: expected a finite number; got {self.min_log_clutter!r}")
+            if not 0.0 <= real(f"Limits.{name}", getattr(self, name)) < 1.0:
+                raise reject(f"Limits.{name}", "a number in [0, 1)", getattr(self, name))
+        probability("Limits.min_track_weight", self.min_track_weight)
+        if probability("Limits.gate_probability", self.gate_probability) == 0.0:
+            raise reject("Limits.gate_probability", "a probability above 0", self.gate_probability)
+        non_negative("Limits.merge_distance", self.merge_distance)
+        real("Limits.min_log_clutter", self.min_log_clutter)
 
     @classmethod
     def none(cls) -> Limits:

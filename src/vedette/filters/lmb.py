@@ -15,6 +15,7 @@ from vedette.filters.inputs import (
     check_belief,
     check_parts,
     check_scan,
+    check_step,
     model_errors,
 )
 from vedette.filters.limits import Limits
@@ -42,7 +43,7 @@ class LmbFilter:
     limits: Limits = field(default_factory=Limits)
 
     def __post_init__(self) -> None:
-        check_parts(self.motion, self.birth, self.sensor)
+        check_parts(self.motion, self.survival, self.birth, self.sensor, self.limits)
 
     def initial(self) -> LMB:
         """The belief before the first scan: no target."""
@@ -60,7 +61,7 @@ class LmbFilter:
         with model_errors():
             posterior, report = step_lmb(
                 prior.to_kernel(),
-                births_at(self.birth, step).to_kernel(),
+                births_at(self.birth, check_step(step, self.birth, prior)).to_kernel(),
                 measurements,
                 pose_vector("pose", pose),
                 positive("dt", dt),
