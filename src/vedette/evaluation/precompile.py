@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from multiprocessing import get_context
 
 import numpy as np
 
-from vedette.control.priors import label_sets, predicted, single_labels
-from vedette.control.pseudo import PseudoPosteriors
-from vedette.control.tables import fused_rewards
+from vedette.control import JointPlanner
 from vedette.densities import GLMB, LMB
+from vedette.evaluation.runs import strategy
 from vedette.filters import LmbFilter
-from vedette.fusion import Clmb, CmDeltaGlmb
 from vedette.scenarios import Scenario
 from vedette.scenarios.build import build_experiment
 from vedette.simulation.experiment import Experiment
@@ -19,12 +18,12 @@ from vedette.simulation.loop import run_stream
 
 
 def precompile(scenario: Scenario) -> None:
-    """Compile the filter of the scenario here, and its fusion and rewards in another process meanwhile.
+    """Compile the filter of the scenario here; its fusion and joint planning in another process meanwhile.
 
-    Planning compiles on top of both when the first decision is made. Whatever the other process does not get done (it
-    may be forbidden, or fail) is compiled where it is first used; no result depends on it.
+    Each finds in the cache what the other has already compiled. Whatever the other process does not get done (it may be
+    forbidden, or fail) is compiled where it is first used; no result depends on it.
     """
-    other = get_context("spawn").Process(target=_compile_fusion, args=(scenario,), daemon=True)
+    other = get_context("spawn").Process(target=_compile_planning, args=(scenario,), daemon=True)
     try:
         other.start()
     except OSError:
@@ -39,31 +38,18 @@ def _compile_filter(experiment: Experiment) -> None:
     local.step(local.initial(), scan, experiment.poses[0], 1.0, 1, rng=run_stream(0, 0))
 
 
-def _compile_fusion(scenario: Scenario) -> None:
+def _compile_planning(scenario: Scenario) -> None:
+    """Fuse, estimate and plan as if every birth site held a target."""
     experiment = build_experiment(scenario)
-    local = experiment.sensors[0].filter
-    birth = local.birth
+    birth, num_sensors = experiment.sensors[0].filter.birth, len(experiment.sensors)
     labels = [(1, site) for site in range(birth.num_sites)]
-    newborn = LMB.from_bernoullis(labels, birth.existence, birth.means, birth.covs)
-    everyone = tuple((step, site) for step, site in newborn.tracks.labels.tolist())
-    belief: GLMB | LMB = newborn
-    if not isinstance(local, LmbFilter):
-        belief = GLMB.from_hypotheses(newborn.tracks, [list(range(len(everyone)))], [1.0])
+    belief: GLMB | LMB = LMB.from_bernoullis(labels, birth.existence, birth.means, birth.covs)
+    if not isinstance(experiment.sensors[0].filter, LmbFilter):
+        belief = GLMB.from_hypotheses(belief.tracks, [list(range(birth.num_sites))], [1.0])
     fusion = experiment.fusion
-    fused = belief if fusion is None else fusion.fuse([belief] * len(experiment.sensors))[0]
+    fused = belief if fusion is None else fusion.fuse([belief] * num_sensors)[0]
     experiment.estimate(fused)
-    if isinstance(fusion, CmDeltaGlmb | Clmb) and isinstance(fused, type(belief)):
-        ahead = predicted(fused, local, 1, 1.0)
-        own = _one_case(belief)
-        fused_rewards([own] * len(experiment.sensors), ahead, fusion, 1, 1.0, 1)(
-            np.zeros((1, len(experiment.sensors)), np.int64)
-        )
-
-
-def _one_case(belief: GLMB | LMB) -> PseudoPosteriors:
-    """The belief as if it were the only pseudo-posterior of a sensor."""
-    is_lmb = isinstance(belief, LMB)
-    sets = single_labels(belief) if isinstance(belief, LMB) else label_sets(belief).sets
-    weights = belief.existence_logit if isinstance(belief, LMB) else belief.hyp_log_weights
-    tracks = belief.tracks
-    return PseudoPosteriors(sets, weights[np.newaxis].copy(), tracks.means[np.newaxis], tracks.covs[np.newaxis], is_lmb)
+    planner = strategy(scenario, "jdm")
+    assert isinstance(planner, JointPlanner)
+    quick = replace(planner, settings=replace(planner.settings, num_samples=2, horizon_steps=1, num_threads=1))
+    quick.plan([belief] * num_sensors, fused, experiment.poses, rng=run_stream(0, 0))
