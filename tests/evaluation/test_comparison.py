@@ -80,7 +80,7 @@ def test_no_runs_are_refused(empty: dict[str, list[RunRecord]]) -> None:
 
 
 def test_nothing_to_count_is_refused(runs: dict[str, list[RunRecord]]) -> None:
-    with pytest.raises(InputError, match="scans after it and up to until, of 1.0 to 40.0 s; got 40.0"):
+    with pytest.raises(InputError, match=r"scans after it and up to until, of 1\.0 to 40\.0 s; got 40\.0"):
         compare(runs, since=40.0)
 
 

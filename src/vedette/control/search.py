@@ -13,7 +13,6 @@ from vedette.errors import InputError
 from vedette.kernels.types import Floats, Ints
 from vedette.models.arguments import dimension
 
-
 # Rewards nearer than this, relative to the best or to 1, are equal: rounding tells them apart, not what they are worth.
 _TIE = 1e-9
 
