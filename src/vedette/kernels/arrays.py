@@ -40,6 +40,6 @@ def grown_ints(array: Ints, needed: int) -> Ints:
 
 @inlined
 def hashed(key: int, value: int) -> int:
-    """A hash below 2^32 of what `key` is a hash of, and `value`. Products stay below 2^62: overflow warns without JIT."""
+    """A hash below 2^32 of what `key` is of, and `value`. Products stay below 2^62: overflow warns without JIT."""
     key = ((key ^ value) & 0x7FFFFFFF) * 1103515245 + 12345
     return (key ^ (key >> 31)) & 0xFFFFFFFF
