@@ -126,7 +126,7 @@ def test_what_a_search_did_not_evaluate_is_left_blank() -> None:
     np.testing.assert_array_equal(upper.images[0].get_array(), mean[:, :, decision.chosen[2]].T)
     line = np.asarray(lower.lines[0].get_ydata())
     np.testing.assert_array_equal(line, np.nanmax(mean, axis=(1, 2)))
-    assert np.isfinite(lower.lines[2].get_ydata()).all()  # type: ignore[arg-type]
+    assert np.isfinite(lower.lines[2].get_ydata()).all()
     third = np.asarray(lower.lines[4].get_ydata())
     np.testing.assert_array_equal(np.isfinite(third), np.arange(len(third)) == decision.chosen[2])
 

@@ -79,7 +79,7 @@ def new_figure(height: float, *, width: float = COLUMN_WIDTH) -> Figure:
 
 def strategy_label(name: str) -> str:
     """The name of a strategy as the paper writes it."""
-    return {"jdm": "JDM", "idm": "IDM", "random": "Random", "fixed": "Fixed"}.get(name, name)
+    return {"jdm": "JDM", "idm": "IDM", "random": "Random", "fixed": "Fixed", "still": "Not moving"}.get(name, name)
 
 
 def degrees_label(value: float) -> str:
