@@ -234,7 +234,7 @@ def nowhere(state, pose, params, out):
 @each_kind
 def test_a_measurement_that_is_none(kind: Any) -> None:
     # Plain NumPy warns of the NaN before the filter looks at it.
-    with pytest.raises(ModelError, match="measurement model: |RuntimeWarning: invalid value"):
+    with pytest.raises(ModelError, match=r"measurement model: |RuntimeWarning: invalid value"):
         step(make(kind, measurement=models.MeasurementModel(2, nowhere)))
 
 
