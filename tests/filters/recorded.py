@@ -8,16 +8,17 @@ from __future__ import annotations
 
 import math
 import os
-from dataclasses import dataclass
+import time
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from vedette import models
-from vedette.densities import Estimate, map_estimate
+from vedette.densities import GLMB, LMB, Estimate, map_estimate
 from vedette.evaluation.metrics import ospa
-from vedette.filters import DeltaGlmbFilter, LmbFilter
+from vedette.filters import LocalFilter
 
 POSE = np.zeros(3)
 PERIOD = 1.0
@@ -55,6 +56,21 @@ def load(family: str, seed: int) -> Recording:
     states = parameters["X_true"][[0, 2]]
     positions = tuple(np.ascontiguousarray(states[:, parameters["Xk_true"] == k].T) for k in numbers)
     return Recording(scans, positions, parameters)
+
+
+def redraw(recording: Recording, *, rng: np.random.Generator) -> Recording:
+    """The same targets seen anew: detections, noise and clutter drawn by the parameters of the file."""
+    parameters = recording.parameters
+    scans = []
+    for positions in recording.positions:
+        seen = positions[rng.random(len(positions)) < parameters["P_D"][0]]
+        if len(parameters["X_true"]) == 5:
+            seen = np.column_stack([np.arctan2(seen[:, 0], seen[:, 1]), np.hypot(seen[:, 0], seen[:, 1])])
+        seen = seen + rng.normal(size=seen.shape) * np.sqrt(np.diagonal(parameters["R"]))
+        low, high = parameters["range_c"].T
+        clutter = rng.uniform(low, high, (rng.poisson(parameters["lambda_c"][0]), 2))
+        scans.append(rng.permutation(np.concatenate([seen, clutter])))
+    return replace(recording, scans=tuple(scans))
 
 
 @models.model_function("measurement")
@@ -114,27 +130,32 @@ def motion_model(parameters: dict[str, Any], method: str) -> models.MotionModel:
     return models.constant_velocity(math.sqrt(float(parameters["Q"][1, 1])))
 
 
-def make_filter(kind: type, recording: Recording, method: str = "ekf", **options: Any) -> DeltaGlmbFilter | LmbFilter:
+def make_filter(kind: type, recording: Recording, method: str = "ekf", **options: Any) -> LocalFilter:
     """A filter of this kind with the recording's models; `method` for the motion and the measurement."""
     parameters = recording.parameters
-    return kind(
+    tracker: LocalFilter = kind(
         motion_model(parameters, method),
         models.constant_survival(float(parameters["P_S"])),
         birth_model(parameters),
         sensor_model(parameters, method),
         **options,
     )
+    return tracker
 
 
-def run(tracker: DeltaGlmbFilter | LmbFilter, recording: Recording, *, seed: int = 0) -> list[Estimate]:
-    """Estimates at every scan: most probable number of targets, then the most probable targets of that number."""
+def run(tracker: LocalFilter, recording: Recording, *, seed: int = 0) -> tuple[list[Estimate], list[float]]:
+    """Estimates at every scan (most probable number of targets, then the most probable of that number), and the CPU
+    seconds of each step.
+    """
     rng = np.random.default_rng(seed)
-    belief: Any = tracker.initial()
-    estimates = []
+    belief: GLMB | LMB = tracker.initial()
+    estimates, seconds = [], []
     for step, scan in enumerate(recording.scans):
+        start = time.process_time()
         belief, _ = tracker.step(belief, scan, POSE, PERIOD, step, rng=rng)
+        seconds.append(time.process_time() - start)
         estimates.append(map_estimate(belief))
-    return estimates
+    return estimates, seconds
 
 
 def mean_ospa(estimates: list[Estimate], recording: Recording) -> float:

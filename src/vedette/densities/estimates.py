@@ -11,10 +11,12 @@ from vedette.densities import checks
 from vedette.densities.conversions import glmb_to_lmb
 from vedette.densities.glmb import GLMB
 from vedette.densities.lmb import LMB
-from vedette.densities.statistics import cardinality_distribution, track_moments
+from vedette.densities.statistics import cardinality_distribution
 from vedette.densities.tracks import TrackTable
 from vedette.errors import InputError, NumericalError, VedetteError
 from vedette.kernels.types import Floats, Ints
+
+_MARGINAL_COMPONENTS = 10
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,18 +91,21 @@ def _map_of_glmb(density: GLMB) -> Estimate:
 
 
 def marginal_estimate(density: GLMB | LMB, threshold: float = 0.5) -> Estimate:
-    """Every label whose probability of existence exceeds `threshold`, with the moments of its marginal density.
+    """Every label whose probability of existence exceeds `threshold`, each estimated by the heaviest component of its
+    marginal density.
 
+    Not by the mean of that density: targets born close together may have swapped labels, and the mean then lies halfway
+    between the two. For a GLMB, near components (Mahalanobis distance 2) are merged before they are weighed.
     Raises `InputError` for a threshold outside [0, 1).
     """
     if not 0.0 <= threshold < 1.0:
         raise InputError(f"threshold: expected a probability below 1; got {threshold}")
     if isinstance(density, GLMB):
-        density = glmb_to_lmb(density)
+        density = glmb_to_lmb(density, max_components=_MARGINAL_COMPONENTS)
     if not isinstance(density, LMB):
         raise InputError(f"density: expected a GLMB or an LMB, which have labels; got {type(density).__name__}")
     chosen = np.flatnonzero(density.existence > threshold)
-    return _moments(density.tracks, chosen, density.existence[chosen])
+    return _peaks(density.tracks, chosen, density.existence[chosen])
 
 
 def _peaks(tracks: TrackTable, chosen: Ints, existence: Floats) -> Estimate:
@@ -108,21 +113,6 @@ def _peaks(tracks: TrackTable, chosen: Ints, existence: Floats) -> Estimate:
     starts, stops = tracks.offsets[chosen], tracks.offsets[chosen + 1]
     heaviest = [int(low + np.argmax(tracks.log_weights[low:high])) for low, high in zip(starts, stops, strict=True)]
     return Estimate(tracks.labels[chosen], tracks.means[heaviest], tracks.covs[heaviest], existence)
-
-
-def _moments(tracks: TrackTable, chosen: Ints, existence: Floats) -> Estimate:
-    """Mean and covariance of each chosen track."""
-    labels = tracks.labels[chosen]
-    if len(tracks.log_weights) == tracks.num_tracks:
-        return Estimate(labels, tracks.means[chosen], tracks.covs[chosen], existence)
-    lengths = np.diff(tracks.offsets)[chosen]
-    offsets = np.concatenate([np.zeros(1, np.int64), np.cumsum(lengths)])
-    components = np.arange(offsets[-1]) + np.repeat(tracks.offsets[chosen] - offsets[:-1], lengths)
-    selected = TrackTable(
-        labels, offsets, tracks.log_weights[components], tracks.means[components], tracks.covs[components]
-    )
-    means, covs = track_moments(selected)
-    return Estimate(labels, means, covs, existence)
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,84 @@
+"""CPU time of one scan of a filter, in the built-in scenario linear-10 or another with one sensor or more.
+
+    python benchmarks/filter_scan.py [--scenario NAME] [--runs N]
+
+Every filter sees the same scans of the first sensor, which stands still. The median is over the scans of all runs, in
+CPU time of this process, checks and the conversion of the arguments included. OSPA of the estimates (c = 100 m, p = 1)
+stands beside it, since time can be bought with accuracy.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from vedette.densities import map_estimate
+from vedette.evaluation import ospa_of_run
+from vedette.filters import DeltaGlmbFilter, LmbFilter, LocalFilter
+from vedette.scenarios import load_scenario
+from vedette.scenarios.build import build_experiment
+from vedette.simulation import Truth, simulate_scan
+
+Run = tuple[Truth, list[np.ndarray]]
+
+
+def simulated(name: str, num_runs: int) -> tuple[DeltaGlmbFilter, np.ndarray, np.ndarray, list[Run]]:
+    """Filter, pose and times of the scenario's first sensor, and truth and scans of each run."""
+    experiment = build_experiment(load_scenario(name))
+    tracker, pose = experiment.sensors[0].filter, experiment.poses[0]
+    if not isinstance(tracker, DeltaGlmbFilter):
+        raise SystemExit(f"{name}: expected a scenario with a delta-GLMB filter")
+    runs = []
+    for run in range(num_runs):
+        rng = np.random.default_rng(run)
+        truth = experiment.targets.truth(experiment.times, rng=rng)
+        states = [truth.at(k)[1] for k in range(len(experiment.times))]
+        runs.append((truth, [simulate_scan(x, pose, tracker.sensor, rng=rng).measurements for x in states]))
+    return tracker, pose, experiment.times, runs
+
+
+def variants(tracker: DeltaGlmbFilter) -> dict[str, LocalFilter]:
+    parts = (tracker.motion, tracker.survival, tracker.birth, tracker.sensor, tracker.limits)
+    return {
+        "delta-GLMB, ranked": replace(tracker, assignment="ranked", marginalised=False),
+        "delta-GLMB, Gibbs": replace(tracker, assignment="gibbs", marginalised=False),
+        "M-delta-GLMB, ranked": replace(tracker, assignment="ranked", marginalised=True),
+        "LMB": LmbFilter(*parts),
+    }
+
+
+def measure(tracker: LocalFilter, pose: Any, times: Any, scans: Any) -> tuple[list[float], list[Any]]:
+    """Seconds of each scan, and the estimates."""
+    belief, rng, seconds, estimates = tracker.initial(), np.random.default_rng(0), [], []
+    for k, scan in enumerate(scans):
+        start = time.process_time()
+        belief, _ = tracker.step(belief, scan, pose, float(times[1] - times[0]), k + 1, rng=rng)
+        seconds.append(time.process_time() - start)
+        estimates.append(map_estimate(belief))
+    return seconds, estimates
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--scenario", default="linear-10")
+    parser.add_argument("--runs", type=int, default=5)
+    options = parser.parse_args()
+    tracker, pose, times, runs = simulated(options.scenario, options.runs)
+    print(f"{'filter':22s}  median ms  95 %  worst   OSPA m")
+    for name, variant in variants(tracker).items():
+        measure(variant, pose, times, runs[0][1])  # compiles, or reads the cache
+        seconds, ospas = [], []
+        for truth, scans in runs:
+            spent, estimates = measure(variant, pose, times, scans)
+            seconds += spent
+            ospas.append(ospa_of_run(truth, estimates, cutoff=100.0, order=1.0)[:, 0].mean())
+        median, high, worst = 1e3 * np.percentile(seconds, [50, 95, 100])
+        print(f"{name:22s}  {median:9.2f}  {high:4.1f}  {worst:5.1f}   {np.mean(ospas):6.2f}")
+
+
+if __name__ == "__main__":
+    main()

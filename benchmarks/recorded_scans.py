@@ -1,0 +1,80 @@
+"""OSPA and CPU time of the filters on recorded scans, beside the figures of the programs that made them.
+
+    python benchmarks/recorded_scans.py [--markdown]
+
+The files lie outside the repository: in the folder that VEDETTE_RECORDED_SCANS names, or in shared/reference beside
+the checkout (docs/recorded-scans.md says what is in them). OSPA with c = 100 m and p = 1, mean over 100 scans, then mean
+and standard deviation over the files; CPU time of a step, median over scans and files.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from vedette.filters import DeltaGlmbFilter, LmbFilter
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+from filters import recorded
+
+# Published with the files: mean OSPA (standard deviation), median CPU ms a scan (GNU Octave, Gibbs sampler in C).
+TOOLBOXES = {
+    ("lin30", "delta-GLMB"): "11.70 (0.28), 13 files, 128 ms",
+    ("lin30", "LMB"): "12.54 (3.0), 13 files, 31 ms",
+    ("lin60", "delta-GLMB"): "CPHD 18.4 (1.1), 5 files, 125 ms",
+    ("ct15", "delta-GLMB, EKF"): "24.6 (0.6), 5 files, 519 ms",
+    ("ct15", "delta-GLMB, UKF"): "24.6 (0.65), 5 files, 648 ms",
+    ("ct15", "LMB, EKF"): "24.7 (0.8), 5 files, 30 ms",
+}
+
+LINEAR: dict[str, tuple[type, dict[str, Any]]] = {
+    "delta-GLMB": (DeltaGlmbFilter, {}),
+    "delta-GLMB, Gibbs": (DeltaGlmbFilter, {"assignment": "gibbs"}),
+    "M-delta-GLMB": (DeltaGlmbFilter, {"marginalised": True}),
+    "LMB": (LmbFilter, {}),
+}
+CURVED: dict[str, tuple[type, dict[str, Any]]] = {
+    f"{name}, {method.upper()}": (kind, {"method": method})
+    for name, kind in (("delta-GLMB", DeltaGlmbFilter), ("LMB", LmbFilter))
+    for method in ("ekf", "ukf", "ckf")
+}
+FAMILIES = {"lin30": LINEAR, "lin60": LINEAR, "ct15": CURVED}
+
+
+def row(family: str, name: str, seeds: list[int]) -> list[str]:
+    kind, options = FAMILIES[family][name]
+    ospas, seconds = [], []
+    for seed in seeds:
+        recording = recorded.load(family, seed)
+        estimates, spent = recorded.run(recorded.make_filter(kind, recording, **options), recording)
+        ospas.append(recorded.mean_ospa(estimates, recording))
+        seconds += spent
+    each = " ".join(f"{value:.2f}" for value in ospas)
+    summary = f"{np.mean(ospas):.2f} ({np.std(ospas, ddof=1):.2f})" if len(ospas) > 1 else each
+    return [family, name, summary, each, f"{1e3 * np.median(seconds):.2f}", TOOLBOXES.get((family, name), "")]
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--markdown", action="store_true", help="print a Markdown table")
+    options = parser.parse_args()
+    rows = [["family", "filter", "OSPA m (sd)", "each file", "ms a scan", "toolboxes"]]
+    for family, variants in FAMILIES.items():
+        seeds = recorded.seeds(family)
+        rows += [row(family, name, seeds) for name in variants if seeds]
+    if len(rows) == 1:
+        raise SystemExit(f"no recorded scans in {recorded.folder()}; name their folder in VEDETTE_RECORDED_SCANS")
+    if options.markdown:
+        rows.insert(1, ["---"] * len(rows[0]))
+    widths = [max(len(entries[i]) for entries in rows) for i in range(len(rows[0]))]
+    for entries in rows:
+        cells = [entry.ljust(width) for entry, width in zip(entries, widths, strict=True)]
+        print(f"| {' | '.join(cells)} |" if options.markdown else "  ".join(cells).rstrip())
+
+
+if __name__ == "__main__":
+    main()
