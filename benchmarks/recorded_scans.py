@@ -3,8 +3,8 @@
     python benchmarks/recorded_scans.py [--markdown]
 
 The files lie outside the repository: in the folder that VEDETTE_RECORDED_SCANS names, or in shared/reference beside
-the checkout (docs/recorded-scans.md says what is in them). OSPA with c = 100 m and p = 1, mean over 100 scans, then mean
-and standard deviation over the files; CPU time of a step, median over scans and files.
+the checkout (docs/recorded-scans.md says what is in them). OSPA with c = 100 m and p = 1, mean over 100 scans, then
+mean and standard deviation over the files; CPU time of a step, median over scans and files.
 """
 
 from __future__ import annotations
