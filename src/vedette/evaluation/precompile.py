@@ -9,7 +9,7 @@ import numpy as np
 
 from vedette.control import JointPlanner
 from vedette.densities import GLMB, LMB
-from vedette.evaluation.runs import strategy
+from vedette.evaluation.runs import children_ignore_interrupts, strategy
 from vedette.filters import LmbFilter
 from vedette.scenarios import Scenario
 from vedette.scenarios.build import build_experiment
@@ -25,7 +25,8 @@ def precompile(scenario: Scenario) -> None:
     """
     other = get_context("spawn").Process(target=_compile_planning, args=(scenario,), daemon=True)
     try:
-        other.start()
+        with children_ignore_interrupts():
+            other.start()
     except OSError:
         return
     _compile_filter(build_experiment(scenario))

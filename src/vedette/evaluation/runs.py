@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import signal
+import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
 from multiprocessing import get_context
@@ -82,11 +84,12 @@ def _shared_runs(
 ) -> Iterator[tuple[tuple[str, int], RunRecord]]:
     """Each task and its record, in the order of finishing."""
     # Spawned, not forked: a forked child would inherit the locks of threads that it does not have.
-    with ProcessPoolExecutor(num_workers, mp_context=get_context("spawn"), initializer=_leave_interrupts) as pool:
-        pending = {
-            pool.submit(run_scenario, scenario, planner, seed=seed, run=run, num_threads=1): (planner, run)
-            for planner, run in tasks
-        }
+    with ProcessPoolExecutor(num_workers, mp_context=get_context("spawn")) as pool:
+        with children_ignore_interrupts():
+            pending = {
+                pool.submit(run_scenario, scenario, planner, seed=seed, run=run, num_threads=1): (planner, run)
+                for planner, run in tasks
+            }
         try:
             for done in as_completed(pending):
                 yield pending[done], done.result()
@@ -98,6 +101,14 @@ def _shared_runs(
             pool.shutdown(wait=False, cancel_futures=True)
 
 
-def _leave_interrupts() -> None:
-    """Ctrl-C is for the main process, which then stops the workers."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+@contextmanager
+def children_ignore_interrupts() -> Iterator[None]:
+    """Processes started inside inherit that Ctrl-C is not for them; the main process stops them."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
