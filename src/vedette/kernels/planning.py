@@ -53,8 +53,16 @@ def write_rows(
 
 @kernel
 def fill_missing(
-    log_weights: Floats, means: Floats, covs: Floats, source_members: Ints, source_sets: Ints, source_offsets: Ints,
-    missing_sets: Ints, floor: float, first: int, last: int,
+    log_weights: Floats,
+    means: Floats,
+    covs: Floats,
+    source_members: Ints,
+    source_sets: Ints,
+    source_offsets: Ints,
+    missing_sets: Ints,
+    floor: float,
+    first: int,
+    last: int,
 ) -> None:
     """Stand-ins in cases `first:last` for label sets that the sensor lacks, as in `vedette.fusion.CmDeltaGlmb`.
 
@@ -86,8 +94,17 @@ def fill_missing(
 
 @kernel
 def reward_table(
-    cases: Cases, first_cases: Ints, actions: Ints, num_samples: int, prediction: Prediction, dim: int,
-    log_unit_volume: float, is_lmb: bool, first: int, last: int, rewards: Floats,
+    cases: Cases,
+    first_cases: Ints,
+    actions: Ints,
+    num_samples: int,
+    prediction: Prediction,
+    dim: int,
+    log_unit_volume: float,
+    is_lmb: bool,
+    first: int,
+    last: int,
+    rewards: Floats,
 ) -> None:
     """Rewards (num_joint, num_samples) of joint actions `first:last`.
 
