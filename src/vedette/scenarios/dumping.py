@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import re
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +33,22 @@ def dump_scenario(model: ScenarioModel, *, folder: Path | None = None) -> str:
     data = model.model_dump(mode="json")
     yaml.dump(_laid_out(data if folder is None else _anchored(data, folder.resolve())), out)
     return out.getvalue()
+
+
+def files_of(model: ScenarioModel, folder: Path) -> tuple[Path, ...]:
+    """The files beside the scenario that decide what it means: recorded targets, and Python files of custom models."""
+    return tuple(dict.fromkeys(_files(model.model_dump(mode="json"), folder.resolve())))
+
+
+def _files(value: Any, folder: Path) -> Iterator[Path]:
+    if isinstance(value, list | dict):
+        for item in value.values() if isinstance(value, dict) else value:
+            yield from _files(item, folder)
+    if isinstance(value, dict):
+        if value.get("kind") == "recorded":
+            yield folder / value["path"]
+        elif value.get("kind") == "custom" and ".py:" in value["python"]:
+            yield folder / value["python"].rpartition(":")[0]
 
 
 def _anchored(value: Any, folder: Path) -> Any:

@@ -1,0 +1,160 @@
+"""A specification resolved: the cells of a campaign, each one strategy in one setting."""
+
+from __future__ import annotations
+
+import hashlib
+import itertools
+import json
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from vedette.campaigns.spec import CampaignSpec
+from vedette.errors import InputError, ScenarioError
+from vedette.evaluation.runs import strategy
+from vedette.scenarios import Scenario, list_builtin, load_scenario
+from vedette.scenarios.dumping import dump_scenario, files_of
+from vedette.scenarios.overrides import with_fields
+
+_SECTIONS = {"filter": "filter.kind", "fusion": "fusion.kind"}
+
+
+@dataclass(frozen=True, slots=True)
+class Cell:
+    """One strategy in one setting; its runs are numbered from 0.
+
+    Attributes:
+        name: unique in the campaign, and fit for a file name.
+        settings: axis and value; the same axes in every cell of a campaign.
+        scenario: with the fields of the cell set.
+        planner: name of the strategy.
+    """
+
+    name: str
+    settings: dict[str, Any]
+    scenario: Scenario
+    planner: str
+
+
+@dataclass(frozen=True, slots=True)
+class Campaign:
+    """A specification with its cells made.
+
+    Attributes:
+        name, seed, num_runs: as specified.
+        cells: in the order of the specification, the last axis fastest.
+        axes: each axis and its values.
+        compare: the axis whose values are compared; the first value is the reference.
+        spec: the specification as plain data, every default written out.
+    """
+
+    name: str
+    seed: int
+    num_runs: int
+    cells: tuple[Cell, ...]
+    axes: dict[str, tuple[Any, ...]]
+    compare: str
+    spec: dict[str, Any]
+
+    @property
+    def tasks(self) -> tuple[tuple[Cell, int], ...]:
+        """Every run that there is to do, the runs of equal number of all cells together, so that pairs come early."""
+        return tuple((cell, run) for run in range(self.num_runs) for cell in self.cells)
+
+    def cell(self, name: str) -> Cell:
+        """The cell of that name. Raises `InputError` where there is none."""
+        for cell in self.cells:
+            if cell.name == name:
+                return cell
+        raise InputError(f"cell: expected one of {', '.join(cell.name for cell in self.cells)}; got {name!r}")
+
+    def groups(self) -> tuple[tuple[Cell, ...], ...]:
+        """Cells that differ in the compared axis alone, groups and cells in the order of the specification."""
+        groups: dict[str, list[Cell]] = {}
+        for cell in self.cells:
+            shared = {axis: value for axis, value in cell.settings.items() if axis != self.compare}
+            groups.setdefault(json.dumps(shared, sort_keys=True), []).append(cell)
+        return tuple(tuple(cells) for cells in groups.values())
+
+    def with_runs(self, num_runs: int) -> Campaign:
+        """The same campaign with another number of runs."""
+        return replace(self, num_runs=num_runs, spec={**self.spec, "runs": num_runs})
+
+    def digest(self) -> str:
+        """SHA-256 of all that fixes the bytes of a run: seed, each cell's planner and scenario, and the files it names.
+
+        The number of runs is not part of it: more runs leave the earlier ones as they are.
+        """
+        cells = [
+            (cell.name, cell.planner, scenario_text(cell.scenario), _contents(cell.scenario)) for cell in self.cells
+        ]
+        return hashlib.sha256(json.dumps([self.seed, cells]).encode()).hexdigest()
+
+
+def scenario_text(scenario: Scenario) -> str:
+    """The scenario as YAML that can be kept anywhere."""
+    return dump_scenario(scenario.model, folder=scenario.folder)
+
+
+def resolve(spec: CampaignSpec, folder: Path | str = ".") -> Campaign:
+    """Load the scenarios (files are relative to `folder`), set the fields of each cell, check that each can be built.
+
+    Raises:
+        InputError: a scenario that is not there, a path that is no field, a combination that cannot be; names the cell.
+    """
+    axes = spec.axes()
+    loaded = {name: _load(name, Path(folder)) for name in spec.scenarios}
+    varying = [axis for axis, values in axes.items() if len(values) > 1 or axis == "planner"]
+    cells: list[Cell] = []
+    for values in itertools.product(*axes.values()):
+        settings = dict(zip(axes, values, strict=True))
+        name = _unused(_name({axis: settings[axis] for axis in varying}, axes), cells)
+        cells.append(_cell(name, settings, loaded[settings["scenario"]], spec))
+    compare = spec.compare or next((axis for axis in ("planner", *axes) if len(axes[axis]) > 1), "planner")
+    return Campaign(spec.name, spec.seed, spec.runs, tuple(cells), axes, compare, spec.model_dump(mode="json"))
+
+
+def _load(name: str, folder: Path) -> Scenario:
+    return load_scenario(name if name in list_builtin() else folder / name)
+
+
+def _cell(name: str, settings: Mapping[str, Any], scenario: Scenario, spec: CampaignSpec) -> Cell:
+    fields = dict(spec.set)
+    fields |= {_SECTIONS[axis]: settings[axis] for axis in _SECTIONS if axis in settings}
+    for variant in spec.variants:
+        if variant.name == settings.get("variant"):
+            fields |= variant.set
+    fields |= {axis: settings[axis] for axis in spec.grid}
+    planner = settings["planner"]
+    try:
+        changed = with_fields(scenario, fields)
+        strategy(changed, planner)
+    except ScenarioError as error:
+        raise InputError("\n".join(f"cell {name}: {fault}" for fault in error.faults)) from None
+    except InputError as error:
+        raise InputError(f"cell {name}: {error}") from None
+    return Cell(name, dict(settings), changed, planner)
+
+
+def _name(settings: Mapping[str, Any], axes: Mapping[str, tuple[Any, ...]]) -> str:
+    """The values of the axes that vary, fit for a file name: `paper-e-jdm-clmb`, `jdm-num_samples-20`."""
+    parts = []
+    for axis, value in settings.items():
+        if isinstance(value, list | dict):
+            value = axes[axis].index(value) + 1
+        known = axis in ("scenario", "planner", "variant", *_SECTIONS)
+        text = Path(value).stem if axis == "scenario" else str(value)
+        parts.append(text if known else f"{axis.rpartition('.')[2]}-{text}")
+    return re.sub(r"[^\w.+-]+", "_", "-".join(parts))
+
+
+def _unused(name: str, cells: list[Cell]) -> str:
+    taken = {cell.name for cell in cells}
+    candidates = itertools.chain([name], (f"{name}-{number}" for number in itertools.count(2)))
+    return next(candidate for candidate in candidates if candidate not in taken)
+
+
+def _contents(scenario: Scenario) -> list[str]:
+    return [hashlib.sha256(file.read_bytes()).hexdigest() for file in files_of(scenario.model, scenario.folder)]

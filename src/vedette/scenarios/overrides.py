@@ -1,0 +1,83 @@
+"""A scenario with some of its fields changed, each named by its path, such as `sensors.*.clutter.rate`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from vedette.errors import ScenarioError
+from vedette.scenarios.diagnostics import suggestion
+from vedette.scenarios.faults import Path, format_path
+from vedette.scenarios.loading import Scenario, diagnose
+from vedette.scenarios.yaml_reader import Document
+
+EVERY = "*"
+
+
+def with_fields(scenario: Scenario, fields: Mapping[str, Any]) -> Scenario:
+    """The scenario with other values at some fields, checked as a whole as if its file had said so.
+
+    Args:
+        fields: values by path. A path is the keys that lead to a field, joined by dots; a number counts the items of a
+            list from 0, and `*` stands for each of them. A value may be a whole section. Sensors hold what
+            `sensor_defaults` gave them, so what they share is set by `sensors.*`.
+
+    Raises:
+        ScenarioError: a path that leads nowhere, or everything that is wrong with the scenario that would result.
+    """
+    if not fields:
+        return scenario
+    data = scenario.model.model_dump(mode="json")
+    faults = [fault for path, value in fields.items() for fault in _set(data, path, value)]
+    if faults:
+        raise ScenarioError(faults)
+    model, found = diagnose(Document(scenario.name, data, {}, {}, []), scenario.folder)
+    if model is None:
+        hints = [f" ({fault.hint})" if fault.hint else "" for fault in found]
+        raise ScenarioError(
+            [
+                f"{format_path(fault.path)}: expected {fault.expected}, got {fault.got}{hint}"
+                for fault, hint in zip(found, hints, strict=True)
+            ]
+        )
+    return Scenario(model, scenario.path)
+
+
+def _set(data: Any, path: str, value: Any) -> Iterator[str]:
+    """Set the value everywhere the path leads, in place; what is wrong with the path."""
+    *parents, last = path.split(".")
+    places: list[tuple[Path, Any]] = [((), data)]
+    for part in parents:
+        inner: list[tuple[Path, Any]] = []
+        for place, holder in places:
+            keys, fault = _keys(holder, place, part, path)
+            if fault:
+                yield fault
+                return
+            inner += [((*place, key), holder[key]) for key in keys]
+        places = inner
+    for place, holder in places:
+        keys, fault = _keys(holder, place, last, path)
+        if fault:
+            yield fault
+            return
+        for key in keys:
+            holder[key] = value
+
+
+def _keys(holder: Any, place: Path, part: str, path: str) -> tuple[list[Any], str]:
+    """The keys or indices that one part of a path means inside a mapping or list, or else what is wrong with it."""
+    where = format_path(place) or "the scenario"
+    if isinstance(holder, list):
+        if part == EVERY:
+            return list(range(len(holder))), ""
+        if part.isdigit() and int(part) < len(holder):
+            return [int(part)], ""
+        return [], f"{path}: expected * or a number below {len(holder)} after {where}, got {part!r}"
+    if not isinstance(holder, dict):
+        return [], f"{path}: expected a section at {where} for {part!r} to be in, got a single value"
+    if part not in holder:
+        hint = "what sensors share is set by sensors.*" if part == "sensor_defaults" else suggestion(part, list(holder))
+        known = ", ".join(sorted(holder))
+        return [], f"{path}: expected one of {known} in {where}, got {part!r}" + (f" ({hint})" if hint else "")
+    return [part], ""
