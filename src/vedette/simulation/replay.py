@@ -1,0 +1,38 @@
+"""The scans of a run that is over, drawn once more: a record keeps what was estimated, not what was measured."""
+
+from __future__ import annotations
+
+from vedette.errors import InputError
+from vedette.simulation.experiment import Experiment
+from vedette.simulation.loop import SCANS, run_stream
+from vedette.simulation.records import RunRecord
+from vedette.simulation.scans import Scan, simulate_scan
+
+
+def scans_of(record: RunRecord, experiment: Experiment) -> tuple[tuple[Scan, ...], ...]:
+    """Every scan of every sensor of a run, exactly as the loop simulated it, with the ids of the targets behind it.
+
+    Seed, run number, truth and poses fix all measurements: each sensor has its own stream of random numbers, and draws
+    from it scan after scan.
+
+    Args:
+        record: of a run of this experiment, whatever the planner.
+        experiment: gives the sensors' models.
+
+    Returns:
+        For each scan, one `Scan` a sensor; its origins are ids of `record.truth`, or `CLUTTER`.
+
+    Raises:
+        InputError: another number of sensors in the record than in the experiment.
+        VedetteError: what the models raise.
+    """
+    if record.num_sensors != len(experiment.sensors):
+        raise InputError(f"record: expected {len(experiment.sensors)} sensors; got {record.num_sensors}")
+    streams = [run_stream(record.seed, record.run, SCANS, sensor) for sensor in range(record.num_sensors)]
+    return tuple(
+        tuple(
+            simulate_scan(states, pose, sensor.filter.sensor, ids=ids, rng=stream)
+            for sensor, pose, stream in zip(experiment.sensors, record.poses[step], streams, strict=True)
+        )
+        for step, (ids, states) in enumerate(record.truth.at(scan) for scan in range(record.num_scans))
+    )
