@@ -25,7 +25,7 @@ STRATEGY_NAMES = ("jdm", "idm", "random", "fixed", "still")
 
 def compile_if_cold(scenario: Scenario) -> None:
     """The first start compiles for about a minute; say so before it happens."""
-    from vedette.kernels.compile import cache_directory, is_cold
+    from vedette.kernels.disk_cache import cache_directory, is_cold
 
     if is_cold():
         where = cache_directory()
@@ -106,7 +106,7 @@ def _print_run(record: RunRecord) -> None:
         console.print(table)
     total, localisation, cardinality = record.ospa.mean(axis=0)
     console.print(f"mean OSPA {total:.2f} m (localisation {localisation:.2f}, cardinality {cardinality:.2f})")
-    spent = ", ".join(f"{what} {seconds:.2f} s" for what, seconds in record.timings.items())
+    spent = ", ".join(f"{stage} {seconds.sum():.2f} s" for stage, seconds in record.timings.items())
     console.print(f"time spent: {spent}")
 
 

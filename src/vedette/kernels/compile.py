@@ -1,127 +1,29 @@
-"""The one place that configures Numba: how kernels and model functions are compiled and cached.
+"""The one place that configures Numba: how kernels and model functions are compiled.
 
-Kernels are compiled at their first call and kept in a disk cache. Numba stamps a cache entry with the source file of
-the function itself and so misses an edit in a file it imports; the stamp used here covers the file and every
-`vedette.kernels` module it reaches.
+Kernels are compiled at their first call and kept on disk, see `vedette.kernels.disk_cache`.
 """
 
 from __future__ import annotations
 
-import ast
-import hashlib
 import inspect
-import os
 from collections.abc import Callable
-from functools import cache
-from pathlib import Path
-from typing import Any, ClassVar, TypeVar, cast
+from typing import Any, TypeVar, cast
 
 import numba
 from numba import types
 from numba.core import cgutils, config
-from numba.core.caching import CompileResultCacheImpl, FunctionCache
 from numba.core.registry import CPUDispatcher
 from numba.experimental.function_type import FunctionModel
 from numba.extending import NativeValue, register_model, typeof_impl, unbox
 
+from vedette.kernels.disk_cache import attach_cache
+
 _F = TypeVar("_F", bound=Callable[..., Any])
-_PACKAGE_ROOT = Path(__file__).resolve().parents[1]
 JIT_ENABLED = not config.DISABLE_JIT
 
 # No fastmath: -inf is a legal log weight. NumPy's error model: division by zero is inf, not an exception branch.
 _OPTIONS: dict[str, Any] = {"nopython": True, "nogil": True, "error_model": "numpy"}
 _BORROWING: dict[str, Any] = {**_OPTIONS, "_nrt": False}
-
-
-def cache_directory() -> Path:
-    """Directory of the compiled kernels: `$VEDETTE_CACHE_DIR`, or `vedette` in the user's cache directory."""
-    override = os.environ.get("VEDETTE_CACHE_DIR")
-    if override:
-        return Path(override)
-    base = os.environ.get("XDG_CACHE_HOME") or os.environ.get("LOCALAPPDATA") or Path.home() / ".cache"
-    return Path(base) / "vedette"
-
-
-def _kernel_imports(source: str) -> set[str]:
-    names: set[str] = set()
-    for node in ast.walk(ast.parse(source)):
-        if isinstance(node, ast.ImportFrom) and node.module and node.module.startswith("vedette.kernels"):
-            names.add(node.module)
-            names.update(f"{node.module}.{alias.name}" for alias in node.names)
-    return names
-
-
-@cache
-def _source_closure(path: Path) -> frozenset[Path]:
-    """The file and every kernel module that it reaches by imports."""
-    found, pending = {path}, [path]
-    while pending:
-        for name in _kernel_imports(pending.pop().read_text(encoding="utf-8")):
-            candidate = _PACKAGE_ROOT.joinpath(*name.split(".")[1:]).with_suffix(".py")
-            if candidate.is_file() and candidate not in found:
-                found.add(candidate)
-                pending.append(candidate)
-    return frozenset(found)
-
-
-@cache
-def _source_stamp(path: Path) -> str:
-    digest = hashlib.sha256(f"{numba.__version__} {bool(config.BOUNDSCHECK)}".encode())
-    for file in sorted(_source_closure(path)):
-        digest.update(file.read_bytes())
-    return digest.hexdigest()
-
-
-class _PackageLocator:
-    """Numba cache locator for functions defined inside this package (the protocol of `numba.core.caching`)."""
-
-    def __init__(self, function: Callable[..., Any], path: Path) -> None:
-        self._path = path
-        self._py_file = str(path)  # Numba's warnings about code that cannot be cached name it
-        self._line = function.__code__.co_firstlineno
-
-    def ensure_cache_path(self) -> None:
-        Path(self.get_cache_path()).mkdir(parents=True, exist_ok=True)
-
-    def get_cache_path(self) -> str:
-        relative = self._path.relative_to(_PACKAGE_ROOT).with_suffix("")
-        # Two checkouts (or versions) side by side must not overwrite each other's entries.
-        root = hashlib.sha256(str(_PACKAGE_ROOT).encode()).hexdigest()[:12]
-        return str(cache_directory() / root / "_".join(relative.parts))
-
-    def get_source_stamp(self) -> str:
-        return _source_stamp(self._path)
-
-    def get_disambiguator(self) -> str:
-        return str(self._line)
-
-    @classmethod
-    def from_function(cls, function: Callable[..., Any], file: str) -> _PackageLocator | None:
-        path = Path(file).resolve()
-        if not path.is_relative_to(_PACKAGE_ROOT):
-            return None
-        locator = cls(function, path)
-        try:
-            locator.ensure_cache_path()
-        except OSError:
-            return None
-        return locator
-
-
-class _CacheImpl(CompileResultCacheImpl):  # type: ignore[misc]
-    _locator_classes: ClassVar[list[Any]] = [_PackageLocator, *CompileResultCacheImpl._locator_classes]
-
-
-class _Cache(FunctionCache):  # type: ignore[misc]
-    _impl_class = _CacheImpl
-
-
-def _attach_cache(dispatcher: Any) -> None:
-    """Cache on disk where that is possible; a function typed at a prompt has no file and is compiled each time."""
-    try:
-        dispatcher._cache = _Cache(dispatcher.py_func)
-    except (RuntimeError, OSError):
-        return
 
 
 def kernel(function: _F) -> _F:
@@ -151,7 +53,7 @@ def _compiled(function: _F, options: dict[str, Any]) -> _F:
     if not JIT_ENABLED:
         return function
     dispatcher = numba.njit(**{k: v for k, v in options.items() if k != "nopython"})(function)
-    _attach_cache(dispatcher)
+    attach_cache(dispatcher)
     return cast(_F, dispatcher)
 
 
@@ -271,7 +173,7 @@ def compile_model_function(function: Callable[..., Any], kind: str) -> Any:
         return function
     dispatcher = ModelFunction(function, targetoptions=dict(_OPTIONS))
     dispatcher.kind = kind
-    _attach_cache(dispatcher)
+    attach_cache(dispatcher)
     if function.__module__.startswith("vedette."):
         return dispatcher
     try:
@@ -281,18 +183,10 @@ def compile_model_function(function: Callable[..., Any], kind: str) -> Any:
     return dispatcher
 
 
-def is_cold() -> bool:
-    """Whether no kernel of this checkout has been compiled on this machine yet (model functions do not count)."""
-    cache = Path(_PackageLocator(kernel, Path(__file__)).get_cache_path()).parent
-    return JIT_ENABLED and not any(cache.glob("kernels_*/*.nbc"))
-
-
 __all__ = [
     "JIT_ENABLED",
     "SIGNATURES",
     "ModelFunction",
-    "cache_directory",
     "compile_model_function",
-    "is_cold",
     "kernel",
 ]

@@ -1,0 +1,83 @@
+"""Compiled kernels on disk: found again, compiled anew when damaged, safe for several processes at once."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from vedette.kernels.compile import JIT_ENABLED
+
+pytestmark = pytest.mark.skipif(not JIT_ENABLED, reason="nothing is compiled")
+
+# Calls one kernel with arrays of the types named, in that order, once a file `go` is there; prints what was read from
+# disk and what was compiled.
+PROGRAM = """
+import sys, time
+from pathlib import Path
+import numpy as np
+from vedette.kernels.linalg import log_sum
+
+print("ready", flush=True)
+while not Path(sys.argv[1], "go").exists():
+    time.sleep(0.001)
+for name in sys.argv[2:]:
+    assert abs(log_sum(np.array([1, 2, 3]).astype(name)) - 3.4076059644443806) < 1e-6, name
+stats = log_sum.stats
+print(sum(stats.cache_hits.values()), sum(stats.cache_misses.values()))
+"""
+TYPES = ["float64", "float32", "int64", "int32", "uint8", "int8"]
+
+
+def start(cache: Path, types: list[str]) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        [sys.executable, "-c", PROGRAM, str(cache), *types],
+        env={**os.environ, "VEDETTE_CACHE_DIR": str(cache)},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+def counts(process: subprocess.Popen[str]) -> tuple[int, int]:
+    """Entries read from disk, and compiled, by a process that must have ended well."""
+    out, error = process.communicate(timeout=120)
+    assert process.returncode == 0, error
+    hits, misses = out.split()[-2:]
+    return int(hits), int(misses)
+
+
+def test_processes_that_compile_at_once_keep_every_entry_under_its_own_key(tmp_path: Path) -> None:
+    processes = [start(tmp_path, TYPES[turn:] + TYPES[:turn]) for turn in (0, 3)]
+    for process in processes:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "ready\n"
+    (tmp_path / "go").touch()
+    for process in processes:
+        hits, misses = counts(process)
+        assert hits + misses == len(TYPES)
+    assert counts(start(tmp_path, TYPES)) == (len(TYPES), 0)
+
+
+def test_a_damaged_entry_is_compiled_again(tmp_path: Path) -> None:
+    (tmp_path / "go").touch()
+    assert counts(start(tmp_path, ["float64", "int64"])) == (0, 2)
+    first, second = sorted(tmp_path.rglob("*log_sum*.nbc"))
+    first.write_bytes(first.read_bytes()[:-20])
+    content = bytearray(second.read_bytes())
+    content[len(content) // 2] ^= 0x20
+    second.write_bytes(content)
+    assert counts(start(tmp_path, ["float64", "int64"])) == (0, 2)
+    assert counts(start(tmp_path, ["float64", "int64"])) == (2, 0)
+    assert not [path for path in tmp_path.rglob("*") if path.is_file() and path.suffix not in (".nbc", "")]
+
+
+def test_a_folder_that_cannot_be_written_leaves_the_kernel_compiled_in_memory(tmp_path: Path) -> None:
+    (tmp_path / "go").touch()
+    (tmp_path / "file").touch()
+    environment = {**os.environ, "VEDETTE_CACHE_DIR": str(tmp_path / "file" / "below")}
+    result = subprocess.run([sys.executable, "-c", PROGRAM, str(tmp_path), "float64"], env=environment, check=False)
+    assert result.returncode == 0
