@@ -71,7 +71,7 @@ def make_record(planner: str = "jdm", run: int = 0, seed: int = 7, num_scans: in
         estimates=estimates,
         decisions=decisions,
         ospa=np.zeros((num_scans, 3)),
-        timings={"filter": 0.25, "plan": 0.5},
+        timings={"filter": np.linspace(0.001, 0.002, num_scans), "planning": np.full(num_scans, 0.1)},
     )
     return replace(record, ospa=ospa_of_run(truth, estimates, cutoff=100.0, order=1.0))
 

@@ -12,7 +12,7 @@ from vedette.errors import InputError
 from vedette.models.platforms import advance
 from vedette.scenarios import load_scenario
 from vedette.scenarios.build import build_experiment
-from vedette.simulation.loop import simulate
+from vedette.simulation.loop import STAGES, simulate
 
 
 def no_score(truth, estimates):
@@ -86,6 +86,14 @@ def test_unequal_scan_times_move_sensors_by_the_time_between(shortened):
     uneven = replace(shortened, times=times, decision_steps=(1,))
     record = run(uneven, FixedPlanner((0.0, 0.0)))
     np.testing.assert_allclose(np.diff(record.poses[:, 0, 0]), np.diff(times) * uneven.sensors[0].speed)
+
+
+def test_time_is_taken_by_stage_and_scan(shortened):
+    record = run(shortened, RandomPlanner(shortened.sensors))
+    assert tuple(record.timings) == STAGES
+    assert all(seconds.shape == (14,) and (seconds >= 0.0).all() for seconds in record.timings.values())
+    assert (record.timings["filter"] > 0.0).all()
+    np.testing.assert_array_equal(np.flatnonzero(record.timings["planning"]), [9])
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ from vedette.simulation import storage
 from vedette.simulation.records import RunRecord
 from vedette.simulation.storage import load_run, read_manifest, save_run
 
-FILES = ("decisions.json", "scans.csv", "sensors.csv", "tracks.csv", "truth.csv")
+FILES = ("decisions.json", "scans.csv", "sensors.csv", "timings.csv", "tracks.csv", "truth.csv")
 
 
 def assert_same(first: Any, second: Any) -> None:
@@ -32,6 +32,9 @@ def assert_same(first: Any, second: Any) -> None:
         assert len(first) == len(second)
         for a, b in zip(first, second, strict=True):
             assert_same(a, b)
+    elif isinstance(first, dict):
+        assert list(first) == list(second)
+        assert_same(tuple(first.values()), tuple(second.values()))
     else:
         assert first == second
 
@@ -154,11 +157,11 @@ def test_altered_and_truncated_files_are_named(saved: Path, file: str) -> None:
         ("{", "cut short or altered"),
         ("[]", "got another file"),
         ('{"format": "photo album"}', "got another file"),
-        ('{"format": "vedette-run", "format_version": 99}', "format version 1; got 99"),
-        ('{"format": "vedette-run", "format_version": 1}', "fields files and run"),
-        ('{"format": "vedette-run", "format_version": 1, "run": {}, "files": {"../x": ""}}', "plain file names"),
+        ('{"format": "vedette-run", "format_version": 99}', "format version 2; got 99"),
+        ('{"format": "vedette-run", "format_version": 2}', "fields files and run"),
+        ('{"format": "vedette-run", "format_version": 2, "run": {}, "files": {"../x": ""}}', "plain file names"),
         (
-            '{"format": "vedette-run", "format_version": 1, "run": {}, "files": {}}',
+            '{"format": "vedette-run", "format_version": 2, "run": {}, "files": {}}',
             "expected a file decisions.json|scans",
         ),
     ],
@@ -208,6 +211,7 @@ def contradictions() -> dict[str, RunRecord]:
     return {
         "scan times": replace(record, times=record.times + 0.5),
         "record.estimates": replace(record, estimates=record.estimates[1:]),
+        "record.timings": replace(record, timings={"filter": np.zeros(3)}),
         "record.poses": replace(record, poses=record.poses[1:]),
         "record.ospa": replace(record, ospa=record.ospa[:, :2]),
         "plan.chosen": replace(record, decisions=(replace(record.decisions[0], plan=plan),)),

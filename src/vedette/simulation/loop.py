@@ -23,6 +23,9 @@ Score: TypeAlias = Callable[[Truth, Sequence[Estimate]], Floats]
 # Streams of one run: strategies meet the same truth and the same luck in the scans, whatever else they draw.
 TRUTH, SCANS, FILTER, PLANNER, RANDOM_CONTROL = range(5)
 
+# What the time of a run is spent on.
+STAGES = ("scans", "filter", "fusion", "estimate", "planning")
+
 
 def run_stream(seed: int, run: int, *stream: int) -> np.random.Generator:
     """The random numbers of one purpose in one run."""
@@ -30,18 +33,19 @@ def run_stream(seed: int, run: int, *stream: int) -> np.random.Generator:
 
 
 class _Stopwatch:
-    """Seconds of wall time spent, by what."""
+    """Seconds of wall time spent at each scan, by stage; `step` is the scan at hand, counted from 1."""
 
-    def __init__(self) -> None:
-        self.spent = dict.fromkeys(("scans", "filter", "fusion", "estimate", "planning"), 0.0)
+    def __init__(self, num_scans: int) -> None:
+        self.spent = {stage: np.zeros(num_scans) for stage in STAGES}
+        self.step = 1
 
     @contextmanager
-    def timing(self, what: str) -> Iterator[None]:
+    def timing(self, stage: str) -> Iterator[None]:
         start = time.perf_counter()
         try:
             yield
         finally:
-            self.spent[what] += time.perf_counter() - start
+            self.spent[stage][self.step - 1] += time.perf_counter() - start
 
 
 class _Course:
@@ -77,13 +81,14 @@ def simulate(experiment: Experiment, planner: Planner | None, *, seed: int, run:
     scan_streams = [run_stream(seed, run, SCANS, sensor) for sensor in range(num_sensors)]
     filter_streams = [run_stream(seed, run, FILTER, sensor) for sensor in range(num_sensors)]
     planner_stream = run_stream(seed, run, RANDOM_CONTROL if isinstance(planner, RandomPlanner) else PLANNER)
-    watch, course = _Stopwatch(), _Course(experiment)
+    watch, course = _Stopwatch(len(experiment.times)), _Course(experiment)
     if planner is None:
         course.moving[:] = False
     beliefs: list[GLMB | LMB] = [sensor.filter.initial() for sensor in experiment.sensors]
     poses, estimates, decisions = [], [], []
     periods = np.diff(experiment.times, prepend=experiment.times[0] - _first_period(experiment.times))
     for step, period in enumerate(periods.tolist(), start=1):
+        watch.step = step
         if step > 1:
             course.move(period)
         poses.append(course.poses)

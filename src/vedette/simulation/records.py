@@ -42,7 +42,8 @@ class RunRecord:
         estimates: one a scan.
         decisions: in order of time.
         ospa: (num_scans, 3) total, localisation and cardinality parts, m.
-        timings: seconds spent, by what.
+        timings: for each stage (`scans`, `filter`, `fusion`, `estimate`, `planning`), (num_scans,) seconds of wall time
+            that it took at each scan; of all that is here the only thing that the seed does not fix.
     """
 
     scenario: str
@@ -55,7 +56,7 @@ class RunRecord:
     estimates: tuple[Estimate, ...]
     decisions: tuple[Decision, ...]
     ospa: Floats
-    timings: dict[str, float]
+    timings: dict[str, Floats]
 
     @property
     def num_scans(self) -> int:

@@ -1,8 +1,8 @@
 """Runs on disk, in open formats.
 
 A run is a folder: `manifest.json` (what ran, on which versions, and a checksum of every other file), `scans.csv`
-(OSPA), `truth.csv`, `tracks.csv` (estimates), `sensors.csv`, `decisions.json` (choices with their reward tables) and,
-where it was given, `scenario.yaml`. A folder appears whole or not at all.
+(OSPA), `truth.csv`, `tracks.csv` (estimates), `sensors.csv`, `timings.csv`, `decisions.json` (choices with their reward
+tables) and, where it was given, `scenario.yaml`. A folder appears whole or not at all.
 """
 
 from __future__ import annotations
@@ -20,9 +20,10 @@ from typing import Any
 from vedette.errors import InputError
 from vedette.simulation.encoding import decode_run, encode_run
 from vedette.simulation.records import RunRecord
+from vedette.simulation.tabulation import run_facts
 
 FORMAT = "vedette-run"
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
 MANIFEST = "manifest.json"
 SCENARIO = "scenario.yaml"
 _PACKAGES = ("vedette", "numpy", "scipy", "numba")
@@ -101,16 +102,15 @@ def _manifest(record: RunRecord, files: Mapping[str, bytes]) -> dict[str, Any]:
     return {
         "format": FORMAT,
         "format_version": FORMAT_VERSION,
-        "run": {
-            "scenario": record.scenario,
-            "planner": record.planner,
-            "seed": record.seed,
-            "run": record.run,
-            "timings_s": record.timings,
-        },
-        "versions": {"python": platform.python_version(), **{name: _version(name) for name in _PACKAGES}},
+        "run": run_facts(record),
+        "versions": versions(),
         "files": {name: hashlib.sha256(content).hexdigest() for name, content in files.items()},
     }
+
+
+def versions() -> dict[str, str]:
+    """Versions of Python and of the packages that results depend on."""
+    return {"python": platform.python_version(), **{name: _version(name) for name in _PACKAGES}}
 
 
 def _version(package: str) -> str:
