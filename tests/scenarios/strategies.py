@@ -161,6 +161,12 @@ def scenarios(draw: st.DrawFn) -> Data:
         **draw(tracking(len(platforms))),
         "control": draw(control),
         "ospa": draw(
-            section(cutoff=positive, order=st.floats(1.0, 100.0), from_step=st.just(1), to_step=st.just(last))
+            section(
+                cutoff=positive,
+                order=st.floats(1.0, 100.0),
+                window=counts,
+                from_step=st.just(1),
+                to_step=st.just(last),
+            )
         ),
     }

@@ -1,19 +1,61 @@
-"""How good it was: OSPA, statistics over paired runs, tables; figures are in `vedette.evaluation.figures`."""
+"""How good it was: metrics, statistics over paired runs, tables; figures are in `vedette.evaluation.figures`."""
 
 from vedette.evaluation.comparison import Comparison, chosen_headings_deg, compare
-from vedette.evaluation.metrics import OspaResult, ospa, ospa_of_run
+from vedette.evaluation.metrics import (
+    AverageNees,
+    Continuity,
+    GospaResult,
+    GospaSeries,
+    Matching,
+    OspaResult,
+    RunMetrics,
+    TrackSet,
+    average_nees,
+    continuity,
+    continuity_of_run,
+    gospa,
+    gospa_distance,
+    gospa_of_run,
+    match_run,
+    measure,
+    nees,
+    nees_interval,
+    ospa,
+    ospa2,
+    ospa2_of_run,
+    ospa_of_run,
+)
 from vedette.evaluation.statistics import PairedDifference, Summary, paired_difference, summarise
 from vedette.evaluation.tables import decision_rows, strategy_csv, strategy_markdown, strategy_rows
 
 __all__ = [
+    "AverageNees",
     "Comparison",
+    "Continuity",
+    "GospaResult",
+    "GospaSeries",
+    "Matching",
     "OspaResult",
     "PairedDifference",
+    "RunMetrics",
     "Summary",
+    "TrackSet",
+    "average_nees",
     "chosen_headings_deg",
     "compare",
+    "continuity",
+    "continuity_of_run",
     "decision_rows",
+    "gospa",
+    "gospa_distance",
+    "gospa_of_run",
+    "match_run",
+    "measure",
+    "nees",
+    "nees_interval",
     "ospa",
+    "ospa2",
+    "ospa2_of_run",
     "ospa_of_run",
     "paired_difference",
     "strategy_csv",

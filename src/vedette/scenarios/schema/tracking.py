@@ -149,6 +149,7 @@ class Ospa(Section):
 
     cutoff: float = Field(default=100.0, gt=0.0, description="Cost of a missed or false target, c [m].")
     order: float = Field(default=1.0, ge=1.0, description="Order p [-].")
+    window: Count = Field(default=10, description="Scans of the window of OSPA(2) [-].")
     from_step: Count | None = Field(
         default=None, description="First scan of the reported mean; none: the one after the first decision, or 1 [-]."
     )

@@ -1,0 +1,34 @@
+"""How far estimates are from the truth: distances between sets of points and of tracks, breaks, consistency."""
+
+from vedette.evaluation.metrics.consistency import AverageNees, average_nees, nees, nees_interval
+from vedette.evaluation.metrics.gospa import GospaResult, GospaSeries, gospa, gospa_distance, gospa_of_run
+from vedette.evaluation.metrics.matching import Matching, match_run
+from vedette.evaluation.metrics.ospa import OspaResult, ospa, ospa_of_run
+from vedette.evaluation.metrics.ospa2 import TrackSet, ospa2, ospa2_of_run
+from vedette.evaluation.metrics.run import RunMetrics, measure
+from vedette.evaluation.metrics.trajectories import Continuity, continuity, continuity_of_run
+
+__all__ = [
+    "AverageNees",
+    "Continuity",
+    "GospaResult",
+    "GospaSeries",
+    "Matching",
+    "OspaResult",
+    "RunMetrics",
+    "TrackSet",
+    "average_nees",
+    "continuity",
+    "continuity_of_run",
+    "gospa",
+    "gospa_distance",
+    "gospa_of_run",
+    "match_run",
+    "measure",
+    "nees",
+    "nees_interval",
+    "ospa",
+    "ospa2",
+    "ospa2_of_run",
+    "ospa_of_run",
+]

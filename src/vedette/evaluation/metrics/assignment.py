@@ -1,0 +1,122 @@
+"""Optimal assignment between two sets of points, which all distances between sets rest on."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.optimize import linear_sum_assignment
+
+from vedette.errors import InputError
+from vedette.kernels.types import Bools, Floats, Ints
+
+_HIGH_ORDER = 30.0
+
+
+def check_parameters(cutoff: float, order: float, *, finite: bool = False) -> None:
+    """Raise `InputError` unless cutoff > 0 and order >= 1; `finite`: and neither is infinite."""
+    if not cutoff > 0.0 or (finite and math.isinf(cutoff)):
+        raise InputError(f"cutoff: expected a{' finite' * finite} distance above 0; got {cutoff}")
+    if not order >= 1.0 or (finite and math.isinf(order)):
+        raise InputError(f"order: expected a{' finite' * finite} number of at least 1; got {order}")
+
+
+def point_set(values: ArrayLike, name: str) -> Floats:
+    """(num, dim) finite points; an empty set of any shape is one.
+
+    Raises `InputError`, with `name`, for anything else.
+    """
+    try:
+        points = np.asarray(values, np.float64)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{name}: expected an array of points; got {values!r}") from error
+    if points.size == 0:
+        return points.reshape(0, points.shape[1] if points.ndim == 2 else 0)
+    if points.ndim != 2:
+        raise InputError(f"{name}: expected shape (number, dimension); got {points.shape}")
+    if not np.isfinite(points).all():
+        raise InputError(f"{name}: expected finite coordinates; got {points[~np.isfinite(points)][0]}")
+    return points
+
+
+def point_sets(estimates: ArrayLike, truths: ArrayLike) -> tuple[Floats, Floats]:
+    """Both as `point_set`; `InputError` also where they differ in dimension."""
+    first, second = point_set(estimates, "estimates"), point_set(truths, "truths")
+    if first.size and second.size and first.shape[1] != second.shape[1]:
+        raise InputError(
+            f"estimates, truths: expected points of equal dimension; got {first.shape[1]} and {second.shape[1]}"
+        )
+    return first, second
+
+
+def cut_distances(first: Floats, second: Floats, cutoff: float) -> Floats:
+    """(len(first), len(second)) Euclidean distances, none above the cutoff. Either set may be empty."""
+    if not (len(first) and len(second)):
+        return np.empty((len(first), len(second)))
+    apart = np.sqrt(((first[:, None, :] - second[None, :, :]) ** 2).sum(axis=2))
+    return np.asarray(np.minimum(apart, cutoff))
+
+
+def assign(distances: Floats, order: float) -> tuple[Ints, Ints]:
+    """Rows and columns, each used at most once, that pair all of the smaller set at the least cost.
+
+    Args:
+        distances: (num_rows, num_columns), finite, at least 0.
+        order: the cost is the sum of distance ** order; for an infinite order the largest distance.
+    """
+    if not distances.size:
+        return np.empty(0, np.int64), np.empty(0, np.int64)
+    if math.isinf(order):
+        return _pairs(distances > _bottleneck(distances))
+    if order == 1.0:
+        return _pairs(distances)
+    # Powers of ratios: powers of metres overflow, or all vanish, at a high order. There the ratio must be to what the
+    # best assignment cannot avoid, for beside a larger distance everything that matters would vanish too.
+    scale = float(distances.max()) if order <= _HIGH_ORDER else _bottleneck(distances)
+    if scale == 0.0:
+        return _pairs(distances > 0.0)
+    with np.errstate(over="ignore", under="ignore"):  # an infinite cost only says: never this pair
+        return _pairs((distances / scale) ** order)
+
+
+def power_mean(values: Floats, number: float, order: float) -> float:
+    """(sum of values ** order / number) ** (1 / order) without overflow; the largest for an infinite order.
+
+    Args:
+        values: (num,) at least 0.
+        number: what the sum is divided by, above 0; at least `num` for a mean, 1 for a root of the sum.
+    """
+    scale = float(values.max()) if len(values) else 0.0
+    if scale == 0.0 or math.isinf(scale) or math.isinf(order):
+        return scale
+    with np.errstate(under="ignore"):
+        total = float(((values / scale) ** order).sum())
+    return float(scale * (total / number) ** (1.0 / order))
+
+
+def combine(first: float, second: float, order: float) -> float:
+    """(first ** order + second ** order) ** (1 / order) without overflow; the larger for an infinite order."""
+    return power_mean(np.array([first, second]), 1.0, order)
+
+
+def _pairs(costs: Floats | Bools) -> tuple[Ints, Ints]:
+    rows, columns = linear_sum_assignment(costs)
+    return rows, columns
+
+
+def _bottleneck(distances: Floats) -> float:
+    """The least bound under which every point of the smaller set has a partner of its own."""
+    candidates = np.unique(distances)
+    low, high = 0, len(candidates) - 1
+    while low < high:
+        middle = (low + high) // 2
+        if _is_matchable(distances <= candidates[middle]):
+            high = middle
+        else:
+            low = middle + 1
+    return float(candidates[low])
+
+
+def _is_matchable(allowed: Bools) -> bool:
+    return bool(allowed[linear_sum_assignment(~allowed)].all())

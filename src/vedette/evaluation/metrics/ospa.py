@@ -1,0 +1,102 @@
+"""Optimal sub-pattern assignment (OSPA) distance between sets of points, with its two parts.
+
+D. Schuhmacher, B.-T. Vo and B.-N. Vo, "A Consistent Metric for Performance Evaluation of Multi-Object Filters",
+IEEE Trans. Signal Processing 56(8), 2008: eq. (3) and (4) for the distance, section III-C for the parts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from vedette.densities.estimates import Estimate
+from vedette.errors import InputError
+from vedette.evaluation.metrics.assignment import (
+    assign,
+    check_parameters,
+    combine,
+    cut_distances,
+    point_set,
+    point_sets,
+    power_mean,
+)
+from vedette.kernels.types import Floats
+from vedette.simulation.truth import Truth
+
+
+@dataclass(frozen=True, slots=True)
+class OspaResult:
+    """OSPA distance and its parts, in the unit of the points.
+
+    For a finite order p, `localisation ** p + cardinality ** p == total ** p`; for an infinite order the total is the
+    larger of the two.
+
+    Attributes:
+        total: the OSPA distance.
+        localisation: the part that comes from matched points that lie apart.
+        cardinality: the part that comes from points too many or too few.
+    """
+
+    total: float
+    localisation: float
+    cardinality: float
+
+
+def ospa(estimates: ArrayLike, truths: ArrayLike, *, cutoff: float, order: float) -> OspaResult:
+    """OSPA distance between two finite sets of points, by exact assignment.
+
+    Args:
+        estimates: (num_estimates, point_dim).
+        truths: (num_truths, point_dim).
+        cutoff: distance c > 0 at which a matched pair counts as missed; also the price of a point too many or too few.
+            May be infinite: then sets of unequal size are infinitely far apart.
+        order: exponent p >= 1; may be infinite.
+
+    Two empty sets are at distance 0; an empty and a non-empty set at `cutoff`.
+    Raises `InputError` for points that are not finite or of unequal dimension, or a cutoff or order out of range.
+    """
+    check_parameters(cutoff, order)
+    first, second = point_sets(estimates, truths)
+    return ospa_of_distances(cut_distances(first, second, cutoff), cutoff, order)
+
+
+def ospa_of_run(truth: Truth, estimates: Sequence[Estimate], *, cutoff: float, order: float) -> Floats:
+    """OSPA of the estimated positions at every scan of a run.
+
+    Returns (num_scans, 3): total, localisation and cardinality parts, m.
+    Raises `InputError` as `ospa` does, and if there is not one estimate a scan.
+    """
+    check_parameters(cutoff, order)
+    check_scans(truth, estimates)
+    parts = np.empty((len(estimates), 3))
+    for scan, estimate in enumerate(estimates):
+        _, states = truth.at(scan)
+        found = point_set(estimate.means[:, :2], f"estimates[{scan}]")
+        distances = cut_distances(found, point_set(states[:, :2], f"truth at scan {scan}"), cutoff)
+        result = ospa_of_distances(distances, cutoff, order)
+        parts[scan] = result.total, result.localisation, result.cardinality
+    return parts
+
+
+def check_scans(truth: Truth, estimates: Sequence[Estimate]) -> None:
+    """Raise `InputError` unless there is one estimate a scan."""
+    if len(estimates) != truth.num_scans:
+        raise InputError(f"estimates: expected one for each of {truth.num_scans} scans; got {len(estimates)}")
+
+
+def ospa_of_distances(distances: Floats, cutoff: float, order: float) -> OspaResult:
+    """OSPA of two sets whose elements lie at these distances.
+
+    Args:
+        distances: (num_first, num_second), none above the cutoff; either number may be 0.
+    """
+    smaller, larger = sorted(distances.shape)
+    if larger == 0:
+        return OspaResult(0.0, 0.0, 0.0)
+    localisation = power_mean(distances[assign(distances, order)], larger, order)
+    # An infinite order makes the share's root 1.
+    cardinality = cutoff * ((larger - smaller) / larger) ** (1.0 / order) if larger > smaller else 0.0
+    return OspaResult(combine(localisation, cardinality, order), localisation, cardinality)

@@ -1,0 +1,123 @@
+"""OSPA distance between sets of tracks over a sliding window, called OSPA(2) as its base distance is itself an OSPA.
+
+M. Beard, B.-T. Vo and B.-N. Vo, "A Solution for Large-Scale Multi-Object Tracking", IEEE Trans. Signal Processing 68,
+2020: the time-averaged OSPA as distance between tracks, and the OSPA between sets of tracks that it is the base of.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from vedette.densities.estimates import Estimate
+from vedette.errors import InputError
+from vedette.evaluation.metrics.assignment import check_parameters
+from vedette.evaluation.metrics.ospa import check_scans, ospa_of_distances
+from vedette.kernels.types import Bools, Floats, Ints
+from vedette.models.arguments import dimension
+from vedette.simulation.truth import Truth
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TrackSet:
+    """Tracks over the same scans; each may begin late, end early and have gaps.
+
+    Attributes:
+        alive: (num_tracks, num_scans) whether the track exists at the scan.
+        positions: (num_tracks, num_scans, dim) m; finite, of no meaning where the track does not exist.
+    """
+
+    alive: Bools
+    positions: Floats
+
+    @property
+    def num_scans(self) -> int:
+        return int(self.alive.shape[1])
+
+    def validate(self, name: str) -> None:
+        """Raise `InputError`, with `name`, unless the arrays fit together as described above."""
+        if self.alive.ndim != 2 or self.positions.shape[:-1] != self.alive.shape:
+            raise InputError(
+                f"{name}: expected one position a track and scan; got {self.positions.shape} for {self.alive.shape}"
+            )
+        if not np.isfinite(self.positions).all():
+            raise InputError(f"{name}: expected finite positions")
+
+    @classmethod
+    def of_truth(cls, truth: Truth) -> TrackSet:
+        """One track a target, by its id."""
+        tracks = np.unique(truth.ids, return_inverse=True)[1].reshape(-1)
+        return cls._of_rows(tracks, np.diff(truth.offsets), truth.states)
+
+    @classmethod
+    def of_estimates(cls, estimates: Sequence[Estimate]) -> TrackSet:
+        """One track a label; one estimate a scan."""
+        counts = np.array([estimate.num_targets for estimate in estimates], np.int64)
+        if not counts.any():
+            return cls(np.empty((0, len(counts)), np.bool_), np.empty((0, len(counts), 2)))
+        labels = np.concatenate([estimate.labels for estimate in estimates])
+        tracks = np.unique(labels, axis=0, return_inverse=True)[1].reshape(-1)
+        return cls._of_rows(tracks, counts, np.concatenate([estimate.means[:, :2] for estimate in estimates]))
+
+    @classmethod
+    def _of_rows(cls, tracks: Ints, counts: Ints, states: Floats) -> TrackSet:
+        scans = np.repeat(np.arange(len(counts)), counts)
+        alive = np.zeros((tracks.max(initial=-1) + 1, len(counts)), np.bool_)
+        positions = np.zeros((*alive.shape, 2))
+        alive[tracks, scans] = True
+        positions[tracks, scans] = states[:, :2]
+        return cls(alive, positions)
+
+    def within(self, start: int, stop: int) -> TrackSet:
+        """The tracks that exist at any of the scans `start` to `stop - 1`, over these scans."""
+        there = self.alive[:, start:stop].any(axis=1)
+        return TrackSet(self.alive[there, start:stop], self.positions[there, start:stop])
+
+
+def ospa2(estimates: TrackSet, truths: TrackSet, *, cutoff: float, order: float, window: int) -> Floats:
+    """OSPA(2) over the window that ends at each scan.
+
+    Two tracks are as far apart as they are on average over the scans of the window at which either exists: their
+    distance cut off at c, or c where only one exists. The tracks that exist in the window are the elements of the sets,
+    and OSPA with the same cutoff and order is the distance of the sets. So what a wrong label, a late start or a gap
+    costs is part of it.
+
+    Args:
+        cutoff: c > 0, m, finite.
+        order: exponent p >= 1 of the OSPA between the sets; may be infinite. (The average over time is of order 1.)
+        window: number of scans, at least 1; the first windows are cut short by the beginning.
+
+    Returns (num_scans, 3): total, and the parts from matched tracks and from tracks too many or too few, m.
+    Raises `InputError` for arguments out of range, positions that are not finite, or unequal numbers of scans.
+    """
+    check_parameters(cutoff, order)
+    check_parameters(cutoff, 1.0, finite=True)
+    dimension("window", window)
+    estimates.validate("estimates")
+    truths.validate("truths")
+    if estimates.num_scans != truths.num_scans:
+        raise InputError(f"estimates: expected {truths.num_scans} scans; got {estimates.num_scans}")
+    parts = np.empty((truths.num_scans, 3))
+    for scan in range(truths.num_scans):
+        start, stop = max(0, scan + 1 - window), scan + 1
+        distances = track_distances(estimates.within(start, stop), truths.within(start, stop), cutoff)
+        result = ospa_of_distances(distances, cutoff, order)
+        parts[scan] = result.total, result.localisation, result.cardinality
+    return parts
+
+
+def ospa2_of_run(truth: Truth, estimates: Sequence[Estimate], *, cutoff: float, order: float, window: int) -> Floats:
+    """OSPA(2) of the estimated positions under their labels; see `ospa2`, which gives the same and raises the same."""
+    check_scans(truth, estimates)
+    return ospa2(TrackSet.of_estimates(estimates), TrackSet.of_truth(truth), cutoff=cutoff, order=order, window=window)
+
+
+def track_distances(first: TrackSet, second: TrackSet, cutoff: float) -> Floats:
+    """(num_first, num_second) time-averaged cut-off distances between tracks; of two that never exist, 0."""
+    either = first.alive[:, None] | second.alive[None]
+    both = first.alive[:, None] & second.alive[None]
+    apart = np.sqrt(((first.positions[:, None] - second.positions[None]) ** 2).sum(axis=3))
+    costs = np.where(both, np.minimum(apart, cutoff), cutoff)
+    return np.asarray((costs * either).sum(axis=2) / np.maximum(either.sum(axis=2), 1))

@@ -1,0 +1,119 @@
+"""All measures of a run, scan by scan."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vedette.evaluation.metrics.consistency import nees_of_matching
+from vedette.evaluation.metrics.gospa import gospa_of_matching
+from vedette.evaluation.metrics.matching import match_run
+from vedette.evaluation.metrics.ospa2 import ospa2_of_run
+from vedette.evaluation.metrics.trajectories import continuity
+from vedette.kernels.types import Floats, Ints
+from vedette.models.arguments import reject
+from vedette.simulation.records import RunRecord
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RunMetrics:
+    """Measures of a run at each scan; every array is (num_scans,). OSPA is in the run's record.
+
+    With c the cutoff and p the order that they were computed with, the three GOSPA costs add up to `gospa_m ** p`: for
+    p = 1 they are metres, in general m ** p. A pair is an estimate and a target matched within c.
+
+    Attributes:
+        gospa_m: GOSPA distance with alpha = 2, m.
+        gospa_localisation: cost of matched pairs that lie apart, m ** p.
+        gospa_missed: cost of targets without a partner, c ** p / 2 each, m ** p.
+        gospa_false: cost of estimates without a partner, c ** p / 2 each, m ** p.
+        num_missed: targets without a partner.
+        num_false: estimates without a partner.
+        ospa2_m: OSPA(2) distance over the window that ends at the scan, m.
+        cardinality_error: number of estimates minus number of targets.
+        nees_mean: mean NEES of the full state over the pairs; NaN where there is none.
+        nees_count: number of pairs that `nees_mean` is over; 0 throughout where estimated and true states differ in
+            dimension.
+        position_nees_mean: mean NEES of the position over all pairs; NaN where there is none.
+        label_switches: targets matched to another label than at their last match.
+        fragmentations: targets matched again after a break.
+    """
+
+    gospa_m: Floats
+    gospa_localisation: Floats
+    gospa_missed: Floats
+    gospa_false: Floats
+    num_missed: Ints
+    num_false: Ints
+    ospa2_m: Floats
+    cardinality_error: Ints
+    nees_mean: Floats
+    nees_count: Ints
+    position_nees_mean: Floats
+    label_switches: Ints
+    fragmentations: Ints
+
+    @property
+    def num_scans(self) -> int:
+        return len(self.gospa_m)
+
+    def columns(self) -> dict[str, NDArray[np.float64] | NDArray[np.int64]]:
+        """Each array under its name, in the order above: float64, or int64 for numbers of things."""
+        return {name: getattr(self, name) for name in COLUMNS}
+
+    @classmethod
+    def from_columns(cls, columns: Mapping[str, NDArray[np.float64] | NDArray[np.int64]]) -> RunMetrics:
+        """Of what `columns` gives, in any order.
+
+        Raises `InputError` for a name missing or unknown, a type that is not the column's, or unequal lengths.
+        """
+        if columns.keys() != COLUMNS.keys():
+            raise reject("columns", ", ".join(COLUMNS), ", ".join(columns))
+        num_scans = len(columns["gospa_m"])
+        for name, dtype in COLUMNS.items():
+            if columns[name].dtype != dtype or columns[name].shape != (num_scans,):
+                got = f"{columns[name].dtype} in shape {columns[name].shape}"
+                raise reject(f"columns.{name}", f"{dtype} in shape {(num_scans,)}", got)
+        return cls(**columns)  # type: ignore[arg-type] # types are checked above
+
+
+COLUMNS = {field.name: np.dtype(np.float64 if field.type == "Floats" else np.int64) for field in fields(RunMetrics)}
+
+
+def measure(record: RunRecord, *, cutoff: float, order: float, window: int) -> RunMetrics:
+    """All measures of a run, from one matching a scan; a matching of tracks besides for OSPA(2).
+
+    Args:
+        cutoff: c > 0, m, finite.
+        order: p >= 1, finite.
+        window: scans of the window of OSPA(2), at least 1.
+
+    Raises:
+        InputError: an argument out of range, not one estimate a scan, or a position that is not finite.
+        NumericalError: an estimate's covariance is not symmetric and positive definite.
+    """
+    truth = record.truth
+    matching = match_run(truth, record.estimates, cutoff=cutoff, order=order)
+    gospa = gospa_of_matching(matching, cutoff, order)
+    ospa2 = ospa2_of_run(truth, record.estimates, cutoff=cutoff, order=order, window=window)
+    full = nees_of_matching(truth, matching, position_only=False)
+    position = nees_of_matching(truth, matching, position_only=True)
+    breaks = continuity(truth, matching)
+    return RunMetrics(
+        gospa_m=gospa.total,
+        gospa_localisation=gospa.localisation,
+        gospa_missed=gospa.missed,
+        gospa_false=gospa.false,
+        num_missed=gospa.num_missed,
+        num_false=gospa.num_false,
+        ospa2_m=np.ascontiguousarray(ospa2[:, 0]),
+        cardinality_error=matching.num_estimates - matching.num_targets,
+        nees_mean=matching.mean_by_scan(full),
+        nees_count=np.bincount(matching.scans[~np.isnan(full)], minlength=matching.num_scans),
+        position_nees_mean=matching.mean_by_scan(position),
+        label_switches=breaks.label_switches,
+        fragmentations=breaks.fragmentations,
+    )

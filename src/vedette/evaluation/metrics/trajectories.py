@@ -1,0 +1,77 @@
+"""Whether a target keeps its label, and whether it is tracked without a break.
+
+In the manner of K. Bernardin and R. Stiefelhagen, "Evaluating Multiple Object Tracking Performance: The CLEAR MOT
+Metrics", EURASIP J. Image and Video Processing, 2008 (mismatches), and of Y. Li, C. Huang and R. Nevatia, "Learning to
+associate: HybridBoosted multi-target tracker for crowded scene", CVPR 2009 (fragments).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from vedette.densities.estimates import Estimate
+from vedette.evaluation.metrics.matching import Matching, match_run
+from vedette.kernels.types import Ints
+from vedette.simulation.truth import Truth
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Continuity:
+    """Breaks in the tracks of targets, counted at the scan where they show.
+
+    Attributes:
+        label_switches: (num_scans,) targets matched to another label than at their last match, however long ago.
+        fragmentations: (num_scans,) targets matched again after they were matched, then alive and not matched. Scans at
+            which the target does not exist are no break.
+    """
+
+    label_switches: Ints
+    fragmentations: Ints
+
+    @property
+    def num_label_switches(self) -> int:
+        """In the whole run."""
+        return int(self.label_switches.sum())
+
+    @property
+    def num_fragmentations(self) -> int:
+        """In the whole run."""
+        return int(self.fragmentations.sum())
+
+
+def continuity_of_run(truth: Truth, estimates: Sequence[Estimate], *, cutoff: float, order: float) -> Continuity:
+    """Label switches and fragmentations of a run. Raises `InputError` as `match_run` does."""
+    return continuity(truth, match_run(truth, estimates, cutoff=cutoff, order=order))
+
+
+def continuity(truth: Truth, matching: Matching) -> Continuity:
+    """Label switches and fragmentations, from the matching of the run.
+
+    Each scan is matched by itself. CLEAR MOT instead keeps a pair of the last scan as long as it is within the cutoff,
+    and so counts fewer switches among targets nearer to each other than that. A target that was never matched before,
+    or never again, has neither switch nor fragmentation: a late start and an early end are missed targets. A first
+    match after a return under the same id is compared with the last match before.
+    """
+    ids = truth.ids[matching.truth_rows]
+    by_target = np.argsort(ids, kind="stable")  # pairs come in order of scans
+    before, after = by_target[:-1], by_target[1:]
+    again = ids[before] == ids[after]
+    switched = again & (matching.labels[before] != matching.labels[after]).any(axis=1)
+    age = _ages(truth)[matching.truth_rows]
+    broken = again & (age[after] - age[before] > 1)
+    scans, num_scans = matching.scans[after], matching.num_scans
+    return Continuity(
+        np.bincount(scans[switched], minlength=num_scans), np.bincount(scans[broken], minlength=num_scans)
+    )
+
+
+def _ages(truth: Truth) -> Ints:
+    """(total,) at how many earlier scans the target of each row existed."""
+    by_target = np.argsort(truth.ids, kind="stable")
+    _, starts, counts = np.unique(truth.ids[by_target], return_index=True, return_counts=True)
+    ages = np.empty(len(by_target), np.int64)
+    ages[by_target] = np.arange(len(by_target)) - np.repeat(starts, counts)
+    return ages
