@@ -1,0 +1,145 @@
+"""The work of a campaign in pieces: what a worker is given, what it gives back, and in which order."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass, replace
+
+from vedette.campaigns.cells import Campaign, Cell
+from vedette.campaigns.codec import encode, encode_timings
+from vedette.errors import VedetteError
+from vedette.evaluation.metrics import measure
+from vedette.evaluation.runs import run_scenario
+from vedette.simulation.storage import versions
+
+# Below this a task costs more to hand out than it is worth.
+MIN_TASK_SECONDS = 0.5
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """Some runs of one cell.
+
+    Attributes:
+        cell, seed, runs: what to run.
+        versions: of what decides the bytes of a result; a worker with others refuses.
+    """
+
+    cell: Cell
+    seed: int
+    runs: tuple[int, ...]
+    versions: Mapping[str, str]
+
+    def alone(self) -> Iterator[Task]:
+        """Its runs, each as a task."""
+        return (replace(self, runs=(run,)) for run in self.runs)
+
+
+@dataclass(frozen=True, slots=True)
+class Landed:
+    """A finished run.
+
+    Attributes:
+        cell, run: which.
+        payload, timings: as `vedette.campaigns.codec` encodes them.
+        ospa: mean over the scans, m.
+        seconds: it took, s of wall time.
+    """
+
+    cell: str
+    run: int
+    payload: bytes
+    timings: bytes
+    ospa: float
+    seconds: float
+
+
+@dataclass(frozen=True, slots=True)
+class Failed:
+    """A run that could not be finished, and why."""
+
+    cell: str
+    run: int
+    message: str
+
+
+def perform(task: Task) -> tuple[Landed | Failed, ...]:
+    """What a worker does. An error in a run is a result of its own and leaves the other runs alone.
+
+    Raises:
+        VedetteError: this worker has other versions than the campaign.
+    """
+    here = versions()
+    wrong = [
+        f"{name} {here.get(name)} (not {wanted})" for name, wanted in task.versions.items() if here[name] != wanted
+    ]
+    if wrong:
+        raise VedetteError(f"a worker has other versions than the campaign: {', '.join(wrong)}")
+    return tuple(_one(task.cell, task.seed, run) for run in task.runs)
+
+
+def _one(cell: Cell, seed: int, run: int) -> Landed | Failed:
+    score, start = cell.scenario.model.ospa, time.perf_counter()
+    try:
+        record = run_scenario(cell.scenario, cell.planner, seed=seed, run=run, num_threads=1)
+        metrics = measure(record, cutoff=score.cutoff, order=score.order, window=score.window)
+        payload, timings = encode(record, metrics), encode_timings(record)
+    except VedetteError as error:
+        return Failed(cell.name, run, str(error))
+    except Exception as error:  # of a model of the user's own: one bad run must not end a night's work
+        return Failed(cell.name, run, f"{type(error).__name__}: {error}")
+    mean = float(record.ospa[:, 0].mean())
+    return Landed(cell.name, run, payload, timings, mean, time.perf_counter() - start)
+
+
+class TaskQueue:
+    """The runs that are still to do, handed out as tasks of about half a second or more.
+
+    Runs of equal number come together, so that strategies can be compared early. How long a run of a cell takes is
+    learnt from the fastest that has landed; nothing that a task holds changes a result.
+    """
+
+    def __init__(self, campaign: Campaign, finished: Collection[tuple[str, int]]) -> None:
+        self._campaign = campaign
+        self._versions = versions()
+        self._fastest: dict[str, float] = {}
+        self._todo = {
+            cell.name: [run for run in range(campaign.num_runs) if (cell.name, run) not in finished]
+            for cell in campaign.cells
+        }
+
+    def __len__(self) -> int:
+        """Runs not yet handed out."""
+        return sum(len(runs) for runs in self._todo.values())
+
+    def learn(self, result: Landed) -> None:
+        """Note how long a run took."""
+        self._fastest[result.cell] = min(self._fastest.get(result.cell, math.inf), result.seconds)
+
+    def take(self) -> Task | None:
+        """The next task; None when all runs are handed out."""
+        waiting = [cell for cell in self._campaign.cells if self._todo[cell.name]]
+        if not waiting:
+            return None
+        cell = min(waiting, key=lambda cell: self._todo[cell.name][0])
+        seconds = self._fastest.get(cell.name, MIN_TASK_SECONDS)
+        return self._task(cell, max(1, math.ceil(MIN_TASK_SECONDS / seconds)))
+
+    def warm_up(self) -> Iterator[Task]:
+        """One run for each set of kernels that the campaign needs, taken from what is to do."""
+        seen = set()
+        for cell in self._campaign.cells:
+            model = cell.scenario.model
+            kinds = {sensor.measurement.kind for sensor in model.sensors}
+            plans = cell.planner if cell.planner in ("jdm", "idm") else ""
+            kernels = (plans, model.filter.kind, model.fusion.kind, model.motion.kind, frozenset(kinds))
+            if kernels not in seen and self._todo[cell.name]:
+                seen.add(kernels)
+                yield self._task(cell, 1)
+
+    def _task(self, cell: Cell, count: int) -> Task:
+        runs = self._todo[cell.name]
+        taken, self._todo[cell.name] = runs[:count], runs[count:]
+        return Task(cell, self._campaign.seed, tuple(taken), self._versions)

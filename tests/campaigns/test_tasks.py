@@ -1,0 +1,104 @@
+"""How the runs of a campaign are cut into tasks, and what becomes of each."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from campaigns.examples import small_campaign
+from vedette.campaigns import tasks
+from vedette.campaigns.codec import decode
+from vedette.campaigns.tasks import MIN_TASK_SECONDS, Failed, Landed, TaskQueue, perform
+from vedette.errors import ModelError, VedetteError
+from vedette.evaluation.metrics import measure
+from vedette.evaluation.runs import run_scenario
+
+
+def landed(cell: str, seconds: float) -> Landed:
+    return Landed(cell, 0, b"", b"", 1.0, seconds)
+
+
+def drain(queue: TaskQueue) -> list[tuple[str, tuple[int, ...]]]:
+    taken = []
+    while (task := queue.take()) is not None:
+        taken.append((task.cell.name, task.runs))
+    return taken
+
+
+def test_runs_of_equal_number_come_together() -> None:
+    assert drain(TaskQueue(small_campaign(runs=2), ())) == [
+        ("idm", (0,)),
+        ("still", (0,)),
+        ("idm", (1,)),
+        ("still", (1,)),
+    ]
+
+
+def test_finished_runs_are_left_out() -> None:
+    queue = TaskQueue(small_campaign(runs=2), {("idm", 0), ("still", 1)})
+    assert len(queue) == 2
+    assert drain(queue) == [("still", (0,)), ("idm", (1,))]
+    assert len(queue) == 0
+
+
+def test_a_task_holds_at_least_half_a_second_of_work_once_that_is_known() -> None:
+    queue = TaskQueue(small_campaign(runs=30), ())
+    queue.learn(landed("idm", 0.1 * MIN_TASK_SECONDS))
+    queue.learn(landed("idm", 7.0))  # the first run of a process also loads the kernels
+    queue.learn(landed("still", 3.0))
+    assert drain(queue)[:3] == [("idm", tuple(range(10))), ("still", (0,)), ("still", (1,))]
+
+
+def test_the_first_run_of_each_set_of_kernels_warms_up() -> None:
+    campaign = small_campaign(planners=["jdm", "idm", "random", "still"], fusions=["cm_delta_glmb", "clmb"], runs=2)
+    queue = TaskQueue(campaign, {("jdm-clmb", run) for run in range(2)})
+    warm = [(task.cell.name, task.runs) for task in queue.warm_up()]
+    assert warm == [
+        (f"{cell}", (0,))
+        for cell in ("jdm-cm_delta_glmb", "idm-cm_delta_glmb", "idm-clmb", "random-cm_delta_glmb", "random-clmb")
+    ]
+    assert len(queue) == 16 - 2 - len(warm)
+
+
+def test_a_task_gives_back_the_runs_it_was_given() -> None:
+    campaign = small_campaign()
+    task = replace(next(TaskQueue(campaign, ()).warm_up()), runs=(0, 2))
+    first, second = perform(task)
+    assert isinstance(first, Landed)
+    assert isinstance(second, Landed)
+    assert (first.cell, first.run, second.run) == ("idm", 0, 2)
+    record, metrics = decode(second.payload)
+    again = run_scenario(task.cell.scenario, "idm", seed=0, run=2)
+    assert record.ospa.tobytes() == again.ospa.tobytes()
+    assert second.ospa == again.ospa[:, 0].mean()
+    score = task.cell.scenario.model.ospa
+    expected = measure(again, cutoff=score.cutoff, order=score.order, window=score.window).columns()
+    assert {name: values.tobytes() for name, values in metrics.columns().items()} == {
+        name: values.tobytes() for name, values in expected.items()
+    }
+
+
+@pytest.mark.parametrize(
+    ("error", "message"), [(ModelError("noise: bad"), "noise: bad"), (ZeroDivisionError("oh"), "ZeroDivisionError: oh")]
+)
+def test_a_run_that_fails_leaves_the_others(monkeypatch: pytest.MonkeyPatch, error: Exception, message: str) -> None:
+    def sometimes(*args: Any, run: int, **options: Any) -> Any:
+        if run == 1:
+            raise error
+        return run_scenario(*args, run=run, **options)
+
+    monkeypatch.setattr(tasks, "run_scenario", sometimes)
+    task = replace(next(TaskQueue(small_campaign(), ()).warm_up()), runs=(0, 1, 2))
+    first, failed, third = perform(task)
+    assert isinstance(first, Landed)
+    assert isinstance(third, Landed)
+    assert failed == Failed("idm", 1, message)
+
+
+def test_a_worker_of_other_versions_refuses() -> None:
+    task = next(TaskQueue(small_campaign(), ()).warm_up())
+    other = replace(task, versions={**task.versions, "numpy": "1.0"})
+    with pytest.raises(VedetteError, match=r"a worker has other versions than the campaign: numpy .* \(not 1\.0\)"):
+        perform(other)
