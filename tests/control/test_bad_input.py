@@ -263,7 +263,7 @@ def test_sensors() -> None:
     for speed in (-1.0, np.nan, np.inf, "fast"):
         with pytest.raises(InputError, match="speed: expected"):
             MobileSensor(local, speed)  # type: ignore[arg-type]
-    with pytest.raises(InputError, match="filter: expected a DeltaGlmbFilter or an LmbFilter"):
+    with pytest.raises(InputError, match="filter: expected a filter of vedette.filters"):
         MobileSensor("filter", 1.0)  # type: ignore[arg-type]
     with pytest.raises(InputError, match="actions: expected an ActionSet"):
         MobileSensor(local, 1.0, (0.0, 90.0))  # type: ignore[arg-type]

@@ -192,7 +192,7 @@ def test_fusions_of_each_kind_have_weights_that_sum_to_one() -> None:
 def test_the_marginal_estimator_has_its_threshold() -> None:
     estimate = build.build_estimator(MarginalEstimator(threshold=0.9))
     for empty in (GLMB.empty(4), LMB.empty(4)):
-        assert len(estimate(empty).labels) == 0
+        assert len(estimate(empty, 1).labels) == 0
 
 
 def test_actions_of_one_sensor_and_of_all() -> None:
@@ -228,7 +228,7 @@ def tracked(loaded: Scenario, num_steps: int, rng: np.random.Generator) -> tuple
 def test_built_in_scenarios_run(name: str) -> None:
     loaded, rng = load_scenario(name), np.random.default_rng(1)
     filters, beliefs, fused, truth = tracked(loaded, 12, rng)
-    estimate = build.build_estimator(loaded.model.estimator)(fused)
+    estimate = build.build_estimator(loaded.model.estimator)(fused, 12)
     assert abs(len(estimate.labels) - len(truth.at(11)[0])) <= 1
     for planner in ("random", "fixed"):
         plan = build.build_planner(loaded.model, filters, planner)

@@ -10,7 +10,7 @@ import numpy as np
 from vedette.control.settings import MobileSensor
 from vedette.densities import GLMB, LMB
 from vedette.errors import InputError
-from vedette.filters import DeltaGlmbFilter
+from vedette.filters import DeltaGlmbFilter, LabelledFilter
 from vedette.kernels.types import Floats
 from vedette.models.arguments import float_array, reject
 
@@ -37,6 +37,8 @@ def check_beliefs(sensors: Sequence[MobileSensor], beliefs: Sequence[Any], fused
         raise InputError(f"beliefs: expected {len(sensors)}, one a sensor; got {len(beliefs)}")
     state_dim = sensors[0].filter.motion.state_dim
     for i, (belief, sensor) in enumerate(zip(beliefs, sensors, strict=True)):
+        if not isinstance(sensor.filter, LabelledFilter):
+            raise reject(f"sensors[{i}].filter", "one that labels its targets", type(sensor.filter).__name__)
         kind = GLMB if isinstance(sensor.filter, DeltaGlmbFilter) else LMB
         _check_density(f"beliefs[{i}]", belief, (kind,), state_dim)
     _check_density("fused", fused, (GLMB, LMB), state_dim)

@@ -8,7 +8,7 @@ from typing import Literal
 
 from vedette.control.actions import ActionSet, HeadingActions
 from vedette.errors import InputError
-from vedette.filters import DeltaGlmbFilter, Limits, LmbFilter, LocalFilter
+from vedette.filters import Limits, LocalFilter
 from vedette.kernels.ideal import EXPECTED, IDEAL, SAMPLED
 from vedette.models.arguments import dimension, non_negative, positive, probability, reject
 
@@ -80,7 +80,8 @@ class MobileSensor:
     """A sensor that a planner steers.
 
     Attributes:
-        filter: its local filter, with the models of the targets and of the sensor.
+        filter: its local filter, with the models of the targets and of the sensor. The joint and the independent
+            planner need one that labels its targets: a `DeltaGlmbFilter` or an `LmbFilter`.
         speed: m/s, constant along its heading once it moves.
         actions: the headings it may take.
 
@@ -93,8 +94,8 @@ class MobileSensor:
     actions: ActionSet = field(default_factory=HeadingActions)
 
     def __post_init__(self) -> None:
-        if not isinstance(self.filter, DeltaGlmbFilter | LmbFilter):
-            raise reject("filter", "a DeltaGlmbFilter or an LmbFilter", self.filter)
+        if not isinstance(self.filter, LocalFilter):
+            raise reject("filter", "a filter of vedette.filters", self.filter)
         non_negative("speed", self.speed)
         if not callable(getattr(self.actions, "headings", None)):
             raise reject("actions", "an ActionSet, with a method headings(pose)", self.actions)

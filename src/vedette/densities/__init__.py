@@ -1,12 +1,28 @@
 """What is believed about the targets: labelled and unlabelled multi-target densities with Gaussian-mixture tracks."""
 
 from vedette.densities.conversions import glmb_to_lmb, lmb_to_glmb, marginalise
-from vedette.densities.estimates import Estimate, TrackHistory, map_estimate, marginal_estimate, track_histories
+from vedette.densities.estimates import (
+    Estimate,
+    TrackHistory,
+    map_estimate,
+    marginal_estimate,
+    track_histories,
+    unlabelled_estimate,
+)
 from vedette.densities.files import load_density, save_density
 from vedette.densities.glmb import GLMB
+from vedette.densities.iid_cluster import IidCluster
 from vedette.densities.lmb import LMB
+from vedette.densities.multi_bernoulli import MultiBernoulli
 from vedette.densities.poisson import Poisson
-from vedette.densities.samples import MultiTargetSamples, sample_glmb, sample_lmb, sample_poisson
+from vedette.densities.samples import (
+    MultiTargetSamples,
+    sample_glmb,
+    sample_iid_cluster,
+    sample_lmb,
+    sample_multi_bernoulli,
+    sample_poisson,
+)
 from vedette.densities.statistics import (
     cardinality_distribution,
     existence_probabilities,
@@ -19,6 +35,8 @@ __all__ = [
     "GLMB",
     "LMB",
     "Estimate",
+    "IidCluster",
+    "MultiBernoulli",
     "MultiTargetSamples",
     "Poisson",
     "TrackHistory",
@@ -33,9 +51,12 @@ __all__ = [
     "marginalise",
     "mixture_moments",
     "sample_glmb",
+    "sample_iid_cluster",
     "sample_lmb",
+    "sample_multi_bernoulli",
     "sample_poisson",
     "save_density",
     "track_histories",
     "track_moments",
+    "unlabelled_estimate",
 ]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -10,7 +11,10 @@ import numpy as np
 from vedette.densities import checks
 from vedette.densities.conversions import glmb_to_lmb
 from vedette.densities.glmb import GLMB
+from vedette.densities.iid_cluster import IidCluster
 from vedette.densities.lmb import LMB
+from vedette.densities.multi_bernoulli import MultiBernoulli
+from vedette.densities.poisson import Poisson
 from vedette.densities.statistics import cardinality_distribution
 from vedette.densities.tracks import TrackTable
 from vedette.errors import InputError, NumericalError, VedetteError
@@ -110,9 +114,48 @@ def marginal_estimate(density: GLMB | LMB, threshold: float = 0.5) -> Estimate:
 
 def _peaks(tracks: TrackTable, chosen: Ints, existence: Floats) -> Estimate:
     """The heaviest component of each chosen track."""
-    starts, stops = tracks.offsets[chosen], tracks.offsets[chosen + 1]
-    heaviest = [int(low + np.argmax(tracks.log_weights[low:high])) for low, high in zip(starts, stops, strict=True)]
+    heaviest = _heaviest(tracks, chosen)
     return Estimate(tracks.labels[chosen], tracks.means[heaviest], tracks.covs[heaviest], existence)
+
+
+def _heaviest(mixtures: TrackTable | MultiBernoulli, chosen: Ints) -> list[int]:
+    """The heaviest component of each chosen mixture."""
+    starts, stops = mixtures.offsets[chosen], mixtures.offsets[chosen + 1]
+    return [int(low + np.argmax(mixtures.log_weights[low:high])) for low, high in zip(starts, stops, strict=True)]
+
+
+def unlabelled_estimate(density: Poisson | IidCluster | MultiBernoulli, step: int) -> Estimate:
+    """The targets of a density that names none; at every step they get new labels (step, 0), (step, 1), ...
+
+    Multi-Bernoulli: the most probable number of targets, and that many Bernoullis of highest existence, each estimated
+    by its heaviest component. Iid cluster: the most probable number; Poisson: the expected number, rounded; each target
+    is where the intensity has most left, of which it takes one away: a component of weight 2 stands for two targets.
+    Existence is what the component had left, at most 1. Ties: the smaller number; the earlier Bernoulli or component.
+    """
+    if isinstance(density, MultiBernoulli):
+        number = int(np.argmax(cardinality_distribution(density)))
+        chosen = np.argsort(-density.existence_logit, kind="stable")[:number]
+        components, existence = np.array(_heaviest(density, chosen), np.int64), density.existence[chosen]
+    elif isinstance(density, IidCluster):
+        number = int(np.argmax(density.log_cardinality))
+        components, existence = _by_units(density.expected_number * np.exp(density.log_weights), number)
+    elif isinstance(density, Poisson):
+        components, existence = _by_units(np.exp(density.log_weights), math.floor(density.expected_number + 0.5))
+    else:
+        raise InputError(f"density: expected one without labels; got {type(density).__name__}")
+    labels = np.column_stack([np.full(len(components), step), np.arange(len(components))]).astype(np.int64)
+    return Estimate(labels, density.means[components], density.covs[components], existence)
+
+
+def _by_units(weights: Floats, number: int) -> tuple[Ints, Floats]:
+    """The component of most remaining weight, `number` times, and how much it had, as probabilities."""
+    remaining = weights.copy()
+    chosen, had = np.empty(number, np.int64), np.empty(number)
+    for i in range(number):
+        chosen[i] = np.argmax(remaining)
+        had[i] = remaining[chosen[i]]
+        remaining[chosen[i]] -= 1.0
+    return chosen, np.clip(had, 0.0, 1.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,4 +206,11 @@ def track_histories(estimates: Sequence[Estimate], times: Floats) -> tuple[Track
     return tuple(histories)
 
 
-__all__ = ["Estimate", "TrackHistory", "map_estimate", "marginal_estimate", "track_histories"]
+__all__ = [
+    "Estimate",
+    "TrackHistory",
+    "map_estimate",
+    "marginal_estimate",
+    "track_histories",
+    "unlabelled_estimate",
+]

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-import contextlib
 import os
-import tempfile
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from vedette.densities.glmb import GLMB
+from vedette.densities.iid_cluster import IidCluster
 from vedette.densities.lmb import LMB
+from vedette.densities.multi_bernoulli import MultiBernoulli
 from vedette.densities.poisson import Poisson
 from vedette.densities.tracks import TrackTable
 from vedette.errors import InputError, VedetteError
+from vedette.files import write_whole
 
 FORMAT_NAME = "vedette-density"
 FORMAT_VERSION = 1
@@ -24,44 +26,40 @@ _OWN_FIELDS: dict[str, tuple[str, ...]] = {
     "glmb": ("hyp_offsets", "hyp_tracks", "hyp_log_weights"),
     "lmb": ("existence_logit",),
     "poisson": ("log_weights", "means", "covs"),
+    "iid_cluster": ("log_cardinality", "log_weights", "means", "covs"),
+    "multi_bernoulli": ("existence_logit", "offsets", "log_weights", "means", "covs"),
+}
+
+Density: TypeAlias = GLMB | LMB | Poisson | IidCluster | MultiBernoulli
+_KINDS: dict[str, type[Density]] = {
+    "glmb": GLMB,
+    "lmb": LMB,
+    "poisson": Poisson,
+    "iid_cluster": IidCluster,
+    "multi_bernoulli": MultiBernoulli,
 }
 
 
-def save_density(path: str | os.PathLike[str], density: GLMB | LMB | Poisson) -> None:
+def save_density(path: str | os.PathLike[str], density: Density) -> None:
     """Write a density to `path`. The file appears whole or not at all; equal densities give equal bytes.
 
     Raises `InputError` for a path that cannot be written.
     """
-    kinds = {GLMB: "glmb", LMB: "lmb", Poisson: "poisson"}
-    if type(density) not in kinds:
-        raise InputError(f"density: expected a GLMB, an LMB or a Poisson; got {type(density).__name__}")
-    kind = kinds[type(density)]
+    kind = next((name for name, container in _KINDS.items() if type(density) is container), None)
+    if kind is None:
+        raise InputError(f"density: expected a multi-target density; got {type(density).__name__}")
     arrays: dict[str, Any] = {"format": FORMAT_NAME, "version": FORMAT_VERSION, "kind": kind}
-    if not isinstance(density, Poisson):
+    if isinstance(density, GLMB | LMB):
         arrays |= {f"tracks.{name}": getattr(density.tracks, name) for name in _TRACK_FIELDS}
     arrays |= {name: getattr(density, name) for name in _OWN_FIELDS[kind]}
     target = Path(path)
     try:
-        _write_whole(target, arrays)
+        write_whole(target, lambda file: np.savez(file, **arrays))
     except OSError as fault:
         raise InputError(f"{target}: expected a file that can be written; {fault}") from fault
 
 
-def _write_whole(target: Path, arrays: dict[str, Any]) -> None:
-    handle, temporary = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
-    try:
-        with os.fdopen(handle, "wb") as file:
-            np.savez(file, **arrays)
-            file.flush()
-            os.fsync(file.fileno())
-        Path(temporary).replace(target)
-    except BaseException:
-        with contextlib.suppress(OSError):
-            os.unlink(temporary)
-        raise
-
-
-def load_density(path: str | os.PathLike[str]) -> GLMB | LMB | Poisson:
+def load_density(path: str | os.PathLike[str]) -> Density:
     """Read a density that `save_density` wrote.
 
     Raises `InputError` for a file that is missing, damaged, of another origin or a later version, or that holds no
@@ -96,12 +94,12 @@ def _kind_of(source: Path, arrays: dict[str, Any]) -> str:
     return kind
 
 
-def _build(kind: str, arrays: dict[str, Any]) -> GLMB | LMB | Poisson:
+def _build(kind: str, arrays: dict[str, Any]) -> Density:
     own = [arrays[name] for name in _OWN_FIELDS[kind]]
-    if kind == "poisson":
-        return Poisson(*own)
-    tracks = TrackTable(*(arrays[f"tracks.{name}"] for name in _TRACK_FIELDS))
-    return GLMB(tracks, *own) if kind == "glmb" else LMB(tracks, *own)
+    container: Callable[..., Density] = _KINDS[kind]
+    if kind not in ("glmb", "lmb"):
+        return container(*own)
+    return container(TrackTable(*(arrays[f"tracks.{name}"] for name in _TRACK_FIELDS)), *own)
 
 
 __all__ = ["FORMAT_NAME", "FORMAT_VERSION", "load_density", "save_density"]

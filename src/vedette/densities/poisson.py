@@ -10,6 +10,7 @@ import numpy as np
 from vedette.densities import checks
 from vedette.densities.tracks import log_weights
 from vedette.errors import InputError, NumericalError, VedetteError
+from vedette.kernels import types as kt
 from vedette.kernels.types import Floats
 
 
@@ -35,6 +36,19 @@ class Poisson:
     def expected_number(self) -> float:
         """Mean number of targets."""
         return float(np.exp(self.log_weights).sum())
+
+    def to_kernel(self) -> kt.Mixture:
+        """The same arrays as the bundle that kernels take."""
+        return kt.Mixture(self.log_weights, self.means, self.covs)
+
+    @classmethod
+    def from_kernel(cls, mixture: kt.Mixture) -> Poisson:
+        return cls(*mixture)
+
+    @classmethod
+    def empty(cls, state_dim: int) -> Poisson:
+        """The density that is certain of no target."""
+        return cls(np.empty(0), np.empty((0, state_dim)), np.empty((0, state_dim, state_dim)))
 
     @classmethod
     def from_gaussians(cls, expected_numbers: Any, means: Any, covs: Any) -> Poisson:

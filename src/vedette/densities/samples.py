@@ -8,7 +8,9 @@ import numpy as np
 
 from vedette.densities import checks
 from vedette.densities.glmb import GLMB
+from vedette.densities.iid_cluster import IidCluster
 from vedette.densities.lmb import LMB
+from vedette.densities.multi_bernoulli import MultiBernoulli
 from vedette.densities.poisson import Poisson
 from vedette.densities.tracks import TrackTable
 from vedette.errors import InputError, NumericalError, VedetteError
@@ -75,13 +77,46 @@ def sample_lmb(density: LMB, num_samples: int, *, rng: np.random.Generator) -> M
 def sample_poisson(density: Poisson, num_samples: int, *, rng: np.random.Generator) -> MultiTargetSamples:
     """Independent samples of a Poisson density: a number of targets, then independent states."""
     _check_number(num_samples)
-    offsets = np.concatenate([np.zeros(1, np.int64), np.cumsum(rng.poisson(density.expected_number, num_samples))])
-    num_targets = int(offsets[-1])
-    labels = np.full((num_targets, 2), -1, np.int64)
-    if num_targets == 0:
-        return MultiTargetSamples(offsets, labels, np.empty((0, density.state_dim)))
+    return _alike(density, rng.poisson(density.expected_number, num_samples), rng)
+
+
+def sample_iid_cluster(density: IidCluster, num_samples: int, *, rng: np.random.Generator) -> MultiTargetSamples:
+    """Independent samples of an iid cluster: a number of targets, then independent states."""
+    _check_number(num_samples)
+    all_numbers = np.array([0, len(density.log_cardinality)])
+    return _alike(density, _choose(density.log_cardinality, all_numbers, np.zeros(num_samples, np.int64), rng), rng)
+
+
+def sample_multi_bernoulli(
+    density: MultiBernoulli, num_samples: int, *, rng: np.random.Generator
+) -> MultiTargetSamples:
+    """Independent samples of a multi-Bernoulli: each Bernoulli exists or not, then a state of each that does."""
+    _check_number(num_samples)
+    exists = rng.random((num_samples, density.num_bernoullis)) < density.existence
+    chosen = np.nonzero(exists)[1]
+    offsets = np.concatenate([np.zeros(1, np.int64), np.cumsum(exists.sum(axis=1))])
+    return _unlabelled(offsets, density, density.offsets, chosen, rng)
+
+
+def _alike(density: Poisson | IidCluster, numbers: Ints, rng: np.random.Generator) -> MultiTargetSamples:
+    """Samples of these numbers of targets, all drawn from the density's one mixture."""
+    offsets = np.concatenate([np.zeros(1, np.int64), np.cumsum(numbers)])
     runs = np.array([0, len(density.log_weights)])
-    components = _choose(density.log_weights, runs, np.zeros(num_targets, np.int64), rng)
+    return _unlabelled(offsets, density, runs, np.zeros(int(offsets[-1]), np.int64), rng)
+
+
+def _unlabelled(
+    offsets: Ints,
+    density: Poisson | IidCluster | MultiBernoulli,
+    mixtures: Ints,
+    chosen: Ints,
+    rng: np.random.Generator,
+) -> MultiTargetSamples:
+    """One state of each of the `chosen` mixtures, which are cut out by offsets."""
+    labels = np.full((len(chosen), 2), -1, np.int64)
+    if len(chosen) == 0:
+        return MultiTargetSamples(offsets, labels, np.empty((0, density.state_dim)))
+    components = _choose(density.log_weights, mixtures, chosen, rng)
     return MultiTargetSamples(offsets, labels, _draw_gaussians(density.means, density.covs, components, rng))
 
 
@@ -124,4 +159,11 @@ def _draw_gaussians(means: Floats, covs: Floats, components: Ints, rng: np.rando
     return np.asarray(means[components] + np.einsum("nij,nj->ni", factors[which], noise))
 
 
-__all__ = ["MultiTargetSamples", "sample_glmb", "sample_lmb", "sample_poisson"]
+__all__ = [
+    "MultiTargetSamples",
+    "sample_glmb",
+    "sample_iid_cluster",
+    "sample_lmb",
+    "sample_multi_bernoulli",
+    "sample_poisson",
+]

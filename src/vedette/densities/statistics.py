@@ -9,29 +9,34 @@ from scipy.special import expit, gammaln
 
 from vedette.densities.checks import run_log_sums
 from vedette.densities.glmb import GLMB
+from vedette.densities.iid_cluster import IidCluster
 from vedette.densities.lmb import LMB
+from vedette.densities.multi_bernoulli import MultiBernoulli
 from vedette.densities.poisson import Poisson
 from vedette.densities.tracks import TrackTable
 from vedette.errors import InputError
 from vedette.kernels.types import Floats, Ints
 
 
-def cardinality_distribution(density: GLMB | LMB | Poisson) -> Floats:
+def cardinality_distribution(density: GLMB | LMB | Poisson | IidCluster | MultiBernoulli) -> Floats:
     """Probabilities of 0, 1, ..., n targets; they sum to one.
 
-    n is the size of the largest hypothesis of a GLMB and the number of labels of an LMB. A Poisson density has no
-    largest number: n is one beyond which less than 1e-20 remains.
+    n is the size of the largest hypothesis of a GLMB, the number of labels of an LMB and of Bernoullis of a
+    multi-Bernoulli, and the largest number that an iid cluster holds. A Poisson density has no largest number: n is one
+    beyond which less than 1e-20 remains.
     """
     if isinstance(density, GLMB):
         sizes = np.diff(density.hyp_offsets)
         return np.asarray(np.bincount(sizes, weights=np.exp(density.hyp_log_weights)), np.float64)
-    if isinstance(density, LMB):
+    if isinstance(density, LMB | MultiBernoulli):
         return _poisson_binomial(density.existence_logit)
+    if isinstance(density, IidCluster):
+        return np.asarray(np.exp(density.log_cardinality))
     if isinstance(density, Poisson):
         mean = density.expected_number
         numbers = np.arange(math.ceil(mean + 12.0 * math.sqrt(mean)) + 41)
         return np.asarray(np.exp(numbers * _log(mean) - mean - gammaln(numbers + 1.0))) if mean > 0.0 else np.ones(1)
-    raise InputError(f"density: expected a GLMB, an LMB or a Poisson; got {type(density).__name__}")
+    raise InputError(f"density: expected a multi-target density; got {type(density).__name__}")
 
 
 def _log(value: float) -> float:

@@ -104,17 +104,7 @@ class TrackTable:
         that are not symmetric positive definite.
         """
         checks.check_array("tracks.labels", self.labels, np.int64, (None, 2))
-        checks.check_array("tracks.means", self.means, np.float64, (None, None))
-        num_components, dim = self.means.shape
-        if dim == 0:
-            raise InputError("tracks.means: expected a state of at least 1 dimension; got 0")
-        checks.check_array("tracks.log_weights", self.log_weights, np.float64, (num_components,))
-        checks.check_array("tracks.covs", self.covs, np.float64, (num_components, dim, dim))
-        checks.check_offsets("tracks.offsets", self.offsets, self.num_tracks, num_components, empty_allowed=False)
-        checks.check_log_weights("tracks.log_weights", self.log_weights, error)
-        checks.check_normalised("tracks.log_weights", self.log_weights, self.offsets, error)
-        checks.check_finite("tracks.means", self.means, error)
-        checks.check_covariances("tracks.covs", self.covs, error)
+        checks.check_mixtures("tracks.", self.offsets, self.log_weights, self.means, self.covs, self.num_tracks, error)
 
 
 def log_weights(field: str, weights: Any) -> Floats:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 from multiprocessing import get_context
+from typing import Any
 
 import numpy as np
 
 from vedette.control import JointPlanner
 from vedette.densities import GLMB, LMB
 from vedette.evaluation.runs import children_ignore_interrupts, strategy
-from vedette.filters import LmbFilter
+from vedette.filters import LabelledFilter, LmbFilter
 from vedette.scenarios import Scenario
 from vedette.scenarios.build import build_experiment
 from vedette.simulation.experiment import Experiment
@@ -23,18 +24,22 @@ def precompile(scenario: Scenario) -> None:
     Each finds in the cache what the other has already compiled. Whatever the other process does not get done (it may be
     forbidden, or fail) is compiled where it is first used; no result depends on it.
     """
+    experiment = build_experiment(scenario)
+    if not isinstance(experiment.sensors[0].filter, LabelledFilter):
+        _compile_filter(experiment)  # there is no fusion nor planning without labels
+        return
     other = get_context("spawn").Process(target=_compile_planning, args=(scenario,), daemon=True)
     try:
         with children_ignore_interrupts():
             other.start()
     except OSError:
         return
-    _compile_filter(build_experiment(scenario))
+    _compile_filter(experiment)
     other.join()
 
 
 def _compile_filter(experiment: Experiment) -> None:
-    local = experiment.sensors[0].filter
+    local: Any = experiment.sensors[0].filter
     scan = np.empty((0, local.sensor.meas_dim))
     local.step(local.initial(), scan, experiment.poses[0], 1.0, 1, rng=run_stream(0, 0))
 
@@ -49,7 +54,7 @@ def _compile_planning(scenario: Scenario) -> None:
         belief = GLMB.from_hypotheses(belief.tracks, [list(range(birth.num_sites))], [1.0])
     fusion = experiment.fusion
     fused = belief if fusion is None else fusion.fuse([belief] * num_sensors)[0]
-    experiment.estimate(fused)
+    experiment.estimate(fused, 1)
     planner = strategy(scenario, "jdm")
     assert isinstance(planner, JointPlanner)
     quick = replace(planner, settings=replace(planner.settings, num_samples=2, horizon_steps=1, num_threads=1))

@@ -2,11 +2,28 @@
 
 from typing import TypeAlias
 
+from vedette.densities import GLMB, LMB, IidCluster, MultiBernoulli, Poisson
+from vedette.filters.cbmember import CbMemberFilter
+from vedette.filters.cphd import CphdFilter
 from vedette.filters.glmb import DeltaGlmbFilter
 from vedette.filters.info import FilterInfo
 from vedette.filters.limits import Limits
 from vedette.filters.lmb import LmbFilter
+from vedette.filters.phd import PhdFilter
 
-LocalFilter: TypeAlias = DeltaGlmbFilter | LmbFilter
+LabelledFilter: TypeAlias = DeltaGlmbFilter | LmbFilter
+LocalFilter: TypeAlias = LabelledFilter | PhdFilter | CphdFilter | CbMemberFilter
+Belief: TypeAlias = GLMB | LMB | Poisson | IidCluster | MultiBernoulli
 
-__all__ = ["DeltaGlmbFilter", "FilterInfo", "Limits", "LmbFilter", "LocalFilter"]
+__all__ = [
+    "Belief",
+    "CbMemberFilter",
+    "CphdFilter",
+    "DeltaGlmbFilter",
+    "FilterInfo",
+    "LabelledFilter",
+    "Limits",
+    "LmbFilter",
+    "LocalFilter",
+    "PhdFilter",
+]

@@ -11,16 +11,21 @@ class FilterInfo:
 
     Attributes:
         log_likelihood: log density of the scan (as a set, with the Poisson clutter's exp(-rate)) given the prior; of
-            the kept hypotheses.
-        num_hypotheses, num_tracks: size of the posterior.
+            the kept hypotheses. NaN for the CB-MeMBer filter, which does not need it.
+        num_hypotheses, num_tracks: size of the posterior; of a PHD or CPHD filter 1 and the number of components, of a
+            CB-MeMBer filter 1 and the number of Bernoullis.
         discarded_weight_bound: upper bound on the share of the posterior weight that was left out by the caps. Attained
             where no measurement is contested; contested ones are counted in it though they carry no weight. Weight
-            outside the gates is not in it. NaN for an LMB, which is not a sum of hypotheses.
-        dropped_existence: expected number of targets in labels that an LMB dropped.
+            outside the gates is not in it. For a CPHD filter the probability of the large numbers of targets that were
+            left out, for a PHD filter 0. NaN for an LMB and a multi-Bernoulli, which are not sums of hypotheses.
+        dropped_existence: expected number of targets in labels that an LMB, or Bernoullis that a CB-MeMBer filter,
+            dropped or bounded by `Limits.max_existence`; 0 for a PHD or CPHD filter, which keeps the weight of what it
+            drops.
         num_clutter_raised: measurements whose clutter intensity was raised to `Limits.min_log_clutter`.
         num_duplicates: measurements that repeat another to the last digit and were left out.
-        num_inexact_clusters: LMB clusters summed over their heaviest joint choices only.
-        search_cut: whether ranking stopped at `Limits.max_search_nodes` before it had found all it was asked for.
+        num_inexact_clusters: LMB clusters summed over their heaviest joint choices only; 0 for other filters.
+        search_cut: whether ranking stopped at `Limits.max_search_nodes` before it had found all it was asked for; false
+            where nothing is ranked.
     """
 
     log_likelihood: float

@@ -9,14 +9,14 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from vedette.densities import GLMB, LMB, TrackTable
+from vedette.densities import GLMB, LMB, IidCluster, MultiBernoulli, Poisson, TrackTable
 from vedette.errors import InputError, ModelError, VedetteError
 from vedette.filters.limits import Limits
 from vedette.kernels.types import Floats
 from vedette.models import BirthModel, MotionModel, SensorModel, SurvivalModel
 from vedette.models.arguments import reject
 
-_Density = TypeVar("_Density", GLMB, LMB)
+_Density = TypeVar("_Density", GLMB, LMB, Poisson, IidCluster, MultiBernoulli)
 
 
 def check_scan(scan: Any, meas_dim: int) -> tuple[Floats, int]:
@@ -77,10 +77,12 @@ def check_belief(belief: object, kind: type[_Density], state_dim: int) -> _Densi
     return belief
 
 
-def check_step(step: Any, birth: BirthModel, belief: GLMB | LMB) -> int:
+def check_step(step: Any, birth: BirthModel, belief: GLMB | LMB | None = None) -> int:
     """The step; `InputError` unless it is a whole number, later than the belief's labels where targets may be born."""
     if isinstance(step, bool) or not isinstance(step, numbers.Integral):
         raise reject("step", "a whole number", step)
+    if belief is None:
+        return int(step)
     newest = belief.tracks.labels[:, 0].max(initial=np.iinfo(np.int64).min)
     if newest >= step and birth.is_active(int(step)):
         raise reject("step", f"a step after those of the labels in the belief, of which the last is {newest}", step)

@@ -19,7 +19,8 @@ class Limits:
 
     Attributes:
         max_hypotheses: hypotheses kept; for an LMB, joint choices summed in a cluster too large for the exact sum.
-        min_relative_weight: hypotheses lighter than this times the heaviest are dropped.
+        min_relative_weight: hypotheses lighter than this times the heaviest are dropped; in a CPHD filter the large
+            numbers of targets less probable than this times the most probable.
         min_track_weight: for every label and what the scan may have done to it (missed, or detected as this
             measurement), the heaviest such hypothesis is kept, in up to half of `max_hypotheses`, while it weighs at
             least this times the heaviest of all; 1 switches this off. Without it a target whose first measurements fit
@@ -28,11 +29,15 @@ class Limits:
         min_log_clutter: floor on the log clutter intensity. A measurement where the model says that clutter is
             impossible (outside the region) would otherwise forbid every hypothesis that leaves it unexplained.
         max_search_nodes: bound on the ranking search, a guard against scenes of hopeless ambiguity.
-        min_component_weight: mixture components lighter than this share of their track are dropped.
+        min_component_weight: mixture components lighter than this share of their track, or of the intensity of a PHD
+            or CPHD filter, are dropped.
         merge_distance: Mahalanobis distance within which components of a track are merged; 0 merges none.
         max_components: components a track; 1 keeps one moment-matched Gaussian.
-        min_existence: labels of an LMB less probable than this are dropped.
-        max_labels: labels of an LMB kept.
+        min_existence: labels of an LMB, or Bernoullis, less probable than this are dropped.
+        max_labels: labels of an LMB, or Bernoullis of a multi-Bernoulli, kept.
+        max_intensity_components: components of the intensity of a PHD or CPHD filter, all targets together.
+        max_existence: Bernoullis of the CB-MeMBer filter surer than this are taken as this sure; below 1, because the
+            update weighs them by r / (1 - r), and leaves one that is certain as it was, whatever the scan says.
 
     Raises:
         InputError: a field out of range.
@@ -49,13 +54,18 @@ class Limits:
     max_components: int = 10
     min_existence: float = 1e-4
     max_labels: int = 200
+    max_intensity_components: int = 100
+    max_existence: float = 0.999
 
     def __post_init__(self) -> None:
-        for name in ("max_hypotheses", "max_search_nodes", "max_components", "max_labels"):
+        counts = ("max_hypotheses", "max_search_nodes", "max_components", "max_labels", "max_intensity_components")
+        for name in counts:
             dimension(f"Limits.{name}", getattr(self, name))
         for name in ("min_relative_weight", "min_component_weight", "min_existence"):
             if not 0.0 <= real(f"Limits.{name}", getattr(self, name)) < 1.0:
                 raise reject(f"Limits.{name}", "a number in [0, 1)", getattr(self, name))
+        if not 0.0 < real("Limits.max_existence", self.max_existence) < 1.0:
+            raise reject("Limits.max_existence", "a probability above 0 and below 1", self.max_existence)
         probability("Limits.min_track_weight", self.min_track_weight)
         if probability("Limits.gate_probability", self.gate_probability) == 0.0:
             raise reject("Limits.gate_probability", "a probability above 0", self.gate_probability)
@@ -76,6 +86,8 @@ class Limits:
             max_components=2**62,
             min_existence=0.0,
             max_labels=2**62,
+            max_intensity_components=2**62,
+            max_existence=1.0 - 2.0**-53,
         )
 
     def truncation(self, meas_dim: int) -> Truncation:
@@ -102,3 +114,11 @@ class Limits:
             float(logit(self.min_existence)),
             int(self.max_labels),
         )
+
+    def intensity_reduction(self) -> Reduction:
+        """As `reduction`, with the cap of a whole intensity in the place of a track's."""
+        return self.reduction()._replace(max_components=int(self.max_intensity_components))
+
+    @property
+    def max_existence_logit(self) -> float:
+        return float(logit(self.max_existence))

@@ -72,7 +72,7 @@ def _existence_logits(options: Options, marginals: Floats) -> Floats:
 
 
 @kernel
-def _labels_to_keep(logits: Floats, reduction: Reduction) -> tuple[Ints, float]:
+def labels_to_keep(logits: Floats, reduction: Reduction) -> tuple[Ints, float]:
     """Rows to keep, in label order, and the expected number of targets lost with the others."""
     marks = np.zeros(len(logits), np.int64)
     kept, dropped = 0, 0.0
@@ -134,7 +134,7 @@ def _posterior_tracks(kept: Ints, rows: Rows, options: Options, marginals: Float
             log_weights[filled] = 0.0
             filled += 1
         else:
-            filled = _append_reduced(
+            filled = append_reduced(
                 wide_weights[:width], wide_means[:width], wide_covs[:width], reduction, filled, log_weights, means, covs
             )
         offsets[i + 1] = filled
@@ -142,7 +142,7 @@ def _posterior_tracks(kept: Ints, rows: Rows, options: Options, marginals: Float
 
 
 @kernel
-def _append_reduced(
+def append_reduced(
     wide_weights: Floats,
     wide_means: Floats,
     wide_covs: Floats,
@@ -184,7 +184,7 @@ def finish_lmb(
         options, len(scan), truncation.max_hyps, truncation.max_log_gap, truncation.max_nodes, marginals
     )
     logits = _existence_logits(options, marginals)
-    kept, dropped = _labels_to_keep(logits, reduction)
+    kept, dropped = labels_to_keep(logits, reduction)
     tracks = _posterior_tracks(kept, rows, options, marginals, reduction)
     kept_logits = np.empty(len(kept))
     for i in range(len(kept)):

@@ -30,6 +30,14 @@ class Tracks(NamedTuple):
     covs: Floats
 
 
+class Mixture(NamedTuple):
+    """One Gaussian mixture of any total weight: log_weights (num,), means (num, state_dim), covs."""
+
+    log_weights: Floats
+    means: Floats
+    covs: Floats
+
+
 class Glmb(NamedTuple):
     """GLMB density: hypotheses over one shared track table. hyp_tracks holds indices into `tracks`, in label order."""
 

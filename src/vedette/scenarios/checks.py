@@ -13,7 +13,7 @@ from vedette.scenarios.faults import Finding, Path, describe
 from vedette.scenarios.file_checks import recorded_findings, reference_findings
 from vedette.scenarios.parts import Parts
 from vedette.scenarios.schema import ScenarioModel
-from vedette.scenarios.schema.tracking import GibbsAssignment
+from vedette.scenarios.schema.tracking import UNLABELLED, GibbsAssignment, MarginalEstimator
 from vedette.scenarios.schema.world import BirthSite, ScriptedTarget, Time
 from vedette.scenarios.sensor_checks import sensor_findings
 
@@ -85,6 +85,9 @@ def _weights(parts: Parts) -> Iterator[Finding]:
 def _fusion(parts: Parts) -> Iterator[Finding]:
     if parts.fusion is None or parts.filter is None:
         return
+    if parts.filter.kind in UNLABELLED:
+        yield from _without_labels(parts.filter.kind, parts.fusion.kind, len(parts.sensors))
+        return
     if parts.fusion.kind == "none" and len(parts.sensors) > 1:
         yield ("fusion", "kind"), f"a fusion, as there are {len(parts.sensors)} sensors", '"none"'
     if parts.fusion.kind == "cm_delta_glmb" and parts.filter.kind == "lmb":
@@ -93,9 +96,26 @@ def _fusion(parts: Parts) -> Iterator[Finding]:
         yield ("fusion", "feedback"), f"false, as {parts.filter.kind} filters cannot go on from an LMB", "true"
 
 
+def _without_labels(filter_kind: str, fusion_kind: str | None, num_sensors: int) -> Iterator[Finding]:
+    if num_sensors > 1:
+        wanted = f"a filter with labels by which to fuse, as there are {num_sensors} sensors"
+        yield ("filter", "kind"), wanted, describe(filter_kind)
+    elif fusion_kind not in ("none", None):
+        yield (
+            ("fusion", "kind"),
+            f"none, as {filter_kind} filters have no labels by which to fuse",
+            describe(fusion_kind),
+        )
+
+
 def _filter(parts: Parts) -> Iterator[Finding]:
-    if parts.filter is not None and parts.filter.kind == "lmb" and isinstance(parts.filter.assignment, GibbsAssignment):
-        yield ("filter", "assignment", "kind"), "ranked, as the filter is lmb", '"gibbs"'
+    if parts.filter is None:
+        return
+    kind = parts.filter.kind
+    if kind in ("lmb", *UNLABELLED) and isinstance(parts.filter.assignment, GibbsAssignment):
+        yield ("filter", "assignment", "kind"), f"ranked, as the filter is {kind}", '"gibbs"'
+    if kind in UNLABELLED and isinstance(parts.estimator, MarginalEstimator):
+        yield ("estimator", "kind"), f"map, as {kind} filters have no labels", '"marginal"'
 
 
 def _combinations(parts: Parts) -> Iterator[Finding]:

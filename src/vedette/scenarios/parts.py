@@ -13,7 +13,7 @@ from pydantic_core import PydanticUndefined
 from vedette.scenarios.schema import ScenarioModel
 from vedette.scenarios.schema.planning import Control
 from vedette.scenarios.schema.sensors import Sensor
-from vedette.scenarios.schema.tracking import Filter, Fusion, Ospa
+from vedette.scenarios.schema.tracking import Estimator, Filter, Fusion, Ospa
 from vedette.scenarios.schema.world import (
     BirthSite,
     CoordinatedTurn,
@@ -45,6 +45,7 @@ class Parts:
     sensors: tuple[Sensor | None, ...]
     filter: Filter | None
     fusion: Fusion | None
+    estimator: Estimator | None
     control: Control | None
     ospa: Ospa | None
     folder: Path | None
@@ -81,6 +82,7 @@ def parts_of_model(model: ScenarioModel, folder: Path | None) -> Parts:
         sensors=model.sensors,
         filter=model.filter,
         fusion=model.fusion,
+        estimator=model.estimator,
         control=model.control,
         ospa=model.ospa,
         folder=folder,
@@ -106,6 +108,7 @@ def parts_of_data(data: Mapping[str, Any], folder: Path | None) -> Parts:
         sensors=_valid_items(Sensor, data, "sensors"),
         filter=section("filter", Filter),
         fusion=section("fusion", Fusion),
+        estimator=section("estimator", Estimator),
         control=section("control", Control),
         ospa=section("ospa", Ospa),
         folder=folder,

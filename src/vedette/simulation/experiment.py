@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from vedette.control import MobileSensor
-from vedette.densities import GLMB, LMB, Estimate
+from vedette.densities import Estimate
 from vedette.errors import InputError
+from vedette.filters import Belief
 from vedette.fusion import Fusion
 from vedette.kernels.types import Bools, Floats
 from vedette.simulation.truth import TargetSource
@@ -30,7 +31,7 @@ class Experiment:
             decision.
         fusion: of the local beliefs; None for a single sensor.
         feedback: whether the fused belief replaces the local ones (paper-notes 9).
-        estimate: reads the targets off the fused belief.
+        estimate: reads the targets off the fused belief, given the number of the scan (from 1).
         decision_steps: scans (counted from 1) after which the planner is asked.
 
     Raises:
@@ -45,7 +46,7 @@ class Experiment:
     moving: Bools
     fusion: Fusion[Any, Any] | None
     feedback: bool
-    estimate: Callable[[GLMB | LMB], Estimate]
+    estimate: Callable[[Belief, int], Estimate]
     decision_steps: tuple[int, ...]
 
     def __post_init__(self) -> None:

@@ -5,12 +5,12 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from vedette.control import Plan, Planner, RandomPlanner
-from vedette.densities import GLMB, LMB, Estimate
+from vedette.densities import Estimate
 from vedette.kernels.types import Floats
 from vedette.models.platforms import advance
 from vedette.simulation.experiment import Experiment
@@ -84,7 +84,7 @@ def simulate(experiment: Experiment, planner: Planner | None, *, seed: int, run:
     watch, course = _Stopwatch(len(experiment.times)), _Course(experiment)
     if planner is None:
         course.moving[:] = False
-    beliefs: list[GLMB | LMB] = [sensor.filter.initial() for sensor in experiment.sensors]
+    beliefs: list[Any] = [sensor.filter.initial() for sensor in experiment.sensors]
     poses, estimates, decisions = [], [], []
     periods = np.diff(experiment.times, prepend=experiment.times[0] - _first_period(experiment.times))
     for step, period in enumerate(periods.tolist(), start=1):
@@ -105,7 +105,7 @@ def simulate(experiment: Experiment, planner: Planner | None, *, seed: int, run:
         if experiment.feedback:
             beliefs = [fused] * num_sensors
         with watch.timing("estimate"):
-            estimates.append(experiment.estimate(fused))
+            estimates.append(experiment.estimate(fused, step))
         if planner is not None and step in experiment.decision_steps:
             with watch.timing("planning"):
                 plan = planner.plan(beliefs, fused, course.poses, rng=planner_stream)

@@ -18,7 +18,7 @@ from vedette.control import (
     planning_limits,
 )
 from vedette.errors import InputError
-from vedette.filters import DeltaGlmbFilter, LocalFilter
+from vedette.filters import DeltaGlmbFilter, LabelledFilter, LocalFilter
 from vedette.fusion import Clmb, CmDeltaGlmb
 from vedette.scenarios.build.tracking import build_fusion
 from vedette.scenarios.schema.planning import CauchySchwarzReward as RewardSection
@@ -78,7 +78,7 @@ def build_planner(model: ScenarioModel, filters: Sequence[LocalFilter], name: st
     """The planner called `jdm` (joint), `idm` (independent), `random`, or `fixed` (sensors keep their first heading).
 
     Raises:
-        InputError: another name.
+        InputError: another name, or `jdm` or `idm` with filters that have no labels.
     """
     sensors = build_mobile_sensors(model, filters)
     if name == "random":
@@ -88,5 +88,8 @@ def build_planner(model: ScenarioModel, filters: Sequence[LocalFilter], name: st
     if name not in PLANNERS:
         raise InputError(f"planner: expected one of {', '.join(PLANNERS)}; got {name!r}")
     planner = JointPlanner if name == "jdm" else IndependentPlanner
+    if not isinstance(filters[0], LabelledFilter):
+        kinds = "delta_glmb, m_delta_glmb or lmb"
+        raise InputError(f"filter.kind: expected {kinds}, as planner {name} needs labels; got {model.filter.kind}")
     settings, reward = build_planning_settings(model.control), build_reward(model.control.reward)
     return planner(sensors, planning_fusion(model, filters), settings, reward)

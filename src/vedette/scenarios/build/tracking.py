@@ -5,14 +5,30 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from vedette.densities import GLMB, LMB, Estimate, map_estimate, marginal_estimate
-from vedette.filters import DeltaGlmbFilter, Limits, LmbFilter, LocalFilter
+from vedette.densities import GLMB, LMB, Estimate, map_estimate, marginal_estimate, unlabelled_estimate
+from vedette.filters import (
+    Belief,
+    CbMemberFilter,
+    CphdFilter,
+    DeltaGlmbFilter,
+    Limits,
+    LmbFilter,
+    LocalFilter,
+    PhdFilter,
+)
 from vedette.fusion import Clmb, CmDeltaGlmb, FusionLimits
 from vedette.models import BirthModel, MotionModel, SensorModel, SurvivalModel
 from vedette.scenarios.build.sensors import build_sensor
 from vedette.scenarios.build.world import build_birth, build_motion, build_region, build_survival
 from vedette.scenarios.loading import Scenario
 from vedette.scenarios.schema.tracking import Estimator, Filter, FilterLimits, Fusion, GibbsAssignment, MapEstimator
+
+_WITHOUT_ASSIGNMENT: dict[str, type[LmbFilter | PhdFilter | CphdFilter | CbMemberFilter]] = {
+    "lmb": LmbFilter,
+    "phd": PhdFilter,
+    "cphd": CphdFilter,
+    "cb_member": CbMemberFilter,
+}
 
 
 def build_limits(section: FilterLimits) -> Limits:
@@ -25,8 +41,8 @@ def build_filter(
 ) -> LocalFilter:
     """The filter of one sensor."""
     limits = build_limits(section.limits)
-    if section.kind == "lmb":
-        return LmbFilter(motion, survival, birth, sensor, limits)
+    if section.kind in _WITHOUT_ASSIGNMENT:
+        return _WITHOUT_ASSIGNMENT[section.kind](motion, survival, birth, sensor, limits)
     gibbs = section.assignment if isinstance(section.assignment, GibbsAssignment) else GibbsAssignment()
     return DeltaGlmbFilter(
         motion,
@@ -77,9 +93,17 @@ def build_fusion(section: Fusion, num_sensors: int) -> CmDeltaGlmb | Clmb | None
     return CmDeltaGlmb(weights, section.mixture_power, math.log(section.missing_weight), fusion_limits)
 
 
-def build_estimator(section: Estimator) -> Callable[[GLMB | LMB], Estimate]:
-    """How estimates are read off a density."""
-    if isinstance(section, MapEstimator):
-        return map_estimate
-    threshold = section.threshold
-    return lambda density: marginal_estimate(density, threshold)
+def build_estimator(section: Estimator) -> Callable[[Belief, int], Estimate]:
+    """How estimates are read off a density after a scan, given the number of the scan.
+
+    Only densities without labels need the number: their estimates are labelled by it.
+    """
+
+    def estimate(density: Belief, step: int) -> Estimate:
+        if not isinstance(density, GLMB | LMB):
+            return unlabelled_estimate(density, step)
+        if isinstance(section, MapEstimator):
+            return map_estimate(density)
+        return marginal_estimate(density, section.threshold)
+
+    return estimate

@@ -35,7 +35,9 @@ class FilterLimits(Section):
 
     max_hypotheses: Count = Field(default=300, description="Most hypotheses kept after a scan [-].")
     min_relative_weight: Share = Field(
-        default=1e-6, description="Hypotheses lighter than this times the heaviest are dropped [-]."
+        default=1e-6,
+        description="Hypotheses (of a cphd: large numbers of targets) lighter than this times the heaviest are dropped "
+        "[-].",
     )
     min_track_weight: Annotated[float, Field(ge=0.0, le=1.0)] = Field(
         default=1e-5,
@@ -49,15 +51,26 @@ class FilterLimits(Section):
     )
     max_search_nodes: Count = Field(default=1_000_000, description="Bound on the ranking search [-].")
     min_component_weight: Share = Field(
-        default=1e-5, description="Gaussian components lighter than this share of their track are dropped [-]."
+        default=1e-5, description="Components lighter than this share of their track or intensity are dropped [-]."
     )
     merge_distance: float = Field(
         default=2.0, ge=0.0, description="Mahalanobis distance within which components are merged; 0: never [-]."
     )
     max_components: Count = Field(default=10, description="Most Gaussian components of a track [-].")
-    min_existence: Share = Field(default=1e-4, description="LMB tracks less probable than this are dropped [-].")
-    max_labels: Count = Field(default=200, description="Most tracks of an LMB [-].")
+    min_existence: Share = Field(
+        default=1e-4, description="LMB tracks and Bernoullis less probable than this are dropped [-]."
+    )
+    max_labels: Count = Field(default=200, description="Most tracks of an LMB, Bernoullis of a cb_member [-].")
+    max_intensity_components: Count = Field(
+        default=100, description="Most Gaussian components of the intensity of a phd or cphd, all targets together [-]."
+    )
+    max_existence: Annotated[float, Field(gt=0.0, lt=1.0)] = Field(
+        default=0.999, description="Bernoullis of a cb_member surer than this are taken as this sure [-]."
+    )
 
+
+# Filters that keep no identity of their targets.
+UNLABELLED = ("phd", "cphd", "cb_member")
 
 GaussianMethod = Literal["auto", "ekf", "ukf", "ckf"]
 
@@ -65,9 +78,11 @@ GaussianMethod = Literal["auto", "ekf", "ukf", "ckf"]
 class Filter(Section):
     """The filter that every sensor runs on its own scans."""
 
-    kind: Literal["delta_glmb", "m_delta_glmb", "lmb"] = Field(
+    kind: Literal["delta_glmb", "m_delta_glmb", "lmb", "phd", "cphd", "cb_member"] = Field(
         default="m_delta_glmb",
-        description="delta-GLMB; delta-GLMB marginalised after each scan (one component a label set); or LMB [-].",
+        description="delta-GLMB; delta-GLMB marginalised after each scan (one component a label set); LMB; or, without "
+        "labels and for a single sensor that nobody steers by its density: PHD, CPHD, cardinality-balanced "
+        "multi-Bernoulli [-].",
     )
     gaussian_method: GaussianMethod = Field(
         default="auto", description="Extended, unscented or cubature Kalman; auto: extended where Jacobians exist [-]."
@@ -127,13 +142,14 @@ class Fusion(Section):
 
 
 class MapEstimator(Section):
-    """Most probable number of targets, then the best hypothesis with that number (as in the paper)."""
+    """Most probable number of targets, then the best hypothesis with that number (as in the paper). Of a filter without
+    labels, the heaviest components or Bernoullis instead, newly labelled at each scan; a phd's number is the mean."""
 
     kind: Literal["map"] = Field(default="map", description="Kind of estimate [-].")
 
 
 class MarginalEstimator(Section):
-    """Every label whose existence is probable enough."""
+    """Every label whose existence is probable enough; for filters that have labels."""
 
     kind: Literal["marginal"] = Field(default="marginal", description="Kind of estimate [-].")
     threshold: Annotated[float, Field(gt=0.0, lt=1.0)] = Field(

@@ -1,0 +1,89 @@
+"""Independent, identically distributed cluster: any number of targets, all of one Gaussian-mixture density."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from vedette.densities import checks
+from vedette.densities.tracks import log_weights as logs_of
+from vedette.errors import InputError, NumericalError, VedetteError
+from vedette.kernels import types as kt
+from vedette.kernels.types import Floats
+
+
+@dataclass(frozen=True, slots=True)
+class IidCluster:
+    """A number of targets from a cardinality distribution, each drawn from one density by itself.
+
+    The intensity is the expected number times that density.
+
+    Attributes:
+        log_cardinality: (most + 1,) log probabilities of 0, 1, ..., most targets, normalised.
+        log_weights: (num_components,) log mixture weights of the density of one target, normalised; there may be none
+            where the density is certain of no target.
+        means: (num_components, state_dim).
+        covs: (num_components, state_dim, state_dim).
+    """
+
+    log_cardinality: Floats
+    log_weights: Floats
+    means: Floats
+    covs: Floats
+
+    @property
+    def state_dim(self) -> int:
+        return int(self.means.shape[1])
+
+    @property
+    def expected_number(self) -> float:
+        """Mean number of targets."""
+        return float(np.exp(self.log_cardinality) @ np.arange(len(self.log_cardinality)))
+
+    def to_kernel(self) -> tuple[Floats, kt.Mixture]:
+        """Log cardinality distribution and density of one target, as kernels take them."""
+        return self.log_cardinality, kt.Mixture(self.log_weights, self.means, self.covs)
+
+    @classmethod
+    def from_kernel(cls, log_cardinality: Floats, mixture: kt.Mixture) -> IidCluster:
+        return cls(log_cardinality, *mixture)
+
+    @classmethod
+    def empty(cls, state_dim: int) -> IidCluster:
+        """The density that is certain of no target."""
+        return cls(np.zeros(1), np.empty(0), np.empty((0, state_dim)), np.empty((0, state_dim, state_dim)))
+
+    @classmethod
+    def from_gaussians(cls, cardinality: Any, weights: Any, means: Any, covs: Any) -> IidCluster:
+        """Density from linear probabilities of 0, 1, ... targets and the Gaussian mixture of one target.
+
+        cardinality: (most + 1,). weights: (num_components,), summing to one. means: (num_components, state_dim).
+        covs: (num_components, state_dim, state_dim). Raises `InputError` for another shape, probabilities or weights
+        that are negative or do not sum to one, or a covariance that is not symmetric positive definite.
+        """
+        log_cardinality, logs = logs_of("cardinality", cardinality), logs_of("weights", weights)
+        checked_means = checks.as_floats("means", means, (len(logs), None))
+        dim = checked_means.shape[1]
+        cluster = cls(log_cardinality, logs, checked_means, checks.as_floats("covs", covs, (len(logs), dim, dim)))
+        cluster.validate(error=InputError)
+        return cluster
+
+    def validate(self, *, error: type[VedetteError] = NumericalError) -> None:
+        """Raise unless the cardinalities and the weights are normalised and every component is a Gaussian.
+
+        `InputError` for faults of form; `error` for values that are not finite, not normalised to 1e-9 or covariances
+        that are not symmetric positive definite, and where there may be targets but no density of one.
+        """
+        checks.check_array("log_cardinality", self.log_cardinality, np.float64, (None,))
+        if len(self.log_cardinality) == 0:
+            raise InputError("log_cardinality: expected at least the probability of no target; got none")
+        checks.check_log_weights("log_cardinality", self.log_cardinality, error)
+        whole = np.array([0, len(self.log_cardinality)])
+        checks.check_normalised("log_cardinality", self.log_cardinality, whole, error)
+        num = len(self.log_weights)
+        offsets = np.array([0, num] if num else [0])
+        checks.check_mixtures("", offsets, self.log_weights, self.means, self.covs, len(offsets) - 1, error)
+        if num == 0 and np.any(self.log_cardinality[1:] > -np.inf):
+            raise error("log_weights: expected the density of a target, as there may be some; got no component")

@@ -1,0 +1,101 @@
+"""Multi-Bernoulli density with Gaussian-mixture components, without labels."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.special import expit
+
+from vedette.densities import checks
+from vedette.errors import InputError, NumericalError, VedetteError
+from vedette.kernels import types as kt
+from vedette.kernels.types import Floats, Ints
+
+
+@dataclass(frozen=True, slots=True)
+class MultiBernoulli:
+    """Independent Bernoullis: each is a target with its probability of existence, or nothing. An LMB without labels.
+
+    Attributes:
+        existence_logit: (num_bernoullis,) log r - log(1 - r), which may be -inf and inf.
+        offsets: (num_bernoullis + 1,) components of Bernoulli `i` are `offsets[i]:offsets[i + 1]`.
+        log_weights: (num_components,) log mixture weights, normalised within each Bernoulli.
+        means: (num_components, state_dim).
+        covs: (num_components, state_dim, state_dim), symmetric positive definite.
+    """
+
+    existence_logit: Floats
+    offsets: Ints
+    log_weights: Floats
+    means: Floats
+    covs: Floats
+
+    @property
+    def num_bernoullis(self) -> int:
+        return len(self.existence_logit)
+
+    @property
+    def existence(self) -> Floats:
+        """(num_bernoullis,) probabilities of existence r."""
+        return np.asarray(expit(self.existence_logit))
+
+    @property
+    def state_dim(self) -> int:
+        return int(self.means.shape[1])
+
+    @property
+    def expected_number(self) -> float:
+        """Mean number of targets."""
+        return float(self.existence.sum())
+
+    def to_kernel(self) -> kt.Lmb:
+        """The same arrays as the bundle that kernels take, every label (-1, -1)."""
+        labels = np.full((self.num_bernoullis, 2), -1, np.int64)
+        return kt.Lmb(kt.Tracks(labels, self.offsets, self.log_weights, self.means, self.covs), self.existence_logit)
+
+    @classmethod
+    def from_kernel(cls, lmb: kt.Lmb) -> MultiBernoulli:
+        """The Bernoullis of a bundle, whatever their labels."""
+        return cls(lmb.existence_logit, *lmb.tracks[1:])
+
+    @classmethod
+    def empty(cls, state_dim: int) -> MultiBernoulli:
+        """The density that is certain of no target."""
+        covs = np.empty((0, state_dim, state_dim))
+        return cls(np.empty(0), np.zeros(1, np.int64), np.empty(0), np.empty((0, state_dim)), covs)
+
+    @classmethod
+    def from_gaussians(cls, existence: Any, means: Any, covs: Any) -> MultiBernoulli:
+        """Density of one Gaussian a Bernoulli.
+
+        existence: (num_bernoullis,) in [0, 1]. means: (num_bernoullis, state_dim). covs: (num_bernoullis, state_dim,
+        state_dim). Raises `InputError` for another shape, a probability outside [0, 1], or a covariance that is not
+        symmetric positive definite.
+        """
+        probabilities = checks.as_floats("existence", existence, (None,))
+        if not np.all((probabilities >= 0.0) & (probabilities <= 1.0)):
+            raise InputError(f"existence: expected probabilities; got {probabilities.tolist()}")
+        num = len(probabilities)
+        checked_means = checks.as_floats("means", means, (num, None))
+        dim = checked_means.shape[1]
+        with np.errstate(divide="ignore"):
+            logit = np.log(probabilities) - np.log1p(-probabilities)
+        checked_covs = checks.as_floats("covs", covs, (num, dim, dim))
+        density = cls(logit, np.arange(num + 1), np.zeros(num), checked_means, checked_covs)
+        density.validate(error=InputError)
+        return density
+
+    def validate(self, *, error: type[VedetteError] = NumericalError) -> None:
+        """Raise unless existences are logits and every Bernoulli's mixture is a probability density.
+
+        `InputError` for faults of form; `error` for values that are not numbers, not normalised to 1e-9 or covariances
+        that are not symmetric positive definite.
+        """
+        checks.check_array("existence_logit", self.existence_logit, np.float64, (None,))
+        num = self.num_bernoullis
+        checks.check_mixtures("", self.offsets, self.log_weights, self.means, self.covs, num, error)
+        faulty = np.isnan(self.existence_logit)
+        if faulty.any():
+            raise error(f"existence_logit[{int(np.flatnonzero(faulty)[0])}]: expected a number; got nan")

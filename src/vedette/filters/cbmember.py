@@ -1,0 +1,58 @@
+"""The cardinality-balanced multi-Bernoulli filter: independent targets without names."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from vedette.densities import MultiBernoulli
+from vedette.filters.info import FilterInfo
+from vedette.filters.inputs import check_belief, model_errors
+from vedette.filters.unlabelled import UnlabelledFilter
+from vedette.kernels.cbmember import step_cb_member
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CbMemberFilter(UnlabelledFilter):
+    """Gaussian-mixture cardinality-balanced multi-target multi-Bernoulli filter (Vo, Vo and Cantoni 2009).
+
+    Believes in a multi-Bernoulli density, to which the births are added as they are; prediction is exact. The update
+    approximates the posterior by a Bernoulli for each one missed and for each measurement. It takes detection to be
+    probable and clutter not too dense; then the expected number of targets is not biased, as Mahler's plain
+    multi-Bernoulli update is.
+    """
+
+    def initial(self) -> MultiBernoulli:
+        """The belief before the first scan: no target."""
+        return MultiBernoulli.empty(self.motion.state_dim)
+
+    def step(
+        self, belief: MultiBernoulli, scan: Any, pose: Any, dt: float, step: int, *, rng: np.random.Generator
+    ) -> tuple[MultiBernoulli, FilterInfo]:
+        """Predict over `dt` seconds and update with a scan; arguments, results and errors as `DeltaGlmbFilter.step`.
+
+        Nothing is drawn from `rng`; it is taken so that filters are interchangeable.
+        """
+        measurements, num_duplicates = self._check_scan(scan)
+        prior = check_belief(belief, MultiBernoulli, self.motion.state_dim)
+        arguments = self._arguments(measurements, pose, dt, step)
+        limits = self.limits
+        with model_errors():
+            posterior, report = step_cb_member(
+                prior.to_kernel(), *arguments, limits.reduction(), limits.max_existence_logit
+            )
+        info = FilterInfo(
+            log_likelihood=math.nan,
+            num_hypotheses=1,
+            num_tracks=len(posterior.existence_logit),
+            discarded_weight_bound=math.nan,
+            dropped_existence=float(report.dropped_existence),
+            num_clutter_raised=int(report.num_raised),
+            num_duplicates=num_duplicates,
+            num_inexact_clusters=0,
+            search_cut=False,
+        )
+        return MultiBernoulli.from_kernel(posterior), info

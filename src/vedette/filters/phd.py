@@ -1,0 +1,52 @@
+"""The probability hypothesis density filter: how many targets are to be expected, and where."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from vedette.densities import Poisson
+from vedette.filters.info import FilterInfo
+from vedette.filters.inputs import check_belief, model_errors
+from vedette.filters.unlabelled import UnlabelledFilter
+from vedette.kernels.phd import step_phd
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PhdFilter(UnlabelledFilter):
+    """Gaussian-mixture PHD filter of one sensor (Vo and Ma 2006).
+
+    Believes in a Poisson density; its intensity after a scan is that of the exact posterior of such a prior. Births
+    enter with their intensity, the existence of each site times its density, which is exact as well.
+    """
+
+    def initial(self) -> Poisson:
+        """The belief before the first scan: no target."""
+        return Poisson.empty(self.motion.state_dim)
+
+    def step(
+        self, belief: Poisson, scan: Any, pose: Any, dt: float, step: int, *, rng: np.random.Generator
+    ) -> tuple[Poisson, FilterInfo]:
+        """Predict over `dt` seconds and update with a scan; arguments, results and errors as `DeltaGlmbFilter.step`.
+
+        Nothing is drawn from `rng`; it is taken so that filters are interchangeable.
+        """
+        measurements, num_duplicates = self._check_scan(scan)
+        prior = check_belief(belief, Poisson, self.motion.state_dim)
+        arguments = self._arguments(measurements, pose, dt, step)
+        with model_errors():
+            posterior, report = step_phd(prior.to_kernel(), *arguments, self.limits.intensity_reduction())
+        info = FilterInfo(
+            log_likelihood=report.log_total + report.log_clutter - self.sensor.clutter.rate,
+            num_hypotheses=1,
+            num_tracks=len(posterior.log_weights),
+            discarded_weight_bound=0.0,
+            dropped_existence=0.0,
+            num_clutter_raised=int(report.num_raised),
+            num_duplicates=num_duplicates,
+            num_inexact_clusters=0,
+            search_cut=False,
+        )
+        return Poisson.from_kernel(posterior), info

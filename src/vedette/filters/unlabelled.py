@@ -1,0 +1,52 @@
+"""What the filters without labels share: their models, and what they hand to their kernels."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from vedette.filters.inputs import births_at, check_parts, check_scan, check_step
+from vedette.filters.limits import Limits
+from vedette.kernels.truncation import Truncation
+from vedette.kernels.types import Floats, Lmb, Motion, Sensor
+from vedette.models import BirthModel, MotionModel, SensorModel, SurvivalModel, kernel_motion
+from vedette.models.arguments import pose_vector, positive
+
+StepArguments = tuple[Lmb, Floats, Floats, float, Motion, Sensor, Truncation]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class UnlabelledFilter:
+    """The models of a filter that keeps no identity of its targets.
+
+    Attributes:
+        motion, survival, birth, sensor: the models; the same as those of the labelled filters.
+        limits: caps and thresholds.
+
+    Raises:
+        InputError: models of different state dimensions.
+    """
+
+    motion: MotionModel
+    survival: SurvivalModel
+    birth: BirthModel
+    sensor: SensorModel
+    limits: Limits = field(default_factory=Limits)
+
+    def __post_init__(self) -> None:
+        check_parts(self.motion, self.survival, self.birth, self.sensor, self.limits)
+
+    def _arguments(self, scan: Floats, pose: Any, dt: Any, step: Any) -> StepArguments:
+        """Births, scan, pose, time step, models and truncation as the kernels take them, in their order."""
+        return (
+            births_at(self.birth, check_step(step, self.birth)).to_kernel(),
+            scan,
+            pose_vector("pose", pose),
+            positive("dt", dt),
+            kernel_motion(self.motion, self.survival),
+            self.sensor.to_kernel(),
+            self.limits.truncation(self.sensor.meas_dim),
+        )
+
+    def _check_scan(self, scan: Any) -> tuple[Floats, int]:
+        return check_scan(scan, self.sensor.meas_dim)
