@@ -1,11 +1,11 @@
 """How far estimates are from the truth: distances between sets of points and of tracks, breaks, consistency."""
 
 from vedette.evaluation.metrics.consistency import AverageNees, average_nees, nees, nees_interval
-from vedette.evaluation.metrics.gospa import GospaResult, GospaSeries, gospa, gospa_distance, gospa_of_run
 from vedette.evaluation.metrics.matching import Matching, match_run
-from vedette.evaluation.metrics.ospa import OspaResult, ospa, ospa_of_run
-from vedette.evaluation.metrics.ospa2 import TrackSet, ospa2, ospa2_of_run
+from vedette.evaluation.metrics.point_gospa import GospaResult, GospaSeries, gospa, gospa_distance, gospa_of_run
+from vedette.evaluation.metrics.point_ospa import OspaResult, ospa, ospa_of_run
 from vedette.evaluation.metrics.run import RunMetrics, measure
+from vedette.evaluation.metrics.track_ospa import TrackSet, ospa2, ospa2_of_run
 from vedette.evaluation.metrics.trajectories import Continuity, continuity, continuity_of_run
 
 __all__ = [

@@ -10,7 +10,7 @@ import numpy as np
 from vedette.densities.estimates import Estimate
 from vedette.errors import InputError
 from vedette.evaluation.metrics.assignment import assign, check_parameters, cut_distances, point_set
-from vedette.evaluation.metrics.ospa import check_scans
+from vedette.evaluation.metrics.point_ospa import check_scans
 from vedette.kernels.types import Floats, Ints
 from vedette.simulation.truth import Truth
 

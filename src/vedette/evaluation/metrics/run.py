@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vedette.evaluation.metrics.consistency import nees_of_matching
-from vedette.evaluation.metrics.gospa import gospa_of_matching
 from vedette.evaluation.metrics.matching import match_run
-from vedette.evaluation.metrics.ospa2 import ospa2_of_run
+from vedette.evaluation.metrics.point_gospa import gospa_of_matching
+from vedette.evaluation.metrics.track_ospa import ospa2_of_run
 from vedette.evaluation.metrics.trajectories import continuity
 from vedette.kernels.types import Floats, Ints
 from vedette.models.arguments import reject
