@@ -88,6 +88,12 @@ def test_missed_and_false_of_empty_sets() -> None:
     assert (false.total, false.missed, false.false, false.num_false) == (10.0, 0.0, 100.0, 2)
 
 
+def test_the_best_pairs_depend_on_the_order() -> None:
+    first, second = np.array([[0.0, 0], [5, 1]]), np.array([[5.0, 1], [10, 0]])
+    assert gospa(first, second, cutoff=100.0, order=1.0).total == pytest.approx(10.0)
+    assert gospa(first, second, cutoff=100.0, order=2.0).localisation == pytest.approx(52.0)
+
+
 def test_a_pair_at_the_cutoff_is_a_missed_and_a_false_point() -> None:
     result = gospa([[0.0, 0.0]], [[5.0, 0.0]], cutoff=5.0, order=1.0)
     assert (result.total, result.localisation, result.num_missed, result.num_false) == (5.0, 0.0, 1, 1)

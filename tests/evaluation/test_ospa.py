@@ -80,6 +80,13 @@ def test_bottleneck_of_the_infinite_order_may_differ_from_the_least_sum() -> Non
     assert ospa(first, second, cutoff=100.0, order=1.0).total == 5.0  # 0 and 10, or 5 and 5
 
 
+def test_the_best_pairs_depend_on_the_order() -> None:
+    first, second = np.array([[0.0, 0], [5, 1]]), np.array([[5.0, 1], [10, 0]])
+    assert ospa(first, second, cutoff=100.0, order=1.0).total == pytest.approx(5.0)  # 10 and 0; 2 * 26**0.5 is more
+    for order in (2.0, 25.0, 31.0, 300.0, math.inf):
+        assert ospa(first, second, cutoff=100.0, order=order).total == pytest.approx(math.sqrt(26.0))
+
+
 def test_a_very_high_order_neither_overflows_nor_underflows() -> None:
     far = ospa([[0.0, 0.0]], [[900.0, 0.0]], cutoff=1000.0, order=400.0)
     near = ospa([[0.0, 0.0]], [[0.001, 0.0]], cutoff=1000.0, order=400.0)
