@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from vedette.errors import InputError
-from vedette.evaluation.reproduction import MARK, check_target, scored, typical_run, write_reproduction
+from vedette.evaluation.comparison import scored
+from vedette.evaluation.reproduction import MARK, check_target, typical_run, write_reproduction
 from vedette.evaluation.runs import run_paired, run_scenario, strategy
 from vedette.scenarios import Scenario, list_builtin
 from vedette.scenarios.loading import parse_scenario

@@ -7,8 +7,10 @@ from typing import Annotated
 import typer
 
 from vedette import __version__
+from vedette.cli.campaign import campaign, reproduce
 from vedette.cli.errors import Commands
-from vedette.cli.running import reproduce, run
+from vedette.cli.results import results
+from vedette.cli.running import run
 from vedette.cli.scenario_files import check, init, list_, schema
 from vedette.cli.show import show
 
@@ -44,3 +46,5 @@ app.command()(show)
 app.command()(schema)
 app.command()(run)
 app.command()(reproduce)
+app.command()(campaign)
+app.command()(results)

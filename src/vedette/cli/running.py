@@ -1,4 +1,4 @@
-"""Commands that simulate: run, reproduce."""
+"""The command that runs a scenario once, and what commands that simulate share."""
 
 from __future__ import annotations
 
@@ -13,13 +13,10 @@ import typer
 from vedette.cli.errors import usage_error
 
 if TYPE_CHECKING:
-    from vedette.evaluation import Comparison
     from vedette.scenarios import Scenario
     from vedette.simulation.records import RunRecord
 
 INTERRUPTED = 130
-# Of `vedette.evaluation.tables.HEADER`, for a terminal of 80 columns; the caption under the table says the rest.
-_SHORT_HEADER = ("", "OSPA (m)", "loc.", "card.", "difference", "95 %", "won")
 STRATEGY_NAMES = ("jdm", "idm", "random", "fixed", "still")
 
 
@@ -45,7 +42,8 @@ def interruptible(advice: str) -> Iterator[None]:
         raise typer.Exit(INTERRUPTED) from None
 
 
-def _check_planner(name: str, option: str) -> None:
+def check_planner(name: str, option: str) -> None:
+    """Wrong use of an option unless it names a strategy."""
     if name not in STRATEGY_NAMES:
         raise usage_error(f"expected one of {', '.join(STRATEGY_NAMES)}; got {name}", option)
 
@@ -64,7 +62,7 @@ def run(
     threads: Annotated[int, typer.Option("--threads", min=0, help="Threads a decision; 0: one a processor.")] = 0,
 ) -> None:
     """Run a scenario once: tracks, decisions with their rewards, errors, figures."""
-    _check_planner(planner, "--planner")
+    check_planner(planner, "--planner")
     from vedette.evaluation.runs import run_scenario
     from vedette.scenarios import load_scenario
     from vedette.scenarios.dumping import dump_scenario
@@ -118,89 +116,7 @@ def _draw_run(record: RunRecord, folder: Path) -> None:
     draw_rewards(record, folder, "rewards")
 
 
-def reproduce(
-    scenario: Annotated[str, typer.Argument(help="Name of a built-in scenario, or a scenario file.")] = "paper-a",
-    planners: Annotated[
-        str, typer.Option("--planners", metavar="LIST", help="Strategies to compare; the first is the reference.")
-    ] = "jdm,idm,random",
-    runs: Annotated[int, typer.Option("--runs", min=1, help="Paired runs of each strategy.")] = 30,
-    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of all runs.")] = 0,
-    workers: Annotated[int, typer.Option("--workers", min=0, help="Processes; 0: one a processor.")] = 0,
-    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for runs, tables and figures.")] = Path(
-        "reproduction"
-    ),
-) -> None:
-    """Compare strategies over paired runs, as the paper does: tables, figures 3 to 5, and every run in open formats."""
-    names = [name.strip() for name in planners.split(",")]
-    for name in names:
-        _check_planner(name, "--planners")
-    if len(set(names)) != len(names):
-        raise usage_error(f"expected each strategy once; got {planners}", "--planners")
-    from vedette.evaluation.reproduction import check_target, write_reproduction
-    from vedette.evaluation.runs import run_paired
-    from vedette.scenarios import load_scenario
-
-    loaded = load_scenario(scenario)
-    check_target(out)
-    with interruptible("nothing was written"):
-        compile_if_cold(loaded)
-        with _progress(len(names) * runs) as progress:
-            records = run_paired(
-                loaded, names, runs, seed=seed, num_workers=workers or _processors(), progress=progress.advance
-            )
-        comparison = write_reproduction(loaded, records, seed, out)
-    _print_comparison(comparison)
-    typer.echo(f"wrote {out}")
-
-
-def _processors() -> int:
+def processors() -> int:
+    """Processors that this process may use."""
     affinity = getattr(os, "sched_getaffinity", None)
     return len(affinity(0)) if affinity else os.cpu_count() or 1
-
-
-class _Progress:
-    """Runs done, time left, and the running mean error of each strategy."""
-
-    def __init__(self, total: int) -> None:
-        from rich.console import Console
-        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
-        console = Console(stderr=True)
-        self.bar = Progress(
-            BarColumn(bar_width=20), MofNCompleteColumn(), TimeRemainingColumn(), TextColumn("{task.description}"),
-            console=console, disable=not console.is_terminal, transient=True,
-        )  # fmt: skip
-        self.task = self.bar.add_task("starting", total=total)
-        self.errors: dict[str, list[float]] = {}
-
-    def advance(self, record: RunRecord) -> None:
-        self.errors.setdefault(record.planner, []).append(float(record.ospa[:, 0].mean()))
-        means = "  ".join(f"{name} {sum(values) / len(values):.1f} m" for name, values in sorted(self.errors.items()))
-        self.bar.update(self.task, advance=1, description=means)
-
-
-@contextmanager
-def _progress(total: int) -> Iterator[_Progress]:
-    progress = _Progress(total)
-    with progress.bar:
-        yield progress
-
-
-def _print_comparison(comparison: Comparison) -> None:
-    from rich.console import Console
-    from rich.table import Table
-
-    from vedette.evaluation import decision_rows, strategy_rows
-    from vedette.evaluation.tables import caption
-
-    console = Console(highlight=False)
-    table = Table(box=None, pad_edge=False)
-    for i, heading in enumerate(_SHORT_HEADER):
-        table.add_column(heading, justify="right" if i else "left", no_wrap=True)
-    for row in strategy_rows(comparison):
-        table.add_row(*row)
-    console.print(table)
-    console.print(caption(comparison), style="dim")
-    for strategy in comparison.strategies:
-        for when, shares in decision_rows(comparison, strategy):
-            console.print(f"{strategy} at {when}: {shares}")

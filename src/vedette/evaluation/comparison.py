@@ -12,6 +12,7 @@ import numpy as np
 from vedette.errors import InputError
 from vedette.evaluation.statistics import PairedDifference, Summary, paired_difference, summarise
 from vedette.kernels.types import Bools, Floats
+from vedette.scenarios import Scenario
 from vedette.simulation.records import RunRecord
 
 PARTS = ("total", "localisation", "cardinality")
@@ -116,6 +117,15 @@ def compare(
         until=until,
         headings=tuple(tuple(chosen_headings_deg(record) for record in runs[name]) for name in strategies),
     )
+
+
+def scored(scenario: Scenario, runs: Mapping[str, Sequence[RunRecord]]) -> Comparison:
+    """The comparison over the scans that the scenario counts."""
+    window = scenario.model.ospa
+    times = next(iter(runs.values()))[0].times
+    since = None if window.from_step is None else float(np.nextafter(times[window.from_step - 1], -np.inf))
+    until = np.inf if window.to_step is None else float(times[window.to_step - 1])
+    return compare(runs, since=since, until=until)
 
 
 def chosen_headings_deg(record: RunRecord) -> tuple[Headings, ...]:

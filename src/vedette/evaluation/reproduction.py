@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from vedette.errors import InputError
-from vedette.evaluation.comparison import Comparison, compare
+from vedette.evaluation.comparison import Comparison, scored
 from vedette.evaluation.figures import ospa_figure, overview_figure, reward_figure, save_figure, tracks_figure
 from vedette.evaluation.tables import decision_rows, strategy_csv, strategy_markdown
 from vedette.scenarios import Scenario
@@ -22,15 +22,6 @@ MARK = "reproduction.json"
 TABLE_MARKDOWN, TABLE_CSV = "strategies.md", "strategies.csv"
 
 
-def scored(scenario: Scenario, runs: Mapping[str, Sequence[RunRecord]]) -> Comparison:
-    """The comparison over the scans that the scenario counts."""
-    window = scenario.model.ospa
-    times = next(iter(runs.values()))[0].times
-    since = None if window.from_step is None else float(np.nextafter(times[window.from_step - 1], -np.inf))
-    until = np.inf if window.to_step is None else float(times[window.to_step - 1])
-    return compare(runs, since=since, until=until)
-
-
 def check_target(folder: Path) -> None:
     """`InputError` unless the folder is new, empty, or an earlier reproduction, which may be replaced."""
     if folder.is_file() or (folder.is_dir() and any(folder.iterdir()) and not (folder / MARK).is_file()):
@@ -39,9 +30,12 @@ def check_target(folder: Path) -> None:
         )
 
 
-def typical_run(comparison: Comparison, records: Sequence[RunRecord]) -> RunRecord:
-    """The run whose mean OSPA is the median (of an even number, the better of the two in the middle)."""
-    means = comparison.run_means(records[0].planner)
+def typical_run(comparison: Comparison, records: Sequence[RunRecord], strategy: str | None = None) -> RunRecord:
+    """The run whose mean OSPA is the median (of an even number, the better of the two in the middle).
+
+    `strategy` is what the comparison calls them; by default the planner's name.
+    """
+    means = comparison.run_means(records[0].planner if strategy is None else strategy)
     return records[int(np.argsort(means, kind="stable")[(len(means) - 1) // 2])]
 
 

@@ -108,9 +108,9 @@ def _manifest(record: RunRecord, files: Mapping[str, bytes]) -> dict[str, Any]:
     }
 
 
-def versions() -> dict[str, str]:
-    """Versions of Python and of the packages that results depend on."""
-    return {"python": platform.python_version(), **{name: _version(name) for name in _PACKAGES}}
+def versions(*more: str) -> dict[str, str]:
+    """Versions of Python, of the packages that results depend on, and of `more` packages."""
+    return {"python": platform.python_version(), **{name: _version(name) for name in (*_PACKAGES, *more)}}
 
 
 def _version(package: str) -> str:

@@ -1,0 +1,146 @@
+"""What it costs to keep the runs of a campaign: one SQLite file, or a folder of Parquet files a run.
+
+    python benchmarks/store.py                    # 300 runs, on the disk of the temporary folder
+    python benchmarks/store.py --runs 3000 --folder /somewhere/else
+
+Each run is the same finished run of paper-a (joint decisions). Every way of keeping makes it reach the disk before the
+next run: SQLite by its durable settings, Parquet files by fsync of each file and of the folder that holds them. Times
+are those to encode and land a run (median and 99th percentile) and to read everything back as run records; sizes are
+those on the disk.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import shutil
+import sqlite3
+import statistics
+import tempfile
+import time
+import zlib
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pyarrow as pa
+from pyarrow import parquet
+
+from vedette.campaigns.codec import decode, encode
+from vedette.evaluation.metrics import RunMetrics, measure
+from vedette.evaluation.runs import run_scenario
+from vedette.files import sync_folder
+from vedette.scenarios import load_scenario
+from vedette.simulation.columns import flatten
+from vedette.simulation.decisions import read_decisions, write_decisions
+from vedette.simulation.records import RunRecord
+from vedette.simulation.tabulation import TABLES, record_of, run_facts, tables_of
+
+Way = tuple[Callable[[int], None], Callable[[], int]]
+
+
+def sqlite_file(folder: Path, record: RunRecord, metrics: RunMetrics, journal: str) -> Way:
+    """One row a run in one file."""
+    database = sqlite3.connect(folder / "campaign.sqlite", isolation_level=None)
+    database.execute(f"PRAGMA journal_mode = {journal}")
+    database.execute(f"PRAGMA synchronous = {'EXTRA' if journal == 'delete' else 'FULL'}")
+    database.execute("CREATE TABLE runs (cell TEXT, run INTEGER, payload BLOB, PRIMARY KEY (cell, run)) STRICT")
+
+    def land(run: int) -> None:
+        payload = zlib.compress(encode(record, metrics), 1)
+        database.execute("INSERT INTO runs VALUES ('jdm', ?, ?)", (run, payload))
+
+    def read() -> int:
+        rows = database.execute("SELECT payload FROM runs ORDER BY cell, run")
+        return sum(decode(zlib.decompress(payload))[0].num_scans for (payload,) in rows)
+
+    return land, read
+
+
+def parquet_folders(folder: Path, record: RunRecord, metrics: RunMetrics) -> Way:
+    """A folder of Parquet files a run, made beside and renamed into place."""
+
+    def land(run: int) -> None:
+        scratch = folder / f".jdm-{run}"
+        scratch.mkdir()
+        tables = {**tables_of(record), "metrics": metrics.columns()}
+        for name, columns in tables.items():
+            parquet.write_table(pa.table(flatten(columns)), scratch / f"{name}.parquet")
+        (scratch / "run.json").write_text(json.dumps(run_facts(record)))
+        (scratch / "decisions.json").write_text(write_decisions(record.decisions))
+        for file in scratch.iterdir():
+            with file.open("rb") as opened:
+                os.fsync(opened.fileno())
+        sync_folder(scratch)
+        scratch.rename(folder / f"jdm-{run}")
+        sync_folder(folder)
+
+    def read() -> int:
+        return sum(_read_folder(folder / name).num_scans for name in sorted(os.listdir(folder)))
+
+    return land, read
+
+
+def _read_folder(folder: Path) -> RunRecord:
+    tables = {}
+    for name, kinds in TABLES.items():
+        table = parquet.read_table(folder / f"{name}.parquet")
+        flat = {column: table.column(column).to_numpy() for column in table.column_names}
+        tables[name] = {column: flat[column] if column in flat else _stacked(flat, column) for column in kinds}
+    RunMetrics.from_columns(
+        {name: column.to_numpy() for name, column in _columns(parquet.read_table(folder / "metrics.parquet"))}
+    )
+    facts = json.loads((folder / "run.json").read_text())
+    return record_of(facts, tables, read_decisions((folder / "decisions.json").read_text()), {})
+
+
+def _columns(table: pa.Table) -> Iterator[tuple[str, pa.ChunkedArray]]:
+    return zip(table.column_names, table.columns, strict=True)
+
+
+def _stacked(flat: dict[str, object], name: str) -> object:
+    import numpy as np
+
+    width = sum(column.startswith(f"{name}_") for column in flat)
+    return np.stack([flat[f"{name}_{index}"] for index in range(width)], axis=1)  # type: ignore[arg-type]
+
+
+def measured(way: Way, folder: Path, num_runs: int) -> str:
+    land, read = way
+    seconds = []
+    for run in range(num_runs):
+        start = time.perf_counter()
+        land(run)
+        seconds.append(time.perf_counter() - start)
+    size = sum(file.stat().st_blocks * 512 for file in folder.rglob("*") if file.is_file())
+    files = sum(file.is_file() for file in folder.rglob("*"))
+    start = time.perf_counter()
+    read()
+    whole = time.perf_counter() - start
+    worst = statistics.quantiles(seconds, n=100)[-1]
+    return f"{1e3 * statistics.median(seconds):9.2f} {1e3 * worst:9.2f} {whole:10.2f} {size / 2**20:10.1f} {files:8d}"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--runs", type=int, default=300)
+    parser.add_argument("--folder", type=Path, default=None, help="where to write; the system's temporary folder")
+    options = parser.parse_args()
+    scenario = load_scenario("paper-a")
+    record = run_scenario(scenario, "jdm", seed=0, num_threads=1)
+    metrics = measure(record, cutoff=100.0, order=1.0, window=10)
+    print(f"{options.runs} runs              ms a run   99th ms   read all s        MiB    files")
+    for journal in ("delete", "truncate", "persist", "wal", "parquet"):
+        with tempfile.TemporaryDirectory(dir=options.folder) as scratch:
+            folder = Path(scratch)
+            if journal == "parquet":
+                name, way = "Parquet folders", parquet_folders(folder, record, metrics)
+            else:
+                name, way = f"SQLite, {journal}", sqlite_file(folder, record, metrics, journal)
+            print(f"{name:18s} {measured(way, folder, options.runs)}", flush=True)
+            shutil.rmtree(folder, ignore_errors=True)
+            folder.mkdir()
+
+
+if __name__ == "__main__":
+    main()

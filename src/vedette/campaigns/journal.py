@@ -1,0 +1,202 @@
+"""The runs of a campaign in one SQLite file: a row a run, each landing whole or not at all.
+
+A rollback journal, not a write-ahead log: see docs/decisions/0004-results-store.md. Every row carries checksums, over
+its cell and run number too, that are verified whenever it is read.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import sqlite3
+import zlib
+from collections.abc import Iterator, Sequence
+from contextlib import closing, contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from vedette.errors import InputError
+
+DATABASE, LOCK = "campaign.sqlite", "campaign.lock"
+
+_WAIT = 60.0  # s, for a reader or writer of the same file; each holds it for milliseconds
+_LEVEL = 1  # of zlib: half the size in under a millisecond, and higher levels gain little
+_TABLES = (
+    "CREATE TABLE IF NOT EXISTS campaign (contents TEXT NOT NULL)",
+    "CREATE TABLE IF NOT EXISTS runs (cell TEXT NOT NULL, run INTEGER NOT NULL, session INTEGER NOT NULL, "
+    "payload BLOB NOT NULL, payload_sha256 TEXT NOT NULL, timings BLOB NOT NULL, timings_sha256 TEXT NOT NULL, "
+    "PRIMARY KEY (cell, run))",
+)
+_COLUMNS = "cell, run, session, payload, payload_sha256, timings, timings_sha256"
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """One finished run as it was handed in, and the session (counted from 1) that it was handed in by."""
+
+    cell: str
+    run: int
+    session: int
+    payload: bytes
+    timings: bytes
+
+    @property
+    def checksum(self) -> str:
+        """SHA-256 of the run's cell, number and payload: equal for equal results, whenever they were computed."""
+        return _checksum(self.cell, self.run, self.payload)
+
+
+class Writer:
+    """Adds runs to the file of one folder, alone: `InputError` if another writer has it open."""
+
+    def __init__(self, folder: Path) -> None:
+        self._path = folder / DATABASE
+        self._lock = _lock(folder)
+        self._database: sqlite3.Connection | None = None
+
+    def open(self, contents: str) -> None:
+        """Make the file, or check that it is of the campaign whose manifest has the checksum `contents`."""
+        with _explained(self._path):
+            database = sqlite3.connect(self._path, timeout=_WAIT, isolation_level=None, check_same_thread=False)
+            self._database = database
+            database.execute("PRAGMA journal_mode = PERSIST")
+            database.execute("PRAGMA synchronous = FULL")
+            database.execute("BEGIN IMMEDIATE")
+            for statement in _TABLES:
+                database.execute(statement)
+            found = database.execute("SELECT contents FROM campaign").fetchall()
+            if not found:
+                database.execute("INSERT INTO campaign VALUES (?)", (contents,))
+            database.execute("COMMIT")
+        _check_contents(self._path, found or [(contents,)], contents)
+
+    def add(self, entry: Entry) -> None:
+        """Put the run on the disk; when this returns it stays, whatever happens to this process or its machine."""
+        row = (
+            *(entry.cell, entry.run, entry.session),
+            *(zlib.compress(entry.payload, _LEVEL), entry.checksum),
+            *(zlib.compress(entry.timings, _LEVEL), _checksum(entry.cell, entry.run, entry.timings)),
+        )
+        assert self._database is not None
+        try:
+            with _explained(self._path, f"cell {entry.cell}, run {entry.run}: "):
+                self._database.execute(f"INSERT INTO runs ({_COLUMNS}) VALUES (?, ?, ?, ?, ?, ?, ?)", row)
+        except sqlite3.IntegrityError:
+            raise InputError(
+                f"{self._path}: cell {entry.cell}, run {entry.run}: expected another run; it is there"
+            ) from None
+
+    def finished(self) -> set[tuple[str, int]]:
+        """Cell and number of every run in the file."""
+        assert self._database is not None
+        with _explained(self._path):
+            return set(self._database.execute("SELECT cell, run FROM runs"))
+
+    def close(self) -> None:
+        """Let other writers in."""
+        if self._database is not None:
+            with suppress(sqlite3.Error):  # a reader at this very moment: the emptied journal does no harm
+                self._database.execute("PRAGMA busy_timeout = 0")
+                self._database.execute("PRAGMA journal_mode = DELETE")
+            self._database.close()
+        self._lock.close()
+
+
+class Reader:
+    """Reads the file of one folder, also while a writer adds to it; opened anew for every question."""
+
+    def __init__(self, folder: Path) -> None:
+        self._path = folder / DATABASE
+
+    def check(self, contents: str) -> None:
+        """`InputError` unless the file is whole so far and of the campaign whose manifest has that checksum."""
+        _check_contents(self._path, self._ask("SELECT contents FROM campaign"), contents)
+
+    def finished(self) -> list[tuple[str, int]]:
+        """Cell and number of every run in the file, sorted."""
+        return self._ask("SELECT cell, run FROM runs ORDER BY cell, run")
+
+    def entry(self, cell: str, run: int) -> Entry:
+        """A finished run, its checksums verified. `InputError` where there is none, or its row is damaged."""
+        where = f"cell {cell}, run {run}: "
+        rows = self._ask(f"SELECT {_COLUMNS} FROM runs WHERE cell = ? AND run = ?", (cell, run), where)
+        if not rows:
+            raise InputError(f"{self._path}: {where}expected a finished run; it is not there yet")
+        return self._verified(rows[0], where)
+
+    def _ask(self, question: str, values: Sequence[Any] = (), where: str = "") -> list[Any]:
+        with _explained(self._path, where):
+            try:
+                return _answer(self._path, question, values)
+            except sqlite3.OperationalError as error:
+                if error.sqlite_errorcode != sqlite3.SQLITE_READONLY_ROLLBACK:
+                    raise
+            # A writer was killed in the middle of a run: what it left half done is first taken back.
+            _answer(self._path, question, values, mode="rw")
+            return _answer(self._path, question, values)
+
+    def _verified(self, row: tuple[Any, ...], where: str) -> Entry:
+        cell, run, session, payload, payload_checksum, timings, timings_checksum = row
+        try:
+            entry = Entry(cell, run, session, zlib.decompress(payload), zlib.decompress(timings))
+            intact = entry.checksum == payload_checksum and _checksum(cell, run, entry.timings) == timings_checksum
+        except (zlib.error, TypeError):
+            intact = False
+        if not intact:
+            raise InputError(f"{self._path}: {where}expected the run as it was written; it is cut short or altered")
+        return entry
+
+
+def _answer(path: Path, question: str, values: Sequence[Any], mode: str = "ro") -> list[Any]:
+    address = f"{path.resolve().as_uri()}?mode={mode}"
+    with closing(sqlite3.connect(address, timeout=_WAIT, uri=True)) as database:
+        return database.execute(question, values).fetchall()
+
+
+def _lock(folder: Path) -> sqlite3.Connection:
+    """An open transaction on a file beside: SQLite's own locks, which the system ends with the process."""
+    path = folder / LOCK
+    lock = sqlite3.connect(path, timeout=0.0, isolation_level=None, check_same_thread=False)
+    try:
+        lock.execute("BEGIN EXCLUSIVE")
+    except sqlite3.Error as error:
+        lock.close()
+        if getattr(error, "sqlite_errorcode", None) == sqlite3.SQLITE_BUSY:
+            raise InputError(f"{folder}: expected to write alone; another process is writing this campaign") from None
+        raise InputError(f"{folder}: expected a folder that can be written; {path.name}: {error}") from error
+    return lock
+
+
+def _check_contents(path: Path, found: Sequence[tuple[str]], contents: str) -> None:
+    if list(found) != [(contents,)]:
+        raise InputError(
+            f"{path}: expected the runs of the manifest beside it; they are another campaign's, or the manifest was "
+            "altered"
+        )
+
+
+def _checksum(cell: str, run: int, content: bytes) -> str:
+    return hashlib.sha256(f"{cell}\n{run}\n".encode() + content).hexdigest()
+
+
+@contextmanager
+def _explained(path: Path, where: str = "") -> Iterator[None]:
+    """What SQLite raises, as errors of this library that name the file; a key that is there already is passed on."""
+    try:
+        yield
+    except sqlite3.IntegrityError:
+        raise
+    except sqlite3.DatabaseError as error:
+        raise InputError(f"{path}: {where}{_advice(path, error)} ({error})") from error
+
+
+def _advice(path: Path, error: sqlite3.DatabaseError) -> str:
+    code = getattr(error, "sqlite_errorcode", None)
+    primary = code & 0xFF if code is not None else None
+    if primary in (sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR):
+        return "expected room on the disk and a disk that works; what was finished before is kept: make room, go on"
+    if primary in (sqlite3.SQLITE_CANTOPEN, sqlite3.SQLITE_READONLY, sqlite3.SQLITE_PERM):
+        return "expected a file that can be opened" if path.exists() else "expected the runs of a campaign; got no file"
+    if primary == sqlite3.SQLITE_BUSY:
+        return f"expected a file that is free within {_WAIT:g} s; it stayed in use"
+    return "expected the runs of a campaign as they were written; the file is cut short or altered"

@@ -1,0 +1,167 @@
+"""The results folder of a campaign, opened to read: finished, unfinished, or while it is written."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from vedette.campaigns.cells import Campaign, Cell
+from vedette.campaigns.codec import decode, decode_timings
+from vedette.campaigns.journal import DATABASE, Entry, Reader
+from vedette.campaigns.manifest import campaign_of, contents_checksum, read_manifest
+from vedette.errors import InputError
+from vedette.evaluation.comparison import Comparison, scored
+from vedette.evaluation.metrics import RunMetrics
+from vedette.simulation.records import RunRecord
+
+if TYPE_CHECKING:
+    import pyarrow
+    import xarray
+
+
+@dataclass(frozen=True, slots=True)
+class FinishedRun:
+    """One run of a campaign.
+
+    Attributes:
+        cell: name of its cell.
+        record: with the seconds that it took.
+        metrics: measures of its estimates.
+        session: number of the session, from 1, in the manifest's list, that kept it.
+        checksum: SHA-256 of all but its timings; equal for equal results.
+    """
+
+    cell: str
+    record: RunRecord
+    metrics: RunMetrics
+    session: int
+    checksum: str
+
+
+@dataclass(frozen=True, slots=True)
+class GroupComparison:
+    """Cells that differ in the compared axis alone, side by side.
+
+    Attributes:
+        settings: axis and value, of the axes that all of them share.
+        cells: in the order of the comparison's strategies.
+        labels: values of the compared axis as text: the names of the comparison's strategies.
+        comparison: over the runs that are finished in every cell, and the scans that the scenario counts.
+    """
+
+    settings: dict[str, Any]
+    cells: tuple[Cell, ...]
+    labels: tuple[str, ...]
+    comparison: Comparison
+
+
+@dataclass(frozen=True, slots=True)
+class CampaignResults:
+    """What is finished of a campaign. Runs are read when they are asked for, and their checksums verified each time.
+
+    Every method that reads runs raises `InputError`, naming file, cell and run, for one that is damaged.
+
+    Attributes:
+        folder: where it is.
+        campaign: what was to be run.
+        manifest: all that the folder says of itself, as plain data: spec, scenarios, seeds, sessions with versions and
+            machines.
+    """
+
+    folder: Path
+    campaign: Campaign
+    manifest: dict[str, Any]
+    _reader: Reader = field(repr=False)
+
+    def finished(self, cell: str) -> tuple[int, ...]:
+        """Numbers of the finished runs of a cell, increasing. Raises `InputError` for a name of no cell."""
+        self.campaign.cell(cell)
+        return tuple(run for name, run in self._reader.finished() if name == cell)
+
+    def missing(self, cell: str) -> tuple[int, ...]:
+        """Numbers of the runs of a cell that are still to be done."""
+        done = set(self.finished(cell))
+        return tuple(run for run in range(self.campaign.num_runs) if run not in done)
+
+    def run(self, cell: str, run: int) -> FinishedRun:
+        """A finished run. Raises `InputError` for one that is not finished, or damaged."""
+        self.campaign.cell(cell)
+        return self._decoded(self._reader.entry(cell, run))
+
+    def runs(self) -> Iterator[FinishedRun]:
+        """Every finished run, cells in the order of the campaign, each with its runs in order."""
+        finished = self._reader.finished()
+        for cell in self.campaign.cells:
+            for name, run in finished:
+                if name == cell.name:
+                    yield self.run(name, run)
+
+    def record(self, cell: str, run: int) -> RunRecord:
+        """The record of a finished run."""
+        return self.run(cell, run).record
+
+    def metrics(self, cell: str, run: int) -> RunMetrics:
+        """The measures of a finished run."""
+        return self.run(cell, run).metrics
+
+    def comparisons(self) -> tuple[GroupComparison, ...]:
+        """One for each group of cells, in order, that has finished runs in common."""
+        return tuple(filter(None, map(self._comparison, self.campaign.groups())))
+
+    def tables(self) -> dict[str, pyarrow.Table]:
+        """Runs, scans, decisions, rewards, tracks, truth, sensors and timings as Arrow tables.
+
+        For pandas `.to_pandas()`, for polars `polars.from_arrow`; DuckDB queries them as they are. See
+        `vedette.campaigns.tables`. Raises `InputError` where pyarrow is not installed.
+        """
+        from vedette.campaigns.tables import tables_of_runs
+
+        return tables_of_runs(self.campaign, self.runs())
+
+    def dataset(self) -> xarray.Dataset:
+        """Measures at each scan as arrays over cell, run and scan; see `vedette.campaigns.dataset`.
+
+        Raises `InputError` where xarray is not installed.
+        """
+        from vedette.campaigns.dataset import dataset_of_runs
+
+        return dataset_of_runs(self.campaign, self.runs())
+
+    def _comparison(self, cells: tuple[Cell, ...]) -> GroupComparison | None:
+        common = sorted(set.intersection(*(set(self.finished(cell.name)) for cell in cells)))
+        if not common:
+            return None
+        axis = self.campaign.compare
+        labels = tuple(str(cell.settings[axis]) for cell in cells)
+        records = {
+            label: [self.record(cell.name, run) for run in common] for label, cell in zip(labels, cells, strict=True)
+        }
+        settings = {name: value for name, value in cells[0].settings.items() if name != axis}
+        return GroupComparison(settings, cells, labels, scored(cells[0].scenario, records))
+
+    def _decoded(self, entry: Entry) -> FinishedRun:
+        try:
+            record, metrics = decode(entry.payload)
+            record = replace(record, timings=decode_timings(entry.timings))
+        except InputError as error:
+            place = f"{self.folder / DATABASE}: cell {entry.cell}, run {entry.run}"
+            raise InputError(f"{place}: {error}") from error
+        return FinishedRun(entry.cell, record, metrics, entry.session, entry.checksum)
+
+
+def open_results(folder: Path | str) -> CampaignResults:
+    """Open the results folder of a campaign to read.
+
+    Raises `InputError`, naming the file, for a folder that holds no campaign, or one whose manifest or runs are
+    missing, cut short or altered.
+    """
+    target = Path(folder)
+    if not target.is_dir():
+        got = "a file" if target.exists() else "nothing"
+        raise InputError(f"{target}: expected the results folder of a campaign; got {got}")
+    manifest = read_manifest(target)
+    reader = Reader(target)
+    reader.check(contents_checksum(manifest))
+    return CampaignResults(target, campaign_of(target, manifest), manifest, reader)

@@ -1,0 +1,135 @@
+"""The results folder of a campaign, opened to write: the one place through which finished runs reach the disk.
+
+The folder holds `manifest.json` (the campaign as data, who worked on it when, with which versions) and
+`campaign.sqlite` (the finished runs). Read it with `vedette.campaigns.results.open_results`.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+from vedette.campaigns import journal
+from vedette.campaigns.cells import Campaign
+from vedette.campaigns.manifest import (
+    MANIFEST,
+    check_same,
+    contents_checksum,
+    new_manifest,
+    new_session,
+    read_manifest,
+    write_manifest,
+)
+from vedette.errors import InputError
+
+
+class Store:
+    """The one writer of a results folder; a context manager. Its calls may come from any thread, one at a time."""
+
+    def __init__(self, folder: Path, campaign: Campaign, writer: journal.Writer, manifest: dict[str, Any]) -> None:
+        self.folder = folder
+        self._num_runs = {cell.name: int(manifest["num_runs"]) for cell in campaign.cells}
+        self._writer = writer
+        self._sessions: list[dict[str, Any]] = manifest["sessions"]
+
+    @classmethod
+    def open(cls, folder: Path | str, campaign: Campaign) -> Store:
+        """Make the folder, or go on with it.
+
+        A campaign may be gone on with under a larger number of runs; a smaller number leaves the larger in place.
+
+        Raises `InputError`, and changes nothing, for a folder that holds something else or another campaign, one that
+        another process is writing, a file in it that is damaged, and a place that cannot be written.
+        """
+        target = Path(folder)
+        fresh = new_manifest(campaign)
+        _check_place(target)
+        try:
+            target.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise InputError(f"{target}: expected a place for a results folder; {error}") from error
+        if (target / MANIFEST).exists():  # before the lock, which is a file of its own
+            check_same(target, read_manifest(target), fresh)
+        writer = journal.Writer(target)
+        try:
+            manifest = _begin_session(target, fresh, writer)
+        except BaseException:
+            writer.close()
+            raise
+        return cls(target, campaign, writer, manifest)
+
+    @property
+    def session(self) -> int:
+        """Number of times, this one included, that the campaign was worked on."""
+        return len(self._sessions)
+
+    @property
+    def version_changes(self) -> tuple[str, ...]:
+        """What has another version now than in an earlier session; runs of other versions may differ in their bytes."""
+        now = self._sessions[-1]["versions"]
+        changes = (
+            f"{package} was {earlier['versions'].get(package, 'absent')} in session {number} and is {version} now"
+            for package, version in now.items()
+            for number, earlier in enumerate(self._sessions[:-1], start=1)
+            if earlier["versions"].get(package) != version
+        )
+        return tuple(changes)
+
+    def finished(self) -> set[tuple[str, int]]:
+        """Cell name and number of every finished run."""
+        return self._writer.finished()
+
+    def add(self, cell: str, run: int, payload: bytes, timings: bytes) -> None:
+        """Keep a finished run (`vedette.campaigns.codec`). When this returns, the run is on the disk.
+
+        Raises `InputError` for a run that is not the campaign's or is there already, and for a disk that is full or
+        fails: then the run is not kept, the earlier ones are, and adding may be tried again.
+        """
+        if cell not in self._num_runs:
+            raise InputError(f"cell: expected one of {', '.join(self._num_runs)}; got {cell!r}")
+        if not 0 <= run < self._num_runs[cell]:
+            raise InputError(f"run: expected a number from 0 to {self._num_runs[cell] - 1}; got {run}")
+        self._writer.add(journal.Entry(cell, int(run), self.session, payload, timings))
+
+    def close(self) -> None:
+        """Let another process write."""
+        self._writer.close()
+
+    def __enter__(self) -> Store:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+def _check_place(folder: Path) -> None:
+    """`InputError` unless the folder is new, empty but for what a killed start leaves, or has a manifest."""
+    if not folder.exists() or (folder / MANIFEST).exists():
+        return
+    if not folder.is_dir():
+        raise InputError(f"{folder}: expected a folder for results; got a file")
+    names = {path.name for path in folder.iterdir() if not path.name.startswith(f".{MANIFEST}.")} - {journal.LOCK}
+    if journal.DATABASE in names:
+        raise InputError(f"{folder}: expected {MANIFEST} beside {journal.DATABASE}; it is missing, nothing was changed")
+    if names:
+        raise InputError(f"{folder}: expected a new or empty folder, or one of results; it holds something else")
+
+
+def _begin_session(folder: Path, fresh: dict[str, Any], writer: journal.Writer) -> dict[str, Any]:
+    """Write a new session into the folder's manifest, and open its runs; returns the manifest."""
+    started = (folder / MANIFEST).exists()
+    manifest = read_manifest(folder) if started else fresh
+    check_same(folder, manifest, fresh)
+    num_runs = max(manifest["num_runs"], fresh["num_runs"])
+    manifest = {**manifest, "num_runs": num_runs, "sessions": [*manifest["sessions"], new_session()]}
+    contents = contents_checksum(manifest)
+    if started:
+        writer.open(contents)  # first, so that damaged runs leave the manifest as it is
+        write_manifest(folder, manifest)
+    else:
+        write_manifest(folder, manifest)
+        writer.open(contents)
+    return manifest

@@ -1,0 +1,65 @@
+"""The command that reads a campaign's results: results."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from vedette.cli.comparisons import print_comparison
+from vedette.cli.errors import usage_error
+
+if TYPE_CHECKING:
+    from vedette.campaigns.results import CampaignResults
+
+_FORMATS = ("parquet", "csv", "netcdf")
+
+
+def results(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Results folder of a campaign, finished or not.")],
+    export: Annotated[
+        Path | None, typer.Option("--export", metavar="DIR", help="Folder for the results as files of other tools.")
+    ] = None,
+    formats: Annotated[
+        list[str] | None,
+        typer.Option("--format", metavar="NAME", help="Of the files: parquet (default), csv, netcdf; may be repeated."),
+    ] = None,
+) -> None:
+    """Print the comparison of a campaign's strategies, and what is still to be run; export the results."""
+    for name in formats or ():
+        if name not in _FORMATS:
+            raise usage_error(f"expected one of {', '.join(_FORMATS)}; got {name}", "--format")
+    if formats and export is None:
+        raise usage_error("expected with --export, which names the folder", "--format")
+    from vedette.campaigns.results import open_results
+
+    opened = open_results(folder)
+    print_results(opened)
+    if export is not None:
+        from vedette.campaigns.export import FORMATS
+
+        for name in dict.fromkeys(formats or ("parquet",)):
+            for path in FORMATS[name](opened, export):
+                typer.echo(f"wrote {path}")
+
+
+def print_results(opened: CampaignResults) -> None:
+    """One comparison a group of settings, then how many runs there are and how many are missing."""
+    campaign = opened.campaign
+    several = {axis for axis, values in campaign.axes.items() if len(values) > 1}
+    for group in opened.comparisons():
+        shared = ", ".join(f"{axis} {value}" for axis, value in group.settings.items() if axis in several)
+        if shared:
+            typer.echo(f"{shared}:")
+        print_comparison(group.comparison)
+        typer.echo("")
+    missing = {cell.name: len(opened.missing(cell.name)) for cell in campaign.cells}
+    total = campaign.num_runs * len(campaign.cells)
+    typer.echo(f"{campaign.name}, seed {campaign.seed}: {total - sum(missing.values())} of {total} runs are finished")
+    for cell, number in missing.items():
+        if number:
+            typer.echo(f"missing of {cell}: {number}")
+    tables = opened.folder / "tables"
+    if tables.is_dir():
+        typer.echo(f"tables: {tables}")
