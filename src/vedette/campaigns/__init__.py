@@ -1,1 +1,24 @@
 """Monte Carlo campaigns: many runs of many settings, on one machine or many, kept in a folder that nothing tears."""
+
+from vedette.campaigns.cells import Campaign, Cell, resolve
+from vedette.campaigns.results import CampaignResults, open_results
+from vedette.campaigns.running import Outcome, Watch, run_campaign
+from vedette.campaigns.spec import CampaignSpec, Variant, load_spec, parse_spec
+from vedette.campaigns.tasks import Failed, Landed
+
+__all__ = [
+    "Campaign",
+    "CampaignResults",
+    "CampaignSpec",
+    "Cell",
+    "Failed",
+    "Landed",
+    "Outcome",
+    "Variant",
+    "Watch",
+    "load_spec",
+    "open_results",
+    "parse_spec",
+    "resolve",
+    "run_campaign",
+]

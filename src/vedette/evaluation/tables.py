@@ -40,6 +40,14 @@ def strategy_markdown(comparison: Comparison) -> str:
     return "\n".join([*lines, "", caption(comparison), ""])
 
 
+def decisions_markdown(comparison: Comparison) -> str:
+    """What each strategy decided, and how often, as Markdown."""
+    lines = ["| Strategy | Time | Headings and share of the runs |", "| --- | --- | --- |"]
+    for strategy in comparison.strategies:
+        lines += [f"| {strategy} | {time} | {shares} |" for time, shares in decision_rows(comparison, strategy)]
+    return "\n".join(lines) + "\n"
+
+
 def strategy_csv(comparison: Comparison) -> str:
     """The numbers behind the table, unrounded, one row a strategy."""
     out = io.StringIO()

@@ -1,0 +1,121 @@
+"""A campaign from start to end: what is missing is run, each run lands whole, and the tables are written last."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+from vedette.campaigns.cells import Campaign
+from vedette.campaigns.engine import in_process, local_workers, on_workers, remote_workers
+from vedette.campaigns.export import export_tables
+from vedette.campaigns.results import open_results
+from vedette.campaigns.store import Store
+from vedette.campaigns.tasks import Failed, Landed, TaskQueue, perform
+
+TABLES = "tables"
+
+
+class Watch(Protocol):
+    """What is told of a campaign while it runs."""
+
+    def begin(self, num_found: int, num_runs: int, version_changes: tuple[str, ...]) -> None:
+        """How many runs were there already, how many there are to be, and what has another version than before."""
+        ...
+
+    def landed(self, result: Landed) -> None:
+        """A run is in the store."""
+        ...
+
+    def failed(self, result: Failed) -> None:
+        """A run could not be finished."""
+        ...
+
+
+class Unwatched:
+    """Tells nobody."""
+
+    def begin(self, num_found: int, num_runs: int, version_changes: tuple[str, ...]) -> None:
+        """See `Watch`."""
+
+    def landed(self, result: Landed) -> None:
+        """See `Watch`."""
+
+    def failed(self, result: Failed) -> None:
+        """See `Watch`."""
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """How a campaign ended.
+
+    Attributes:
+        num_landed: runs that this call added.
+        num_found: runs that were there before.
+        failed: runs that could not be finished; the same call tries them again.
+    """
+
+    num_landed: int
+    num_found: int
+    failed: tuple[Failed, ...]
+
+
+def run_campaign(
+    campaign: Campaign,
+    folder: Path | str,
+    *,
+    num_workers: int = 1,
+    scheduler: str | None = None,
+    watch: Watch | None = None,
+) -> Outcome:
+    """Run what the folder does not hold yet, and write the tables when all is done.
+
+    May be stopped at any moment, by any means: the same call goes on from there, and what it leaves in the end is what
+    one undisturbed call would have left, byte for byte (but for the seconds that things took). Workers, their number,
+    and the order in which they finish change nothing.
+
+    Args:
+        campaign: see `vedette.campaigns.resolve`.
+        folder: for the results; new, empty, or of the same campaign.
+        num_workers: processes on this machine; 1: this process alone.
+        scheduler: address of a dask scheduler whose workers do the work instead; each has this version installed.
+        watch: is told of the progress.
+
+    Raises:
+        InputError: the folder holds something else, another campaign, or damaged results; nothing answers at the
+            scheduler's address.
+        VedetteError: the disk is full, or the scheduler is lost; the runs that landed are safe.
+    """
+    watch = watch or Unwatched()
+    failed, num_landed = [], 0
+    with Store.open(Path(folder), campaign) as store:
+        finished = store.finished()
+        found = [(cell.name, run) for cell, run in campaign.tasks if (cell.name, run) in finished]
+        watch.begin(len(found), len(campaign.tasks), store.version_changes)
+        with closing(_results(TaskQueue(campaign, finished), num_workers, scheduler)) as results:
+            for result in results:
+                if isinstance(result, Failed):
+                    failed.append(result)
+                    watch.failed(result)
+                    continue
+                store.add(result.cell, result.run, result.payload, result.timings)
+                num_landed += 1
+                watch.landed(result)
+    tables = Path(folder) / TABLES
+    if num_landed or not tables.is_dir():
+        export_tables(open_results(Path(folder)), tables)
+    return Outcome(num_landed, len(found), tuple(failed))
+
+
+def _results(queue: TaskQueue, num_workers: int, scheduler: str | None) -> Generator[Landed | Failed]:
+    if scheduler is None and num_workers <= 1:
+        yield from in_process(queue)
+        return
+    # Here first, so that kernels are compiled once and not once a worker.
+    for task in queue.warm_up():
+        yield from perform(task)
+    if len(queue):
+        with remote_workers(scheduler) if scheduler else local_workers(min(num_workers, len(queue))) as client:
+            yield from on_workers(client, queue)

@@ -1,0 +1,119 @@
+"""The commands that run many runs: campaign, and the paper's comparison, reproduce."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from vedette.cli.errors import usage_error
+from vedette.cli.progress import CampaignProgress
+from vedette.cli.results import print_results
+from vedette.cli.running import check_planner, compile_if_cold, interruptible, processors
+
+if TYPE_CHECKING:
+    from vedette.campaigns import Campaign, Failed, Outcome
+
+_SHOWN_FAILURES = 10
+
+
+def campaign(
+    spec: Annotated[Path, typer.Argument(help="Campaign file (TOML): scenarios, planners, fields to sweep, runs.")],
+    out: Annotated[
+        Path | None, typer.Option("--out", metavar="DIR", help="Folder for the results; else named after the campaign.")
+    ] = None,
+    workers: Annotated[
+        int, typer.Option("--workers", min=0, help="Processes on this machine; 1: this one; 0: one a processor.")
+    ] = 0,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(
+            "--scheduler", metavar="ADDRESS", help="Dask scheduler, tcp://host:port, with workers of its own."
+        ),
+    ] = None,
+    runs: Annotated[
+        int | None, typer.Option("--runs", min=1, help="Runs of each cell, in place of the file's.")
+    ] = None,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what would be run, and stop.")] = False,
+) -> None:
+    """Run a campaign, or go on with one: every run that its folder does not hold yet."""
+    from vedette.campaigns import load_spec, resolve
+
+    resolved = resolve(load_spec(spec), spec.parent)
+    if runs is not None:
+        resolved = resolved.with_runs(runs)
+    if dry_run:
+        _describe(resolved)
+        return
+    folder = out or Path(f"{resolved.name}-results")
+    outcome = carry_out(resolved, folder, workers, scheduler)
+    typer.echo(f"{folder}: {outcome.num_landed + outcome.num_found} of {len(resolved.tasks)} runs")
+    typer.echo(f"next: vedette results {folder}; vedette report {folder}")
+    report_failures(outcome.failed)
+
+
+def reproduce(
+    scenario: Annotated[str, typer.Argument(help="Name of a built-in scenario, or a scenario file.")] = "paper-a",
+    planners: Annotated[
+        str, typer.Option("--planners", metavar="LIST", help="Strategies to compare; the first is the reference.")
+    ] = "jdm,idm,random",
+    runs: Annotated[int, typer.Option("--runs", min=1, help="Paired runs of each strategy.")] = 30,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of all runs.")] = 0,
+    workers: Annotated[int, typer.Option("--workers", min=0, help="Processes; 1: this one; 0: one a processor.")] = 0,
+    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for results, report and figures.")] = Path(
+        "reproduction"
+    ),
+) -> None:
+    """Compare strategies over paired runs, as the paper does: a campaign with its report, tables and figures."""
+    names = [name.strip() for name in planners.split(",")]
+    for name in names:
+        check_planner(name, "--planners")
+    if len(set(names)) != len(names):
+        raise usage_error(f"expected each strategy once; got {planners}", "--planners")
+    from vedette.campaigns import CampaignSpec, open_results, resolve
+    from vedette.reports import write_figures, write_report, write_summary
+
+    spec = CampaignSpec(
+        name="reproduction", scenarios=(scenario,), planners=tuple(names), runs=runs, seed=seed, compare="planner"
+    )
+    outcome = carry_out(resolve(spec), out, workers, None)
+    opened = open_results(out)
+    print_results(opened)
+    with interruptible(f"{out} keeps every run; the same command writes the report"):
+        write_summary(opened, out)
+        write_figures(opened, out / "figures")
+        write_report(opened, out / "report.html")
+    typer.echo(f"wrote {out}; open {out / 'report.html'}")
+    report_failures(outcome.failed)
+
+
+def carry_out(campaign: Campaign, folder: Path, workers: int, scheduler: str | None) -> Outcome:
+    """Run a campaign with its progress shown; Ctrl-C says how to go on."""
+    from vedette.campaigns import run_campaign
+
+    with interruptible(f"{folder} keeps every run that is finished; the same command goes on from there"):
+        compile_if_cold(campaign.cells[0].scenario)
+        with CampaignProgress(campaign) as progress:
+            return run_campaign(
+                campaign, folder, num_workers=workers or processors(), scheduler=scheduler, watch=progress
+            )
+
+
+def report_failures(failed: tuple[Failed, ...]) -> None:
+    """Name runs that could not be finished, and end with status 1 if there are any."""
+    if not failed:
+        return
+    typer.echo(f"{len(failed)} runs failed; the same command tries them again:", err=True)
+    for result in failed[:_SHOWN_FAILURES]:
+        typer.echo(f"  cell {result.cell}, run {result.run}: {result.message}", err=True)
+    raise typer.Exit(1)
+
+
+def _describe(campaign: Campaign) -> None:
+    typer.echo(f"{campaign.name}: {len(campaign.cells)} cells, {campaign.num_runs} runs each, seed {campaign.seed}")
+    for axis, values in campaign.axes.items():
+        compared = " (compared)" if axis == campaign.compare else ""
+        typer.echo(f"  {axis}: {', '.join(str(value) for value in values)}{compared}")
+    for cell in campaign.cells:
+        typer.echo(f"  - {cell.name}")

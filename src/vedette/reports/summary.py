@@ -1,0 +1,53 @@
+"""The tables of a report as text: Markdown for people, CSV for programs."""
+
+from __future__ import annotations
+
+import csv
+import io
+from pathlib import Path
+
+from vedette.errors import InputError
+from vedette.evaluation.tables import decisions_markdown, strategy_csv, strategy_markdown
+from vedette.files import write_whole
+from vedette.reports.groups import Group, gather
+from vedette.reports.source import Results
+
+MARKDOWN, CSV = "summary.md", "summary.csv"
+
+
+def write_summary(results: Results, folder: Path) -> tuple[Path, ...]:
+    """Write the comparison of every group into `summary.md` and, unrounded, `summary.csv`; returns both.
+
+    Raises:
+        InputError: the folder cannot be written.
+    """
+    groups = [group for group in gather(results) if group.comparison is not None]
+    contents = {MARKDOWN: "\n".join(map(_markdown, groups)), CSV: _csv(groups)}
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for name, text in contents.items():
+            write_whole(folder / name, lambda file, text=text: file.write(text.encode()))  # type: ignore[misc]
+    except OSError as error:
+        raise InputError(f"{folder}: expected a place to write a summary; got {error}") from error
+    return tuple(folder / name for name in contents)
+
+
+def _markdown(group: Group) -> str:
+    assert group.comparison is not None
+    parts = [f"## {group.title}\n" if group.title else "", strategy_markdown(group.comparison)]
+    if len(group.comparison.decision_times):
+        parts.append(decisions_markdown(group.comparison))
+    return "\n".join(part for part in parts if part)
+
+
+def _csv(groups: list[Group]) -> str:
+    """The tables of all groups under one header, the group's name in front."""
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    for number, group in enumerate(groups):
+        assert group.comparison is not None
+        header, *rows = csv.reader(io.StringIO(strategy_csv(group.comparison)))
+        if number == 0:
+            writer.writerow(["group", *header])
+        writer.writerows([group.name, *row] for row in rows)
+    return out.getvalue()
