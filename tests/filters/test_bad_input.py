@@ -12,7 +12,7 @@ import pytest
 from vedette import models
 from vedette.densities import GLMB, LMB, TrackTable, existence_probabilities
 from vedette.errors import InputError, ModelError, NumericalError
-from vedette.filters import DeltaGlmbFilter, Limits, LmbFilter
+from vedette.filters import CbMemberFilter, CphdFilter, DeltaGlmbFilter, Limits, LmbFilter, PhdFilter
 
 pytestmark = pytest.mark.lanes
 
@@ -21,6 +21,7 @@ REGION = models.Region(-100.0, 100.0, -100.0, 100.0)
 NEAR = [[10.0, 10.0]]
 KINDS = [DeltaGlmbFilter, LmbFilter]
 each_kind = pytest.mark.parametrize("kind", KINDS)
+every_kind = pytest.mark.parametrize("kind", [*KINDS, PhdFilter, CphdFilter, CbMemberFilter])
 
 
 @models.model_function("prob_detection")
@@ -91,7 +92,7 @@ def step(tracker: Any, scan: Any = NEAR, belief: Any = None, pose: Any = POSE, d
     return tracker.step(prior, scan, pose, dt, number, rng=np.random.default_rng(0))
 
 
-@each_kind
+@every_kind
 @pytest.mark.parametrize(
     ("scan", "message"),
     [
@@ -160,21 +161,21 @@ def test_beliefs(kind: Any) -> None:
         step(tracker, belief=type(tracker.initial()).empty(5))
 
 
-@each_kind
+@every_kind
 @pytest.mark.parametrize("pose", [np.zeros(2), np.zeros((1, 3)), [0.0, 0.0, math.nan], [math.inf, 0.0, 0.0], None, "x"])
 def test_poses(kind: Any, pose: Any) -> None:
     with pytest.raises(InputError, match=r"pose: expected .*; got"):
         step(make(kind), pose=pose)
 
 
-@each_kind
+@every_kind
 @pytest.mark.parametrize("dt", [0.0, -1.0, math.nan, math.inf, True, np.ones(2), "1", None])
 def test_time_steps(kind: Any, dt: Any) -> None:
     with pytest.raises(InputError, match=r"dt: expected a .*number.*; got"):
         step(make(kind), dt=dt)
 
 
-@each_kind
+@every_kind
 @pytest.mark.parametrize("number", [1.5, None, True, "1"])
 def test_steps(kind: Any, number: Any) -> None:
     with pytest.raises(InputError, match="step: expected a whole number; got"):
@@ -196,14 +197,14 @@ def first_belief(kind: Any) -> Any:
     return step(make(kind))[0]
 
 
-@each_kind
+@every_kind
 def test_a_model_that_raises(kind: Any) -> None:
     tracker = make(kind, detection=models.DetectionModel(raises, np.array([5.0])))
     with pytest.raises(ModelError, match="a model function raised ValueError: out of my depth"):
         step(tracker)
 
 
-@each_kind
+@every_kind
 @pytest.mark.parametrize("value", [1.5, -0.1, math.nan, math.inf])
 def test_probabilities_that_are_none(kind: Any, value: float) -> None:
     # Parameters cannot be NaN, so infinity less infinity stands in for one that a function works out.
@@ -218,7 +219,7 @@ def test_probabilities_that_are_none(kind: Any, value: float) -> None:
             )
 
 
-@each_kind
+@every_kind
 @pytest.mark.parametrize("noise", [negative_definite, nan_noise])
 def test_noise_that_is_none(kind: Any, noise: Any) -> None:
     with pytest.raises(ModelError, match="innovation covariance is not positive definite or not finite"):
@@ -231,7 +232,7 @@ def nowhere(state, pose, params, out):
         out[i] = math.inf
 
 
-@each_kind
+@every_kind
 def test_a_measurement_that_is_none(kind: Any) -> None:
     # Plain NumPy warns of the NaN before the filter looks at it.
     with pytest.raises(ModelError, match=r"measurement model: |RuntimeWarning: invalid value"):
@@ -248,7 +249,7 @@ def test_a_belief_that_is_no_density(kind: Any) -> None:
         step(tracker, belief=belief, number=1)
 
 
-@each_kind
+@every_kind
 def test_a_motion_to_nowhere(kind: Any) -> None:
     known = models.constant_velocity(1.0)
     motion = models.MotionModel(4, drifts_off, known.process_noise_cov, noise_params=known.noise_params)
@@ -256,7 +257,7 @@ def test_a_motion_to_nowhere(kind: Any) -> None:
         step(make(kind, motion=motion), belief=first_belief(kind), number=1)
 
 
-@each_kind
+@every_kind
 def test_a_clutter_intensity_without_bound(kind: Any) -> None:
     clutter = models.ClutterModel(1.0, given_intensity, np.array([math.inf]))
     with pytest.raises(ModelError, match="clutter model: log intensity is not a number below infinity"):
@@ -332,6 +333,8 @@ def test_more_targets_than_caps(kind: Any) -> None:
         ("max_search_nodes", (0,)),
         ("max_components", (0,)),
         ("max_labels", (0,)),
+        ("max_intensity_components", (0, 1.5)),
+        ("max_existence", (0.0, 1.0, -0.1, math.nan)),
         ("min_relative_weight", (-0.1, 1.0, math.nan)),
         ("min_component_weight", (-0.1, 1.0, math.nan)),
         ("min_existence", (-0.1, 1.0, math.nan)),
@@ -347,7 +350,7 @@ def test_limits_out_of_range(field: str, values: tuple[Any, ...]) -> None:
             dataclasses.replace(Limits(), **{field: value})
 
 
-@each_kind
+@every_kind
 def test_parts_that_do_not_fit(kind: Any) -> None:
     with pytest.raises(InputError, match=r"birth\.means: expected states of dimension 4, as the motion model; got 5"):
         make(kind, birth=birth(dim=5))

@@ -108,9 +108,16 @@ def sites(dim: int) -> st.SearchStrategy[list[Data]]:
 
 @st.composite
 def tracking(draw: st.DrawFn, num_sensors: int) -> Data:
-    kind = draw(st.sampled_from(["delta_glmb", "m_delta_glmb", "lmb"]))
-    gibbs = st.just({"kind": "ranked"}) if kind == "lmb" else section("gibbs", num_samples=counts)
-    limits = section(max_hypotheses=counts, min_relative_weight=st.floats(0.0, 0.5), gate_probability=inner)
+    without_labels = ("phd", "cphd", "cb_member") if num_sensors == 1 else ()
+    kind = draw(st.sampled_from(["delta_glmb", "m_delta_glmb", "lmb", *without_labels]))
+    gibbs = section("gibbs", num_samples=counts) if "glmb" in kind else st.just({"kind": "ranked"})
+    limits = section(
+        max_intensity_components=counts,
+        max_existence=inner,
+        max_hypotheses=counts,
+        min_relative_weight=st.floats(0.0, 0.5),
+        gate_probability=inner,
+    )
     method = st.sampled_from(["auto", "ekf", "ukf", "ckf"])
     weights = [1.0 / num_sensors] * num_sensors
     fusion = section(
@@ -123,10 +130,11 @@ def tracking(draw: st.DrawFn, num_sensors: int) -> Data:
             max_hypotheses=counts, max_components=st.integers(1, 4), merge_distance=st.none() | zero_or_more
         ),
     )
+    marginal = section("marginal", threshold=inner)
     return {
         "filter": {"kind": kind, **draw(section(gaussian_method=method, assignment=gibbs, limits=limits))},
-        "fusion": {"kind": "clmb" if kind == "lmb" else "cm_delta_glmb", **draw(fusion)},
-        "estimator": draw(st.just({"kind": "map"}) | section("marginal", threshold=inner)),
+        "fusion": {"kind": {"lmb": "clmb"}.get(kind, "cm_delta_glmb" if "glmb" in kind else "none"), **draw(fusion)},
+        "estimator": draw(st.just({"kind": "map"}) | marginal if "lmb" in kind else st.just({"kind": "map"})),
     }
 
 

@@ -13,7 +13,7 @@ import pytest
 from scenarios.minimal import changed
 from vedette.densities import GLMB, LMB
 from vedette.errors import InputError
-from vedette.filters import DeltaGlmbFilter, LmbFilter
+from vedette.filters import CbMemberFilter, CphdFilter, DeltaGlmbFilter, LmbFilter, PhdFilter
 from vedette.fusion import Clmb, CmDeltaGlmb
 from vedette.scenarios import Scenario, build, list_builtin, load_scenario, parse_scenario
 from vedette.scenarios.schema.tracking import Fusion, MarginalEstimator
@@ -176,6 +176,35 @@ def test_filters_of_each_kind() -> None:
     assert (gibbs.motion.method, gibbs.sensor.method, gibbs.limits.max_hypotheses) == ("ckf", "ckf", 9)
     lmb, _ = build.build_filters(scenario(("kind: m_delta_glmb", "kind: lmb"), ("kind: cm_delta_glmb", "kind: clmb")))
     assert isinstance(lmb, LmbFilter)
+
+
+ALONE = (
+    ("  - {name: south, position: [0.0, -40.0]}\n", ""),
+    ("kind: cm_delta_glmb, weights: [0.5, 0.5]", "kind: none"),
+    ("kind: marginal, threshold: 0.6", "kind: map"),
+)
+UNLABELLED = [("phd", PhdFilter), ("cphd", CphdFilter), ("cb_member", CbMemberFilter)]
+
+
+@pytest.mark.parametrize(("kind", "container"), UNLABELLED)
+def test_a_filter_without_labels_runs_alone_and_names_its_estimates_by_the_scan(kind: str, container: type) -> None:
+    text = f"kind: {kind}, limits: {{max_intensity_components: 7, max_existence: 0.5}}"
+    loaded = scenario(*ALONE, ("kind: m_delta_glmb", text))
+    (local,) = build.build_filters(loaded)
+    assert isinstance(local, container)
+    assert (local.limits.max_intensity_components, local.limits.max_existence) == (7, 0.5)
+    filters, beliefs, fused, _ = tracked(loaded, 8, np.random.default_rng(1))
+    estimate = build.build_estimator(loaded.model.estimator)(fused, 8)
+    estimate.validate()
+    assert estimate.labels.tolist() == [[8, i] for i in range(estimate.num_targets)]
+    poses = build.build_poses(loaded.model)
+    for planner in ("random", "fixed"):
+        build.build_planner(loaded.model, filters, planner).plan(beliefs, fused, poses, rng=np.random.default_rng(0))
+    for planner in ("jdm", "idm"):
+        with pytest.raises(
+            InputError, match=rf"^filter\.kind: expected .*, as planner {planner} needs labels; got {kind}"
+        ):
+            build.build_planner(loaded.model, filters, planner)
 
 
 def test_fusions_of_each_kind_have_weights_that_sum_to_one() -> None:

@@ -60,7 +60,7 @@ def truth_of(scenario: Scenario) -> Truth:
 
 
 def test_they_are_all_there_and_valid() -> None:
-    assert list(list_builtin()) == ["linear-10", "paper-a", "paper-e", "solent"]
+    assert list(list_builtin()) == ["linear-10", "paper-a", "paper-e", "polar-10", "solent"]
     for name in list_builtin():
         assert load_scenario(name).name == name
 
@@ -121,19 +121,22 @@ def test_every_choice_that_the_paper_leaves_open_is_a_field_with_its_default(row
     assert field_at(ScenarioModel.model_validate(least), path) == default
 
 
-def test_linear_10_has_ten_targets_inside_the_region_and_as_many_at_once() -> None:
-    scenario = load_scenario("linear-10")
-    truth = truth_of(scenario)
+@pytest.mark.parametrize(("name", "measures"), [("linear-10", "position"), ("polar-10", "bearing_range")])
+def test_ten_targets_inside_the_region_and_as_many_at_once(name: str, measures: str) -> None:
+    scenario = load_scenario(name)
+    truth, region = truth_of(scenario), scenario.model.region
     assert len(np.unique(truth.ids)) == 10
     assert np.diff(truth.offsets).max() == 10
-    assert np.abs(truth.states[:, :2]).max() < 1000.0
+    assert (truth.states[:, :2] > [region.x_min, region.y_min]).all()
+    assert (truth.states[:, :2] < [region.x_max, region.y_max]).all()
     sensor = scenario.model.sensors[0]
-    assert (sensor.measurement.kind, sensor.speed) == ("position", 0.0)
+    assert (sensor.measurement.kind, sensor.speed) == (measures, 0.0)
     assert len(scenario.model.birth.sites) == 4
 
 
-def test_linear_10s_targets_are_likely_births_of_its_sites() -> None:
-    model = load_scenario("linear-10").model
+@pytest.mark.parametrize("name", ["linear-10", "polar-10"])
+def test_the_targets_are_likely_births_of_the_sites(name: str) -> None:
+    model = load_scenario(name).model
     assert isinstance(model.targets, ScriptedTargets)
     for track in model.targets.tracks:
         distances = [

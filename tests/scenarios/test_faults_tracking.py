@@ -40,6 +40,22 @@ CASES = [
     ),
     (
         "kind: m_delta_glmb",
+        "kind: cphd, assignment: {kind: gibbs}, limits: {max_existence: 1.0, max_intensity_components: 0}",
+        [
+            'f.yaml:19:16: filter.kind: expected a filter with labels by which to fuse, as there are 2 sensors, got "cphd"',
+            'f.yaml:19:41: filter.assignment.kind: expected ranked, as the filter is cphd, got "gibbs"',
+            "f.yaml:19:73: filter.limits.max_existence: expected a number below 1, got 1.0",
+            "f.yaml:19:104: filter.limits.max_intensity_components: expected a number of at least 1, got 0",
+            'f.yaml:21:19: estimator.kind: expected map, as cphd filters have no labels, got "marginal"',
+        ],
+    ),
+    (
+        "  - {name: south, position: [0.0, -40.0]}\nfilter: {kind: m_delta_glmb}\nfusion: {kind: cm_delta_glmb, weights: [0.5, 0.5]}\nestimator: {kind: marginal, threshold: 0.6}",
+        "filter: {kind: phd}\nfusion: {kind: clmb}",
+        ['f.yaml:19:16: fusion.kind: expected none, as phd filters have no labels by which to fuse, got "clmb"'],
+    ),
+    (
+        "kind: m_delta_glmb",
         "kind: m_delta_glmb, assignment: murty",
         ['f.yaml:19:42: filter.assignment: expected a mapping, got "murty"'],
     ),
