@@ -3,9 +3,29 @@
 Every function returns a `matplotlib.figure.Figure`; `save_figure` writes it as PDF, SVG and PNG.
 """
 
+from vedette.evaluation.figures.consistency import consistency_figure
+from vedette.evaluation.figures.cost import cost_figure
+from vedette.evaluation.figures.distributions import distributions_figure
+from vedette.evaluation.figures.mean_rewards import mean_rewards_figure
 from vedette.evaluation.figures.ospa import ospa_figure
 from vedette.evaluation.figures.rewards import reward_figure
-from vedette.evaluation.figures.style import save_figure
+from vedette.evaluation.figures.roses import roses_figure
+from vedette.evaluation.figures.style import save_figure, svg_text
+from vedette.evaluation.figures.sweep import SweepCurve, sweep_figure
 from vedette.evaluation.figures.tracks import overview_figure, tracks_figure
 
-__all__ = ["ospa_figure", "overview_figure", "reward_figure", "save_figure", "tracks_figure"]
+__all__ = [
+    "SweepCurve",
+    "consistency_figure",
+    "cost_figure",
+    "distributions_figure",
+    "mean_rewards_figure",
+    "ospa_figure",
+    "overview_figure",
+    "reward_figure",
+    "roses_figure",
+    "save_figure",
+    "svg_text",
+    "sweep_figure",
+    "tracks_figure",
+]

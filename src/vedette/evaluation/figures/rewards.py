@@ -12,6 +12,7 @@ from vedette.errors import InputError
 from vedette.evaluation.figures.style import (
     COLUMN_WIDTH,
     HEAT_MAP,
+    MARKERS,
     colour,
     degrees_label,
     line_style,
@@ -19,8 +20,6 @@ from vedette.evaluation.figures.style import (
     styled,
 )
 from vedette.kernels.types import Floats
-
-_MARKERS = "osD^vP"
 
 
 @styled
@@ -56,7 +55,7 @@ def reward_figure(plan: Plan, *, pair: tuple[int, int] = (0, 1)) -> Figure:
 def _draw_curves(axes: Axes, plan: Plan) -> None:
     for table in plan.tables:
         for axis, sensor in enumerate(table.sensors):
-            mean, error = _best_over_others(table, axis)
+            mean, error = best_over_others(table, axis)
             _draw_curve(axes, plan, sensor, mean, error)
     joint = any(len(table.sensors) > 1 for table in plan.tables)
     axes.set_xlabel("Heading (deg)")
@@ -77,7 +76,7 @@ def _draw_curve(axes: Axes, plan: Plan, sensor: int, mean: Floats, error: Floats
         mean,
         color=shade,
         linestyle=line_style(sensor),
-        marker=_MARKERS[sensor % len(_MARKERS)],
+        marker=MARKERS[sensor % len(MARKERS)],
         markersize=6,
         markeredgecolor="black",
         markevery=[chosen],
@@ -88,7 +87,7 @@ def _draw_curve(axes: Axes, plan: Plan, sensor: int, mean: Floats, error: Floats
         axes.set_xticks(np.arange(-180, 181, 60))
 
 
-def _best_over_others(table: RewardTable, axis: int) -> tuple[Floats, Floats]:
+def best_over_others(table: RewardTable, axis: int) -> tuple[Floats, Floats]:
     """For each action on `axis`, the largest mean over all other axes, and the standard error of that entry."""
     mean = np.moveaxis(table.mean, axis, 0).reshape(table.mean.shape[axis], -1)
     error = np.moveaxis(table.standard_error, axis, 0).reshape(mean.shape)
@@ -97,14 +96,21 @@ def _best_over_others(table: RewardTable, axis: int) -> tuple[Floats, Floats]:
     return mean[rows, best], error[rows, best]
 
 
-def _draw_heat_map(figure: Figure, axes: Axes, plan: Plan, table: RewardTable, pair: tuple[int, int]) -> None:
+def best_over_pair(table: RewardTable, pair: tuple[int, int]) -> Floats:
+    """(num_actions of pair[0], num_actions of pair[1]) largest mean over the actions of all other sensors.
+
+    Raises `InputError` for what is not two sensors of the table.
+    """
     if pair[0] == pair[1] or not set(pair) <= set(table.sensors):
         raise InputError(f"pair: expected two of the sensors {table.sensors}; got {pair}")
     positions = [table.sensors.index(sensor) for sensor in pair]
     others = tuple(axis for axis in range(table.mean.ndim) if axis not in positions)
     reward = np.fmax.reduce(table.mean, axis=others) if others else table.mean
-    if positions[0] > positions[1]:
-        reward = reward.T
+    return reward.T if positions[0] > positions[1] else reward
+
+
+def _draw_heat_map(figure: Figure, axes: Axes, plan: Plan, table: RewardTable, pair: tuple[int, int]) -> None:
+    reward = best_over_pair(table, pair)
     image = axes.imshow(reward.T, origin="lower", cmap=HEAT_MAP, aspect="auto", interpolation="nearest")
     axes.grid(False)
     for axis, sensor in zip((axes.xaxis, axes.yaxis), pair, strict=True):

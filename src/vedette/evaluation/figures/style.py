@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 from collections.abc import Callable, Sequence
 from functools import wraps
@@ -23,6 +24,8 @@ TEXT_WIDTH = 7.16  # inches, of both columns
 BLUE, ORANGE, GREEN, PURPLE, SKY, VERMILION = "#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00"
 COLOURS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY)
 GREY = "#6E6E6E"
+INK = "#222222"
+MARKERS = "osD^vP"
 LINE_STYLES: tuple[Any, ...] = (
     "-",
     (0, (5, 1.5)),
@@ -91,6 +94,13 @@ def colour(index: int) -> str:
     return COLOURS[index % len(COLOURS)]
 
 
+def shown_decisions(number: int, most: int = 6) -> tuple[int, ...]:
+    """Indices of at most `most` of `number` decisions, evenly spread, the first and the last among them."""
+    if number <= most:
+        return tuple(range(number))
+    return tuple(round(place * (number - 1) / (most - 1)) for place in range(most))
+
+
 def line_style(index: int) -> Any:
     return LINE_STYLES[index % len(LINE_STYLES)]
 
@@ -114,6 +124,14 @@ def save_figure(figure: Figure, path: Path | str, *, formats: Sequence[str] = _F
         return tuple(_save(figure, stem.with_name(f"{stem.name}.{name}"), name) for name in formats)
     except OSError as error:
         raise InputError(f"path: expected a place to write figures; got {stem}: {error}") from error
+
+
+@styled
+def svg_text(figure: Figure) -> str:
+    """The figure as the text of an SVG file; the same figure gives the same text."""
+    out = io.StringIO()
+    figure.savefig(out, format="svg", metadata=_UNDATED["svg"])
+    return out.getvalue()
 
 
 def _save(figure: Figure, path: Path, name: str) -> Path:

@@ -14,11 +14,19 @@ from matplotlib.ticker import MaxNLocator
 from vedette.errors import InputError
 from vedette.evaluation.comparison import Comparison
 from vedette.evaluation.figures.ospa import draw_ospa
-from vedette.evaluation.figures.style import COLUMN_WIDTH, GREY, TEXT_WIDTH, colour, new_figure, strategy_label, styled
+from vedette.evaluation.figures.style import (
+    COLUMN_WIDTH,
+    GREY,
+    INK,
+    TEXT_WIDTH,
+    colour,
+    new_figure,
+    strategy_label,
+    styled,
+)
 from vedette.kernels.types import Floats
 from vedette.simulation.records import RunRecord
 
-_INK = "#222222"
 _LARGE = 5000.0  # m, beyond which axes are in kilometres
 _SENSOR_MARKERS = "sDpP*X"
 
@@ -101,9 +109,9 @@ def _positions(record: RunRecord) -> Floats:
 def _draw_truth(axes: Axes, record: RunRecord, scale: float) -> None:
     for target in np.unique(record.truth.ids):
         path = record.truth.states[record.truth.ids == target, :2] * scale
-        axes.plot(path[:, 0], path[:, 1], color=_INK, linewidth=0.9, zorder=2)
-        axes.plot(*path[0], marker="o", color=_INK, markerfacecolor="white", markersize=5, zorder=4)
-        axes.plot(*path[-1], marker="^", color=_INK, markerfacecolor="white", markersize=5, zorder=4)
+        axes.plot(path[:, 0], path[:, 1], color=INK, linewidth=0.9, zorder=2)
+        axes.plot(*path[0], marker="o", color=INK, markerfacecolor="white", markersize=5, zorder=4)
+        axes.plot(*path[-1], marker="^", color=INK, markerfacecolor="white", markersize=5, zorder=4)
 
 
 def _draw_estimates(axes: Axes, record: RunRecord, scale: float) -> None:
@@ -120,7 +128,7 @@ def _draw_sensor(axes: Axes, record: RunRecord, sensor: int, scale: float) -> No
     path = record.poses[:, sensor, :2] * scale
     axes.plot(path[:, 0], path[:, 1], color=GREY, linewidth=1.6, linestyle=(0, (2.5, 1)), zorder=5)
     marker = _SENSOR_MARKERS[sensor % len(_SENSOR_MARKERS)]
-    axes.plot(*path[0], marker=marker, color=_INK, markerfacecolor=GREY, markersize=9, zorder=6)
+    axes.plot(*path[0], marker=marker, color=INK, markerfacecolor=GREY, markersize=9, zorder=6)
     paper = {"boxstyle": "square,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.75}
     style: dict[str, Any] = {"textcoords": "offset points", "fontsize": 7, "zorder": 9, "bbox": paper}
     axes.annotate(f"S{sensor + 1}", _point(path[0]), xytext=(-6, 5), ha="right", **style)
@@ -135,12 +143,10 @@ def _draw_sensor(axes: Axes, record: RunRecord, sensor: int, scale: float) -> No
             place,
             xytext=tuple(ahead),
             textcoords="offset points",
-            arrowprops={"arrowstyle": "<|-", "color": _INK, "linewidth": 0.9, "shrinkA": 0, "shrinkB": 0},
+            arrowprops={"arrowstyle": "<|-", "color": INK, "linewidth": 0.9, "shrinkA": 0, "shrinkB": 0},
             zorder=7,
         )
-        axes.plot(
-            *place, marker="o", markersize=6.0, color=_INK, markerfacecolor="white", markeredgewidth=0.7, zorder=8
-        )
+        axes.plot(*place, marker="o", markersize=6.0, color=INK, markerfacecolor="white", markeredgewidth=0.7, zorder=8)
         axes.annotate(str(number), place, ha="center", va="center_baseline", fontsize=5, zorder=9)
 
 
@@ -150,7 +156,7 @@ def _point(values: Floats) -> tuple[float, float]:
 
 def tracks_legend(record: RunRecord) -> list[Line2D]:
     """What the marks mean, for a legend outside the axes."""
-    open_marker: dict[str, Any] = {"color": _INK, "markerfacecolor": "white", "markersize": 4.5, "linewidth": 0.9}
+    open_marker: dict[str, Any] = {"color": INK, "markerfacecolor": "white", "markersize": 4.5, "linewidth": 0.9}
     handles = [
         Line2D([], [], marker="o", label="target start", **open_marker),
         Line2D([], [], marker="^", label="target end", **open_marker),
@@ -160,7 +166,5 @@ def tracks_legend(record: RunRecord) -> list[Line2D]:
         ),
     ]
     if record.decisions:
-        handles.append(
-            Line2D([], [], linestyle="", marker="$\\rightarrow$", color=_INK, markersize=8, label="decision")
-        )
+        handles.append(Line2D([], [], linestyle="", marker="$\\rightarrow$", color=INK, markersize=8, label="decision"))
     return handles

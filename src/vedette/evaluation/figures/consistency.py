@@ -1,0 +1,57 @@
+"""Whether the estimates are as certain as they say, over time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullFormatter
+
+from vedette.errors import InputError
+from vedette.evaluation.figures.style import GREY, INK, colour, line_style, new_figure, strategy_label, styled
+from vedette.evaluation.metrics import AverageNees
+from vedette.kernels.types import Floats
+
+
+@styled
+def consistency_figure(times: Floats, position: Mapping[str, AverageNees]) -> Figure:
+    """Average NEES over the runs, divided by its dimension, against time.
+
+    A consistent filter is at 1; of the scans, 95 % then lie in the interval, drawn as a band (that of the first
+    strategy: its width follows from the number of pairs). Above it, estimates are worse than their covariances say.
+
+    Args:
+        times: (num_scans,) s.
+        position: for each strategy, the average at each scan.
+
+    Raises `InputError` for no strategy.
+    """
+    if not position:
+        raise InputError("position: expected the NEES of at least one strategy; got none")
+    figure = new_figure(2.2)
+    axes = figure.subplots()
+    for index, (strategy, average) in enumerate(position.items()):
+        axes.plot(
+            times,
+            average.mean / average.dim,
+            color=colour(index),
+            linestyle=line_style(index),
+            label=strategy_label(strategy),
+        )
+    _draw_interval(axes, times, next(iter(position.values())))
+    axes.set_yscale("log")
+    axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axes.yaxis.set_major_formatter("{x:g}")
+    axes.yaxis.set_minor_formatter(NullFormatter())
+    axes.set_xlim(times[0], times[-1])
+    axes.set_xlabel("Time (s)")
+    axes.set_ylabel("Position NEES / 2")
+    figure.legend(loc="outside upper center", ncols=min(len(position) + 1, 4))
+    return figure
+
+
+def _draw_interval(axes: Axes, times: Floats, average: AverageNees) -> None:
+    low, high = average.lower / average.dim, average.upper / average.dim
+    axes.fill_between(times, low, high, color=GREY, alpha=0.3, linewidth=0, label="95 % if consistent")
+    axes.axhline(1.0, color=INK, linewidth=0.6)

@@ -1,0 +1,84 @@
+"""How the error spreads over the runs, strategy by strategy, and run by run against the first strategy."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from vedette.evaluation.comparison import Comparison
+from vedette.evaluation.figures.style import GREY, INK, colour, new_figure, strategy_label, styled
+from vedette.evaluation.statistics import Summary, paired_difference
+from vedette.kernels.types import Floats
+
+_ROW = 0.36  # inches
+_GOLDEN = 0.6180339887498949
+
+
+@styled
+def distributions_figure(comparison: Comparison) -> Figure:
+    """The mean OSPA of every run, and below it every paired difference from the first strategy.
+
+    A dot is a run; the box holds the middle half of the runs and its line is their median; the diamond is the mean,
+    with its 95 % confidence interval in the lower panel, where an interval that holds 0 tells nothing apart.
+    """
+    strategies = comparison.strategies
+    others = strategies[1:]
+    rows = (len(strategies), len(others)) if others else (len(strategies),)
+    figure = new_figure(_ROW * sum(rows) + 0.62 * len(rows))
+    panels = figure.subplots(len(rows), 1, height_ratios=rows, squeeze=False)[:, 0]
+    for index, strategy in enumerate(strategies):
+        means = comparison.run_means(strategy)
+        _draw_runs(panels[0], means, len(strategies) - 1 - index, colour(index))
+        _draw_box(panels[0], means, len(strategies) - 1 - index)
+    _name_rows(panels[0], [strategy_label(name) for name in strategies])
+    panels[0].set_xlabel("Mean OSPA of a run (m)")
+    if others:
+        _draw_differences(panels[1], comparison)
+    return figure
+
+
+def _draw_differences(axes: Axes, comparison: Comparison) -> None:
+    reference, others = comparison.strategies[0], comparison.strategies[1:]
+    first = comparison.run_means(reference)
+    axes.axvline(0.0, color=INK, linewidth=0.8)
+    for index, strategy in enumerate(others):
+        row, means = len(others) - 1 - index, comparison.run_means(strategy)
+        _draw_runs(axes, means - first, row, colour(index + 1))
+        _draw_mean(axes, paired_difference(means, first).summary, row)
+    name = strategy_label(reference)
+    _name_rows(axes, [f"{strategy_label(strategy)} \N{MINUS SIGN} {name}" for strategy in others])
+    axes.set_xlabel(f"Paired difference (m), right of 0: {name} better")
+
+
+def _draw_runs(axes: Axes, values: Floats, row: int, shade: str) -> None:
+    """Dots spread over half the height of the row, always the same way, so that equal values can be told apart."""
+    spread = (np.arange(1, len(values) + 1) * _GOLDEN) % 1.0 - 0.5
+    axes.plot(
+        values, row + 0.55 * spread, linestyle="", marker="o", markersize=2.4, markeredgewidth=0, color=shade, alpha=0.6
+    )
+
+
+def _draw_box(axes: Axes, values: Floats, row: int) -> None:
+    low, middle, high = np.quantile(values, (0.25, 0.5, 0.75))
+    corners_x, corners_y = [low, high, high, low, low], [row - 0.36, row - 0.36, row + 0.36, row + 0.36, row - 0.36]
+    axes.plot(corners_x, corners_y, color=INK, linewidth=0.8)
+    axes.plot([middle, middle], [row - 0.36, row + 0.36], color=INK, linewidth=1.6)
+    axes.plot(values.mean(), row, marker="D", markersize=4, color=INK, markerfacecolor="white", markeredgewidth=0.8)
+
+
+def _draw_mean(axes: Axes, summary: Summary, row: int) -> None:
+    if summary.num_runs > 1:
+        axes.plot([summary.low, summary.high], [row, row], color=INK, linewidth=1.6)
+        for end in (summary.low, summary.high):
+            axes.plot([end, end], [row - 0.14, row + 0.14], color=INK, linewidth=1.0)
+    axes.plot(summary.mean, row, marker="D", markersize=4, color=INK, markerfacecolor="white", markeredgewidth=0.8)
+
+
+def _name_rows(axes: Axes, names: list[str]) -> None:
+    axes.set_yticks(range(len(names)), names[::-1])
+    axes.tick_params(axis="y", length=0)
+    axes.set_ylim(-0.6, len(names) - 0.4)
+    axes.grid(False, axis="y")
+    axes.spines["left"].set_visible(False)
+    axes.axhline(-0.6, color=GREY, linewidth=0.6)

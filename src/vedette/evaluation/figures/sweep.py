@@ -1,0 +1,79 @@
+"""The error against a number that a campaign varies."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from vedette.errors import InputError
+from vedette.evaluation.figures.style import MARKERS, colour, line_style, new_figure, strategy_label, styled
+from vedette.evaluation.statistics import Summary
+from vedette.kernels.types import Floats
+
+
+@dataclass(frozen=True, slots=True)
+class SweepCurve:
+    """One line of a sweep.
+
+    Attributes:
+        name: of the strategy.
+        values: (num_values,) the number that was varied.
+        errors: for each value the mean over runs of the runs' mean OSPA, m.
+    """
+
+    name: str
+    values: Floats
+    errors: tuple[Summary, ...]
+
+
+@styled
+def sweep_figure(curves: Sequence[SweepCurve], label: str) -> Figure:
+    """Mean OSPA over the runs against a varied number, with its 95 % confidence interval.
+
+    Args:
+        curves: one a strategy.
+        label: what was varied, for the axis.
+
+    Raises `InputError` for no curve.
+    """
+    if not curves:
+        raise InputError("curves: expected at least one; got none")
+    figure = new_figure(2.4)
+    axes = figure.subplots()
+    values = np.unique(np.concatenate([curve.values for curve in curves]))
+    logarithmic = _spans_decades(values)
+    for index, curve in enumerate(curves):
+        order = np.argsort(curve.values)
+        mean = np.array([float(curve.errors[i].mean) for i in order])
+        low, high = (np.array([float(getattr(curve.errors[i], end)) for i in order]) for end in ("low", "high"))
+        place = _beside(curve.values[order], index - (len(curves) - 1) / 2.0, values, logarithmic)
+        style = {"color": colour(index), "linestyle": line_style(index), "marker": MARKERS[index % len(MARKERS)]}
+        reach = np.nan_to_num(np.array([mean - low, high - mean]))
+        axes.errorbar(
+            place, mean, yerr=reach, markersize=4, capsize=2, elinewidth=0.9, label=strategy_label(curve.name), **style
+        )
+    if logarithmic:
+        axes.set_xscale("log")
+    axes.set_xticks(values, [f"{value:g}" for value in values])
+    axes.minorticks_off()
+    axes.set_ylim(bottom=0.0)
+    axes.set_xlabel(label)
+    axes.set_ylabel("Mean OSPA (m)")
+    figure.legend(loc="outside upper center", ncols=min(len(curves), 4))
+    return figure
+
+
+def _spans_decades(values: Floats) -> bool:
+    return bool(len(values) > 2 and values[0] > 0.0 and values[-1] / values[0] >= 20.0)
+
+
+def _beside(at: Floats, offset: float, values: Floats, logarithmic: bool) -> Floats:
+    """Moved a little sideways, so that the intervals of several curves at one value do not hide one another."""
+    if len(values) < 2:
+        return at
+    if logarithmic:
+        return np.asarray(at * np.exp(0.04 * offset * float(np.diff(np.log(values)).min())))
+    return at + 0.04 * offset * float(np.diff(values).min())
