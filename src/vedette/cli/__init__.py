@@ -9,6 +9,7 @@ import typer
 from vedette import __version__
 from vedette.cli.campaign import campaign, reproduce
 from vedette.cli.errors import Commands
+from vedette.cli.reporting import report
 from vedette.cli.results import results
 from vedette.cli.running import run
 from vedette.cli.scenario_files import check, init, list_, schema
@@ -48,3 +49,4 @@ app.command()(run)
 app.command()(reproduce)
 app.command()(campaign)
 app.command()(results)
+app.command()(report)

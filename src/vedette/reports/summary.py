@@ -6,16 +6,16 @@ import csv
 import io
 from pathlib import Path
 
+from vedette.campaigns.results import CampaignResults
 from vedette.errors import InputError
 from vedette.evaluation.tables import decisions_markdown, strategy_csv, strategy_markdown
 from vedette.files import write_whole
 from vedette.reports.groups import Group, gather
-from vedette.reports.source import Results
 
 MARKDOWN, CSV = "summary.md", "summary.csv"
 
 
-def write_summary(results: Results, folder: Path) -> tuple[Path, ...]:
+def write_summary(results: CampaignResults, folder: Path) -> tuple[Path, ...]:
     """Write the comparison of every group into `summary.md` and, unrounded, `summary.csv`; returns both.
 
     Raises:

@@ -1,0 +1,44 @@
+"""The command that reports on a campaign."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from vedette.cli.errors import usage_error
+
+
+def report(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Results folder of a campaign, finished or not.")],
+    out: Annotated[
+        Path | None, typer.Option("--out", metavar="FILE", help="Where the page goes; else report.html in the folder.")
+    ] = None,
+    figures: Annotated[
+        Path | None, typer.Option("--figures", metavar="DIR", help="Write the figures too, as PDF, SVG and PNG.")
+    ] = None,
+    runs: Annotated[
+        str | None,
+        typer.Option("--runs", metavar="CELL:RUN,...", help="Runs to replay; else the typical one of each strategy."),
+    ] = None,
+) -> None:
+    """Report on a campaign: one page that opens anywhere, with tables, figures and a replay of runs."""
+    replays = None if runs is None else [_cell_and_run(text) for text in runs.split(",")]
+    from vedette.campaigns.results import open_results
+    from vedette.reports import write_figures, write_report
+
+    results = open_results(folder)
+    page = out or folder / "report.html"
+    write_report(results, page, replays=replays)
+    typer.echo(f"wrote {page}")
+    if figures is not None:
+        written = write_figures(results, figures)
+        typer.echo(f"wrote {len(written)} files to {figures}")
+
+
+def _cell_and_run(text: str) -> tuple[str, int]:
+    cell, colon, run = text.strip().rpartition(":")
+    if not colon or not cell or not (run.isascii() and run.isdigit()):
+        raise usage_error(f"expected CELL:RUN, such as jdm:0; got {text.strip()!r}", "--runs")
+    return cell, int(run)

@@ -1,0 +1,7 @@
+"""A campaign's results as one page that opens anywhere, and as figures for a paper."""
+
+from vedette.reports.saving import write_figures
+from vedette.reports.summary import write_summary
+from vedette.reports.writing import write_report
+
+__all__ = ["write_figures", "write_report", "write_summary"]

@@ -1,0 +1,183 @@
+"""The figures of a report: the same ones on the page and in files."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from vedette.campaigns.cells import Campaign, Cell
+from vedette.errors import InputError
+from vedette.evaluation import Comparison, Summary, summarise
+from vedette.evaluation.figures import (
+    SweepCurve,
+    consistency_figure,
+    cost_figure,
+    distributions_figure,
+    mean_rewards_figure,
+    ospa_figure,
+    roses_figure,
+    sweep_figure,
+    tracks_figure,
+)
+from vedette.evaluation.reproduction import typical_run
+from vedette.kernels.types import Floats
+from vedette.reports.groups import Group, Strategy, axis_label, describe_settings
+from vedette.reports.tables import nees_over_runs, stage_seconds
+from vedette.simulation.records import RunRecord
+
+
+@dataclass(frozen=True, slots=True)
+class Drawing:
+    """A figure with its words.
+
+    Attributes:
+        name: fit for a file name.
+        title: heading.
+        caption: what is drawn, and what the bands and marks are.
+        figure: of Matplotlib.
+    """
+
+    name: str
+    title: str
+    caption: str
+    figure: Figure
+
+    @property
+    def is_wide(self) -> bool:
+        """Whether it wants the width of a page rather than of a column."""
+        return bool(self.figure.get_figwidth() > 5.0)
+
+
+def group_drawings(group: Group) -> Iterator[Drawing]:
+    """Every figure that the runs of a group give."""
+    if group.comparison is not None:
+        yield from _error_drawings(group.comparison)
+    yield from _reward_drawings(group)
+    if any(metrics.num_scans for each in group.strategies for metrics in each.metrics):
+        yield _consistency_drawing(group.strategies)
+    spent = {each.label: stage_seconds(each) for each in group.strategies}
+    if any(spent.values()):
+        caption = (
+            "Wall time of each stage, a scan or a decision: median, and the range from the 5th to the 95th percentile."
+        )
+        yield Drawing("cost", "Cost", caption, cost_figure({name: stages for name, stages in spent.items() if stages}))
+    for strategy, record in typical_records(group):
+        caption = f"Run {record.run}, the typical one of {strategy.name}: its mean OSPA is the median."
+        figure = tracks_figure(record, titles=(f"{strategy.name}, run {record.run}",))
+        yield Drawing(f"tracks-{strategy.cell.name}", f"Tracks, {strategy.name}", caption, figure)
+
+
+def _error_drawings(comparison: Comparison) -> Iterator[Drawing]:
+    bands = "bands of one standard error" if comparison.num_runs > 1 else "one run, so no bands"
+    yield Drawing(
+        "ospa",
+        "OSPA against time",
+        f"Mean OSPA over {comparison.num_runs} paired runs with its localisation and cardinality parts; {bands}.",
+        ospa_figure(comparison, parts=("total", "localisation", "cardinality")),
+    )
+    differences = (
+        " Below: the paired differences with mean and 95 % confidence interval; an interval that holds 0 tells "
+        "nothing apart."
+        if len(comparison.strategies) > 1
+        else ""
+    )
+    yield Drawing(
+        "distributions",
+        "Run by run",
+        "Mean OSPA of each run. A dot is a run, the box holds the middle half with the median, the diamond is the "
+        f"mean.{differences}",
+        distributions_figure(comparison),
+    )
+    if any(any(runs) for runs in comparison.headings):
+        yield Drawing(
+            "headings",
+            "Where the sensors were sent",
+            "Share of the runs that chose each heading at each decision; areas are in proportion to shares.",
+            roses_figure(comparison),
+        )
+
+
+def _reward_drawings(group: Group) -> Iterator[Drawing]:
+    for strategy in group.strategies:
+        figure = _rewards(strategy.records)
+        if figure is not None:
+            caption = (
+                f"Rewards that {strategy.name} decided on, averaged over {len(strategy.records)} runs. The area of a "
+                "mark is the share of the runs that chose the action; joint rewards of more than two sensors are the "
+                "largest over the others."
+            )
+            yield Drawing(f"rewards-{strategy.cell.name}", f"Rewards, {strategy.name}", caption, figure)
+
+
+def _rewards(records: Sequence[RunRecord]) -> Figure | None:
+    """None for strategies that weigh no actions, or whose runs had different ones to weigh."""
+    try:
+        return mean_rewards_figure(records)
+    except InputError:
+        return None
+
+
+def typical_records(group: Group) -> tuple[tuple[Strategy, RunRecord], ...]:
+    """Of each strategy, the run whose mean OSPA is the median; without a comparison, its first run."""
+    found = []
+    for strategy in group.strategies:
+        if group.comparison is None:
+            record = strategy.records[0]
+        else:
+            record = typical_run(group.comparison, strategy.records, strategy.label)
+        found.append((strategy, record))
+    return tuple(found)
+
+
+def _consistency_drawing(strategies: Sequence[Strategy]) -> Drawing:
+    times = next(record.times for each in strategies for record in each.records)
+    averages = {each.label: nees_over_runs(each, 2) for each in strategies}
+    caption = (
+        "Normalised squared error of the estimated positions, averaged over the runs; 1 where covariances are right. "
+        "Band: where 95 % of the averages of a consistent filter lie."
+    )
+    return Drawing("consistency", "Consistency", caption, consistency_figure(times, averages))
+
+
+def sweep_drawings(campaign: Campaign, errors: Mapping[str, Floats]) -> Iterator[Drawing]:
+    """Mean OSPA against every axis that is a number with several values.
+
+    Args:
+        errors: for each cell by its name, the mean OSPA of its paired runs, m; cells without are left out.
+    """
+    cells = [cell for cell in campaign.cells if cell.name in errors]
+    for axis, values in campaign.axes.items():
+        if len(values) < 2 or not all(
+            isinstance(value, int | float) and not isinstance(value, bool) for value in values
+        ):
+            continue
+        panels = _panels(campaign, cells, axis)
+        for number, (shared, curves) in enumerate(panels.items()):
+            drawn = [SweepCurve(name, *_curve(line, axis, errors)) for name, line in curves.items()]
+            if max(len(curve.values) for curve in drawn) < 2:
+                continue
+            label, suffix = axis_label(axis), f"-{number + 1}" if len(panels) > 1 else ""
+            where = f" ({shared})" if shared else ""
+            caption = f"Mean OSPA over the runs against {label}{where}; bars are 95 % confidence intervals."
+            name = f"sweep-{label.replace(' ', '-')}{suffix}"
+            yield Drawing(name, f"Sweep of {label}{where}", caption, sweep_figure(drawn, label.capitalize()))
+
+
+def _panels(campaign: Campaign, cells: Sequence[Cell], axis: str) -> dict[str, dict[str, list[Cell]]]:
+    """For each setting of the other axes, for each strategy, its cells along the axis."""
+    others = [name for name, values in campaign.axes.items() if len(values) > 1 and name != axis]
+    lines = campaign.compare if campaign.compare in others else ("planner" if "planner" in others else "")
+    panels: dict[str, dict[str, list[Cell]]] = {}
+    for cell in cells:
+        shared = describe_settings({name: cell.settings[name] for name in others if name != lines})
+        curve = str(cell.settings[lines]) if lines else cell.planner
+        panels.setdefault(shared, {}).setdefault(curve, []).append(cell)
+    return panels
+
+
+def _curve(cells: Sequence[Cell], axis: str, errors: Mapping[str, Floats]) -> tuple[Floats, tuple[Summary, ...]]:
+    values = np.array([float(cell.settings[axis]) for cell in cells])
+    return values, tuple(summarise(errors[cell.name]) for cell in cells)

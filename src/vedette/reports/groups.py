@@ -1,0 +1,147 @@
+"""The runs of a campaign, gathered by what is compared."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from vedette.campaigns.cells import Campaign, Cell
+from vedette.campaigns.results import CampaignResults
+from vedette.errors import InputError
+from vedette.evaluation import Comparison, RunMetrics
+from vedette.evaluation.comparison import scored
+from vedette.evaluation.figures.style import strategy_label
+from vedette.kernels.types import Bools
+from vedette.simulation.records import RunRecord
+
+
+@dataclass(frozen=True, slots=True)
+class Strategy:
+    """One cell of a group with its runs.
+
+    Attributes:
+        cell: strategy and setting.
+        label: its value of the compared axis, as text.
+        num_finished: runs that there are.
+        records, metrics: of the runs that the group has in common; of all finished runs where it has none in common.
+    """
+
+    cell: Cell
+    label: str
+    num_finished: int
+    records: tuple[RunRecord, ...]
+    metrics: tuple[RunMetrics, ...]
+
+    @property
+    def name(self) -> str:
+        """The label as a reader should see it."""
+        return strategy_label(self.label)
+
+
+@dataclass(frozen=True, slots=True)
+class Group:
+    """Strategies that differ in the compared axis alone.
+
+    Attributes:
+        name: fit for a file name and an anchor; unique in the campaign.
+        title: what sets the group apart from the others.
+        strategies: in the order of the specification, those without a finished run left out.
+        missing: labels of those left out.
+        comparison: over the runs in common, its strategies named by their labels; None where there are none.
+        reason: why there is no comparison, or nothing.
+    """
+
+    name: str
+    title: str
+    strategies: tuple[Strategy, ...]
+    missing: tuple[str, ...]
+    comparison: Comparison | None
+    reason: str
+
+    @property
+    def counted(self) -> Bools:
+        """(num_scans,) whether a scan counts in means over time; all of them without a comparison."""
+        if self.comparison is not None:
+            return self.comparison.counted
+        return np.ones(max((record.num_scans for each in self.strategies for record in each.records), default=0), bool)
+
+
+def gather(results: CampaignResults) -> Iterator[Group]:
+    """Every group in the order of the specification, its runs read when it is asked for."""
+    campaign = results.campaign
+    taken: set[str] = set()
+    for cells in campaign.groups():
+        shared = {axis: value for axis, value in cells[0].settings.items() if axis != campaign.compare}
+        yield _group(results, cells, _unused(_slug(campaign, shared), taken), _title(campaign, shared))
+
+
+def _group(results: CampaignResults, cells: tuple[Cell, ...], name: str, title: str) -> Group:
+    axis = results.campaign.compare
+    labels = {cell.name: _label(axis, cell.settings[axis]) for cell in cells}
+    finished = {cell.name: results.finished(cell.name) for cell in cells}
+    common = sorted(set.intersection(*(set(runs) for runs in finished.values())))
+    strategies = []
+    for cell in cells:
+        runs = [results.run(cell.name, run) for run in common or finished[cell.name]]
+        if runs:
+            records, metrics = tuple(run.record for run in runs), tuple(run.metrics for run in runs)
+            strategies.append(Strategy(cell, labels[cell.name], len(finished[cell.name]), records, metrics))
+    missing = tuple(label for cell, label in labels.items() if not finished[cell])
+    paired = {each.label: each.records for each in strategies}
+    comparison, reason = None, "no run number is finished for every one of them yet"
+    if common:
+        try:
+            comparison, reason = scored(cells[0].scenario, paired), ""
+        except InputError as error:  # such as scenarios compared with one another
+            reason = str(error)
+    return Group(name, title, tuple(strategies), missing, comparison, reason)
+
+
+def varying_axes(campaign: Campaign) -> tuple[str, ...]:
+    """Axes with several values, the compared one left out."""
+    return tuple(axis for axis, values in campaign.axes.items() if len(values) > 1 and axis != campaign.compare)
+
+
+def describe_settings(settings: Mapping[str, Any]) -> str:
+    """Axis and value, in words: `paper-a, fusion clmb, clutter rate 20`."""
+    return ", ".join(
+        str(value) if axis in ("scenario", "variant") else f"{axis_label(axis)} {_short(value)}"
+        for axis, value in settings.items()
+    )
+
+
+def _label(axis: str, value: Any) -> str:
+    """A value of the compared axis as text; a bare number says nothing without its axis."""
+    return f"{axis_label(axis)} {_short(value)}" if isinstance(value, bool | int | float) else str(value)
+
+
+def _short(value: Any) -> str:
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def axis_label(axis: str) -> str:
+    """The last two parts of a field's path, or the name of an axis, in words: `clutter rate`."""
+    parts = [part for part in axis.split(".") if part != "*" and not part.isdigit()]
+    return " ".join(parts[-2:]).replace("_", " ")
+
+
+def _title(campaign: Campaign, shared: Mapping[str, Any]) -> str:
+    varying = varying_axes(campaign)
+    return describe_settings({axis: value for axis, value in shared.items() if axis in varying or axis == "scenario"})
+
+
+def _slug(campaign: Campaign, shared: Mapping[str, Any]) -> str:
+    parts = [str(value) for axis, value in shared.items() if axis in varying_axes(campaign)]
+    return re.sub(r"[^A-Za-z0-9.]+", "-", "-".join(parts)).strip("-.") or "all"
+
+
+def _unused(name: str, taken: set[str]) -> str:
+    fresh, number = name, 2
+    while fresh in taken:
+        fresh, number = f"{name}-{number}", number + 1
+    taken.add(fresh)
+    return fresh

@@ -1,0 +1,28 @@
+// The runs that can be replayed, and numbers as a reader wants them.
+const runs = JSON.parse(document.getElementById("runs").textContent);
+
+const minus = (text) => text.replace("-", "\u2212");
+const fixed = (value, digits) => minus(value.toFixed(digits));
+const bounded = (value, low, high) => Math.min(high, Math.max(low, value));
+const degrees = (radians) => minus(String(Math.round((radians * 180) / Math.PI)));
+
+const extentOf = (run) => Math.max(run.extent[1] - run.extent[0], run.extent[3] - run.extent[2]);
+const unitOf = (run) => (extentOf(run) > 5000 ? { name: "km", metres: 1000 } : { name: "m", metres: 1 });
+
+// Distances with the digits that the size of the scene deserves.
+const metres = (value, run) => (unitOf(run).metres === 1000 ? `${fixed(value / 1000, 2)} km` : `${fixed(value, 1)} m`);
+
+const labelsOf = new Map();
+// The place of a label among all labels of its run, which gives its colour.
+function placeOfLabel(run, label) {
+  if (!labelsOf.has(run)) {
+    const key = (text) => text.split(".").map(Number);
+    const all = [...new Set(run.estimates.flat().map((estimate) => estimate[0]))];
+    all.sort((a, b) => key(a)[0] - key(b)[0] || key(a)[1] - key(b)[1]);
+    labelsOf.set(run, new Map(all.map((text, place) => [text, place])));
+  }
+  return labelsOf.get(run).get(label);
+}
+
+// The last decision at or before a scan, or undefined.
+const decisionAt = (run, step) => run.decisions.filter((decision) => decision.scan <= step).at(-1);

@@ -1,0 +1,152 @@
+// One scan of a run in the plane.
+function drawScene(canvas, run, step, show) {
+  const { context, width, height } = prepared(canvas);
+  const view = viewOf(run, width, height);
+  if (view.scale <= 0) return view; // not laid out yet
+  drawAxes(context, run, view, width, height);
+  context.save();
+  context.beginPath();
+  context.rect(MARGIN.left, MARGIN.top, view.inner.width, view.inner.height);
+  context.clip();
+  drawRegion(context, run, view);
+  if (show.measurements) run.sensors.forEach((_, s) => drawMeasurements(context, run, view, step, s));
+  if (show.trails) drawTrails(context, run, view, step);
+  run.sensors.forEach((_, s) => drawSensor(context, run, view, step, s));
+  run.truth[step].forEach((target) => drawTarget(context, view, target, show));
+  run.estimates[step].forEach((estimate) => drawEstimate(context, run, view, estimate, show));
+  context.restore();
+  return view;
+}
+
+function drawRegion(context, run, view) {
+  const [xMin, xMax, yMin, yMax] = run.region;
+  context.strokeStyle = colours.grey;
+  context.setLineDash([5, 4]);
+  context.strokeRect(view.x(xMin), view.y(yMax), view.x(xMax) - view.x(xMin), view.y(yMin) - view.y(yMax));
+  context.setLineDash([]);
+}
+
+function drawTrails(context, run, view, step) {
+  context.lineWidth = 1.2;
+  context.strokeStyle = colours.ink;
+  const paths = new Map();
+  for (let scan = 0; scan <= step; scan += 1) {
+    for (const [target, x, y] of run.truth[scan]) {
+      if (!paths.has(target)) paths.set(target, []);
+      paths.get(target).push([x, y]);
+    }
+  }
+  for (const path of paths.values()) polyline(context, view, path);
+  for (let scan = 0; scan <= step; scan += 1) {
+    for (const [label, x, y] of run.estimates[scan]) {
+      context.fillStyle = seriesColour(placeOfLabel(run, label));
+      context.globalAlpha = 0.55;
+      disc(context, view.x(x), view.y(y), 1.6);
+    }
+  }
+  context.globalAlpha = 1;
+  context.strokeStyle = colours.grey;
+  context.lineWidth = 2;
+  context.setLineDash([6, 3]);
+  run.sensors.forEach((_, s) => polyline(context, view, run.poses.slice(0, step + 1).map((poses) => poses[s])));
+  context.setLineDash([]);
+}
+
+function polyline(context, view, path) {
+  context.beginPath();
+  path.forEach(([x, y], place) => (place ? context.lineTo(view.x(x), view.y(y)) : context.moveTo(view.x(x), view.y(y))));
+  context.stroke();
+}
+
+function disc(context, x, y, radius) {
+  context.beginPath();
+  context.arc(x, y, radius, 0, 2 * Math.PI);
+  context.fill();
+}
+
+function drawMeasurements(context, run, view, step, s) {
+  const [x, y] = run.poses[step][s];
+  const kind = run.sensors[s].kind;
+  for (const [origin, u, v] of (run.scans[step] ?? [])[s] ?? []) {
+    context.strokeStyle = seriesColour(s);
+    context.globalAlpha = origin ? 0.95 : 0.45;
+    context.lineWidth = origin ? 1.6 : 1;
+    if (kind === "ray") {
+      const reach = 2 * extentOf(run) * view.scale;
+      line(context, view.x(x), view.y(y), view.x(x) + reach * Math.cos(u), view.y(y) - reach * Math.sin(u));
+    } else if (kind === "circle") {
+      context.beginPath();
+      context.arc(view.x(x), view.y(y), Math.max(u, 0) * view.scale, 0, 2 * Math.PI);
+      context.stroke();
+    } else if (kind !== "none") {
+      const size = origin ? 4 : 2.5;
+      line(context, view.x(u) - size, view.y(v) - size, view.x(u) + size, view.y(v) + size);
+      line(context, view.x(u) - size, view.y(v) + size, view.x(u) + size, view.y(v) - size);
+    }
+  }
+  context.globalAlpha = 1;
+}
+
+function drawSensor(context, run, view, step, s) {
+  const [x, y, heading] = run.poses[step][s];
+  const { range, half_width: halfWidth, name } = run.sensors[s];
+  const [px, py] = [view.x(x), view.y(y)];
+  if (range !== undefined) {
+    context.fillStyle = seriesColour(s);
+    context.globalAlpha = 0.08;
+    context.beginPath();
+    if (halfWidth !== undefined && halfWidth < Math.PI) context.moveTo(px, py);
+    const spread = halfWidth ?? Math.PI;
+    context.arc(px, py, range * view.scale, -heading - spread, -heading + spread);
+    context.fill();
+    context.globalAlpha = 1;
+  }
+  context.strokeStyle = colours.ink;
+  context.fillStyle = seriesColour(s);
+  context.lineWidth = 1.5;
+  const [tipX, tipY] = [px + 20 * Math.cos(heading), py - 20 * Math.sin(heading)];
+  line(context, px, py, tipX, tipY);
+  for (const side of [2.6, -2.6]) {
+    line(context, tipX, tipY, tipX + 6 * Math.cos(heading + side), tipY - 6 * Math.sin(heading + side));
+  }
+  context.fillRect(px - 5.5, py - 5.5, 11, 11);
+  context.strokeRect(px - 5.5, py - 5.5, 11, 11);
+  mark(context, name.length > 6 ? `S${s + 1}` : name, px, py + 17, colours.ink);
+}
+
+function drawTarget(context, view, [target, x, y], show) {
+  context.strokeStyle = colours.ink;
+  context.fillStyle = colours.paper;
+  context.lineWidth = 1.6;
+  disc(context, view.x(x), view.y(y), 4);
+  context.stroke();
+  if (show.labels) mark(context, `T${target}`, view.x(x) - 13, view.y(y) - 10, colours.ink);
+}
+
+function drawEstimate(context, run, view, [label, x, y, , long, short, angle], show) {
+  const shade = seriesColour(placeOfLabel(run, label));
+  context.strokeStyle = shade;
+  context.fillStyle = shade;
+  context.lineWidth = 1.4;
+  if (show.ellipses) {
+    context.beginPath();
+    context.ellipse(view.x(x), view.y(y), long * view.scale, short * view.scale, -angle, 0, 2 * Math.PI);
+    context.globalAlpha = 0.18;
+    context.fill();
+    context.globalAlpha = 1;
+    context.stroke();
+  }
+  disc(context, view.x(x), view.y(y), 3);
+  if (show.labels) mark(context, label, view.x(x) + 13, view.y(y) + 12, shade);
+}
+
+// Text that stays legible over whatever is behind it.
+function mark(context, text, x, y, shade) {
+  context.textAlign = "center";
+  context.textBaseline = "middle";
+  context.lineWidth = 3;
+  context.strokeStyle = colours.paper;
+  context.strokeText(text, x, y);
+  context.fillStyle = shade;
+  context.fillText(text, x, y);
+}

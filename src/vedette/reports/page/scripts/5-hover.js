@@ -1,0 +1,66 @@
+// What lies under the pointer, in words.
+const REACH = 12; // pixels
+
+function describeAt(run, step, view, x, y, show) {
+  const found = [];
+  const near = (east, north, reach = REACH) => Math.hypot(view.x(east) - x, view.y(north) - y) <= reach;
+  for (const [target, east, north, ...velocity] of run.truth[step]) {
+    if (near(east, north)) found.push(describeTarget(run, target, east, north, velocity));
+  }
+  for (const estimate of run.estimates[step]) {
+    if (near(estimate[1], estimate[2])) found.push(describeEstimate(run, estimate));
+  }
+  run.poses[step].forEach(([east, north, heading], s) => {
+    if (near(east, north)) {
+      const at = `${metres(east, run)}, ${metres(north, run)}`;
+      found.push(`${run.sensors[s].name}: at ${at}, heading ${degrees(heading)}\u00b0`);
+    }
+  });
+  if (show.measurements && found.length < 3) found.push(...measurementsAt(run, step, view, x, y).slice(0, 3));
+  return found;
+}
+
+function describeTarget(run, target, east, north, velocity) {
+  const speed = velocity.length > 1 ? `, speed ${fixed(Math.hypot(velocity[0], velocity[1]), 1)} m/s` : "";
+  return `target ${target}: at ${metres(east, run)}, ${metres(north, run)}${speed}`;
+}
+
+function describeEstimate(run, [label, east, north, existence, long, short, , target, error]) {
+  const of = target ? `${metres(error, run)} from target ${target}` : "false: no target is matched";
+  const at = `${metres(east, run)}, ${metres(north, run)}`;
+  const size = `2\u03c3 ${metres(long, run)} by ${metres(short, run)}`;
+  return `estimate ${label}: ${of}; existence ${existence.toFixed(3)}; at ${at}; ${size}`;
+}
+
+function measurementsAt(run, step, view, x, y) {
+  const found = [];
+  run.sensors.forEach(({ kind, name }, s) => {
+    const [east, north] = run.poses[step][s];
+    const [px, py] = [view.x(east), view.y(north)];
+    for (const [origin, u, v] of (run.scans[step] ?? [])[s] ?? []) {
+      const what = origin ? `detection of target ${origin}` : "clutter";
+      if (distanceTo(kind, view, x, y, px, py, u, v) <= REACH / 2) {
+        found.push(`${what} of ${name}: ${describeMeasurement(run, kind, east, north, u, v)}`);
+      }
+    }
+  });
+  return found;
+}
+
+// Pixels from the pointer to a measurement: a point, a ray from the sensor, or a circle around it.
+function distanceTo(kind, view, x, y, px, py, u, v) {
+  if (kind === "circle") return Math.abs(Math.hypot(x - px, y - py) - u * view.scale);
+  if (kind === "ray") {
+    const along = (x - px) * Math.cos(u) - (y - py) * Math.sin(u);
+    const across = (x - px) * Math.sin(u) + (y - py) * Math.cos(u);
+    return along < 0 ? Infinity : Math.abs(across);
+  }
+  return kind === "none" ? Infinity : Math.hypot(view.x(u) - x, view.y(v) - y);
+}
+
+function describeMeasurement(run, kind, east, north, u, v) {
+  if (kind === "ray") return `bearing ${degrees(u)}\u00b0`;
+  if (kind === "circle") return `range ${metres(u, run)}`;
+  if (kind === "position") return `at ${metres(u, run)}, ${metres(v, run)}`;
+  return `bearing ${degrees(Math.atan2(v - north, u - east))}\u00b0, range ${metres(Math.hypot(u - east, v - north), run)}`;
+}

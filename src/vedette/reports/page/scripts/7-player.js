@@ -1,0 +1,144 @@
+// The state of the replay, its controls, and the words beside the picture.
+function startReplay(root) {
+  const part = (name) => root.querySelector(`[data-part="${name}"]`);
+  const state = { run: 0, step: 0, playing: false, speed: 5, view: null, pointer: null };
+  const show = () => Object.fromEntries([...root.querySelectorAll("[data-show]")].map((box) => [box.dataset.show, box.checked]));
+
+  const run = () => runs[state.run];
+  const last = () => run().times.length - 1;
+
+  function draw() {
+    state.view = drawScene(part("scene"), run(), state.step, show());
+    drawRewards(part("rewards"), run(), state.step);
+    drawErrors(part("errors"), run(), state.step);
+    tell();
+  }
+
+  function tell() {
+    const { times, truth, estimates, ospa } = run();
+    const [total, localisation, cardinality] = ospa[state.step];
+    const time = +times[state.step].toFixed(3);
+    const errors = `OSPA ${total.toFixed(1)} m (localisation ${localisation.toFixed(1)}, cardinality ${cardinality.toFixed(1)})`;
+    const counts = `${truth[state.step].length} targets, ${estimates[state.step].length} estimates`;
+    part("summary").textContent = `t = ${time} s: ${counts}, ${errors}`;
+    part("decision").textContent = decisionText();
+    part("scene").setAttribute("aria-label", `${run().strategy}, run ${run().run}, ${part("summary").textContent}`);
+    part("scrubber").value = state.step;
+    part("scrubber").setAttribute("aria-valuetext", `scan ${state.step + 1} of ${last() + 1}, ${time} s`);
+    part("play").textContent = state.playing ? "Pause" : "Play";
+    Object.assign(root.dataset, { step: state.step, run: state.run, playing: state.playing, speed: state.speed });
+    tellPointer();
+    if (part("values").open) fillValues();
+  }
+
+  function decisionText() {
+    const decision = decisionAt(run(), state.step);
+    if (!decision) return "No decision yet.";
+    const headings = decision.headings.map((heading) => `${minus(String(heading))}\u00b0`).join(", ");
+    return `Decision at ${+run().times[decision.scan].toFixed(3)} s: headings ${headings}.`;
+  }
+
+  function tellPointer() {
+    const { pointer, view } = state;
+    const found = pointer ? describeAt(run(), state.step, view, pointer.x, pointer.y, show()) : [];
+    part("hover").textContent = found.join("\n") || "Point at a target, an estimate, a sensor or a measurement.";
+    root.dataset.hover = found.length;
+  }
+
+  function fillValues() {
+    const rows = [
+      ...run().truth[state.step].map(([target, x, y, ...velocity]) => describeTarget(run(), target, x, y, velocity)),
+      ...run().estimates[state.step].map((estimate) => describeEstimate(run(), estimate)),
+    ];
+    part("rows").replaceChildren(...rows.map((text) => Object.assign(document.createElement("li"), { textContent: text })));
+  }
+
+  function go(step) {
+    state.step = bounded(step, 0, last());
+    if (state.step === last()) state.playing = false;
+    draw();
+  }
+
+  function choose(index) {
+    state.run = index;
+    state.playing = false;
+    part("scrubber").max = last();
+    part("nothing").hidden = run().scans.length > 0;
+    go(Math.min(state.step, last()));
+  }
+
+  let before = null;
+  function tick(now) {
+    if (!state.playing) return;
+    if (before === null) before = now;
+    const due = Math.floor(((now - before) / 1000) * state.speed);
+    if (due > 0) {
+      before += (due * 1000) / state.speed;
+      go(state.step + due);
+    }
+    if (state.playing) requestAnimationFrame(tick);
+  }
+
+  function play(wanted) {
+    if (wanted && state.step === last()) state.step = 0;
+    state.playing = wanted;
+    before = null;
+    draw();
+    if (wanted) requestAnimationFrame(tick);
+  }
+
+  const step = (by) => {
+    state.playing = false;
+    go(state.step + by);
+  };
+  const keys = {
+    " ": () => play(!state.playing),
+    ArrowRight: () => step(1),
+    ArrowLeft: () => step(-1),
+    Home: () => step(-Infinity),
+    End: () => step(Infinity),
+  };
+
+  part("play").addEventListener("click", () => play(!state.playing));
+  part("back").addEventListener("click", () => step(-1));
+  part("forward").addEventListener("click", () => step(1));
+  part("scrubber").addEventListener("input", (event) => step(Number(event.target.value) - state.step));
+  part("run").addEventListener("change", (event) => choose(Number(event.target.value)));
+  part("speed").addEventListener("change", (event) => {
+    state.speed = Number(event.target.value);
+    before = null;
+    tell();
+  });
+  root.querySelectorAll("[data-show]").forEach((box) => box.addEventListener("change", draw));
+  part("values").addEventListener("toggle", tell);
+  root.addEventListener("keydown", (event) => {
+    // Fields and buttons keep the keys that are theirs.
+    const own = event.target.closest("select, input, button, summary");
+    if (own || event.ctrlKey || event.metaKey || event.altKey || !(event.key in keys)) return;
+    event.preventDefault();
+    keys[event.key]();
+  });
+  for (const kind of ["pointermove", "pointerdown"]) {
+    part("scene").addEventListener(kind, (event) => {
+      const box = part("scene").getBoundingClientRect();
+      state.pointer = { x: event.clientX - box.left, y: event.clientY - box.top };
+      tellPointer();
+    });
+  }
+  part("scene").addEventListener("pointerleave", () => {
+    state.pointer = null;
+    tellPointer();
+  });
+
+  const redraw = () => {
+    readColours();
+    draw();
+  };
+  new ResizeObserver(redraw).observe(part("scene"));
+  window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
+  readColours();
+  choose(0);
+}
+
+const replay = document.getElementById("replay");
+if (replay && runs.length) startReplay(replay);

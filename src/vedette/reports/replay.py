@@ -1,0 +1,210 @@
+"""A run as the plain data that the page draws it from, scan by scan."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from vedette.control.plan import Plan
+from vedette.errors import VedetteError
+from vedette.evaluation import match_run
+from vedette.evaluation.figures.rewards import best_over_others, best_over_pair
+from vedette.kernels.types import Floats
+from vedette.reports.groups import Strategy
+from vedette.scenarios import Scenario
+from vedette.scenarios.build import build_experiment
+from vedette.scenarios.names import sensor_names
+from vedette.scenarios.schema.sensors import BearingOnly, BearingRange, LimitedRange, LimitedSector, Position, RangeOnly
+from vedette.scenarios.schema.sensors import Sensor as SensorSection
+from vedette.simulation.records import Decision, RunRecord
+from vedette.simulation.replay import scans_of
+from vedette.simulation.scans import Scan
+
+_DIGITS = 4  # of an extent that positions are kept to: well under a pixel
+_SIGMAS = 2.0
+
+
+def replay_data(strategy: Strategy, record: RunRecord, group: str) -> dict[str, Any]:
+    """Everything that the page shows of a run, as data for JSON; positions rounded to what can be seen.
+
+    Measurements are drawn again by `scans_of`; where the sensor gives no place in the plane, or the models cannot be
+    had, they are left out.
+    """
+    scenario = strategy.cell.scenario
+    extent = _extent(record, scenario)
+    places = max(0, _DIGITS - math.floor(math.log10(max(extent[1] - extent[0], extent[3] - extent[2]))))
+    names, sections = sensor_names(scenario.model), scenario.model.sensors
+    sensors = [_sensor(name, section) for name, section in zip(names, sections, strict=True)]
+    region = scenario.model.region
+    return {
+        "cell": strategy.cell.name,
+        "group": group,
+        "strategy": strategy.name,
+        "run": record.run,
+        "extent": _rounded(extent, places),
+        "region": [region.x_min, region.x_max, region.y_min, region.y_max],
+        "sensors": sensors,
+        "times": _rounded(record.times, 6),
+        "truth": [_targets(record, scan, places) for scan in range(record.num_scans)],
+        "estimates": _estimates(record, scenario, places),
+        "poses": [
+            [[*_rounded(pose[:2], places), round(float(pose[2]), 4)] for pose in poses] for poses in record.poses
+        ],
+        "scans": _scans(record, scenario, [sensor["kind"] for sensor in sensors], places),
+        "ospa": [_rounded(parts, 2) for parts in record.ospa],
+        "decisions": [_decision(decision) for decision in record.decisions],
+    }
+
+
+def _rounded(values: Any, places: int) -> list[float]:
+    return [round(float(value), places) for value in values]
+
+
+def _extent(record: RunRecord, scenario: Scenario) -> tuple[float, float, float, float]:
+    """x_min, x_max, y_min, y_max of region, targets and sensors, m."""
+    region = scenario.model.region
+    corners = np.array([[region.x_min, region.y_min], [region.x_max, region.y_max]])
+    points = np.concatenate([corners, record.truth.states[:, :2], record.poses[:, :, :2].reshape(-1, 2)])
+    (x_min, y_min), (x_max, y_max) = points.min(axis=0).tolist(), points.max(axis=0).tolist()
+    return x_min, x_max, y_min, y_max
+
+
+def _sensor(name: str, section: SensorSection) -> dict[str, Any]:
+    """What a sensor sees, for drawing: how a measurement lies in the plane, and its field where that has an edge."""
+    kinds = {BearingRange: "point", Position: "position", BearingOnly: "ray", RangeOnly: "circle"}
+    found: dict[str, Any] = {"name": name, "kind": kinds.get(type(section.measurement), "none")}
+    if isinstance(section.detection, LimitedRange | LimitedSector):
+        found["range"] = section.detection.max_range
+    if isinstance(section.detection, LimitedSector):
+        found["half_width"] = round(math.radians(section.detection.half_width_deg), 4)
+    return found
+
+
+def _targets(record: RunRecord, scan: int, places: int) -> list[list[float]]:
+    """For each target its number from 1, and its position and velocity where the state has one."""
+    ids, states = record.truth.at(scan)
+    return [
+        [target + 1, *_rounded(state[:2], places), *_rounded(state[2:4], 2)]
+        for target, state in zip(ids.tolist(), states, strict=True)
+    ]
+
+
+def _estimates(record: RunRecord, scenario: Scenario, places: int) -> list[list[list[Any]]]:
+    """For each estimate: label, position, existence, ellipse (semi-axes in m, angle in rad), matched target, error.
+
+    Target and error are those of the assignment that OSPA is made of; 0 and 0 for an estimate without a partner.
+    """
+    score = scenario.model.ospa
+    matching = match_run(record.truth, record.estimates, cutoff=score.cutoff, order=score.order)
+    partners = {
+        (scan, *label, *mean): (int(record.truth.ids[row]) + 1, round(distance, places))
+        for scan, label, mean, row, distance in zip(
+            matching.scans.tolist(),
+            matching.labels.tolist(),
+            matching.means[:, :2].tolist(),
+            matching.truth_rows.tolist(),
+            matching.distances.tolist(),
+            strict=True,
+        )
+    }
+    found = []
+    for scan, estimate in enumerate(record.estimates):
+        rows: list[list[Any]] = []
+        for place, label in enumerate(estimate.labels.tolist()):
+            partner = partners.get((scan, *label, *estimate.means[place, :2].tolist()), (0, 0.0))
+            ellipse = _ellipse(estimate.covs[place, :2, :2], places)
+            position = _rounded(estimate.means[place, :2], places)
+            existence = round(float(estimate.existence[place]), 4)
+            rows.append([f"{label[0]}.{label[1]}", *position, existence, *ellipse, *partner])
+        found.append(rows)
+    return found
+
+
+def _ellipse(cov: Floats, places: int) -> list[float]:
+    variances, axes = np.linalg.eigh(cov)
+    semi = _SIGMAS * np.sqrt(np.maximum(variances, 0.0))
+    return [*_rounded(semi[::-1], places), round(math.atan2(axes[1, 1], axes[0, 1]), 3)]
+
+
+def _scans(record: RunRecord, scenario: Scenario, kinds: Sequence[str], places: int) -> list[list[list[list[float]]]]:
+    """For each scan, for each sensor, its measurements: the target behind it (0: clutter), and where it lies.
+
+    Empty where the models of the scenario cannot be had.
+    """
+    if all(kind == "none" for kind in kinds):
+        return []
+    try:
+        scans = scans_of(record, build_experiment(scenario))
+    except VedetteError:
+        return []
+    return [
+        [_measurements(scan, kind, pose, places) for scan, kind, pose in zip(sensors, kinds, poses, strict=True)]
+        for sensors, poses in zip(scans, record.poses, strict=True)
+    ]
+
+
+def _measurements(scan: Scan, kind: str, pose: Floats, places: int) -> list[list[float]]:
+    found: list[list[float]] = []
+    for origin, measurement in zip(scan.origins.tolist(), scan.measurements, strict=True):
+        if kind == "point":
+            bearing, distance = measurement[:2]
+            place = pose[:2] + distance * np.array([math.cos(bearing), math.sin(bearing)])
+            found.append([origin + 1, *_rounded(place, places)])
+        elif kind == "position":
+            found.append([origin + 1, *_rounded(measurement[:2], places)])
+        elif kind == "ray":
+            found.append([origin + 1, round(float(measurement[0]), 4)])
+        elif kind == "circle":
+            found.append([origin + 1, round(float(measurement[0]), places)])
+    return found
+
+
+def _decision(decision: Decision) -> dict[str, Any]:
+    plan = decision.plan
+    headings = [round(float(value)) for value in np.rad2deg(plan.chosen_headings)]
+    return {"scan": decision.step - 1, "headings": headings, "curves": _curves(plan), "map": _map(plan)}
+
+
+def _curves(plan: Plan) -> list[dict[str, Any]]:
+    """Reward against heading, one curve a sensor; of a joint table the largest over the other sensors' actions."""
+    curves = []
+    for table in plan.tables:
+        for axis, sensor in enumerate(table.sensors):
+            degrees = np.rad2deg(plan.action_values[sensor])
+            order = np.argsort(degrees, kind="stable")
+            mean, error = best_over_others(table, axis)
+            chosen = int(np.flatnonzero(order == plan.chosen[sensor])[0])
+            curves.append(
+                {
+                    "sensor": sensor,
+                    "degrees": _rounded(degrees[order], 1),
+                    "mean": [_number(value) for value in mean[order]],
+                    "error": [_number(value) for value in error[order]],
+                    "chosen": chosen,
+                }
+            )
+    return curves
+
+
+def _map(plan: Plan) -> dict[str, Any] | None:
+    """The joint rewards of the first two sensors, the largest over the others."""
+    joint = next((table for table in plan.tables if len(table.sensors) > 1), None)
+    if joint is None:
+        return None
+    pair = (joint.sensors[0], joint.sensors[1])
+    orders = [np.argsort(plan.action_values[sensor], kind="stable") for sensor in pair]
+    ordered = tuple(zip(pair, orders, strict=True))
+    reward = best_over_pair(joint, pair)[np.ix_(*orders)]
+    return {
+        "sensors": pair,
+        "degrees": [_rounded(np.rad2deg(plan.action_values[sensor])[order], 1) for sensor, order in ordered],
+        "mean": [[_number(value) for value in row] for row in reward],
+        "chosen": [int(np.flatnonzero(order == plan.chosen[sensor])[0]) for sensor, order in ordered],
+    }
+
+
+def _number(value: float) -> float | None:
+    return float(f"{value:.5g}") if math.isfinite(value) else None

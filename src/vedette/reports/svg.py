@@ -1,0 +1,52 @@
+"""Matplotlib's figures as parts of a page: they follow its colours, light or dark, and share no names."""
+
+from __future__ import annotations
+
+import re
+
+from markupsafe import Markup
+from matplotlib.figure import Figure
+
+from vedette.evaluation.figures import svg_text
+from vedette.evaluation.figures.style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, SKY, VERMILION
+
+# What the page's style sheet gives another shade in the dark.
+_VARIABLES = {
+    "#000000": "ink",
+    INK: "ink",
+    "#FFFFFF": "paper",
+    "#DDDDDD": "line",
+    "#CCCCCC": "line",
+    GREY: "grey",
+    BLUE: "blue",
+    VERMILION: "vermilion",
+    GREEN: "green",
+    PURPLE: "purple",
+    ORANGE: "orange",
+    SKY: "sky",
+}
+_COLOUR = re.compile("|".join(_VARIABLES), re.IGNORECASE)
+_NAMES = {colour.lower(): f"var(--{name})" for colour, name in _VARIABLES.items()}
+_LONG_NUMBER = re.compile(r"(\d+\.\d{2})\d+")
+_POINTS_TO_PIXELS = 1.9
+
+
+def inline_svg(figure: Figure, prefix: str, description: str) -> Markup:
+    """An `svg` element that is as wide as its place, at most as wide as reads well.
+
+    Args:
+        prefix: unique on the page; put before every id in the figure.
+        description: for readers who do not see it.
+    """
+    text = svg_text(figure)
+    body = text[text.index(">", text.index("<svg")) + 1 :]
+    body = re.sub(r"<metadata>.*?</metadata>", "", body, flags=re.DOTALL)
+    body = re.sub(r'\bid="', f'id="{prefix}-', body)
+    body = re.sub(r'(href="#|url\(#)', rf"\g<1>{prefix}-", body)
+    body = _COLOUR.sub(lambda found: _NAMES[found.group().lower()], body)
+    body = _LONG_NUMBER.sub(r"\1", body)
+    width, height = (72.0 * float(length) for length in figure.get_size_inches())
+    opening = Markup('<svg viewBox="0 0 {:g} {:g}" role="img" aria-label="{}" style="max-width: {:.0f}px">').format(
+        round(width, 2), round(height, 2), description, _POINTS_TO_PIXELS * width
+    )
+    return opening + Markup(body)  # what Matplotlib wrote: it escapes the texts in a figure itself

@@ -1,0 +1,195 @@
+"""The tables of a report: errors and other measures a strategy, what they cost, how often what was decided."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from vedette.evaluation import AverageNees, RunMetrics, average_nees, summarise
+from vedette.evaluation.figures.style import strategy_label
+from vedette.evaluation.tables import HEADER, decision_rows, strategy_rows
+from vedette.kernels.types import Bools, Floats
+from vedette.reports.claims import percent
+from vedette.reports.groups import Group, Strategy
+from vedette.simulation.records import RunRecord
+
+Measure = Callable[[RunMetrics, Bools], float]
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """Cells of text under a header; the first column names the rows.
+
+    Attributes:
+        caption: what the numbers are.
+        header: one entry a column.
+        rows: as long as the header.
+        notes: what a row is, where its name does not say; may be empty.
+        is_words: whether the cells are words rather than numbers.
+    """
+
+    caption: str
+    header: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    notes: tuple[str, ...] = ()
+    is_words: bool = False
+
+
+def _mean(name: str) -> Measure:
+    return lambda metrics, counted: float(getattr(metrics, name)[counted].mean())
+
+
+def _total(name: str) -> Measure:
+    return lambda metrics, counted: float(getattr(metrics, name)[counted].sum())
+
+
+def _mean_size(metrics: RunMetrics, counted: Bools) -> float:
+    return float(np.abs(metrics.cardinality_error[counted]).mean())
+
+
+def measures(order: float) -> tuple[tuple[str, str, Measure], ...]:
+    """Name, explanation and value of each measure of a run; `order` is that of OSPA, whose power GOSPA's parts have."""
+    power = "m" if order == 1.0 else f"m^{order:g}"
+    return (
+        ("GOSPA (m)", "mean over the scans, alpha = 2", _mean("gospa_m")),
+        (f"  localisation ({power})", "part of GOSPA", _mean("gospa_localisation")),
+        (f"  missed targets ({power})", "part of GOSPA", _mean("gospa_missed")),
+        (f"  false targets ({power})", "part of GOSPA", _mean("gospa_false")),
+        ("OSPA(2) (m)", "mean over the windows that end at the scans", _mean("ospa2_m")),
+        (
+            "Cardinality error",
+            "estimated minus true number of targets, mean over the scans",
+            _mean("cardinality_error"),
+        ),
+        ("Cardinality error, size", "the same without its sign", _mean_size),
+        ("Label switches a run", "a target continues under another label", _total("label_switches")),
+        ("Fragmentations a run", "a target is found again after a break", _total("fragmentations")),
+    )
+
+
+def error_table(group: Group) -> Table | None:
+    """OSPA and its parts, and the paired differences; None without runs in common."""
+    if group.comparison is None:
+        return None
+    rows = tuple(
+        (strategy_label(name), *(cell.replace("-", "\N{MINUS SIGN}") for cell in cells))
+        for name, *cells in strategy_rows(group.comparison)
+    )
+    first = strategy_label(group.comparison.strategies[0])
+    counted = group.comparison.times[group.comparison.counted]
+    caption = (
+        f"Mean over {group.comparison.num_runs} paired runs and over t = {counted[0]:g} to {counted[-1]:g} s, ± one "
+        f"standard error. Difference: strategy minus {first}, run by run, so above 0 where {first} is better; "
+        f"runs won: by {first}."
+    )
+    return Table(caption, HEADER, rows)
+
+
+def measure_table(group: Group) -> Table | None:
+    """Measures beside OSPA, a column a strategy; None where nothing has run."""
+    strategies = [each for each in group.strategies if each.metrics]
+    if not strategies:
+        return None
+    score = strategies[0].cell.scenario.model.ospa
+    rows = [
+        (name, *(_with_error([value(metrics, group.counted) for metrics in each.metrics]) for each in strategies))
+        for name, _, value in measures(score.order)
+    ]
+    notes = [note for _, note, _ in measures(score.order)]
+    for name, note, dim in _consistency_kinds(strategies):
+        rows.append((name, *(_consistency(each, group.counted, dim) for each in strategies)))
+        notes.append(note)
+    caption = (
+        f"Mean over the runs ± one standard error, over the same scans as above; cutoff {score.cutoff:g} m, order "
+        f"{score.order:g}, window of OSPA(2) {score.window} scans. NEES / dimension is 1 for a consistent "
+        "filter; in brackets, the share of the scans whose average over the runs lies in its 95 % interval."
+    )
+    return Table(caption, ("Measure", *(each.name for each in strategies)), tuple(rows), tuple(notes))
+
+
+def _consistency_kinds(strategies: Sequence[Strategy]) -> list[tuple[str, str, int]]:
+    kinds = [("Position NEES / 2", "squared error over what the covariance says", 2)]
+    metrics = [metrics for each in strategies for metrics in each.metrics]
+    dims = {record.truth.states.shape[1] for each in strategies for record in each.records}
+    if len(dims) == 1 and any(run.nees_count.any() for run in metrics):
+        dim = dims.pop()
+        kinds.append((f"State NEES / {dim}", "the same of the whole state", dim))
+    return kinds
+
+
+def nees_over_runs(strategy: Strategy, dim: int) -> AverageNees:
+    """NEES averaged over the runs at each scan: of the position for `dim` 2, or else of the full state."""
+    if dim == 2:
+        means = np.array([metrics.position_nees_mean for metrics in strategy.metrics])
+        counts = np.array([_num_pairs(*each) for each in zip(strategy.records, strategy.metrics, strict=True)])
+    else:
+        means = np.array([metrics.nees_mean for metrics in strategy.metrics])
+        counts = np.array([metrics.nees_count for metrics in strategy.metrics])
+    return average_nees(means, counts, dim=dim)
+
+
+def _num_pairs(record: RunRecord, metrics: RunMetrics) -> Floats:
+    return np.diff(record.truth.offsets) - metrics.num_missed
+
+
+def _consistency(strategy: Strategy, counted: Bools, dim: int) -> str:
+    average = nees_over_runs(strategy, dim)
+    known = counted & (average.count > 0)
+    if not known.any():
+        return "\N{EN DASH}"
+    mean = float((average.mean[known] * average.count[known]).sum() / average.count[known].sum()) / dim
+    return f"{mean:.2f} ({percent(float(average.consistent[known].mean()))})"
+
+
+def _with_error(values: Sequence[float]) -> str:
+    summary = summarise(values)
+    mean = f"{float(summary.mean):.2f}".replace("-", "\N{MINUS SIGN}")
+    return mean if summary.num_runs < 2 else f"{mean} ± {float(summary.standard_error):.2f}"
+
+
+def stage_seconds(strategy: Strategy) -> dict[str, Floats]:
+    """Seconds of each stage, at all scans of all runs: planning at the decisions alone, other stages at every scan."""
+    spent: dict[str, list[Floats]] = {}
+    for record in strategy.records:
+        steps = np.array([decision.step - 1 for decision in record.decisions], np.int64)
+        for stage, seconds in record.timings.items():
+            if stage == "planning":
+                spent.setdefault("planning, a decision", []).append(seconds[steps])
+            else:
+                spent.setdefault(f"{stage}, a scan", []).append(seconds)
+    joined = {stage: np.concatenate(parts) for stage, parts in spent.items()}
+    return {stage: seconds for stage, seconds in joined.items() if len(seconds)}
+
+
+def cost_table(group: Group) -> Table | None:
+    """Time of each stage, median and 95th percentile, a column a strategy; None where nothing was timed."""
+    spent = {each.name: stage_seconds(each) for each in group.strategies}
+    stages = list(dict.fromkeys(stage for seconds in spent.values() for stage in seconds))
+    if not stages:
+        return None
+    rows = tuple((stage, *(_milliseconds(seconds.get(stage)) for seconds in spent.values())) for stage in stages)
+    return Table("Wall time in milliseconds: median, and the 95th percentile in brackets.", ("Stage", *spent), rows)
+
+
+def _milliseconds(seconds: Floats | None) -> str:
+    if seconds is None:
+        return "\N{EN DASH}"
+    middle, high = np.quantile(seconds, (0.5, 0.95)) * 1e3
+    return f"{middle:.3g} ({high:.3g})"
+
+
+def decision_table(group: Group) -> Table | None:
+    """The most frequent choices at each decision; None where none was made."""
+    if group.comparison is None:
+        return None
+    rows = [
+        (strategy_label(strategy), when, shares.replace("-", "\N{MINUS SIGN}"))
+        for strategy in group.comparison.strategies
+        for when, shares in decision_rows(group.comparison, strategy)
+    ]
+    if not rows:
+        return None
+    caption = "Headings of the sensors, in order, and the share of the runs that chose them; at most three a decision."
+    return Table(caption, ("Strategy", "Time", "Headings"), tuple(rows), is_words=True)

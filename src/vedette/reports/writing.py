@@ -1,0 +1,181 @@
+"""The report as one HTML file."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
+
+from vedette.campaigns.results import CampaignResults
+from vedette.errors import InputError
+from vedette.files import write_whole
+from vedette.kernels.types import Floats
+from vedette.reports.claims import Claim, all_pairs, claims
+from vedette.reports.drawings import Drawing, group_drawings, sweep_drawings, typical_records
+from vedette.reports.groups import Group, axis_label, gather
+from vedette.reports.replay import replay_data
+from vedette.reports.saving import run_errors
+from vedette.reports.spec_text import spec_toml
+from vedette.reports.svg import inline_svg
+from vedette.reports.tables import Table, cost_table, decision_table, error_table, measure_table
+
+MAX_REPLAY_BYTES = 6_000_000
+_FILES = resources.files("vedette.reports") / "page"
+
+
+@dataclass(frozen=True, slots=True)
+class _Section:
+    """What the page shows of one group, or of the sweeps."""
+
+    group: Group
+    claims: tuple[Claim, ...]
+    pairs: tuple[Claim, ...]
+    tables: tuple[tuple[str, Table], ...]
+    figures: tuple[tuple[Drawing, Markup], ...]
+
+
+def write_report(results: CampaignResults, path: Path, *, replays: Sequence[tuple[str, int]] | None = None) -> None:
+    """Write a campaign's report as one HTML file that needs nothing else; the same results give the same bytes.
+
+    Args:
+        replays: cell and number of the runs that can be replayed; None: the typical run of each strategy, as many as
+            keep the page small.
+
+    Raises:
+        InputError: a run that is not there, or a file that cannot be written.
+    """
+    _check_replays(results, replays or ())
+    sections: list[_Section] = []
+    runs: list[str] = []
+    errors: dict[str, Floats] = {}
+    for number, group in enumerate(gather(results)):
+        errors.update(run_errors(group))
+        sections.append(_section(group, f"g{number}"))
+        runs += [_json(data) for data in _replays(results, group, replays)]
+    sweeps = _drawn(tuple(sweep_drawings(results.campaign, errors)), "sweep")
+    kept = _within(runs, MAX_REPLAY_BYTES) if replays is None else runs
+    page = _render(results, sections, sweeps, kept, len(runs) - len(kept))
+    _write(path, page)
+
+
+def _check_replays(results: CampaignResults, replays: Sequence[tuple[str, int]]) -> None:
+    for name, run in replays:
+        finished = results.finished(results.campaign.cell(name).name)
+        if run not in finished:
+            raise InputError(f"replays: expected a finished run of cell {name}; got {run}")
+
+
+def _section(group: Group, prefix: str) -> _Section:
+    named = {
+        "Errors": error_table(group),
+        "Other measures": measure_table(group),
+        "Decisions": decision_table(group),
+        "Cost": cost_table(group),
+    }
+    comparison = group.comparison
+    return _Section(
+        group=group,
+        claims=() if comparison is None else claims(comparison),
+        pairs=() if comparison is None or len(comparison.strategies) < 3 else all_pairs(comparison),
+        tables=tuple((title, table) for title, table in named.items() if table is not None),
+        figures=_drawn(tuple(group_drawings(group)), prefix),
+    )
+
+
+def _drawn(drawings: Sequence[Drawing], prefix: str) -> tuple[tuple[Drawing, Markup], ...]:
+    return tuple(
+        (each, inline_svg(each.figure, f"{prefix}-{number}", f"{each.title}. {each.caption}"))
+        for number, each in enumerate(drawings)
+    )
+
+
+def _replays(results: CampaignResults, group: Group, replays: Sequence[tuple[str, int]] | None) -> list[dict[str, Any]]:
+    """The typical runs of a group, or those of the chosen runs that belong to it."""
+    if replays is None:
+        return [
+            {**replay_data(strategy, record, group.title), "typical": True}
+            for strategy, record in typical_records(group)
+        ]
+    strategies = {each.cell.name: each for each in group.strategies}
+    return [
+        {**replay_data(strategies[name], results.record(name, run), group.title), "typical": False}
+        for name, run in replays
+        if name in strategies
+    ]
+
+
+def _within(texts: Sequence[str], most: int) -> list[str]:
+    """The texts that fit within a number of bytes, the first ones first."""
+    kept, size = [], 0
+    for text in texts:
+        size += len(text)
+        if size <= most:
+            kept.append(text)
+    return kept
+
+
+def _json(data: Any) -> str:
+    """JSON that may stand inside an element of a page."""
+    text = json.dumps(data, separators=(",", ":"), ensure_ascii=True, allow_nan=False)
+    return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
+
+
+def _render(
+    results: CampaignResults,
+    sections: Sequence[_Section],
+    sweeps: Sequence[tuple[Drawing, Markup]],
+    runs: Sequence[str],
+    left_out: int,
+) -> str:
+    campaign = results.campaign
+    script = _script()
+    environment = Environment(
+        loader=PackageLoader("vedette.reports", "page"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    finished = sum(len(results.finished(cell.name)) for cell in campaign.cells)
+    return environment.get_template("report.html").render(
+        campaign=campaign,
+        compared=axis_label(campaign.compare),
+        sections=sections,
+        sweeps=sweeps,
+        finished=finished,
+        planned=campaign.num_runs * len(campaign.cells),
+        replays=[json.loads(run) for run in runs],
+        replay_json=Markup("[" + ",".join(runs) + "]"),  # safe inside an element: see `_json`
+        left_out=left_out,
+        spec=spec_toml(campaign.spec),
+        manifest=json.dumps(_plain(results.manifest), indent=2, sort_keys=True, default=str, ensure_ascii=False),
+        style=Markup((_FILES / "report.css").read_text("utf-8")),
+        script=Markup(script),
+        script_hash=base64.b64encode(hashlib.sha256(script.encode()).digest()).decode(),
+    )
+
+
+def _plain(manifest: Any) -> Any:
+    """What the page does not show elsewhere of the manifest."""
+    return {key: value for key, value in manifest.items() if key in ("digest", "created", "sessions")}
+
+
+def _script() -> str:
+    files = sorted((_FILES / "scripts").iterdir(), key=lambda file: file.name)
+    return "(() => {\n" + "\n".join(file.read_text("utf-8") for file in files if file.name.endswith(".js")) + "})();\n"
+
+
+def _write(path: Path, page: str) -> None:
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_whole(path, lambda file: file.write(page.encode()))
+    except OSError as error:
+        raise InputError(f"path: expected a place to write a report; got {path}: {error}") from error
