@@ -1,0 +1,186 @@
+"""Campaigns that are killed, for real: nothing is lost, and the same command ends with the same bytes."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+
+from campaigns.examples import small_campaign
+from vedette.campaigns.journal import Reader
+from vedette.campaigns.results import open_results
+from vedette.campaigns.running import run_campaign
+from vedette.errors import InputError
+
+RUNS = 40
+SPEC = f"""
+name = "small"
+scenarios = ["paper-a"]
+planners = ["idm", "still"]
+runs = {RUNS}
+
+[set]
+"time.num_steps" = 12
+"control.decision_steps" = [10]
+"control.num_samples" = 2
+"ospa.to_step" = 12
+"""
+
+
+def contents(folder: Path) -> dict[str, str]:
+    """What a campaign leaves, but for the seconds that things took."""
+    results = open_results(folder)
+    runs = {f"{run.cell} {run.record.run}": run.checksum for run in results.runs()}
+    files = {
+        path.name: hashlib.sha256(path.read_bytes()).hexdigest()
+        for path in sorted((folder / "tables").iterdir())
+        if path.name not in ("timings.parquet", "runs.parquet")
+    }
+    assert files
+    return {**runs, **files}
+
+
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    folder = tmp_path_factory.mktemp("undisturbed") / "results"
+    outcome = run_campaign(small_campaign(runs=RUNS), folder)
+    assert (outcome.num_landed, outcome.num_found, outcome.failed) == (2 * RUNS, 0, ())
+    return contents(folder)
+
+
+@pytest.fixture
+def program(tmp_path: Path) -> Iterator[Program]:
+    started = Program(tmp_path)
+    yield started
+    started.end()
+
+
+class Program:
+    """The command line on one campaign and one folder, started again and again."""
+
+    def __init__(self, place: Path) -> None:
+        self.folder = place / "results"
+        self._spec = place / "spec.toml"
+        self._spec.write_text(SPEC)
+        self._process: subprocess.Popen[str] | None = None
+
+    def start(self, *options: str) -> subprocess.Popen[str]:
+        command = [Path(sys.executable).with_name("vedette"), "campaign", self._spec, "--out", self.folder, *options]
+        self._process = subprocess.Popen(
+            [str(part) for part in command],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            start_new_session=True,
+        )
+        return self._process
+
+    def wait_for(self, num_runs: int) -> None:
+        """Until at least so many runs are in the store."""
+        for _ in range(1200):
+            assert self._process is not None
+            assert self._process.poll() is None, self._process.communicate()
+            try:
+                if len(Reader(self.folder).finished()) >= num_runs:
+                    return
+            except InputError:  # the store is not made yet
+                pass
+            time.sleep(0.05)
+        raise AssertionError("the campaign did not get that far")
+
+    def finish(self) -> str:
+        """What it printed, once it has ended well."""
+        assert self._process is not None
+        with closing(self._process.stdout):  # type: ignore[type-var]
+            out, _ = self._process.communicate(timeout=120)
+        assert self._process.returncode == 0, out
+        return out
+
+    def end(self) -> None:
+        if self._process is not None and self._process.poll() is None:
+            os.killpg(self._process.pid, signal.SIGKILL)
+            self._process.communicate()
+
+
+def assert_gone(group: int) -> None:
+    """No process of the group is left, or will be in a moment."""
+    for _ in range(200):
+        try:
+            os.killpg(group, 0)
+        except ProcessLookupError:
+            return
+        time.sleep(0.05)
+    raise AssertionError("workers outlive the program")
+
+
+def test_the_program_killed_at_several_moments_ends_with_the_same_bytes(
+    program: Program, undisturbed: dict[str, str]
+) -> None:
+    for workers, enough in ((1, 7), (2, 30)):
+        process = program.start("--workers", str(workers))
+        program.wait_for(enough)
+        process.kill()  # the program alone: its workers are to notice
+        process.communicate()
+        assert_gone(process.pid)
+    program.start("--workers", "1")
+    assert f"{2 * RUNS} of {2 * RUNS} runs" in program.finish()
+    assert contents(program.folder) == undisturbed
+
+
+def test_ctrl_c_leaves_a_folder_to_go_on_with(program: Program, undisturbed: dict[str, str]) -> None:
+    process = program.start("--workers", "2")
+    program.wait_for(20)
+    os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to every process of the group
+    out, _ = process.communicate(timeout=60)
+    assert process.returncode == 130, out
+    assert "the same command goes on from there" in out
+    assert "Traceback" not in out
+    assert_gone(process.pid)
+    program.start("--workers", "1")
+    assert f"of {2 * RUNS} runs are there already" in program.finish()
+    assert contents(program.folder) == undisturbed
+
+
+def test_a_lost_scheduler_leaves_a_folder_to_go_on_with(
+    program: Program, undisturbed: dict[str, str], free_port: int
+) -> None:
+    address = f"tcp://127.0.0.1:{free_port}"
+    dask = [sys.executable, "-m", "dask"]
+    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    scheduler = subprocess.Popen(
+        [*dask, "scheduler", "--host", "127.0.0.1", "--port", str(free_port), "--no-dashboard"], **quiet
+    )
+    worker = subprocess.Popen([*dask, "worker", address, "--nthreads", "1", "--no-dashboard"], **quiet)
+    try:
+        process = program.start("--scheduler", address)
+        program.wait_for(15)
+        scheduler.kill()
+        out, _ = process.communicate(timeout=60)
+    finally:
+        for each in (worker, scheduler):
+            each.kill()
+            each.wait()
+    assert process.returncode == 1, out
+    assert "the scheduler is gone" in out
+    assert "Traceback" not in out
+    program.start("--workers", "1")
+    program.finish()
+    assert contents(program.folder) == undisturbed
+
+
+def test_a_finished_campaign_runs_nothing_and_more_runs_add_to_it(tmp_path: Path) -> None:
+    first = run_campaign(small_campaign(runs=2), tmp_path / "results")
+    again = run_campaign(small_campaign(runs=2), tmp_path / "results")
+    more = run_campaign(small_campaign(runs=3), tmp_path / "results")
+    assert [(outcome.num_landed, outcome.num_found) for outcome in (first, again, more)] == [(4, 0), (0, 4), (2, 4)]
+    alone = run_campaign(small_campaign(runs=3), tmp_path / "alone")
+    assert alone.num_landed == 6
+    assert contents(tmp_path / "results") == contents(tmp_path / "alone")
