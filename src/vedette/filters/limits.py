@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from scipy.special import logit
-from scipy.stats import chi2
+from scipy.special import gammaincinv, logit
 
 from vedette.kernels.lmb import Reduction
 from vedette.kernels.truncation import Truncation
@@ -95,7 +94,7 @@ class Limits:
         return Truncation(
             int(self.max_hypotheses),
             -math.log(self.min_relative_weight) if self.min_relative_weight > 0.0 else math.inf,
-            float(chi2.ppf(self.gate_probability, meas_dim)),
+            2.0 * float(gammaincinv(0.5 * meas_dim, self.gate_probability)),  # the quantile of chi-squared
             float(self.min_log_clutter),
             int(self.max_search_nodes),
             -math.log(self.min_track_weight) if self.min_track_weight > 0.0 else math.inf,

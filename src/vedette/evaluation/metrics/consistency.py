@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.stats import chi2
+from scipy.special import gammaincinv
 
 from vedette.densities.checks import check_covariances
 from vedette.evaluation.metrics.matching import Matching
@@ -117,5 +117,5 @@ def nees_interval(counts: ArrayLike, *, dim: int, confidence: float = CONFIDENCE
         raise reject("confidence", "a probability above 0 and below 1", confidence)
     numbers = np.where(np.asarray(counts) > 0, counts, np.nan)
     tails = (0.5 - confidence / 2.0, 0.5 + confidence / 2.0)
-    lower, upper = (np.asarray(chi2.ppf(tail, numbers * dim) / numbers, np.float64) for tail in tails)
+    lower, upper = (np.asarray(2.0 * gammaincinv(0.5 * numbers * dim, tail) / numbers, np.float64) for tail in tails)
     return lower, upper
