@@ -7,6 +7,7 @@ import os
 import sqlite3
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 from vedette.campaigns.journal import DATABASE, Entry, Writer
@@ -23,8 +24,8 @@ def entry_of(run: int) -> Entry:
     return Entry(CELL, run, 1, payload, payload[:1000])
 
 
-def add_for_ever(folder: Path) -> None:
-    """Print the number of every run once it is added."""
+def add_for_ever(folder: Path, pause: str = "0.0") -> None:
+    """Print the number of every run once it is added; rest for so many seconds after each."""
     writer = Writer(folder)
     writer.open(CONTENTS)
     done = writer.finished()
@@ -33,6 +34,7 @@ def add_for_ever(folder: Path) -> None:
         if (CELL, run) not in done:
             writer.add(entry_of(run))
             print(run, flush=True)
+            time.sleep(float(pause))
         run += 1
 
 

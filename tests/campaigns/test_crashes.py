@@ -90,10 +90,10 @@ def test_a_transaction_killed_half_way_is_taken_back_by_the_first_reader(folder)
 
 
 def test_a_folder_is_read_while_it_is_written(folder):
-    with started("add_for_ever", str(folder)) as process:
+    with started("add_for_ever", str(folder), "0.02") as process:
         assert process.stdout is not None
         told = set()
-        for _ in range(4):
+        for _ in range(20):
             told.add(int(process.stdout.readline()))
             assert told <= {run for _, run in Reader(folder).finished()}
             assert Reader(folder).entry(CELL, max(told)) == entry_of(max(told))

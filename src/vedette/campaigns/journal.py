@@ -129,7 +129,7 @@ class Reader:
             try:
                 return _answer(self._path, question, values)
             except sqlite3.OperationalError as error:
-                if error.sqlite_errorcode != sqlite3.SQLITE_READONLY_ROLLBACK:
+                if _code(error) != sqlite3.SQLITE_READONLY_ROLLBACK:
                     raise
             # A writer was killed in the middle of a run: what it left half done is first taken back.
             _answer(self._path, question, values, mode="rw")
@@ -161,7 +161,7 @@ def _lock(folder: Path) -> sqlite3.Connection:
         lock.execute("BEGIN EXCLUSIVE")
     except sqlite3.Error as error:
         lock.close()
-        if getattr(error, "sqlite_errorcode", None) == sqlite3.SQLITE_BUSY:
+        if _code(error) == sqlite3.SQLITE_BUSY:
             raise InputError(f"{folder}: expected to write alone; another process is writing this campaign") from None
         raise InputError(f"{folder}: expected a folder that can be written; {path.name}: {error}") from error
     return lock
@@ -191,8 +191,7 @@ def _explained(path: Path, where: str = "") -> Iterator[None]:
 
 
 def _advice(path: Path, error: sqlite3.DatabaseError) -> str:
-    code = getattr(error, "sqlite_errorcode", None)
-    primary = code & 0xFF if code is not None else None
+    primary = _code(error) & 0xFF
     if primary in (sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR):
         return "expected room on the disk and a disk that works; what was finished before is kept: make room, go on"
     if primary in (sqlite3.SQLITE_CANTOPEN, sqlite3.SQLITE_READONLY, sqlite3.SQLITE_PERM):
@@ -200,3 +199,8 @@ def _advice(path: Path, error: sqlite3.DatabaseError) -> str:
     if primary == sqlite3.SQLITE_BUSY:
         return f"expected a file that is free within {_WAIT:g} s; it stayed in use"
     return "expected the runs of a campaign as they were written; the file is cut short or altered"
+
+
+def _code(error: sqlite3.Error) -> int:
+    """SQLite's extended code of an error; -1 for what Python's own layer raised."""
+    return int(getattr(error, "sqlite_errorcode", -1))
