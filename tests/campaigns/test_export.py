@@ -1,0 +1,240 @@
+"""The results of a campaign in other tools: Arrow, Parquet, DuckDB, CSV, xarray, NetCDF, and the pages that show it."""
+
+from __future__ import annotations
+
+import builtins
+import importlib.util
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from campaigns.filled import NUM_RUNS, fill, make_campaign, make_run
+from vedette.campaigns.export import FORMATS, export_csv, export_netcdf, export_tables
+from vedette.campaigns.results import open_results
+from vedette.errors import InputError
+
+pyarrow = pytest.importorskip("pyarrow")
+pytest.importorskip("xarray")
+
+PAGE = Path(__file__).parents[2] / "docs" / "results.md"
+KEYS = ["cell", "scenario", "planner", "sensors.*.clutter.rate", "run"]
+TABLES = ["runs", "scans", "decisions", "rewards", "tracks", "truth", "sensors", "timings"]
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory):
+    """All runs but two."""
+    return open_results(fill(tmp_path_factory.mktemp("campaign") / "results", make_campaign(), leave_out=2))
+
+
+@pytest.fixture(scope="module")
+def tables(results):
+    return results.tables()
+
+
+def part(table, cell, run):
+    """Columns of one run as lists."""
+    rows = [row for row in table.to_pylist() if (row["cell"], row["run"]) == (cell, run)]
+    return {name: [row[name] for row in rows] for name in table.column_names}
+
+
+def test_every_table_tells_which_run_a_row_is_of(results, tables):
+    assert list(tables) == TABLES
+    finished = [(run.cell, run.record.run) for run in results.runs()]
+    for table in tables.values():
+        assert table.column_names[: len(KEYS)] == KEYS
+        seen = dict.fromkeys(zip(table["cell"].to_pylist(), table["run"].to_pylist(), strict=True))
+        if table is tables["rewards"]:
+            assert list(seen) == [(cell, run) for cell, run in finished if cell.startswith("jdm")]
+        else:
+            assert list(seen) == finished
+    assert set(tables["scans"]["planner"].to_pylist()) == {"jdm", "random"}
+    assert set(tables["scans"]["sensors.*.clutter.rate"].to_pylist()) == {5.0, 10.0}
+
+
+def test_rows_of_scans_tracks_truth_and_sensors_are_those_of_the_record(tables):
+    record, metrics = make_run("jdm", 1)
+    scans = part(tables["scans"], "jdm-rate-5.0", 1)
+    np.testing.assert_array_equal(scans["ospa_m"], record.ospa[:, 0])
+    np.testing.assert_array_equal(scans["time_s"], record.times)
+    for name, column in metrics.columns().items():
+        np.testing.assert_array_equal(scans[name], column)
+    tracks = part(tables["tracks"], "jdm-rate-5.0", 1)
+    np.testing.assert_array_equal(tracks["mean_1"], np.concatenate([e.means[:, 1] for e in record.estimates]))
+    np.testing.assert_array_equal(tracks["cov_5"], np.concatenate([e.covs[:, 1, 1] for e in record.estimates]))
+    truth = part(tables["truth"], "jdm-rate-5.0", 1)
+    np.testing.assert_array_equal(truth["state_3"], record.truth.states[:, 3])
+    sensors = part(tables["sensors"], "jdm-rate-5.0", 1)
+    np.testing.assert_array_equal(np.array(sensors["heading_rad"]).reshape(40, 2), record.poses[:, :, 2])
+
+
+def test_rows_of_decisions_and_rewards_are_those_of_the_plans(tables):
+    record, _ = make_run("jdm", 2)
+    rows = part(tables["decisions"], "jdm-rate-5.0", 2)
+    rewards = part(tables["rewards"], "jdm-rate-5.0", 2)
+    reward = np.array(rewards["reward"]).reshape(len(record.decisions), 13, 13)
+    chosen = np.array(rewards["chosen"]).reshape(reward.shape)
+    for index, decision in enumerate(record.decisions):
+        plan = decision.plan
+        assert (rows["step"][index], rows["time_s"][index]) == (decision.step, decision.time)
+        assert rows["chosen_actions"][index] == list(plan.chosen)
+        np.testing.assert_array_equal(rows["chosen_headings_rad"][index], plan.chosen_headings)
+        np.testing.assert_array_equal(rows["sensor_x_m"][index], decision.poses[:, 0])
+        assert rows["expected_rewards"][index] == [mean for mean, _ in plan.expected_rewards]
+        assert rows["num_samples"][index] == 40
+        np.testing.assert_array_equal(reward[index], plan.tables[0].mean)
+        assert [tuple(place) for place in np.argwhere(chosen[index])] == [plan.chosen]
+    assert rewards["sensors"][0] == [0, 1]
+    assert rewards["actions"][14] == [1, 1]
+    np.testing.assert_array_equal(rewards["headings_rad"][14], plan.action_values[0][[1, 1]])
+
+
+def test_actions_that_were_not_evaluated_have_no_row(results):
+    from dataclasses import replace
+
+    from vedette.campaigns.rows import reward_rows
+
+    finished = results.run("jdm-rate-5.0", 0)
+    decision = finished.record.decisions[0]
+    table = decision.plan.tables[0]
+    gaps = np.arange(13) != decision.plan.chosen[0]
+    mean, error = table.mean.copy(), table.standard_error.copy()
+    mean[gaps], error[gaps] = np.nan, np.nan
+    plan = replace(decision.plan, tables=(replace(table, mean=mean, standard_error=error),))
+    rows: Any = reward_rows(
+        replace(finished, record=replace(finished.record, decisions=(replace(decision, plan=plan),)))
+    )
+    assert len(rows["reward"]) == 13
+    assert np.isfinite(rows["reward"]).all()
+    assert rows["chosen"].sum() == 1
+
+
+def test_timings_are_by_stage_and_scan(tables):
+    rows = part(tables["timings"], "random-rate-10.0", 1)
+    record, _ = make_run("random", 1)
+    assert rows["stage"] == ["filter"] * 40 + ["planning"] * 40
+    np.testing.assert_array_equal(rows["duration_s"], np.concatenate(list(record.timings.values())))
+    assert set(rows["session"]) == {1}
+
+
+def test_units_are_in_the_metadata(tables):
+    schema = tables["sensors"].schema
+    assert schema.field("x_m").metadata == {b"unit": b"m"}
+    assert schema.field("heading_rad").metadata == {b"unit": b"rad"}
+    assert schema.field("sensor").metadata is None
+    assert b"trial" in schema.metadata[b"vedette"]
+
+
+def test_equal_results_are_equal_files_whatever_order_they_came_in(results, tmp_path):
+    from campaigns.filled import add
+    from vedette.campaigns.store import Store
+
+    campaign = make_campaign()
+    with Store.open(tmp_path / "other", campaign) as store:
+        for cell, run in reversed(campaign.tasks[:-2]):
+            add(store, cell.name, run)
+    first = export_tables(results, tmp_path / "first")
+    second = export_tables(open_results(tmp_path / "other"), tmp_path / "second")
+    assert [path.name for path in first] == [f"{name}.parquet" for name in TABLES]
+    for mine, theirs in zip(first, second, strict=True):
+        assert mine.read_bytes() == theirs.read_bytes()
+    again = export_tables(results, tmp_path / "first")
+    assert sorted(path.name for path in (tmp_path / "first").iterdir()) == sorted(path.name for path in again)
+
+
+def test_cells_of_other_dimensions_share_a_table(tmp_path):
+    """A sweep over scenarios whose states differ in size: what a cell lacks is null."""
+    from vedette.campaigns.rows import Lists
+    from vedette.campaigns.tables import _column
+
+    first = pyarrow.table({"mean_0": _column([np.zeros(2)])})
+    second = pyarrow.table({"mean_0": _column([np.ones(1)]), "mean_1": _column([np.ones(1)])})
+    joined = pyarrow.concat_tables([first, second], promote_options="permissive")
+    assert joined["mean_1"].to_pylist() == [None, None, 1.0]
+    lists = _column([Lists.of([[1, 2], []], np.int64), Lists.of([[3]], np.int64)])
+    assert lists.to_pylist() == [[1, 2], [], [3]]
+
+
+def test_csv_holds_the_same_and_lists_as_json(results, tables, tmp_path):
+    import csv
+    import json
+
+    files = {path.stem: path for path in export_csv(results, tmp_path)}
+    with files["decisions"].open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == tables["decisions"].num_rows
+    assert json.loads(rows[0]["chosen_actions"]) == tables["decisions"]["chosen_actions"][0].as_py()
+    with files["scans"].open(newline="") as file:
+        values = [float(row["ospa_m"]) for row in csv.DictReader(file)]
+    np.testing.assert_array_equal(values, tables["scans"]["ospa_m"].to_numpy())
+
+
+def test_the_dataset_has_every_measure_and_gaps_where_runs_are_missing(results):
+    dataset = results.dataset()
+    assert dict(dataset.sizes) == {"cell": 4, "run": NUM_RUNS, "scan": 40}
+    record, metrics = make_run("jdm", 1)
+    chosen = dataset.sel(cell="jdm-rate-10.0", run=1)
+    np.testing.assert_array_equal(chosen["ospa_m"], record.ospa[:, 0])
+    np.testing.assert_array_equal(chosen["time_s"], record.times)
+    for name, column in metrics.columns().items():
+        np.testing.assert_array_equal(chosen[name], column)
+    assert bool(dataset["ospa_m"].sel(cell="random-rate-5.0", run=2).isnull().all())
+    assert dataset["ospa_m"].attrs["units"] == "m"
+    strategies = dataset.groupby("planner").mean()["ospa_m"].mean(("run", "scan"))
+    assert float(strategies.sel(planner="jdm")) < float(strategies.sel(planner="random"))
+
+
+def test_netcdf_reads_back(results, tmp_path):
+    import xarray
+
+    (path,) = export_netcdf(results, tmp_path)
+    with xarray.open_dataset(path, engine="scipy") as read:
+        dataset = results.dataset()
+        for name in dataset.data_vars:
+            np.testing.assert_array_equal(read[name], dataset[name])
+        assert list(read["planner"].astype(str).values) == list(dataset["planner"].values)
+        assert read.attrs["campaign"] == "trial"
+
+
+@pytest.mark.parametrize(("name", "ask"), [("pyarrow", "tables"), ("xarray", "dataset")])
+def test_a_missing_package_is_named(results, monkeypatch, name, ask):
+    real = builtins.__import__
+
+    def without(module, *arguments, **options):
+        if module == name:
+            raise ImportError(module)
+        return real(module, *arguments, **options)
+
+    monkeypatch.setattr(builtins, "__import__", without)
+    with pytest.raises(InputError, match=rf"expected {name}, which is not installed; pip install 'vedette\["):
+        getattr(results, ask)()
+
+
+@pytest.mark.parametrize("kind", FORMATS)
+def test_a_place_that_cannot_be_written_is_named(results, tmp_path, kind):
+    (tmp_path / "file").write_text("mine")
+    with pytest.raises(InputError, match="expected a file that can be written"):
+        FORMATS[kind](results, tmp_path / "file")
+    assert (tmp_path / "file").read_text() == "mine"
+
+
+def test_what_the_page_shows_runs(results, tmp_path, monkeypatch, capsys):
+    """Every block of Python on the page, one after another, in a results folder with its tables."""
+    pytest.importorskip("duckdb")
+    pytest.importorskip("pandas")
+    fill(tmp_path, make_campaign())
+    export_tables(open_results(tmp_path), tmp_path / "tables")
+    monkeypatch.chdir(tmp_path)
+    known: dict[str, object] = {"__name__": "__main__"}
+    blocks = re.findall(r"```python\n(.*?)```", PAGE.read_text("utf-8"), re.DOTALL)
+    assert len(blocks) >= 6
+    for block in blocks:
+        if "polars" in block and importlib.util.find_spec("polars") is None:
+            continue
+        exec(compile(block, str(PAGE), "exec"), known)
+    output = capsys.readouterr().out
+    for shown in ("gospa_m", "margin", "jdm-rate-5.0", "chosen_headings_rad"):
+        assert shown in output
