@@ -28,3 +28,16 @@ def results_of(folder: Path, campaign: Campaign, *, skipped: Collection[tuple[st
                 assert isinstance(result, Landed), result
                 store.add(result.cell, result.run, result.payload, result.timings)
     return open_results(folder)
+
+
+# A bearing-only sensor that sees a sector, and a range-only one that sees as far as its range.
+MIXED_SENSORS: dict[str, Any] = {
+    "sensors.0.measurement": {"kind": "bearing_only"},
+    "sensors.0.noise": {"kind": "constant", "std": [0.02]},
+    "sensors.0.clutter": {"kind": "measurement_space", "rate": 4.0, "low": [-3.14], "high": [3.14]},
+    "sensors.0.detection": {"kind": "limited_sector", "probability": 0.95, "max_range": 1500.0, "half_width_deg": 60.0},
+    "sensors.1.measurement": {"kind": "range_only"},
+    "sensors.1.noise": {"kind": "constant", "std": [10.0]},
+    "sensors.1.clutter": {"kind": "measurement_space", "rate": 4.0, "low": [0.0], "high": [2000.0]},
+    "sensors.1.detection": {"kind": "limited_range", "probability": 0.95, "max_range": 1200.0},
+}

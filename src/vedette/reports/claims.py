@@ -47,6 +47,7 @@ def claim(comparison: Comparison, first: str, second: str) -> Claim:
     paired = comparison.difference(second, first)
     verdict, names = _verdict(paired), (strategy_label(first), strategy_label(second))
     sentence = _SENTENCES[verdict](*names, paired)
+    sentence = sentence[0].upper() + sentence[1:]
     mean, low, high = (float(each) for each in (paired.summary.mean, paired.summary.low, paired.summary.high))
     interval = "" if verdict == "unknown" else f" ({low:+.2f} to {high:+.2f})"
     return Claim(verdict, *names, sentence, _minus(f"{mean:+.2f}{interval}"), percent(paired.share_won))
@@ -79,7 +80,7 @@ def _untold(first: str, second: str, paired: PairedDifference) -> str:
     return (
         f"{first} and {second} are not told apart: the paired difference in mean OSPA, {second} minus {first}, is "
         f"{_minus(f'{float(paired.summary.mean):.2f}')} m, but its 95 % confidence interval, {_interval(paired)}, "
-        f"holds 0 ({_runs(paired)}). {first} is better in {_share(paired)}."
+        f"holds 0 ({_runs(paired)}); {first} is better in {_share(paired)}."
     )
 
 

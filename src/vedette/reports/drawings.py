@@ -172,7 +172,7 @@ def _panels(campaign: Campaign, cells: Sequence[Cell], axis: str) -> dict[str, d
     lines = campaign.compare if campaign.compare in others else ("planner" if "planner" in others else "")
     panels: dict[str, dict[str, list[Cell]]] = {}
     for cell in cells:
-        shared = describe_settings({name: cell.settings[name] for name in others if name != lines})
+        shared = describe_settings(cell, (name for name in others if name != lines))
         curve = str(cell.settings[lines]) if lines else cell.planner
         panels.setdefault(shared, {}).setdefault(curve, []).append(cell)
     return panels

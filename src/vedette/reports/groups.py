@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -76,7 +76,7 @@ def gather(results: CampaignResults) -> Iterator[Group]:
     taken: set[str] = set()
     for cells in campaign.groups():
         shared = {axis: value for axis, value in cells[0].settings.items() if axis != campaign.compare}
-        yield _group(results, cells, _unused(_slug(campaign, shared), taken), _title(campaign, shared))
+        yield _group(results, cells, _unused(_slug(campaign, shared), taken), _title(campaign, cells[0]))
 
 
 def _group(results: CampaignResults, cells: tuple[Cell, ...], name: str, title: str) -> Group:
@@ -106,12 +106,16 @@ def varying_axes(campaign: Campaign) -> tuple[str, ...]:
     return tuple(axis for axis, values in campaign.axes.items() if len(values) > 1 and axis != campaign.compare)
 
 
-def describe_settings(settings: Mapping[str, Any]) -> str:
-    """Axis and value, in words: `paper-a, fusion clmb, clutter rate 20`."""
-    return ", ".join(
-        str(value) if axis in ("scenario", "variant") else f"{axis_label(axis)} {_short(value)}"
-        for axis, value in settings.items()
-    )
+def describe_settings(cell: Cell, axes: Iterable[str]) -> str:
+    """Value of each axis of a cell, in words: `paper-a, fusion clmb, clutter rate 20`."""
+    return ", ".join(_describe(cell, axis) for axis in axes)
+
+
+def _describe(cell: Cell, axis: str) -> str:
+    if axis == "scenario":
+        return cell.scenario.name
+    value = cell.settings[axis]
+    return str(value) if axis == "variant" else f"{axis_label(axis)} {_short(value)}"
 
 
 def _label(axis: str, value: Any) -> str:
@@ -129,9 +133,10 @@ def axis_label(axis: str) -> str:
     return " ".join(parts[-2:]).replace("_", " ")
 
 
-def _title(campaign: Campaign, shared: Mapping[str, Any]) -> str:
+def _title(campaign: Campaign, cell: Cell) -> str:
     varying = varying_axes(campaign)
-    return describe_settings({axis: value for axis, value in shared.items() if axis in varying or axis == "scenario"})
+    shown = (axis for axis in cell.settings if axis in varying or axis == "scenario" != campaign.compare)
+    return describe_settings(cell, shown) or campaign.name
 
 
 def _slug(campaign: Campaign, shared: Mapping[str, Any]) -> str:

@@ -9,7 +9,16 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
 from vedette.errors import InputError
-from vedette.evaluation.figures.style import GREY, INK, colour, line_style, new_figure, strategy_label, styled
+from vedette.evaluation.figures.style import (
+    GREY,
+    INK,
+    colour,
+    legend_columns,
+    line_style,
+    new_figure,
+    strategy_label,
+    styled,
+)
 from vedette.evaluation.metrics import AverageNees
 from vedette.kernels.types import Floats
 
@@ -47,7 +56,8 @@ def consistency_figure(times: Floats, position: Mapping[str, AverageNees]) -> Fi
     axes.set_xlim(times[0], times[-1])
     axes.set_xlabel("Time (s)")
     axes.set_ylabel("Position NEES / 2")
-    figure.legend(loc="outside upper center", ncols=min(len(position) + 1, 4))
+    _, labels = axes.get_legend_handles_labels()
+    figure.legend(loc="outside upper center", ncols=legend_columns(labels))
     return figure
 
 

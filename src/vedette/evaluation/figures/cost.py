@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
 from vedette.errors import InputError
-from vedette.evaluation.figures.style import MARKERS, colour, new_figure, strategy_label, styled
+from vedette.evaluation.figures.style import MARKERS, colour, legend_columns, new_figure, strategy_label, styled
 from vedette.kernels.types import Floats
 
 
@@ -44,5 +44,6 @@ def cost_figure(seconds: Mapping[str, Mapping[str, Floats]]) -> Figure:
     axes.grid(False, axis="y")
     axes.tick_params(axis="y", length=0)
     axes.set_xlabel("Time (ms): median, 5 % to 95 %")
-    figure.legend(loc="outside upper center", ncols=min(len(seconds), 4), handlelength=1.2)
+    _, labels = axes.get_legend_handles_labels()
+    figure.legend(loc="outside upper center", ncols=legend_columns(labels), handlelength=1.2)
     return figure

@@ -12,6 +12,7 @@ from vedette.evaluation.statistics import Summary, paired_difference
 from vedette.kernels.types import Floats
 
 _ROW = 0.36  # inches
+_SHORT = 8  # letters
 _GOLDEN = 0.6180339887498949
 
 
@@ -48,7 +49,9 @@ def _draw_differences(axes: Axes, comparison: Comparison) -> None:
         _draw_mean(axes, paired_difference(means, first).summary, row)
     name = strategy_label(reference)
     _name_rows(axes, [f"{strategy_label(strategy)} \N{MINUS SIGN} {name}" for strategy in others])
-    axes.set_xlabel(f"Paired difference (m), right of 0: {name} better")
+    # The whole sentence where it fits; the names of the rows say the same.
+    better = f", right of 0: {name} better" if len(name) <= _SHORT else ""
+    axes.set_xlabel(f"Paired difference (m){better}")
 
 
 def _draw_runs(axes: Axes, values: Floats, row: int, shade: str) -> None:

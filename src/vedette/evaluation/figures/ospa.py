@@ -9,7 +9,15 @@ from matplotlib.figure import Figure
 
 from vedette.errors import InputError
 from vedette.evaluation.comparison import PARTS, Comparison
-from vedette.evaluation.figures.style import GREY, colour, line_style, new_figure, strategy_label, styled
+from vedette.evaluation.figures.style import (
+    GREY,
+    colour,
+    legend_columns,
+    line_style,
+    new_figure,
+    strategy_label,
+    styled,
+)
 
 _LABELS = {"total": "OSPA (m)", "localisation": "Localisation (m)", "cardinality": "Cardinality (m)"}
 
@@ -33,7 +41,7 @@ def ospa_figure(comparison: Comparison, *, parts: Sequence[str] = ("total",)) ->
     panels[-1].set_xlabel("Time (s)")
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(
-        handles, labels, loc="outside upper center", ncols=min(len(labels), 5), columnspacing=1.2, handlelength=1.8
+        handles, labels, loc="outside upper center", ncols=legend_columns(labels), columnspacing=1.2, handlelength=1.8
     )
     return figure
 

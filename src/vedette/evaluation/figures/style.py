@@ -90,6 +90,12 @@ def degrees_label(value: float) -> str:
     return f"{value:.0f}".replace("-", "\N{MINUS SIGN}")
 
 
+def legend_columns(labels: Sequence[str], *, width: float = COLUMN_WIDTH) -> int:
+    """How many entries of a legend stand side by side within a width in inches: at least one, at most five."""
+    longest = max(map(len, labels), default=1)
+    return max(1, min(5, len(labels), int((width - 0.1) / (0.5 + 0.055 * longest))))
+
+
 def colour(index: int) -> str:
     return COLOURS[index % len(COLOURS)]
 

@@ -9,7 +9,15 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from vedette.errors import InputError
-from vedette.evaluation.figures.style import MARKERS, colour, line_style, new_figure, strategy_label, styled
+from vedette.evaluation.figures.style import (
+    MARKERS,
+    colour,
+    legend_columns,
+    line_style,
+    new_figure,
+    strategy_label,
+    styled,
+)
 from vedette.evaluation.statistics import Summary
 from vedette.kernels.types import Floats
 
@@ -62,7 +70,8 @@ def sweep_figure(curves: Sequence[SweepCurve], label: str) -> Figure:
     axes.set_ylim(bottom=0.0)
     axes.set_xlabel(label)
     axes.set_ylabel("Mean OSPA (m)")
-    figure.legend(loc="outside upper center", ncols=min(len(curves), 4))
+    _, labels = axes.get_legend_handles_labels()
+    figure.legend(loc="outside upper center", ncols=legend_columns(labels))
     return figure
 
 

@@ -3,12 +3,8 @@ function drawRewards(canvas, run, step) {
   const { context, width, height } = prepared(canvas);
   const decision = decisionAt(run, step);
   if (width < 150) return; // not laid out yet
-  context.fillStyle = colours.grey;
-  context.textBaseline = "middle";
-  if (!decision || (!decision.map && !decision.curves.length)) {
-    context.textAlign = "center";
-    context.fillText(decision ? "decided without rewards" : "no decision yet", width / 2, height / 2);
-  } else if (decision.map) drawMap(context, width, height, decision.map);
+  if (!decision?.curves.length) return;
+  if (decision.map) drawMap(context, width, height, decision.map);
   else drawCurves(context, width, height, decision.curves);
 }
 

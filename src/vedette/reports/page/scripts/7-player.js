@@ -35,7 +35,8 @@ function startReplay(root) {
     const decision = decisionAt(run(), state.step);
     if (!decision) return "No decision yet.";
     const headings = decision.headings.map((heading) => `${minus(String(heading))}\u00b0`).join(", ");
-    return `Decision at ${+run().times[decision.scan].toFixed(3)} s: headings ${headings}.`;
+    const without = decision.curves.length ? "" : ", without rewards";
+    return `Decision at ${+run().times[decision.scan].toFixed(3)} s${without}: headings ${headings}.`;
   }
 
   function tellPointer() {
@@ -63,6 +64,7 @@ function startReplay(root) {
     state.run = index;
     state.playing = false;
     part("scrubber").max = last();
+    part("rewards").hidden = !run().decisions.some((decision) => decision.curves.length);
     part("nothing").hidden = run().scans.length > 0;
     go(Math.min(state.step, last()));
   }

@@ -1,0 +1,161 @@
+from __future__ import annotations
+
+import re
+import tomllib
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from reports.examples import campaign_of, results_of
+from vedette.campaigns.results import CampaignResults
+from vedette.errors import InputError
+from vedette.reports import write_report
+from vedette.reports.spec_text import spec_toml
+from vedette.scenarios import load_scenario
+from vedette.scenarios.dumping import dump_scenario
+
+HOSTILE = '<script>alert("&")</script>'
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory: pytest.TempPathFactory) -> CampaignResults:
+    folder = tmp_path_factory.mktemp("campaign") / "results"
+    return results_of(folder, campaign_of(planners=["jdm", "idm", "random"], runs=3))
+
+
+class Words(HTMLParser):
+    """The text of a page outside scripts and styles, its elements, and the attributes that would load something."""
+
+    def __init__(self, page: str) -> None:
+        super().__init__()
+        self.text: list[str] = []
+        self.elements: list[str] = []
+        self.loads: list[str] = []
+        self.ids: list[str] = []
+        self._inside = ""
+        self.feed(page)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.elements.append(tag)
+        self._inside = tag
+        for name, value in attrs:
+            if name in ("src", "href", "xlink:href", "srcset", "action") and value and not value.startswith("#"):
+                self.loads.append(value)
+            if name == "id":
+                self.ids.append(value or "")
+
+    def handle_data(self, data: str) -> None:
+        if self._inside not in ("script", "style"):
+            self.text.append(data)
+
+    @property
+    def words(self) -> str:
+        return " ".join(" ".join(self.text).split())
+
+
+@pytest.fixture(scope="module")
+def page(results: CampaignResults, tmp_path_factory: pytest.TempPathFactory) -> str:
+    return page_of(results, tmp_path_factory.mktemp("page"))
+
+
+def page_of(results: CampaignResults, folder: Path, **options: Any) -> str:
+    write_report(results, folder / "report.html", **options)
+    return (folder / "report.html").read_text("utf-8")
+
+
+def test_the_page_says_what_was_found_and_how_to_do_it_again(page: str) -> None:
+    words = Words(page).words
+    assert re.search(r"JDM (has \d+\.\d\d m less mean OSPA than|and) (Random|IDM) .*95 % confidence interval", words)
+    assert "3 paired runs" in words
+    for title in ("OSPA against time", "Run by run", "Where the sensors were sent", "Rewards, JDM", "Rewards, IDM"):
+        assert title in words
+    for measure in ("GOSPA (m)", "OSPA(2) (m)", "Cardinality error", "Label switches a run", "Position NEES / 2"):
+        assert measure in words
+    for part in ("planning, a decision", "vedette campaign spec.toml", 'planners = ["jdm", "idm", "random"]', "numba"):
+        assert part in words
+    assert "Unfinished" not in words
+
+
+def test_the_page_needs_nothing_but_itself(page: str) -> None:
+    parsed = Words(page)
+    assert parsed.loads == ["data:,"]  # an icon of nothing, so that no browser asks for one
+    assert not {"img", "iframe", "image", "object"} & set(parsed.elements)
+    assert len(parsed.ids) == len(set(parsed.ids))
+    assert len(page) < 1_500_000
+
+
+def test_the_same_results_give_the_same_bytes(results: CampaignResults, page: str, tmp_path: Path) -> None:
+    assert page_of(results, tmp_path) == page
+
+
+def test_names_are_text_and_never_part_of_the_page(tmp_path: Path) -> None:
+    text = dump_scenario(load_scenario("paper-a").model).replace("name: paper-a", f"name: '{HOSTILE}'", 1)
+    (tmp_path / "hostile.yaml").write_text(text.replace("name: sensor 1", f"name: '{HOSTILE}'", 1), "utf-8")
+    variants = [{"name": HOSTILE}, {"name": "</script><b>"}]
+    scenarios = [str(tmp_path / "hostile.yaml")]
+    campaign = campaign_of(name=HOSTILE, scenarios=scenarios, planners=["still"], variants=variants)
+    page = page_of(results_of(tmp_path / "results", campaign), tmp_path)
+    parsed = Words(page)
+    assert parsed.elements.count("script") == 2
+    assert "b" not in parsed.elements
+    assert parsed.words.count(HOSTILE) > 5
+    assert "<script>alert" not in page
+
+
+def test_strategies_without_a_run_in_common_are_shown_but_not_compared(tmp_path: Path) -> None:
+    campaign = campaign_of(planners=["random", "fixed", "still"])
+    skipped = {("fixed", 0), ("random", 1), ("still", 0), ("still", 1)}
+    words = Words(page_of(results_of(tmp_path / "results", campaign, skipped=skipped), tmp_path)).words
+    assert "Unfinished: 2 of 6 runs are in." in words
+    assert "There is nothing to compare yet" in words
+    assert "no run number is finished for every one of them yet" in words
+    assert "Random: 1 of 2 runs; Fixed: 1 of 2 runs; no run yet of still" in words
+    assert "GOSPA (m)" in words
+
+
+def test_a_campaign_without_any_run_has_a_report(tmp_path: Path) -> None:
+    campaign = campaign_of(planners=["random", "fixed"], runs=1)
+    skipped = {("random", 0), ("fixed", 0)}
+    words = Words(page_of(results_of(tmp_path / "results", campaign, skipped=skipped), tmp_path)).words
+    assert "Unfinished: 0 of 2 runs are in." in words
+    assert "There is no finished run to replay." in words
+
+
+def test_a_number_that_is_compared_is_named_and_swept(tmp_path: Path) -> None:
+    axis = "sensors.*.clutter.rate"
+    campaign = campaign_of(planners=["fixed"], grid={axis: [5.0, 40.0]}, compare=axis)
+    results = results_of(tmp_path / "results", campaign)
+    words = Words(page_of(results, tmp_path, replays=[(campaign.cells[1].name, 0)])).words
+    assert "compared: clutter rate" in words
+    assert re.search(r"[Cc]lutter rate 5 .*clutter rate 40", words)
+    assert "Sweep of clutter rate" in words
+    assert "Run clutter rate 40, run 0 " in words
+
+
+@pytest.mark.parametrize(("chosen", "message"), [(("jdm", 9), "expected a finished run"), (("gdm", 0), "expected one")])
+def test_runs_that_are_not_there_are_refused(
+    results: CampaignResults, tmp_path: Path, chosen: tuple[str, int], message: str
+) -> None:
+    with pytest.raises(InputError, match=message):
+        write_report(results, tmp_path / "report.html", replays=[chosen])
+    assert not (tmp_path / "report.html").exists()
+
+
+def test_a_page_that_cannot_be_written_is_an_error(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    campaign = campaign_of(planners=["still"], runs=1)
+    results = results_of(tmp_path / "results", campaign, skipped={("still", 0)})
+    with pytest.raises(InputError, match="expected a place to write a report"):
+        write_report(results, tmp_path / "file" / "report.html")
+
+
+def test_the_specification_reads_back() -> None:
+    spec = {
+        "name": 'a "name"\n', "runs": 3, "seed": None, "flag": True, "list": [1, 2.5, "x"], "set": {},
+        "grid": {"sensors.*.clutter.rate": [5.0, 1e-9], "a b": [[1, 2], [3, 4]]},
+        "variants": [{"name": "one", "set": {"filter.kind": "lmb"}}, {"name": "two"}],
+    }  # fmt: skip
+    kept = {key: value for key, value in spec.items() if key not in ("seed", "set")}
+    assert tomllib.loads(spec_toml(spec)) == kept
