@@ -16,9 +16,9 @@ from typing import Any
 
 import numpy as np
 
-from vedette.densities import map_estimate
+from vedette.densities import GLMB, LMB, map_estimate, unlabelled_estimate
 from vedette.evaluation import ospa_of_run
-from vedette.filters import DeltaGlmbFilter, LmbFilter, LocalFilter
+from vedette.filters import CbMemberFilter, CphdFilter, DeltaGlmbFilter, LmbFilter, LocalFilter, PhdFilter
 from vedette.scenarios import load_scenario
 from vedette.scenarios.build import build_experiment
 from vedette.simulation import Truth, simulate_scan
@@ -48,36 +48,44 @@ def variants(tracker: DeltaGlmbFilter) -> dict[str, LocalFilter]:
         "delta-GLMB, Gibbs": replace(tracker, assignment="gibbs", marginalised=False),
         "M-delta-GLMB, ranked": replace(tracker, assignment="ranked", marginalised=True),
         "LMB": LmbFilter(*parts),
+        "PHD": PhdFilter(*parts),
+        "CPHD": CphdFilter(*parts),
+        "CB-MeMBer": CbMemberFilter(*parts),
     }
 
 
-def measure(tracker: LocalFilter, pose: Any, times: Any, scans: Any) -> tuple[list[float], list[Any]]:
+def measure(tracker: Any, pose: Any, times: Any, scans: Any) -> tuple[list[float], list[Any]]:
     """Seconds of each scan, and the estimates."""
     belief, rng, seconds, estimates = tracker.initial(), np.random.default_rng(0), [], []
     for k, scan in enumerate(scans):
         start = time.process_time()
         belief, _ = tracker.step(belief, scan, pose, float(times[1] - times[0]), k + 1, rng=rng)
         seconds.append(time.process_time() - start)
-        estimates.append(map_estimate(belief))
+        labelled = isinstance(belief, GLMB | LMB)
+        estimates.append(map_estimate(belief) if labelled else unlabelled_estimate(belief, k + 1))
     return seconds, estimates
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--scenario", default="linear-10")
-    parser.add_argument("--runs", type=int, default=5)
+    parser.add_argument("--runs", type=int, default=5, help="at least 2")
     options = parser.parse_args()
     tracker, pose, times, runs = simulated(options.scenario, options.runs)
-    print(f"{'filter':22s}  median ms  95 %  worst   OSPA m")
+    print(f"{'filter':22s}  median ms  95 %  worst   OSPA m (sd)    error of the number: mean, mean size")
     for name, variant in variants(tracker).items():
         measure(variant, pose, times, runs[0][1])  # compiles, or reads the cache
-        seconds, ospas = [], []
+        seconds, ospas, errors = [], [], []
         for truth, scans in runs:
             spent, estimates = measure(variant, pose, times, scans)
             seconds += spent
             ospas.append(ospa_of_run(truth, estimates, cutoff=100.0, order=1.0)[:, 0].mean())
+            errors.append([estimate.num_targets for estimate in estimates] - np.diff(truth.offsets))
         median, high, worst = 1e3 * np.percentile(seconds, [50, 95, 100])
-        print(f"{name:22s}  {median:9.2f}  {high:4.1f}  {worst:5.1f}   {np.mean(ospas):6.2f}")
+        score = (
+            f"{np.mean(ospas):6.2f} ({np.std(ospas, ddof=1):.2f})   {np.mean(errors):+.2f} {np.abs(errors).mean():.2f}"
+        )
+        print(f"{name:22s}  {median:9.2f}  {high:4.1f}  {worst:5.1f}   {score}")
 
 
 if __name__ == "__main__":

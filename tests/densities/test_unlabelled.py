@@ -145,6 +145,17 @@ def test_a_component_of_weight_two_is_two_targets() -> None:
     np.testing.assert_allclose(estimate.existence, [1.0, 0.95, 0.9])
 
 
+def test_a_component_with_less_than_half_a_target_left_stands_for_no_other() -> None:
+    means, covs = spread(3)
+    density = IidCluster.from_gaussians([0.0, 0.1, 0.0, 0.9], [0.6, 0.38, 0.02], means, covs)
+    estimate = unlabelled_estimate(density, 1)
+    np.testing.assert_array_equal(estimate.means[:, 0], [0.0, 10.0, 0.0])
+    few = IidCluster.from_gaussians([0.0, 0.1, 0.0, 0.9], [0.5, 0.48, 0.02], means, covs)
+    np.testing.assert_array_equal(unlabelled_estimate(few, 1).means[:, 0], [0.0, 10.0, 20.0])
+    alone = IidCluster.from_gaussians([0.5, 0.0, 0.0, 0.5 + 1e-12], [1.0], means[:1], covs[:1])
+    assert unlabelled_estimate(alone, 1).num_targets == 2
+
+
 @pytest.mark.parametrize(("mean", "number"), [(0.0, 0), (0.49, 0), (0.5, 1), (1.49, 1), (1.51, 2)])
 def test_the_mean_number_of_a_poisson_is_rounded(mean: float, number: int) -> None:
     means, covs = spread(1)

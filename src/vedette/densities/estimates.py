@@ -129,8 +129,10 @@ def unlabelled_estimate(density: Poisson | IidCluster | MultiBernoulli, step: in
 
     Multi-Bernoulli: the most probable number of targets, and that many Bernoullis of highest existence, each estimated
     by its heaviest component. Iid cluster: the most probable number; Poisson: the expected number, rounded; each target
-    is where the intensity has most left, of which it takes one away: a component of weight 2 stands for two targets.
-    Existence is what the component had left, at most 1. Ties: the smaller number; the earlier Bernoulli or component.
+    is where the intensity has most left, of which it takes one away, and a component stands for another target only
+    where half of one or more is left: one of weight 1.9 for two. Components are fewer than targets where these are all
+    in one place. Existence is what the component had left, at most 1. Ties: the smaller number; the earlier Bernoulli or
+    component.
     """
     if isinstance(density, MultiBernoulli):
         number = int(np.argmax(cardinality_distribution(density)))
@@ -148,14 +150,17 @@ def unlabelled_estimate(density: Poisson | IidCluster | MultiBernoulli, step: in
 
 
 def _by_units(weights: Floats, number: int) -> tuple[Ints, Floats]:
-    """The component of most remaining weight, `number` times, and how much it had, as probabilities."""
+    """The component of most remaining weight, up to `number` times, and how much it had, as probabilities."""
     remaining = weights.copy()
-    chosen, had = np.empty(number, np.int64), np.empty(number)
-    for i in range(number):
-        chosen[i] = np.argmax(remaining)
-        had[i] = remaining[chosen[i]]
-        remaining[chosen[i]] -= 1.0
-    return chosen, np.clip(had, 0.0, 1.0)
+    chosen: list[int] = []
+    had: list[float] = []
+    while len(chosen) < number and remaining.max(initial=-1.0) >= 0.0:
+        heaviest = int(np.argmax(remaining))
+        chosen.append(heaviest)
+        had.append(min(float(remaining[heaviest]), 1.0))
+        left = remaining[heaviest] - 1.0
+        remaining[heaviest] = left if left >= 0.5 else -1.0
+    return np.array(chosen, np.int64), np.array(had)
 
 
 @dataclass(frozen=True, slots=True)

@@ -23,6 +23,8 @@ class CbMemberFilter(UnlabelledFilter):
     approximates the posterior by a Bernoulli for each one missed and for each measurement. It takes detection to be
     probable and clutter not too dense; then the expected number of targets is not biased, as Mahler's plain
     multi-Bernoulli update is.
+
+    Attributes and errors: as `LmbFilter`.
     """
 
     def initial(self) -> MultiBernoulli:

@@ -23,6 +23,8 @@ class CphdFilter(UnlabelledFilter):
     Believes in an iid cluster; its cardinality distribution and intensity after a scan are those of the exact posterior
     of such a prior. The cardinality distribution of the births is that of the multi-Bernoulli birth (not a Poisson one
     of the same mean), so that the predicted cardinality distribution is exact too.
+
+    Attributes and errors: as `LmbFilter`.
     """
 
     def initial(self) -> IidCluster:

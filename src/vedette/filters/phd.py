@@ -20,6 +20,8 @@ class PhdFilter(UnlabelledFilter):
 
     Believes in a Poisson density; its intensity after a scan is that of the exact posterior of such a prior. Births
     enter with their intensity, the existence of each site times its density, which is exact as well.
+
+    Attributes and errors: as `LmbFilter`.
     """
 
     def initial(self) -> Poisson:
