@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import hashlib
 import json
+import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import resources
@@ -147,6 +148,7 @@ def _render(
     finished = sum(len(results.finished(cell.name)) for cell in campaign.cells)
     return environment.get_template("report.html").render(
         campaign=campaign,
+        folder=shlex.quote(f"{campaign.name}-results"),
         compared=axis_label(campaign.compare),
         sections=sections,
         sweeps=sweeps,

@@ -1,0 +1,116 @@
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from reports.examples import MIXED_SENSORS, campaign_of, results_of
+from vedette.errors import InputError
+from vedette.reports import replay
+from vedette.reports.groups import Strategy, gather
+from vedette.reports.replay import replay_data
+from vedette.scenarios.build import build_experiment
+from vedette.simulation.replay import scans_of
+
+
+def strategies_of(folder: Path, **fields: Any) -> dict[str, Strategy]:
+    (group,) = gather(results_of(folder, campaign_of(runs=1, **fields)))
+    return {each.label: each for each in group.strategies}
+
+
+@pytest.fixture(scope="module")
+def strategies(tmp_path_factory: pytest.TempPathFactory) -> Mapping[str, Strategy]:
+    return strategies_of(tmp_path_factory.mktemp("replay") / "results", planners=["jdm", "idm", "fixed"])
+
+
+def test_it_holds_the_truth_the_poses_and_the_errors(strategies: Mapping[str, Strategy]) -> None:
+    record = strategies["jdm"].records[0]
+    data = replay_data(strategies["jdm"], record, "group")
+    json.dumps(data, allow_nan=False)
+    ids, states = record.truth.at(30)
+    assert [row[0] for row in data["truth"][30]] == (ids + 1).tolist()
+    np.testing.assert_allclose([row[1:3] for row in data["truth"][30]], states[:, :2], atol=0.06)
+    np.testing.assert_allclose(np.array(data["poses"])[:, :, :2], record.poses[:, :, :2], atol=0.06)
+    np.testing.assert_allclose(data["ospa"], record.ospa, atol=0.006)
+
+
+def test_estimates_have_their_two_sigma_ellipse_and_their_error(strategies: Mapping[str, Strategy]) -> None:
+    record = strategies["jdm"].records[0]
+    for scan, rows in enumerate(replay_data(strategies["jdm"], record, "")["estimates"]):
+        estimate = record.estimates[scan]
+        assert len(rows) == estimate.num_targets
+        ids, states = record.truth.at(scan)
+        for row, mean, cov in zip(rows, estimate.means, estimate.covs, strict=True):
+            _, x, y, existence, long, short, angle, target, error = row
+            turn = np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
+            drawn = turn @ np.diag([long / 2.0, short / 2.0]) ** 2 @ turn.T
+            np.testing.assert_allclose(drawn, cov[:2, :2], rtol=0.02, atol=0.02 * np.trace(cov[:2, :2]))
+            assert 0.0 <= existence <= 1.0
+            assert (x, y) == pytest.approx(mean[:2], abs=0.06)
+            if target:
+                place = states[ids.tolist().index(target - 1), :2]
+                assert error == pytest.approx(math.dist(mean[:2], place), abs=0.06)
+
+
+def test_bearing_and_range_become_a_point(strategies: Mapping[str, Strategy]) -> None:
+    strategy = strategies["fixed"]
+    record = strategy.records[0]
+    data = replay_data(strategy, record, "")
+    scans = scans_of(record, build_experiment(strategy.cell.scenario))
+    for step in (0, 39):
+        for sensor in (0, 1):
+            rows = data["scans"][step][sensor]
+            assert [row[0] for row in rows] == (scans[step][sensor].origins + 1).tolist()
+            offsets = np.array([row[1:] for row in rows]) - record.poses[step, sensor, :2]
+            measured = np.c_[np.arctan2(offsets[:, 1], offsets[:, 0]), np.hypot(offsets[:, 0], offsets[:, 1])]
+            np.testing.assert_allclose(measured, scans[step][sensor].measurements, atol=0.1)
+
+
+def test_bearings_and_ranges_alone_stay_what_they_are(tmp_path: Path) -> None:
+    strategy = strategies_of(tmp_path / "results", planners=["still"], set=MIXED_SENSORS)["still"]
+    data = replay_data(strategy, strategy.records[0], "")
+    assert [sensor["kind"] for sensor in data["sensors"]] == ["ray", "circle"]
+    assert data["sensors"][0]["half_width"] == pytest.approx(math.pi / 3.0, abs=1e-4)
+    assert data["sensors"][1]["range"] == 1200.0
+    scans = scans_of(strategy.records[0], build_experiment(strategy.cell.scenario))
+    bearings = [row[1] for row in data["scans"][7][0]]
+    ranges = [row[1] for row in data["scans"][7][1]]
+    np.testing.assert_allclose(bearings, scans[7][0].measurements[:, 0], atol=1e-4)
+    np.testing.assert_allclose(ranges, scans[7][1].measurements[:, 0], atol=0.06)
+
+
+def test_a_joint_decision_is_a_map_and_curves_with_the_choice(strategies: Mapping[str, Strategy]) -> None:
+    record = strategies["jdm"].records[0]
+    decision = replay_data(strategies["jdm"], record, "")["decisions"][0]
+    plan = record.decisions[0].plan
+    i, j = decision["map"]["chosen"]
+    assert decision["scan"] == 9
+    assert [decision["map"]["degrees"][0][i], decision["map"]["degrees"][1][j]] == decision["headings"]
+    table = np.array(decision["map"]["mean"])
+    assert table[i, j] == table.max() == pytest.approx(plan.expected_rewards[0][0], rel=1e-4)
+    for curve, chosen in zip(decision["curves"], (i, j), strict=True):
+        assert curve["chosen"] == chosen
+        assert max(curve["mean"]) == curve["mean"][chosen]
+
+
+def test_independent_decisions_are_curves_and_fixed_ones_nothing(strategies: Mapping[str, Strategy]) -> None:
+    decision = replay_data(strategies["idm"], strategies["idm"].records[0], "")["decisions"][0]
+    assert decision["map"] is None
+    assert [curve["sensor"] for curve in decision["curves"]] == [0, 1]
+    decision = replay_data(strategies["fixed"], strategies["fixed"].records[0], "")["decisions"][0]
+    assert (decision["map"], decision["curves"]) == (None, [])
+
+
+def test_without_the_models_there_are_no_measurements(
+    strategies: Mapping[str, Strategy], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def missing(_: object) -> None:
+        raise InputError("python: expected a file; got none")
+
+    monkeypatch.setattr(replay, "build_experiment", missing)
+    assert replay_data(strategies["fixed"], strategies["fixed"].records[0], "")["scans"] == []
