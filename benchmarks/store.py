@@ -6,7 +6,7 @@
 Each run is the same finished run of paper-a (joint decisions). Every way of keeping makes it reach the disk before the
 next run: SQLite by its durable settings, Parquet files by fsync of each file and of the folder that holds them. Times
 are those to encode and land a run (median and 99th percentile) and to read everything back as run records; sizes are
-those on the disk.
+those on the disk. Last, what is done with a whole results folder of so many runs: comparing them, writing the tables.
 """
 
 from __future__ import annotations
@@ -14,19 +14,25 @@ from __future__ import annotations
 import argparse
 import json
 import os
-import shutil
 import sqlite3
 import statistics
 import tempfile
 import time
 import zlib
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pyarrow as pa
 from pyarrow import parquet
 
-from vedette.campaigns.codec import decode, encode
+from vedette.campaigns.cells import resolve
+from vedette.campaigns.codec import decode, encode, encode_timings
+from vedette.campaigns.export import export_tables
+from vedette.campaigns.results import open_results
+from vedette.campaigns.spec import spec_from_data
+from vedette.campaigns.store import Store
 from vedette.evaluation.metrics import RunMetrics, measure
 from vedette.evaluation.runs import run_scenario
 from vedette.files import sync_folder
@@ -99,8 +105,6 @@ def _columns(table: pa.Table) -> Iterator[tuple[str, pa.ChunkedArray]]:
 
 
 def _stacked(flat: dict[str, object], name: str) -> object:
-    import numpy as np
-
     width = sum(column.startswith(f"{name}_") for column in flat)
     return np.stack([flat[f"{name}_{index}"] for index in range(width)], axis=1)  # type: ignore[arg-type]
 
@@ -121,6 +125,27 @@ def measured(way: Way, folder: Path, num_runs: int) -> str:
     return f"{1e3 * statistics.median(seconds):9.2f} {1e3 * worst:9.2f} {whole:10.2f} {size / 2**20:10.1f} {files:8d}"
 
 
+def whole_folder(folder: Path, record: RunRecord, metrics: RunMetrics, num_runs: int) -> None:
+    """Print what reading a results folder of two strategies, and writing its tables cost."""
+    spec = {"name": "bench", "scenarios": ["paper-a"], "planners": ["jdm", "random"], "runs": num_runs // 2}
+    campaign = resolve(spec_from_data(spec))
+    with Store.open(folder / "results", campaign) as store:
+        for cell, run in campaign.tasks:
+            mine = replace(record, run=run)
+            store.add(cell.name, run, encode(mine, metrics), encode_timings(mine))
+    start = time.perf_counter()
+    results = open_results(folder / "results")
+    results.comparisons()
+    compared = time.perf_counter()
+    export_tables(results, folder / "tables")
+    exported = time.perf_counter()
+    memory = sum(table.nbytes for table in results.tables().values())
+    print(
+        f"results folder: opened and compared in {compared - start:.2f} s; "
+        f"tables written in {exported - compared:.2f} s, {memory / 2**20:.1f} MiB in memory"
+    )
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--runs", type=int, default=300)
@@ -138,8 +163,8 @@ def main() -> None:
             else:
                 name, way = f"SQLite, {journal}", sqlite_file(folder, record, metrics, journal)
             print(f"{name:18s} {measured(way, folder, options.runs)}", flush=True)
-            shutil.rmtree(folder, ignore_errors=True)
-            folder.mkdir()
+    with tempfile.TemporaryDirectory(dir=options.folder) as scratch:
+        whole_folder(Path(scratch), record, metrics, options.runs)
 
 
 if __name__ == "__main__":

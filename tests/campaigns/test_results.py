@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 
 from campaigns.filled import NUM_RUNS, add, fill, make_campaign, make_run
 from simulation.test_storage import assert_same
-from vedette.campaigns.codec import encode
+from vedette.campaigns.codec import encode, encode_timings
 from vedette.campaigns.manifest import contents_checksum
 from vedette.campaigns.results import open_results
 from vedette.campaigns.store import Store
@@ -149,6 +149,18 @@ def test_a_run_that_was_altered_is_named(folder, statement):
         with pytest.raises(InputError, match=message):
             ask()
     assert results.record("jdm-rate-5.0", 2).run == 2
+
+
+def test_a_payload_of_another_run_or_of_none_is_named(folder, campaign):
+    record, metrics = make_run("random", 0)
+    timings = encode_timings(record)
+    with Store.open(folder, campaign) as store:
+        store.add("random-rate-5.0", 2, encode(record, metrics), timings)
+        store.add("random-rate-10.0", 2, b"no run", timings)
+    results = open_results(folder)
+    for cell, message in (("random-rate-5.0", "expected the number 2; got 0"), ("random-rate-10.0", "got others")):
+        with pytest.raises(InputError, match=rf"campaign\.sqlite: cell {cell}, run 2: run: .*{message}"):
+            results.record(cell, 2)
 
 
 def test_bytes_changed_anywhere_in_the_file_are_never_read_as_results(folder):

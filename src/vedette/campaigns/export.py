@@ -7,8 +7,10 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, BinaryIO
 
+from pyarrow import csv, parquet
+
 from vedette.campaigns.results import CampaignResults
-from vedette.campaigns.tables import arrow, plain_lists
+from vedette.campaigns.tables import plain_lists
 from vedette.errors import InputError
 from vedette.files import write_whole
 
@@ -21,10 +23,8 @@ def export_tables(results: CampaignResults, folder: Path | str) -> tuple[Path, .
     Each file appears whole or not at all, in place of one of that name. Equal results give equal bytes under the same
     version of pyarrow, but for `timings.parquet`, which holds what the clock said. No file where no run is finished.
 
-    Raises `InputError` where pyarrow is not installed or the files cannot be written.
+    Raises `InputError` where the files cannot be written.
     """
-    arrow()
-    from pyarrow import parquet
 
     def write(table: Any, file: BinaryIO) -> None:
         parquet.write_table(table, file, compression="zstd")
@@ -34,9 +34,6 @@ def export_tables(results: CampaignResults, folder: Path | str) -> tuple[Path, .
 
 def export_csv(results: CampaignResults, folder: Path | str) -> tuple[Path, ...]:
     """Write the same tables as `<name>.csv`, lists as JSON; as `export_tables`."""
-    arrow()
-    from pyarrow import csv
-
     return _write_tables(results, Path(folder), ".csv", lambda table, file: csv.write_csv(plain_lists(table), file))
 
 

@@ -114,7 +114,7 @@ class CampaignResults:
         """Runs, scans, decisions, rewards, tracks, truth, sensors and timings as Arrow tables.
 
         For pandas `.to_pandas()`, for polars `polars.from_arrow`; DuckDB queries them as they are. See
-        `vedette.campaigns.tables`. Raises `InputError` where pyarrow is not installed.
+        `vedette.campaigns.tables`. None where no run is finished.
         """
         from vedette.campaigns.tables import tables_of_runs
 
@@ -145,6 +145,8 @@ class CampaignResults:
         try:
             record, metrics = decode(entry.payload)
             record = replace(record, timings=decode_timings(entry.timings))
+            if record.run != entry.run:
+                raise InputError(f"run: expected the number {entry.run}; got {record.run}")
         except InputError as error:
             place = f"{self.folder / DATABASE}: cell {entry.cell}, run {entry.run}"
             raise InputError(f"{place}: {error}") from error

@@ -10,40 +10,26 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable
 from itertools import groupby
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import pyarrow as pa
 
 from vedette.campaigns.cells import Campaign, Cell
 from vedette.campaigns.rows import PER_RUN, Lists
-from vedette.errors import InputError
 
 if TYPE_CHECKING:
-    import pyarrow
-
     from vedette.campaigns.results import FinishedRun
-
-Table: TypeAlias = "pyarrow.Table"
 
 NAMES = tuple(PER_RUN)
 _UNITS = {"_m": "m", "_s": "s", "_rad": "rad"}
 
 
-def arrow() -> Any:
-    """The module pyarrow. Raises `InputError` where it is not installed."""
-    try:
-        import pyarrow
-    except ImportError:
-        raise InputError("tables: expected pyarrow, which is not installed; pip install 'vedette[parquet]'") from None
-    return pyarrow
-
-
-def tables_of_runs(campaign: Campaign, runs: Iterable[FinishedRun]) -> dict[str, Table]:
+def tables_of_runs(campaign: Campaign, runs: Iterable[FinishedRun]) -> dict[str, pa.Table]:
     """The tables `NAMES`, of runs in the order of `CampaignResults.runs`.
 
     Takes about as much memory as the tables: some 150 MB for 1,000 runs of 40 scans with joint decisions.
     """
-    pa = arrow()
     parts: dict[str, list[Any]] = {name: [] for name in NAMES}
     for name, group in groupby(runs, key=lambda run: run.cell):
         finished = list(group)
@@ -57,9 +43,8 @@ def tables_of_runs(campaign: Campaign, runs: Iterable[FinishedRun]) -> dict[str,
     }
 
 
-def _of_cell(campaign: Campaign, cell: Cell, runs: list[FinishedRun], rows: list[dict[str, Any]]) -> Table:
+def _of_cell(campaign: Campaign, cell: Cell, runs: list[FinishedRun], rows: list[dict[str, Any]]) -> pa.Table:
     """The rows of all finished runs of one cell, its name and settings before them."""
-    pa = arrow()
     lengths = [len(next(iter(columns.values()))) for columns in rows]
     num_rows = sum(lengths)
     settings = {axis: setting_of(campaign, cell, axis) for axis in campaign.axes}
@@ -72,7 +57,6 @@ def _of_cell(campaign: Campaign, cell: Cell, runs: list[FinishedRun], rows: list
 
 
 def _column(parts: list[Any]) -> Any:
-    pa = arrow()
     if all(isinstance(part, np.ndarray) for part in parts):
         return pa.array(np.concatenate(parts))
     if all(isinstance(part, Lists) for part in parts):
@@ -91,7 +75,7 @@ def setting_of(campaign: Campaign, cell: Cell, axis: str) -> Any:
     return json.dumps(value)
 
 
-def _with_units(table: Table) -> Table:
+def _with_units(table: pa.Table) -> pa.Table:
     schema = table.schema
     for index, schema_field in enumerate(schema):
         unit = unit_of(schema_field.name)
@@ -105,9 +89,8 @@ def unit_of(column: str) -> str | None:
     return next((unit for end, unit in _UNITS.items() if column.endswith(end)), None)
 
 
-def plain_lists(table: Table) -> Table:
+def plain_lists(table: pa.Table) -> pa.Table:
     """The table with its lists as JSON text, for formats without lists."""
-    pa = arrow()
     for index, schema_field in enumerate(table.schema):
         if pa.types.is_list(schema_field.type):
             texts = [None if value is None else json.dumps(value) for value in table.column(index).to_pylist()]
