@@ -25,7 +25,7 @@ from vedette.control import (
 )
 from vedette.densities import GLMB, LMB, Poisson
 from vedette.errors import InputError, ModelError, NumericalError
-from vedette.filters import Limits
+from vedette.filters import CbMemberFilter, CphdFilter, Limits, PhdFilter
 from vedette.fusion import Clmb, CmDeltaGlmb
 
 PLANNERS = [JointPlanner, IndependentPlanner]
@@ -263,10 +263,21 @@ def test_sensors() -> None:
     for speed in (-1.0, np.nan, np.inf, "fast"):
         with pytest.raises(InputError, match="speed: expected"):
             MobileSensor(local, speed)  # type: ignore[arg-type]
-    with pytest.raises(InputError, match="filter: expected a filter of vedette.filters"):
+    with pytest.raises(InputError, match=r"filter: expected a filter of vedette\.filters"):
         MobileSensor("filter", 1.0)  # type: ignore[arg-type]
     with pytest.raises(InputError, match="actions: expected an ActionSet"):
         MobileSensor(local, 1.0, (0.0, 90.0))  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("kind", [PhdFilter, CphdFilter, CbMemberFilter])
+@pytest.mark.parametrize("planner", [JointPlanner, IndependentPlanner])
+def test_filters_without_labels_cannot_be_planned_with(planner: Any, kind: Any) -> None:
+    known = mobile_sensor("lmb").filter
+    local = kind(known.motion, known.survival, known.birth, known.sensor)
+    sensors = (MobileSensor(local, 1.0),)
+    belief = local.initial()
+    with pytest.raises(InputError, match=rf"sensors\[0\].filter: expected one that labels its .*; got {kind.__name__}"):
+        planner(sensors, Clmb((1.0,))).plan([belief], belief, np.zeros((1, 3)), rng=np.random.default_rng(0))
 
 
 @pytest.mark.parametrize("value", [0.0, -1.0, np.nan, np.inf, "unit", True])
