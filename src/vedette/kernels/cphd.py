@@ -65,15 +65,22 @@ def symmetric_functions(log_ratios: Floats) -> Floats:
 
 
 @kernel
+def _log_factorials(num: int) -> Floats:
+    """Of 0 to `num` - 1."""
+    logs = np.zeros(num)
+    for n in range(1, num):
+        logs[n] = logs[n - 1] + math.log(n)
+    return logs
+
+
+@kernel
 def cardinality_derivatives(log_cardinality: Floats, log_missed: float, most: int) -> Floats:
     """(most + 1,) log of the derivatives of order 0, 1, ... of the generating function at exp(log_missed).
 
     The one of order j is the expected number of ways to choose j detected targets in order while the others are missed.
     """
     num = len(log_cardinality)
-    log_factorials = np.zeros(num)
-    for n in range(1, num):
-        log_factorials[n] = log_factorials[n - 1] + math.log(n)
+    log_factorials = _log_factorials(num)
     derivatives, terms = np.full(most + 1, -math.inf), np.empty(num)
     for j in range(min(most + 1, num)):
         for n in range(j, num):
@@ -90,9 +97,7 @@ def correct_cardinality(log_cardinality: Floats, log_missed: float, log_symmetri
     log_symmetric: (num_measurements + 1,) elementary symmetric functions of the scan's ratios.
     """
     num = len(log_cardinality)
-    log_factorials = np.zeros(num)
-    for n in range(1, num):
-        log_factorials[n] = log_factorials[n - 1] + math.log(n)
+    log_factorials = _log_factorials(num)
     corrected, terms = np.empty(num), np.empty(len(log_symmetric))
     for n in range(num):
         most = min(n + 1, len(log_symmetric))
