@@ -109,6 +109,22 @@ def _stacked(flat: dict[str, object], name: str) -> object:
     return np.stack([flat[f"{name}_{index}"] for index in range(width)], axis=1)  # type: ignore[arg-type]
 
 
+def print_codec(record: RunRecord, metrics: RunMetrics, repeats: int = 200) -> None:
+    """Median milliseconds to encode and to decode a run, with all checks."""
+    payload = encode(record, metrics)
+    calls: dict[str, Callable[[], object]] = {
+        "encode": lambda: encode(record, metrics),
+        "decode": lambda: decode(payload),
+    }
+    for name, call in calls.items():
+        seconds = []
+        for _ in range(repeats):
+            start = time.perf_counter()
+            call()
+            seconds.append(time.perf_counter() - start)
+        print(f"{name}: {1e3 * statistics.median(seconds):.2f} ms, {len(payload)} bytes")
+
+
 def measured(way: Way, folder: Path, num_runs: int) -> str:
     land, read = way
     seconds = []
@@ -154,6 +170,7 @@ def main() -> None:
     scenario = load_scenario("paper-a")
     record = run_scenario(scenario, "jdm", seed=0, num_threads=1)
     metrics = measure(record, cutoff=100.0, order=1.0, window=10)
+    print_codec(record, metrics)
     print(f"{options.runs} runs              ms a run   99th ms   read all s        MiB    files")
     for journal in ("delete", "truncate", "persist", "wal", "parquet"):
         with tempfile.TemporaryDirectory(dir=options.folder) as scratch:

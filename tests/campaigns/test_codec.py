@@ -15,10 +15,11 @@ from hypothesis.extra import numpy as hnp
 
 from campaigns.filled import make_run
 from simulation.test_storage import assert_same
-from vedette.campaigns.codec import decode, decode_timings, encode, encode_timings
+from vedette.campaigns.codec import PAYLOAD_VERSION, decode, decode_timings, encode, encode_timings
 from vedette.densities.estimates import Estimate
 from vedette.errors import InputError
 from vedette.simulation.columns import pack, unpack
+from vedette.simulation.tabulation import TABLES
 
 NUMBERS = st.floats(width=64, allow_nan=True, allow_infinity=True)
 
@@ -68,6 +69,22 @@ def test_numpy_alone_reads_a_payload():
         assert archive["tracks"]["mean"].shape[1] == 4
         assert json.loads(archive["run.json"])["seed"] == 7
         assert json.loads(archive["decisions.json"])[0]["planner"] == "jdm"
+
+
+def test_the_layout_of_this_version_is_as_written_here():
+    """Where this fails, results of earlier versions no longer read: raise PAYLOAD_VERSION with the change."""
+    assert PAYLOAD_VERSION == 1
+    layout = {name: " ".join(kinds) for name, kinds in TABLES.items()}
+    assert layout == {
+        "scans": "scan time_s num_targets num_estimates ospa_m localisation_m cardinality_m",
+        "truth": "scan time_s target state",
+        "tracks": "scan time_s birth_step birth_site existence mean cov",
+        "sensors": "scan time_s sensor x_m y_m heading_rad",
+    }
+    assert " ".join(make_run("jdm", 0)[1].columns()) == (
+        "gospa_m gospa_localisation gospa_missed gospa_false num_missed num_false ospa2_m cardinality_error nees_mean "
+        "nees_count position_nees_mean label_switches fragmentations"
+    )
 
 
 def test_what_cannot_be_encoded_is_named():
