@@ -1,0 +1,36 @@
+"""Files that appear whole or not at all."""
+
+from __future__ import annotations
+
+import stat
+from pathlib import Path
+
+import pytest
+
+from vedette.files import write_whole
+
+
+def test_a_file_appears_whole_and_readable_by_others(tmp_path: Path) -> None:
+    target = tmp_path / "file"
+    write_whole(target, lambda file: file.write(b"first"))
+    write_whole(target, lambda file: file.write(b"second"))
+    assert target.read_bytes() == b"second"
+    (tmp_path / "plain").touch()
+    assert stat.S_IMODE(target.stat().st_mode) == stat.S_IMODE((tmp_path / "plain").stat().st_mode)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["file", "plain"]
+
+
+def test_a_fault_half_way_leaves_what_was_there(tmp_path: Path) -> None:
+    target = tmp_path / "file"
+    target.write_bytes(b"first")
+
+    def write(file) -> None:
+        file.write(b"sec")
+        raise OSError("no space")
+
+    with pytest.raises(OSError, match="no space"):
+        write_whole(target, write)
+    assert target.read_bytes() == b"first"
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]
+    with pytest.raises(FileNotFoundError):
+        write_whole(tmp_path / "nowhere" / "file", lambda file: file.write(b""))
