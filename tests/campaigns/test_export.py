@@ -60,7 +60,7 @@ def test_rows_of_scans_tracks_truth_and_sensors_are_those_of_the_record(tables):
     np.testing.assert_array_equal(scans["ospa_m"], record.ospa[:, 0])
     np.testing.assert_array_equal(scans["time_s"], record.times)
     for name, column in metrics.columns().items():
-        np.testing.assert_array_equal(scans[name], column)
+        np.testing.assert_array_equal(np.array(scans[name], np.float64), column)  # None, or null, becomes NaN
     tracks = part(tables["tracks"], "jdm-rate-5.0", 1)
     np.testing.assert_array_equal(tracks["mean_1"], np.concatenate([e.means[:, 1] for e in record.estimates]))
     np.testing.assert_array_equal(tracks["cov_5"], np.concatenate([e.covs[:, 1, 1] for e in record.estimates]))
@@ -89,6 +89,18 @@ def test_rows_of_decisions_and_rewards_are_those_of_the_plans(tables):
     assert rewards["sensors"][0] == [0, 1]
     assert rewards["actions"][14] == [1, 1]
     np.testing.assert_array_equal(rewards["headings_rad"][14], plan.action_values[0][[1, 1]])
+
+
+def test_a_measure_without_a_value_is_null_and_leaves_averages_alone(tables):
+    import duckdb
+
+    scans = tables["scans"]
+    with duckdb.connect() as database:
+        answer = database.register("scans", scans).execute("SELECT avg(nees_mean), count(nees_mean) FROM scans")
+        ((mean, num),) = answer.fetchall()
+    values = scans["nees_mean"].to_numpy()
+    assert num == np.isfinite(values).sum() < len(values)
+    assert mean == pytest.approx(np.nanmean(values))
 
 
 def test_actions_that_were_not_evaluated_have_no_row(results):

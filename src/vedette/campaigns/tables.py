@@ -2,7 +2,8 @@
 
 Every table begins with the columns `cell`, one for each axis of the campaign, and `run`; rows are in the order of the
 campaign's cells, then by run, then by time. The unit of a column is the end of its name (`_m`, `_s`, `_rad`) and in the
-metadata of its field. Scans are counted from 0; the `step` of a decision is the scan that it followed, counted from 1.
+metadata of its field; null stands where a measure has no value. Scans are counted from 0; the `step` of a decision is
+the scan that it followed, counted from 1.
 """
 
 from __future__ import annotations
@@ -58,7 +59,7 @@ def _of_cell(campaign: Campaign, cell: Cell, runs: list[FinishedRun], rows: list
 
 def _column(parts: list[Any]) -> Any:
     if all(isinstance(part, np.ndarray) for part in parts):
-        return pa.array(np.concatenate(parts))
+        return pa.array(np.concatenate(parts), from_pandas=True)  # null for NaN, which SQL takes for a number
     if all(isinstance(part, Lists) for part in parts):
         lists = Lists.joined(parts)
         return pa.ListArray.from_arrays(pa.array(np.cumsum([0, *lists.lengths]), pa.int32()), pa.array(lists.values))
