@@ -111,7 +111,7 @@ def test_strategies_without_a_run_in_common_are_shown_but_not_compared(tmp_path:
     assert "Unfinished: 2 of 6 runs are in." in words
     assert "There is nothing to compare yet" in words
     assert "no run number is finished for every one of them yet" in words
-    assert "Random: 1 of 2 runs; Fixed: 1 of 2 runs; no run yet of still" in words
+    assert "Random: 1 of 2 runs; Fixed: 1 of 2 runs; no run yet of Not moving" in words
     assert "GOSPA (m)" in words
 
 

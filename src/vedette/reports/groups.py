@@ -16,6 +16,7 @@ from vedette.evaluation import Comparison, RunMetrics
 from vedette.evaluation.comparison import scored
 from vedette.evaluation.figures.style import strategy_label
 from vedette.kernels.types import Bools
+from vedette.scenarios.schema.tracking import UNLABELLED
 from vedette.simulation.records import RunRecord
 
 
@@ -41,6 +42,11 @@ class Strategy:
         """The label as a reader should see it."""
         return strategy_label(self.label)
 
+    @property
+    def has_labels(self) -> bool:
+        """Whether its estimates keep their labels from scan to scan."""
+        return self.cell.scenario.model.filter.kind not in UNLABELLED
+
 
 @dataclass(frozen=True, slots=True)
 class Group:
@@ -50,7 +56,7 @@ class Group:
         name: fit for a file name and an anchor; unique in the campaign.
         title: what sets the group apart from the others.
         strategies: in the order of the specification, those without a finished run left out.
-        missing: labels of those left out.
+        missing: names of those left out.
         comparison: over the runs in common, its strategies named by their labels; None where there are none.
         reason: why there is no comparison, or nothing.
     """
@@ -90,7 +96,7 @@ def _group(results: CampaignResults, cells: tuple[Cell, ...], name: str, title: 
         if runs:
             records, metrics = tuple(run.record for run in runs), tuple(run.metrics for run in runs)
             strategies.append(Strategy(cell, labels[cell.name], len(finished[cell.name]), records, metrics))
-    missing = tuple(label for cell, label in labels.items() if not finished[cell])
+    missing = tuple(strategy_label(label) for cell, label in labels.items() if not finished[cell])
     paired = {each.label: each.records for each in strategies}
     comparison, reason = None, "no run number is finished for every one of them yet"
     if common:
@@ -124,7 +130,7 @@ def _label(axis: str, value: Any) -> str:
 
 
 def _short(value: Any) -> str:
-    return f"{value:g}" if isinstance(value, float) else str(value)
+    return f"{value:g}" if isinstance(value, float) else strategy_label(str(value))
 
 
 def axis_label(axis: str) -> str:

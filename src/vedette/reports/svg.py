@@ -27,6 +27,7 @@ _VARIABLES = {
 }
 _COLOUR = re.compile("|".join(_VARIABLES), re.IGNORECASE)
 _NAMES = {colour.lower(): f"var(--{name})" for colour, name in _VARIABLES.items()}
+_TAG = re.compile(r"<[^>]*>")
 _LONG_NUMBER = re.compile(r"(\d+\.\d{2})\d+")
 _POINTS_TO_PIXELS = 1.9
 
@@ -40,13 +41,18 @@ def inline_svg(figure: Figure, prefix: str, description: str) -> Markup:
     """
     text = svg_text(figure)
     body = text[text.index(">", text.index("<svg")) + 1 :]
-    body = re.sub(r"<metadata>.*?</metadata>", "", body, flags=re.DOTALL)
-    body = re.sub(r'\bid="', f'id="{prefix}-', body)
-    body = re.sub(r'(href="#|url\(#)', rf"\g<1>{prefix}-", body)
-    body = _COLOUR.sub(lambda found: _NAMES[found.group().lower()], body)
-    body = _LONG_NUMBER.sub(r"\1", body)
+    body = re.sub(r"<metadata>.*?</metadata>|<!--.*?-->", "", body, flags=re.DOTALL)
+    body = _TAG.sub(lambda tag: _adapted(tag.group(), prefix), body)
     width, height = (72.0 * float(length) for length in figure.get_size_inches())
     opening = Markup('<svg viewBox="0 0 {:g} {:g}" role="img" aria-label="{}" style="max-width: {:.0f}px">').format(
         round(width, 2), round(height, 2), description, _POINTS_TO_PIXELS * width
     )
     return opening + Markup(body)  # what Matplotlib wrote: it escapes the texts in a figure itself
+
+
+def _adapted(tag: str, prefix: str) -> str:
+    """A tag with its names made unique, the page's colours, and numbers to a hundredth of a point; texts stay."""
+    tag = re.sub(r'\bid="', f'id="{prefix}-', tag)
+    tag = re.sub(r'(href="#|url\(#)', rf"\g<1>{prefix}-", tag)
+    tag = _COLOUR.sub(lambda found: _NAMES[found.group().lower()], tag)
+    return _LONG_NUMBER.sub(r"\1", tag)

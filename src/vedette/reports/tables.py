@@ -49,23 +49,30 @@ def _mean_size(metrics: RunMetrics, counted: Bools) -> float:
     return float(np.abs(metrics.cardinality_error[counted]).mean())
 
 
-def measures(order: float) -> tuple[tuple[str, str, Measure], ...]:
-    """Name, explanation and value of each measure of a run; `order` is that of OSPA, whose power GOSPA's parts have."""
+@dataclass(frozen=True, slots=True)
+class _Kind:
+    """One measure of a run: what it is called, what it is, its value, and whether it says something only of labels."""
+
+    name: str
+    note: str
+    value: Measure
+    needs_labels: bool = False
+
+
+def _kinds(order: float) -> tuple[_Kind, ...]:
+    """The measures of a run; `order` is that of OSPA, whose power GOSPA's parts have."""
     power = "m" if order == 1.0 else f"m^{order:g}"
+    bias = "estimated minus true number of targets, mean over the scans"
     return (
-        ("GOSPA (m)", "mean over the scans, alpha = 2", _mean("gospa_m")),
-        (f"  localisation ({power})", "part of GOSPA", _mean("gospa_localisation")),
-        (f"  missed targets ({power})", "part of GOSPA", _mean("gospa_missed")),
-        (f"  false targets ({power})", "part of GOSPA", _mean("gospa_false")),
-        ("OSPA(2) (m)", "mean over the windows that end at the scans", _mean("ospa2_m")),
-        (
-            "Cardinality error",
-            "estimated minus true number of targets, mean over the scans",
-            _mean("cardinality_error"),
-        ),
-        ("Cardinality error, size", "the same without its sign", _mean_size),
-        ("Label switches a run", "a target continues under another label", _total("label_switches")),
-        ("Fragmentations a run", "a target is found again after a break", _total("fragmentations")),
+        _Kind("GOSPA (m)", "mean over the scans, alpha = 2", _mean("gospa_m")),
+        _Kind(f"  localisation ({power})", "part of GOSPA", _mean("gospa_localisation")),
+        _Kind(f"  missed targets ({power})", "part of GOSPA", _mean("gospa_missed")),
+        _Kind(f"  false targets ({power})", "part of GOSPA", _mean("gospa_false")),
+        _Kind("OSPA(2) (m)", "mean over the windows that end at the scans", _mean("ospa2_m"), needs_labels=True),
+        _Kind("Cardinality error", bias, _mean("cardinality_error")),
+        _Kind("Cardinality error, size", "the same without its sign", _mean_size),
+        _Kind("Label switches a run", "a target goes on under another label", _total("label_switches"), True),
+        _Kind("Fragmentations a run", "a target is found again after a break", _total("fragmentations")),
     )
 
 
@@ -93,11 +100,9 @@ def measure_table(group: Group) -> Table | None:
     if not strategies:
         return None
     score = strategies[0].cell.scenario.model.ospa
-    rows = [
-        (name, *(_with_error([value(metrics, group.counted) for metrics in each.metrics]) for each in strategies))
-        for name, _, value in measures(score.order)
-    ]
-    notes = [note for _, note, _ in measures(score.order)]
+    kinds = _kinds(score.order)
+    rows = [(kind.name, *(_over_runs(kind, each, group.counted) for each in strategies)) for kind in kinds]
+    notes = [kind.note for kind in kinds]
     for name, note, dim in _consistency_kinds(strategies):
         rows.append((name, *(_consistency(each, group.counted, dim) for each in strategies)))
         notes.append(note)
@@ -143,6 +148,12 @@ def _consistency(strategy: Strategy, counted: Bools, dim: int) -> str:
     return f"{mean:.2f} ({percent(float(average.consistent[known].mean()))})"
 
 
+def _over_runs(kind: _Kind, strategy: Strategy, counted: Bools) -> str:
+    if kind.needs_labels and not strategy.has_labels:
+        return "\N{EN DASH}"
+    return _with_error([kind.value(metrics, counted) for metrics in strategy.metrics])
+
+
 def _with_error(values: Sequence[float]) -> str:
     summary = summarise(values)
     mean = f"{float(summary.mean):.2f}".replace("-", "\N{MINUS SIGN}")
@@ -176,8 +187,13 @@ def cost_table(group: Group) -> Table | None:
 def _milliseconds(seconds: Floats | None) -> str:
     if seconds is None:
         return "\N{EN DASH}"
-    middle, high = np.quantile(seconds, (0.5, 0.95)) * 1e3
-    return f"{middle:.3g} ({high:.3g})"
+    middle, high = (np.quantile(seconds, (0.5, 0.95)) * 1e3).tolist()
+    return f"{_three_digits(middle)} ({_three_digits(high)})"
+
+
+def _three_digits(value: float) -> str:
+    """At least three significant digits, and no power of ten."""
+    return f"{value:.0f}" if value >= 1000.0 else f"{value:.3g}"
 
 
 def decision_table(group: Group) -> Table | None:

@@ -80,9 +80,26 @@ def new_figure(height: float, *, width: float = COLUMN_WIDTH) -> Figure:
     return Figure(figsize=(width, height), layout="constrained")
 
 
+_LABELS = {
+    "jdm": "JDM",
+    "idm": "IDM",
+    "random": "Random",
+    "fixed": "Fixed",
+    "still": "Not moving",
+    "delta_glmb": "delta-GLMB",
+    "m_delta_glmb": "M-delta-GLMB",
+    "lmb": "LMB",
+    "phd": "PHD",
+    "cphd": "CPHD",
+    "cb_member": "CB-MeMBer",
+    "cm_delta_glmb": "CM-delta-GLMB",
+    "clmb": "CLMB",
+}
+
+
 def strategy_label(name: str) -> str:
-    """The name of a strategy as the paper writes it."""
-    return {"jdm": "JDM", "idm": "IDM", "random": "Random", "fixed": "Fixed", "still": "Not moving"}.get(name, name)
+    """The name of a planner, a filter or a fusion as papers write it; any other name as it is."""
+    return _LABELS.get(name, name)
 
 
 def degrees_label(value: float) -> str:
@@ -93,7 +110,7 @@ def degrees_label(value: float) -> str:
 def legend_columns(labels: Sequence[str], *, width: float = COLUMN_WIDTH) -> int:
     """How many entries of a legend stand side by side within a width in inches: at least one, at most five."""
     longest = max(map(len, labels), default=1)
-    return max(1, min(5, len(labels), int((width - 0.1) / (0.5 + 0.055 * longest))))
+    return max(1, min(5, len(labels), int((width - 0.1) / (0.42 + 0.05 * longest))))
 
 
 def colour(index: int) -> str:

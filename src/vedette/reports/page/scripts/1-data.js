@@ -13,8 +13,9 @@ const unitOf = (run) => (extentOf(run) > 5000 ? { name: "km", metres: 1000 } : {
 const metres = (value, run) => (unitOf(run).metres === 1000 ? `${fixed(value / 1000, 2)} km` : `${fixed(value, 1)} m`);
 
 const labelsOf = new Map();
-// The place of a label among all labels of its run, which gives its colour.
+// The place of a label among all labels of its run, which gives its colour; all alike where labels do not last.
 function placeOfLabel(run, label) {
+  if (!run.labelled) return 0;
   if (!labelsOf.has(run)) {
     const key = (text) => text.split(".").map(Number);
     const all = [...new Set(run.estimates.flat().map((estimate) => estimate[0]))];

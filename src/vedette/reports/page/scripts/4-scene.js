@@ -137,7 +137,7 @@ function drawEstimate(context, run, view, [label, x, y, , long, short, angle], s
     context.stroke();
   }
   disc(context, view.x(x), view.y(y), 3);
-  if (show.labels) mark(context, label, view.x(x) + 13, view.y(y) + 12, shade);
+  if (show.labels && run.labelled) mark(context, label, view.x(x) + 13, view.y(y) + 12, shade);
 }
 
 // Text that stays legible over whatever is behind it.

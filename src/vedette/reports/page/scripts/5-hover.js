@@ -29,7 +29,7 @@ function describeEstimate(run, [label, east, north, existence, long, short, , ta
   const of = target ? `${metres(error, run)} from target ${target}` : "false: no target is matched";
   const at = `${metres(east, run)}, ${metres(north, run)}`;
   const size = `2\u03c3 ${metres(long, run)} by ${metres(short, run)}`;
-  return `estimate ${label}: ${of}; existence ${existence.toFixed(3)}; at ${at}; ${size}`;
+  return `estimate${run.labelled ? ` ${label}` : ""}: ${of}; existence ${existence.toFixed(3)}; at ${at}; ${size}`;
 }
 
 function measurementsAt(run, step, view, x, y) {

@@ -1,0 +1,67 @@
+"""`vedette report`: a page, figures, chosen runs, and errors that say what is wrong."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner, Result
+
+from reports.examples import campaign_of, results_of
+from vedette.cli import app
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("cli") / "results"
+    results_of(folder, campaign_of(planners=["fixed", "still"]))
+    return folder
+
+
+def report(*words: object) -> Result:
+    return CliRunner().invoke(app, ["report", *map(str, words)])
+
+
+def test_the_page_and_the_figures_are_written_where_they_should_be(folder: Path, tmp_path: Path) -> None:
+    page, figures = tmp_path / "page.html", tmp_path / "figures"
+    result = report(folder, "--out", page, "--figures", figures)
+    assert result.exit_code == 0, result.output
+    names = sorted(path.name for path in figures.iterdir())
+    assert f"wrote {page}" in result.stdout
+    assert f"wrote {len(names)} files to {figures}" in result.stdout
+    for stem in ("ospa", "distributions", "headings", "cost", "consistency", "tracks-fixed"):
+        assert {f"{stem}.pdf", f"{stem}.png", f"{stem}.svg"} <= set(names)
+    assert "Fixed, run" in page.read_text("utf-8")
+
+
+def test_the_page_lies_in_the_folder_unless_said_otherwise_and_shows_the_chosen_runs(folder: Path) -> None:
+    result = report(folder, "--runs", "still:1, fixed:0")
+    assert result.exit_code == 0, result.output
+    page = (folder / "report.html").read_text("utf-8")
+    assert "Not moving, run 1" in page
+    assert "(typical)" not in page
+
+
+@pytest.mark.parametrize(
+    ("runs", "status", "message"),
+    [
+        ("fixed", 2, "expected CELL:RUN, such as jdm:0; got 'fixed'"),
+        ("fixed:x", 2, "got 'fixed:x'"),
+        ("fixed:0,", 2, "got ''"),
+        ("fixed:7", 1, "expected a finished run of cell fixed; got 7"),
+        ("gone:0", 1, "expected one of fixed, still; got 'gone'"),
+    ],
+)
+def test_runs_that_cannot_be_meant_are_named(
+    folder: Path, tmp_path: Path, runs: str, status: int, message: str
+) -> None:
+    result = report(folder, "--runs", runs, "--out", tmp_path / "page.html")
+    assert result.exit_code == status
+    assert message in " ".join(result.output.replace("\u2502", " ").split())
+    assert not (tmp_path / "page.html").exists()
+
+
+def test_a_folder_without_results_is_an_error(tmp_path: Path) -> None:
+    result = report(tmp_path)
+    assert result.exit_code == 1
+    assert "expected" in result.output
