@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -232,3 +233,19 @@ def test_bearings_ranges_and_positions_are_drawn(browser: Browser, tmp_path: Pat
     page.click("[data-show=trails]")
     kinds = page.evaluate("JSON.parse(document.getElementById('runs').textContent)[0].sensors.map((s) => s.kind)")
     assert kinds == ["ray", "circle"]
+
+
+def test_pointing_at_a_reward_says_its_actions_and_its_value(page: Page) -> None:
+    choose(page, "scrubber", "12")
+    x, y = page.middle("[data-part=rewards]")
+    page.point(x - 40, y)
+    assert re.fullmatch(
+        r"sensor 1 to \S+°, sensor 2 to \S+°: reward \d\.\d+( \(chosen\))?", text(page, "hover").strip()
+    )
+    choose(page, "run", "1")
+    x, y = page.middle("[data-part=rewards]")
+    page.point(x + 15.0, y)  # the middle of the curves: 40 pixels are left of them, 10 right
+    first, second = text(page, "hover").splitlines()
+    assert re.fullmatch(r"sensor 1 to 0°: reward \d\.\d+ ± 0\.\d+( \(chosen\))?", first)
+    assert second.startswith("sensor 2 to 0°: reward ")
+    assert page.complaints() == []

@@ -48,7 +48,7 @@ class Drawing:
     @property
     def is_wide(self) -> bool:
         """Whether it wants the width of a page rather than of a column."""
-        return bool(self.figure.get_figwidth() > 5.0)
+        return bool(self.figure.get_figwidth() > 5.1)
 
 
 def group_drawings(group: Group) -> Iterator[Drawing]:

@@ -39,10 +39,16 @@ function startReplay(root) {
     return `Decision at ${+run().times[decision.scan].toFixed(3)} s${without}: headings ${headings}.`;
   }
 
-  function tellPointer() {
+  function underPointer() {
     const { pointer, view } = state;
-    const found = pointer ? describeAt(run(), state.step, view, pointer.x, pointer.y, show()) : [];
-    part("hover").textContent = found.join("\n") || "Point at a target, an estimate, a sensor or a measurement.";
+    if (pointer?.part === "scene") return describeAt(run(), state.step, view, pointer.x, pointer.y, show());
+    if (!pointer) return [];
+    return describeReward(part("rewards"), decisionAt(run(), state.step), pointer.x, pointer.y);
+  }
+
+  function tellPointer() {
+    const found = underPointer();
+    part("hover").textContent = found.join("\n") || "Point at a target, an estimate, a sensor, a measurement or a reward.";
     root.dataset.hover = found.length;
   }
 
@@ -120,17 +126,19 @@ function startReplay(root) {
     event.preventDefault();
     keys[event.key]();
   });
-  for (const kind of ["pointermove", "pointerdown"]) {
-    part("scene").addEventListener(kind, (event) => {
-      const box = part("scene").getBoundingClientRect();
-      state.pointer = { x: event.clientX - box.left, y: event.clientY - box.top };
+  for (const name of ["scene", "rewards"]) {
+    const follow = (event) => {
+      const box = part(name).getBoundingClientRect();
+      state.pointer = { part: name, x: event.clientX - box.left, y: event.clientY - box.top };
+      tellPointer();
+    };
+    part(name).addEventListener("pointermove", follow);
+    part(name).addEventListener("pointerdown", follow);
+    part(name).addEventListener("pointerleave", () => {
+      state.pointer = null;
       tellPointer();
     });
   }
-  part("scene").addEventListener("pointerleave", () => {
-    state.pointer = null;
-    tellPointer();
-  });
 
   const redraw = () => {
     readColours();

@@ -1,4 +1,4 @@
-// Beside the plane: the rewards of the last decision, and the error over time.
+// Beside the plane: the rewards of the last decision, and what lies under the pointer there.
 function drawRewards(canvas, run, step) {
   const { context, width, height } = prepared(canvas);
   const decision = decisionAt(run, step);
@@ -8,10 +8,15 @@ function drawRewards(canvas, run, step) {
   else drawCurves(context, width, height, decision.curves);
 }
 
+// Where a square map lies in its canvas.
+function mapFrame(width, height, map) {
+  const [left, top] = [46, 8];
+  const size = Math.min(width - left - 46, height - top - 34);
+  return { left, top, size, columns: map.mean.length, rows: map.mean[0].length };
+}
+
 function drawMap(context, width, height, map) {
-  const [left, top, bottom] = [46, 8, 34];
-  const size = Math.min(width - left - 46, height - top - bottom);
-  const [columns, rows] = [map.mean.length, map.mean[0].length];
+  const { left, top, size, columns, rows } = mapFrame(width, height, map);
   const known = map.mean.flat().filter((value) => value !== null);
   const [low, high] = [Math.min(...known), Math.max(...known)];
   const cell = { width: size / columns, height: size / rows };
@@ -67,13 +72,18 @@ function labelMap(context, map, left, top, size) {
   context.restore();
 }
 
-function drawCurves(context, width, height, curves) {
+// Where the curves lie in their canvas.
+function curvesFrame(width, height, curves) {
   const all = curves.flatMap((curve) => curve.mean).filter((value) => value !== null);
   const headings = curves.flatMap((curve) => curve.degrees);
-  const frame = {
+  return {
     left: 40, right: width - 10, top: 22, bottom: height - 34,
     x: [Math.min(...headings), Math.max(...headings)], y: [Math.min(...all), Math.max(...all)],
   };
+}
+
+function drawCurves(context, width, height, curves) {
+  const frame = curvesFrame(width, height, curves);
   const { x, y } = drawFrame(context, frame, "heading (deg)");
   curves.forEach((curve, place) => {
     const shade = seriesColour(curve.sensor);
@@ -91,47 +101,35 @@ function drawCurves(context, width, height, curves) {
   });
 }
 
-// Axes of a small chart; gives back where a value lies.
-function drawFrame(context, frame, label) {
-  const [xLow, xHigh] = frame.x;
-  const pad = 0.06 * (frame.y[1] - frame.y[0] || 1);
-  const [yLow, yHigh] = [frame.y[0] - (frame.y[0] === 0 ? 0 : pad), frame.y[1] + pad];
-  const x = (value) => frame.left + ((value - xLow) / (xHigh - xLow || 1)) * (frame.right - frame.left);
-  const y = (value) => frame.bottom - ((value - yLow) / (yHigh - yLow)) * (frame.bottom - frame.top);
-  context.strokeStyle = colours.line;
-  context.fillStyle = colours.grey;
-  context.lineWidth = 1;
-  context.textAlign = "right";
-  context.textBaseline = "middle";
-  for (const tick of ticks(yLow, yHigh, 3)) {
-    line(context, frame.left, y(tick), frame.right, y(tick));
-    context.fillText(minus(String(+tick.toPrecision(4))), frame.left - 4, y(tick));
-  }
-  context.textAlign = "center";
-  context.textBaseline = "top";
-  for (const tick of ticks(xLow, xHigh, 4)) context.fillText(minus(String(+tick.toPrecision(5))), x(tick), frame.bottom + 3);
-  context.fillText(label, (frame.left + frame.right) / 2, frame.bottom + 18);
-  return { x, y };
+const rewardText = (value) => (value === null ? "not evaluated" : `reward ${minus(value.toPrecision(4))}`);
+const headingText = (sensor, heading) => `sensor ${sensor + 1} to ${minus(String(Math.round(heading)))}\u00b0`;
+
+// The reward under the pointer, in words; nothing beside the map or the curves.
+function describeReward(canvas, decision, x, y) {
+  if (!decision?.curves.length) return [];
+  const [width, height] = [canvas.clientWidth, canvas.clientHeight];
+  return decision.map ? describeCell(mapFrame(width, height, decision.map), decision.map, x, y)
+    : describeHeading(curvesFrame(width, height, decision.curves), decision.curves, x);
 }
 
-function drawErrors(canvas, run, step) {
-  const { context, width, height } = prepared(canvas);
-  if (width < 150) return; // not laid out yet
-  const total = run.ospa.map((parts) => parts[0]);
-  const frame = {
-    left: 40, right: width - 10, top: 8, bottom: height - 34,
-    x: [run.times[0], run.times.at(-1)], y: [0, Math.max(...total, 1)],
-  };
-  const { x, y } = drawFrame(context, frame, "time (s)");
-  context.setLineDash([2, 3]);
-  context.strokeStyle = colours.grey;
-  for (const { scan } of run.decisions) line(context, x(run.times[scan]), frame.top, x(run.times[scan]), frame.bottom);
-  context.setLineDash([]);
-  context.strokeStyle = colours.blue;
-  context.lineWidth = 1.6;
-  context.beginPath();
-  total.forEach((value, k) => context.lineTo(x(run.times[k]), y(value)));
-  context.stroke();
-  context.fillStyle = colours.vermilion;
-  disc(context, x(run.times[step]), y(total[step]), 4);
+function describeCell({ left, top, size, columns, rows }, map, x, y) {
+  const i = Math.floor(((x - left) / size) * columns);
+  const j = rows - 1 - Math.floor(((y - top) / size) * rows);
+  if (i < 0 || j < 0 || i >= columns || j >= rows) return [];
+  const joint = map.sensors.map((sensor, axis) => headingText(sensor, map.degrees[axis][axis ? j : i])).join(", ");
+  const chosen = i === map.chosen[0] && j === map.chosen[1] ? " (chosen)" : "";
+  return [`${joint}: ${rewardText(map.mean[i][j])}${chosen}`];
+}
+
+function describeHeading(frame, curves, x) {
+  const share = (x - frame.left) / (frame.right - frame.left);
+  const heading = frame.x[0] + share * (frame.x[1] - frame.x[0]);
+  if (share < -0.02 || share > 1.02) return [];
+  return curves.map((curve) => {
+    const off = curve.degrees.map((each) => Math.abs(each - heading));
+    const k = off.indexOf(Math.min(...off));
+    const error = curve.error[k] ? ` \u00b1 ${curve.error[k].toPrecision(2)}` : "";
+    const chosen = k === curve.chosen ? " (chosen)" : "";
+    return `${headingText(curve.sensor, curve.degrees[k])}: ${rewardText(curve.mean[k])}${error}${chosen}`;
+  });
 }
