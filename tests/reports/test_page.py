@@ -11,7 +11,7 @@ import pytest
 from reports.examples import campaign_of, results_of
 from vedette.campaigns.results import CampaignResults
 from vedette.errors import InputError
-from vedette.reports import write_report
+from vedette.reports import write_report, writing
 from vedette.reports.spec_text import spec_toml
 from vedette.scenarios import load_scenario
 from vedette.scenarios.dumping import dump_scenario
@@ -132,6 +132,19 @@ def test_a_number_that_is_compared_is_named_and_swept(tmp_path: Path) -> None:
     assert re.search(r"[Cc]lutter rate 5 .*clutter rate 40", words)
     assert "Sweep of clutter rate" in words
     assert "Run clutter rate 40, run 0 " in words
+
+
+def test_a_page_that_grows_too_large_leaves_figures_and_runs_out_and_says_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(writing, "MAX_FIGURE_BYTES", 1000)
+    monkeypatch.setattr(writing, "MAX_REPLAY_BYTES", 100_000)
+    campaign = campaign_of(planners=["fixed"], variants=[{"name": "one"}, {"name": "two"}], compare="planner")
+    words = Words(page_of(results_of(tmp_path / "results", campaign), tmp_path)).words
+    assert words.count("not drawn for this group") == 1
+    assert words.count("Run by run") == 2
+    assert words.count("Consistency") == 1
+    assert "1 more typical run is left out" in words
 
 
 @pytest.mark.parametrize(("chosen", "message"), [(("jdm", 9), "expected a finished run"), (("gdm", 0), "expected one")])

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from vedette.campaigns.cells import Campaign, Cell
 from vedette.errors import InputError
-from vedette.evaluation import Comparison, Summary, summarise
+from vedette.evaluation import Summary, summarise
 from vedette.evaluation.figures import (
     SweepCurve,
     consistency_figure,
@@ -53,8 +53,8 @@ class Drawing:
 
 def group_drawings(group: Group) -> Iterator[Drawing]:
     """Every figure that the runs of a group give."""
-    if group.comparison is not None:
-        yield from _error_drawings(group.comparison)
+    yield from error_drawings(group)
+    yield from _decision_drawings(group)
     yield from _reward_drawings(group)
     if any(metrics.num_scans for each in group.strategies for metrics in each.metrics):
         yield _consistency_drawing(group.strategies)
@@ -70,7 +70,11 @@ def group_drawings(group: Group) -> Iterator[Drawing]:
         yield Drawing(f"tracks-{strategy.cell.name}", f"Tracks, {strategy.name}", caption, figure)
 
 
-def _error_drawings(comparison: Comparison) -> Iterator[Drawing]:
+def error_drawings(group: Group) -> Iterator[Drawing]:
+    """The figures of the error alone; none without a comparison."""
+    if group.comparison is None:
+        return
+    comparison = group.comparison
     bands = "bands of one standard error" if comparison.num_runs > 1 else "one run, so no bands"
     yield Drawing(
         "ospa",
@@ -91,7 +95,11 @@ def _error_drawings(comparison: Comparison) -> Iterator[Drawing]:
         f"mean.{differences}",
         distributions_figure(comparison),
     )
-    if any(any(runs) for runs in comparison.headings):
+
+
+def _decision_drawings(group: Group) -> Iterator[Drawing]:
+    comparison = group.comparison
+    if comparison is not None and any(any(runs) for runs in comparison.headings):
         yield Drawing(
             "headings",
             "Where the sensors were sent",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -74,6 +74,10 @@ class Group:
         if self.comparison is not None:
             return self.comparison.counted
         return np.ones(max((record.num_scans for each in self.strategies for record in each.records), default=0), bool)
+
+    def without_runs(self) -> Group:
+        """The same group, its runs let go of."""
+        return replace(self, strategies=tuple(replace(each, records=(), metrics=()) for each in self.strategies))
 
 
 def gather(results: CampaignResults) -> Iterator[Group]:

@@ -55,4 +55,4 @@ def _adapted(tag: str, prefix: str) -> str:
     tag = re.sub(r'\bid="', f'id="{prefix}-', tag)
     tag = re.sub(r'(href="#|url\(#)', rf"\g<1>{prefix}-", tag)
     tag = _COLOUR.sub(lambda found: _NAMES[found.group().lower()], tag)
-    return _LONG_NUMBER.sub(r"\1", tag)
+    return _LONG_NUMBER.sub(r"\1", tag).replace(" \n", " ")

@@ -20,7 +20,7 @@ from vedette.errors import InputError
 from vedette.files import write_whole
 from vedette.kernels.types import Floats
 from vedette.reports.claims import Claim, all_pairs, claims
-from vedette.reports.drawings import Drawing, group_drawings, sweep_drawings, typical_records
+from vedette.reports.drawings import Drawing, error_drawings, group_drawings, sweep_drawings, typical_records
 from vedette.reports.groups import Group, axis_label, gather
 from vedette.reports.replay import replay_data
 from vedette.reports.saving import run_errors
@@ -28,19 +28,26 @@ from vedette.reports.spec_text import spec_toml
 from vedette.reports.svg import inline_svg
 from vedette.reports.tables import Table, cost_table, decision_table, error_table, measure_table
 
-MAX_REPLAY_BYTES = 6_000_000
+# A page that a mail can carry: beyond these, groups show their errors alone, and typical runs are left out.
+MAX_FIGURE_BYTES, MAX_REPLAY_BYTES = 6_000_000, 4_000_000
 _FILES = resources.files("vedette.reports") / "page"
 
 
 @dataclass(frozen=True, slots=True)
 class _Section:
-    """What the page shows of one group, or of the sweeps."""
+    """What the page shows of one group; `is_brief` where all figures but those of the error are left out."""
 
     group: Group
+    is_brief: bool
     claims: tuple[Claim, ...]
     pairs: tuple[Claim, ...]
     tables: tuple[tuple[str, Table], ...]
     figures: tuple[tuple[Drawing, Markup], ...]
+
+    @property
+    def size(self) -> int:
+        """Bytes of its figures."""
+        return sum(len(svg) for _, svg in self.figures)
 
 
 def write_report(results: CampaignResults, path: Path, *, replays: Sequence[tuple[str, int]] | None = None) -> None:
@@ -59,7 +66,8 @@ def write_report(results: CampaignResults, path: Path, *, replays: Sequence[tupl
     errors: dict[str, Floats] = {}
     for number, group in enumerate(gather(results)):
         errors.update(run_errors(group))
-        sections.append(_section(group, f"g{number}"))
+        is_brief = sum(section.size for section in sections) > MAX_FIGURE_BYTES
+        sections.append(_section(group, f"g{number}", is_brief))
         runs += [_json(data) for data in _replays(results, group, replays)]
     sweeps = _drawn(tuple(sweep_drawings(results.campaign, errors)), "sweep")
     kept = _within(runs, MAX_REPLAY_BYTES) if replays is None else runs
@@ -74,7 +82,7 @@ def _check_replays(results: CampaignResults, replays: Sequence[tuple[str, int]])
             raise InputError(f"replays: expected a finished run of cell {name}; got {run}")
 
 
-def _section(group: Group, prefix: str) -> _Section:
+def _section(group: Group, prefix: str, is_brief: bool) -> _Section:
     named = {
         "Errors": error_table(group),
         "Other measures": measure_table(group),
@@ -83,11 +91,12 @@ def _section(group: Group, prefix: str) -> _Section:
     }
     comparison = group.comparison
     return _Section(
-        group=group,
+        group=group.without_runs(),
+        is_brief=is_brief,
         claims=() if comparison is None else claims(comparison),
         pairs=() if comparison is None or len(comparison.strategies) < 3 else all_pairs(comparison),
         tables=tuple((title, table) for title, table in named.items() if table is not None),
-        figures=_drawn(tuple(group_drawings(group)), prefix),
+        figures=_drawn(tuple(error_drawings(group) if is_brief else group_drawings(group)), prefix),
     )
 
 
