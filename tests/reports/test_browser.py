@@ -25,14 +25,6 @@ def browser() -> Iterator[Browser]:
         yield running
 
 
-@pytest.fixture(scope="module")
-def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("browser")
-    results = results_of(folder / "results", campaign_of(planners=["jdm", "idm", "random"]))
-    write_report(results, folder / "report.html")
-    return folder / "report.html"
-
-
 @pytest.fixture
 def page(browser: Browser, report: Path) -> Page:
     return browser.open(report)

@@ -19,12 +19,6 @@ from vedette.scenarios.dumping import dump_scenario
 HOSTILE = '<script>alert("&")</script>'
 
 
-@pytest.fixture(scope="module")
-def results(tmp_path_factory: pytest.TempPathFactory) -> CampaignResults:
-    folder = tmp_path_factory.mktemp("campaign") / "results"
-    return results_of(folder, campaign_of(planners=["jdm", "idm", "random"], runs=3))
-
-
 class Words(HTMLParser):
     """The text of a page outside scripts and styles, its elements, and the attributes that would load something."""
 
@@ -56,8 +50,8 @@ class Words(HTMLParser):
 
 
 @pytest.fixture(scope="module")
-def page(results: CampaignResults, tmp_path_factory: pytest.TempPathFactory) -> str:
-    return page_of(results, tmp_path_factory.mktemp("page"))
+def page(report: Path) -> str:
+    return report.read_text("utf-8")
 
 
 def page_of(results: CampaignResults, folder: Path, **options: Any) -> str:
