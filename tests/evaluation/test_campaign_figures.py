@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from evaluation.synthetic import make_record
@@ -19,6 +20,7 @@ from vedette.evaluation.figures import (
     roses_figure,
     svg_text,
     sweep_figure,
+    tracks_figure,
 )
 from vedette.evaluation.figures.style import legend_columns, shown_decisions
 from vedette.kernels.types import Floats
@@ -135,3 +137,23 @@ def test_of_many_decisions_the_first_the_last_and_some_between_are_shown() -> No
 def test_long_names_get_a_line_of_the_legend_each() -> None:
     assert legend_columns(["JDM", "IDM", "Random"]) == 3
     assert legend_columns(["a name of a strategy that is rather long"] * 3) == 1
+
+
+@pytest.mark.parametrize("shift", [0.0, 150.0, 400.0])
+def test_the_title_over_equal_axes_lies_within_the_figure(shift: float) -> None:
+    record = make_record()
+    figure = tracks_figure(replace(record, poses=record.poses - [shift, 0.0, 0.0]))
+    FigureCanvasAgg(figure).draw()
+    assert figure.axes[0].title.get_window_extent().y1 < figure.bbox.height
+
+
+def test_estimates_whose_labels_never_recur_are_not_told_apart_by_colour() -> None:
+    record = make_record()
+    anew = tuple(
+        replace(estimate, labels=np.c_[np.full(estimate.num_targets, scan), np.arange(estimate.num_targets)])
+        for scan, estimate in enumerate(record.estimates)
+    )
+    figure = tracks_figure(replace(record, estimates=anew))
+    total = sum(estimate.num_targets for estimate in anew)
+    assert any(len(line.get_xdata()) == total for line in panels(figure)[0].lines)
+    assert "estimates" in {text.get_text() for text in figure.legends[0].get_texts()}

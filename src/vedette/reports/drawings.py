@@ -65,7 +65,8 @@ def group_drawings(group: Group) -> Iterator[Drawing]:
         )
         yield Drawing("cost", "Cost", caption, cost_figure({name: stages for name, stages in spent.items() if stages}))
     for strategy, record in typical_records(group):
-        caption = f"Run {record.run}, the typical one of {strategy.name}: its mean OSPA is the median."
+        typical = ", the typical one: its mean OSPA is the median" if group.comparison is not None else ""
+        caption = f"Run {record.run} of {strategy.name}{typical}."
         figure = tracks_figure(record, titles=(f"{strategy.name}, run {record.run}",))
         yield Drawing(f"tracks-{strategy.cell.name}", f"Tracks, {strategy.name}", caption, figure)
 

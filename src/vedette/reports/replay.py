@@ -39,6 +39,7 @@ def replay_data(strategy: Strategy, record: RunRecord, group: str) -> dict[str, 
     names, sections = sensor_names(scenario.model), scenario.model.sensors
     sensors = [_sensor(name, section) for name, section in zip(names, sections, strict=True)]
     region = scenario.model.region
+    has_velocity = scenario.model.motion.kind != "custom"
     return {
         "cell": strategy.cell.name,
         "group": group,
@@ -49,7 +50,7 @@ def replay_data(strategy: Strategy, record: RunRecord, group: str) -> dict[str, 
         "region": [region.x_min, region.x_max, region.y_min, region.y_max],
         "sensors": sensors,
         "times": _rounded(record.times, 6),
-        "truth": [_targets(record, scan, places) for scan in range(record.num_scans)],
+        "truth": [_targets(record, scan, places, has_velocity) for scan in range(record.num_scans)],
         "estimates": _estimates(record, scenario, places),
         "poses": [
             [[*_rounded(pose[:2], places), round(float(pose[2]), 4)] for pose in poses] for poses in record.poses
@@ -77,18 +78,18 @@ def _sensor(name: str, section: SensorSection) -> dict[str, Any]:
     """What a sensor sees, for drawing: how a measurement lies in the plane, and its field where that has an edge."""
     kinds = {BearingRange: "point", Position: "position", BearingOnly: "ray", RangeOnly: "circle"}
     found: dict[str, Any] = {"name": name, "kind": kinds.get(type(section.measurement), "none")}
-    if isinstance(section.detection, LimitedRange | LimitedSector):
+    if isinstance(section.detection, LimitedRange | LimitedSector) and math.isfinite(section.detection.max_range):
         found["range"] = section.detection.max_range
-    if isinstance(section.detection, LimitedSector):
+    if isinstance(section.detection, LimitedSector) and "range" in found:
         found["half_width"] = round(math.radians(section.detection.half_width_deg), 4)
     return found
 
 
-def _targets(record: RunRecord, scan: int, places: int) -> list[list[float]]:
-    """For each target its number from 1, and its position and velocity where the state has one."""
+def _targets(record: RunRecord, scan: int, places: int, has_velocity: bool) -> list[list[float]]:
+    """For each target its number from 1, its position, and its velocity where that is what the state goes on with."""
     ids, states = record.truth.at(scan)
     return [
-        [target + 1, *_rounded(state[:2], places), *_rounded(state[2:4], 2)]
+        [target + 1, *_rounded(state[:2], places), *(_rounded(state[2:4], 2) if has_velocity else [])]
         for target, state in zip(ids.tolist(), states, strict=True)
     ]
 

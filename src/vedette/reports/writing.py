@@ -111,7 +111,7 @@ def _replays(results: CampaignResults, group: Group, replays: Sequence[tuple[str
     """The typical runs of a group, or those of the chosen runs that belong to it."""
     if replays is None:
         return [
-            {**replay_data(strategy, record, group.title), "typical": True}
+            {**replay_data(strategy, record, group.title), "typical": group.comparison is not None}
             for strategy, record in typical_records(group)
         ]
     strategies = {each.cell.name: each for each in group.strategies}

@@ -47,7 +47,8 @@ def tracks_figure(*records: RunRecord, titles: Sequence[str] | None = None) -> F
     if len(names) != len(records):
         raise InputError(f"titles: expected {len(records)}; got {len(names)}")
     width = COLUMN_WIDTH if len(records) == 1 else TEXT_WIDTH * max(1.0, len(records) / 2)
-    figure = new_figure(width / len(records) + 0.3, width=width)
+    figure = new_figure(width / len(records) + 0.4, width=width)
+    figure.set_layout_engine("constrained", h_pad=0.08)  # equal axes are fitted last, and would push titles off the top
     panels = figure.subplots(1, len(records), sharex=True, sharey=True, squeeze=False)[0]
     scale = 1e-3 if _reach(records) > _LARGE else 1.0
     for panel, record, name in zip(panels, records, names, strict=True):
