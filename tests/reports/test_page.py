@@ -128,6 +128,14 @@ def test_a_number_that_is_compared_is_named_and_swept(tmp_path: Path) -> None:
     assert "Run clutter rate 40, run 0 " in words
 
 
+@pytest.mark.parametrize("compare", [None, "scenario"])
+def test_scenarios_are_groups_and_not_compared_with_one_another(tmp_path: Path, compare: str | None) -> None:
+    campaign = campaign_of(planners=["still"], scenarios=["paper-a", "paper-e"], compare=compare, runs=1)
+    words = Words(page_of(results_of(tmp_path / "results", campaign), tmp_path)).words
+    assert ("Nothing can be compared: runs of different scenarios are not paired." in words) == (compare is not None)
+    assert words.count("OSPA against time") == (0 if compare else 2)
+
+
 def test_a_page_that_grows_too_large_leaves_figures_and_runs_out_and_says_so(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -112,7 +112,9 @@ def resolve(spec: CampaignSpec, folder: Path | str = ".") -> Campaign:
         settings = dict(zip(axes, values, strict=True))
         name = _unused(_name({axis: settings[axis] for axis in varying}, axes), cells)
         cells.append(_cell(name, settings, loaded[settings["scenario"]], spec))
-    compare = spec.compare or next((axis for axis in ("planner", *axes) if len(axes[axis]) > 1), "planner")
+    # Never the scenario unless asked for: runs of different scenarios are not paired.
+    candidates = ("planner", *(axis for axis in axes if axis != "scenario"))
+    compare = spec.compare or next((axis for axis in candidates if len(axes[axis]) > 1), "planner")
     return Campaign(spec.name, spec.seed, spec.runs, tuple(cells), axes, compare, spec.model_dump(mode="json"))
 
 

@@ -107,7 +107,8 @@ def _group(results: CampaignResults, cells: tuple[Cell, ...], name: str, title: 
         try:
             comparison, reason = scored(cells[0].scenario, paired), ""
         except InputError as error:  # such as scenarios compared with one another
-            reason = str(error)
+            unpaired = "runs of different scenarios are not paired"
+            reason = unpaired if axis == "scenario" else str(error)
     return Group(name, title, tuple(strategies), missing, comparison, reason)
 
 
