@@ -134,6 +134,16 @@ def test_scenarios_are_groups_and_not_compared_with_one_another(tmp_path: Path, 
     words = Words(page_of(results_of(tmp_path / "results", campaign), tmp_path)).words
     assert ("Nothing can be compared: runs of different scenarios are not paired." in words) == (compare is not None)
     assert words.count("OSPA against time") == (0 if compare else 2)
+    assert ("There is nothing to compare: one strategy each." in words) == (compare is None)
+
+
+def test_measures_of_labels_are_left_out_for_filters_that_have_none(tmp_path: Path) -> None:
+    filters = ["delta_glmb", "phd"]
+    campaign = campaign_of(planners=["still"], scenarios=["linear-10"], filters=filters, runs=1)
+    page = page_of(results_of(tmp_path / "results", campaign), tmp_path)
+    rows = re.findall(r'<th scope="row">([^<]+)</th><td>([^<]+)</td><td>([^<]+)</td></tr>', page)
+    missing = {name for name, glmb, phd in rows if phd == "\N{EN DASH}" != glmb}
+    assert missing == {"OSPA(2) (m)", "Label switches a run"}
 
 
 def test_a_page_that_grows_too_large_leaves_figures_and_runs_out_and_says_so(
