@@ -24,7 +24,7 @@ from vedette.evaluation.figures import (
 )
 from vedette.evaluation.reproduction import typical_run
 from vedette.kernels.types import Floats
-from vedette.reports.groups import Group, Strategy, axis_label, describe_settings
+from vedette.reports.groups import Group, Strategy, axis_label, axis_unit, describe_settings
 from vedette.reports.tables import nees_over_runs, stage_seconds
 from vedette.simulation.records import RunRecord
 
@@ -169,10 +169,11 @@ def sweep_drawings(campaign: Campaign, errors: Mapping[str, Floats]) -> Iterator
             if max(len(curve.values) for curve in drawn) < 2:
                 continue
             label, suffix = axis_label(axis), f"-{number + 1}" if len(panels) > 1 else ""
+            unit = f" ({axis_unit(cells[0], axis)})" if axis_unit(cells[0], axis) else ""
             where = f" ({shared})" if shared else ""
             caption = f"Mean OSPA over the runs against {label}{where}; bars are 95 % confidence intervals."
             name = f"sweep-{label.replace(' ', '-')}{suffix}"
-            yield Drawing(name, f"Sweep of {label}{where}", caption, sweep_figure(drawn, label.capitalize()))
+            yield Drawing(name, f"Sweep of {label}{where}", caption, sweep_figure(drawn, label.capitalize() + unit))
 
 
 def _panels(campaign: Campaign, cells: Sequence[Cell], axis: str) -> dict[str, dict[str, list[Cell]]]:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from pydantic import BaseModel
 
 from vedette.campaigns.cells import Campaign, Cell
 from vedette.campaigns.results import CampaignResults
@@ -142,6 +143,20 @@ def axis_label(axis: str) -> str:
     """The last two parts of a field's path, or the name of an axis, in words: `clutter rate`."""
     parts = [part for part in axis.split(".") if part != "*" and not part.isdigit()]
     return " ".join(parts[-2:]).replace("_", " ")
+
+
+def axis_unit(cell: Cell, axis: str) -> str:
+    """Unit of the scenario field that an axis varies, as its description gives it; nothing where it has none."""
+    section: Any = cell.scenario.model
+    *path, name = axis.split(".")
+    for part in path:
+        if isinstance(section, tuple):
+            section = section[0 if part == "*" else int(part)]
+        else:
+            section = getattr(section, part, None)
+    field = type(section).model_fields.get(name) if isinstance(section, BaseModel) else None
+    unit = re.search(r"\[([^\]]+)\]\.?$", (field.description if field else None) or "")
+    return unit.group(1) if unit and unit.group(1) != "-" else ""
 
 
 def _title(campaign: Campaign, cell: Cell) -> str:

@@ -1,0 +1,56 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from reports.examples import campaign_of, results_of
+from vedette.reports.drawings import group_drawings, sweep_drawings
+from vedette.reports.groups import axis_label, axis_unit, gather
+from vedette.reports.saving import run_errors
+
+
+@pytest.mark.parametrize(
+    ("axis", "label", "unit"),
+    [
+        ("sensors.*.clutter.rate", "clutter rate", ""),
+        ("sensors.0.noise.sigma_range", "noise sigma range", "m"),
+        ("sensors.*.speed", "sensors speed", "m/s"),
+        ("control.horizon_period", "control horizon period", "s"),
+        ("planner", "planner", ""),
+        ("nothing.of.this", "of this", ""),
+    ],
+)
+def test_axes_have_words_and_units(axis: str, label: str, unit: str) -> None:
+    (cell,) = campaign_of(planners=["still"]).cells
+    assert (axis_label(axis), axis_unit(cell, axis)) == (label, unit)
+
+
+def test_runs_that_not_every_strategy_has_are_left_out_of_a_comparison(tmp_path: Path) -> None:
+    campaign = campaign_of(planners=["fixed", "still"], runs=3)
+    (group,) = gather(results_of(tmp_path / "results", campaign, skipped={("still", 1)}))
+    assert group.comparison is not None
+    assert (group.comparison.strategies, group.comparison.num_runs) == (("fixed", "still"), 2)
+    assert [[record.run for record in each.records] for each in group.strategies] == [[0, 2], [0, 2]]
+    assert [each.num_finished for each in group.strategies] == [3, 2]
+    assert len(group.counted) == 40
+    assert group.without_runs().strategies[0].records == ()
+    assert {name: len(errors) for name, errors in run_errors(group).items()} == {"fixed": 2, "still": 2}
+
+
+def test_groups_are_named_by_what_sets_them_apart(tmp_path: Path) -> None:
+    grid = {"sensors.*.clutter.rate": [5.0, 40.0], "sensors.*.noise.sigma_range": [10.0, 20.0]}
+    campaign = campaign_of(planners=["still"], grid=grid, runs=1)
+    groups = list(gather(results_of(tmp_path / "results", campaign)))
+    titles = ["paper-a, noise sigma range 10", "paper-a, noise sigma range 20"]
+    assert [group.title for group in groups] == titles
+    assert len({group.name for group in groups}) == len(groups) == 2
+    errors = {name: values for group in groups for name, values in run_errors(group).items()}
+    sweeps = list(sweep_drawings(campaign, errors))
+    assert [drawing.name for drawing in sweeps] == [
+        "sweep-clutter-rate-1",
+        "sweep-clutter-rate-2",
+        "sweep-noise-sigma-range",
+    ]
+    assert sweeps[2].figure.axes[0].get_xlabel() == "Noise sigma range (m)"
+    assert {drawing.name for drawing in group_drawings(groups[0])} >= {"ospa", "distributions", "cost", "consistency"}
