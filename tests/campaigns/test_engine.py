@@ -37,7 +37,7 @@ def alone() -> dict[tuple[str, int], bytes]:
 def test_workers_change_no_byte_even_when_one_is_killed(alone: dict[tuple[str, int], bytes]) -> None:
     results = []
     with local_workers(2) as client:
-        for result in on_workers(client, TaskQueue(small_campaign(runs=RUNS), ())):
+        for result in on_workers(client, TaskQueue(small_campaign(runs=RUNS), ()), print):
             results.append(result)
             if len(results) == 10:
                 os.kill(next(iter(client.run(os.getpid).values())), signal.SIGKILL)
@@ -65,7 +65,7 @@ def test_a_cluster_of_its_own_does_the_same(alone: dict[tuple[str, int], bytes],
         dask("worker", address, "--nthreads", "1", "--nworkers", "2"),
         remote_workers(address) as client,
     ):
-        assert payloads(on_workers(client, TaskQueue(small_campaign(runs=RUNS), ()))) == alone
+        assert payloads(on_workers(client, TaskQueue(small_campaign(runs=RUNS), ()), print)) == alone
 
 
 def test_a_scheduler_that_is_killed_is_said_to_be_gone(free_port: int) -> None:
@@ -74,7 +74,7 @@ def test_a_scheduler_that_is_killed_is_said_to_be_gone(free_port: int) -> None:
 
     def run_until_it_dies() -> None:
         with remote_workers(address) as client:
-            for result in on_workers(client, TaskQueue(small_campaign(runs=RUNS), ())):
+            for result in on_workers(client, TaskQueue(small_campaign(runs=RUNS), ()), print):
                 landed.append(result)
                 if len(landed) == 5:
                     scheduler.kill()

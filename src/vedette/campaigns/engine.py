@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Iterator
+from asyncio import CancelledError
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
@@ -19,7 +20,11 @@ if TYPE_CHECKING:
 # Tasks that wait at a worker, so that none idles while results travel.
 _TASKS_A_THREAD = 2
 _CONNECT_SECONDS = 10.0
-_REFRESH_SECONDS = 2.0
+_REFRESH_SECONDS = 2.0  # between looks at which workers there are
+_POLL_SECONDS = 0.02
+_PATIENCE_SECONDS = 10.0  # without a worker, until that is said
+_SETTLE_SECONDS = 60.0
+_TRIES_ALONE = 2
 
 
 def in_process(queue: TaskQueue) -> Iterator[Landed | Failed]:
@@ -31,10 +36,11 @@ def in_process(queue: TaskQueue) -> Iterator[Landed | Failed]:
 @contextmanager
 def local_workers(num_workers: int) -> Iterator[Client]:
     """As many worker processes on this machine; one that dies is replaced."""
+    import dask
     from distributed import Client, LocalCluster
 
     with TemporaryDirectory(prefix="vedette-workers-", ignore_cleanup_errors=True) as scratch:
-        with children_ignore_interrupts():
+        with children_ignore_interrupts(), dask.config.set({"distributed.scheduler.allowed-failures": 1}):
             cluster = LocalCluster(
                 n_workers=num_workers,
                 threads_per_worker=1,
@@ -72,73 +78,143 @@ def remote_workers(address: str) -> Iterator[Client]:
         yield client
 
 
-def on_workers(client: Client, queue: TaskQueue) -> Iterator[Landed | Failed]:
+def on_workers(client: Client, queue: TaskQueue, tell: Callable[[str], None]) -> Iterator[Landed | Failed]:
     """Every run, in the order of finishing. The runs of a worker that died are done again by another.
+
+    Args:
+        tell: is told, in words, when there is no worker to do the work.
 
     Raises:
         VedetteError: the scheduler is gone, or a worker cannot do the work of this version.
     """
-    flow = _Flow(client, queue)
+    from distributed import KilledWorker
+
+    flow = _Flow(client, queue, _Workers(client, tell))
+    suspects: list[Task] = []
     while (done := flow.next()) is not None:
-        future, task = done
-        if future.status == "finished":
-            yield from _learnt(queue, future.result())
-        elif future.status == "error":
-            yield from _failed(flow, task, future.exception())
+        task, outcome = done
+        if isinstance(outcome, KilledWorker):
+            suspects += task.alone()
         else:
-            raise VedetteError("the scheduler is gone, and with it the tasks that were under way")
+            yield from _learnt(queue, _results_of(outcome))
+    for task in suspects:
+        outcome = flow.alone(task)
+        if isinstance(outcome, KilledWorker):
+            yield Failed(task.cell.name, task.runs[0], "every worker that took it died (out of memory?)")
+        else:
+            yield from _learnt(queue, _results_of(outcome))
+
+
+def _results_of(outcome: Any) -> tuple[Landed | Failed, ...]:
+    """What a task gave back; errors that end the campaign are raised."""
+    if isinstance(outcome, CancelledError):
+        raise VedetteError("the scheduler is gone, and with it the tasks that were under way")
+    if isinstance(outcome, VedetteError):
+        raise outcome
+    if isinstance(outcome, Exception):
+        raise VedetteError(
+            f"a worker could not do its work: {type(outcome).__name__}: {outcome}; is the same vedette installed there?"
+        )
+    results: tuple[Landed | Failed, ...] = outcome
+    return results
+
+
+class _Workers:
+    """The workers that there are: they may come and go."""
+
+    def __init__(self, client: Client, tell: Callable[[str], None]) -> None:
+        self._client = client
+        self._tell = tell
+        self._looked_at = -_REFRESH_SECONDS
+        self._seen_at: float | None = time.monotonic()
+        self.num_threads = 1
+
+    def look(self) -> None:
+        """Count them, now and then; replace those of this machine that were given up."""
+        now = time.monotonic()
+        if now - self._looked_at < _REFRESH_SECONDS or self._client.status != "running":
+            return
+        self._looked_at = now
+        threads: dict[str, int] = self._client.nthreads()
+        self.num_threads = max(1, sum(threads.values()))
+        local = self._client.cluster
+        if local is not None and len(threads) < len(local.worker_spec):
+            # A worker that dies while it starts is not replaced by its nanny.
+            local.scale(len(local.worker_spec))
+        if threads:
+            self._seen_at = now
+        elif self._seen_at is not None and now - self._seen_at > _PATIENCE_SECONDS:
+            self._tell("waiting: there is no worker")
+            self._seen_at = None
+
+    def settle(self) -> None:
+        """Wait until the workers that died on this machine are replaced, but not for ever."""
+        local, begin = self._client.cluster, time.monotonic()
+        while local is not None and time.monotonic() - begin < _SETTLE_SECONDS:
+            if len(self._client.nthreads()) >= len(local.worker_spec):
+                return
+            self.look()
+            time.sleep(_POLL_SECONDS)
 
 
 class _Flow:
     """Tasks under way: never more than keep the workers busy."""
 
-    def __init__(self, client: Client, queue: TaskQueue) -> None:
+    def __init__(self, client: Client, queue: TaskQueue, workers: _Workers) -> None:
         from distributed import as_completed
 
         self._client = client
         self._queue = queue
+        self._workers = workers
         self._tasks: dict[Future, Task] = {}
         self._done = as_completed(loop=client.loop)
-        self._room, self._room_known = _TASKS_A_THREAD, -_REFRESH_SECONDS
 
     def submit(self, task: Task) -> None:
+        """Hand out a task."""
         future = self._client.submit(perform, task, pure=False)
         self._tasks[future] = task
         self._done.add(future)
 
-    def next(self) -> tuple[Future, Task] | None:
-        """A task that has ended; None when all have."""
-        while len(self._tasks) < self._capacity() and (task := self._queue.take()) is not None:
+    def next(self) -> tuple[Task, Any] | None:
+        """A task that has ended with what it gave back, or the exception that it ended by; None when all have ended."""
+        self._workers.look()
+        room = _TASKS_A_THREAD * self._workers.num_threads
+        while len(self._tasks) < room and (task := self._queue.take()) is not None:
             self.submit(task)
         if not self._tasks:
             return None
+        while not self._done.has_ready():
+            self._workers.look()
+            time.sleep(_POLL_SECONDS)
         future = next(self._done)
-        return future, self._tasks.pop(future)
+        return self._tasks.pop(future), self._outcome(future)
 
-    def _capacity(self) -> int:
-        """Workers may come and go."""
-        now = time.monotonic()
-        if now - self._room_known > _REFRESH_SECONDS and self._client.status == "running":
-            threads: dict[str, int] = self._client.nthreads()
-            self._room, self._room_known = _TASKS_A_THREAD * max(1, sum(threads.values())), now
-        return self._room
+    def alone(self, task: Task) -> Any:
+        """What a task gives back, or the exception that it ends by, when no other one can bring its worker down.
 
+        A task counts as suspect too when it only waited at a worker that another one killed.
+        """
+        from distributed import KilledWorker
 
-def _failed(flow: _Flow, task: Task, error: Any) -> Iterator[Failed]:
-    """What becomes of a task that no worker could do: its runs one by one, and then nothing."""
-    from distributed import KilledWorker
+        outcome: Any = None
+        for _ in range(_TRIES_ALONE):
+            self._workers.settle()
+            self.submit(task)
+            done = self.next()
+            assert done is not None
+            outcome = done[1]
+            if not isinstance(outcome, KilledWorker):
+                break
+        return outcome
 
-    if isinstance(error, VedetteError):
-        raise error
-    if not isinstance(error, KilledWorker):
-        raise VedetteError(
-            f"a worker could not do its work: {type(error).__name__}: {error}; is the same vedette installed there?"
-        ) from None
-    if len(task.runs) > 1:
-        for single in task.alone():
-            flow.submit(single)
-        return
-    yield Failed(task.cell.name, task.runs[0], "every worker that took it died (out of memory?)")
+    def _outcome(self, future: Future) -> Any:
+        while True:
+            try:
+                return future.result(timeout=_REFRESH_SECONDS)
+            except TimeoutError:  # the worker died before it handed the results over: the task is done again
+                self._workers.look()
+            except (Exception, CancelledError) as error:
+                return error
 
 
 def _learnt(queue: TaskQueue, results: tuple[Landed | Failed, ...]) -> Iterator[Landed | Failed]:

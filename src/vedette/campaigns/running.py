@@ -21,8 +21,12 @@ TABLES = "tables"
 class Watch(Protocol):
     """What is told of a campaign while it runs."""
 
-    def begin(self, num_found: int, num_runs: int, version_changes: tuple[str, ...]) -> None:
-        """How many runs were there already, how many there are to be, and what has another version than before."""
+    def begin(self, num_found: int, num_runs: int) -> None:
+        """How many runs were there already, and how many there are to be."""
+        ...
+
+    def note(self, text: str) -> None:
+        """Something that a person should know."""
         ...
 
     def landed(self, result: Landed) -> None:
@@ -37,7 +41,10 @@ class Watch(Protocol):
 class Unwatched:
     """Tells nobody."""
 
-    def begin(self, num_found: int, num_runs: int, version_changes: tuple[str, ...]) -> None:
+    def begin(self, num_found: int, num_runs: int) -> None:
+        """See `Watch`."""
+
+    def note(self, text: str) -> None:
         """See `Watch`."""
 
     def landed(self, result: Landed) -> None:
@@ -93,8 +100,10 @@ def run_campaign(
     with Store.open(Path(folder), campaign) as store:
         finished = store.finished()
         found = [(cell.name, run) for cell, run in campaign.tasks if (cell.name, run) in finished]
-        watch.begin(len(found), len(campaign.tasks), store.version_changes)
-        with closing(_results(TaskQueue(campaign, finished), num_workers, scheduler)) as results:
+        watch.begin(len(found), len(campaign.tasks))
+        for change in store.version_changes:
+            watch.note(f"{change}; runs of both may differ in their last digits")
+        with closing(_results(TaskQueue(campaign, finished), num_workers, scheduler, watch)) as results:
             for result in results:
                 if isinstance(result, Failed):
                     failed.append(result)
@@ -109,7 +118,7 @@ def run_campaign(
     return Outcome(num_landed, len(found), tuple(failed))
 
 
-def _results(queue: TaskQueue, num_workers: int, scheduler: str | None) -> Generator[Landed | Failed]:
+def _results(queue: TaskQueue, num_workers: int, scheduler: str | None, watch: Watch) -> Generator[Landed | Failed]:
     if scheduler is None and num_workers <= 1:
         yield from in_process(queue)
         return
@@ -118,4 +127,4 @@ def _results(queue: TaskQueue, num_workers: int, scheduler: str | None) -> Gener
         yield from perform(task)
     if len(queue):
         with remote_workers(scheduler) if scheduler else local_workers(min(num_workers, len(queue))) as client:
-            yield from on_workers(client, queue)
+            yield from on_workers(client, queue, watch.note)

@@ -154,11 +154,11 @@ def test_a_lost_scheduler_leaves_a_folder_to_go_on_with(
 ) -> None:
     address = f"tcp://127.0.0.1:{free_port}"
     dask = [sys.executable, "-m", "dask"]
-    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-    scheduler = subprocess.Popen(
-        [*dask, "scheduler", "--host", "127.0.0.1", "--port", str(free_port), "--no-dashboard"], **quiet
+    place = ["--host", "127.0.0.1", "--port", str(free_port), "--no-dashboard"]
+    scheduler, worker = (
+        subprocess.Popen([*dask, *arguments], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        for arguments in (["scheduler", *place], ["worker", address, "--nthreads", "1", "--no-dashboard"])
     )
-    worker = subprocess.Popen([*dask, "worker", address, "--nthreads", "1", "--no-dashboard"], **quiet)
     try:
         process = program.start("--scheduler", address)
         program.wait_for(15)
