@@ -13,6 +13,7 @@ import platform
 import shutil
 import tempfile
 from collections.abc import Mapping
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -113,6 +114,7 @@ def versions(*more: str) -> dict[str, str]:
     return {"python": platform.python_version(), **{name: _version(name) for name in (*_PACKAGES, *more)}}
 
 
+@cache  # asked for every task of a campaign; the answer is read from disk
 def _version(package: str) -> str:
     try:
         return version(package)
