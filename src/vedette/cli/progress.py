@@ -35,14 +35,16 @@ class CampaignProgress:
     def __exit__(self, *_: object) -> None:
         self._bar.stop()
 
-    def begin(self, num_found: int, num_runs: int, version_changes: tuple[str, ...]) -> None:
+    def begin(self, num_found: int, num_runs: int) -> None:
         """See `vedette.campaigns.Watch`."""
         self._left = num_runs - num_found
         if num_found and self._left:
             typer.echo(f"going on: {num_found} of {num_runs} runs are there already", err=True)
-            for change in version_changes:
-                typer.echo(f"warning: {change}; runs of both may differ in their last digits", err=True)
         self._bar.update(self._bars, total=num_runs, completed=num_found)
+
+    def note(self, text: str) -> None:
+        """See `vedette.campaigns.Watch`."""
+        typer.echo(text, err=True)
 
     def landed(self, result: Landed) -> None:
         """See `vedette.campaigns.Watch`."""
