@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 from typer.testing import CliRunner
 
+from vedette.campaigns import open_results
 from vedette.cli import app
 from vedette.scenarios import list_builtin
 from vedette.simulation.storage import load_run
@@ -56,12 +57,15 @@ def test_reproduce(scenario_file, tmp_path):
     result = call("reproduce", scenario_file, "--runs", 2, "--planners", "idm,still", "--workers", 1, "--out", out)
     assert result.exit_code == 0, result.output
     assert "idm at 8 s" in result.output
-    assert sorted(path.name for path in (out / "runs").iterdir()) == [
-        "idm-0000",
-        "idm-0001",
-        "still-0000",
-        "still-0001",
-    ]
+    results = open_results(out)
+    assert [results.finished(cell) for cell in ("idm", "still")] == [(0, 1), (0, 1)]
+    for name in ("report.html", "summary.md", "summary.csv", "figures/ospa.pdf", "tables/scans.parquet"):
+        assert (out / name).stat().st_size > 100
+    again = call("reproduce", scenario_file, "--runs", 2, "--planners", "idm,still", "--workers", 1, "--out", out)
+    assert again.exit_code == 0, again.output
+    other = call("reproduce", scenario_file, "--runs", 2, "--planners", "still", "--workers", 1, "--out", out)
+    assert other.exit_code == 1
+    assert "expected a folder of this campaign" in other.output
 
 
 @pytest.mark.parametrize(
@@ -88,5 +92,5 @@ def test_a_folder_of_someone_elses_is_kept(scenario_file, tmp_path):
     for arguments in (("run", scenario_file), ("reproduce", scenario_file, "--runs", 1)):
         result = call(*arguments, "--out", precious)
         assert result.exit_code == 1
-        assert "kept" in result.output or "exists" in result.output
+        assert "holds something else" in result.output or "exists" in result.output
     assert [path.name for path in precious.iterdir()] == ["a.tex"]

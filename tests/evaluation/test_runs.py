@@ -1,19 +1,15 @@
-"""Runs of scenarios: paired, and the same whoever does the work."""
+"""Runs of scenarios, and what is made of several."""
 
 from __future__ import annotations
-
-import json
 
 import numpy as np
 import pytest
 
 from vedette.errors import InputError
-from vedette.evaluation.comparison import scored
-from vedette.evaluation.reproduction import MARK, check_target, typical_run, write_reproduction
-from vedette.evaluation.runs import run_paired, run_scenario, strategy
+from vedette.evaluation.comparison import scored, typical_run
+from vedette.evaluation.runs import run_scenario, strategy
 from vedette.scenarios import Scenario, list_builtin
 from vedette.scenarios.loading import parse_scenario
-from vedette.simulation.storage import load_run
 
 
 @pytest.fixture(scope="module")
@@ -34,7 +30,10 @@ def scenario():
 
 @pytest.fixture(scope="module")
 def runs(scenario):
-    return run_paired(scenario, ("jdm", "idm", "still"), 2, seed=5, num_workers=1)
+    return {
+        name: [run_scenario(scenario, name, seed=5, run=run, num_threads=1) for run in range(2)]
+        for name in ("jdm", "idm", "still")
+    }
 
 
 def same(a, b):
@@ -50,18 +49,8 @@ def same(a, b):
     )
 
 
-def test_workers_and_threads_change_no_byte(scenario, runs):
-    shared = run_paired(scenario, ("jdm", "idm", "still"), 2, seed=5, num_workers=2)
-    for name, records in runs.items():
-        for mine, other in zip(records, shared[name], strict=True):
-            assert same(mine, other)
+def test_threads_change_no_byte(scenario, runs):
     assert same(run_scenario(scenario, "jdm", seed=5, run=1, num_threads=3), runs["jdm"][1])
-
-
-def test_every_finished_run_is_told(scenario):
-    told = []
-    run_paired(scenario, ("still",), 3, seed=1, num_workers=1, progress=lambda record: told.append(record.run))
-    assert told == [0, 1, 2]
 
 
 def test_the_scans_that_count_are_the_scenarios(scenario, runs):
@@ -73,26 +62,7 @@ def test_the_scans_that_count_are_the_scenarios(scenario, runs):
 def test_the_typical_run_is_in_the_middle(scenario, runs):
     comparison = scored(scenario, runs)
     means = comparison.run_means("still")
-    assert typical_run(comparison, runs["still"]) is runs["still"][int(np.argmin(means))]
-
-
-def test_a_reproduction_is_written_whole_and_may_be_replaced_only_by_another(scenario, runs, tmp_path):
-    folder = tmp_path / "deep" / "out"
-    for _ in range(2):
-        write_reproduction(scenario, runs, 5, folder)
-    assert [p.name for p in folder.parent.iterdir()] == ["out"]
-    assert json.loads((folder / MARK).read_text())["strategies"] == ["jdm", "idm", "still"]
-    assert same(load_run(folder / "runs" / "jdm-0001"), runs["jdm"][1])
-    for name in ("overview.png", "ospa.pdf", "tracks-idm.svg", "rewards-jdm-8s.png", "strategies.csv", "strategies.md"):
-        assert (folder / name).stat().st_size > 100
-    other = tmp_path / "mine"
-    other.mkdir()
-    (other / "thesis.tex").write_text("precious")
-    with pytest.raises(InputError, match="holds something else"):
-        check_target(other)
-    with pytest.raises(InputError, match="holds something else"):
-        write_reproduction(scenario, runs, 5, other)
-    assert (other / "thesis.tex").read_text() == "precious"
+    assert typical_run(comparison, "still", runs["still"]) is runs["still"][int(np.argmin(means))]
 
 
 def test_unknown_strategy(scenario):

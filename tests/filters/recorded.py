@@ -18,7 +18,7 @@ import numpy as np
 from vedette import models
 from vedette.densities import GLMB, LMB, Estimate, map_estimate
 from vedette.evaluation.metrics import ospa
-from vedette.filters import LocalFilter
+from vedette.filters import LabelledFilter
 
 POSE = np.zeros(3)
 PERIOD = 1.0
@@ -130,10 +130,10 @@ def motion_model(parameters: dict[str, Any], method: str) -> models.MotionModel:
     return models.constant_velocity(math.sqrt(float(parameters["Q"][1, 1])))
 
 
-def make_filter(kind: type, recording: Recording, method: str = "ekf", **options: Any) -> LocalFilter:
+def make_filter(kind: type, recording: Recording, method: str = "ekf", **options: Any) -> LabelledFilter:
     """A filter of this kind with the recording's models; `method` for the motion and the measurement."""
     parameters = recording.parameters
-    tracker: LocalFilter = kind(
+    tracker: LabelledFilter = kind(
         motion_model(parameters, method),
         models.constant_survival(float(parameters["P_S"])),
         birth_model(parameters),
@@ -143,7 +143,7 @@ def make_filter(kind: type, recording: Recording, method: str = "ekf", **options
     return tracker
 
 
-def run(tracker: LocalFilter, recording: Recording, *, seed: int = 0) -> tuple[list[Estimate], list[float]]:
+def run(tracker: LabelledFilter, recording: Recording, *, seed: int = 0) -> tuple[list[Estimate], list[float]]:
     """Estimates at every scan (most probable number of targets, then the most probable of that number), and the CPU
     seconds of each step.
     """

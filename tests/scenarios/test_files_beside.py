@@ -7,7 +7,9 @@ from pathlib import Path
 from types import ModuleType
 
 import numpy as np
+import pyarrow
 import pytest
+from pyarrow import parquet
 
 from scenarios.minimal import changed
 from vedette.errors import InputError, ScenarioError
@@ -62,7 +64,6 @@ def test_recorded_targets_end_at_the_region_unless_told_otherwise(ships: Path) -
 
 
 def test_recorded_targets_of_a_parquet_file(tmp_path: Path) -> None:
-    pyarrow, parquet = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
     table = {"time": [0.0, 20.0, 0.0, 20.0], "id": [7, 7, 9, 9], "x": [0.0, 20.0, 0.0, 0.0], "y": [0.0, 0.0, 0.0, 10.0]}
     parquet.write_table(pyarrow.table(table), tmp_path / "ships.parquet")
     truth = truth_of(load_scenario(written(tmp_path, "  {kind: recorded, path: ships.parquet}")))

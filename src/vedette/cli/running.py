@@ -109,11 +109,12 @@ def _print_run(record: RunRecord) -> None:
 
 
 def _draw_run(record: RunRecord, folder: Path) -> None:
-    from vedette.evaluation.figures import save_figure, tracks_figure
-    from vedette.evaluation.reproduction import draw_rewards
+    from vedette.evaluation.figures import reward_figure, save_figure, tracks_figure
 
     save_figure(tracks_figure(record), folder / "tracks")
-    draw_rewards(record, folder, "rewards")
+    for decision in record.decisions:
+        if decision.plan.tables:
+            save_figure(reward_figure(decision.plan), folder / f"rewards-{decision.time:g}s")
 
 
 def processors() -> int:

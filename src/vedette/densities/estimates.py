@@ -131,8 +131,8 @@ def unlabelled_estimate(density: Poisson | IidCluster | MultiBernoulli, step: in
     by its heaviest component. Iid cluster: the most probable number; Poisson: the expected number, rounded; each target
     is where the intensity has most left, of which it takes one away, and a component stands for another target only
     where half of one or more is left: one of weight 1.9 for two. Components are fewer than targets where these are all
-    in one place. Existence is what the component had left, at most 1. Ties: the smaller number; the earlier Bernoulli or
-    component.
+    in one place. Existence is what the component had left, at most 1. Ties: the smaller number; the earlier Bernoulli
+    or component.
     """
     if isinstance(density, MultiBernoulli):
         number = int(np.argmax(cardinality_distribution(density)))

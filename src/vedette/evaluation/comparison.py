@@ -128,6 +128,12 @@ def scored(scenario: Scenario, runs: Mapping[str, Sequence[RunRecord]]) -> Compa
     return compare(runs, since=since, until=until)
 
 
+def typical_run(comparison: Comparison, strategy: str, records: Sequence[RunRecord]) -> RunRecord:
+    """Of the runs of a strategy, the one whose mean OSPA is the median (of an even number, the better one."""
+    means = comparison.run_means(strategy)
+    return records[int(np.argsort(means, kind="stable")[(len(means) - 1) // 2])]
+
+
 def chosen_headings_deg(record: RunRecord) -> tuple[Headings, ...]:
     """Headings chosen at each decision of a run, in whole degrees, one a sensor."""
     return tuple(

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from vedette.campaigns.cells import Campaign, Cell
 from vedette.errors import InputError
 from vedette.evaluation import Summary, summarise
+from vedette.evaluation.comparison import typical_run
 from vedette.evaluation.figures import (
     SweepCurve,
     consistency_figure,
@@ -22,7 +23,6 @@ from vedette.evaluation.figures import (
     sweep_figure,
     tracks_figure,
 )
-from vedette.evaluation.reproduction import typical_run
 from vedette.kernels.types import Floats
 from vedette.reports.groups import Group, Strategy, axis_label, axis_unit, describe_settings
 from vedette.reports.tables import nees_over_runs, stage_seconds
@@ -136,7 +136,7 @@ def typical_records(group: Group) -> tuple[tuple[Strategy, RunRecord], ...]:
         if group.comparison is None:
             record = strategy.records[0]
         else:
-            record = typical_run(group.comparison, strategy.records, strategy.label)
+            record = typical_run(group.comparison, strategy.label, strategy.records)
         found.append((strategy, record))
     return tuple(found)
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from vedette.campaigns.results import CampaignResults
-from vedette.evaluation.figures import save_figure
+from vedette.evaluation.figures import overview_figure, save_figure
 from vedette.kernels.types import Floats
-from vedette.reports.drawings import group_drawings, sweep_drawings
+from vedette.reports.drawings import group_drawings, sweep_drawings, typical_records
 from vedette.reports.groups import Group, gather
 
 
@@ -24,9 +24,12 @@ def write_figures(results: CampaignResults, folder: Path) -> tuple[Path, ...]:
     several = len(results.campaign.groups()) > 1
     for group in gather(results):
         errors.update(run_errors(group))
+        prefix = f"{group.name}-" if several else ""
         for drawing in group_drawings(group):
-            stem = f"{group.name}-{drawing.name}" if several else drawing.name
-            written += save_figure(drawing.figure, folder / stem)
+            written += save_figure(drawing.figure, folder / f"{prefix}{drawing.name}")
+        if group.comparison is not None:  # beside one another what the page has apart
+            first = typical_records(group)[0][1]
+            written += save_figure(overview_figure(first, group.comparison), folder / f"{prefix}overview")
     for drawing in sweep_drawings(results.campaign, errors):
         written += save_figure(drawing.figure, folder / drawing.name)
     return tuple(written)

@@ -66,7 +66,7 @@ class RecordedTargets:
         """Of a .csv or .parquet file with columns time, id and x, y or longitude, latitude (and vx, vy if it has them).
 
         Args:
-            path: the file. Parquet needs pyarrow.
+            path: the file.
             columns: names in the file where they differ, {"time": "Time", "id": "MMSI", "longitude": "lon", ...}.
             origin_deg: longitude and latitude of (0, 0), for the tangent plane; None: the median of the reports.
             time_origin, cleaning: see the class.

@@ -137,10 +137,8 @@ def _read_csv(file: Path) -> Table:
 
 
 def _read_parquet(file: Path) -> Table:
-    try:
-        from pyarrow import ArrowException, parquet
-    except ImportError:
-        raise InputError(f"{file}: reading Parquet needs pyarrow; install it, or save the table as CSV") from None
+    from pyarrow import ArrowException, parquet  # here, as most programs never need it
+
     try:
         table = parquet.read_table(file)
         columns = {name: table.column(name).to_pylist() for name in table.column_names}
