@@ -144,5 +144,6 @@ def _check_axes(spec: CampaignSpec, place: str) -> None:
             if value in seen:
                 raise InputError(f"{place}: {axis}: expected each value once; got {value!r} again")
             seen.append(value)
-    if spec.compare is not None and spec.compare not in spec.axes():
-        raise InputError(f"{place}: compare: expected one of {', '.join(spec.axes())}; got {spec.compare!r}")
+    comparable = [axis for axis in spec.axes() if axis != "scenario"]  # runs of two scenarios are no pairs
+    if spec.compare is not None and spec.compare not in comparable:
+        raise InputError(f"{place}: compare: expected one of {', '.join(comparable)}; got {spec.compare!r}")
