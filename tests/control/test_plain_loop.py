@@ -24,6 +24,7 @@ from control.examples import (
 from control.plain_loop import plain_rewards
 from vedette import models
 from vedette.control import CauchySchwarzReward, HeadingActions
+from vedette.control.kinds import of_one_kind
 from vedette.control.plain import PlainRewards, can_be_laid_out
 from vedette.control.search import all_joint_actions
 from vedette.densities import GLMB, LMB
@@ -41,7 +42,8 @@ def assert_equals_plain_loop(example: Situation, unit_volume: Any = 1.0, *, laid
     """Joint and independent tables are those of the plain loop, by the path expected; returns the joint one."""
     joint, alone = plain_rewards(example, unit_volume, SEED)
     evaluator = evaluator_of(example, CauchySchwarzReward(unit_volume), SEED)
-    assert can_be_laid_out(evaluator.posteriors, evaluator.prediction, example.fusion, evaluator.reward) == laid_out
+    alike = of_one_kind(evaluator.posteriors, evaluator.prediction, example.fusion, 1)
+    assert can_be_laid_out(*alike, example.fusion, evaluator.reward) == laid_out
     everyone = range(len(example.sensors))
     np.testing.assert_allclose(evaluator.sample_rewards(everyone, example.fusion), joint, rtol=1e-9, atol=1e-9)
     for s, expected in enumerate(alone):
@@ -156,11 +158,27 @@ def test_powers_of_single_gaussians_are_exact(kind: str) -> None:
     assert_equals_plain_loop(example, laid_out=True)
 
 
-def test_glmbs_may_be_fused_to_an_lmb() -> None:
-    example = situation("delta")
-    fusion = Clmb((0.4, 0.6))
+@pytest.mark.parametrize("kind", ["delta", "marginal"])
+@pytest.mark.parametrize("num_sensors", [2, 3])
+@pytest.mark.parametrize("unit_volume", [1.0, "reference"])
+def test_glmbs_may_be_fused_to_an_lmb(kind: str, num_sensors: int, unit_volume: Any) -> None:
+    example = situation(kind, num_sensors)
+    fusion = Clmb(np.arange(1.0, num_sensors + 1.0) / sum(range(1, num_sensors + 1)))
     example = replace(example, fusion=fusion, fused=fusion.fuse(example.beliefs)[0])
     assert isinstance(example.fused, LMB)
+    assert_equals_plain_loop(example, unit_volume)
+
+
+@pytest.mark.parametrize("labels", [(A,), (A, C), (A, B, C)])
+def test_an_lmb_prediction_may_lack_labels_of_glmb_filters(labels: Any) -> None:
+    example = replace(situation("delta"), fusion=Clmb((0.5, 0.5)), fused=lmb(labels, np.random.default_rng(3)))
+    assert_equals_plain_loop(example)
+
+
+def test_mixtures_of_glmb_filters_are_fused_to_an_lmb_by_the_plain_path() -> None:
+    fusion = Clmb((0.4, 0.6), mixture_power="component_wise")
+    example = situation("delta")
+    example = replace(example, fusion=fusion, fused=fusion.fuse(example.beliefs)[0])
     joint, _ = plain_rewards(example, 1.0, SEED)
     np.testing.assert_allclose(evaluator_of(example).sample_rewards((0, 1), fusion), joint, rtol=1e-9, atol=1e-9)
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from vedette.control.actions import distinct_headings
 from vedette.control.inputs import Belief, check_beliefs, check_headings, check_poses, check_sensors
+from vedette.control.kinds import of_one_kind
 from vedette.control.plain import PlainRewards, can_be_laid_out
 from vedette.control.priors import predicted
 from vedette.control.pseudo import PseudoPosteriors, draw_futures, pseudo_posteriors
@@ -106,14 +107,14 @@ class Evaluator:
         return evaluate
 
     def _compute(self, posteriors: Sequence[PseudoPosteriors], fusion: Fusion[Any, Any] | None) -> SampleRewards:
-        num_samples = self.settings.num_samples
-        if not can_be_laid_out(posteriors, self.prediction, fusion, self.reward):
+        num_samples, threads = self.settings.num_samples, self.settings.threads()
+        alike, prediction = of_one_kind(posteriors, self.prediction, fusion, threads)
+        if not can_be_laid_out(alike, prediction, fusion, self.reward):
             return PlainRewards(posteriors, self.prediction, fusion, self.reward, num_samples)
         assert isinstance(self.reward, CauchySchwarzReward)
-        alone = Clmb((1.0,)) if isinstance(self.prediction, LMB) else CmDeltaGlmb((1.0,))
+        alone = Clmb((1.0,)) if isinstance(prediction, LMB) else CmDeltaGlmb((1.0,))
         rule = fusion if isinstance(fusion, CmDeltaGlmb | Clmb) else alone
-        volume = self.reward.volume(self.prediction)
-        return fused_rewards(posteriors, self.prediction, rule, num_samples, volume, self.settings.threads())
+        return fused_rewards(alike, prediction, rule, num_samples, self.reward.volume(self.prediction), threads)
 
     def sample_rewards(self, which: Sequence[int], fusion: Fusion[Any, Any] | None) -> Floats:
         """(num_joint, num_samples) rewards of all joint actions of the sensors `which`, the last one's fastest."""

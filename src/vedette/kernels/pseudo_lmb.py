@@ -9,12 +9,14 @@ import numpy as np
 
 from vedette.errors import NumericalError
 from vedette.kernels.compile import kernel
+from vedette.kernels.conversions import glmb_to_lmb
 from vedette.kernels.gaussian import make_scratch
 from vedette.kernels.glmb import prepare_rows
 from vedette.kernels.ideal import Decision, ideal_scan, most_targets
 from vedette.kernels.lmb import Reduction, finish_lmb, weigh_by_existence
 from vedette.kernels.mixtures import copy_component
-from vedette.kernels.types import Floats, Lmb
+from vedette.kernels.pseudo_glmb import GlmbResults
+from vedette.kernels.types import Floats, Glmb, Ints, Lmb, Tracks
 
 
 class LmbResults(NamedTuple):
@@ -57,3 +59,21 @@ def pseudo_update_lmb(
         for i in range(len(belief.existence_logit)):
             results.logits[case, i] = belief.existence_logit[i]
             copy_component(belief.tracks.means, belief.tracks.covs, i, results.means[case], results.covs[case], i)
+
+
+@kernel
+def glmb_cases_to_lmb(
+    labels: Ints, set_offsets: Ints, cases: GlmbResults, first: int, last: int, results: LmbResults
+) -> None:
+    """Cases `first:last` of one sensor's GLMB as LMBs by moments, into `results`, in increasing label order.
+
+    labels: (num_members, 2) label of each member of each label set.
+    """
+    num = len(labels)
+    offsets, no_weights, members = np.arange(num + 1), np.zeros(num), np.arange(num)
+    for case in range(first, last):
+        tracks = Tracks(labels, offsets, no_weights, cases.means[case], cases.covs[case])
+        lmb = glmb_to_lmb(Glmb(tracks, set_offsets, members, cases.log_weights[case]), -math.inf, 0.0, 1)
+        for i in range(len(lmb.existence_logit)):
+            results.logits[case, i] = lmb.existence_logit[i]
+            copy_component(lmb.tracks.means, lmb.tracks.covs, i, results.means[case], results.covs[case], i)
