@@ -168,3 +168,10 @@ def test_a_file_that_cannot_be_read(tmp_path: Path) -> None:
     (tmp_path / "latin.toml").write_bytes('name = "café"'.encode("latin-1"))
     with pytest.raises(InputError, match=r"latin\.toml: expected UTF-8 text; byte 11"):
         load_spec(tmp_path / "latin.toml")
+
+
+@pytest.mark.parametrize(
+    "file", sorted((Path(__file__).parents[2] / "examples" / "campaigns").glob("*.toml")), ids=lambda file: file.stem
+)
+def test_the_examples_can_be_run(file: Path) -> None:
+    assert len(resolve(load_spec(file), file.parent).cells) > 1
