@@ -28,6 +28,7 @@ from vedette.control.kinds import of_one_kind
 from vedette.control.plain import PlainRewards, can_be_laid_out
 from vedette.control.search import all_joint_actions
 from vedette.densities import GLMB, LMB
+from vedette.errors import InputError
 from vedette.fusion import Clmb, CmDeltaGlmb, FusionLimits
 
 SEED = 5
@@ -239,3 +240,11 @@ def test_a_subclass_is_asked_itself() -> None:
     fused = evaluator.sample_rewards((0, 1), Fused((0.5, 0.5)))
     first = evaluator.sample_rewards((0,), None)
     np.testing.assert_allclose(fused, np.repeat(first, 3, axis=0), rtol=1e-9, atol=1e-9)
+
+
+def test_an_lmb_prediction_that_shares_no_set_with_a_glmb_filter_is_refused() -> None:
+    tracks = lmb((A, B, C), np.random.default_rng(3)).tracks
+    certain = LMB(tracks, np.array([0.0, 0.0, np.inf]))
+    example = replace(situation("delta"), fusion=Clmb((0.5, 0.5)), fused=certain)
+    with pytest.raises(InputError, match="fused belief: expected a label set in common"):
+        evaluator_of(example).sample_rewards((0,), None)
