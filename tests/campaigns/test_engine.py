@@ -14,7 +14,8 @@ from typing import Any
 import pytest
 
 from campaigns.examples import small_campaign
-from vedette.campaigns.engine import in_process, local_workers, on_workers, remote_workers
+from vedette.campaigns.clients import local_workers, remote_workers
+from vedette.campaigns.engine import in_process, on_workers
 from vedette.campaigns.tasks import Failed, Landed, TaskQueue
 from vedette.errors import InputError, VedetteError
 
@@ -90,9 +91,9 @@ def test_a_scheduler_that_is_killed_is_said_to_be_gone(free_port: int) -> None:
 
 
 def test_an_address_where_nothing_answers(free_port: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("vedette.campaigns.engine._CONNECT_SECONDS", 0.5)
+    monkeypatch.setattr("vedette.campaigns.clients._CONNECT_SECONDS", 0.5)
     start = time.monotonic()
-    for address in (f"tcp://127.0.0.1:{free_port}", "nonsense://x"):
+    for address in (f"tcp://127.0.0.1:{free_port}", "nonsense://x", ""):
         expected = pytest.raises(InputError, match="scheduler: expected the address of a running dask scheduler")
         with expected, remote_workers(address):
             pass

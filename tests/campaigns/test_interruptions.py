@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 import signal
+import sqlite3
 import subprocess
 import sys
 import time
@@ -14,10 +15,11 @@ from pathlib import Path
 
 import pytest
 
+from campaigns.examples import SPEC as SPEC_DATA
 from campaigns.examples import small_campaign
 from vedette.campaigns.journal import Reader
 from vedette.campaigns.results import open_results
-from vedette.campaigns.running import run_campaign
+from vedette.campaigns.running import Unwatched, run_campaign
 from vedette.errors import InputError
 
 RUNS = 40
@@ -145,7 +147,7 @@ def test_ctrl_c_leaves_a_folder_to_go_on_with(program: Program, undisturbed: dic
     assert "Traceback" not in out
     assert_gone(process.pid)
     program.start("--workers", "1")
-    assert f"of {2 * RUNS} runs are there already" in program.finish()
+    assert f"small: {2 * RUNS} runs, " in program.finish()
     assert contents(program.folder) == undisturbed
 
 
@@ -184,3 +186,68 @@ def test_a_finished_campaign_runs_nothing_and_more_runs_add_to_it(tmp_path: Path
     alone = run_campaign(small_campaign(runs=3), tmp_path / "alone")
     assert alone.num_landed == 6
     assert contents(tmp_path / "results") == contents(tmp_path / "alone")
+
+
+def test_a_damaged_run_is_named_and_done_again_if_that_is_asked_for(tmp_path: Path) -> None:
+    folder = tmp_path / "results"
+    run_campaign(small_campaign(runs=2), folder)
+    before = contents(folder)
+    with closing(sqlite3.connect(folder / "campaign.sqlite")) as database, database:
+        database.execute("UPDATE runs SET payload = x'00' WHERE cell = 'idm' AND run = 1")
+    with pytest.raises(InputError, match=r"altered since: idm 1 \(have what is damaged redone"):
+        run_campaign(small_campaign(runs=2), folder)
+    told: list[str] = []
+    outcome = run_campaign(small_campaign(runs=2), folder, redo_damaged=True, watch=Notes(told))
+    assert (outcome.num_landed, told) == (1, ["damaged, and done again: idm 1"])
+    assert contents(folder) == before
+
+
+class Notes(Unwatched):
+    """Keeps what is said."""
+
+    def __init__(self, told: list[str]) -> None:
+        self._told = told
+
+    def note(self, text: str) -> None:
+        self._told.append(text)
+
+
+def test_altered_and_half_written_tables_are_put_right(tmp_path: Path) -> None:
+    folder = tmp_path / "results"
+    run_campaign(small_campaign(runs=2), folder)
+    before = contents(folder)
+    (folder / "tables" / "scans.parquet").write_text("garbage")
+    (folder / "tables" / "truth.parquet").unlink()
+    run_campaign(small_campaign(runs=2), folder)
+    assert contents(folder) == before
+
+
+def test_runs_that_were_lost_are_done_again_and_that_is_said(tmp_path: Path) -> None:
+    folder = tmp_path / "results"
+    told: list[str] = []
+    run_campaign(small_campaign(runs=1), folder)
+    (folder / "campaign.sqlite").unlink()
+    assert run_campaign(small_campaign(runs=1), folder, watch=Notes(told)).num_landed == 2
+    assert any("was not there: every run is done again" in text for text in told)
+
+
+def test_ctrl_c_while_workers_start(program: Program, undisturbed: dict[str, str]) -> None:
+    process = program.start("--workers", "2")
+    program.wait_for(2)  # the first run of each kind is done, and the workers start
+    time.sleep(0.7)
+    os.killpg(process.pid, signal.SIGINT)
+    out, _ = process.communicate(timeout=60)
+    assert process.returncode == 130, out
+    assert_gone(process.pid)
+
+
+def test_a_script_without_a_guard_is_told_so(tmp_path: Path) -> None:
+    script = tmp_path / "script.py"
+    script.write_text(
+        "from vedette.campaigns import CampaignSpec, resolve, run_campaign\n"
+        f"spec = CampaignSpec.model_validate({SPEC_DATA!r})\n"
+        f"run_campaign(resolve(spec), {str(tmp_path / 'results')!r}, num_workers=2)\n"
+    )
+    result = subprocess.run([sys.executable, script], capture_output=True, text=True, check=False, timeout=120)
+    assert result.returncode != 0
+    assert 'under `if __name__ == "__main__":`' in result.stderr

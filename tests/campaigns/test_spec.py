@@ -82,7 +82,7 @@ def test_scenarios_are_named_or_lie_beside_the_file(tmp_path: Path) -> None:
     )
     beside = resolve(load_spec(folder / "spec.toml"), folder)
     assert [cell.name for cell in beside.cells] == ["scene-still", "paper-a-still"]
-    with pytest.raises(InputError, match=r"scenario: expected a YAML file or one of .*absent\.yaml"):
+    with pytest.raises(InputError, match=r"scenarios\.0: scenario: expected a YAML file or one of .*absent\.yaml"):
         resolve(parse_spec('name = "x"\nscenarios = ["absent.yaml"]\nruns = 1'), folder)
 
 
@@ -114,10 +114,21 @@ def test_the_digest_covers_the_files_that_a_scenario_names(tmp_path: Path) -> No
     assert resolve(spec, tmp_path).digest() != before
 
 
+def test_names_of_cells_fit_any_folder() -> None:
+    fields = {f"sensors.{i}.noise.{name}": [1.0, 2.0] for i in (0, 1) for name in ("sigma_range", "sigma_bearing_deg")}
+    text = "\n".join(f'"{field}" = {values}' for field, values in fields.items())
+    cells = campaign(f'filters = ["m_delta_glmb", "delta_glmb"]\n[grid]\n{text}').cells
+    names = [cell.name for cell in cells]
+    assert len(set(names)) == len(names) == 96
+    assert max(map(len, names)) <= 120
+
+
 def test_more_runs_of_the_same_campaign() -> None:
     more = campaign().with_runs(7)
     assert (more.num_runs, more.spec["runs"], len(more.tasks)) == (7, 7, 21)
     assert more.digest() == campaign().digest()
+    with pytest.raises(InputError, match="runs: expected a number of at most 1000000"):
+        campaign().with_runs(10**11)
 
 
 @pytest.mark.parametrize(
@@ -137,7 +148,9 @@ def test_more_runs_of_the_same_campaign() -> None:
         (SMALL.replace("3", "2.5"), r"runs: expected a whole number; got 2\.5"),
         (SMALL + "seed = -1", r"seed: expected a number of at least 0; got -1"),
         (SMALL + 'compare = "speed"', r"compare: expected one of planner; got 'speed'"),
-        (SMALL + 'compare = "scenario"', r"compare: expected one of planner; got 'scenario'"),
+        (SMALL + 'compare = "scenario"', r"compare: .* planner, as runs of two scenarios are no pairs; got"),
+        (SMALL.replace("small", "x" * 61), r"name: expected at most 60 characters"),
+        (SMALL + 'set."ospa.cutoff" = nan', r"set\.ospa\.cutoff: expected a finite number; got nan"),
         (SMALL + '[grid]\nplanner = ["jdm"]', r"grid: expected paths of scenario fields; got 'planner'"),
         (SMALL + '[grid]\n"ospa.cutoff" = 3', r"grid\.ospa\.cutoff: expected a list; got 3"),
         (SMALL + '[[variants]]\nnam = "a"', r"variants\.0\.nam: expected one of name, set; got an unknown key"),
@@ -154,6 +167,10 @@ def test_what_is_wrong_with_the_file_is_named(text: str, message: str) -> None:
         ('filters = ["lmb"]', r"cell jdm: fusion\.kind: expected clmb or none"),
         ('filters = ["glmb"]', r"cell jdm: filter\.kind: expected one of"),
         ('[grid]\n"control.num_samples" = [5, 0]', r"cell jdm-num_samples-0: control\.num_samples: expected a number"),
+        (
+            "set.control.num_samples = 5",
+            r"cell jdm: control: expected the whole section, with .*\"control\.num_samples\"",
+        ),
         ('[grid]\n"control.samples" = [5]', r"cell jdm: control\.samples: expected one of"),
     ],
 )

@@ -11,13 +11,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from vedette.campaigns.spec import CampaignSpec
+from vedette.campaigns.spec import CampaignSpec, spec_from_data
 from vedette.errors import InputError, ScenarioError
 from vedette.evaluation.runs import strategy
 from vedette.scenarios import Scenario, list_builtin, load_scenario
 from vedette.scenarios.dumping import dump_scenario, files_of
 from vedette.scenarios.overrides import with_fields
 
+_LONGEST_NAME = 120
 _SECTIONS = {"filter": "filter.kind", "fusion": "fusion.kind"}
 
 
@@ -59,6 +60,11 @@ class Campaign:
     spec: dict[str, Any]
 
     @property
+    def total(self) -> int:
+        """Number of runs of all cells together."""
+        return self.num_runs * len(self.cells)
+
+    @property
     def tasks(self) -> tuple[tuple[Cell, int], ...]:
         """Every run that there is to do, the runs of equal number of all cells together, so that pairs come early."""
         return tuple((cell, run) for run in range(self.num_runs) for cell in self.cells)
@@ -79,7 +85,8 @@ class Campaign:
         return tuple(tuple(cells) for cells in groups.values())
 
     def with_runs(self, num_runs: int) -> Campaign:
-        """The same campaign with another number of runs."""
+        """The same campaign with another number of runs. Raises `InputError` for a number that no campaign has."""
+        spec_from_data({**self.spec, "runs": num_runs})
         return replace(self, num_runs=num_runs, spec={**self.spec, "runs": num_runs})
 
     def digest(self) -> str:
@@ -105,7 +112,7 @@ def resolve(spec: CampaignSpec, folder: Path | str = ".") -> Campaign:
         InputError: a scenario that is not there, a path that is no field, a combination that cannot be; names the cell.
     """
     axes = spec.axes()
-    loaded = {name: _load(name, Path(folder)) for name in spec.scenarios}
+    loaded = {name: _load(name, number, Path(folder)) for number, name in enumerate(spec.scenarios)}
     varying = [axis for axis, values in axes.items() if len(values) > 1 or axis == "planner"]
     cells: list[Cell] = []
     for values in itertools.product(*axes.values()):
@@ -118,8 +125,11 @@ def resolve(spec: CampaignSpec, folder: Path | str = ".") -> Campaign:
     return Campaign(spec.name, spec.seed, spec.runs, tuple(cells), axes, compare, spec.model_dump(mode="json"))
 
 
-def _load(name: str, folder: Path) -> Scenario:
-    return load_scenario(name if name in list_builtin() else folder / name)
+def _load(name: str, number: int, folder: Path) -> Scenario:
+    try:
+        return load_scenario(name if name in list_builtin() else folder / name)
+    except InputError as error:
+        raise InputError(f"scenarios.{number}: {error}") from None
 
 
 def _cell(name: str, settings: Mapping[str, Any], scenario: Scenario, spec: CampaignSpec) -> Cell:
@@ -134,7 +144,7 @@ def _cell(name: str, settings: Mapping[str, Any], scenario: Scenario, spec: Camp
         changed = with_fields(scenario, fields)
         strategy(changed, planner)
     except ScenarioError as error:
-        raise InputError("\n".join(f"cell {name}: {fault}" for fault in error.faults)) from None
+        raise InputError("\n".join(dict.fromkeys(f"cell {name}: {fault}" for fault in error.faults))) from None
     except InputError as error:
         raise InputError(f"cell {name}: {error}") from None
     return Cell(name, dict(settings), changed, planner)
@@ -149,7 +159,15 @@ def _name(settings: Mapping[str, Any], axes: Mapping[str, tuple[Any, ...]]) -> s
         known = axis in ("scenario", "planner", "variant", *_SECTIONS)
         text = Path(value).stem if axis == "scenario" else str(value)
         parts.append(text if known else f"{axis.rpartition('.')[2]}-{text}")
-    return re.sub(r"[^\w.+-]+", "_", "-".join(parts))
+    text = safe_name("-".join(parts))
+    if len(text) <= _LONGEST_NAME:
+        return text
+    return f"{text[: _LONGEST_NAME - 9]}-{hashlib.sha256(text.encode()).hexdigest()[:8]}"
+
+
+def safe_name(text: str) -> str:
+    """The text with what is unfit for a file name as underscores."""
+    return re.sub(r"[^\w.+-]+", "_", text)
 
 
 def _unused(name: str, cells: list[Cell]) -> str:

@@ -1,28 +1,24 @@
-"""Who does the work: this process, workers on this machine, or a cluster; dask.distributed hands out the tasks."""
+"""How the work is done: by this process, or by workers to which dask.distributed hands out the tasks."""
 
 from __future__ import annotations
 
-import logging
+import math
 import time
-from asyncio import CancelledError
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from tempfile import TemporaryDirectory
+from asyncio import CancelledError as AsyncCancelledError
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import CancelledError
 from typing import TYPE_CHECKING, Any
 
 from vedette.campaigns.tasks import Failed, Landed, Task, TaskQueue, perform
-from vedette.errors import InputError, VedetteError
-from vedette.evaluation.runs import children_ignore_interrupts
+from vedette.errors import VedetteError
 
 if TYPE_CHECKING:
     from distributed import Client, Future
 
 # Tasks that wait at a worker, so that none idles while results travel.
 _TASKS_A_THREAD = 2
-_CONNECT_SECONDS = 10.0
 _REFRESH_SECONDS = 2.0  # between looks at which workers there are
 _POLL_SECONDS = 0.02
-_PATIENCE_SECONDS = 10.0  # without a worker, until that is said
 _SETTLE_SECONDS = 60.0
 _TRIES_ALONE = 2
 
@@ -33,81 +29,52 @@ def in_process(queue: TaskQueue) -> Iterator[Landed | Failed]:
         yield from _learnt(queue, perform(task))
 
 
-@contextmanager
-def local_workers(num_workers: int) -> Iterator[Client]:
-    """As many worker processes on this machine; one that dies is replaced."""
-    import dask
-    from distributed import Client, LocalCluster
-
-    with TemporaryDirectory(prefix="vedette-workers-", ignore_cleanup_errors=True) as scratch:
-        with children_ignore_interrupts(), dask.config.set({"distributed.scheduler.allowed-failures": 1}):
-            cluster = LocalCluster(
-                n_workers=num_workers,
-                threads_per_worker=1,
-                processes=True,
-                host="127.0.0.1",
-                dashboard_address=None,
-                memory_limit=None,
-                local_directory=scratch,
-                silence_logs=logging.CRITICAL,
-                preload=["vedette.campaigns.worker"],
-            )
-        with cluster, Client(cluster, set_as_default=False) as client:
-            yield client
-
-
-@contextmanager
-def remote_workers(address: str) -> Iterator[Client]:
-    """The workers of a scheduler that runs already.
-
-    Raises:
-        InputError: nothing answers at the address.
-    """
-    from distributed import Client
-
-    for logger in ("distributed", "distributed.client"):  # a lost scheduler is said once, by the error
-        logging.getLogger(logger).setLevel(logging.CRITICAL)
-    try:
-        client = Client(address, set_as_default=False, timeout=_CONNECT_SECONDS)
-    except (OSError, ValueError) as error:
-        raise InputError(
-            f"scheduler: expected the address of a running dask scheduler, such as tcp://host:8786; got {address}: "
-            f"{error}"
-        ) from None
-    with client:
-        yield client
-
-
-def on_workers(client: Client, queue: TaskQueue, tell: Callable[[str], None]) -> Iterator[Landed | Failed]:
+def on_workers(
+    client: Client, queue: TaskQueue, tell: Callable[[str], None], first: Iterable[Task] = ()
+) -> Iterator[Landed | Failed]:
     """Every run, in the order of finishing. The runs of a worker that died are done again by another.
 
     Args:
         tell: is told, in words, when there is no worker to do the work.
+        first: tasks to be done before any other, as the kernels that they compile serve the rest.
 
     Raises:
         VedetteError: the scheduler is gone, or a worker cannot do the work of this version.
     """
-    from distributed import KilledWorker
-
     flow = _Flow(client, queue, _Workers(client, tell))
     suspects: list[Task] = []
-    while (done := flow.next()) is not None:
-        task, outcome = done
-        if isinstance(outcome, KilledWorker):
-            suspects += task.alone()
-        else:
-            yield from _learnt(queue, _results_of(outcome))
+    for task in first:
+        flow.submit(task)
+    yield from _finished(flow, queue, suspects, more=False)
+    yield from _finished(flow, queue, suspects, more=True)
     for task in suspects:
         outcome = flow.alone(task)
-        if isinstance(outcome, KilledWorker):
+        if _is_fatal(outcome):
             yield Failed(task.cell.name, task.runs[0], "every worker that took it died (out of memory?)")
         else:
             yield from _learnt(queue, _results_of(outcome))
 
 
+def _finished(flow: _Flow, queue: TaskQueue, suspects: list[Task], *, more: bool) -> Iterator[Landed | Failed]:
+    """The runs of the tasks under way, and of more from the queue if that is wanted."""
+    while (done := flow.next(more=more)) is not None:
+        task, outcome = done
+        if _is_fatal(outcome):
+            suspects += task.alone()
+        else:
+            yield from _learnt(queue, _results_of(outcome))
+
+
+def _is_fatal(outcome: Any) -> bool:
+    """Whether a task ended because the workers that had it died."""
+    from distributed import KilledWorker
+
+    return isinstance(outcome, KilledWorker)
+
+
 def _results_of(outcome: Any) -> tuple[Landed | Failed, ...]:
     """What a task gave back; errors that end the campaign are raised."""
-    if isinstance(outcome, CancelledError):
+    if isinstance(outcome, CancelledError | AsyncCancelledError):
         raise VedetteError("the scheduler is gone, and with it the tasks that were under way")
     if isinstance(outcome, VedetteError):
         raise outcome
@@ -125,8 +92,8 @@ class _Workers:
     def __init__(self, client: Client, tell: Callable[[str], None]) -> None:
         self._client = client
         self._tell = tell
-        self._looked_at = -_REFRESH_SECONDS
-        self._seen_at: float | None = time.monotonic()
+        self._looked_at = -math.inf
+        self._waiting = False
         self.num_threads = 1
 
     def look(self) -> None:
@@ -141,11 +108,9 @@ class _Workers:
         if local is not None and len(threads) < len(local.worker_spec):
             # A worker that dies while it starts is not replaced by its nanny.
             local.scale(len(local.worker_spec))
-        if threads:
-            self._seen_at = now
-        elif self._seen_at is not None and now - self._seen_at > _PATIENCE_SECONDS:
-            self._tell("waiting: there is no worker")
-            self._seen_at = None
+        if bool(threads) == self._waiting:
+            self._waiting = not threads
+            self._tell("waiting: there is no worker" if self._waiting else f"going on: workers: {len(threads)}")
 
     def settle(self) -> None:
         """Wait until the workers that died on this machine are replaced, but not for ever."""
@@ -175,10 +140,13 @@ class _Flow:
         self._tasks[future] = task
         self._done.add(future)
 
-    def next(self) -> tuple[Task, Any] | None:
-        """A task that has ended with what it gave back, or the exception that it ended by; None when all have ended."""
+    def next(self, *, more: bool) -> tuple[Task, Any] | None:
+        """A task that has ended with what it gave back, or the exception that it ended by; None when all have ended.
+
+        more: whether to hand out tasks of the queue.
+        """
         self._workers.look()
-        room = _TASKS_A_THREAD * self._workers.num_threads
+        room = _TASKS_A_THREAD * self._workers.num_threads if more else 0
         while len(self._tasks) < room and (task := self._queue.take()) is not None:
             self.submit(task)
         if not self._tasks:
@@ -194,16 +162,14 @@ class _Flow:
 
         A task counts as suspect too when it only waited at a worker that another one killed.
         """
-        from distributed import KilledWorker
-
         outcome: Any = None
         for _ in range(_TRIES_ALONE):
             self._workers.settle()
             self.submit(task)
-            done = self.next()
+            done = self.next(more=False)
             assert done is not None
             outcome = done[1]
-            if not isinstance(outcome, KilledWorker):
+            if not _is_fatal(outcome):
                 break
         return outcome
 
@@ -213,7 +179,7 @@ class _Flow:
                 return future.result(timeout=_REFRESH_SECONDS)
             except TimeoutError:  # the worker died before it handed the results over: the task is done again
                 self._workers.look()
-            except (Exception, CancelledError) as error:
+            except (Exception, AsyncCancelledError) as error:
                 return error
 
 

@@ -92,6 +92,19 @@ class Writer:
         with _explained(self._path):
             return set(self._database.execute("SELECT cell, run FROM runs"))
 
+    def damaged(self) -> tuple[tuple[str, int], ...]:
+        """Cell and number of every run whose row is not as it was written."""
+        assert self._database is not None
+        with _explained(self._path):
+            rows = self._database.execute(f"SELECT {_COLUMNS} FROM runs ORDER BY cell, run")
+            return tuple((row[0], row[1]) for row in rows if _verified(row) is None)
+
+    def discard(self, cell: str, run: int) -> None:
+        """Take a run out of the file."""
+        assert self._database is not None
+        with _explained(self._path, f"cell {cell}, run {run}: "):
+            self._database.execute("DELETE FROM runs WHERE cell = ? AND run = ?", (cell, run))
+
     def close(self) -> None:
         """Let other writers in."""
         if self._database is not None:
@@ -122,7 +135,10 @@ class Reader:
         rows = self._ask(f"SELECT {_COLUMNS} FROM runs WHERE cell = ? AND run = ?", (cell, run), where)
         if not rows:
             raise InputError(f"{self._path}: {where}expected a finished run; it is not there yet")
-        return self._verified(rows[0], where)
+        entry = _verified(rows[0])
+        if entry is None:
+            raise InputError(f"{self._path}: {where}expected the run as it was written; it is cut short or altered")
+        return entry
 
     def _ask(self, question: str, values: Sequence[Any] = (), where: str = "") -> list[Any]:
         with _explained(self._path, where):
@@ -135,16 +151,16 @@ class Reader:
             _answer(self._path, question, values, mode="rw")
             return _answer(self._path, question, values)
 
-    def _verified(self, row: tuple[Any, ...], where: str) -> Entry:
-        cell, run, session, payload, payload_checksum, timings, timings_checksum = row
-        try:
-            entry = Entry(cell, run, session, zlib.decompress(payload), zlib.decompress(timings))
-            intact = entry.checksum == payload_checksum and _checksum(cell, run, entry.timings) == timings_checksum
-        except (zlib.error, TypeError):
-            intact = False
-        if not intact:
-            raise InputError(f"{self._path}: {where}expected the run as it was written; it is cut short or altered")
-        return entry
+
+def _verified(row: tuple[Any, ...]) -> Entry | None:
+    """The run in a row; None where it is not as it was written."""
+    cell, run, session, payload, payload_checksum, timings, timings_checksum = row
+    try:
+        entry = Entry(cell, run, session, zlib.decompress(payload), zlib.decompress(timings))
+        intact = entry.checksum == payload_checksum and _checksum(cell, run, entry.timings) == timings_checksum
+    except (zlib.error, TypeError):
+        return None
+    return entry if intact else None
 
 
 def _answer(path: Path, question: str, values: Sequence[Any], mode: str = "ro") -> list[Any]:

@@ -5,15 +5,20 @@ from __future__ import annotations
 from collections.abc import Generator
 from contextlib import closing
 from dataclasses import dataclass
+from multiprocessing import current_process
 from pathlib import Path
 from typing import Protocol
 
 from vedette.campaigns.cells import Campaign
-from vedette.campaigns.engine import in_process, local_workers, on_workers, remote_workers
+from vedette.campaigns.clients import local_workers, remote_workers
+from vedette.campaigns.engine import in_process, on_workers
 from vedette.campaigns.export import export_tables
+from vedette.campaigns.journal import DATABASE
+from vedette.campaigns.manifest import MANIFEST
 from vedette.campaigns.results import open_results
 from vedette.campaigns.store import Store
 from vedette.campaigns.tasks import Failed, Landed, TaskQueue, perform
+from vedette.errors import InputError, VedetteError
 
 TABLES = "tables"
 
@@ -75,6 +80,7 @@ def run_campaign(
     *,
     num_workers: int = 1,
     scheduler: str | None = None,
+    redo_damaged: bool = False,
     watch: Watch | None = None,
 ) -> Outcome:
     """Run what the folder does not hold yet, and write the tables when all is done.
@@ -88,6 +94,7 @@ def run_campaign(
         folder: for the results; new, empty, or of the same campaign.
         num_workers: processes on this machine; 1: this process alone.
         scheduler: address of a dask scheduler whose workers do the work instead; each has this version installed.
+        redo_damaged: run again what was altered in the folder since it was kept, instead of refusing to go on.
         watch: is told of the progress.
 
     Raises:
@@ -95,9 +102,17 @@ def run_campaign(
             scheduler's address.
         VedetteError: the disk is full, or the scheduler is lost; the runs that landed are safe.
     """
+    if getattr(current_process(), "_inheriting", False):
+        raise VedetteError(
+            'a script that runs a campaign with workers needs `if __name__ == "__main__":` around the call'
+        )
     watch = watch or Unwatched()
     failed, num_landed = [], 0
+    lost = (Path(folder) / MANIFEST).is_file() and not (Path(folder) / DATABASE).exists()
     with Store.open(Path(folder), campaign) as store:
+        if lost:
+            watch.note(f"{Path(folder) / DATABASE} was not there: every run is done again")
+        _check_undamaged(store, redo_damaged, watch)
         finished = store.finished()
         found = [(cell.name, run) for cell, run in campaign.tasks if (cell.name, run) in finished]
         watch.begin(len(found), len(campaign.tasks))
@@ -112,19 +127,37 @@ def run_campaign(
                 store.add(result.cell, result.run, result.payload, result.timings)
                 num_landed += 1
                 watch.landed(result)
-    tables = Path(folder) / TABLES
-    if num_landed or not tables.is_dir():
-        export_tables(open_results(Path(folder)), tables)
+    # Each time: what was left of them by another end of this call, or altered since, is put right.
+    export_tables(open_results(folder), Path(folder) / TABLES)
     return Outcome(num_landed, len(found), tuple(failed))
+
+
+def _check_undamaged(store: Store, redo: bool, watch: Watch) -> None:
+    """`InputError` if a finished run was altered, unless it is to be done again: then it is taken out."""
+    damaged = store.damaged()
+    names = ", ".join(f"{cell} {run}" for cell, run in damaged)
+    if damaged and not redo:
+        raise InputError(
+            f"{store.folder}: expected the runs as they were kept; altered since: {names} (have what is "
+            "damaged redone, or put the file back)"
+        )
+    for cell, run in damaged:
+        store.discard(cell, run)
+    if damaged:
+        watch.note(f"damaged, and done again: {names}")
 
 
 def _results(queue: TaskQueue, num_workers: int, scheduler: str | None, watch: Watch) -> Generator[Landed | Failed]:
     if scheduler is None and num_workers <= 1:
         yield from in_process(queue)
         return
+    if scheduler is not None:
+        with remote_workers(scheduler) as client:
+            yield from on_workers(client, queue, watch.note, first=list(queue.warm_up()))
+        return
     # Here first, so that kernels are compiled once and not once a worker.
     for task in queue.warm_up():
         yield from perform(task)
     if len(queue):
-        with remote_workers(scheduler) if scheduler else local_workers(min(num_workers, len(queue))) as client:
+        with local_workers(min(num_workers, len(queue))) as client:
             yield from on_workers(client, queue, watch.note)

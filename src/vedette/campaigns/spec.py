@@ -13,6 +13,7 @@ from vedette.evaluation.runs import STRATEGIES
 from vedette.scenarios.diagnostics import suggestion
 from vedette.scenarios.schema.base import Name, Section, Whole, expected
 
+ShortName = Annotated[Name, Field(max_length=60)]
 Names = Annotated[tuple[Name, ...], Field(strict=False, min_length=1)]
 Fields = dict[str, JsonValue]
 
@@ -29,13 +30,16 @@ _WHAT = {
     "greater_than_equal": "a number of at least {ge}",
     "less_than_equal": "a number of at most {le}",
     "expected": "{expected}",
+    "finite_number": "a finite number",
+    "too_long": "at most {max_length} characters",
 }
+_UNIONS = ("float", "int", "str", "bool", "list", "dict")
 
 
 class Variant(Section):
     """One entry of a list of settings that belong together."""
 
-    name: Name = Field(description="What tables and figures call it.")
+    name: ShortName = Field(description="What tables and figures call it.")
     set: Fields = Field(default={}, description="Scenario fields by path, and their values.")
 
 
@@ -46,7 +50,7 @@ class CampaignSpec(Section):
     what the scenario says. Paths of scenario fields are those of `vedette.scenarios.overrides.with_fields`.
     """
 
-    name: Name = Field(description="What the campaign is called.")
+    name: ShortName = Field(description="What the campaign is called.")
     scenarios: Names = Field(description="Built-in scenarios by name, or files relative to the specification.")
     planners: Names = Field(default=("jdm", "idm", "random"), description="Strategies: " + ", ".join(STRATEGIES) + ".")
     runs: Annotated[Whole, Field(ge=1, le=1_000_000)] = Field(description="Paired runs of each.")
@@ -121,6 +125,8 @@ def load_spec(path: Path | str) -> CampaignSpec:
 def _fault(detail: Any) -> str:
     loc, context = detail["loc"], detail.get("ctx", {})
     loc += tuple(context.get("at", ()))
+    if detail["type"] == "finite_number":  # the member of a union that was tried
+        loc = tuple(part for part in loc if part not in _UNIONS)
     field = ".".join(str(part) for part in loc) or "the specification"
     model: type[BaseModel] = Variant if loc[:1] == ("variants",) else CampaignSpec
     known = [name for name in model.model_fields if name != "kind"]
@@ -146,4 +152,5 @@ def _check_axes(spec: CampaignSpec, place: str) -> None:
             seen.append(value)
     comparable = [axis for axis in spec.axes() if axis != "scenario"]  # runs of two scenarios are no pairs
     if spec.compare is not None and spec.compare not in comparable:
-        raise InputError(f"{place}: compare: expected one of {', '.join(comparable)}; got {spec.compare!r}")
+        why = ", as runs of two scenarios are no pairs" if spec.compare == "scenario" else ""
+        raise InputError(f"{place}: compare: expected one of {', '.join(comparable)}{why}; got {spec.compare!r}")

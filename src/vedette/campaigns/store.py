@@ -44,8 +44,8 @@ class Store:
         """
         target = Path(folder)
         fresh = new_manifest(campaign)
-        _check_place(target)
         try:
+            _check_place(target)
             target.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise InputError(f"{target}: expected a place for a results folder; {error}") from error
@@ -79,6 +79,14 @@ class Store:
     def finished(self) -> set[tuple[str, int]]:
         """Cell name and number of every finished run."""
         return self._writer.finished()
+
+    def damaged(self) -> tuple[tuple[str, int], ...]:
+        """Cell name and number of every finished run that is not as it was written."""
+        return self._writer.damaged()
+
+    def discard(self, cell: str, run: int) -> None:
+        """Take a finished run out, so that it can be added anew."""
+        self._writer.discard(cell, run)
 
     def add(self, cell: str, run: int, payload: bytes, timings: bytes) -> None:
         """Keep a finished run (`vedette.campaigns.codec`). When this returns, the run is on the disk.

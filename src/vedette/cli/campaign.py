@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -35,10 +36,14 @@ def campaign(
     runs: Annotated[
         int | None, typer.Option("--runs", min=1, help="Runs of each cell, in place of the file's.")
     ] = None,
+    redo_damaged: Annotated[
+        bool, typer.Option("--redo-damaged", help="Run again what was altered since it was kept, in its place.")
+    ] = False,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what would be run, and stop.")] = False,
 ) -> None:
     """Run a campaign, or go on with one: every run that its folder does not hold yet."""
     from vedette.campaigns import load_spec, resolve
+    from vedette.campaigns.cells import safe_name
 
     resolved = resolve(load_spec(spec), spec.parent)
     if runs is not None:
@@ -46,10 +51,11 @@ def campaign(
     if dry_run:
         _describe(resolved)
         return
-    folder = out or Path(f"{resolved.name}-results")
-    outcome = carry_out(resolved, folder, workers, scheduler)
-    typer.echo(f"{folder}: {outcome.num_landed + outcome.num_found} of {len(resolved.tasks)} runs")
-    typer.echo(f"next: vedette results {folder}; vedette report {folder}")
+    folder = out or Path(f"{safe_name(resolved.name)}-results")
+    outcome = carry_out(resolved, folder, workers, scheduler, redo_damaged)
+    typer.echo(f"{folder}: {outcome.num_landed + outcome.num_found} of {resolved.total} runs")
+    place = shlex.quote(str(folder))
+    typer.echo(f"next: vedette results {place}; vedette report {place}")
     report_failures(outcome.failed)
 
 
@@ -77,7 +83,7 @@ def reproduce(
     spec = CampaignSpec(
         name="reproduction", scenarios=(scenario,), planners=tuple(names), runs=runs, seed=seed, compare="planner"
     )
-    outcome = carry_out(resolve(spec), out, workers, None)
+    outcome = carry_out(resolve(spec), out, workers)
     opened = open_results(out)
     print_results(opened)
     with interruptible(f"{out} keeps every run; the same command writes the report"):
@@ -88,7 +94,9 @@ def reproduce(
     report_failures(outcome.failed)
 
 
-def carry_out(campaign: Campaign, folder: Path, workers: int, scheduler: str | None) -> Outcome:
+def carry_out(
+    campaign: Campaign, folder: Path, workers: int, scheduler: str | None = None, redo_damaged: bool = False
+) -> Outcome:
     """Run a campaign with its progress shown; Ctrl-C says how to go on."""
     from vedette.campaigns import run_campaign
 
@@ -96,7 +104,12 @@ def carry_out(campaign: Campaign, folder: Path, workers: int, scheduler: str | N
         compile_if_cold(campaign.cells[0].scenario)
         with CampaignProgress(campaign) as progress:
             return run_campaign(
-                campaign, folder, num_workers=workers or processors(), scheduler=scheduler, watch=progress
+                campaign,
+                folder,
+                num_workers=workers or processors(),
+                scheduler=scheduler,
+                redo_damaged=redo_damaged,
+                watch=progress,
             )
 
 
@@ -111,7 +124,15 @@ def report_failures(failed: tuple[Failed, ...]) -> None:
 
 
 def _describe(campaign: Campaign) -> None:
-    typer.echo(f"{campaign.name}: {len(campaign.cells)} cells, {campaign.num_runs} runs each, seed {campaign.seed}")
+    typer.echo(
+        f"{campaign.name}: {campaign.total} runs, {campaign.num_runs} of each of {len(campaign.cells)} cells, "
+        f"seed {campaign.seed}"
+    )
+    for field, value in campaign.spec["set"].items():
+        typer.echo(f"  set {field} = {value}")
+    for variant in campaign.spec["variants"]:
+        for field, value in variant["set"].items():
+            typer.echo(f"  variant {variant['name']}: {field} = {value}")
     for axis, values in campaign.axes.items():
         compared = " (compared)" if axis == campaign.compare else ""
         typer.echo(f"  {axis}: {', '.join(str(value) for value in values)}{compared}")

@@ -1,6 +1,6 @@
 """How errors meet a person: the message, no traceback, and an exit status that says whose fault it was.
 
-0: done. 1: faulty content (a scenario, a file, a computation). 2: wrong use of the command line.
+0: done. 1: faulty content (a scenario, a file, a computation). 2: wrong use of the command line. 130: interrupted.
 """
 
 from __future__ import annotations
@@ -12,6 +12,8 @@ from typer.core import TyperGroup
 
 from vedette.errors import VedetteError
 
+INTERRUPTED = 130
+
 
 class Commands(TyperGroup):
     """The group of all commands; prints the library's own errors instead of raising them."""
@@ -22,6 +24,9 @@ class Commands(TyperGroup):
         except VedetteError as error:
             typer.echo(str(error), err=True)
             raise typer.Exit(1) from None
+        except KeyboardInterrupt:  # where a command has nothing to say of what it leaves
+            typer.echo("\ninterrupted", err=True)
+            raise typer.Exit(INTERRUPTED) from None
 
 
 def usage_error(message: str, option: str) -> typer.BadParameter:

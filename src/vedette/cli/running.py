@@ -10,13 +10,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from vedette.cli.errors import usage_error
+from vedette.cli.errors import INTERRUPTED, usage_error
 
 if TYPE_CHECKING:
     from vedette.scenarios import Scenario
     from vedette.simulation.records import RunRecord
 
-INTERRUPTED = 130
 STRATEGY_NAMES = ("jdm", "idm", "random", "fixed", "still")
 
 
@@ -45,7 +44,7 @@ def interruptible(advice: str) -> Iterator[None]:
 def check_planner(name: str, option: str) -> None:
     """Wrong use of an option unless it names a strategy."""
     if name not in STRATEGY_NAMES:
-        raise usage_error(f"expected one of {', '.join(STRATEGY_NAMES)}; got {name}", option)
+        raise usage_error(f"expected one of {', '.join(STRATEGY_NAMES)}; got {name!r}", option)
 
 
 def run(

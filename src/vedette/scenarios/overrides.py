@@ -62,7 +62,21 @@ def _set(data: Any, path: str, value: Any) -> Iterator[str]:
             yield fault
             return
         for key in keys:
+            missing = _left_out(holder[key], value)
+            if missing:
+                yield (
+                    f"{path}: expected the whole section, with {missing[0]} too, got a part of it "
+                    f'(a field is set by its path in quotes: "{path}.{next(iter(value), missing[0])}")'
+                )
+                return
             holder[key] = value
+
+
+def _left_out(present: Any, value: Any) -> list[str]:
+    """Keys of a section without which a new one would fall back on defaults unseen; one of another kind may."""
+    if not isinstance(present, dict) or not isinstance(value, dict) or "kind" in value:
+        return []
+    return sorted(present.keys() - value.keys())
 
 
 def _keys(holder: Any, place: Path, part: str, path: str) -> tuple[list[Any], str]:

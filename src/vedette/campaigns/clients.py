@@ -1,0 +1,90 @@
+"""Workers to hand tasks to: processes on this machine, or those of a cluster."""
+
+from __future__ import annotations
+
+import logging
+import re
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from multiprocessing import active_children
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING
+
+from vedette.errors import InputError, VedetteError
+from vedette.evaluation.runs import children_ignore_interrupts
+
+if TYPE_CHECKING:
+    from distributed import Client, LocalCluster
+
+_CONNECT_SECONDS = 10.0
+_SPAWN_SECONDS = 5.0
+_START_SECONDS = 120.0
+_POLL_SECONDS = 0.02
+_ADDRESS = re.compile(r"(tcp|tls)://[^\s/]+:[0-9]+")
+
+
+@contextmanager
+def local_workers(num_workers: int) -> Iterator[Client]:
+    """As many worker processes on this machine; one that dies is replaced.
+
+    Raises:
+        VedetteError: they cannot be started.
+    """
+    import dask
+    from distributed import Client, LocalCluster
+
+    with TemporaryDirectory(prefix="vedette-workers-", ignore_cleanup_errors=True) as scratch:
+        with dask.config.set({"distributed.scheduler.allowed-failures": 1}):
+            cluster = LocalCluster(
+                n_workers=0,
+                threads_per_worker=1,
+                processes=True,
+                host="127.0.0.1",
+                dashboard_address="127.0.0.1:0",
+                memory_limit=None,
+                local_directory=scratch,
+                silence_logs=logging.CRITICAL,
+                preload=["vedette.campaigns.worker"],
+            )
+        with cluster, Client(cluster, set_as_default=False) as client:
+            _start(cluster, num_workers)
+            yield client
+
+
+def _start(cluster: LocalCluster, num_workers: int) -> None:
+    """Start the processes, and wait for the first; Ctrl-C is kept from them from their first moment."""
+    begin = time.monotonic()
+    with children_ignore_interrupts():
+        cluster.scale(num_workers)
+        while len(active_children()) < num_workers and time.monotonic() - begin < _SPAWN_SECONDS:
+            time.sleep(_POLL_SECONDS)
+    while not cluster.scheduler_info["workers"]:
+        if not active_children() or time.monotonic() - begin > _START_SECONDS:
+            raise VedetteError(
+                "the worker processes ended while they started; in a script of your own, put the call that runs the "
+                'campaign under `if __name__ == "__main__":`'
+            )
+        time.sleep(_POLL_SECONDS)
+
+
+@contextmanager
+def remote_workers(address: str) -> Iterator[Client]:
+    """The workers of a scheduler that runs already.
+
+    Raises:
+        InputError: the address is none, or nothing answers there.
+    """
+    expected = "scheduler: expected the address of a running dask scheduler, such as tcp://host:8786"
+    if not _ADDRESS.fullmatch(address):
+        raise InputError(f"{expected}; got {address!r}")
+    from distributed import Client
+
+    for logger in ("distributed", "distributed.client"):  # a lost scheduler is said once, by the error
+        logging.getLogger(logger).setLevel(logging.CRITICAL)
+    try:
+        client = Client(address, set_as_default=False, timeout=_CONNECT_SECONDS)
+    except (OSError, ValueError) as error:
+        raise InputError(f"{expected}; nothing answers at {address}: {error}") from None
+    with client:
+        yield client
