@@ -131,6 +131,23 @@ def situation(
     return Situation(sensors, fusion, settings, beliefs, fusion.fuse(beliefs)[0], POSES[:num_sensors])
 
 
+def crowded(num_targets: int) -> Situation:
+    """Targets so near each other that each may have given any of the measurements."""
+    rng = np.random.default_rng(4)
+    labels, spread = np.array([(0, i) for i in range(num_targets)]), np.array([6.0, 6.0, 1.0, 1.0])
+    covs = np.tile(np.diag(np.square([20.0, 20.0, 3.0, 3.0])), (num_targets, 1, 1))
+    beliefs = tuple(
+        LMB.from_bernoullis(
+            labels, rng.uniform(0.6, 0.999, num_targets), STATES[A] + spread * rng.normal(size=(num_targets, 4)), covs
+        )
+        for _ in range(2)
+    )
+    fusion = Clmb((0.5, 0.5))
+    sensors = tuple(mobile_sensor("lmb", actions=HeadingActions((-90.0, 30.0))) for _ in range(2))
+    settings = replace(SETTINGS, limits=planning_limits(), num_samples=4)
+    return Situation(sensors, fusion, settings, beliefs, fusion.fuse(beliefs)[0], POSES[:2])
+
+
 def evaluator_of(situation: Situation, reward: Any = None, seed: int = 5) -> Evaluator:
     """The evaluator of a situation, by default with K = 1."""
     return Evaluator.prepare(

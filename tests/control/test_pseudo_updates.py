@@ -8,12 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from control.examples import EXACT_LIMITS, POSES, SETTINGS, evaluator_of, mobile_sensor, situation
+from control.examples import EXACT_LIMITS, POSES, SETTINGS, crowded, evaluator_of, mobile_sensor, situation
+from control.plain_loop import plain_rewards
 from vedette import models
 from vedette.control.priors import label_sets
 from vedette.control.pseudo import draw_futures, pseudo_posteriors
 from vedette.densities import GLMB, sample_glmb
 from vedette.filters import DeltaGlmbFilter
+from vedette.kernels.marginals import MAX_EXACT_MEASUREMENTS
 from vedette.models.platforms import advance
 
 
@@ -106,3 +108,17 @@ def test_a_target_is_seen_with_or_above_its_detection_probability(mode: Any) -> 
         own = pseudo_posteriors(example.beliefs[0], sensor, POSES[0], np.zeros(1), futures, settings)
         rose = own.log_weights > example.beliefs[0].existence_logit
         assert abs(rose.mean() - share[mode]) < 0.15
+
+
+@pytest.mark.parametrize("num_targets", [5, 16])
+def test_targets_may_contend_for_more_measurements_than_there_was_room_for(num_targets: int) -> None:
+    example = crowded(num_targets)
+    (futures, *_) = draw_futures(example.fused, example.sensors, example.settings, rng=np.random.default_rng(5))
+    sizes = np.diff(futures.offsets)
+    if num_targets > MAX_EXACT_MEASUREMENTS:
+        assert sizes.min() <= MAX_EXACT_MEASUREMENTS < sizes.max()
+    joint, alone = plain_rewards(example, 1.0, seed=5)
+    evaluator = evaluator_of(example, seed=5)
+    np.testing.assert_allclose(evaluator.sample_rewards((0, 1), example.fusion), joint, rtol=1e-9, atol=1e-9)
+    for s, expected in enumerate(alone):
+        np.testing.assert_allclose(evaluator.sample_rewards((s,), None), expected, rtol=1e-9, atol=1e-9)

@@ -127,12 +127,10 @@ def _run_lmb(belief: LMB, decision: Decision, settings: PlanningSettings, num_ca
     results = LmbResults(
         np.empty((num_cases, num)), np.empty((num_cases, num, dim)), np.empty((num_cases, num, dim, dim))
     )
-    reduction = settings.limits.reduction()._replace(max_labels=max(num, 1))
     prior = LMB(single_gaussians(belief.tracks), belief.existence_logit).to_kernel()
-    no_birth = LMB.empty(dim).to_kernel()
 
     def work(first: int, last: int) -> None:
-        pseudo_update_lmb(prior, no_birth, decision, reduction, first, last, results)
+        pseudo_update_lmb(prior, decision, first, last, results)
 
     with model_errors():
         run_chunks(work, num_cases, settings.threads())

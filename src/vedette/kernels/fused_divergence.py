@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from vedette.kernels.compile import kernel
+from vedette.kernels.compile import borrowing, inlined
 from vedette.kernels.information import log_integral
 from vedette.kernels.linalg import log_add
 from vedette.kernels.types import Bools, Floats, Ints
@@ -52,7 +52,7 @@ class Prediction(NamedTuple):
     log_self: float
 
 
-@kernel
+@borrowing
 def _log_integral(row: Floats, dim: int) -> float:
     # The compiler unrolls a call of constant dimension, which makes the two usual ones more than twice as fast.
     if dim == 4:
@@ -62,7 +62,7 @@ def _log_integral(row: Floats, dim: int) -> float:
     return log_integral(row, dim)
 
 
-@kernel
+@inlined
 def _integrals(
     cases: Cases, chosen: Ints, member: int, prediction: Prediction, dim: int, work: Floats
 ) -> tuple[float, float, float]:
@@ -86,7 +86,7 @@ def _integrals(
     return overlap, squared, _log_integral(joint, dim)
 
 
-@kernel
+@inlined
 def _weight(cases: Cases, chosen: Ints, at: int) -> tuple[float, bool]:
     total, held = 0.0, False
     for s in range(chosen.shape[0]):
@@ -95,7 +95,7 @@ def _weight(cases: Cases, chosen: Ints, at: int) -> tuple[float, bool]:
     return total, held
 
 
-@kernel
+@borrowing
 def fused_glmb_divergence(
     cases: Cases, chosen: Ints, prediction: Prediction, dim: int, log_unit_volume: float, work: Floats
 ) -> float:
@@ -118,7 +118,7 @@ def fused_glmb_divergence(
     return 0.5 * (own + prediction.log_self) - cross
 
 
-@kernel
+@borrowing
 def fused_lmb_divergence(
     cases: Cases, chosen: Ints, prediction: Prediction, dim: int, log_unit_volume: float, work: Floats
 ) -> float:

@@ -86,7 +86,7 @@ def _add_noise(sensor: Sensor, state: Floats, pose: Floats, normals: Floats, scr
             out[a] = wrap_angle(out[a])
 
 
-@borrowing
+@inlined
 def ideal_scan(decision: Decision, action: int, sample: int, step: int, scratch: Scratch, out: Floats) -> int:
     """Write the ideal measurements of a sample at a step of an action into `out`; returns their number.
 

@@ -14,18 +14,18 @@ from __future__ import annotations
 
 import math
 
-from vedette.kernels.compile import kernel
+from vedette.kernels.compile import borrowing, inlined
 from vedette.kernels.linalg import LOG_2PI, cholesky, inverse_from_factor, log_det_from_factor, solve_lower, solve_upper
 from vedette.kernels.types import Floats
 
 
-@kernel
+@borrowing
 def row_size(dim: int) -> int:
     """Length of the information row of a state of `dim` components."""
     return (dim + 1) * (dim + 2) // 2 + 1
 
 
-@kernel
+@inlined
 def to_information(
     mean: Floats, cov: Floats, reference: Floats, power: float, row: Floats, factor: Floats, inverse: Floats
 ) -> bool:
@@ -63,7 +63,7 @@ def to_information(
     return True
 
 
-@kernel
+@inlined
 def log_integral(row: Floats, dim: int) -> float:
     """log of the integral over all states of what `row` describes; NaN where its Y is not positive definite.
 
@@ -95,7 +95,7 @@ def log_integral(row: Floats, dim: int) -> float:
     return float(0.5 * (dim * LOG_2PI - log_det - row[diagonal]))
 
 
-@kernel
+@borrowing
 def log_value(row: Floats, offset: Floats) -> float:
     """log of what `row` describes at the state reference + `offset`."""
     n = offset.shape[0]
@@ -110,7 +110,7 @@ def log_value(row: Floats, offset: Floats) -> float:
     return float(linear - quadratic - 0.5 * row[last + n])
 
 
-@kernel
+@borrowing
 def to_moments(row: Floats, reference: Floats, mean: Floats, cov: Floats, factor: Floats) -> bool:
     """Mean and covariance of the normalised Gaussian that `row` describes. False where Y is not positive definite.
 

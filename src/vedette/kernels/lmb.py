@@ -10,12 +10,13 @@ import numpy as np
 from vedette.kernels.assembly import write_updated
 from vedette.kernels.assignment import ABSENT, Options
 from vedette.kernels.association import Rows, clutter_levels, list_options
-from vedette.kernels.compile import kernel
+from vedette.kernels.compile import borrowing, inlined, kernel
 from vedette.kernels.gaussian import make_scratch
 from vedette.kernels.glmb import prepare_rows
 from vedette.kernels.linalg import log_add
 from vedette.kernels.marginals import option_marginals
-from vedette.kernels.mixtures import copy_component, descending_order, moment_match, reduce_mixture
+from vedette.kernels.matching import make_mixture, match_rows
+from vedette.kernels.mixtures import copy_component, descending_order, reduce_mixture
 from vedette.kernels.truncation import Truncation
 from vedette.kernels.types import Floats, Ints, Lmb, Motion, Sensor, Tracks
 
@@ -47,20 +48,30 @@ class LmbReport(NamedTuple):
     dropped_existence: float
 
 
-@kernel
+@inlined
+def _log_presence(logit: float) -> tuple[float, float]:
+    """log existence and log (1 - existence)."""
+    if logit >= 0.0:
+        log_existence = -math.log1p(math.exp(-logit))
+        return log_existence, log_existence - logit
+    log_absence = -math.log1p(math.exp(logit))
+    return log_absence + logit, log_absence
+
+
+@borrowing
 def weigh_by_existence(existence_logit: Floats, rows: Rows) -> None:
     """Make the first rows, predicted as if certain, uncertain by the prior existence of their tracks."""
     for i in range(len(existence_logit)):
-        log_existence = -log_add(0.0, -existence_logit[i])
-        rows.log_absent[i] = log_add(-log_add(0.0, existence_logit[i]), log_existence + rows.log_absent[i])
+        log_existence, log_absence = _log_presence(existence_logit[i])
+        rows.log_absent[i] = log_add(log_absence, log_existence + rows.log_absent[i])
         for c in range(rows.offsets[i], rows.offsets[i + 1]):
             rows.log_weights[c] += log_existence
 
 
-@kernel
-def _existence_logits(options: Options, marginals: Floats) -> Floats:
-    logits = np.empty(len(options.offsets) - 1)
-    for row in range(len(logits)):
+@borrowing
+def fill_existence(options: Options, marginals: Floats, logits: Floats) -> None:
+    """Posterior existence logit of every row."""
+    for row in range(len(options.offsets) - 1):
         present, absent = -math.inf, -math.inf
         for option in range(options.offsets[row], options.offsets[row + 1]):
             if options.columns[option] == ABSENT:
@@ -68,7 +79,6 @@ def _existence_logits(options: Options, marginals: Floats) -> Floats:
             else:
                 present = log_add(present, marginals[option])
         logits[row] = present - absent
-    return logits
 
 
 @kernel
@@ -96,20 +106,33 @@ def _most_components(kept: Ints, rows: Rows, options: Options) -> tuple[int, int
     """Components of the widest row and of all kept rows together, before reduction."""
     widest, total = 0, 0
     for row in kept:
-        width = (rows.offsets[row + 1] - rows.offsets[row]) * (options.offsets[row + 1] - options.offsets[row])
+        width = (rows.offsets[row + 1] - rows.offsets[row]) * max(1, options.offsets[row + 1] - options.offsets[row])
         widest = max(widest, width)
         total += width
     return widest, total
 
 
 @kernel
-def _posterior_tracks(kept: Ints, rows: Rows, options: Options, marginals: Floats, reduction: Reduction) -> Tracks:
+def _matched_tracks(kept: Ints, rows: Rows, options: Options, marginals: Floats) -> Tracks:
+    """One Gaussian for each kept row."""
+    num, dim = len(kept), rows.means.shape[1]
+    widest, _ = _most_components(kept, rows, options)
+    labels, offsets = np.empty((num, 2), np.int64), np.zeros(num + 1, np.int64)
+    log_weights, means, covs = np.zeros(num), np.empty((num, dim)), np.empty((num, dim, dim))
+    for i in range(num):
+        labels[i, 0], labels[i, 1] = rows.labels[kept[i], 0], rows.labels[kept[i], 1]
+        offsets[i + 1] = i + 1
+    match_rows(kept, rows, options, marginals, make_mixture(widest, dim), means, covs)
+    return Tracks(labels, offsets, log_weights, means, covs)
+
+
+@kernel
+def _reduced_tracks(kept: Ints, rows: Rows, options: Options, marginals: Floats, reduction: Reduction) -> Tracks:
     """Each kept row's mixture over its options, reduced."""
     dim = rows.means.shape[1]
     widest, total = _most_components(kept, rows, options)
-    capacity = len(kept) if reduction.max_components == 1 else total
     labels, offsets = np.empty((len(kept), 2), np.int64), np.zeros(len(kept) + 1, np.int64)
-    log_weights, means, covs = np.empty(capacity), np.empty((capacity, dim)), np.empty((capacity, dim, dim))
+    log_weights, means, covs = np.empty(total), np.empty((total, dim)), np.empty((total, dim, dim))
     wide_weights, wide_means, wide_covs = np.empty(widest), np.empty((widest, dim)), np.empty((widest, dim, dim))
     filled = 0
     for i in range(len(kept)):
@@ -129,14 +152,9 @@ def _posterior_tracks(kept: Ints, rows: Rows, options: Options, marginals: Float
                 copy_component(rows.means, rows.covs, c, wide_means, wide_covs, width)
                 wide_weights[width] = 0.0
                 width += 1
-        if reduction.max_components == 1:
-            moment_match(wide_weights[:width], wide_means[:width], wide_covs[:width], means[filled], covs[filled])
-            log_weights[filled] = 0.0
-            filled += 1
-        else:
-            filled = append_reduced(
-                wide_weights[:width], wide_means[:width], wide_covs[:width], reduction, filled, log_weights, means, covs
-            )
+        filled = append_reduced(
+            wide_weights[:width], wide_means[:width], wide_covs[:width], reduction, filled, log_weights, means, covs
+        )
         offsets[i + 1] = filled
     return Tracks(labels, offsets, log_weights[:filled], means[:filled], covs[:filled])
 
@@ -183,9 +201,13 @@ def finish_lmb(
     log_total, num_ranked = option_marginals(
         options, len(scan), truncation.max_hyps, truncation.max_log_gap, truncation.max_nodes, marginals
     )
-    logits = _existence_logits(options, marginals)
+    logits = np.empty(len(rows.log_absent))
+    fill_existence(options, marginals, logits)
     kept, dropped = labels_to_keep(logits, reduction)
-    tracks = _posterior_tracks(kept, rows, options, marginals, reduction)
+    if reduction.max_components == 1:
+        tracks = _matched_tracks(kept, rows, options, marginals)
+    else:
+        tracks = _reduced_tracks(kept, rows, options, marginals, reduction)
     kept_logits = np.empty(len(kept))
     for i in range(len(kept)):
         kept_logits[i] = logits[kept[i]]

@@ -7,55 +7,34 @@ of measurements already taken. A cluster too large for that is summed over its h
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
-import numpy as np
-
-from vedette.kernels.arrays import filled_ints
 from vedette.kernels.assignment import Options
-from vedette.kernels.compile import kernel
-from vedette.kernels.ranked import Parents, rank_children
+from vedette.kernels.children import Parents
+from vedette.kernels.clusters import (
+    MarginalWork,
+    find_clusters,
+    gather_cluster,
+    grown_marginal_work,
+    make_marginal_work,
+)
+from vedette.kernels.compile import borrowing, inlined, kernel
+from vedette.kernels.openings import size_search, start_search
+from vedette.kernels.ranked import run_search
 from vedette.kernels.types import Floats, Ints
 
 MAX_EXACT_MEASUREMENTS = 12
 
 
-@kernel
-def _clusters(options: Options, num_columns: int) -> tuple[Ints, int]:
-    """Number of the cluster of each row; rows that share a gated measurement, directly or not, are together."""
-    num_rows = len(options.offsets) - 1
-    leader = np.empty(num_rows, np.int64)
-    owner = filled_ints(num_columns, -1)
-    for row in range(num_rows):
-        leader[row] = row
-        for option in range(options.offsets[row], options.offsets[row + 1]):
-            column = options.columns[option]
-            if column < 0:
-                continue
-            if owner[column] < 0:
-                owner[column] = row
-            else:
-                a, b = _root(leader, owner[column]), _root(leader, row)
-                leader[max(a, b)] = min(a, b)
-    cluster = np.empty(num_rows, np.int64)
-    num_clusters = 0
-    for row in range(num_rows):
-        root = _root(leader, row)
-        if root == row:
-            cluster[row] = num_clusters
-            num_clusters += 1
-        else:
-            cluster[row] = cluster[root]
-    return cluster, num_clusters
+class MarginalCaps(NamedTuple):
+    """How a cluster too large for the exact sum is summed: see `ranked.rank_children`."""
+
+    max_choices: int
+    max_log_gap: float
+    max_nodes: int
 
 
-@kernel
-def _root(leader: Ints, row: int) -> int:
-    while leader[row] != row:
-        row = leader[row]
-    return row
-
-
-@kernel
+@inlined
 def _single_row(options: Options, row: int, out: Floats) -> float:
     start, stop = options.offsets[row], options.offsets[row + 1]
     if start == stop:
@@ -69,7 +48,7 @@ def _single_row(options: Options, row: int, out: Floats) -> float:
     return log_total
 
 
-@kernel
+@borrowing
 def _transfer(options: Options, row: int, bit_of: Ints, source: Floats, target: Floats, forward: bool) -> None:
     """One row's step of the pass over sets of taken measurements; weights relative to the row's heaviest option."""
     for mask in range(len(target)):
@@ -87,23 +66,25 @@ def _transfer(options: Options, row: int, bit_of: Ints, source: Floats, target: 
                     target[mask] += weight * source[mask | bit]
 
 
-@kernel
-def _exact_cluster(options: Options, rows: Ints, bit_of: Ints, num_bits: int, out: Floats) -> float:
+@borrowing
+def _exact_cluster(options: Options, rows: Ints, bit_of: Ints, num_bits: int, tables: Floats, out: Floats) -> float:
     """Marginals of a cluster by forward-backward; returns its log total weight, -inf if that underflows."""
     num, size = len(rows), 1 << num_bits
-    forward, backward = np.empty((num + 1, size)), np.empty((num + 1, size))
+    backwards = (num + 1) * size
     for mask in range(size):
-        forward[0, mask] = 1.0 if mask == 0 else 0.0
-        backward[num, mask] = 1.0
+        tables[mask] = 1.0 if mask == 0 else 0.0
+        tables[backwards + num * size + mask] = 1.0
     scale = 0.0
     for i in range(num):
         if options.offsets[rows[i]] == options.offsets[rows[i] + 1]:
             return -math.inf
         scale += options.log_weights[options.offsets[rows[i]]]
-        _transfer(options, rows[i], bit_of, forward[i], forward[i + 1], True)
+        at = i * size
+        _transfer(options, rows[i], bit_of, tables[at : at + size], tables[at + size : at + 2 * size], True)
     for i in range(num - 1, -1, -1):
-        _transfer(options, rows[i], bit_of, backward[i + 1], backward[i], False)
-    total = backward[0, 0]
+        at = backwards + i * size
+        _transfer(options, rows[i], bit_of, tables[at + size : at + 2 * size], tables[at : at + size], False)
+    total = tables[backwards]
     if not total > 1e-250:
         return -math.inf
     for i in range(num):
@@ -114,28 +95,34 @@ def _exact_cluster(options: Options, rows: Ints, bit_of: Ints, num_bits: int, ou
             joint = 0.0
             for mask in range(size):
                 if mask & bit == 0:
-                    joint += forward[i, mask] * backward[i + 1, mask | bit]
+                    joint += tables[i * size + mask] * tables[backwards + (i + 1) * size + (mask | bit)]
             log_joint = math.log(joint / total) if joint > 0.0 else -math.inf
             out[option] = options.log_weights[option] - options.log_weights[start] + log_joint
     return scale + math.log(total)
 
 
-@kernel
+@borrowing
 def _ranked_cluster(
-    options: Options, rows: Ints, num_columns: int, max_choices: int, max_log_gap: float, max_nodes: int, out: Floats
-) -> float:
-    """Marginals of a cluster over its heaviest joint choices; returns their log total weight."""
-    offsets = np.zeros(2, np.int64)
-    offsets[1] = len(rows)
-    parents = Parents(offsets, rows, np.zeros(1), np.empty(0, np.int64))
-    children, _ = rank_children(options, parents, num_columns, max_choices, max_log_gap, max_nodes)
+    options: Options, rows: Ints, num_columns: int, caps: MarginalCaps, work: MarginalWork, out: Floats
+) -> tuple[float, bool]:
+    """Marginals of a cluster over its heaviest joint choices; their log total weight, and whether there was room."""
+    work.single[1] = len(rows)
+    parents, children, used = Parents(work.single, rows, work.no_weight, work.no_groups), work.children, work.used
+    used[0] = used[1] = 0
+    if not size_search(options, parents, num_columns, work.search):
+        return 0.0, False
+    start_search(options, parents, work.search)
+    if not run_search(
+        options, parents, caps.max_choices, caps.max_log_gap, caps.max_nodes, work.search, children, used
+    ):
+        return 0.0, False
     for row in rows:
         for option in range(options.offsets[row], options.offsets[row + 1]):
             out[option] = 0.0
-    if len(children.log_weights) == 0:
-        return -math.inf
+    if used[0] == 0:
+        return -math.inf, True
     peak, total = children.log_weights[0], 0.0
-    for child in range(len(children.log_weights)):
+    for child in range(used[0]):
         weight = math.exp(children.log_weights[child] - peak)
         total += weight
         for i in range(children.offsets[child], children.offsets[child + 1]):
@@ -143,7 +130,44 @@ def _ranked_cluster(
     for row in rows:
         for option in range(options.offsets[row], options.offsets[row + 1]):
             out[option] = math.log(out[option] / total) if out[option] > 0.0 else -math.inf
-    return peak + math.log(total)
+    return peak + math.log(total), True
+
+
+@inlined
+def fill_marginals(
+    options: Options, num_columns: int, caps: MarginalCaps, work: MarginalWork, out: Floats
+) -> tuple[float, int, bool]:
+    """As `option_marginals`; the flag is false where `work` must be grown and all done anew.
+
+    Inlined because `work` is a large bundle, of which the usual small clusters need little.
+    """
+    log_total, num_ranked = 0.0, 0
+    if not find_clusters(options, work.leaders, work.owners):
+        for row in range(len(options.offsets) - 1):
+            log_total += _single_row(options, row, out)
+        return log_total, num_ranked, True
+    for column in range(num_columns):
+        work.bits[column] = -1
+    for leader in range(len(options.offsets) - 1):
+        if work.leaders[leader] != leader:
+            continue
+        count, num_bits = gather_cluster(options, leader, work)
+        if count == 1:
+            log_total += _single_row(options, leader, out)
+            continue
+        total, rows = -math.inf, work.members[:count]
+        if num_bits <= MAX_EXACT_MEASUREMENTS:
+            work.needed[0] = 2 * (count + 1) << num_bits
+            if work.needed[0] > len(work.tables):
+                return 0.0, 0, False
+            total = _exact_cluster(options, rows, work.bits, num_bits, work.tables, out)
+        if total == -math.inf:
+            num_ranked += 1
+            total, has_room = _ranked_cluster(options, rows, num_columns, caps, work, out)
+            if not has_room:
+                return 0.0, 0, False
+        log_total += total
+    return log_total, num_ranked, True
 
 
 @kernel
@@ -154,36 +178,10 @@ def option_marginals(
     number of clusters that were summed over their `max_choices` heaviest choices only. The total is -inf if none is
     possible.
     """
-    num_rows = len(options.offsets) - 1
-    cluster, num_clusters = _clusters(options, num_columns)
-    sizes = filled_ints(num_clusters, 0)
-    for row in range(num_rows):
-        sizes[cluster[row]] += 1
-    log_total, num_ranked = 0.0, 0
-    bit_of = filled_ints(num_columns, -1)
-    members = np.empty(num_rows, np.int64)
-    for row in range(num_rows):
-        if sizes[cluster[row]] == 1:
-            log_total += _single_row(options, row, out)
-    for c in range(num_clusters):
-        if sizes[c] == 1:
-            continue
-        count, num_bits = 0, 0
-        for row in range(num_rows):
-            if cluster[row] != c:
-                continue
-            members[count] = row
-            count += 1
-            for option in range(options.offsets[row], options.offsets[row + 1]):
-                column = options.columns[option]
-                if column >= 0 and bit_of[column] < 0:
-                    bit_of[column] = num_bits
-                    num_bits += 1
-        total = -math.inf
-        if num_bits <= MAX_EXACT_MEASUREMENTS:
-            total = _exact_cluster(options, members[:count], bit_of, num_bits, out)
-        if total == -math.inf:
-            total = _ranked_cluster(options, members[:count], num_columns, max_choices, max_log_gap, max_nodes, out)
-            num_ranked += 1
-        log_total += total
+    work = make_marginal_work(len(options.offsets) - 1, num_columns)
+    caps = MarginalCaps(max_choices, max_log_gap, max_nodes)
+    log_total, num_ranked, done = fill_marginals(options, num_columns, caps, work, out)
+    while not done:
+        work = grown_marginal_work(work)
+        log_total, num_ranked, done = fill_marginals(options, num_columns, caps, work, out)
     return log_total, num_ranked
