@@ -45,17 +45,25 @@ def _compile_filter(experiment: Experiment) -> None:
 
 
 def _compile_planning(scenario: Scenario) -> None:
-    """Fuse, estimate and plan as if every birth site held a target."""
+    """Fuse, estimate and plan as if every birth site held a target, one of which a single sensor knows."""
     experiment = build_experiment(scenario)
-    birth, num_sensors = experiment.sensors[0].filter.birth, len(experiment.sensors)
-    labels = [(1, site) for site in range(birth.num_sites)]
-    belief: GLMB | LMB = LMB.from_bernoullis(labels, birth.existence, birth.means, birth.covs)
-    if not isinstance(experiment.sensors[0].filter, LmbFilter):
-        belief = GLMB.from_hypotheses(belief.tracks, [list(range(birth.num_sites))], [1.0])
+    num_sites, num_sensors = experiment.sensors[0].filter.birth.num_sites, len(experiment.sensors)
+    beliefs = [_belief(experiment, num_sites), *[_belief(experiment, max(num_sites - 1, 1))] * (num_sensors - 1)]
     fusion = experiment.fusion
-    fused = belief if fusion is None else fusion.fuse([belief] * num_sensors)[0]
+    fused = beliefs[0] if fusion is None else fusion.fuse(beliefs)[0]
     experiment.estimate(fused, 1)
     planner = strategy(scenario, "jdm")
     assert isinstance(planner, JointPlanner)
     quick = replace(planner, settings=replace(planner.settings, num_samples=2, horizon_steps=1, num_threads=1))
-    quick.plan([belief] * num_sensors, fused, experiment.poses, rng=run_stream(0, 0))
+    quick.plan(beliefs, fused, experiment.poses, rng=run_stream(0, 0))
+
+
+def _belief(experiment: Experiment, num_targets: int) -> GLMB | LMB:
+    """One target at each of the first birth sites, in the kind of density that the filter keeps."""
+    local = experiment.sensors[0].filter
+    birth, labels = local.birth, [(1, site) for site in range(num_targets)]
+    sites = slice(num_targets)
+    belief = LMB.from_bernoullis(labels, birth.existence[sites], birth.means[sites], birth.covs[sites])
+    if isinstance(local, LmbFilter):
+        return belief
+    return GLMB.from_hypotheses(belief.tracks, [list(range(num_targets))], [1.0])
