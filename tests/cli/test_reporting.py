@@ -48,8 +48,8 @@ def test_the_page_lies_in_the_folder_unless_said_otherwise_and_shows_the_chosen_
         ("fixed", 2, "expected CELL:RUN, such as jdm:0; got 'fixed'"),
         ("fixed:x", 2, "got 'fixed:x'"),
         ("fixed:0,", 2, "got ''"),
-        ("fixed:7", 1, "expected a finished run of cell fixed; got 7"),
-        ("gone:0", 1, "expected one of fixed, still; got 'gone'"),
+        ("fixed:7", 1, "--runs: expected a finished run of cell fixed (0 to 1); got 7"),
+        ("gone:0", 1, "--runs: expected one of fixed, still; got 'gone'"),
     ],
 )
 def test_runs_that_cannot_be_meant_are_named(
@@ -65,3 +65,44 @@ def test_a_folder_without_results_is_an_error(tmp_path: Path) -> None:
     result = report(tmp_path)
     assert result.exit_code == 1
     assert "expected" in result.output
+
+
+def test_places_that_cannot_be_written_are_named_by_their_option_alone(folder: Path, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    below = tmp_path / "file" / "below"
+    result = report(folder, "--out", below)
+    assert (result.exit_code, result.output.splitlines()) == (
+        1,
+        [f"--out: expected a place to write a report; got {below}: {reason(below)}"],
+    )
+    result = report(folder, "--out", tmp_path)
+    assert result.output.strip() == f"--out: expected a place to write a report; got {tmp_path}: a folder"
+    result = report(folder, "--out", tmp_path / "page.html", "--figures", below)
+    assert result.exit_code == 1
+    assert f"--figures: expected a folder to write figures into; got {below}: " in result.output
+    assert ".part" not in result.output
+
+
+def reason(path: Path) -> str:
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        return str(error.strerror)
+    raise AssertionError(f"{path.parent} is no folder and could be made")
+
+
+def test_the_folders_above_the_page_are_made(folder: Path, tmp_path: Path) -> None:
+    page = tmp_path / "a" / "b" / "page.html"
+    assert report(folder, "--out", page).exit_code == 0
+    assert page.is_file()
+
+
+def test_an_interrupted_report_says_so_in_a_line(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("vedette.reports.write_report", interrupted)
+    result = report(folder, "--out", tmp_path / "page.html")
+    assert result.exit_code == 130
+    assert result.output.strip().startswith("interrupted: ")
+    assert len(result.output.strip().splitlines()) == 1

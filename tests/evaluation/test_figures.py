@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,7 +17,17 @@ from vedette.control.plan import Plan
 from vedette.densities.estimates import Estimate
 from vedette.errors import InputError
 from vedette.evaluation import Comparison, compare
-from vedette.evaluation.figures import ospa_figure, overview_figure, reward_figure, save_figure, tracks_figure
+from vedette.evaluation.figures import (
+    cost_figure,
+    distributions_figure,
+    ospa_figure,
+    overview_figure,
+    reward_figure,
+    roses_figure,
+    save_figure,
+    svg_text,
+    tracks_figure,
+)
 
 
 def labels(figure: Figure) -> list[tuple[str, str]]:
@@ -186,6 +197,42 @@ def test_global_settings_are_left_alone() -> None:
     before = dict(matplotlib.rcParams)
     reward_figure(plan("idm"))
     assert dict(matplotlib.rcParams) == before
+
+
+@pytest.mark.parametrize("kind", [ospa_figure, distributions_figure, roses_figure])
+def test_any_name_can_be_drawn_without_a_warning(
+    kind: Callable[[Comparison], Figure], comparison: Comparison, tmp_path: Path
+) -> None:
+    names = ("\u00fc \u6f22\u5b57 \U0001f642", "_$x_1$ $\\frac$ " + "long " * 40, "w" * 200)
+    figure = kind(replace(comparison, strategies=names))
+    save_figure(figure, tmp_path / "figure")
+    text = svg_text(figure)
+    assert "$x_1$" in text
+    assert "w" * 30 not in text
+
+
+def test_curves_that_are_one_share_a_line_with_dashes_of_each_colour(comparison: Comparison) -> None:
+    ospa = comparison.ospa.copy()
+    ospa[1, :, :20] = ospa[0, :, :20]
+    (axes,) = ospa_figure(replace(comparison, ospa=ospa)).axes
+    jdm, idm, random = (np.asarray(line.get_ydata()) for line in axes.lines[:3])
+    np.testing.assert_array_equal(np.isnan(jdm), np.arange(len(jdm)) < 19)
+    np.testing.assert_array_equal(np.isnan(idm), np.isnan(jdm))
+    assert np.isfinite(random).all()
+    shared = axes.lines[3:5]
+    assert {line.get_color() for line in shared} == {line.get_color() for line in axes.lines[:2]}
+    for line in shared:
+        np.testing.assert_array_equal(np.isfinite(np.asarray(line.get_ydata())), np.arange(len(jdm)) < 20)
+
+
+def test_few_values_have_no_tails() -> None:
+    def reach(number: int) -> float:
+        (axes,) = cost_figure({"jdm": {"planning": np.arange(1.0, number + 1.0)}}).axes
+        (line,) = axes.collections[0].get_paths()
+        return float(np.ptp(np.asarray(line.vertices)[:, 0]))
+
+    assert reach(19) == 0.0
+    assert reach(20) > 0.0
 
 
 def test_no_display_and_no_pyplot_is_needed() -> None:

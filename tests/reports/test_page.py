@@ -11,7 +11,8 @@ import pytest
 from reports.examples import campaign_of, results_of
 from vedette.campaigns.results import CampaignResults
 from vedette.errors import InputError
-from vedette.reports import write_report, writing
+from vedette.reports import write_figures, write_report, writing
+from vedette.reports.origin import versions_table
 from vedette.reports.spec_text import spec_toml
 from vedette.scenarios import load_scenario
 from vedette.scenarios.dumping import dump_scenario
@@ -128,13 +129,11 @@ def test_a_number_that_is_compared_is_named_and_swept(tmp_path: Path) -> None:
     assert "Run clutter rate 40, run 0 " in words
 
 
-@pytest.mark.parametrize("compare", [None, "scenario"])
-def test_scenarios_are_groups_and_not_compared_with_one_another(tmp_path: Path, compare: str | None) -> None:
-    campaign = campaign_of(planners=["still"], scenarios=["paper-a", "paper-e"], compare=compare, runs=1)
+def test_scenarios_are_groups_and_not_compared_with_one_another(tmp_path: Path) -> None:
+    campaign = campaign_of(planners=["still"], scenarios=["paper-a", "paper-e"], runs=1)
     words = Words(page_of(results_of(tmp_path / "results", campaign), tmp_path)).words
-    assert ("Nothing can be compared: runs of different scenarios are not paired." in words) == (compare is not None)
-    assert words.count("OSPA against time") == (0 if compare else 2)
-    assert ("There is nothing to compare: one strategy each." in words) == (compare is None)
+    assert words.count("OSPA against time") == 2
+    assert "There is nothing to compare: one strategy each." in words
 
 
 def test_measures_of_labels_are_left_out_for_filters_that_have_none(tmp_path: Path) -> None:
@@ -184,3 +183,26 @@ def test_the_specification_reads_back() -> None:
     }  # fmt: skip
     kept = {key: value for key, value in spec.items() if key not in ("seed", "set")}
     assert tomllib.loads(spec_toml(spec)) == kept
+
+
+def test_long_names_stay_whole_in_the_table_of_errors_and_short_elsewhere(tmp_path: Path) -> None:
+    long = "x" * 60
+    campaign = campaign_of(planners=["fixed"], variants=[{"name": long}, {"name": "y"}])
+    results = results_of(tmp_path / "results", campaign)
+    page = page_of(results, tmp_path)
+    short = f"{'x' * 16}\N{HORIZONTAL ELLIPSIS}{'x' * 15}"
+    assert f'<th scope="row">{long}</th>' in page
+    assert f'<th scope="col" title="{long}">{short}</th>' in page
+    assert f"<title>{long}</title>" in page
+    written = write_figures(results, tmp_path / "figures")
+    assert max(len(path.name) for path in written) <= 80
+    assert len({path.name for path in written}) == len(written)
+
+
+def test_sessions_that_are_alike_share_a_column() -> None:
+    def session(started: str, numpy: str) -> dict[str, Any]:
+        return {"started": started, "versions": {"numpy": numpy}, "machine": {"processors": 2}}
+
+    table = versions_table({"sessions": [session("a", "1"), session("b", "1"), session("c", "2")]})
+    assert table.header == ("", "Sessions 1 to 2", "Session 3")
+    assert table.rows == (("started", "a to b", "c"), ("numpy", "1", "2"), ("processors", "2", "2"))

@@ -51,3 +51,9 @@ def _with_names(svg: str) -> str:
     """Inside HTML the names of SVG and XLink are known; an XML reader has to be told."""
     spaces = 'xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink"'
     return svg.replace("<svg", f"<svg {spaces}", 1)
+
+
+def test_elided_names_have_the_full_one_as_title() -> None:
+    svg = str(inline_svg(drawing(), "one", "", {TEXT: "<full> name"}))
+    assert "<title>&lt;full&gt; name</title>" in svg
+    ET.fromstring(_with_names(svg))

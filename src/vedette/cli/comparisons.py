@@ -4,29 +4,66 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from vedette.text import display_width, elided_apart
+
 if TYPE_CHECKING:
+    from rich.console import Console
+
     from vedette.evaluation import Comparison
 
 # Of `vedette.evaluation.tables.HEADER`, for a terminal of 80 columns; the caption under the table says the rest.
 _SHORT_HEADER = ("", "OSPA (m)", "loc.", "card.", "difference", "95 %", "won")
+_LONGEST_LABEL, _SHORTEST_LABEL = 24, 8
 
 
 def print_comparison(comparison: Comparison) -> None:
-    """The table of the strategies, what its numbers are, and what each strategy decided."""
+    """The table of the strategies, what its numbers are, and what each strategy decided.
+
+    Labels that are too long are elided, numbers never: where they do not fit side by side they stand in lines.
+    """
     from rich.console import Console
-    from rich.table import Table
 
     from vedette.evaluation import decision_rows, strategy_rows
     from vedette.evaluation.tables import caption
 
-    console = Console(highlight=False)
-    table = Table(box=None, pad_edge=False)
+    console = Console(highlight=False, markup=False, emoji=False)
+    numbers = [row[1:] for row in strategy_rows(comparison)]
+    labels = elided_apart(comparison.strategies, _LONGEST_LABEL)
+    longest = max(map(display_width, labels))
+    gap = 2 if _width(numbers, 2) + longest <= console.width else 1
+    room = console.width - _width(numbers, gap)
+    if room < min(_SHORTEST_LABEL, longest):
+        _print_lines(console, labels, numbers)
+    else:
+        _print_table(console, elided_apart(comparison.strategies, min(room, _LONGEST_LABEL)), numbers, gap)
+    console.print(caption(comparison), style="dim")
+    for label, strategy in zip(labels, comparison.strategies, strict=True):
+        for when, shares in decision_rows(comparison, strategy):
+            console.print(f"{label} at {when}: {shares}")
+
+
+def _width(numbers: list[tuple[str, ...]], gap: int) -> int:
+    """Columns of the terminal that the numbers take, each with the gap before it."""
+    columns = zip(_SHORT_HEADER[1:], *numbers, strict=True)
+    return sum(gap + max(map(len, column)) for column in columns)
+
+
+def _print_table(console: Console, labels: tuple[str, ...], numbers: list[tuple[str, ...]], gap: int) -> None:
+    from rich.table import Table
+
+    table = Table(box=None, pad_edge=False, padding=(0, gap, 0, 0))
     for i, heading in enumerate(_SHORT_HEADER):
         table.add_column(heading, justify="right" if i else "left", no_wrap=True)
-    for row in strategy_rows(comparison):
-        table.add_row(*row)
+    for label, row in zip(labels, numbers, strict=True):
+        table.add_row(label, *row)
     console.print(table)
-    console.print(caption(comparison), style="dim")
-    for strategy in comparison.strategies:
-        for when, shares in decision_rows(comparison, strategy):
-            console.print(f"{strategy} at {when}: {shares}")
+
+
+def _print_lines(console: Console, labels: tuple[str, ...], numbers: list[tuple[str, ...]]) -> None:
+    """One strategy after the other, with a line for each number that it has."""
+    widest = max(map(len, _SHORT_HEADER))
+    for label, row in zip(labels, numbers, strict=True):
+        console.print(label)
+        for heading, number in zip(_SHORT_HEADER[1:], row, strict=True):
+            if number:
+                console.print(f"  {heading:<{widest}}  {number}")

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from vedette.cli.errors import usage_error
+from vedette.cli.running import interruptible
+from vedette.errors import InputError
 
 
 def report(
@@ -25,16 +29,31 @@ def report(
 ) -> None:
     """Report on a campaign: one page that opens anywhere, with tables, figures and a replay of runs."""
     replays = None if runs is None else [_cell_and_run(text) for text in runs.split(",")]
-    from vedette.campaigns.results import open_results
-    from vedette.reports import write_figures, write_report
-
-    results = open_results(folder)
     page = out or folder / "report.html"
-    write_report(results, page, replays=replays)
-    typer.echo(f"wrote {page}")
-    if figures is not None:
-        written = write_figures(results, figures)
-        typer.echo(f"wrote {len(written)} files to {figures}")
+    with interruptible("what is not yet written is missing; the same command writes it all anew"):
+        from vedette.campaigns.results import open_results
+        from vedette.reports import write_figures, write_report
+
+        results = open_results(folder)
+        with _named({"path": "--out", "replays": "--runs", "cell": "--runs"}):
+            write_report(results, page, replays=replays)
+        typer.echo(f"wrote {page}")
+        if figures is not None:
+            with _named({"path": "--figures"}):
+                written = write_figures(results, figures)
+            typer.echo(f"wrote {len(written)} files to {figures}")
+
+
+@contextmanager
+def _named(options: Mapping[str, str]) -> Iterator[None]:
+    """Errors of arguments of the library's functions, by the options that give them."""
+    try:
+        yield
+    except InputError as error:
+        field, _, rest = str(error).partition(": ")
+        if field not in options:
+            raise
+        raise InputError(f"{options[field]}: {rest}") from error
 
 
 def _cell_and_run(text: str) -> tuple[str, int]:

@@ -8,7 +8,7 @@ import io
 import numpy as np
 
 from vedette.evaluation.comparison import Comparison
-from vedette.evaluation.statistics import Summary
+from vedette.evaluation.statistics import PairedDifference, Summary
 
 HEADER = ("Strategy", "OSPA (m)", "Localisation (m)", "Cardinality (m)", "Difference (m)", "95 % interval", "Runs won")
 
@@ -17,7 +17,7 @@ def strategy_rows(comparison: Comparison) -> list[tuple[str, ...]]:
     """One row a strategy, under `HEADER`: mean OSPA with standard error, its parts, and the paired difference.
 
     The difference is strategy minus the first strategy, so positive where the first is better; "Runs won" is the share
-    of runs that the first strategy wins. The first row has no difference.
+    of runs that the first strategy wins, and the share of ties if there are any. The first row has no difference.
     """
     return [_row(comparison, strategy) for strategy in comparison.strategies]
 
@@ -66,11 +66,14 @@ def strategy_csv(comparison: Comparison) -> str:
 
 def caption(comparison: Comparison) -> str:
     """What the numbers of the table are."""
-    counted = comparison.times[comparison.counted]
+    counted, first = comparison.times[comparison.counted], comparison.strategies[0]
+    over = f"mean over t = {counted[0]:g} to {counted[-1]:g} s"
+    if comparison.num_runs == 1:
+        said = f"Scenario {comparison.scenario}, 1 paired run, {over}."
+        return f"{said} Difference: strategy minus {first}." if len(comparison.strategies) > 1 else said
     return (
-        f"Scenario {comparison.scenario}, {comparison.num_runs} paired runs, mean over t = {counted[0]:g} to "
-        f"{counted[-1]:g} s, ± one standard error. Difference: strategy minus {comparison.strategies[0]}, run by run; "
-        f"runs won: by {comparison.strategies[0]}."
+        f"Scenario {comparison.scenario}, {comparison.num_runs} paired runs, {over}, ± one standard error. Difference: "
+        f"strategy minus {first}, run by run; runs won: by {first}."
     )
 
 
@@ -88,8 +91,13 @@ def _row(comparison: Comparison, strategy: str) -> tuple[str, ...]:
         *parts,
         _with_error(difference.summary, sign="+"),
         interval if known else "unknown",
-        f"{difference.share_won:.0%}",
+        _won(difference) if known else "unknown",
     )
+
+
+def _won(difference: PairedDifference) -> str:
+    tied = f", {difference.share_tied:.0%} tied" if difference.share_tied > 0.0 else ""
+    return f"{difference.share_won:.0%}{tied}"
 
 
 def _with_error(summary: Summary, sign: str = "") -> str:

@@ -23,10 +23,12 @@ from vedette.evaluation.figures import (
     sweep_figure,
     tracks_figure,
 )
+from vedette.evaluation.figures.cost import MIN_FOR_TAILS
 from vedette.kernels.types import Floats
 from vedette.reports.groups import Group, Strategy, axis_label, axis_unit, describe_settings
 from vedette.reports.tables import nees_over_runs, stage_seconds
 from vedette.simulation.records import RunRecord
+from vedette.text import elided
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,18 +58,23 @@ def group_drawings(group: Group) -> Iterator[Drawing]:
     yield from error_drawings(group)
     yield from _decision_drawings(group)
     yield from _reward_drawings(group)
+    yield from _tracks_drawings(group)
     if any(metrics.num_scans for each in group.strategies for metrics in each.metrics):
         yield _consistency_drawing(group.strategies)
     spent = {each.label: stage_seconds(each) for each in group.strategies}
     if any(spent.values()):
         caption = (
-            "Wall time of each stage, a scan or a decision: median, and the range from the 5th to the 95th percentile."
+            "Wall time of each stage, a scan or a decision: median, and the range from the 5th to the 95th percentile "
+            f"where there are at least {MIN_FOR_TAILS} values."
         )
         yield Drawing("cost", "Cost", caption, cost_figure({name: stages for name, stages in spent.items() if stages}))
+
+
+def _tracks_drawings(group: Group) -> Iterator[Drawing]:
     for strategy, record in typical_records(group):
         typical = ", the typical one: its mean OSPA is the median" if group.comparison is not None else ""
         caption = f"Run {record.run} of {strategy.name}{typical}."
-        figure = tracks_figure(record, titles=(f"{strategy.name}, run {record.run}",))
+        figure = tracks_figure(record, titles=(f"{elided(strategy.name)}, run {record.run}",))
         yield Drawing(f"tracks-{strategy.cell.name}", f"Tracks, {strategy.name}", caption, figure)
 
 
@@ -76,11 +83,14 @@ def error_drawings(group: Group) -> Iterator[Drawing]:
     if group.comparison is None:
         return
     comparison = group.comparison
+    over = f"Mean OSPA over {comparison.num_runs} paired runs" if comparison.num_runs > 1 else "OSPA of one paired run"
     bands = "bands of one standard error" if comparison.num_runs > 1 else "one run, so no bands"
+    together = " Strategies that are equal for a while share a line with dashes of their colours."
     yield Drawing(
         "ospa",
         "OSPA against time",
-        f"Mean OSPA over {comparison.num_runs} paired runs with its localisation and cardinality parts; {bands}.",
+        f"{over} with its localisation and cardinality parts; {bands}."
+        f"{together if len(comparison.strategies) > 1 else ''}",
         ospa_figure(comparison, parts=("total", "localisation", "cardinality")),
     )
     differences = (
@@ -114,11 +124,15 @@ def _reward_drawings(group: Group) -> Iterator[Drawing]:
         figure = _rewards(strategy.records)
         if figure is not None:
             caption = (
-                f"Rewards that {strategy.name} decided on, averaged over {len(strategy.records)} runs. The area of a "
+                f"Rewards that {strategy.name} decided on, averaged over {_runs(len(strategy.records))}. The area of a "
                 "mark is the share of the runs that chose the action; joint rewards of more than two sensors are the "
                 "largest over the others."
             )
             yield Drawing(f"rewards-{strategy.cell.name}", f"Rewards, {strategy.name}", caption, figure)
+
+
+def _runs(number: int) -> str:
+    return "1 run" if number == 1 else f"{number} runs"
 
 
 def _rewards(records: Sequence[RunRecord]) -> Figure | None:

@@ -107,9 +107,8 @@ def _group(results: CampaignResults, cells: tuple[Cell, ...], name: str, title: 
     if common:
         try:
             comparison, reason = scored(cells[0].scenario, paired), ""
-        except InputError as error:  # such as scenarios compared with one another
-            unpaired = "runs of different scenarios are not paired"
-            reason = unpaired if axis == "scenario" else str(error)
+        except InputError as error:  # such as scans of other times
+            reason = str(error)
     return Group(name, title, tuple(strategies), missing, comparison, reason)
 
 
@@ -161,7 +160,7 @@ def axis_unit(cell: Cell, axis: str) -> str:
 
 def _title(campaign: Campaign, cell: Cell) -> str:
     varying = varying_axes(campaign)
-    shown = (axis for axis in cell.settings if axis in varying or axis == "scenario" != campaign.compare)
+    shown = (axis for axis in cell.settings if axis in varying or axis == "scenario")
     return describe_settings(cell, shown) or campaign.name
 
 

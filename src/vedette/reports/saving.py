@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import hashlib
 from pathlib import Path
 
 from vedette.campaigns.results import CampaignResults
+from vedette.errors import InputError
 from vedette.evaluation.figures import overview_figure, save_figure
 from vedette.kernels.types import Floats
 from vedette.reports.drawings import group_drawings, sweep_drawings, typical_records
 from vedette.reports.groups import Group, gather
+
+_LONGEST_NAME, _START, _END = 75, 45, 20  # bytes
 
 
 def write_figures(results: CampaignResults, folder: Path) -> tuple[Path, ...]:
@@ -19,6 +23,10 @@ def write_figures(results: CampaignResults, folder: Path) -> tuple[Path, ...]:
     Raises:
         InputError: the folder cannot be written.
     """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"path: expected a folder to write figures into; got {folder}: {error.strerror}") from error
     written: list[Path] = []
     errors: dict[str, Floats] = {}
     several = len(results.campaign.groups()) > 1
@@ -26,13 +34,22 @@ def write_figures(results: CampaignResults, folder: Path) -> tuple[Path, ...]:
         errors.update(run_errors(group))
         prefix = f"{group.name}-" if several else ""
         for drawing in group_drawings(group):
-            written += save_figure(drawing.figure, folder / f"{prefix}{drawing.name}")
+            written += save_figure(drawing.figure, folder / _file_name(f"{prefix}{drawing.name}"))
         if group.comparison is not None:  # beside one another what the page has apart
             first = typical_records(group)[0][1]
-            written += save_figure(overview_figure(first, group.comparison), folder / f"{prefix}overview")
+            written += save_figure(overview_figure(first, group.comparison), folder / _file_name(f"{prefix}overview"))
     for drawing in sweep_drawings(results.campaign, errors):
-        written += save_figure(drawing.figure, folder / drawing.name)
+        written += save_figure(drawing.figure, folder / _file_name(drawing.name))
     return tuple(written)
+
+
+def _file_name(name: str) -> str:
+    """The name; what is longer than file systems and people like keeps both ends, and a digest between them."""
+    if len(name.encode()) <= _LONGEST_NAME:
+        return name
+    digest = hashlib.sha256(name.encode()).hexdigest()[:8]
+    start, end = name.encode()[:_START], name.encode()[-_END:]
+    return f"{start.decode(errors='ignore')}-{digest}-{end.decode(errors='ignore')}"
 
 
 def run_errors(group: Group) -> dict[str, Floats]:

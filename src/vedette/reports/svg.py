@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import html
 import re
+from collections.abc import Mapping
 
 from markupsafe import Markup
 from matplotlib.figure import Figure
@@ -28,21 +30,25 @@ _VARIABLES = {
 _COLOUR = re.compile("|".join(_VARIABLES), re.IGNORECASE)
 _NAMES = {colour.lower(): f"var(--{name})" for colour, name in _VARIABLES.items()}
 _TAG = re.compile(r"<[^>]*>")
+_TEXT = re.compile(r"(<text[^>]*>)([^<]*)(?=</text>)")
 _LONG_NUMBER = re.compile(r"(\d+\.\d{2})\d+")
 _POINTS_TO_PIXELS = 1.9
 
 
-def inline_svg(figure: Figure, prefix: str, description: str) -> Markup:
+def inline_svg(figure: Figure, prefix: str, description: str, names: Mapping[str, str] | None = None) -> Markup:
     """An `svg` element that is as wide as its place, at most as wide as reads well.
 
     Args:
         prefix: unique on the page; put before every id in the figure.
         description: for readers who do not see it.
+        names: elided names and the full ones, which show where a reader points at a text that holds the elided one.
     """
     text = svg_text(figure)
     body = text[text.index(">", text.index("<svg")) + 1 :]
     body = re.sub(r"<metadata>.*?</metadata>|<!--.*?-->", "", body, flags=re.DOTALL)
     body = _TAG.sub(lambda tag: _adapted(tag.group(), prefix), body)
+    if names:
+        body = _TEXT.sub(lambda text: _titled(text, names), body)
     width, height = (72.0 * float(length) for length in figure.get_size_inches())
     opening = Markup('<svg viewBox="0 0 {:g} {:g}" role="img" aria-label="{}" style="max-width: {:.0f}px">').format(
         round(width, 2), round(height, 2), description, _POINTS_TO_PIXELS * width
@@ -56,3 +62,11 @@ def _adapted(tag: str, prefix: str) -> str:
     tag = re.sub(r'(href="#|url\(#)', rf"\g<1>{prefix}-", tag)
     tag = _COLOUR.sub(lambda found: _NAMES[found.group().lower()], tag)
     return _LONG_NUMBER.sub(r"\1", tag).replace(" \n", " ")
+
+
+def _titled(text: re.Match[str], names: Mapping[str, str]) -> str:
+    opening, shown = text.groups()
+    full = shown
+    for short, name in names.items():
+        full = full.replace(html.escape(short, quote=False), html.escape(name, quote=False))
+    return text.group() if full == shown else f"{opening}<title>{full}</title>{shown}"

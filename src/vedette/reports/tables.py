@@ -8,12 +8,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from vedette.evaluation import AverageNees, RunMetrics, average_nees, summarise
+from vedette.evaluation.figures.cost import MIN_FOR_TAILS
 from vedette.evaluation.figures.style import strategy_label
 from vedette.evaluation.tables import HEADER, decision_rows, strategy_rows
 from vedette.kernels.types import Bools, Floats
 from vedette.reports.claims import percent
 from vedette.reports.groups import Group, Strategy
 from vedette.simulation.records import RunRecord
+from vedette.text import elided_apart
+
+_LONGEST_NAME = 32  # letters, beyond which the page gives the full name as a title
 
 Measure = Callable[[RunMetrics, Bools], float]
 
@@ -35,6 +39,21 @@ class Table:
     rows: tuple[tuple[str, ...], ...]
     notes: tuple[str, ...] = ()
     is_words: bool = False
+
+    @property
+    def short_header(self) -> tuple[str, ...]:
+        """The header with long names elided."""
+        return elided_apart(self.header, _LONGEST_NAME)
+
+    @property
+    def short_names(self) -> tuple[str, ...]:
+        """What the rows are called, long names elided where the same one names several rows."""
+        names = [row[0] for row in self.rows]
+        distinct = list(dict.fromkeys(names))
+        if len(distinct) == len(names):
+            return tuple(names)
+        short = dict(zip(distinct, elided_apart(distinct, _LONGEST_NAME), strict=True))
+        return tuple(short[name] for name in names)
 
 
 def _mean(name: str) -> Measure:
@@ -86,11 +105,16 @@ def error_table(group: Group) -> Table | None:
     )
     first = strategy_label(group.comparison.strategies[0])
     counted = group.comparison.times[group.comparison.counted]
+    several = group.comparison.num_runs > 1
+    over = f"over t = {counted[0]:g} to {counted[-1]:g} s"
     caption = (
-        f"Mean over {group.comparison.num_runs} paired runs and over t = {counted[0]:g} to {counted[-1]:g} s, ± one "
-        f"standard error. Difference: strategy minus {first}, run by run, so above 0 where {first} is better; "
-        f"runs won: by {first}."
+        f"Mean over {group.comparison.num_runs} paired runs and {over}, ± one standard error."
+        if several
+        else f"1 paired run, mean {over}."
     )
+    if len(rows) > 1:
+        won = f", run by run, so above 0 where {first} is better; runs won: by {first}." if several else "."
+        caption += f" Difference: strategy minus {first}{won}"
     return Table(caption, HEADER, rows)
 
 
@@ -106,8 +130,9 @@ def measure_table(group: Group) -> Table | None:
     for name, note, dim in _consistency_kinds(strategies):
         rows.append((name, *(_consistency(each, group.counted, dim) for each in strategies)))
         notes.append(note)
+    over = "Mean over the runs ± one standard error" if any(len(each.metrics) > 1 for each in strategies) else "One run"
     caption = (
-        f"Mean over the runs ± one standard error, over the same scans as above; cutoff {score.cutoff:g} m, order "
+        f"{over}, over the same scans as above; cutoff {score.cutoff:g} m, order "
         f"{score.order:g}, window of OSPA(2) {score.window} scans. NEES / dimension is 1 for a consistent "
         "filter; in brackets, the share of the scans whose average over the runs lies in its 95 % interval."
     )
@@ -175,20 +200,25 @@ def stage_seconds(strategy: Strategy) -> dict[str, Floats]:
 
 
 def cost_table(group: Group) -> Table | None:
-    """Time of each stage, median and 95th percentile, a column a strategy; None where nothing was timed."""
+    """Time of each stage: median and 95th percentile, a column a strategy; None where nothing was timed."""
     spent = {each.name: stage_seconds(each) for each in group.strategies}
     stages = list(dict.fromkeys(stage for seconds in spent.values() for stage in seconds))
     if not stages:
         return None
     rows = tuple((stage, *(_milliseconds(seconds.get(stage)) for seconds in spent.values())) for stage in stages)
-    return Table("Wall time in milliseconds: median, and the 95th percentile in brackets.", ("Stage", *spent), rows)
+    caption = (
+        "Wall time in milliseconds: median of n values, and where there are at least "
+        f"{MIN_FOR_TAILS} of them the 95th percentile in brackets."
+    )
+    return Table(caption, ("Stage", *spent), rows)
 
 
 def _milliseconds(seconds: Floats | None) -> str:
     if seconds is None:
         return "\N{EN DASH}"
     middle, high = (np.quantile(seconds, (0.5, 0.95)) * 1e3).tolist()
-    return f"{_three_digits(middle)} ({_three_digits(high)})"
+    tail = f" ({_three_digits(high)})" if len(seconds) >= MIN_FOR_TAILS else ""
+    return f"{_three_digits(middle)}{tail}, n = {len(seconds)}"
 
 
 def _three_digits(value: float) -> str:

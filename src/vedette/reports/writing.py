@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import base64
 import hashlib
+import itertools
 import json
 import shlex
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
@@ -17,11 +18,13 @@ from markupsafe import Markup
 
 from vedette.campaigns.results import CampaignResults
 from vedette.errors import InputError
+from vedette.evaluation.figures.labels import elided_names
 from vedette.files import write_whole
 from vedette.kernels.types import Floats
 from vedette.reports.claims import Claim, all_pairs, claims
 from vedette.reports.drawings import Drawing, error_drawings, group_drawings, sweep_drawings, typical_records
 from vedette.reports.groups import Group, axis_label, gather
+from vedette.reports.origin import versions_table
 from vedette.reports.replay import replay_data
 from vedette.reports.saving import run_errors
 from vedette.reports.spec_text import spec_toml
@@ -45,6 +48,11 @@ class _Section:
     figures: tuple[tuple[Drawing, Markup], ...]
 
     @property
+    def blocks(self) -> list[tuple[bool, list[tuple[Drawing, Markup]]]]:
+        """The figures in order, those in a row that are as wide (True) or as narrow as one another together."""
+        return [(wide, list(each)) for wide, each in itertools.groupby(self.figures, lambda pair: pair[0].is_wide)]
+
+    @property
     def size(self) -> int:
         """Bytes of its figures."""
         return sum(len(svg) for _, svg in self.figures)
@@ -61,6 +69,7 @@ def write_report(results: CampaignResults, path: Path, *, replays: Sequence[tupl
         InputError: a run that is not there, or a file that cannot be written.
     """
     _check_replays(results, replays or ())
+    _make_room(path)
     sections: list[_Section] = []
     runs: list[str] = []
     errors: dict[str, Floats] = {}
@@ -79,7 +88,32 @@ def _check_replays(results: CampaignResults, replays: Sequence[tuple[str, int]])
     for name, run in replays:
         finished = results.finished(results.campaign.cell(name).name)
         if run not in finished:
-            raise InputError(f"replays: expected a finished run of cell {name}; got {run}")
+            raise InputError(f"replays: expected a finished run of cell {name} ({_spans(finished)}); got {run}")
+
+
+def _spans(runs: Sequence[int]) -> str:
+    """Numbers that follow one another as a span: `0 to 4, 7`."""
+    spans: list[list[int]] = []
+    for run in runs:
+        if spans and spans[-1][-1] == run - 1:
+            spans[-1][1:] = [run]
+        else:
+            spans.append([run])
+    return ", ".join(" to ".join(map(str, span)) for span in spans) or "there is none yet"
+
+
+def _make_room(path: Path) -> None:
+    """Make the folders above the page, before the work that a bad place would waste."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise _misplaced(path, error) from error
+    if path.is_dir():
+        raise InputError(f"path: expected a place to write a report; got {path}: a folder")
+
+
+def _misplaced(path: Path, error: OSError) -> InputError:
+    return InputError(f"path: expected a place to write a report; got {path}: {error.strerror}")
 
 
 def _section(group: Group, prefix: str, is_brief: bool) -> _Section:
@@ -96,13 +130,19 @@ def _section(group: Group, prefix: str, is_brief: bool) -> _Section:
         claims=() if comparison is None else claims(comparison),
         pairs=() if comparison is None or len(comparison.strategies) < 3 else all_pairs(comparison),
         tables=tuple((title, table) for title, table in named.items() if table is not None),
-        figures=_drawn(tuple(error_drawings(group) if is_brief else group_drawings(group)), prefix),
+        figures=_drawn(
+            tuple(error_drawings(group) if is_brief else group_drawings(group)),
+            prefix,
+            elided_names([each.label for each in group.strategies]),
+        ),
     )
 
 
-def _drawn(drawings: Sequence[Drawing], prefix: str) -> tuple[tuple[Drawing, Markup], ...]:
+def _drawn(
+    drawings: Sequence[Drawing], prefix: str, names: Mapping[str, str] | None = None
+) -> tuple[tuple[Drawing, Markup], ...]:
     return tuple(
-        (each, inline_svg(each.figure, f"{prefix}-{number}", f"{each.title}. {each.caption}"))
+        (each, inline_svg(each.figure, f"{prefix}-{number}", f"{each.title}. {each.caption}", names))
         for number, each in enumerate(drawings)
     )
 
@@ -167,16 +207,11 @@ def _render(
         replay_json=Markup("[" + ",".join(runs) + "]"),  # safe inside an element: see `_json`
         left_out=left_out,
         spec=spec_toml(campaign.spec),
-        manifest=json.dumps(_plain(results.manifest), indent=2, sort_keys=True, default=str, ensure_ascii=False),
+        versions=versions_table(results.manifest),
         style=Markup((_FILES / "report.css").read_text("utf-8")),
         script=Markup(script),
         script_hash=base64.b64encode(hashlib.sha256(script.encode()).digest()).decode(),
     )
-
-
-def _plain(manifest: Any) -> Any:
-    """What the page does not show elsewhere of the manifest."""
-    return {key: value for key, value in manifest.items() if key in ("digest", "created", "sessions")}
 
 
 def _script() -> str:
@@ -186,7 +221,6 @@ def _script() -> str:
 
 def _write(path: Path, page: str) -> None:
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
         write_whole(path, lambda file: file.write(page.encode()))
     except OSError as error:
-        raise InputError(f"path: expected a place to write a report; got {path}: {error}") from error
+        raise _misplaced(path, error) from error

@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
 from vedette.errors import InputError
+from vedette.evaluation.figures.labels import short_labels
 from vedette.evaluation.figures.style import (
     GREY,
     INK,
@@ -16,7 +17,6 @@ from vedette.evaluation.figures.style import (
     legend_columns,
     line_style,
     new_figure,
-    strategy_label,
     styled,
 )
 from vedette.evaluation.metrics import AverageNees
@@ -40,13 +40,13 @@ def consistency_figure(times: Floats, position: Mapping[str, AverageNees]) -> Fi
         raise InputError("position: expected the NEES of at least one strategy; got none")
     figure = new_figure(2.2)
     axes = figure.subplots()
-    for index, (strategy, average) in enumerate(position.items()):
+    for index, (label, average) in enumerate(zip(short_labels(list(position)), position.values(), strict=True)):
         axes.plot(
             times,
             average.mean / average.dim,
             color=colour(index),
             linestyle=line_style(index),
-            label=strategy_label(strategy),
+            label=label,
         )
     _draw_interval(axes, times, next(iter(position.values())))
     axes.set_yscale("log")

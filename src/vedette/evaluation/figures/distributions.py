@@ -7,12 +7,14 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from vedette.evaluation.comparison import Comparison
-from vedette.evaluation.figures.style import GREY, INK, colour, new_figure, strategy_label, styled
+from vedette.evaluation.figures.labels import short_labels
+from vedette.evaluation.figures.style import GREY, INK, colour, new_figure, styled
 from vedette.evaluation.statistics import Summary, paired_difference
 from vedette.kernels.types import Floats
+from vedette.text import display_width
 
 _ROW = 0.36  # inches
-_SHORT = 8  # letters
+_SHORT, _ONE_LINE = 8, 20  # letters
 _GOLDEN = 0.6180339887498949
 
 
@@ -32,7 +34,7 @@ def distributions_figure(comparison: Comparison) -> Figure:
         means = comparison.run_means(strategy)
         _draw_runs(panels[0], means, len(strategies) - 1 - index, colour(index))
         _draw_box(panels[0], means, len(strategies) - 1 - index)
-    _name_rows(panels[0], [strategy_label(name) for name in strategies])
+    _name_rows(panels[0], list(short_labels(strategies)))
     panels[0].set_xlabel("Mean OSPA of a run (m)")
     if others:
         _draw_differences(panels[1], comparison)
@@ -40,18 +42,25 @@ def distributions_figure(comparison: Comparison) -> Figure:
 
 
 def _draw_differences(axes: Axes, comparison: Comparison) -> None:
-    reference, others = comparison.strategies[0], comparison.strategies[1:]
-    first = comparison.run_means(reference)
+    others = comparison.strategies[1:]
+    first = comparison.run_means(comparison.strategies[0])
     axes.axvline(0.0, color=INK, linewidth=0.8)
     for index, strategy in enumerate(others):
         row, means = len(others) - 1 - index, comparison.run_means(strategy)
         _draw_runs(axes, means - first, row, colour(index + 1))
         _draw_mean(axes, paired_difference(means, first).summary, row)
-    name = strategy_label(reference)
-    _name_rows(axes, [f"{strategy_label(strategy)} \N{MINUS SIGN} {name}" for strategy in others])
+    name, *names = short_labels(comparison.strategies)
+    _name_rows(axes, [_minus(other, name) for other in names])
     # The whole sentence where it fits; the names of the rows say the same.
-    better = f", right of 0: {name} better" if len(name) <= _SHORT else ""
+    are_short = max(map(display_width, (name, *names))) <= _SHORT
+    better = f", right of 0: {name} better" if are_short else ""
     axes.set_xlabel(f"Paired difference (m){better}")
+
+
+def _minus(name: str, reference: str) -> str:
+    """A difference in words, on two lines where one would leave little room to draw."""
+    between = "\n" if display_width(name + reference) > _ONE_LINE else " "
+    return f"{name}{between}\N{MINUS SIGN} {reference}"
 
 
 def _draw_runs(axes: Axes, values: Floats, row: int, shade: str) -> None:

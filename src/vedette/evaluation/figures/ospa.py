@@ -4,22 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from vedette.errors import InputError
 from vedette.evaluation.comparison import PARTS, Comparison
+from vedette.evaluation.figures.labels import short_labels
+from vedette.evaluation.figures.overlap import own_points, shared_stretches
 from vedette.evaluation.figures.style import (
     GREY,
     colour,
     legend_columns,
     line_style,
     new_figure,
-    strategy_label,
     styled,
 )
+from vedette.evaluation.statistics import Summary
+from vedette.kernels.types import Bools, Floats
 
 _LABELS = {"total": "OSPA (m)", "localisation": "Localisation (m)", "cardinality": "Cardinality (m)"}
+_DASH = 4.5  # line widths, of curves that lie on one another
 
 
 @styled
@@ -47,19 +52,35 @@ def ospa_figure(comparison: Comparison, *, parts: Sequence[str] = ("total",)) ->
 
 
 def draw_ospa(axes: Axes, comparison: Comparison, part: str) -> None:
-    """Draw one part of the OSPA of every strategy into axes."""
-    for index, strategy in enumerate(comparison.strategies):
-        curve = comparison.curve(strategy, part)
+    """Draw one part of the OSPA of every strategy into axes; curves that are one have dashes of all their colours."""
+    times = comparison.times
+    curves = [comparison.curve(strategy, part) for strategy in comparison.strategies]
+    means = np.array([curve.mean for curve in curves])
+    own = own_points(means)
+    for index, (label, curve) in enumerate(zip(short_labels(comparison.strategies), curves, strict=True)):
         shade = colour(index)
-        axes.plot(
-            comparison.times, curve.mean, color=shade, linestyle=line_style(index), label=strategy_label(strategy)
-        )
+        mean = np.where(own[index], curve.mean, np.nan)
+        axes.plot(times, mean, color=shade, linestyle=line_style(index), label=label)
         if comparison.num_runs > 1:
-            low, high = curve.mean - curve.standard_error, curve.mean + curve.standard_error
-            axes.fill_between(comparison.times, low, high, color=shade, alpha=0.2, linewidth=0)
+            _draw_band(axes, times, curve, own[index], shade)
+    for shared in shared_stretches(means):
+        mean = np.where(shared.shown, means[shared.members[0]], np.nan)
+        for place, index in enumerate(shared.members):
+            dashes = (-_DASH * place, (_DASH, _DASH * (len(shared.members) - 1)))
+            axes.plot(times, mean, color=colour(index), linestyle=dashes, dash_capstyle="butt", label="_")
+        if comparison.num_runs > 1:
+            _draw_band(axes, times, curves[shared.members[0]], shared.shown, GREY)
     for number, time in enumerate(comparison.decision_times):
         label = "_" if number else "decision"  # named once in the legend
         axes.axvline(time, color=GREY, linestyle=(0, (2, 2)), linewidth=0.9, zorder=1, label=label)
     axes.set_ylim(bottom=0.0)
     axes.set_xlim(comparison.times[0], comparison.times[-1])
     axes.set_ylabel(_LABELS[part])
+
+
+def _draw_band(axes: Axes, times: Floats, curve: Summary, shown: Bools, shade: str) -> None:
+    """One standard error to either side: faint, with a thin outline that tells one band from another."""
+    low, high = curve.mean - curve.standard_error, curve.mean + curve.standard_error
+    axes.fill_between(
+        times, low, high, where=shown.tolist(), facecolor=(shade, 0.12), edgecolor=(shade, 0.45), linewidth=0.35
+    )

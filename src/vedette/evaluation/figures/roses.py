@@ -9,13 +9,13 @@ from matplotlib.figure import Figure
 
 from vedette.errors import InputError
 from vedette.evaluation.comparison import Comparison
+from vedette.evaluation.figures.labels import short_labels
 from vedette.evaluation.figures.style import (
     GREY,
     TEXT_WIDTH,
     colour,
     new_figure,
     shown_decisions,
-    strategy_label,
     styled,
 )
 from vedette.kernels.types import Floats, Ints
@@ -38,7 +38,7 @@ def roses_figure(comparison: Comparison) -> Figure:
     if not rows:
         raise InputError("comparison: expected decisions; got none")
     columns = shown_decisions(len(comparison.decision_times))
-    num_sensors = _num_sensors(comparison)
+    num_sensors, names = _num_sensors(comparison), short_labels(comparison.strategies, 20)
     size = min(TEXT_WIDTH / (len(columns) + 0.35), _SIZE)
     figure = new_figure(size * len(rows) + 0.5, width=size * (len(columns) + 0.35))
     panels = figure.subplots(len(rows), len(columns), subplot_kw={"projection": "polar"}, squeeze=False)
@@ -48,7 +48,7 @@ def roses_figure(comparison: Comparison) -> Figure:
             _draw_rose(panel, _chosen(comparison, index, decision), num_sensors)
             if row == 0:
                 panel.set_title(f"{comparison.decision_times[decision]:g} s", pad=9)
-        panels[row, 0].set_ylabel(strategy_label(comparison.strategies[index]), labelpad=22, fontsize=8)
+        panels[row, 0].set_ylabel(names[index], labelpad=22, fontsize=8)
     handles, labels = panels[0, 0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=min(num_sensors, 6))
     return figure

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import io
 import os
-from collections.abc import Callable, Sequence
-from functools import wraps
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from functools import lru_cache, wraps
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
 import matplotlib
+from matplotlib import font_manager
 from matplotlib.figure import Figure
 
 from vedette.errors import InputError
@@ -36,6 +39,14 @@ LINE_STYLES: tuple[Any, ...] = (
 )
 HEAT_MAP = "cividis"
 
+# TrueType fonts for letters that DejaVu Sans lacks, on machines that have one of them.
+_OTHER_FONTS = (
+    "Noto Sans SC", "Noto Sans JP", "Noto Sans KR", "Droid Sans Fallback", "IPAGothic", "SimHei", "Malgun Gothic",
+    "Arial Unicode MS", "Segoe UI Symbol", "Noto Emoji", "Symbola",
+)  # fmt: skip
+# Of the drawing of names, not of the results: a letter without a font is drawn as a box, a crowded figure as it is.
+_UNTOLD = ("Glyph .* missing from", "constrained_layout not applied", "Tight layout not applied")
+
 _SETTINGS: Any = {
     "axes.grid": True,
     "axes.labelsize": 8,
@@ -43,7 +54,6 @@ _SETTINGS: Any = {
     "axes.spines.right": False,
     "axes.spines.top": False,
     "axes.titlesize": 8,
-    "font.family": "sans-serif",
     "font.sans-serif": ["DejaVu Sans"],  # comes with Matplotlib, so a figure is the same everywhere
     "font.size": 8,
     "grid.color": "#DDDDDD",
@@ -69,10 +79,25 @@ def styled(function: Callable[_P, _R]) -> Callable[_P, _R]:
 
     @wraps(function)
     def wrapper(*args: _P.args, **kwargs: _P.kwargs) -> _R:
-        with matplotlib.rc_context(_SETTINGS):
+        with matplotlib.rc_context({**_SETTINGS, "font.family": ["sans-serif", *_other_fonts()]}):
             return function(*args, **kwargs)
 
     return wrapper
+
+
+@lru_cache(maxsize=1)
+def _other_fonts() -> tuple[str, ...]:
+    known = {font.name for font in font_manager.fontManager.ttflist if font.fname.lower().endswith(".ttf")}
+    return tuple(name for name in _OTHER_FONTS if name in known)
+
+
+@contextmanager
+def _untold() -> Iterator[None]:
+    """Draw without Matplotlib's warnings of letters that no font has and of crowded layouts."""
+    with warnings.catch_warnings():
+        for message in _UNTOLD:
+            warnings.filterwarnings("ignore", message, UserWarning)
+        yield
 
 
 def new_figure(height: float, *, width: float = COLUMN_WIDTH) -> Figure:
@@ -146,21 +171,23 @@ def save_figure(figure: Figure, path: Path | str, *, formats: Sequence[str] = _F
         stem.parent.mkdir(parents=True, exist_ok=True)
         return tuple(_save(figure, stem.with_name(f"{stem.name}.{name}"), name) for name in formats)
     except OSError as error:
-        raise InputError(f"path: expected a place to write figures; got {stem}: {error}") from error
+        raise InputError(f"path: expected a place to write figures; got {stem}: {error.strerror}") from error
 
 
 @styled
 def svg_text(figure: Figure) -> str:
     """The figure as the text of an SVG file; the same figure gives the same text."""
     out = io.StringIO()
-    figure.savefig(out, format="svg", metadata=_UNDATED["svg"])
+    with _untold():
+        figure.savefig(out, format="svg", metadata=_UNDATED["svg"])
     return out.getvalue()
 
 
 def _save(figure: Figure, path: Path, name: str) -> Path:
     partial = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
-        figure.savefig(partial, format=name, dpi=300, metadata=_UNDATED[name])
+        with _untold():
+            figure.savefig(partial, format=name, dpi=300, metadata=_UNDATED[name])
         partial.replace(path)
     finally:
         partial.unlink(missing_ok=True)

@@ -9,13 +9,13 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from vedette.errors import InputError
+from vedette.evaluation.figures.labels import drawn_text, short_labels
 from vedette.evaluation.figures.style import (
     MARKERS,
     colour,
     legend_columns,
     line_style,
     new_figure,
-    strategy_label,
     styled,
 )
 from vedette.evaluation.statistics import Summary
@@ -53,22 +53,21 @@ def sweep_figure(curves: Sequence[SweepCurve], label: str) -> Figure:
     axes = figure.subplots()
     values = np.unique(np.concatenate([curve.values for curve in curves]))
     logarithmic = _spans_decades(values)
-    for index, curve in enumerate(curves):
+    names = short_labels([curve.name for curve in curves])
+    for index, (name, curve) in enumerate(zip(names, curves, strict=True)):
         order = np.argsort(curve.values)
         mean = np.array([float(curve.errors[i].mean) for i in order])
         low, high = (np.array([float(getattr(curve.errors[i], end)) for i in order]) for end in ("low", "high"))
         place = _beside(curve.values[order], index - (len(curves) - 1) / 2.0, values, logarithmic)
         style = {"color": colour(index), "linestyle": line_style(index), "marker": MARKERS[index % len(MARKERS)]}
         reach = np.nan_to_num(np.array([mean - low, high - mean]))
-        axes.errorbar(
-            place, mean, yerr=reach, markersize=4, capsize=2, elinewidth=0.9, label=strategy_label(curve.name), **style
-        )
+        axes.errorbar(place, mean, yerr=reach, markersize=4, capsize=2, elinewidth=0.9, label=name, **style)
     if logarithmic:
         axes.set_xscale("log")
     axes.set_xticks(values, [f"{value:g}" for value in values])
     axes.minorticks_off()
     axes.set_ylim(bottom=0.0)
-    axes.set_xlabel(label)
+    axes.set_xlabel(drawn_text(label))
     axes.set_ylabel("Mean OSPA (m)")
     _, labels = axes.get_legend_handles_labels()
     figure.legend(loc="outside upper center", ncols=legend_columns(labels))

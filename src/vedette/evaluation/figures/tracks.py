@@ -13,6 +13,7 @@ from matplotlib.ticker import MaxNLocator
 
 from vedette.errors import InputError
 from vedette.evaluation.comparison import Comparison
+from vedette.evaluation.figures.labels import drawn_text, short_label
 from vedette.evaluation.figures.ospa import draw_ospa
 from vedette.evaluation.figures.style import (
     COLUMN_WIDTH,
@@ -21,7 +22,6 @@ from vedette.evaluation.figures.style import (
     TEXT_WIDTH,
     colour,
     new_figure,
-    strategy_label,
     styled,
 )
 from vedette.kernels.types import Floats, Ints
@@ -43,7 +43,7 @@ def tracks_figure(*records: RunRecord, titles: Sequence[str] | None = None) -> F
     """
     if not records:
         raise InputError("records: expected at least one run; got none")
-    names = tuple(titles) if titles is not None else tuple(strategy_label(record.planner) for record in records)
+    names = tuple(titles) if titles is not None else tuple(short_label(record.planner) for record in records)
     if len(names) != len(records):
         raise InputError(f"titles: expected {len(records)}; got {len(names)}")
     width = COLUMN_WIDTH if len(records) == 1 else TEXT_WIDTH * max(1.0, len(records) / 2)
@@ -53,7 +53,7 @@ def tracks_figure(*records: RunRecord, titles: Sequence[str] | None = None) -> F
     scale = 1e-3 if _reach(records) > _LARGE else 1.0
     for panel, record, name in zip(panels, records, names, strict=True):
         draw_tracks(panel, record, scale)
-        panel.set_title(name)
+        panel.set_title(drawn_text(name))
     frame_tracks(panels[0], records, scale)
     figure.legend(handles=tracks_legend(records[0]), loc="outside lower center", ncols=3 if len(records) == 1 else 6)
     return figure
@@ -67,10 +67,10 @@ def overview_figure(record: RunRecord, comparison: Comparison) -> Figure:
     scale = 1e-3 if _reach([record]) > _LARGE else 1.0
     draw_tracks(left, record, scale)
     frame_tracks(left, [record], scale)
-    left.set_title(f"{strategy_label(record.planner)}, one run")
+    left.set_title(f"{short_label(record.planner)}, one run")
     draw_ospa(right, comparison, "total")
     right.set_xlabel("Time (s)")
-    right.set_title(f"Mean of {comparison.num_runs} runs")
+    right.set_title(f"Mean of {comparison.num_runs} runs" if comparison.num_runs > 1 else "OSPA of one run")
     right.legend(loc="upper right")
     figure.legend(handles=tracks_legend(record), loc="outside lower center", ncols=6)
     return figure

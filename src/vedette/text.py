@@ -1,0 +1,47 @@
+"""Names of any length where there is little room."""
+
+from __future__ import annotations
+
+import unicodedata
+from collections.abc import Sequence
+
+ELLIPSIS = "\N{HORIZONTAL ELLIPSIS}"
+
+
+def display_width(text: str) -> int:
+    """Columns that a text takes where letters are of equal width: wide letters (Chinese, emoji) take two."""
+    return sum(map(_width, text))
+
+
+def _width(letter: str) -> int:
+    if unicodedata.combining(letter):
+        return 0
+    return 2 if unicodedata.east_asian_width(letter) in "WF" else 1
+
+
+def elided(text: str, most: int = 24) -> str:
+    """The text on one line; what is wider than `most` columns keeps its beginning and its end."""
+    text = " ".join(text.split())
+    if display_width(text) <= most:
+        return text
+    tail = (most - 1) // 2
+    return _fitting(text, most - 1 - tail) + ELLIPSIS + _fitting(text[::-1], tail)[::-1]
+
+
+def _fitting(text: str, most: int) -> str:
+    """As much of the beginning as fits."""
+    taken = 0
+    for place, letter in enumerate(text):
+        taken += _width(letter)
+        if taken > most:
+            return text[:place]
+    return text
+
+
+def elided_apart(names: Sequence[str], most: int = 24) -> tuple[str, ...]:
+    """Each name elided; those that would then look alike have their place in the list, from 1, put behind."""
+    short = [elided(name, most) for name in names]
+    return tuple(
+        text if short.count(text) == 1 else f"{elided(name, most - 5)} ({place})"
+        for place, (name, text) in enumerate(zip(names, short, strict=True), start=1)
+    )

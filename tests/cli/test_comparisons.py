@@ -1,0 +1,48 @@
+"""The comparison in a terminal: labels give way, numbers never do."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from evaluation.synthetic import make_record
+from vedette.cli.comparisons import print_comparison
+from vedette.evaluation import Comparison, compare, strategy_rows
+
+LONG = "a variant with a very long name that says everything about it, and about the weather too"
+ODD = "\N{CJK UNIFIED IDEOGRAPH-6F22}\N{CJK UNIFIED IDEOGRAPH-5B57} [bold]:smile:"
+
+
+def comparison_of(num_runs: int) -> Comparison:
+    found = compare({name: [make_record(name, run) for run in range(num_runs)] for name in ("jdm", "idm", "random")})
+    ospa = found.ospa.copy()
+    ospa[2] = ospa[0]  # all tied
+    return replace(found, strategies=("jdm", LONG, ODD), ospa=np.ascontiguousarray(ospa))
+
+
+@pytest.mark.parametrize("width", [60, 80, 100, 160])
+def test_every_number_is_shown_at_any_width(
+    width: int, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", str(width))
+    comparison = comparison_of(4)
+    print_comparison(comparison)
+    printed = capsys.readouterr().out
+    table = printed[: printed.index("Scenario ")]
+    for row in strategy_rows(comparison):
+        assert all(number in table for number in row[1:])
+    assert "0%, 100% tied" in table
+    assert LONG not in table
+    assert max(map(len, table.splitlines())) <= width
+    assert "[bold]:smile:" in printed
+
+
+def test_one_run_claims_nothing(capsys: pytest.CaptureFixture[str]) -> None:
+    print_comparison(comparison_of(1))
+    printed = " ".join(capsys.readouterr().out.split())
+    assert "1 paired run, mean over" in printed
+    assert "standard error" not in printed
+    assert "runs won" not in printed
+    assert "unknown unknown" in printed
