@@ -62,6 +62,11 @@ def test_the_campaign_is_read_back_from_the_manifest(whole, campaign):
     assert read.digest() == campaign.digest()
 
 
+def test_a_run_may_be_named_by_any_whole_number(whole):
+    cell = whole.campaign.cells[0].name
+    assert whole.record(cell, np.int64(1)).run == 1
+
+
 def test_what_is_finished_and_missing(whole):
     results = open_results(whole)
     assert results.finished("jdm-rate-5.0") == (0, 1, 2)

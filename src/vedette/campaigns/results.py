@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -88,7 +89,7 @@ class CampaignResults:
     def run(self, cell: str, run: int) -> FinishedRun:
         """A finished run. Raises `InputError` for one that is not finished, or damaged."""
         self.campaign.cell(cell)
-        return self._decoded(self._reader.entry(cell, run))
+        return self._decoded(self._reader.entry(cell, operator.index(run)))
 
     def runs(self) -> Iterator[FinishedRun]:
         """Every finished run, cells in the order of the campaign, each with its runs in order."""
