@@ -206,3 +206,12 @@ def test_sessions_that_are_alike_share_a_column() -> None:
     table = versions_table({"sessions": [session("a", "1"), session("b", "1"), session("c", "2")]})
     assert table.header == ("", "Sessions 1 to 2", "Session 3")
     assert table.rows == (("started", "a to b", "c"), ("numpy", "1", "2"), ("processors", "2", "2"))
+
+
+def test_one_run_claims_no_interval_and_no_win(tmp_path: Path) -> None:
+    campaign = campaign_of(planners=["random", "fixed", "still"], runs=1)
+    words = Words(page_of(results_of(tmp_path / "results", campaign), tmp_path)).words
+    assert "1 paired run, mean over t = " in words
+    assert "one run tells nothing apart" in words
+    for claim in ("Each interval", "standard error", "1 paired runs", "over 1 runs", "with mean and 95 % confidence"):
+        assert claim not in words

@@ -20,7 +20,7 @@ class Claim:
         first, second: names of the strategies.
         sentence: the finding with its numbers.
         difference: second minus first, m, with its interval: "+1.20 (+0.80 to +1.60)".
-        share_won: of the runs, by `first`: "93 %".
+        share_won: of the runs, by `first`: "93 %"; "unknown" for want of runs.
     """
 
     verdict: Verdict
@@ -49,8 +49,9 @@ def claim(comparison: Comparison, first: str, second: str) -> Claim:
     sentence = _SENTENCES[verdict](*names, paired)
     sentence = sentence[0].upper() + sentence[1:]
     mean, low, high = (float(each) for each in (paired.summary.mean, paired.summary.low, paired.summary.high))
+    share = "unknown" if verdict == "unknown" else percent(paired.share_won)
     interval = "" if verdict == "unknown" else f" ({low:+.2f} to {high:+.2f})"
-    return Claim(verdict, *names, sentence, _minus(f"{mean:+.2f}{interval}"), percent(paired.share_won))
+    return Claim(verdict, *names, sentence, _minus(f"{mean:+.2f}{interval}"), share)
 
 
 def _verdict(paired: PairedDifference) -> Verdict:

@@ -93,12 +93,14 @@ def error_drawings(group: Group) -> Iterator[Drawing]:
         f"{together if len(comparison.strategies) > 1 else ''}",
         ospa_figure(comparison, parts=("total", "localisation", "cardinality")),
     )
-    differences = (
-        " Below: the paired differences with mean and 95 % confidence interval; an interval that holds 0 tells "
-        "nothing apart."
-        if len(comparison.strategies) > 1
-        else ""
-    )
+    differences = ""
+    if len(comparison.strategies) > 1 and comparison.num_runs > 1:
+        differences = (
+            " Below: the paired differences with mean and 95 % confidence interval; an interval that holds 0 tells "
+            "nothing apart."
+        )
+    elif len(comparison.strategies) > 1:
+        differences = " Below: the differences, which one run gives no confidence interval."
     yield Drawing(
         "distributions",
         "Run by run",

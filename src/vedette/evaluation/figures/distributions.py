@@ -52,7 +52,7 @@ def _draw_differences(axes: Axes, comparison: Comparison) -> None:
     name, *names = short_labels(comparison.strategies)
     _name_rows(axes, [_minus(other, name) for other in names])
     # The whole sentence where it fits; the names of the rows say the same.
-    are_short = max(map(display_width, (name, *names))) <= _SHORT
+    are_short = display_width(name) <= _SHORT and max(map(display_width, names)) <= _ONE_LINE - _SHORT
     better = f", right of 0: {name} better" if are_short else ""
     axes.set_xlabel(f"Paired difference (m){better}")
 
