@@ -6,7 +6,7 @@ import operator
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, SupportsIndex
 
 from vedette.campaigns.cells import Campaign, Cell
 from vedette.campaigns.codec import decode, decode_timings
@@ -86,7 +86,7 @@ class CampaignResults:
         done = set(self.finished(cell))
         return tuple(run for run in range(self.campaign.num_runs) if run not in done)
 
-    def run(self, cell: str, run: int) -> FinishedRun:
+    def run(self, cell: str, run: SupportsIndex) -> FinishedRun:
         """A finished run. Raises `InputError` for one that is not finished, or damaged."""
         self.campaign.cell(cell)
         return self._decoded(self._reader.entry(cell, operator.index(run)))
@@ -99,11 +99,11 @@ class CampaignResults:
                 if name == cell.name:
                     yield self.run(name, run)
 
-    def record(self, cell: str, run: int) -> RunRecord:
+    def record(self, cell: str, run: SupportsIndex) -> RunRecord:
         """The record of a finished run."""
         return self.run(cell, run).record
 
-    def metrics(self, cell: str, run: int) -> RunMetrics:
+    def metrics(self, cell: str, run: SupportsIndex) -> RunMetrics:
         """The measures of a finished run."""
         return self.run(cell, run).metrics
 
