@@ -28,7 +28,6 @@ from vedette.control.kinds import of_one_kind
 from vedette.control.plain import PlainRewards, can_be_laid_out
 from vedette.control.search import all_joint_actions
 from vedette.densities import GLMB, LMB
-from vedette.errors import InputError
 from vedette.fusion import Clmb, CmDeltaGlmb, FusionLimits
 
 SEED = 5
@@ -242,9 +241,13 @@ def test_a_subclass_is_asked_itself() -> None:
     np.testing.assert_allclose(fused, np.repeat(first, 3, axis=0), rtol=1e-9, atol=1e-9)
 
 
-def test_an_lmb_prediction_that_shares_no_set_with_a_glmb_filter_is_refused() -> None:
-    tracks = lmb((A, B, C), np.random.default_rng(3)).tracks
-    certain = LMB(tracks, np.array([0.0, 0.0, np.inf]))
-    example = replace(situation("delta"), fusion=Clmb((0.5, 0.5)), fused=certain)
-    with pytest.raises(InputError, match="fused belief: expected a label set in common"):
-        evaluator_of(example).sample_rewards((0,), None)
+def test_a_prediction_may_be_certain_of_a_label_that_a_glmb_filter_lacks() -> None:
+    """The scale of the prediction's weights says nothing."""
+    tracks, rewards = lmb((A, B, C), np.random.default_rng(3)).tracks, []
+    for existence_logit in (1.0, np.inf):
+        fused = LMB(tracks, np.array([0.0, 0.0, existence_logit]))
+        example = replace(situation("delta"), fusion=Clmb((0.5, 0.5)), fused=fused)
+        evaluator = evaluator_of(example)
+        assert not any(C in labels for labels in evaluator.posteriors[0].sets)
+        rewards.append(evaluator.sample_rewards((0,), None))
+    assert all(np.isfinite(values).all() for values in rewards)

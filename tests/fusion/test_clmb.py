@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.special import logit
 
 from densities.examples import lmbs, random_glmb, random_lmb
-from fusion.examples import A, B, C, glmb, lmb, mixture_track
+from fusion.examples import A, B, C, lmb, mixture_track
 from vedette.densities import LMB, Poisson, TrackTable, glmb_to_lmb
 from vedette.errors import InputError
 from vedette.fusion import Clmb
@@ -126,20 +126,3 @@ def test_bad_input():
     tracks = TrackTable.from_gaussians([B, A], [[0.0], [1.0]], np.ones((2, 1, 1)))
     with pytest.raises(InputError, match=r"beliefs\[0\].*increasing order"):
         Clmb(HALVES).fuse([LMB(tracks, np.zeros(2)), belief])
-
-
-def test_a_label_in_every_hypothesis_that_truncation_left_is_not_certain():
-    rng = np.random.default_rng(0)
-    truncated, doubting = glmb({(A, B): 0.7, (A,): 0.3}, rng), lmb([A, B], [0.6, 0.5], rng)
-    same_place = LMB(glmb_to_lmb(truncated).tracks, doubting.existence_logit)
-    fused, _ = Clmb(HALVES, missing_existence=1e-4).fuse([truncated, same_place])
-    assert fused.existence_logit[0] == pytest.approx(0.5 * (logit(1.0 - 1e-4) + logit(0.6)), abs=1e-9)
-    assert fused.existence_logit[1] == pytest.approx(0.5 * (logit(0.7) + logit(0.5)), abs=1e-9)
-    surer = glmb({(A, B): 1.0 - 1e-9, (A,): 1e-9}, rng)
-    fused, _ = Clmb((1.0,), missing_existence=1e-4).fuse([surer])
-    assert fused.existence_logit[0] == fused.existence_logit[1] == pytest.approx(math.log(1e9), rel=1e-6)
-
-
-def test_an_lmb_may_be_certain():
-    certain = LMB.from_bernoullis([A], [1.0], [[0.0]], [[[1.0]]])
-    assert Clmb((1.0,)).fuse([certain])[0].existence_logit[0] == math.inf

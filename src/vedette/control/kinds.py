@@ -12,13 +12,15 @@ import numpy as np
 from scipy.special import log_expit
 
 from vedette.control.inputs import Belief
-from vedette.control.priors import LabelSet, offsets_of, take_hypotheses
+from vedette.control.priors import LabelSet, offsets_of
 from vedette.control.pseudo import PseudoPosteriors
 from vedette.control.threads import run_chunks
 from vedette.densities import GLMB, LMB
 from vedette.fusion import Clmb, Fusion
 from vedette.kernels.pseudo_glmb import GlmbResults
 from vedette.kernels.pseudo_lmb import LmbResults, glmb_cases_to_lmb
+
+_ALL_BUT_CERTAIN = 700.0  # logit; its exponential is still a number
 
 
 def of_one_kind(
@@ -32,13 +34,13 @@ def of_one_kind(
     if not isinstance(prediction, LMB) or any(own.is_lmb or np.isneginf(own.log_weights).any() for own in posteriors):
         return posteriors, prediction
     if type(fusion) is Clmb and fusion.mixture_power == "moment_matched":
-        return [_as_lmb(own, fusion, num_threads) for own in posteriors], prediction
+        return [_as_lmb(own, num_threads) for own in posteriors], prediction
     if fusion is None and len(posteriors) == 1:
         return posteriors, _on_label_sets(prediction, posteriors[0].sets)
     return posteriors, prediction
 
 
-def _as_lmb(own: PseudoPosteriors, fusion: Clmb, num_threads: int) -> PseudoPosteriors:
+def _as_lmb(own: PseudoPosteriors, num_threads: int) -> PseudoPosteriors:
     """Each case of a GLMB as an LMB of one Gaussian a label."""
     members = np.array([label for labels in own.sets for label in labels], np.int64).reshape(-1, 2)
     labels = sorted({label for members in own.sets for label in members})
@@ -53,19 +55,22 @@ def _as_lmb(own: PseudoPosteriors, fusion: Clmb, num_threads: int) -> PseudoPost
     run_chunks(
         lambda first, last: glmb_cases_to_lmb(members, set_offsets, cases, first, last, results), num_cases, num_threads
     )
-    logits = fusion.without_certainty(results.logits)
-    return PseudoPosteriors(tuple((label,) for label in labels), logits, results.means, results.covs, True)
+    return PseudoPosteriors(tuple((label,) for label in labels), results.logits, results.means, results.covs, True)
 
 
 def _on_label_sets(lmb: LMB, sets: Sequence[LabelSet]) -> GLMB:
-    """The LMB's hypotheses on those of the label sets that it has, none of weight zero; they do not sum to one."""
+    """The LMB's hypotheses on those of the label sets that it has; their weights do not sum to one.
+
+    A certain or impossible label is taken as all but that: the divergence on common label sets does not depend on the scale of the
+    weights, and so it is defined also where the GLMB lacks that label in every set.
+    """
     place = {(step, site): i for i, (step, site) in enumerate(lmb.tracks.labels.tolist())}
     hyps = [[place[label] for label in labels] for labels in sets if all(label in place for label in labels)]
-    present, absent = log_expit(lmb.existence_logit), log_expit(-lmb.existence_logit)
+    logits = np.clip(lmb.existence_logit, -_ALL_BUT_CERTAIN, _ALL_BUT_CERTAIN)
+    present, absent = log_expit(logits), log_expit(-logits)
     exists = np.zeros((len(hyps), len(place)), np.bool_)
     for h, hyp in enumerate(hyps):
         exists[h, hyp] = True
     log_weights = np.where(exists, present, absent).sum(axis=1)
     flat = np.array([track for hyp in hyps for track in hyp], np.int64)
-    whole = GLMB(lmb.tracks, offsets_of([len(hyp) for hyp in hyps]), flat, log_weights)
-    return take_hypotheses(whole, np.flatnonzero(log_weights > -np.inf))
+    return GLMB(lmb.tracks, offsets_of([len(hyp) for hyp in hyps]), flat, log_weights)

@@ -38,8 +38,8 @@ class Clmb:
     The fused labels are those that any sensor of positive weight has. Where a sensor lacks a label (or has it with
     existence 0), its existence there is a floor, the least of `missing_existence` and the existences that it has, and
     it is left out of the label's density, where the other sensors' weights are scaled to sum to one; counted in the
-    `FusionInfo`. Where no hypothesis of a sensor's GLMB lacks a label, because truncation left none, its absence there
-    has the same floor: it is as probable as the floor, or as the label that the sensor is surest of, if that is surer.
+    `FusionInfo`. A label in every hypothesis of a sensor's GLMB is certain there, and so in the fusion. (Truncation may
+    have cut off the rest; to bound its certainty as its absence is bounded makes joint decisions worse, not better.)
 
     Attributes:
         weights: fusion weights, one a sensor, in the order of the beliefs; non-negative, sum 1. A sensor of weight 0
@@ -71,7 +71,7 @@ class Clmb:
         rule = power_rule(self.mixture_power, self.limits, beliefs[0].state_dim)
         active = [i for i, weight in enumerate(self.weights) if weight > 0.0]
         weights = np.array([self.weights[i] for i in active])
-        aligned = _align([self._as_lmb(beliefs[i], rule) for i in active], self.missing_existence)
+        aligned = _align([_as_lmb(beliefs[i], rule) for i in active], self.missing_existence)
         tracks, log_overlaps = fused_tracks(aligned.labels, aligned.chosen, weights, aligned.tracks, rule)
         log_present = log_expit(aligned.logits) @ weights + log_overlaps
         log_absent = log_expit(-aligned.logits) @ weights
@@ -84,23 +84,6 @@ class Clmb:
             log_normaliser=float(np.logaddexp(log_present, log_absent).sum()),
             discarded_weight=0.0,
         )
-
-    def _as_lmb(self, belief: LMB | GLMB, rule: PowerRule) -> Lmb:
-        """An LMB with reduced mixtures."""
-        if isinstance(belief, GLMB):
-            converted = glmb_to_lmb(belief.to_kernel(), *rule.limits)
-            return converted._replace(existence_logit=self.without_certainty(converted.existence_logit))
-        return Lmb(reduced_tracks(belief.tracks.to_kernel(), rule), belief.existence_logit)
-
-    def without_certainty(self, logits: Floats) -> Floats:
-        """Existence logits (..., num_labels) of LMBs made of GLMBs, where certain ones (inf) are what truncation left.
-
-        Each is bounded by that of the floor, or by the largest finite one of its row if that is larger.
-        """
-        surest = np.max(
-            logits, axis=-1, keepdims=True, where=np.isfinite(logits), initial=-_logit(self.missing_existence)
-        )
-        return np.asarray(np.minimum(logits, surest))
 
 
 class _Aligned(NamedTuple):
@@ -116,7 +99,7 @@ class _Aligned(NamedTuple):
 
 
 def _align(sensors: Sequence[Lmb], missing_existence: float) -> _Aligned:
-    floor = _logit(missing_existence)
+    floor = math.log(missing_existence) - math.log1p(-missing_existence)
     places = [_places(sensor) for sensor in sensors]
     labels = sorted(set().union(*places))
     chosen, logits = np.full((len(labels), len(sensors)), -1), np.empty((len(labels), len(sensors)))
@@ -132,8 +115,11 @@ def _align(sensors: Sequence[Lmb], missing_existence: float) -> _Aligned:
     return _Aligned(np.array(labels, np.int64).reshape(-1, 2), chosen, table, logits)
 
 
-def _logit(probability: float) -> float:
-    return math.log(probability) - math.log1p(-probability)
+def _as_lmb(belief: LMB | GLMB, rule: PowerRule) -> Lmb:
+    """An LMB with reduced mixtures."""
+    if isinstance(belief, GLMB):
+        return glmb_to_lmb(belief.to_kernel(), *rule.limits)
+    return Lmb(reduced_tracks(belief.tracks.to_kernel(), rule), belief.existence_logit)
 
 
 def _places(lmb: Lmb) -> dict[tuple[int, int], int]:
