@@ -61,8 +61,8 @@ def _as_lmb(own: PseudoPosteriors, num_threads: int) -> PseudoPosteriors:
 def _on_label_sets(lmb: LMB, sets: Sequence[LabelSet]) -> GLMB:
     """The LMB's hypotheses on those of the label sets that it has; their weights do not sum to one.
 
-    A certain or impossible label is taken as all but that: the divergence on common label sets does not depend on the scale of the
-    weights, and so it is defined also where the GLMB lacks that label in every set.
+    A certain or impossible label is taken as all but that: the divergence on common label sets does not depend on the
+    scale of the weights, and so it is defined also where the GLMB lacks that label in every set.
     """
     place = {(step, site): i for i, (step, site) in enumerate(lmb.tracks.labels.tolist())}
     hyps = [[place[label] for label in labels] for labels in sets if all(label in place for label in labels)]
