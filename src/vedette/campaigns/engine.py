@@ -102,7 +102,10 @@ class _Workers:
         if now - self._looked_at < _REFRESH_SECONDS or self._client.status != "running":
             return
         self._looked_at = now
-        threads: dict[str, int] = self._client.nthreads()
+        try:
+            threads: dict[str, int] = self._client.nthreads()
+        except OSError:  # the connection is lost: the tasks under way say so
+            return
         self.num_threads = max(1, sum(threads.values()))
         local = self._client.cluster
         if local is not None and len(threads) < len(local.worker_spec):
