@@ -15,7 +15,7 @@ from vedette.errors import InputError
 if TYPE_CHECKING:
     import xarray
 
-    from vedette.campaigns.results import FinishedRun
+    from vedette.campaigns.finished import FinishedRun
 
 
 def dataset_of_runs(campaign: Campaign, runs: Iterable[FinishedRun]) -> xarray.Dataset:

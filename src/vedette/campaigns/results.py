@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, SupportsIndex
 
 from vedette.campaigns.cells import Campaign, Cell
 from vedette.campaigns.codec import decode, decode_timings
+from vedette.campaigns.finished import FinishedRun
 from vedette.campaigns.journal import DATABASE, Entry, Reader
 from vedette.campaigns.manifest import campaign_of, contents_checksum, read_manifest
 from vedette.errors import InputError
@@ -20,25 +21,6 @@ from vedette.simulation.records import RunRecord
 if TYPE_CHECKING:
     import pyarrow
     import xarray
-
-
-@dataclass(frozen=True, slots=True)
-class FinishedRun:
-    """One run of a campaign.
-
-    Attributes:
-        cell: name of its cell.
-        record: with the seconds that it took.
-        metrics: measures of its estimates.
-        session: number of the session, from 1, in the manifest's list, that kept it.
-        checksum: SHA-256 of all but its timings; equal for equal results.
-    """
-
-    cell: str
-    record: RunRecord
-    metrics: RunMetrics
-    session: int
-    checksum: str
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,7 +15,7 @@ from vedette.simulation.records import Decision
 from vedette.simulation.tabulation import POSE_COLUMNS, tables_of
 
 if TYPE_CHECKING:
-    from vedette.campaigns.results import FinishedRun
+    from vedette.campaigns.finished import FinishedRun
 
 
 @dataclass(frozen=True, slots=True)

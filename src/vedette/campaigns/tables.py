@@ -20,7 +20,7 @@ from vedette.campaigns.cells import Campaign, Cell
 from vedette.campaigns.rows import PER_RUN, Lists
 
 if TYPE_CHECKING:
-    from vedette.campaigns.results import FinishedRun
+    from vedette.campaigns.finished import FinishedRun
 
 NAMES = tuple(PER_RUN)
 _UNITS = {"_m": "m", "_s": "s", "_rad": "rad"}
