@@ -87,6 +87,7 @@ def reproduce(
     opened = open_results(out)
     print_results(opened)
     with interruptible(f"{out} keeps every run; the same command writes the report"):
+        typer.echo("drawing the figures and the report ...", err=True)
         write_summary(opened, out)
         write_figures(opened, out / "figures")
         write_report(opened, out / "report.html")
