@@ -82,6 +82,7 @@ class Program:
             stderr=subprocess.STDOUT,
             text=True,
             start_new_session=True,
+            preexec_fn=heed_interrupts,
         )
         return self._process
 
@@ -110,6 +111,11 @@ class Program:
         if self._process is not None and self._process.poll() is None:
             os.killpg(self._process.pid, signal.SIGKILL)
             self._process.communicate()
+
+
+def heed_interrupts() -> None:
+    """As a program started from a terminal does; one started in the background is told to ignore them."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 def assert_gone(group: int) -> None:
