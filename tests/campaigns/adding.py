@@ -33,7 +33,7 @@ def add_for_ever(folder: Path, pause: str = "0.0") -> None:
     while True:
         if (CELL, run) not in done:
             writer.add(entry_of(run))
-            print(run, flush=True)
+            print(f"{run}\n", end="", flush=True)
             time.sleep(float(pause))
         run += 1
 
