@@ -39,8 +39,8 @@ _UNIONS = ("float", "int", "str", "bool", "list", "dict")
 class Variant(Section):
     """One entry of a list of settings that belong together."""
 
-    name: ShortName = Field(description="What tables and figures call it.")
-    set: Fields = Field(default={}, description="Scenario fields by path, and their values.")
+    name: ShortName = Field(description="What tables and figures call it [-].")
+    set: Fields = Field(default={}, description="Scenario fields by path, and their values [-].")
 
 
 class CampaignSpec(Section):
@@ -50,22 +50,25 @@ class CampaignSpec(Section):
     what the scenario says. Paths of scenario fields are those of `vedette.scenarios.overrides.with_fields`.
     """
 
-    name: ShortName = Field(description="What the campaign is called.")
-    scenarios: Names = Field(description="Built-in scenarios by name, or files relative to the specification.")
-    planners: Names = Field(default=("jdm", "idm", "random"), description="Strategies: " + ", ".join(STRATEGIES) + ".")
-    runs: Annotated[Whole, Field(ge=1, le=1_000_000)] = Field(description="Paired runs of each.")
-    seed: Annotated[Whole, Field(ge=0)] = Field(default=0, description="With the run number it fixes every draw.")
-    filters: Names | None = Field(default=None, description="Values of filter.kind.")
-    fusions: Names | None = Field(default=None, description="Values of fusion.kind.")
-    set: Fields = Field(default={}, description="Scenario fields by path, changed everywhere.")
+    name: ShortName = Field(description="What the campaign is called [-].")
+    scenarios: Names = Field(description="Built-in scenarios by name, or files relative to the specification [-].")
+    planners: Names = Field(
+        default=("jdm", "idm", "random"), description="Strategies: " + ", ".join(STRATEGIES) + " [-]."
+    )
+    runs: Annotated[Whole, Field(ge=1, le=1_000_000)] = Field(description="Paired runs of each [-].")
+    seed: Annotated[Whole, Field(ge=0)] = Field(default=0, description="With the run number it fixes every draw [-].")
+    filters: Names | None = Field(default=None, description="Values of filter.kind [-].")
+    fusions: Names | None = Field(default=None, description="Values of fusion.kind [-].")
+    set: Fields = Field(default={}, description="Scenario fields by path, changed everywhere [-].")
     grid: dict[str, Annotated[tuple[JsonValue, ...], Field(strict=False, min_length=1)]] = Field(
-        default={}, description="Scenario fields by path, and the values of each: every combination is run."
+        default={}, description="Scenario fields by path, and the values of each: every combination is run [-]."
     )
     variants: Annotated[tuple[Variant, ...], Field(strict=False)] = Field(
-        default=(), description="Settings that belong together: each entry is run."
+        default=(), description="Settings that belong together: each entry is run [-]."
     )
     compare: str | None = Field(
-        default=None, description="Axis whose values are compared; none: planner, or the one that has several values."
+        default=None,
+        description="Axis whose values are compared; none: planner, or the one that has several values [-].",
     )
 
     @field_validator("planners")
