@@ -65,6 +65,11 @@ class Campaign:
         return self.num_runs * len(self.cells)
 
     @property
+    def default_folder(self) -> str:
+        """Where its results go unless another place is named."""
+        return f"{safe_name(self.name)}-results"
+
+    @property
     def tasks(self) -> tuple[tuple[Cell, int], ...]:
         """Every run that there is to do, the runs of equal number of all cells together, so that pairs come early."""
         return tuple((cell, run) for run in range(self.num_runs) for cell in self.cells)

@@ -113,12 +113,12 @@ def run_campaign(
         if lost:
             watch.note(f"{Path(folder) / DATABASE} was not there: every run is done again")
         _check_undamaged(store, redo_damaged, watch)
-        finished = store.finished()
-        found = [(cell.name, run) for cell, run in campaign.tasks if (cell.name, run) in finished]
-        watch.begin(len(found), len(campaign.tasks))
+        queue = TaskQueue(campaign, store.finished())
+        num_found = campaign.total - len(queue)
+        watch.begin(num_found, campaign.total)
         for change in store.version_changes:
             watch.note(f"{change}; runs of both may differ in their last digits")
-        with closing(_results(TaskQueue(campaign, finished), num_workers, scheduler, watch)) as results:
+        with closing(_results(queue, num_workers, scheduler, watch)) as results:
             for result in results:
                 if isinstance(result, Failed):
                     failed.append(result)
@@ -129,7 +129,7 @@ def run_campaign(
                 watch.landed(result)
     # Each time: what was left of them by another end of this call, or altered since, is put right.
     export_tables(open_results(folder), Path(folder) / TABLES)
-    return Outcome(num_landed, len(found), tuple(failed))
+    return Outcome(num_landed, num_found, tuple(failed))
 
 
 def _check_undamaged(store: Store, redo: bool, watch: Watch) -> None:

@@ -73,7 +73,7 @@ def perform(task: Task) -> tuple[Landed | Failed, ...]:
     """
     here = versions()
     wrong = [
-        f"{name} {here.get(name)} (not {wanted})" for name, wanted in task.versions.items() if here[name] != wanted
+        f"{name} {here.get(name)} (not {wanted})" for name, wanted in task.versions.items() if here.get(name) != wanted
     ]
     if wrong:
         raise VedetteError(f"a worker has other versions than the campaign: {', '.join(wrong)}")

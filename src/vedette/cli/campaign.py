@@ -43,7 +43,6 @@ def campaign(
 ) -> None:
     """Run a campaign, or go on with one: every run that its folder does not hold yet."""
     from vedette.campaigns import load_spec, resolve
-    from vedette.campaigns.cells import safe_name
 
     resolved = resolve(load_spec(spec), spec.parent)
     if runs is not None:
@@ -51,7 +50,7 @@ def campaign(
     if dry_run:
         _describe(resolved)
         return
-    folder = out or Path(f"{safe_name(resolved.name)}-results")
+    folder = out or Path(resolved.default_folder)
     outcome = carry_out(resolved, folder, workers, scheduler, redo_damaged)
     typer.echo(f"{folder}: {outcome.num_landed + outcome.num_found} of {resolved.total} runs")
     place = shlex.quote(str(folder))

@@ -55,7 +55,7 @@ def print_results(opened: CampaignResults) -> None:
         print_comparison(group.comparison)
         typer.echo("")
     missing = {cell.name: len(opened.missing(cell.name)) for cell in campaign.cells}
-    total = campaign.num_runs * len(campaign.cells)
+    total = campaign.total
     typer.echo(f"{campaign.name}, seed {campaign.seed}: {total - sum(missing.values())} of {total} runs are finished")
     for cell, number in missing.items():
         if number:

@@ -9,13 +9,13 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from scipy.special import log_expit
 
 from vedette.control.inputs import Belief
 from vedette.control.priors import LabelSet, offsets_of
 from vedette.control.pseudo import PseudoPosteriors
 from vedette.control.threads import run_chunks
 from vedette.densities import GLMB, LMB
+from vedette.densities.conversions import lmb_on_label_sets
 from vedette.fusion import Clmb, Fusion
 from vedette.kernels.pseudo_glmb import GlmbResults
 from vedette.kernels.pseudo_lmb import LmbResults, glmb_cases_to_lmb
@@ -64,13 +64,5 @@ def _on_label_sets(lmb: LMB, sets: Sequence[LabelSet]) -> GLMB:
     A certain or impossible label is taken as all but that: the divergence on common label sets does not depend on the
     scale of the weights, and so it is defined also where the GLMB lacks that label in every set.
     """
-    place = {(step, site): i for i, (step, site) in enumerate(lmb.tracks.labels.tolist())}
-    hyps = [[place[label] for label in labels] for labels in sets if all(label in place for label in labels)]
     logits = np.clip(lmb.existence_logit, -_ALL_BUT_CERTAIN, _ALL_BUT_CERTAIN)
-    present, absent = log_expit(logits), log_expit(-logits)
-    exists = np.zeros((len(hyps), len(place)), np.bool_)
-    for h, hyp in enumerate(hyps):
-        exists[h, hyp] = True
-    log_weights = np.where(exists, present, absent).sum(axis=1)
-    flat = np.array([track for hyp in hyps for track in hyp], np.int64)
-    return GLMB(lmb.tracks, offsets_of([len(hyp) for hyp in hyps]), flat, log_weights)
+    return lmb_on_label_sets(LMB(lmb.tracks, logits), sets)

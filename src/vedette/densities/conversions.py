@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.special import log_expit
 
 from vedette.densities.glmb import GLMB
 from vedette.densities.lmb import LMB
@@ -77,3 +81,15 @@ def lmb_to_glmb(lmb: LMB, *, max_hyps: int) -> tuple[GLMB, float]:
 
 
 __all__ = ["DEFAULT_LOG_MIN_WEIGHT", "DEFAULT_MERGE_DISTANCE", "glmb_to_lmb", "lmb_to_glmb", "marginalise"]
+
+
+def lmb_on_label_sets(lmb: LMB, sets: Sequence[Sequence[tuple[int, int]]]) -> GLMB:
+    """The LMB's hypotheses on those of the label sets that it has, in their order; their weights do not sum to one."""
+    place = {(step, site): i for i, (step, site) in enumerate(lmb.tracks.labels.tolist())}
+    hyps = [[place[label] for label in labels] for labels in sets if all(label in place for label in labels)]
+    exists = np.zeros((len(hyps), len(place)), np.bool_)
+    for h, hyp in enumerate(hyps):
+        exists[h, hyp] = True
+    log_weights = np.where(exists, log_expit(lmb.existence_logit), log_expit(-lmb.existence_logit)).sum(axis=1)
+    offsets = np.cumsum([0, *(len(hyp) for hyp in hyps)])
+    return GLMB(lmb.tracks, offsets, np.array([track for hyp in hyps for track in hyp], np.int64), log_weights)

@@ -6,9 +6,9 @@ import math
 from typing import Literal, TypeAlias
 
 import numpy as np
-from scipy.special import log_expit
 
 from vedette.densities import GLMB, LMB, Poisson
+from vedette.densities.conversions import lmb_on_label_sets
 from vedette.errors import InputError, NumericalError
 from vedette.kernels.inner_products import log_glmbs, log_lmbs, log_tracks
 from vedette.kernels.labels import group_by_label_set
@@ -119,23 +119,12 @@ def _lmbs(a: LMB, b: LMB, log_unit_volume: float, common: bool) -> tuple[float, 
 
 def _on_label_sets(lmb: LMB, glmb: GLMB) -> Glmb:
     """The LMB's hypotheses on those label sets of `glmb` that it has; their weights do not sum to one."""
-    bundle = glmb.to_kernel()
-    place = {(int(label[0]), int(label[1])): i for i, label in enumerate(lmb.tracks.labels)}
-    log_present, log_absent = log_expit(lmb.existence_logit), log_expit(-lmb.existence_logit)
-    hyps: list[list[int]] = []
-    for first in group_by_label_set(bundle)[1].tolist():
-        members = glmb.hyp_tracks[glmb.hyp_offsets[first] : glmb.hyp_offsets[first + 1]]
-        hyp = [place.get((int(label[0]), int(label[1])), -1) for label in glmb.tracks.labels[members]]
-        if -1 not in hyp:
-            hyps.append(hyp)
-    log_weights = np.empty(len(hyps))
-    for h, hyp in enumerate(hyps):
-        exists = np.zeros(len(place), np.bool_)
-        exists[hyp] = True
-        log_weights[h] = np.where(exists, log_present, log_absent).sum()
-    hyp_offsets = np.cumsum([0, *(len(hyp) for hyp in hyps)])
-    hyp_tracks = np.array([track for hyp in hyps for track in hyp], np.int64)
-    return Glmb(lmb.tracks.to_kernel(), hyp_offsets, hyp_tracks, log_weights)
+    labels, bundle = glmb.tracks.labels.tolist(), glmb.to_kernel()
+    sets = [
+        [tuple(labels[track]) for track in glmb.hyp_tracks[glmb.hyp_offsets[first] : glmb.hyp_offsets[first + 1]]]
+        for first in group_by_label_set(bundle)[1].tolist()
+    ]
+    return lmb_on_label_sets(lmb, sets).to_kernel()
 
 
 def _intensities(a: Poisson, b: Poisson) -> Tracks:

@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 
 from vedette.densities import MultiBernoulli
+from vedette.filters.base import ModelledFilter
 from vedette.filters.info import FilterInfo
 from vedette.filters.inputs import check_belief, model_errors
-from vedette.filters.unlabelled import UnlabelledFilter
 from vedette.kernels.cbmember import step_cb_member
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class CbMemberFilter(UnlabelledFilter):
+class CbMemberFilter(ModelledFilter):
     """Gaussian-mixture cardinality-balanced multi-target multi-Bernoulli filter (Vo, Vo and Cantoni 2009).
 
     Believes in a multi-Bernoulli density, to which the births are added as they are; prediction is exact. The update

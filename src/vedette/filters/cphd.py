@@ -10,14 +10,14 @@ import numpy as np
 
 from vedette.densities import IidCluster
 from vedette.errors import NumericalError
+from vedette.filters.base import ModelledFilter
 from vedette.filters.info import FilterInfo
 from vedette.filters.inputs import check_belief, model_errors
-from vedette.filters.unlabelled import UnlabelledFilter
 from vedette.kernels.cphd import step_cphd
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class CphdFilter(UnlabelledFilter):
+class CphdFilter(ModelledFilter):
     """Gaussian-mixture CPHD filter of one sensor (Vo, Vo and Cantoni 2007).
 
     Believes in an iid cluster; its cardinality distribution and intensity after a scan are those of the exact posterior

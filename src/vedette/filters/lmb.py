@@ -2,30 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from vedette.densities import GLMB, LMB
 from vedette.errors import NumericalError
+from vedette.filters.base import ModelledFilter
 from vedette.filters.info import FilterInfo
-from vedette.filters.inputs import (
-    births_at,
-    check_belief,
-    check_parts,
-    check_scan,
-    check_step,
-    model_errors,
-)
-from vedette.filters.limits import Limits
+from vedette.filters.inputs import check_belief, model_errors
 from vedette.kernels.lmb import step_lmb
-from vedette.models import BirthModel, MotionModel, SensorModel, SurvivalModel, kernel_motion
-from vedette.models.arguments import pose_vector, positive
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class LmbFilter:
+class LmbFilter(ModelledFilter):
     """LMB filter of one sensor (Reuter, Vo, Vo, Dietmayer 2014), cheaper than the delta-GLMB filter.
 
     Attributes:
@@ -35,15 +26,6 @@ class LmbFilter:
     Raises:
         InputError: models of different state dimensions.
     """
-
-    motion: MotionModel
-    survival: SurvivalModel
-    birth: BirthModel
-    sensor: SensorModel
-    limits: Limits = field(default_factory=Limits)
-
-    def __post_init__(self) -> None:
-        check_parts(self.motion, self.survival, self.birth, self.sensor, self.limits)
 
     def initial(self) -> LMB:
         """The belief before the first scan: no target."""
@@ -56,20 +38,11 @@ class LmbFilter:
 
         Nothing is drawn from `rng`; it is taken so that filters are interchangeable.
         """
-        measurements, num_duplicates = check_scan(scan, self.sensor.meas_dim)
+        measurements, num_duplicates = self._check_scan(scan)
         prior = check_belief(belief, LMB, self.motion.state_dim)
+        arguments = self._arguments(measurements, pose, dt, step, prior)
         with model_errors():
-            posterior, report = step_lmb(
-                prior.to_kernel(),
-                births_at(self.birth, check_step(step, self.birth, prior)).to_kernel(),
-                measurements,
-                pose_vector("pose", pose),
-                positive("dt", dt),
-                kernel_motion(self.motion, self.survival),
-                self.sensor.to_kernel(),
-                self.limits.truncation(self.sensor.meas_dim),
-                self.limits.reduction(),
-            )
+            posterior, report = step_lmb(prior.to_kernel(), *arguments, self.limits.reduction())
         if not np.isfinite(report.log_total):
             raise NumericalError(f"step {step}: no association has positive weight; do the models forbid this scan?")
         info = FilterInfo(

@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 
 from vedette.densities import Poisson
+from vedette.filters.base import ModelledFilter
 from vedette.filters.info import FilterInfo
 from vedette.filters.inputs import check_belief, model_errors
-from vedette.filters.unlabelled import UnlabelledFilter
 from vedette.kernels.phd import step_phd
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class PhdFilter(UnlabelledFilter):
+class PhdFilter(ModelledFilter):
     """Gaussian-mixture PHD filter of one sensor (Vo and Ma 2006).
 
     Believes in a Poisson density; its intensity after a scan is that of the exact posterior of such a prior. Births

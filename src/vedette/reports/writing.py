@@ -197,12 +197,12 @@ def _render(
     finished = sum(len(results.finished(cell.name)) for cell in campaign.cells)
     return environment.get_template("report.html").render(
         campaign=campaign,
-        folder=shlex.quote(f"{campaign.name}-results"),
+        folder=shlex.quote(campaign.default_folder),
         compared=axis_label(campaign.compare),
         sections=sections,
         sweeps=sweeps,
         finished=finished,
-        planned=campaign.num_runs * len(campaign.cells),
+        planned=campaign.total,
         replays=[json.loads(run) for run in runs],
         replay_json=Markup("[" + ",".join(runs) + "]"),  # safe inside an element: see `_json`
         left_out=left_out,

@@ -1,10 +1,11 @@
-"""What the filters without labels share: their models, and what they hand to their kernels."""
+"""What filters of one step a scan share: their models, and what they hand to their kernels."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 from typing import Any
 
+from vedette.densities import LMB
 from vedette.filters.inputs import births_at, check_parts, check_scan, check_step
 from vedette.filters.limits import Limits
 from vedette.kernels.truncation import Truncation
@@ -16,11 +17,11 @@ StepArguments = tuple[Lmb, Floats, Floats, float, Motion, Sensor, Truncation]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class UnlabelledFilter:
-    """The models of a filter that keeps no identity of its targets.
+class ModelledFilter:
+    """The models of a filter.
 
     Attributes:
-        motion, survival, birth, sensor: the models; the same as those of the labelled filters.
+        motion, survival, birth, sensor: the models.
         limits: caps and thresholds.
 
     Raises:
@@ -36,10 +37,13 @@ class UnlabelledFilter:
     def __post_init__(self) -> None:
         check_parts(self.motion, self.survival, self.birth, self.sensor, self.limits)
 
-    def _arguments(self, scan: Floats, pose: Any, dt: Any, step: Any) -> StepArguments:
-        """Births, scan, pose, time step, models and truncation as the kernels take them, in their order."""
+    def _arguments(self, scan: Floats, pose: Any, dt: Any, step: Any, prior: LMB | None = None) -> StepArguments:
+        """Births, scan, pose, time step, models and truncation as the kernels take them, in their order.
+
+        prior: whose labels those of the births must not repeat; None where there are none.
+        """
         return (
-            births_at(self.birth, check_step(step, self.birth)).to_kernel(),
+            births_at(self.birth, check_step(step, self.birth, prior)).to_kernel(),
             scan,
             pose_vector("pose", pose),
             positive("dt", dt),
