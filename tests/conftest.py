@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import matplotlib
+import pytest
 from hypothesis import HealthCheck, settings
 
 matplotlib.use("Agg")
@@ -12,3 +13,11 @@ settings.register_profile(
     "vedette", derandomize=True, deadline=None, max_examples=50, suppress_health_check=[HealthCheck.too_slow]
 )
 settings.load_profile("vedette")
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """How long the fuzzers of `tests/fuzz` go on, and from where."""
+    group = parser.getgroup("fuzz")
+    group.addoption("--fuzz-seconds", type=float, help="seconds for each fuzzer (default: a fixed number of cases)")
+    group.addoption("--fuzz-seed", type=int, default=0, help="seed of the cases (default: 0)")
+    group.addoption("--fuzz-case", type=int, help="try only the case of this number")

@@ -2,7 +2,7 @@
 
 usage: check.py [--list] [STAGE ...]
 
-With no stage named, all but the slow tests are run. A stage that fails does not stop the others.
+With no stage named, all but the long ones (`slow`, `fuzz`) are run. A stage that fails does not stop the others.
 """
 
 from __future__ import annotations
@@ -52,6 +52,11 @@ STAGES = {
     "jit-off": lane("kernels as plain Python", "jit-off", NUMBA_DISABLE_JIT="1"),
     "bounds": lane("kernels with bounds checks", "bounds", NUMBA_BOUNDSCHECK="1"),
     "slow": Stage("tests that take long", python("pytest", "-q", "-m", "slow"), by_default=False),
+    "fuzz": Stage(
+        "random files, scans and results folders, an hour each",
+        python("pytest", "-q", "-s", "-m", "fuzz", "--fuzz-seconds=3600"),
+        by_default=False,
+    ),
     "tests": Stage("everything else", python("pytest", "-q", "--durations=10")),
 }
 

@@ -133,8 +133,8 @@ def test_label_sets_that_certain_detection_rules_out(kind: str) -> None:
         ("delta", {"mixture_power": "component_wise"}, False),
         ("delta", {"mixture_power": "quadrature"}, False),
         ("delta", {"weights": (0.0, 1.0)}, False),
-        ("delta", {"limits": FusionLimits(max_hyps=3)}, False),
-        ("delta", {"limits": FusionLimits(max_hyps=8)}, True),
+        ("delta", {"limits": FusionLimits(max_hypotheses=3)}, False),
+        ("delta", {"limits": FusionLimits(max_hypotheses=8)}, True),
         ("lmb", {"mixture_power": "component_wise"}, False),
         ("lmb", {"mixture_power": "quadrature"}, False),
         ("lmb", {"weights": (0.0, 1.0)}, False),
@@ -198,7 +198,7 @@ def test_a_prediction_may_have_sets_of_weight_zero() -> None:
 def test_a_prediction_may_lack_label_sets_of_the_sensors(kind: str, most: int) -> None:
     """Stand-ins for what a sensor lacks draw on sets that are not compared."""
     example = situation(kind, 3)
-    fused, _ = replace(example.fusion, limits=FusionLimits(max_hyps=most)).fuse(example.beliefs)
+    fused, _ = replace(example.fusion, limits=FusionLimits(max_hypotheses=most)).fuse(example.beliefs)
     assert fused.num_hyps == most
     assert_equals_plain_loop(replace(example, fused=fused), "reference")
 

@@ -163,7 +163,7 @@ def test_existence_near_one_keeps_its_precision():
 
 @given(lmbs())
 def test_lmb_to_glmb_and_back_is_the_identity(lmb):
-    glmb, discarded = lmb_to_glmb(lmb, max_hyps=10**6)
+    glmb, discarded = lmb_to_glmb(lmb, max_hypotheses=10**6)
     glmb.validate()
     assert discarded == 0.0
     assert glmb.num_hyps == 2**lmb.tracks.num_tracks
@@ -175,11 +175,11 @@ def test_lmb_to_glmb_and_back_is_the_identity(lmb):
 
 
 @given(lmbs(), st.integers(1, 70))
-def test_lmb_to_glmb_lists_the_heaviest_subsets_in_order(lmb, max_hyps):
-    glmb, discarded = lmb_to_glmb(lmb, max_hyps=max_hyps)
+def test_lmb_to_glmb_lists_the_heaviest_subsets_in_order(lmb, max_hypotheses):
+    glmb, discarded = lmb_to_glmb(lmb, max_hypotheses=max_hypotheses)
     glmb.validate()
     exact = oracle.label_set_weights(oracle.expand_lmb(plain_lmb(lmb)))
-    heaviest = np.sort(list(exact.values()))[::-1][:max_hyps]
+    heaviest = np.sort(list(exact.values()))[::-1][:max_hypotheses]
     _close(np.exp(glmb.hyp_log_weights), heaviest / heaviest.sum())
     assert discarded == pytest.approx(1.0 - heaviest.sum(), abs=1e-12)
     for weight, tracks in plain_glmb(glmb):
@@ -188,7 +188,7 @@ def test_lmb_to_glmb_lists_the_heaviest_subsets_in_order(lmb, max_hyps):
 
 def test_certain_and_impossible_labels_are_not_doubted():
     lmb = LMB.from_bernoullis([[0, 0], [0, 1], [0, 2]], [1.0, 0.0, 0.25], np.zeros((3, 2)), [np.eye(2)] * 3)
-    glmb, discarded = lmb_to_glmb(lmb, max_hyps=100)
+    glmb, discarded = lmb_to_glmb(lmb, max_hypotheses=100)
     assert discarded == 0.0
     assert oracle.label_set_weights(plain_glmb(glmb)) == pytest.approx(
         {((0, 0),): 0.75, ((0, 0), (0, 2)): 0.25}, rel=1e-12
@@ -201,7 +201,7 @@ def test_many_labels_and_few_hypotheses():
     lmb = LMB.from_bernoullis(
         [(0, i) for i in range(num)], rng.uniform(0.9, 0.99, num), np.zeros((num, 2)), random_covs(rng, num)
     )
-    glmb, discarded = lmb_to_glmb(lmb, max_hyps=500)
+    glmb, discarded = lmb_to_glmb(lmb, max_hypotheses=500)
     glmb.validate()
     assert glmb.num_hyps == 500
     assert 0.0 < discarded < 1.0
@@ -221,15 +221,15 @@ def test_limits_outside_their_range_are_refused(convert, field, value):
 
 
 def test_no_hypothesis_at_all_is_refused():
-    with pytest.raises(InputError, match="max_hyps"):
-        lmb_to_glmb(LMB.empty(2), max_hyps=0)
+    with pytest.raises(InputError, match="max_hypotheses"):
+        lmb_to_glmb(LMB.empty(2), max_hypotheses=0)
 
 
 @pytest.mark.lanes
 def test_densities_of_no_target():
     assert marginalise(GLMB.empty(4)).num_hyps == 1
     assert glmb_to_lmb(GLMB.empty(4)).tracks.num_tracks == 0
-    glmb, discarded = lmb_to_glmb(LMB.empty(4), max_hyps=5)
+    glmb, discarded = lmb_to_glmb(LMB.empty(4), max_hypotheses=5)
     glmb.validate()
     assert (glmb.num_hyps, discarded) == (1, 0.0)
 
@@ -240,6 +240,6 @@ def test_conversions_leave_their_input_alone(limits):
     glmb = random_glmb(np.random.default_rng(1), 4, 12, 3)
     before = [array.copy() for array in (*glmb.tracks.to_kernel(), *glmb.to_kernel()[1:])]
     marginalise(glmb, **limits)
-    lmb_to_glmb(glmb_to_lmb(glmb, **limits), max_hyps=5)
+    lmb_to_glmb(glmb_to_lmb(glmb, **limits), max_hypotheses=5)
     for array, copy in zip((*glmb.tracks.to_kernel(), *glmb.to_kernel()[1:]), before, strict=True):
         assert np.array_equal(array, copy)

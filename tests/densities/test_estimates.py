@@ -47,7 +47,7 @@ def test_map_estimate_of_a_glmb(glmb):
 
 @given(lmbs())
 def test_map_estimate_of_an_lmb_is_that_of_its_glmb(lmb):
-    estimate, other = map_estimate(lmb), map_estimate(lmb_to_glmb(lmb, max_hyps=10**6)[0])
+    estimate, other = map_estimate(lmb), map_estimate(lmb_to_glmb(lmb, max_hypotheses=10**6)[0])
     estimate.validate()
     assert _labels(estimate) == _labels(other)
     np.testing.assert_allclose(estimate.means, other.means)

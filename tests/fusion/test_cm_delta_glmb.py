@@ -184,7 +184,7 @@ def test_a_cap_reports_the_weight_beyond_it():
     rng = np.random.default_rng(11)
     beliefs = full_glmbs(2, rng)
     full, _ = CmDeltaGlmb(HALVES).fuse(beliefs)
-    capped, info = CmDeltaGlmb(HALVES, limits=FusionLimits(max_hyps=2)).fuse(beliefs)
+    capped, info = CmDeltaGlmb(HALVES, limits=FusionLimits(max_hypotheses=2)).fuse(beliefs)
     capped.validate()
     assert capped.num_hyps == 2
     assert info.discarded_weight == pytest.approx(np.exp(full.hyp_log_weights[2:]).sum(), rel=1e-12)
@@ -205,8 +205,8 @@ def test_options_that_cannot_be_used():
         CmDeltaGlmb(HALVES, missing_log_weight=0.5)
     with pytest.raises(InputError, match="max_components"):
         CmDeltaGlmb([0.125] * 8, "component_wise")
-    with pytest.raises(InputError, match="max_hyps"):
-        CmDeltaGlmb(HALVES, limits=FusionLimits(max_hyps=0))
+    with pytest.raises(InputError, match="max_hypotheses"):
+        CmDeltaGlmb(HALVES, limits=FusionLimits(max_hypotheses=0))
 
 
 def test_beliefs_that_cannot_be_fused():

@@ -80,4 +80,4 @@ def can_be_laid_out(
     sets = [set(own.sets) for own in posteriors]
     # Stand-ins for missing sets are the only mixtures, and powers of single Gaussians are exact.
     exact = fusion.mixture_power == "moment_matched" or all(own == sets[0] for own in sets)
-    return exact and fusion.mixture_power != "quadrature" and len(set().union(*sets)) <= fusion.limits.max_hyps
+    return exact and fusion.mixture_power != "quadrature" and len(set().union(*sets)) <= fusion.limits.max_hypotheses

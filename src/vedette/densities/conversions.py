@@ -68,15 +68,15 @@ def glmb_to_lmb(
     )
 
 
-def lmb_to_glmb(lmb: LMB, *, max_hyps: int) -> tuple[GLMB, float]:
-    """GLMB of the `max_hyps` most probable label subsets of an LMB, and the weight of those left out.
+def lmb_to_glmb(lmb: LMB, *, max_hypotheses: int) -> tuple[GLMB, float]:
+    """GLMB of the `max_hypotheses` most probable label subsets of an LMB, and the weight of those left out.
 
     The GLMB shares the LMB's track table, and its weights are normalised over the subsets kept, which come by
-    descending weight. Subsets of probability zero are not listed. Raises `InputError` for a `max_hyps` below 1.
+    descending weight. Subsets of probability zero are not listed. Raises `InputError` for a `max_hypotheses` below 1.
     """
-    if max_hyps < 1:
-        raise InputError(f"max_hyps: expected at least 1; got {max_hyps}")
-    glmb, discarded_weight = kernels.lmb_to_glmb(lmb.to_kernel(), int(max_hyps))
+    if max_hypotheses < 1:
+        raise InputError(f"max_hypotheses: expected at least 1; got {max_hypotheses}")
+    glmb, discarded_weight = kernels.lmb_to_glmb(lmb.to_kernel(), int(max_hypotheses))
     return GLMB.from_kernel(glmb), float(discarded_weight)
 
 

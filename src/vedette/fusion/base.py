@@ -60,14 +60,14 @@ class FusionLimits(NamedTuple):
     power and after the fusion (dropped below the weight; merged within the Mahalanobis distance; the heaviest kept).
     A `merge_distance` of None is 2 for component-wise powers and 0.5 for quadrature. Not used with moment matching.
     max_combinations: bound on the combinations of components of one label, max_components^sensors.
-    max_hyps: label sets kept in a fused GLMB.
+    max_hypotheses: label sets kept in a fused GLMB.
     """
 
     log_min_component_weight: float = math.log(1e-5)
     merge_distance: float | None = None
     max_components: int = 4
     max_combinations: int = 4096
-    max_hyps: int = 1000
+    max_hypotheses: int = 1000
 
 
 class PowerRule(NamedTuple):
@@ -94,7 +94,7 @@ def check_power(mixture_power: str, limits: FusionLimits, num_sensors: int) -> N
     """Raise `InputError` for an unknown power of mixtures or limits that cannot be kept."""
     if mixture_power not in MIXTURE_POWERS:
         raise InputError(f"mixture_power: expected one of {', '.join(MIXTURE_POWERS)}; got {mixture_power!r}")
-    for name in ("max_components", "max_hyps"):
+    for name in ("max_components", "max_hypotheses"):
         if getattr(limits, name) < 1:
             raise InputError(f"limits.{name}: expected at least 1; got {getattr(limits, name)}")
     combinations = limits.max_components**num_sensors

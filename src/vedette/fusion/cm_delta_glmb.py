@@ -78,7 +78,7 @@ class CmDeltaGlmb:
         tracks, log_overlaps = fused_tracks(aligned.labels, aligned.chosen, weights, aligned.tracks, rule)
         log_weights = aligned.log_weights @ weights
         log_weights = log_weights + np.bincount(aligned.set_of_member, log_overlaps, len(log_weights))
-        fused, discarded_weight = _heaviest(aligned, tracks, log_weights, self.limits.max_hyps)
+        fused, discarded_weight = _heaviest(aligned, tracks, log_weights, self.limits.max_hypotheses)
         return fused, FusionInfo(
             num_missing_sets=int(np.count_nonzero(~aligned.held)),
             num_missing_labels=aligned.num_missing_labels,
@@ -101,10 +101,10 @@ def _marginalised(belief: GLMB, rule: PowerRule) -> Glmb:
     )
 
 
-def _heaviest(aligned: Aligned, tracks: TrackTable, log_weights: Floats, max_hyps: int) -> tuple[GLMB, float]:
-    """Normalised GLMB of the `max_hyps` heaviest label sets, and the weight of the others."""
+def _heaviest(aligned: Aligned, tracks: TrackTable, log_weights: Floats, max_hypotheses: int) -> tuple[GLMB, float]:
+    """Normalised GLMB of the `max_hypotheses` heaviest label sets, and the weight of the others."""
     order = np.argsort(-log_weights, kind="stable")
-    kept, cut = order[:max_hyps], order[max_hyps:]
+    kept, cut = order[:max_hypotheses], order[max_hypotheses:]
     log_kept = log_sum(log_weights[kept])
     sizes = np.diff(aligned.set_offsets)[kept]
     hyp_offsets = np.concatenate([np.zeros(1, np.int64), np.cumsum(sizes)])

@@ -129,11 +129,11 @@ def glmb_to_lmb(glmb: Glmb, log_min_weight: float, merge_distance: float, max_co
 
 
 @kernel
-def lmb_to_glmb(lmb: Lmb, max_hyps: int) -> tuple[Glmb, float]:
-    """GLMB of the `max_hyps` most probable label subsets of an LMB, by descending weight, and the weight left out.
+def lmb_to_glmb(lmb: Lmb, max_hypotheses: int) -> tuple[Glmb, float]:
+    """GLMB of the `max_hypotheses` most probable label subsets of an LMB, by descending weight, and the weight left out.
 
     The GLMB shares the LMB's track table; its weights are normalised. Subsets of weight zero are never listed, so with
-    a large `max_hyps` all the others are there and the weight left out is zero. Equal weights come in the order in
+    a large `max_hypotheses` all the others are there and the weight left out is zero. Equal weights come in the order in
     which the search finds them, which is the same every time.
     """
     num = len(lmb.existence_logit)
@@ -141,7 +141,7 @@ def lmb_to_glmb(lmb: Lmb, max_hyps: int) -> tuple[Glmb, float]:
     for i in range(num):
         costs[i] = abs(lmb.existence_logit[i])
         base -= math.log1p(math.exp(-costs[i]))
-    flips, previous, order, complete = smallest_sums(costs, max_hyps)
+    flips, previous, order, complete = smallest_sums(costs, max_hypotheses)
     num_hyps = len(order)
     hyp_offsets, hyp_log_weights = np.zeros(num_hyps + 1, np.int64), np.empty(num_hyps)
     hyp_tracks, flipped = np.empty(num_hyps * num, np.int64), np.zeros(num, np.int64)

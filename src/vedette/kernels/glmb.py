@@ -103,10 +103,10 @@ def finish_step(
     options = list_options(rows, scan, levels, sensor, truncation.gate)
     parents = _parents_with_births(prior, num_births, groups)
     children, cut = rank_children(
-        options, parents, len(scan), truncation.max_hyps, truncation.max_log_gap, truncation.max_nodes
+        options, parents, len(scan), truncation.max_hypotheses, truncation.max_log_gap, truncation.max_nodes
     )
     # A search that ran dry has left nothing out.
-    is_covered = len(children.parents) < truncation.max_hyps and not cut
+    is_covered = len(children.parents) < truncation.max_hypotheses and not cut
     return _conclude(children, parents, rows, options, len(scan), truncation, log_clutter, num_raised, cut, is_covered)
 
 
@@ -132,9 +132,16 @@ def _conclude(
     order = heaviest_first(children, merge_equal(children, options.columns))
     needed = filled_ints(len(children.parents), 0)
     if covering:
-        half = truncation.max_hyps // 2
+        half = truncation.max_hypotheses // 2
         mark_heaviest(
-            children, order, themes, num_themes, truncation.max_hyps - half, half, truncation.max_track_gap, needed
+            children,
+            order,
+            themes,
+            num_themes,
+            truncation.max_hypotheses - half,
+            half,
+            truncation.max_track_gap,
+            needed,
         )
     kept = keep_heaviest(children, order, needed, truncation, parents.groups)
     posterior, log_total = assemble(children, kept, parents, rows, options)

@@ -199,7 +199,7 @@ def finish_lmb(
     options = list_options(rows, scan, levels, sensor, truncation.gate)
     marginals = np.empty(options.offsets[-1])
     log_total, num_ranked = option_marginals(
-        options, len(scan), truncation.max_hyps, truncation.max_log_gap, truncation.max_nodes, marginals
+        options, len(scan), truncation.max_hypotheses, truncation.max_log_gap, truncation.max_nodes, marginals
     )
     logits = np.empty(len(rows.log_absent))
     fill_existence(options, marginals, logits)

@@ -64,7 +64,7 @@ def _rank(options: Options, parents: Parents, num_columns: int, caps: Truncation
         return False
     start_search(options, parents, work.search)
     if not run_search(
-        options, parents, caps.max_hyps, caps.max_log_gap, caps.max_nodes, work.search, work.children, work.used
+        options, parents, caps.max_hypotheses, caps.max_log_gap, caps.max_nodes, work.search, work.children, work.used
     ):
         return False
     return add_missing_groups(options, parents, work.search.work, work.seen, work.children, work.used)

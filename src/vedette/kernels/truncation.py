@@ -16,12 +16,12 @@ from vedette.kernels.types import Ints
 
 
 class Truncation(NamedTuple):
-    """What is kept. max_hyps: number of hypotheses. max_log_gap: log weight below the best. gate: squared Mahalanobis
+    """What is kept. max_hypotheses: how many. max_log_gap: log weight below the best. gate: squared Mahalanobis
     distance. log_clutter_floor: least log clutter intensity. max_nodes: bound on the ranking search. max_track_gap: log
     weight below the best to which a hypothesis is kept as the only one of a track; 0: none is.
     """
 
-    max_hyps: int
+    max_hypotheses: int
     max_log_gap: float
     gate: float
     log_clutter_floor: float
@@ -93,7 +93,7 @@ def keep_heaviest(children: Children, order: Ints, needed: Ints, truncation: Tru
     """The children to keep of those in `order`, heaviest first: those needed; of the others, by number and gap; and the
     heaviest of each group.
     """
-    others = truncation.max_hyps
+    others = truncation.max_hypotheses
     for child in order:
         others -= needed[child]
     kept = np.empty(len(order), np.int64)

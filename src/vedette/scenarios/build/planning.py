@@ -52,7 +52,7 @@ def build_planning_settings(section: Control) -> PlanningSettings:
         num_samples=section.num_samples,
         ideal_measurements=section.ideal_measurements,
         detection_threshold=section.detection_threshold,
-        max_prior_hypotheses=limits.prior_hypotheses,
+        max_prior_hypotheses=limits.max_prior_hypotheses,
         limits=replace(
             planning_limits(),
             max_hypotheses=limits.max_hypotheses,

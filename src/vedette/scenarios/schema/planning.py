@@ -26,7 +26,7 @@ class CauchySchwarzReward(Section):
 class PlanningLimits(Section):
     """How much of the density the planner works with."""
 
-    prior_hypotheses: Count = Field(default=10, description="Most hypotheses at the start of the horizon [-].")
+    max_prior_hypotheses: Count = Field(default=10, description="Most hypotheses at the start of the horizon [-].")
     max_hypotheses: Count = Field(default=40, description="Most hypotheses after each step of the horizon [-].")
     min_relative_weight: Share = Field(
         default=1e-5, description="Hypotheses lighter than this times the heaviest are dropped [-]."
