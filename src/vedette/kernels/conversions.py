@@ -130,11 +130,12 @@ def glmb_to_lmb(glmb: Glmb, log_min_weight: float, merge_distance: float, max_co
 
 @kernel
 def lmb_to_glmb(lmb: Lmb, max_hypotheses: int) -> tuple[Glmb, float]:
-    """GLMB of the `max_hypotheses` most probable label subsets of an LMB, by descending weight, and the weight left out.
+    """GLMB of the `max_hypotheses` most probable label subsets of an LMB, by descending weight, and the
+    weight left out.
 
     The GLMB shares the LMB's track table; its weights are normalised. Subsets of weight zero are never listed, so with
-    a large `max_hypotheses` all the others are there and the weight left out is zero. Equal weights come in the order in
-    which the search finds them, which is the same every time.
+    a large `max_hypotheses` all the others are there and the weight left out is zero. Equal weights come in the order
+    in which the search finds them, which is the same every time.
     """
     num = len(lmb.existence_logit)
     costs, base = np.empty(num), 0.0
