@@ -154,7 +154,7 @@ def scenarios(draw: st.DrawFn) -> Data:
         ideal_measurements=st.sampled_from(["ideal", "expected", "sampled"]),
         detection_threshold=probability,
         reward=section("cauchy_schwarz", unit_volume=st.just("reference") | positive),
-        limits=section(prior_hypotheses=counts, max_hypotheses=counts),
+        limits=section(max_prior_hypotheses=counts, max_hypotheses=counts),
     )
     return {
         "name": draw(names),
