@@ -59,7 +59,7 @@ def range_dependent_noise(
     sigma_bearing: float | None = None,
     eta_bearing: float = 0.0,
 ) -> NoiseModel:
-    """Noise that grows with the distance d of the target (paper section IV; paper-notes row 3).
+    """Noise that grows with the distance d of the target (paper section IV; paper-notes 3).
 
     Standard deviations sigma_range + eta_range d^2 and sigma_bearing + eta_bearing d. With only `sigma_bearing` given
     it serves a bearing-only sensor, with only `sigma_range` a range-only one, with both [bearing, range].

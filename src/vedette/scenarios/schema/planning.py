@@ -13,7 +13,7 @@ from vedette.scenarios.schema.world import Steps
 
 
 class CauchySchwarzReward(Section):
-    """Cauchy-Schwarz divergence between the predicted and the updated density (paper eq. 10 to 15)."""
+    """Cauchy-Schwarz divergence between the predicted and the updated density (paper eqs. 5, 8 and 13 to 17)."""
 
     kind: Literal["cauchy_schwarz"] = Field(default="cauchy_schwarz", description="Kind of reward [-].")
     unit_volume: Literal["reference"] | Annotated[float, Field(gt=0.0)] = Field(

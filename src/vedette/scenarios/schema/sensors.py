@@ -49,7 +49,7 @@ Measurement = Annotated[
 
 
 class RangeDependentNoise(Section):
-    """Standard deviations that grow with the distance d (paper, section V), evaluated at the predicted state.
+    """Standard deviations that grow with the distance d (paper section IV), evaluated at the predicted state.
 
     Range: sigma_range + eta_range d^2. Bearing: sigma_bearing + eta_bearing d.
     """
@@ -83,7 +83,7 @@ Noise = Annotated[RangeDependentNoise | ConstantNoise | CustomNoise, Field(discr
 
 
 class GaussianDetection(Section):
-    """Probability of detection exp(-d^2 / (2 sigma^2)) at distance d (paper, section V)."""
+    """Probability of detection exp(-d^2 / (2 sigma^2)) at distance d (paper section IV)."""
 
     kind: Literal["gaussian"] = Field(default="gaussian", description="Kind of detection [-].")
     sigma: float = Field(default=10000.0, gt=0.0, description="Distance scale of the fall of detection [m].")

@@ -115,7 +115,7 @@ class FusionLimits(Section):
 
 
 class Fusion(Section):
-    """How the sensors' densities become one: generalised covariance intersection (paper, section III)."""
+    """How the sensors' densities become one: generalised covariance intersection (paper section II-D)."""
 
     kind: Literal["cm_delta_glmb", "clmb", "none"] = Field(
         default="cm_delta_glmb",
