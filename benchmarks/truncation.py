@@ -47,8 +47,6 @@ def main() -> None:
     options = parser.parse_args()
     folder = recorded.sources().get("others", recorded.OWN)
     seeds = recorded.seeds(options.family, folder)
-    if not seeds:
-        raise SystemExit(f"no recorded scans in {recorded.folder()}; name their folder in VEDETTE_RECORDED_SCANS")
     original = recorded.load(options.family, seeds[0], folder)
     draws = [recorded.redraw(original, rng=np.random.default_rng(draw)) for draw in range(options.draws)]
     print(f"{'hypotheses kept':28s}  OSPA m          worst  ms a scan")

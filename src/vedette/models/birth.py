@@ -46,10 +46,12 @@ class BirthModel:
 
     @property
     def num_sites(self) -> int:
+        """Number of birth sites."""
         return len(self.existence)
 
     @property
     def state_dim(self) -> int:
+        """Length of a target's state."""
         return int(self.means.shape[1])
 
     def is_active(self, step: int) -> bool:

@@ -65,8 +65,10 @@ def range_dependent_noise(
     it serves a bearing-only sensor, with only `sigma_range` a range-only one, with both [bearing, range].
 
     Args:
-        sigma_range: m, above 0 (paper: 10). eta_range: 1/m (paper: 5e-5).
-        sigma_bearing: rad, above 0 (paper: pi/180). eta_bearing: rad/m (paper: 5e-6).
+        sigma_range: m, above 0 (paper: 10).
+        eta_range: 1/m (paper: 5e-5).
+        sigma_bearing: rad, above 0 (paper: pi/180).
+        eta_bearing: rad/m (paper: 5e-6).
     """
     ranges = _growth("range", sigma_range, eta_range)
     bearings = _growth("bearing", sigma_bearing, eta_bearing)

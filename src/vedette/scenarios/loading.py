@@ -34,6 +34,7 @@ class Scenario:
 
     @property
     def name(self) -> str:
+        """Name that the scenario gives itself."""
         return self.model.name
 
     @property

@@ -18,6 +18,7 @@ def with_fields(scenario: Scenario, fields: Mapping[str, Any]) -> Scenario:
     """The scenario with other values at some fields, checked as a whole as if its file had said so.
 
     Args:
+        scenario: what is changed; it stays as it is.
         fields: values by path. A path is the keys that lead to a field, joined by dots; a number counts the items of a
             list from 0, and `*` stands for each of them. A value may be a whole section. Sensors hold what
             `sensor_defaults` gave them, so what they share is set by `sensors.*`.

@@ -46,12 +46,14 @@ class Table:
     source: str
 
     def column(self, name: str) -> Sequence[Any]:
+        """The cells of a column, or an error that says which there are."""
         if name not in self.columns:
             have = ", ".join(self.columns) or "none"
             raise InputError(f"{self.source}: expected a column {name!r}; got columns {have}")
         return self.columns[name]
 
     def fault(self, index: int, name: str, expected: str) -> InputError:
+        """An error that names file, row and column of a cell."""
         got = self.columns[name][index]
         return InputError(f"{self.source}, row {self.rows[index]}, column {name!r}: expected {expected}; got {got!r}")
 
