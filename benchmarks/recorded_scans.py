@@ -3,7 +3,8 @@
     python benchmarks/recorded_scans.py [--markdown]
 
 Of this project's own files (tests/filters/recordings), and of those of other programs where they are at hand: in the
-folder that VEDETTE_RECORDED_SCANS names, or in shared/reference beside the checkout (docs/recorded-scans.md). OSPA with c = 100 m and p = 1, mean over 100 scans, then
+folder that VEDETTE_RECORDED_SCANS names, or in shared/reference beside the checkout (docs/recorded-scans.md).
+OSPA with c = 100 m and p = 1, mean over 100 scans, then
 mean and standard deviation over the files; CPU time of a step, median over scans and files.
 """
 

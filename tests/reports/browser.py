@@ -111,15 +111,15 @@ class Browser:
         message: dict[str, Any] = json.loads(text)
         return message
 
-    def open(self, path: Path, *, width: int = 1280, height: int = 900, dark: bool = False) -> Page:
-        """Load a file into a new tab."""
-        return Page(self, path, width, height, dark)
+    def open(self, path: Path, *, width: int = 1280, height: int = 900, dark: bool = False, query: str = "") -> Page:
+        """Load a file into a new tab, with a query in its address."""
+        return Page(self, path, width, height, dark, query)
 
 
 class Page:
     """A tab with a file in it."""
 
-    def __init__(self, browser: Browser, path: Path, width: int, height: int, dark: bool) -> None:
+    def __init__(self, browser: Browser, path: Path, width: int, height: int, dark: bool, query: str) -> None:
         self._browser = browser
         target = browser.call("Target.createTarget", url="about:blank")["targetId"]
         self._session: str = browser.call("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
@@ -132,7 +132,7 @@ class Page:
         )  # fmt: skip
         scheme = {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}
         self.call("Emulation.setEmulatedMedia", features=[scheme])
-        self.url = path.resolve().as_uri()
+        self.url = path.resolve().as_uri() + (f"?{query}" if query else "")
         self.call("Page.navigate", url=self.url)
         browser.wait_for("Page.loadEventFired", self._session)
 
