@@ -10,11 +10,21 @@ import numpy as np
 
 from vedette.errors import InputError
 from vedette.kernels.types import Floats
+from vedette.text import printable
+
+
+def plain(value: Any) -> str:
+    """A value as a person would write it: numbers of NumPy as numbers, also inside lists."""
+    with np.printoptions(legacy="1.25"):  # from 2.0 on the repr of a number names its type
+        try:
+            return repr(value.tolist() if isinstance(value, np.ndarray) else value)
+        except ValueError:  # a whole number of more digits than Python writes
+            return "a number of thousands of digits"
 
 
 def reject(field: str, expected: str, got: Any) -> InputError:
     """The error for one bad argument; a long value is cut short."""
-    text = got if isinstance(got, str) else repr(got)
+    text = printable(got if isinstance(got, str) else plain(got))
     return InputError(f"{field}: expected {expected}; got {text if len(text) <= 200 else text[:197] + '...'}")
 
 

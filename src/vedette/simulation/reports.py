@@ -116,8 +116,8 @@ def read_table(path: str | Path) -> Table:
     file = Path(path)
     if file.suffix.lower() not in (".csv", ".parquet"):
         raise InputError(f"{file}: expected a .csv or .parquet file")
-    if not file.is_file():
-        raise InputError(f"{file}: expected a file; there is none")
+    if not os.path.isfile(file):  # a name can be too long, or hold what no name can: for pathlib, an error
+        raise InputError(f"{named}: expected a file; there is none")
     return _read_csv(file) if file.suffix.lower() == ".csv" else _read_parquet(file)
 
 
