@@ -43,17 +43,17 @@ def check_message(error: VedetteError) -> None:
 
 
 @contextmanager
-def bounded(what: Any) -> Iterator[None]:
+def bounded(what: Any, seconds: float = SECONDS) -> Iterator[None]:
     """Fail where the body takes far longer than anything sensible does."""
     if not hasattr(signal, "setitimer") or threading.current_thread() is not threading.main_thread():
         yield
         return
 
     def stop(*_: Any) -> None:
-        raise AssertionError(f"still at work after {SECONDS} s: {str(what)[:500]}")
+        raise AssertionError(f"still at work after {seconds} s: {str(what)[:500]}")
 
     before = signal.signal(signal.SIGALRM, stop)
-    signal.setitimer(signal.ITIMER_REAL, SECONDS)
+    signal.setitimer(signal.ITIMER_REAL, seconds)
     try:
         yield
     finally:

@@ -37,6 +37,9 @@ from vedette.simulation.recorded import RecordedTargets
 Check = Callable[[np.random.Generator], object]
 TryCases = Callable[[Check, int], None]
 
+# A first run compiles kernels.
+SECONDS_TO_RUN = 900
+
 pytestmark = pytest.mark.fuzz
 
 SHIPS = "time,id,longitude,latitude\n" + "".join(
@@ -177,7 +180,7 @@ def test_what_is_accepted_can_be_run(try_cases: TryCases, folder: Path) -> None:
     def check(rng: np.random.Generator) -> None:
         data = pressed(rng, small(rng))
         path.write_text(json.dumps(data, indent=1))
-        with bounded(data):
+        with bounded(data, SECONDS_TO_RUN):
             loaded = outcome(lambda: load_scenario(path))
             if loaded is None:
                 return
