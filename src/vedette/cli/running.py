@@ -66,8 +66,11 @@ def run(
     from vedette.evaluation.runs import run_scenario
     from vedette.scenarios import load_scenario
     from vedette.scenarios.dumping import dump_scenario
+    from vedette.scenarios.record_cautions import cautions
 
     loaded = load_scenario(scenario)
+    for caution in cautions(loaded):
+        typer.echo(f"{scenario}: warning: {caution}", err=True)
     if out is not None:
         from vedette.simulation.storage import check_free
 

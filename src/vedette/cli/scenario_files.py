@@ -76,12 +76,16 @@ def check(files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="S
     Each by file, line, column and field, with what was expected and what came.
     """
     from vedette.scenarios import load_scenario
+    from vedette.scenarios.record_cautions import cautions
     from vedette.scenarios.summary import one_line
 
     faulty = False
     for file in files:
         try:
-            typer.echo(f"{file}: {one_line(load_scenario(file))}")
+            loaded = load_scenario(file)
+            typer.echo(f"{file}: {one_line(loaded)}")
+            for caution in cautions(loaded):
+                typer.echo(f"{file}: warning: {caution}")
         except (ScenarioError, InputError) as error:
             typer.echo(str(error))
             faulty = True
