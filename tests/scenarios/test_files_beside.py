@@ -12,7 +12,7 @@ import pytest
 from pyarrow import parquet
 
 from scenarios.minimal import changed
-from vedette.errors import InputError, ScenarioError
+from vedette.errors import ScenarioError
 from vedette.scenarios import Scenario, load_scenario, parse_scenario
 from vedette.scenarios.build import build_motion, build_times, build_truth_source
 from vedette.scenarios.dumping import dump_scenario
@@ -104,8 +104,8 @@ def test_the_running_program_is_no_module_to_take_models_from(monkeypatch: pytes
 
 def test_a_recorded_file_that_is_no_table(ships: Path) -> None:
     (ships / "broken.csv").write_text("time,id,x,y\n0,a,1\n", encoding="utf-8")
-    with pytest.raises(InputError, match=r"broken\.csv, row 2: expected 4 cells"):
-        truth_of(load_scenario(written(ships, "  {kind: recorded, path: broken.csv}")))
+    with pytest.raises(ScenarioError, match=r"broken\.csv, row 2: expected 4 cells"):
+        load_scenario(written(ships, "  {kind: recorded, path: broken.csv}"))
 
 
 def test_a_kept_copy_still_finds_its_files(ships: Path) -> None:
