@@ -117,7 +117,7 @@ def test_a_kept_copy_still_finds_its_files(ships: Path) -> None:
 
 
 def test_a_kept_copy_still_finds_its_models(tmp_path: Path) -> None:
-    (tmp_path / "own.py").write_text("", encoding="utf-8")
+    (tmp_path / "own.py").write_text("motion = None", encoding="utf-8")
     custom = "{kind: custom, python: 'own.py:motion', arguments: {kind: custom, python: 'a.py:b'}, state_dim: 4}"
     text = changed(("{kind: constant_velocity, sigma_v: 1.0}", custom))
     motion = parse_scenario(dump_scenario(parse_scenario(text, folder=tmp_path), folder=tmp_path)).motion
