@@ -1,4 +1,4 @@
-"""Names of any length where there is little room."""
+"""Numbers of things in words, and names of any length where there is little room."""
 
 from __future__ import annotations
 
@@ -6,6 +6,11 @@ import unicodedata
 from collections.abc import Sequence
 
 ELLIPSIS = "\N{HORIZONTAL ELLIPSIS}"
+
+
+def counted(number: int, thing: str) -> str:
+    """`1 sensor`, `2 sensors`."""
+    return f"{number} {thing}" if number == 1 else f"{number} {thing}s"
 
 
 def display_width(text: str) -> int:

@@ -16,10 +16,12 @@ from vedette.fusion.base import (
     FusionLimits,
     MixturePower,
     PowerRule,
+    by_sensor,
     check_beliefs,
     check_floor,
     check_power,
     check_weights,
+    count_lost,
     power_rule,
 )
 from vedette.fusion.tracks import fused_tracks, take_tracks
@@ -79,11 +81,16 @@ class CmDeltaGlmb:
         log_weights = aligned.log_weights @ weights
         log_weights = log_weights + np.bincount(aligned.set_of_member, log_overlaps, len(log_weights))
         fused, discarded_weight = _heaviest(aligned, tracks, log_weights, self.limits.max_hypotheses)
+        log_normaliser = float(log_sum(log_weights))
+        of_sensors = aligned.existence(np.where(aligned.held, aligned.log_weights, -math.inf))
+        of_fused = aligned.existence((log_weights - log_normaliser)[:, None])[:, 0]
         return fused, FusionInfo(
-            num_missing_sets=int(np.count_nonzero(~aligned.held)),
-            num_missing_labels=aligned.num_missing_labels,
+            missing_sets=by_sensor(np.count_nonzero(~aligned.held, axis=0), active, len(beliefs)),
+            missing_labels=by_sensor(aligned.num_missing_labels, active, len(beliefs)),
+            num_sets=len(aligned.held),
+            num_lost_labels=count_lost(of_sensors, of_fused),
             empty_intersection=not bool(aligned.held.all(axis=1).any()),
-            log_normaliser=float(log_sum(log_weights)),
+            log_normaliser=log_normaliser,
             discarded_weight=discarded_weight,
         )
 

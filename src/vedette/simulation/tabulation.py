@@ -12,6 +12,7 @@ from vedette.densities.estimates import Estimate
 from vedette.errors import InputError
 from vedette.kernels.types import Floats, Ints
 from vedette.simulation.columns import Columns, Kind
+from vedette.simulation.health import FUSION_COLUMNS, SENSOR_COLUMNS, Health
 from vedette.simulation.records import Decision, RunRecord
 from vedette.simulation.truth import Truth
 
@@ -26,10 +27,10 @@ _COUNTS = {"num_targets": Kind.INTEGER, "num_estimates": Kind.INTEGER}
 
 # The tables of a run and their columns; scans are counted from 0. A row of `tracks` is one estimate at one scan.
 TABLES: dict[str, dict[str, Kind]] = {
-    "scans": {**_TIME, **_COUNTS, **dict.fromkeys(OSPA_COLUMNS, Kind.NUMBER)},
+    "scans": {**_TIME, **_COUNTS, **dict.fromkeys(OSPA_COLUMNS, Kind.NUMBER), **FUSION_COLUMNS},
     "truth": {**_TIME, "target": Kind.INTEGER, "state": Kind.VECTOR},
     "tracks": {**_TIME, **_LABEL, "existence": Kind.NUMBER, "mean": Kind.VECTOR, "cov": Kind.VECTOR},
-    "sensors": {**_TIME, "sensor": Kind.INTEGER, **dict.fromkeys(POSE_COLUMNS, Kind.NUMBER)},
+    "sensors": {**_TIME, "sensor": Kind.INTEGER, **dict.fromkeys(POSE_COLUMNS, Kind.NUMBER), **SENSOR_COLUMNS},
 }
 
 
@@ -46,6 +47,7 @@ def check_record(record: RunRecord) -> None:
             raise InputError(f"record.{name}: expected one entry for each of {num_scans} scans; got {length}")
     if record.ospa.shape != (num_scans, 3):
         raise InputError(f"record.ospa: expected shape {(num_scans, 3)}; got {record.ospa.shape}")
+    record.health.check(num_scans, record.num_sensors)
     for decision in record.decisions:
         decision.plan.validate()
 
@@ -56,8 +58,9 @@ def tables_of(record: RunRecord) -> Tables:
 
 
 def run_facts(record: RunRecord) -> dict[str, Any]:
-    """What names a run: scenario, planner, seed and number."""
-    return {"scenario": record.scenario, "planner": record.planner, "seed": record.seed, "run": record.run}
+    """What names a run: scenario, planner, seed and number; and why it stopped early, null where it did not."""
+    names = {"scenario": record.scenario, "planner": record.planner, "seed": record.seed, "run": record.run}
+    return {**names, "stopped": record.stopped}
 
 
 def record_of(
@@ -83,7 +86,9 @@ def record_of(
         estimates=_estimates_of(tables["tracks"], len(times)),
         decisions=decisions,
         ospa=np.stack([scans[name] for name in OSPA_COLUMNS], axis=1),
+        health=Health.from_columns(sensors, scans, len(times)),
         timings=timings,
+        stopped=None if facts["stopped"] is None else str(facts["stopped"]),
     )
 
 
@@ -94,6 +99,7 @@ def _scans(record: RunRecord) -> Columns:
         "num_targets": np.diff(record.truth.offsets),
         "num_estimates": _counts(record),
         **dict(zip(OSPA_COLUMNS, record.ospa.T, strict=True)),
+        **record.health.fusion_columns(),
     }
 
 
@@ -136,7 +142,7 @@ def _sensors(record: RunRecord) -> Columns:
     scans = np.repeat(np.arange(num_scans), num_sensors)
     sensors = np.tile(np.arange(num_sensors), num_scans)
     poses = record.poses.reshape(num_scans * num_sensors, 3)
-    columns = dict(zip(POSE_COLUMNS, poses.T, strict=True))
+    columns = dict(zip(POSE_COLUMNS, poses.T, strict=True)) | record.health.sensor_columns()
     return {"scan": scans, "time_s": record.times[scans], "sensor": sensors, **columns}
 
 
