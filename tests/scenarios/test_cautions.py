@@ -95,7 +95,9 @@ def test_what_a_sensor_sees_is_what_its_model_says(detection: dict[str, object],
     points = np.random.default_rng(1).uniform(-200.0, 200.0, (500, 2))
     pose = np.array([10.0, -20.0, np.radians(130.0)])
     expected = build_detection(sensor.detection, tmp_path).prob(np.c_[points, np.zeros((500, 2))], pose)
-    np.testing.assert_allclose(prob_detection(sensor, points), expected, atol=1e-12)
+    found = prob_detection(sensor, points)
+    assert found is not None
+    np.testing.assert_allclose(found, expected, atol=1e-12)
 
 
 def test_check_run_and_a_dry_run_warn_and_go_on(tmp_path: Path) -> None:

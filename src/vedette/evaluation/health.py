@@ -123,7 +123,7 @@ def _of_fusion(health: HealthSummary, scans: Callable[[float], str]) -> Iterator
         yield (
             f"at {scans(health.lost)} GCI lost a target that one sensor was sure of and another was not (up to "
             f"{counted(health.worst_lost, 'target')} at a scan)",
-            True,
+            health.lost > _MUCH,
         )
     if health.disjoint:
         yield f"at {scans(health.disjoint)} the sensors had no label set in common", True

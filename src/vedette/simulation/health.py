@@ -65,7 +65,8 @@ class Health:
     def unreported(cls, num_scans: int, num_sensors: int) -> Health:
         """All zero, to be filled in scan by scan."""
         shapes = {name: (num_scans,) if name in FUSION_COLUMNS else (num_scans, num_sensors) for name in _DTYPES}
-        return cls(**{name: np.zeros(shape, _DTYPES[name]) for name, shape in shapes.items()})
+        arrays: dict[str, Any] = {name: np.zeros(shape, _DTYPES[name]) for name, shape in shapes.items()}
+        return cls(**arrays)
 
     def first(self, num_scans: int) -> Health:
         """Of the first scans alone."""
