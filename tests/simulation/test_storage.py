@@ -91,9 +91,9 @@ def test_the_same_run_gives_the_same_bytes(tmp_path: Path) -> None:
 
 def test_files_are_open_and_described(saved: Path) -> None:
     assert sorted(path.name for path in saved.iterdir()) == sorted([*FILES, "manifest.json", "scenario.yaml"])
-    assert (saved / "scans.csv").read_text().startswith("scan,time_s,num_targets,num_estimates,ospa_m,localisation_m")
+    assert (saved / "scans.csv").read_text().startswith("step,time_s,num_targets,num_estimates,ospa_m,localisation_m")
     assert (
-        (saved / "sensors.csv").read_text().startswith("scan,time_s,sensor,x_m,y_m,heading_rad,log_likelihood,num_hyp")
+        (saved / "sensors.csv").read_text().startswith("step,time_s,sensor,x_m,y_m,heading_rad,log_likelihood,num_hyp")
     )
     decision = json.loads((saved / "decisions.json").read_text())[0]
     assert len(decision["chosen_headings_deg"]) == 2
@@ -193,10 +193,10 @@ def rewrite(saved: Path, file: str, old: str, new: str) -> None:
     [
         ("tracks.csv", "existence", "exists", "expected a column existence"),
         ("truth.csv", "-55.0", "west", "column state_0: expected numbers"),
-        ("truth.csv", "\n0,", "\n0.5,", "column scan: expected whole numbers"),
-        ("truth.csv", "\n0,", "\n39,", "expected rows in order"),
-        ("sensors.csv", "\n0,1.0,0,-745.0,830.0,0.0,nan", "", "rows as long as"),
-        ("scans.csv", "\n0,1.0,3", "\n0,1.0,3,3", "rows as long as"),
+        ("truth.csv", "\n1,", "\n1.5,", "column step: expected whole numbers"),
+        ("truth.csv", "\n1,", "\n40,", "expected rows in order"),
+        ("sensors.csv", "\n1,1.0,0,-745.0,830.0,0.0,nan", "", "rows as long as"),
+        ("scans.csv", "\n1,1.0,3", "\n1,1.0,3,3", "rows as long as"),
         ("decisions.json", '"chosen"', '"choice"', "do not fit together"),
         ("decisions.json", '"sensors": [', '"sensors": [7, ', "reward table"),
     ],

@@ -112,7 +112,7 @@ class CampaignResults:
         return tables_of_runs(self.campaign, self.runs())
 
     def dataset(self) -> xarray.Dataset:
-        """Measures at each scan as arrays over cell, run and scan; see `vedette.campaigns.dataset`.
+        """Measures at each scan as arrays over cell, run and step; see `vedette.campaigns.dataset`.
 
         Raises `InputError` where xarray is not installed.
         """

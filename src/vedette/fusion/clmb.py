@@ -43,6 +43,9 @@ class Clmb:
     `FusionInfo`. A label in every hypothesis of a sensor's GLMB is certain there, and so in the fusion. (Truncation may
     have cut off the rest; to bound its certainty as its absence is bounded makes joint decisions worse, not better.)
 
+    Assumes that the sensors see the same part of the world and that a target has one label at all of them: what one
+    sensor surely sees is lost where another has none of its label, or does not see there.
+
     Attributes:
         weights: fusion weights, one a sensor, in the order of the beliefs; non-negative, sum 1. A sensor of weight 0
             takes no part.

@@ -41,6 +41,9 @@ class CmDeltaGlmb:
     the label at all, it is left out of the label's density and the other sensors' weights there are scaled to sum to
     one. A hypothesis of weight zero counts as missing. All this is counted in the `FusionInfo`.
 
+    Assumes that the sensors see the same part of the world and that a target has one label at all of them: what one
+    sensor surely sees is lost where another has no set with it, or does not see there.
+
     Attributes:
         weights: fusion weights, one a sensor, in the order of the beliefs; non-negative, sum 1. A sensor of weight 0
             takes no part.

@@ -16,7 +16,7 @@ class Decision:
     """A plan and the moment it was made.
 
     Attributes:
-        step: index of the scan after which the plan was made.
+        step: number of the scan, from 1, after which the plan was made.
         time: s.
         poses: (num_sensors, 3) poses [px, py, heading_rad] of the sensors at that moment.
         plan: the choice and its evidence.

@@ -21,11 +21,11 @@ Tables: TypeAlias = dict[str, Columns]
 OSPA_COLUMNS = ("ospa_m", "localisation_m", "cardinality_m")
 POSE_COLUMNS = ("x_m", "y_m", "heading_rad")
 
-_TIME = {"scan": Kind.INTEGER, "time_s": Kind.NUMBER}
+_TIME = {"step": Kind.INTEGER, "time_s": Kind.NUMBER}
 _LABEL = {"birth_step": Kind.INTEGER, "birth_site": Kind.INTEGER}
 _COUNTS = {"num_targets": Kind.INTEGER, "num_estimates": Kind.INTEGER}
 
-# The tables of a run and their columns; scans are counted from 0. A row of `tracks` is one estimate at one scan.
+# The tables of a run and their columns; `step` counts scans from 1. A row of `tracks` is one estimate at one scan.
 TABLES: dict[str, dict[str, Kind]] = {
     "scans": {**_TIME, **_COUNTS, **dict.fromkeys(OSPA_COLUMNS, Kind.NUMBER), **FUSION_COLUMNS},
     "truth": {**_TIME, "target": Kind.INTEGER, "state": Kind.VECTOR},
@@ -94,7 +94,7 @@ def record_of(
 
 def _scans(record: RunRecord) -> Columns:
     return {
-        "scan": np.arange(record.num_scans),
+        "step": np.arange(1, record.num_scans + 1),
         "time_s": record.times,
         "num_targets": np.diff(record.truth.offsets),
         "num_estimates": _counts(record),
@@ -106,11 +106,11 @@ def _scans(record: RunRecord) -> Columns:
 def _truth(record: RunRecord) -> Columns:
     scans = np.repeat(np.arange(record.num_scans), np.diff(record.truth.offsets))
     truth = record.truth
-    return {"scan": scans, "time_s": record.times[scans], "target": truth.ids, "state": truth.states}
+    return {"step": scans + 1, "time_s": record.times[scans], "target": truth.ids, "state": truth.states}
 
 
 def _truth_of(table: Mapping[str, Any], times: Floats) -> Truth:
-    return Truth(times, _offsets(table["scan"], len(times)), table["target"], table["state"])
+    return Truth(times, _offsets(table["step"], len(times)), table["target"], table["state"])
 
 
 def _tracks(record: RunRecord) -> Columns:
@@ -118,7 +118,7 @@ def _tracks(record: RunRecord) -> Columns:
     labels = np.concatenate([estimate.labels for estimate in record.estimates])
     covs = np.concatenate([estimate.covs for estimate in record.estimates])
     return {
-        "scan": scans,
+        "step": scans + 1,
         "time_s": record.times[scans],
         "birth_step": labels[:, 0],
         "birth_site": labels[:, 1],
@@ -129,7 +129,7 @@ def _tracks(record: RunRecord) -> Columns:
 
 
 def _estimates_of(table: Mapping[str, Any], num_scans: int) -> tuple[Estimate, ...]:
-    offsets = _offsets(table["scan"], num_scans)
+    offsets = _offsets(table["step"], num_scans)
     labels = np.stack([table["birth_step"], table["birth_site"]], axis=1)
     means, existence = table["mean"], table["existence"]
     covs = table["cov"].reshape(len(means), means.shape[1], means.shape[1])
@@ -143,15 +143,15 @@ def _sensors(record: RunRecord) -> Columns:
     sensors = np.tile(np.arange(num_sensors), num_scans)
     poses = record.poses.reshape(num_scans * num_sensors, 3)
     columns = dict(zip(POSE_COLUMNS, poses.T, strict=True)) | record.health.sensor_columns()
-    return {"scan": scans, "time_s": record.times[scans], "sensor": sensors, **columns}
+    return {"step": scans + 1, "time_s": record.times[scans], "sensor": sensors, **columns}
 
 
 def _counts(record: RunRecord) -> Ints:
     return np.array([len(estimate.labels) for estimate in record.estimates], np.int64)
 
 
-def _offsets(scans: Ints, num_scans: int) -> Ints:
-    """CSR offsets of rows that are in order of scan."""
-    if len(scans) and (np.any(np.diff(scans) < 0) or scans[0] < 0 or scans[-1] >= num_scans):
-        raise InputError(f"scan: expected rows in order, of scans 0 to {num_scans - 1}")
-    return np.searchsorted(scans, np.arange(num_scans + 1)).astype(np.int64)
+def _offsets(steps: Ints, num_scans: int) -> Ints:
+    """CSR offsets of rows that are in order of step."""
+    if len(steps) and (np.any(np.diff(steps) < 0) or steps[0] < 1 or steps[-1] > num_scans):
+        raise InputError(f"step: expected rows in order, of steps 1 to {num_scans}")
+    return np.searchsorted(steps, np.arange(1, num_scans + 2)).astype(np.int64)
