@@ -88,6 +88,17 @@ def test_a_run_that_stops_keeps_what_it_had(scenario_file, tmp_path, monkeypatch
     assert load_run(out).num_scans == 10
 
 
+def test_ctrl_c_while_the_figures_are_drawn_says_that_the_run_is_there(scenario_file, tmp_path, monkeypatch):
+    def interrupted(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("vedette.evaluation.figures.tracks_figure", interrupted)
+    result = call("run", scenario_file, "--planner", "still", "--out", tmp_path / "results")
+    assert result.exit_code == 130
+    assert f"interrupted: wrote {tmp_path / 'results'}, but not all of its figures" in result.stderr
+    assert load_run(tmp_path / "results").num_scans == 10
+
+
 def test_a_run_that_stops_at_once_writes_nothing(scenario_file, tmp_path, monkeypatch):
     fail_at(monkeypatch, 1, NumericalError("no weight"))
     result = call("run", scenario_file, "--planner", "still", "--out", tmp_path / "results")

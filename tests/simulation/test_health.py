@@ -13,13 +13,14 @@ import pytest
 from vedette.control import FixedPlanner
 from vedette.errors import NumericalError
 from vedette.evaluation.health import health_findings, health_line, summarise_health
-from vedette.filters import Limits
+from vedette.filters import FilterInfo, Limits
 from vedette.fusion import CmDeltaGlmb
+from vedette.fusion.base import FusionInfo
 from vedette.models import limited_range
 from vedette.scenarios import load_scenario
 from vedette.scenarios.build import build_experiment
 from vedette.simulation.experiment import Experiment
-from vedette.simulation.health import Health
+from vedette.simulation.health import FUSION_COLUMNS, SENSOR_COLUMNS, Health
 from vedette.simulation.loop import simulate
 from vedette.simulation.records import RunRecord
 from vedette.simulation.stopping import RunInterrupted, RunStopped
@@ -56,6 +57,12 @@ class _Recording:
         fused, info = self.inner.fuse(beliefs)
         self.said.append(info)
         return fused, info
+
+
+def test_every_field_of_both_reports_is_recorded() -> None:
+    assert {field.name for field in fields(FilterInfo)} <= set(SENSOR_COLUMNS)
+    of_fusion = {f"fusion_{field.name}" for field in fields(FusionInfo)}
+    assert of_fusion - set(FUSION_COLUMNS) == {"fusion_missing_sets", "fusion_missing_labels"}  # these by sensor
 
 
 def test_the_record_holds_what_filters_and_fusion_said(experiment: Experiment) -> None:

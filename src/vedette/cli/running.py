@@ -12,6 +12,7 @@ import typer
 
 from vedette.cli.errors import INTERRUPTED, usage_error
 from vedette.cli.scenario_files import warn
+from vedette.text import counted
 
 if TYPE_CHECKING:
     from vedette.scenarios import Scenario
@@ -74,33 +75,34 @@ def run(
     warn(loaded)
     if out is not None:
         check_free(out, overwrite)
+    stop: RunStopped | RunInterrupted | None = None
     with interruptible("nothing was written"):
         compile_if_cold(loaded)
-        stop: RunStopped | RunInterrupted | None = None
         try:
             record = run_scenario(loaded, planner, seed=seed, run=run_number, num_threads=threads)
         except (RunStopped, RunInterrupted) as error:
-            stop = error
             if error.record is None:
                 _end(error, "nothing was written")
-            record = error.record
+            record, stop = error.record, error
         _print_run(record)
-        kept = "nothing was written" if out is None else f"wrote {out}"
+        if stop is not None and out is None:
+            _end(stop, "nothing was written")
+        if stop is not None and _holds_whole_run(out):
+            _end(stop, f"{out} keeps the whole run that was there")
         if out is not None:
-            if stop is not None and _holds_whole_run(out):
-                _end(stop, f"{out} keeps the whole run that was there")
             save_run(record, out, scenario_text=dump_scenario(loaded.model, folder=loaded.folder), overwrite=overwrite)
+    if out is not None:
+        with interruptible(f"wrote {out}, but not all of its figures"):
             _draw_run(record, out / "figures")
-            if stop is None:
-                typer.echo(kept)
         if stop is not None:
-            _end(stop, f"{kept}, with the {record.num_scans} scans before")
+            _end(stop, f"wrote {out}, with the {counted(record.num_scans, 'scan')} before")
+        typer.echo(f"wrote {out}")
 
 
-def _holds_whole_run(folder: Path) -> bool:
+def _holds_whole_run(folder: Path | None) -> bool:
     from vedette.simulation.storage import MANIFEST, read_manifest
 
-    return (folder / MANIFEST).exists() and read_manifest(folder)["run"].get("stopped") is None
+    return folder is not None and (folder / MANIFEST).exists() and read_manifest(folder)["run"].get("stopped") is None
 
 
 def _end(stop: RunStopped | RunInterrupted, left: str) -> NoReturn:

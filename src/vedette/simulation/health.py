@@ -110,7 +110,7 @@ class Health:
 
 _DTYPES = {field.name: np.dtype(np.float64 if field.type == "Floats" else np.int64) for field in fields(Health)}
 _KINDS = {name: Kind.NUMBER if dtype == np.float64 else Kind.INTEGER for name, dtype in _DTYPES.items()}
-_OF_FILTER = tuple(field.name for field in fields(FilterInfo))
+_OF_FILTER = tuple(field.name for field in fields(FilterInfo) if field.name in _DTYPES)
 
 # The columns of the tables of sensors and of scans.
 FUSION_COLUMNS = {name: kind for name, kind in _KINDS.items() if name.startswith(_FUSION)}
