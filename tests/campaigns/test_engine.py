@@ -6,7 +6,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -92,9 +91,7 @@ def test_a_scheduler_that_is_killed_is_said_to_be_gone(free_port: int) -> None:
 
 def test_an_address_where_nothing_answers(free_port: int, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("vedette.campaigns.clients._CONNECT_SECONDS", 0.5)
-    start = time.monotonic()
     for address in (f"tcp://127.0.0.1:{free_port}", "nonsense://x", ""):
         expected = pytest.raises(InputError, match="scheduler: expected the address of a running dask scheduler")
         with expected, remote_workers(address):
             pass
-    assert time.monotonic() - start < 30.0

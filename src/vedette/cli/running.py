@@ -23,12 +23,13 @@ STRATEGY_NAMES = ("jdm", "idm", "random", "fixed", "still")
 
 
 def compile_if_cold(scenario: Scenario) -> None:
-    """The first start compiles for about a minute; say so before it happens."""
+    """The first start in an environment compiles for minutes of processor time; say so before it happens."""
     from vedette.kernels.disk_cache import cache_directory, is_cold
 
     if is_cold():
         where = cache_directory()
-        typer.echo(f"Compiling the kernels: once on this machine, about a minute. They are kept in {where}.", err=True)
+        cost = "once for this environment, about three minutes of processor time"
+        typer.echo(f"Compiling the kernels: {cost}. They are kept in {where}.", err=True)
         from vedette.evaluation.precompile import precompile
 
         precompile(scenario)

@@ -74,7 +74,7 @@ def check(files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="S
     """Name every fault of scenario files.
 
     Each by file, line, column and field, with what was expected and what came. Warnings, of what is valid but costs
-    accuracy, go to standard error and leave the exit status at 0.
+    accuracy or may not be meant, go to standard error and leave the exit status at 0.
     """
     from vedette.scenarios import load_scenario
     from vedette.scenarios.summary import one_line

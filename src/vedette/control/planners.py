@@ -53,6 +53,7 @@ class JointPlanner:
 
     @property
     def name(self) -> str:
+        """The strategy "jdm"."""
         return "jdm"
 
     def plan(self, beliefs: Sequence[Belief], fused: Belief, poses: Floats, *, rng: np.random.Generator) -> Plan:
@@ -97,6 +98,7 @@ class IndependentPlanner:
 
     @property
     def name(self) -> str:
+        """The strategy "idm"."""
         return "idm"
 
     def plan(self, beliefs: Sequence[Belief], fused: Belief, poses: Floats, *, rng: np.random.Generator) -> Plan:
@@ -122,6 +124,7 @@ class RandomPlanner:
 
     @property
     def name(self) -> str:
+        """The strategy "random"."""
         return "random"
 
     def plan(self, beliefs: Sequence[Belief], fused: Belief, poses: Floats, *, rng: np.random.Generator) -> Plan:
@@ -152,6 +155,7 @@ class FixedPlanner:
 
     @property
     def name(self) -> str:
+        """The strategy "fixed"."""
         return "fixed"
 
     def plan(self, beliefs: Sequence[Belief], fused: Belief, poses: Floats, *, rng: np.random.Generator) -> Plan:

@@ -41,10 +41,12 @@ class Estimate:
 
     @property
     def num_targets(self) -> int:
+        """Number of estimated targets."""
         return len(self.labels)
 
     @classmethod
     def empty(cls, state_dim: int) -> Estimate:
+        """No target."""
         return cls(
             np.empty((0, 2), np.int64), np.empty((0, state_dim)), np.empty((0, state_dim, state_dim)), np.empty(0)
         )

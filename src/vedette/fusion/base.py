@@ -68,7 +68,9 @@ class FusionInfo:
 class Fusion(Protocol[_BeliefT_contra, _FusedT_co]):
     """One belief of all the sensors'. The order of `beliefs` is that of the fusion weights."""
 
-    def fuse(self, beliefs: Sequence[_BeliefT_contra]) -> tuple[_FusedT_co, FusionInfo]: ...
+    def fuse(self, beliefs: Sequence[_BeliefT_contra]) -> tuple[_FusedT_co, FusionInfo]:
+        """The fused belief, and what had to be repaired or thrown away."""
+        ...
 
 
 class FusionLimits(NamedTuple):

@@ -64,6 +64,8 @@ def write_report(results: CampaignResults, path: Path, *, replays: Sequence[tupl
     """Write a campaign's report as one HTML file that needs nothing else; the same results give the same bytes.
 
     Args:
+        results: of a finished campaign.
+        path: of the file; its folder is made.
         replays: cell and number of the runs that can be replayed; None: the typical run of each strategy, as many as
             keep the page small.
 

@@ -1,4 +1,4 @@
-"""What is valid in a scenario but costs accuracy: warnings, not faults."""
+"""What is valid in a scenario but costs accuracy, or may not be meant: warnings, not faults."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from vedette.scenarios.diagnostics import place_fault
 from vedette.scenarios.faults import Path
 from vedette.scenarios.loading import Scenario
 from vedette.scenarios.names import sensor_names
+from vedette.scenarios.record_cautions import record_cautions
 from vedette.scenarios.schema import ScenarioModel
 from vedette.scenarios.schema.sensors import (
     ConstantDetection,
@@ -31,7 +32,7 @@ _POINTS_A_SIDE = 21
 
 def cautions(scenario: Scenario) -> tuple[str, ...]:
     """Warnings of a valid scenario, one line each, with file, line and column where it was read from a file."""
-    found = [*_views(scenario.model), *_births(scenario.model)]
+    found = [*record_cautions(scenario), *_views(scenario.model), *_births(scenario.model)]
     if not found:
         return ()
     document = None

@@ -134,6 +134,7 @@ def simulate(experiment: Experiment, planner: Planner | None, *, seed: int, run:
     """One run of a strategy.
 
     Args:
+        experiment: the parts of the run.
         planner: decides at the experiment's decision steps; None: the sensors never move, and no decision is made.
         seed, run: fix every random number; runs with equal seed and number are paired across planners.
         score: (num_scans, 3) OSPA of the estimates against the truth, see `vedette.evaluation.ospa_of_run`.

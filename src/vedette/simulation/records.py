@@ -65,8 +65,10 @@ class RunRecord:
 
     @property
     def num_scans(self) -> int:
+        """Number of scans."""
         return len(self.times)
 
     @property
     def num_sensors(self) -> int:
+        """Number of sensors."""
         return int(self.poses.shape[1])

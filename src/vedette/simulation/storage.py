@@ -37,6 +37,7 @@ def save_run(
     """Write a run as a folder of its own.
 
     Args:
+        record: the run.
         directory: the folder to make; its parents are made too.
         scenario_text: the scenario as it was read, kept beside the results.
         overwrite: replace a folder that holds a run; a folder that holds anything else is never replaced.

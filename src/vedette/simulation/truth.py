@@ -38,6 +38,7 @@ class Truth:
 
     @property
     def num_scans(self) -> int:
+        """Number of scans."""
         return len(self.times)
 
     def at(self, scan: int) -> tuple[Ints, Floats]:
