@@ -1,4 +1,4 @@
-"""Names of any length where there is little room."""
+"""Numbers of things in words, and names of any length where there is little room."""
 
 from __future__ import annotations
 
@@ -22,6 +22,11 @@ def listed(lines: Sequence[str]) -> str:
     shown = [line if len(line) <= _LONGEST_LINE else line[:_LONGEST_LINE] + ELLIPSIS for line in lines[:_MOST_LINES]]
     more = len(lines) - len(shown)
     return "\n".join([*shown, *([f"and {more} more"] if more else [])])
+
+
+def counted(number: int, thing: str) -> str:
+    """`1 sensor`, `2 sensors`."""
+    return f"{number} {thing}" if number == 1 else f"{number} {thing}s"
 
 
 def display_width(text: str) -> int:

@@ -168,7 +168,7 @@ def test_the_scrubber_shows_a_scan_with_its_decision(page: Page) -> None:
     assert text(page, "decision").startswith("Decision at 20 s: headings ")
     assert ink(page, "rewards") > empty + 20
     assert page.evaluate("document.querySelector('[data-part=scrubber]').getAttribute('aria-valuetext')") == (
-        "scan 26 of 40, 26 s"
+        "step 26 of 40, 26 s"
     )
     assert "t = 26 s" in page.evaluate("document.querySelector('[data-part=scene]').getAttribute('aria-label')")
 

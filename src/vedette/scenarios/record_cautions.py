@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from vedette.scenarios.faults import Path, format_path
 from vedette.scenarios.loading import Scenario
 from vedette.scenarios.records import recorded_source
 from vedette.scenarios.schema.sensors import Sensor
@@ -15,31 +16,32 @@ from vedette.simulation import RecordedTargets as RecordedSource
 _NEAR = 1000.0  # m; what is nearer than this to the targets is not called far
 
 
-def cautions(scenario: Scenario) -> list[str]:
-    """What a run accepts of recorded targets but may not be meant, one a line."""
+def record_cautions(scenario: Scenario) -> Iterator[tuple[Path, str]]:
+    """What a run accepts of recorded targets but may not be meant: where in the scenario, and what it is."""
     model, folder = scenario.model, scenario.folder
     if not isinstance(model.targets, RecordedTargets):
-        return []
+        return
     source = recorded_source(model.targets, model.region, folder)
-    lines = list(_repeats(model.targets, source))
+    yield from _repeats(model.targets, source)
     for index, sensor in enumerate(model.sensors):
-        place = f"sensors[{index}].position: expected metres from the origin"
+        path: Path = ("sensors", index, "position")
+        place = f"{format_path(path)}: expected metres from the origin"
         at = f"({sensor.position[0]:g}, {sensor.position[1]:g})"
         if _is_geographic(sensor, source):
-            lines.append(f"{place}, got {at}, which is a longitude and latitude among those of {model.targets.path}")
+            yield path, f"{place}, got {at}, which is a longitude and latitude among those of {model.targets.path}"
         elif (distance := _distance(sensor, source, model.time)) is not None:
-            lines.append(f"{place}, got {at}, {distance / 1000.0:.3g} km from the nearest recorded position")
-    return lines
+            yield path, f"{place}, got {at}, {distance / 1000.0:.3g} km from the nearest recorded position"
 
 
-def _repeats(section: RecordedTargets, source: RecordedSource) -> Iterator[str]:
+def _repeats(section: RecordedTargets, source: RecordedSource) -> Iterator[tuple[Path, str]]:
     repeats = source.reports.repeats
     if repeats:
         first, second = repeats[0]
         others = f", as are {len(repeats) - 1} more" if len(repeats) > 1 else ""
         yield (
+            ("targets", "path"),
             f"targets.path: {section.path}, row {second}: a second report of one target at the time of row {first}; "
-            f"left out{others}"
+            f"left out{others}",
         )
 
 

@@ -48,6 +48,11 @@ class Truth:
         rows = slice(self.offsets[scan], self.offsets[scan + 1])
         return self.ids[rows], self.states[rows]
 
+    def first(self, num_scans: int) -> Truth:
+        """The first scans alone."""
+        last = self.offsets[num_scans]
+        return Truth(self.times[:num_scans], self.offsets[: num_scans + 1], self.ids[:last], self.states[:last])
+
     def validate(self) -> None:
         """Raise `InputError` unless the arrays fit together as described above."""
         scan_times(self.times)

@@ -24,7 +24,7 @@ function startReplay(root) {
     part("decision").textContent = decisionText();
     part("scene").setAttribute("aria-label", `${run().strategy}, run ${run().run}, ${part("summary").textContent}`);
     part("scrubber").value = state.step;
-    part("scrubber").setAttribute("aria-valuetext", `scan ${state.step + 1} of ${last() + 1}, ${time} s`);
+    part("scrubber").setAttribute("aria-valuetext", `step ${state.step + 1} of ${last() + 1}, ${time} s`);
     part("play").textContent = state.playing ? "Pause" : "Play";
     Object.assign(root.dataset, { step: state.step, run: state.run, playing: state.playing, speed: state.speed });
     tellPointer();
