@@ -140,7 +140,7 @@ def read_arrays(archive: bytes) -> Mapping[str, np.ndarray[Any, Any]]:
     return arrays
 
 
-def said(error: BaseException) -> str:
+def said(error: object) -> str:
     """What an error of another library says, in a line of bounded length."""
     text = " ".join(str(error).split()) or type(error).__name__
     return text if len(text) <= _LONGEST_MESSAGE else f"{text[:_LONGEST_MESSAGE]} ..."

@@ -59,7 +59,9 @@ def decode(payload: bytes) -> tuple[RunRecord, RunMetrics]:
     except InputError:
         raise
     except Exception as error:  # bytes of no run can raise nearly anything on the way to one
-        raise InputError(f"run: expected the bytes of a run; got others: {said(error)}") from error
+        raise InputError(
+            f"run: expected the bytes of a run; got others: {type(error).__name__}: {said(error)}"
+        ) from error
     check_record(record)
     if metrics.num_scans != record.num_scans:
         raise InputError(f"metrics: expected one entry for each of {record.num_scans} scans; got {metrics.num_scans}")

@@ -179,7 +179,9 @@ def _check_tables(path: Path, database: sqlite3.Connection) -> None:
     """`InputError` unless the tables are those of a campaign, with nothing that acts or answers in their place."""
     found = database.execute("SELECT sql FROM sqlite_master WHERE name NOT LIKE 'sqlite~_%' ESCAPE '~'")
     if sorted(str(sql) for (sql,) in found) != sorted(_TABLES):
-        raise InputError(f"{path}: expected the tables campaign and runs as they were made; the file is damaged")
+        raise InputError(
+            f"{path}: expected the tables campaign and runs as they were made; the file is cut short or altered"
+        )
 
 
 def _checked_keys(path: Path, rows: Sequence[tuple[Any, Any]]) -> list[tuple[str, int]]:

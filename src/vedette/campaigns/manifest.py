@@ -117,13 +117,16 @@ def read_manifest(folder: Path) -> dict[str, Any]:
             f"{path}: expected format version {FORMAT_VERSION}; got {short(manifest.get('format_version'))}, "
             "written by another version of this program"
         )
+    missing = [field for field in (*_FIXED, "num_runs", "sessions") if field not in manifest]
+    if missing:
+        raise InputError(f"{path}: expected a field {missing[0]}; it is cut short or altered")
     try:
         _Manifest.model_validate(manifest)
     except ValidationError as error:
         fault = error.errors(include_url=False)[0]
-        field = ".".join(map(str, fault["loc"]))
+        place = ".".join(map(str, fault["loc"]))
         raise InputError(
-            f"{path}: {field}: expected what was written; it is cut short or altered: {said(fault['msg'])}"
+            f"{path}: expected a campaign; it is cut short or altered: {place}: {said(fault['msg'])}"
         ) from None
     return manifest
 
@@ -174,7 +177,9 @@ def campaign_of(folder: Path, manifest: Mapping[str, Any]) -> Campaign:
             spec=spec,
         )
     except (InputError, ValidationError) as error:
-        raise InputError(f"{folder / MANIFEST}: expected a campaign; it is altered: {said(error)}") from error
+        raise InputError(
+            f"{folder / MANIFEST}: expected a campaign; it is cut short or altered: {said(error)}"
+        ) from error
 
 
 def _check_axes(manifest: Mapping[str, Any], axes: Mapping[str, tuple[Any, ...]]) -> None:

@@ -17,7 +17,7 @@ from vedette.densities.poisson import Poisson
 from vedette.densities.tracks import TrackTable
 from vedette.errors import InputError, VedetteError
 from vedette.files import write_whole
-from vedette.reading import read_arrays, read_file, short
+from vedette.reading import read_arrays, read_file, said, short
 
 FORMAT_NAME = "vedette-density"
 FORMAT_VERSION = 1
@@ -89,7 +89,7 @@ def _kind_of(source: Path, arrays: Mapping[str, Any]) -> str:
     if str(arrays.get("format")) != FORMAT_NAME:
         raise InputError(f"{source}: expected a file of format {FORMAT_NAME}; got one of another origin")
     if str(arrays.get("version")) != str(FORMAT_VERSION):
-        raise InputError(f"{source}: expected format version {FORMAT_VERSION}; got {short(arrays.get('version'))}")
+        raise InputError(f"{source}: expected format version {FORMAT_VERSION}; got {said(arrays.get('version'))}")
     kind = str(arrays.get("kind"))
     if kind not in _OWN_FIELDS:
         raise InputError(f"{source}: expected a kind of density among {', '.join(_OWN_FIELDS)}; got {short(kind)}")
