@@ -7,6 +7,7 @@ import csv
 import importlib.util
 import os
 import symtable
+import tokenize
 import warnings
 from collections.abc import Iterator
 from pathlib import Path as FilePath
@@ -95,14 +96,15 @@ def _unnamed(file: FilePath, name: str) -> tuple[str, str] | None:
     """What is wrong where a file is no Python, or does not define the name; nothing of it is run."""
     try:
         with warnings.catch_warnings(action="ignore"):  # of the user's style; a run tells them
-            code = file.read_bytes()
+            with tokenize.open(file) as text:  # in the encoding that it says it has
+                code = text.read()
             tree, symbols = ast.parse(code), symtable.symtable(code, str(file), "exec").get_symbols()
     except (OSError, SyntaxError, ValueError, RecursionError, MemoryError) as error:
         line = f", line {error.lineno}" if isinstance(error, SyntaxError) and error.lineno else ""
         return "a file of Python", f"{describe(file.name)}{line}, which is none"
     known = {symbol.get_name() for symbol in symbols if symbol.is_assigned() or symbol.is_imported()}
     hidden = any(isinstance(node, ast.ImportFrom) and node.names[0].name == "*" for node in ast.walk(tree))
-    if name in known or hidden or "__getattr__" in known or "globals" in code.decode("utf-8", "replace"):
+    if name in known or hidden or "__getattr__" in known or "globals" in code:
         return None
     return f"a name that {describe(file.name)} defines", describe(name)
 

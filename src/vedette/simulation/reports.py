@@ -101,6 +101,8 @@ class Table:
                 values[i] = seconds(cell)
             except (TypeError, ValueError, OverflowError):
                 raise self.fault(i, name, "an ISO 8601 time") from None
+            if not abs(values[i]) <= _LATEST:  # a number, infinite or not, among times
+                raise self.fault(i, name, "an ISO 8601 time")
         return values
 
     def labels(self, name: str) -> list[str]:
