@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import itertools
+import re
 
 import pytest
 
@@ -88,6 +89,24 @@ def described(entry: Documented) -> tuple[set[str], set[str]]:
 
 def test_what_is_described_exists() -> None:
     assert {entry.place: missing for entry in WITH_TEXT if (missing := described(entry)[0])} == {}
+
+
+def test_the_fields_that_a_named_tuple_describes_exist() -> None:
+    """These begin a line with the names of fields, without a heading."""
+    wrong = {}
+    for entry in WITH_TEXT:
+        if isinstance(entry.node, ast.ClassDef) and "NamedTuple" in map(ast.unparse, entry.node.bases):
+            begun = re.findall(r"^(\w+(?:, \w+)*): ", entry.text or "", re.MULTILINE)
+            names = {name for group in begun for name in group.split(", ")} - set(HEADINGS)
+            if unknown := names - set(attributes(entry.node, CLASSES)):
+                wrong[entry.place] = unknown
+    assert wrong == {}
+
+
+def test_headings_stand_alone() -> None:
+    """What follows one on its line is taken for prose, and is no list in the reference."""
+    heads = "|".join(HEADINGS)
+    assert [entry.place for entry in WITH_TEXT if re.search(rf"^({heads}): \S", entry.text or "", re.MULTILINE)] == []
 
 
 def test_a_list_of_parameters_or_attributes_is_whole() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -29,7 +30,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
         from mkdocs.commands.build import build
         from mkdocs.config import load_config
 
-        settings = {"docs_dir": str(pages), "site_dir": str(place / "site"), "plugins": ["search"]}
+        settings: dict[str, Any] = {"docs_dir": str(pages), "site_dir": str(place / "site"), "plugins": ["search"]}
         build(load_config(str(ROOT / "mkdocs.yml"), nav=["index.md", "birds.md"], **settings))
     return place / "site"
 

@@ -166,7 +166,12 @@ def test_the_documentation_is_built_and_where_it_is_is_said(
     shown: list[str] = []
     monkeypatch.setattr(dev, "ROOT", tmp_path)
     monkeypatch.setattr(dev, "set_up", lambda extent: called.append([extent]))
-    monkeypatch.setattr(dev.subprocess, "call", lambda command, cwd: called.append(command[-2:]) or 0)
+
+    def call(command: list[str], cwd: Path) -> int:
+        called.append(command[-2:])
+        return 0
+
+    monkeypatch.setattr(dev.subprocess, "call", call)
     monkeypatch.setattr(dev.webbrowser, "open", shown.append)
     assert dev.main(["docs"]) == 0
     assert called == [["check"], [str(tmp_path / "tools" / "check.py"), "docs"]]

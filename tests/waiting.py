@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import socket
 import time
 from collections.abc import Callable
 
@@ -16,3 +17,13 @@ def wait_until(condition: Callable[[], bool], what: str) -> None:
         if time.monotonic() > end:
             raise AssertionError(f"waited {PATIENCE:g} s in vain: {what}")
         time.sleep(0.02)
+
+
+def wait_for_port(port: int) -> None:
+    """Until something listens at a port of this machine."""
+
+    def is_open() -> bool:
+        with socket.socket() as probe:
+            return probe.connect_ex(("127.0.0.1", port)) == 0
+
+    wait_until(is_open, f"something that listens at port {port}")

@@ -1,7 +1,7 @@
 """The README as a package index shows it: away from the repository, where links to its files lead nowhere.
 
-Hatchling calls this while it builds. With a `Source` among the project's URLs in pyproject.toml, links and pictures lead
-there; without one, a link is left as its text, and a picture as its description.
+Hatchling calls this while it builds. With a `Source` among the project's URLs in pyproject.toml, links and pictures
+lead there; without one, a link is left as its text, and a picture as its description.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ _LINK = re.compile(r"(!?)\[([^\]]*)\]\((?![a-z]+:|#)([^)\s]+)\)")
 
 
 def portable(text: str, source: str | None) -> str:
-    """Markdown text with every link to a file of the repository made absolute, or taken out where there is no source."""
+    """Markdown text whose links to files of the repository lead to its source, or are taken out where none is known."""
 
     def elsewhere(link: re.Match[str]) -> str:
         is_picture, words, target = link.groups()

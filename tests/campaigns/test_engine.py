@@ -17,6 +17,7 @@ from vedette.campaigns.clients import local_workers, remote_workers
 from vedette.campaigns.engine import in_process, on_workers
 from vedette.campaigns.tasks import Failed, Landed, TaskQueue
 from vedette.errors import InputError, VedetteError
+from waiting import wait_for_port
 
 pytestmark = pytest.mark.filterwarnings("ignore::ResourceWarning", "ignore::DeprecationWarning")
 RUNS = 30
@@ -52,6 +53,8 @@ def dask(*arguments: str) -> Iterator[subprocess.Popen[bytes]]:
         stderr=subprocess.DEVNULL,
     )
     try:
+        if arguments[0] == "scheduler":
+            wait_for_port(int(arguments[-1]))
         yield process
     finally:
         process.kill()

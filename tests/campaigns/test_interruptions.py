@@ -21,7 +21,7 @@ from vedette.campaigns.journal import Reader
 from vedette.campaigns.results import open_results
 from vedette.campaigns.running import Unwatched, run_campaign
 from vedette.errors import InputError
-from waiting import PATIENCE, wait_until
+from waiting import PATIENCE, wait_for_port, wait_until
 
 RUNS = 40
 SPEC = f"""
@@ -171,6 +171,7 @@ def test_a_lost_scheduler_leaves_a_folder_to_go_on_with(
         for arguments in (["scheduler", *place], ["worker", address, "--nthreads", "1", "--no-dashboard"])
     )
     try:
+        wait_for_port(free_port)
         process = program.start("--scheduler", address)
         program.wait_for(15)
         scheduler.kill()

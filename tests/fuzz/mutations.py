@@ -281,7 +281,7 @@ def covariance(rng: np.random.Generator, dim: int) -> list[list[float]]:
     elif how < 0.5:
         cov -= np.eye(dim) * np.linalg.eigvalsh(cov)[0] * pick(rng, [1.0, 1.0 - 1e-9, 1.1])
     elif how < 0.6:
-        cov = np.diag(np.diagonal(cov)) * pick(rng, [1e-320, 1e-100, 1e100, 1e302])
+        cov = np.diag(np.diagonal(cov)) * pick(rng, [1e-320, 1e-100, 1e100, 1e290])
     elif how < 0.7:
         cov = np.ones((dim, dim))
     rows: list[list[float]] = cov.tolist()

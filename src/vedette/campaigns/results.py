@@ -16,6 +16,7 @@ from vedette.campaigns.manifest import campaign_of, contents_checksum, read_mani
 from vedette.errors import InputError
 from vedette.evaluation.comparison import Comparison, scored
 from vedette.evaluation.metrics import RunMetrics
+from vedette.reading import short
 from vedette.simulation.records import RunRecord
 
 if TYPE_CHECKING:
@@ -61,7 +62,7 @@ class CampaignResults:
     def finished(self, cell: str) -> tuple[int, ...]:
         """Numbers of the finished runs of a cell, increasing. Raises `InputError` for a name of no cell."""
         self.campaign.cell(cell)
-        return tuple(run for name, run in self._reader.finished() if name == cell)
+        return tuple(run for name, run in self._finished() if name == cell)
 
     def missing(self, cell: str) -> tuple[int, ...]:
         """Numbers of the runs of a cell that are still to be done."""
@@ -83,7 +84,7 @@ class CampaignResults:
 
     def runs(self) -> Iterator[FinishedRun]:
         """Every finished run, cells in the order of the campaign, each with its runs in order."""
-        finished = self._reader.finished()
+        finished = self._finished()
         for cell in self.campaign.cells:
             for name, run in finished:
                 if name == cell.name:
@@ -119,6 +120,17 @@ class CampaignResults:
         from vedette.campaigns.dataset import dataset_of_runs
 
         return dataset_of_runs(self.campaign, self.runs())
+
+    def _finished(self) -> list[tuple[str, int]]:
+        """Cell and number of every finished run, sorted; `InputError` for one that the campaign does not have."""
+        finished = self._reader.finished()
+        names = {cell.name for cell in self.campaign.cells}
+        for cell, run in finished:
+            if cell not in names or not 0 <= run < self.campaign.num_runs:
+                raise InputError(
+                    f"{self.folder / DATABASE}: expected runs of the campaign; got cell {short(cell)}, run {run}"
+                )
+        return finished
 
     def _comparison(self, cells: tuple[Cell, ...]) -> GroupComparison | None:
         common = sorted(set.intersection(*(set(self.finished(cell.name)) for cell in cells)))

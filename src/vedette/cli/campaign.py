@@ -11,7 +11,7 @@ import typer
 from vedette.cli.errors import usage_error
 from vedette.cli.progress import CampaignProgress
 from vedette.cli.results import print_failures, print_results
-from vedette.cli.running import check_planner, compile_if_cold, interruptible, processors
+from vedette.cli.running import TRUST_HELP, Approval, check_planner, compile_if_cold, interruptible, processors
 from vedette.text import counted
 
 if TYPE_CHECKING:
@@ -39,11 +39,12 @@ def campaign(
         bool, typer.Option("--redo-damaged", help="Run again what was altered since it was kept, in its place.")
     ] = False,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what would be run, and stop.")] = False,
+    trust: Annotated[bool, typer.Option("--trust", help=TRUST_HELP)] = False,
 ) -> None:
     """Run a campaign, or go on with one: every run that its folder does not hold yet."""
     from vedette.campaigns import load_spec, resolve
 
-    resolved = resolve(load_spec(spec), spec.parent)
+    resolved = resolve(load_spec(spec), spec.parent, approve=Approval(trust, spec))
     if runs is not None:
         resolved = resolved.with_runs(runs)
     if dry_run:
@@ -68,6 +69,7 @@ def reproduce(
     out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for results, report and figures.")] = Path(
         "reproduction"
     ),
+    trust: Annotated[bool, typer.Option("--trust", help=TRUST_HELP)] = False,
 ) -> None:
     """Compare strategies over paired runs, as the paper does: a campaign with its report, tables and figures."""
     names = [name.strip() for name in planners.split(",")]
@@ -81,14 +83,14 @@ def reproduce(
     spec = CampaignSpec(
         name="reproduction", scenarios=(scenario,), planners=tuple(names), runs=runs, seed=seed, compare="planner"
     )
-    outcome = carry_out(resolve(spec), out, workers)
+    outcome = carry_out(resolve(spec, approve=Approval(trust)), out, workers)
     opened = open_results(out)
     print_results(opened)
     with interruptible(f"{out} keeps every run; the same command writes the report"):
         typer.echo("drawing the figures and the report ...", err=True)
         write_summary(opened, out)
         write_figures(opened, out / "figures")
-        write_report(opened, out / "report.html")
+        write_report(opened, out / "report.html", trust=True)  # what it names has just been run
     typer.echo(f"wrote {out}; open {out / 'report.html'}")
     report_failures(outcome.failed)
 

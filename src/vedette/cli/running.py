@@ -12,6 +12,7 @@ import typer
 
 from vedette.cli.errors import INTERRUPTED, usage_error
 from vedette.cli.scenario_files import warn
+from vedette.errors import InputError
 from vedette.text import counted
 
 if TYPE_CHECKING:
@@ -45,6 +46,37 @@ def interruptible(advice: str) -> Iterator[None]:
         raise typer.Exit(INTERRUPTED) from None
 
 
+TRUST_HELP = "Run code that a scenario names also where others may have written it."
+
+
+class Approval:
+    """Says which code a scenario runs, once, before it runs; refuses code that others may have written, unless trusted.
+
+    With `spec`, the campaign's file must be the user's own too, as its fields can name code.
+    """
+
+    def __init__(self, trust: bool, spec: Path | None = None) -> None:
+        self._trust = trust
+        self._spec = spec
+        self._said: set[str] = set()
+
+    def __call__(self, scenario: Scenario) -> None:
+        from vedette.scenarios.trust import code_of, not_own, others_may_change
+
+        code = code_of(scenario.model)
+        if not code:
+            return
+        reason = not_own(scenario) or (others_may_change(self._spec) if self._spec is not None else "")
+        if reason and not self._trust:
+            raise InputError(
+                f"scenario {scenario.path or scenario.name}: expected code of your own; it runs {', '.join(code)}, and "
+                f"{reason}: read it, and have it run by --trust"
+            )
+        if new := [name for name in code if name not in self._said]:
+            typer.echo(f"runs code of {'theirs, as trusted' if reason else 'yours'}: {', '.join(new)}", err=True)
+            self._said.update(new)
+
+
 def check_planner(name: str, option: str) -> None:
     """Wrong use of an option unless it names a strategy."""
     if name not in STRATEGY_NAMES:
@@ -63,6 +95,7 @@ def run(
     ] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an earlier run in that folder.")] = False,
     threads: Annotated[int, typer.Option("--threads", min=0, help="Threads a decision; 0: one a processor.")] = 0,
+    trust: Annotated[bool, typer.Option("--trust", help=TRUST_HELP)] = False,
 ) -> None:
     """Run a scenario once: tracks, decisions with their rewards, errors, figures."""
     check_planner(planner, "--planner")
@@ -73,6 +106,7 @@ def run(
     from vedette.simulation.storage import check_free, save_run
 
     loaded = load_scenario(scenario)
+    Approval(trust)(loaded)
     warn(loaded)
     if out is not None:
         check_free(out, overwrite)

@@ -88,7 +88,11 @@ class JointPlanner:
 class IndependentPlanner:
     """Independent decision making: each sensor maximises the reward of its own update alone (paper, Algorithm 3).
 
-    Attributes: as `JointPlanner`; the fusion is not used in the decision itself.
+    Attributes:
+        sensors: the sensors, in the order of the beliefs.
+        fusion: how the beliefs became one; the decision itself does not use it.
+        settings: horizon, samples, caps.
+        reward: Cauchy-Schwarz divergence, or a reward of the user's own.
     """
 
     sensors: tuple[MobileSensor, ...]

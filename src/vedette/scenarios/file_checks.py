@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import ast
 import csv
 import importlib.util
 import os
+import symtable
+import warnings
 from collections.abc import Iterator
 from pathlib import Path as FilePath
 from typing import Any
@@ -88,6 +91,22 @@ def _is_findable(package: str) -> bool:
         return False
 
 
+def _unnamed(file: FilePath, name: str) -> tuple[str, str] | None:
+    """What is wrong where a file is no Python, or does not define the name; nothing of it is run."""
+    try:
+        with warnings.catch_warnings(action="ignore"):  # of the user's style; a run tells them
+            code = file.read_bytes()
+            tree, symbols = ast.parse(code), symtable.symtable(code, str(file), "exec").get_symbols()
+    except (OSError, SyntaxError, ValueError, RecursionError, MemoryError) as error:
+        line = f", line {error.lineno}" if isinstance(error, SyntaxError) and error.lineno else ""
+        return "a file of Python", f"{describe(file.name)}{line}, which is none"
+    known = {symbol.get_name() for symbol in symbols if symbol.is_assigned() or symbol.is_imported()}
+    hidden = any(isinstance(node, ast.ImportFrom) and node.names[0].name == "*" for node in ast.walk(tree))
+    if name in known or hidden or "__getattr__" in known or "globals" in code.decode("utf-8", "replace"):
+        return None
+    return f"a name that {describe(file.name)} defines", describe(name)
+
+
 def reference_findings(parts: Parts) -> Iterator[Finding]:
     """Which models of the user's own are not there. Nothing is imported."""
     sections: list[tuple[Path, Any]] = [(("motion",), parts.motion), (("survival",), parts.survival)]
@@ -95,7 +114,10 @@ def reference_findings(parts: Parts) -> Iterator[Finding]:
     for path, custom in (found for start, section in sections for found in _customs(section, start)):
         module = custom.python.rpartition(":")[0]
         if module.endswith(".py"):
-            if not os.path.isfile((parts.folder or FilePath()) / module):
+            file = (parts.folder or FilePath()) / module
+            if not os.path.isfile(file):
                 yield (*path, "python"), "a file, relative to the scenario file", _absent(module)
+            elif fault := _unnamed(file, custom.python.rpartition(":")[2].partition(".")[0]):
+                yield (*path, "python"), *fault
         elif not _is_findable(module.partition(".")[0]):
             yield (*path, "python"), "a module that Python finds", describe(module)

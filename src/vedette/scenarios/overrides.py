@@ -67,10 +67,10 @@ def _set(data: Any, path: str, value: Any) -> Iterator[str]:
         for key in keys:
             missing = _left_out(holder[key], value)
             if missing:
-                inner = f"{named(path)}.{named(str(next(iter(value), missing[0])))}"
+                one = f"{named(path)}.{named(str(next(iter(value), missing[0])))}"
                 yield (
                     f"{named(path)}: expected the whole section, with {missing[0]} too, got a part of it "
-                    f'(a field is set by its path in quotes: "{inner}")'
+                    f'(a field is set by its path in quotes: "{one}")'
                 )
                 return
             holder[key] = value

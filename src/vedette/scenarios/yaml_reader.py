@@ -35,6 +35,7 @@ _INTEGER = re.compile(r"[-+]?[0-9]+")
 _BASED = re.compile(r"0o[0-7]+|0x[0-9a-fA-F]+")
 _FLOAT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
 _SPECIAL = re.compile(r"[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)")
+_NO_LETTER = re.compile(r"\\U(?!000[0-9a-fA-F]|0010)[0-9a-fA-F]{8}")
 _WORDS: dict[str, Any] = {text: None for text in ("", "~", "null", "Null", "NULL")}
 _WORDS |= {text: True for text in ("true", "True", "TRUE")} | {text: False for text in ("false", "False", "FALSE")}
 
@@ -213,6 +214,13 @@ def _document_start(events: Iterator[Any]) -> Any:
     return None
 
 
+def _place_of_escape(text: str) -> Place:
+    """The first escape beyond the last letter there is, U+10FFFF."""
+    found = _NO_LETTER.search(text)
+    before = text[: found.start()] if found else ""
+    return before.count("\n") + 1, len(before) - before.rfind("\n")
+
+
 def _read(reader: _Reader) -> Any:
     first = _document_start(reader.events)
     if first is None:
@@ -230,8 +238,7 @@ def read_yaml(text: str, file: str) -> Document:
     if len(text) > _MAX_BYTES:
         fault = Fault((1, 1), (), f"a file of at most {_MAX_BYTES} letters", f"{len(text)}")
         return Document(file, None, {}, {}, [fault])
-    yaml = YAML(typ="safe", pure=True)
-    reader = _Reader(iter(yaml.parse(text)))
+    reader = _Reader(iter(YAML(typ="safe", pure=True).parse(text)))
     data: Any = None
     try:
         data = _read(reader)
@@ -244,6 +251,5 @@ def read_yaml(text: str, file: str) -> Document:
     except YAMLError as error:
         reader.faults.append(_syntax((1, 1), str(error).splitlines()[0]))
     except (ValueError, OverflowError):  # what the scanner makes of an escape such as "\U00110000"
-        mark = yaml.reader.get_mark()
-        reader.faults.append(_syntax((mark.line + 1, mark.column + 1), "an escape of what is no letter"))
+        reader.faults.append(_syntax(_place_of_escape(text), "an escape of what is no letter"))
     return Document(file, data, reader.keys, reader.values, reader.faults)

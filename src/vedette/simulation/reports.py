@@ -7,7 +7,7 @@ import numbers
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from datetime import UTC, datetime
+from datetime import UTC, date, datetime, timedelta
 from decimal import Decimal
 from pathlib import Path
 from typing import Any
@@ -113,6 +113,8 @@ class Table:
 
 def shown(value: Any) -> str:
     """A cell or name in a message: in quotes where it is text, in printable letters, and not long."""
+    if isinstance(value, date | timedelta):
+        return f"the time {value}"
     return elided(printable(repr(value) if isinstance(value, str) else plain(value)), 80)
 
 

@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from vedette.errors import InputError
+from vedette.reading import parse_json, read_file, short
 from vedette.simulation.encoding import decode_run, encode_run
 from vedette.simulation.records import RunRecord
 from vedette.simulation.tabulation import run_facts
@@ -74,11 +75,14 @@ def load_run(directory: Path | str) -> RunRecord:
     files = {}
     for name, checksum in manifest["files"].items():
         if Path(name).name != name:
-            raise InputError(f"{folder / MANIFEST}: expected plain file names; got {name!r}")
+            raise InputError(f"{folder / MANIFEST}: expected plain file names; got {short(name)}")
         content = _read(folder / name)
         if hashlib.sha256(content).hexdigest() != checksum:
             raise InputError(f"{folder / name}: expected the file as it was written; it is cut short or altered")
-        files[name] = content.decode()
+        try:
+            files[name] = content.decode()
+        except UnicodeDecodeError as error:
+            raise InputError(f"{folder / name}: expected UTF-8 text; byte {error.start} is not") from None
     return decode_run(manifest["run"], files, str(folder))
 
 
@@ -86,14 +90,16 @@ def read_manifest(directory: Path | str) -> dict[str, Any]:
     """The manifest of a saved run: format, versions, run, checksums of its files. Raises `InputError` as `load_run`."""
     path = Path(directory) / MANIFEST
     try:
-        manifest = json.loads(_read(path))
+        manifest = parse_json(_read(path))
+    except InputError:
+        raise
     except ValueError as error:
         raise InputError(f"{path}: expected the manifest of a run; it is cut short or altered: {error}") from error
     if not isinstance(manifest, dict) or manifest.get("format") != FORMAT:
         raise InputError(f"{path}: expected the manifest of a run; got another file")
     if manifest.get("format_version") != FORMAT_VERSION:
         raise InputError(
-            f"{path}: expected format version {FORMAT_VERSION}; got {manifest.get('format_version')}, "
+            f"{path}: expected format version {FORMAT_VERSION}; got {short(manifest.get('format_version'))}, "
             "written by another version of this program"
         )
     if not isinstance(manifest.get("files"), dict) or not isinstance(manifest.get("run"), dict):
@@ -126,9 +132,11 @@ def _version(package: str) -> str:
 
 def _read(path: Path) -> bytes:
     try:
-        return path.read_bytes()
+        return read_file(path)
     except OSError as error:
         raise InputError(f"{path}: expected a file of a saved run; {error.strerror or error}") from error
+    except ValueError as error:
+        raise InputError(f"{path}: expected a file of a saved run; {error}") from error
 
 
 def check_free(target: Path, overwrite: bool) -> None:
