@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from vedette.cli.errors import INTERRUPTED, usage_error
+from vedette.cli.output import console as new_console
 from vedette.errors import InputError
 
 if TYPE_CHECKING:
@@ -118,10 +119,9 @@ def run(
 
 
 def _print_run(record: RunRecord) -> None:
-    from rich.console import Console
     from rich.table import Table
 
-    console = Console(highlight=False)
+    console = new_console()
     console.print(
         f"{record.scenario}, {record.planner}, seed {record.seed}, run {record.run}: {record.num_scans} scans"
     )
