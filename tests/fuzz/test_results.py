@@ -78,7 +78,7 @@ def originals(tmp_path_factory: pytest.TempPathFactory) -> Originals:
 
 
 @pytest.fixture
-def copies(tmp_path: Path) -> Iterator[Callable[[Path], Path]]:
+def copies(tmp_path: Path) -> Callable[[Path], Path]:
     """Makes the copy that a case edits, in place of the one of the case before."""
     target = tmp_path / "copy"
 

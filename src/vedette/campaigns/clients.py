@@ -24,6 +24,7 @@ _CONNECT_SECONDS = 10.0
 _SPAWN_SECONDS = 5.0
 _START_SECONDS = 120.0
 _POLL_SECONDS = 0.02
+_FILES, _FILES_A_WORKER = 60, 24  # open at once, with room to spare: 33 were with one worker, 56 with three
 _ADDRESS = re.compile(r"(tcp|tls)://[^\s/]+:[0-9]+")
 
 
@@ -37,6 +38,7 @@ def local_workers(num_workers: int) -> Iterator[Client]:
     Raises:
         VedetteError: they cannot be started.
     """
+    _make_room_for_files(num_workers)
     import dask
     from distributed import Client, LocalCluster
     from distributed.security import Security
@@ -59,6 +61,27 @@ def local_workers(num_workers: int) -> Iterator[Client]:
         with cluster, Client(cluster, set_as_default=False) as client:
             _start(cluster, num_workers)
             yield client
+
+
+def _make_room_for_files(num_workers: int) -> None:
+    """Raise this process's limit of open files where it is too low, as far as the system lets it.
+
+    Raises `VedetteError` where that is not enough: dask would tell of every file that it cannot open.
+    """
+    try:
+        import resource
+    except ImportError:  # Windows has no such limit
+        return
+    needed = _FILES + num_workers * _FILES_A_WORKER
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    if soft == resource.RLIM_INFINITY or soft >= needed:
+        return
+    if hard != resource.RLIM_INFINITY and hard < needed:
+        raise VedetteError(
+            f"workers: expected that {needed} files may be open at once for {num_workers} workers; the limit is {hard} "
+            "(ulimit -n; --workers 1 needs fewer)"
+        )
+    resource.setrlimit(resource.RLIMIT_NOFILE, (needed, hard))
 
 
 def _start(cluster: LocalCluster, num_workers: int) -> None:

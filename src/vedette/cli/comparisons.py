@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from vedette.cli.output import console as new_console
 from vedette.text import display_width, elided_apart
 
 if TYPE_CHECKING:
@@ -21,12 +22,10 @@ def print_comparison(comparison: Comparison) -> None:
 
     Labels that are too long are elided, numbers never: where they do not fit side by side they stand in lines.
     """
-    from rich.console import Console
-
     from vedette.evaluation import decision_rows, strategy_rows
     from vedette.evaluation.tables import caption
 
-    console = Console(highlight=False, markup=False, emoji=False)
+    console = new_console()
     numbers = [row[1:] for row in strategy_rows(comparison)]
     labels = elided_apart(comparison.strategies, _LONGEST_LABEL)
     longest = max(map(display_width, labels))

@@ -5,11 +5,13 @@
 
 from __future__ import annotations
 
+import sys
 from typing import Any
 
 import typer
 from typer.core import TyperGroup
 
+from vedette.cli.output import accept_any_letter, drop_output, trouble_of_system
 from vedette.errors import VedetteError
 
 INTERRUPTED = 130
@@ -18,12 +20,24 @@ INTERRUPTED = 130
 class Commands(TyperGroup):
     """The group of all commands; prints the library's own errors instead of raising them."""
 
+    def main(self, *args: Any, **options: Any) -> Any:
+        accept_any_letter()
+        return super().main(*args, **options)
+
     def invoke(self, ctx: Any) -> Any:
         """Run a command; what it raises becomes a line and a status."""
         try:
-            return super().invoke(ctx)
+            result = super().invoke(ctx)
+            sys.stdout.flush()  # here, where a fault can still be told in words
+            return result
         except VedetteError as error:
             typer.echo(str(error), err=True)
+            raise typer.Exit(1) from None
+        except OSError as error:
+            text = trouble_of_system(error)
+            drop_output()
+            if text:
+                typer.echo(text, err=True)
             raise typer.Exit(1) from None
         except KeyboardInterrupt:  # where a command has nothing to say of what it leaves
             typer.echo("\ninterrupted", err=True)

@@ -11,6 +11,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Ellipse, Rectangle
 from matplotlib.ticker import MaxNLocator
 
+from vedette.evaluation.figures.labels import drawn_text
 from vedette.evaluation.figures.style import COLUMN_WIDTH, GREY, VERMILION, colour, line_style, new_figure, styled
 from vedette.kernels.types import Floats
 from vedette.scenarios import Scenario
@@ -42,7 +43,7 @@ def scenario_figure(scenario: Scenario, truth: Truth) -> Figure:
         axis.set_major_locator(MaxNLocator(6, steps=[1, 2, 5, 10]))
     axes.set_xlabel(f"x ({unit})")
     axes.set_ylabel(f"y ({unit})")
-    axes.set_title(scenario.name)
+    axes.set_title(drawn_text(scenario.name))
     figure.legend(handles=_legend(), loc="outside lower center", ncols=3)
     return figure
 
@@ -98,7 +99,7 @@ def _draw_sensors(axes: Axes, scenario: Scenario, scale: float) -> None:
         axes.plot(*place, marker="s", markersize=6, color=_INK, zorder=5)
         paper = {"boxstyle": "square,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.75}
         style: dict[str, Any] = {"textcoords": "offset points", "fontsize": 7, "zorder": 4.5, "bbox": paper}
-        axes.annotate(name, place, xytext=(0, 7), ha="center", **style)
+        axes.annotate(drawn_text(name), place, xytext=(0, 7), ha="center", **style)
 
 
 def _draw_heading(axes: Axes, place: tuple[float, float], heading: float) -> None:

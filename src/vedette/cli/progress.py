@@ -5,6 +5,8 @@ from __future__ import annotations
 import time
 from typing import TYPE_CHECKING
 
+from vedette.cli.output import console
+
 if TYPE_CHECKING:
     from vedette.campaigns import Campaign, Failed, Landed
 
@@ -17,14 +19,17 @@ class CampaignProgress:
     """Runs done, their rate, the time left, and the running mean error of what is compared."""
 
     def __init__(self, campaign: Campaign) -> None:
-        from rich.console import Console
         from rich.progress import BarColumn, Progress, TextColumn
 
-        self._console = Console(stderr=True, highlight=False, markup=False)
+        self._console = console(stderr=True)
         self._terminal = self._console.is_terminal
         bar = (BarColumn(bar_width=20),) if self._console.width >= _ROOM_FOR_BAR else ()
         self._bar = Progress(
-            *bar, TextColumn("{task.description}"), console=self._console, disable=not self._terminal, transient=True
+            *bar,
+            TextColumn("{task.description}", markup=False),
+            console=self._console,
+            disable=not self._terminal,
+            transient=True,
         )
         self._bars = self._bar.add_task("starting", total=None)
         self._name = campaign.name

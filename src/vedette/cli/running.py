@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, NoReturn
 import typer
 
 from vedette.cli.errors import INTERRUPTED, usage_error
+from vedette.cli.output import console as new_console
 from vedette.cli.scenario_files import warn
 from vedette.errors import InputError
 from vedette.text import counted
@@ -148,12 +149,11 @@ def _end(stop: RunStopped | RunInterrupted, left: str) -> NoReturn:
 
 
 def _print_run(record: RunRecord) -> None:
-    from rich.console import Console
     from rich.table import Table
 
     from vedette.evaluation.health import health_line
 
-    console = Console(highlight=False)
+    console = new_console()
     console.print(
         f"{record.scenario}, {record.planner}, seed {record.seed}, run {record.run}: {record.num_scans} scans"
     )

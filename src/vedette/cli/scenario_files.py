@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from vedette.cli.errors import usage_error
+from vedette.cli.output import console
 from vedette.errors import InputError, ScenarioError
 
 if TYPE_CHECKING:
@@ -19,7 +20,6 @@ SCHEMA_FILE = "vedette.schema.json"
 
 def list_() -> None:
     """List the scenarios that come with Vedette."""
-    from rich.console import Console
     from rich.table import Table
 
     from vedette.scenarios import list_builtin, load_scenario
@@ -27,7 +27,7 @@ def list_() -> None:
     table = Table.grid(padding=(0, 2))
     for name in list_builtin():
         table.add_row(name, load_scenario(name).model.description)
-    Console(highlight=False).print(table)
+    console().print(table)
 
 
 def init(

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from vedette.cli.errors import usage_error
+from vedette.cli.output import console as new_console
 from vedette.cli.running import TRUST_HELP, Approval
 
 if TYPE_CHECKING:
@@ -53,11 +54,9 @@ def show(
 
 
 def _print_tables(scenario: Scenario) -> None:
-    from rich.console import Console
-
-    console = Console(highlight=False, soft_wrap=False)
-    console.print(f"[bold]{scenario.name}[/bold]")
-    console.print(scenario.model.description, markup=False)
+    console = new_console()
+    console.print(scenario.name, style="bold")
+    console.print(scenario.model.description)
     for table in (_facts(scenario), _sensors(scenario), _sensing(scenario), _targets(scenario)):
         console.print()
         console.print(table)
