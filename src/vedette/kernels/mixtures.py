@@ -6,9 +6,42 @@ import math
 
 import numpy as np
 
+from vedette.errors import NumericalError
 from vedette.kernels.compile import borrowing, inlined, kernel
-from vedette.kernels.linalg import cholesky, log_sum, solve_lower
+from vedette.kernels.linalg import cholesky, cholesky_of_size, log_sum, solve_lower
 from vedette.kernels.types import Floats, Ints
+
+# A pivot of a Cholesky factor is known to some epsilons of its variance: below these many it says nothing.
+_LEAST_PIVOT = 4.0 * 2.0**-52
+
+
+@inlined
+def _is_definite(cov: Floats, factor: Floats, n: int) -> bool:
+    """Whether `cov` is positive definite beyond the rounding of its entries."""
+    if not cholesky_of_size(cov, factor, n):
+        return False
+    definite = True
+    for i in range(n):
+        definite = definite and factor[i, i] * factor[i, i] > n * _LEAST_PIVOT * cov[i, i]
+    return definite
+
+
+@kernel
+def require_gaussians(means: Floats, covs: Floats) -> None:
+    """Raise `NumericalError` unless means are finite and covariances positive definite beyond their rounding."""
+    num, n = means.shape
+    factor = np.empty((n, n))
+    for c in range(num):
+        for i in range(n):
+            if not math.isfinite(means[c, i]):
+                raise NumericalError("mean of a track is not finite: the models or the scan lead beyond all numbers")
+        # A constant size is unrolled by the compiler.
+        definite = _is_definite(covs[c], factor, 4) if n == 4 else _is_definite(covs[c], factor, n)
+        if not definite:
+            raise NumericalError(
+                "covariance of a track is not positive definite within the precision of a double: its axes differ by "
+                "too many orders of magnitude (a long time step, far smaller noise, or targets far apart made one)"
+            )
 
 
 @kernel
@@ -202,4 +235,11 @@ def reduce_mixture(
     return out_log_weights, out_means, out_covs
 
 
-__all__ = ["copy_component", "descending_order", "match_components", "moment_match", "reduce_mixture"]
+__all__ = [
+    "copy_component",
+    "descending_order",
+    "match_components",
+    "moment_match",
+    "reduce_mixture",
+    "require_gaussians",
+]
