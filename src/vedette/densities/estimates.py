@@ -132,9 +132,9 @@ def unlabelled_estimate(density: Poisson | IidCluster | MultiBernoulli, step: in
     Multi-Bernoulli: the most probable number of targets, and that many Bernoullis of highest existence, each estimated
     by its heaviest component. Iid cluster: the most probable number; Poisson: the expected number, rounded; that many
     of the heaviest components, each one target. A component from which one was taken counts again with what is left in
-    it where that is a whole target or more (weight 2 stands for two); half a target or more comes only before components
-    lighter than 0.2. Components are fewer than targets where these are all in one place. Existence is what the
-    component had left, at most 1. Ties: the smaller number; the earlier Bernoulli or component.
+    it where that is a whole target or more (weight 2 stands for two); half a target or more comes only before
+    components lighter than 0.2. Components are fewer than targets where these are all in one place. Existence is what
+    the component had left, at most 1. Ties: the smaller number; the earlier Bernoulli or component.
     """
     if isinstance(density, MultiBernoulli):
         number = int(np.argmax(cardinality_distribution(density)))
