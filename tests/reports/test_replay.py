@@ -30,7 +30,7 @@ def strategies(tmp_path_factory: pytest.TempPathFactory) -> Mapping[str, Strateg
 
 def test_it_holds_the_truth_the_poses_and_the_errors(strategies: Mapping[str, Strategy]) -> None:
     record = strategies["jdm"].records[0]
-    data = replay_data(strategies["jdm"], record, "group")
+    data = replay_data(strategies["jdm"], record, "group", trust=True)
     json.dumps(data, allow_nan=False)
     ids, states = record.truth.at(30)
     assert [row[0] for row in data["truth"][30]] == (ids + 1).tolist()
@@ -41,7 +41,7 @@ def test_it_holds_the_truth_the_poses_and_the_errors(strategies: Mapping[str, St
 
 def test_estimates_have_their_two_sigma_ellipse_and_their_error(strategies: Mapping[str, Strategy]) -> None:
     record = strategies["jdm"].records[0]
-    for scan, rows in enumerate(replay_data(strategies["jdm"], record, "")["estimates"]):
+    for scan, rows in enumerate(replay_data(strategies["jdm"], record, "", trust=True)["estimates"]):
         estimate = record.estimates[scan]
         assert len(rows) == estimate.num_targets
         ids, states = record.truth.at(scan)
@@ -60,7 +60,7 @@ def test_estimates_have_their_two_sigma_ellipse_and_their_error(strategies: Mapp
 def test_bearing_and_range_become_a_point(strategies: Mapping[str, Strategy]) -> None:
     strategy = strategies["fixed"]
     record = strategy.records[0]
-    data = replay_data(strategy, record, "")
+    data = replay_data(strategy, record, "", trust=True)
     scans = scans_of(record, build_experiment(strategy.cell.scenario))
     for step in (0, 39):
         for sensor in (0, 1):
@@ -73,7 +73,7 @@ def test_bearing_and_range_become_a_point(strategies: Mapping[str, Strategy]) ->
 
 def test_bearings_and_ranges_alone_stay_what_they_are(tmp_path: Path) -> None:
     strategy = strategies_of(tmp_path / "results", planners=["still"], set=MIXED_SENSORS)["still"]
-    data = replay_data(strategy, strategy.records[0], "")
+    data = replay_data(strategy, strategy.records[0], "", trust=True)
     assert [sensor["kind"] for sensor in data["sensors"]] == ["ray", "circle"]
     assert data["sensors"][0]["half_width"] == pytest.approx(math.pi / 3.0, abs=1e-4)
     assert data["sensors"][1]["range"] == 1200.0
@@ -86,7 +86,7 @@ def test_bearings_and_ranges_alone_stay_what_they_are(tmp_path: Path) -> None:
 
 def test_a_joint_decision_is_a_map_and_curves_with_the_choice(strategies: Mapping[str, Strategy]) -> None:
     record = strategies["jdm"].records[0]
-    decision = replay_data(strategies["jdm"], record, "")["decisions"][0]
+    decision = replay_data(strategies["jdm"], record, "", trust=True)["decisions"][0]
     plan = record.decisions[0].plan
     i, j = decision["map"]["chosen"]
     assert decision["scan"] == 9
@@ -99,18 +99,18 @@ def test_a_joint_decision_is_a_map_and_curves_with_the_choice(strategies: Mappin
 
 
 def test_independent_decisions_are_curves_and_fixed_ones_nothing(strategies: Mapping[str, Strategy]) -> None:
-    decision = replay_data(strategies["idm"], strategies["idm"].records[0], "")["decisions"][0]
+    decision = replay_data(strategies["idm"], strategies["idm"].records[0], "", trust=True)["decisions"][0]
     assert decision["map"] is None
     assert [curve["sensor"] for curve in decision["curves"]] == [0, 1]
-    decision = replay_data(strategies["fixed"], strategies["fixed"].records[0], "")["decisions"][0]
+    decision = replay_data(strategies["fixed"], strategies["fixed"].records[0], "", trust=True)["decisions"][0]
     assert (decision["map"], decision["curves"]) == (None, [])
 
 
 def test_without_the_models_there_are_no_measurements(
     strategies: Mapping[str, Strategy], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def missing(_: object) -> None:
+    def missing(*_: object) -> None:
         raise InputError("python: expected a file; got none")
 
-    monkeypatch.setattr(replay, "build_experiment", missing)
-    assert replay_data(strategies["fixed"], strategies["fixed"].records[0], "")["scans"] == []
+    monkeypatch.setattr(replay, "build_sensor", missing)
+    assert replay_data(strategies["fixed"], strategies["fixed"].records[0], "", trust=True)["scans"] == []

@@ -6,7 +6,7 @@ import hashlib
 import itertools
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -17,6 +17,7 @@ from vedette.evaluation.runs import strategy
 from vedette.scenarios import Scenario, list_builtin, load_scenario
 from vedette.scenarios.dumping import dump_scenario, files_of
 from vedette.scenarios.overrides import with_fields
+from vedette.text import listed
 
 _LONGEST_NAME = 120
 _SECTIONS = {"filter": "filter.kind", "fusion": "fusion.kind"}
@@ -110,8 +111,13 @@ def scenario_text(scenario: Scenario) -> str:
     return dump_scenario(scenario.model, folder=scenario.folder)
 
 
-def resolve(spec: CampaignSpec, folder: Path | str = ".") -> Campaign:
+def resolve(
+    spec: CampaignSpec, folder: Path | str = ".", *, approve: Callable[[Scenario], None] = lambda scenario: None
+) -> Campaign:
     """Load the scenarios (files are relative to `folder`), set the fields of each cell, check that each can be built.
+
+    Args:
+        approve: is given the scenario of each cell before code that it names is run, and may raise.
 
     Raises:
         InputError: a scenario that is not there, a path that is no field, a combination that cannot be; names the cell.
@@ -123,7 +129,7 @@ def resolve(spec: CampaignSpec, folder: Path | str = ".") -> Campaign:
     for values in itertools.product(*axes.values()):
         settings = dict(zip(axes, values, strict=True))
         name = _unused(_name({axis: settings[axis] for axis in varying}, axes), cells)
-        cells.append(_cell(name, settings, loaded[settings["scenario"]], spec))
+        cells.append(_cell(name, settings, loaded[settings["scenario"]], spec, approve))
     # Never the scenario unless asked for: runs of different scenarios are not paired.
     candidates = ("planner", *(axis for axis in axes if axis != "scenario"))
     compare = spec.compare or next((axis for axis in candidates if len(axes[axis]) > 1), "planner")
@@ -137,7 +143,13 @@ def _load(name: str, number: int, folder: Path) -> Scenario:
         raise InputError(f"scenarios.{number}: {error}") from None
 
 
-def _cell(name: str, settings: Mapping[str, Any], scenario: Scenario, spec: CampaignSpec) -> Cell:
+def _cell(
+    name: str,
+    settings: Mapping[str, Any],
+    scenario: Scenario,
+    spec: CampaignSpec,
+    approve: Callable[[Scenario], None],
+) -> Cell:
     fields = dict(spec.set)
     fields |= {_SECTIONS[axis]: settings[axis] for axis in _SECTIONS if axis in settings}
     for variant in spec.variants:
@@ -147,9 +159,10 @@ def _cell(name: str, settings: Mapping[str, Any], scenario: Scenario, spec: Camp
     planner = settings["planner"]
     try:
         changed = with_fields(scenario, fields)
+        approve(changed)
         strategy(changed, planner)
     except ScenarioError as error:
-        raise InputError("\n".join(dict.fromkeys(f"cell {name}: {fault}" for fault in error.faults))) from None
+        raise InputError(listed(list(dict.fromkeys(f"cell {name}: {fault}" for fault in error.faults)))) from None
     except InputError as error:
         raise InputError(f"cell {name}: {error}") from None
     return Cell(name, dict(settings), changed, planner)

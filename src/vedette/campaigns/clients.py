@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import asyncio
 import logging
 import re
+import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from multiprocessing import active_children
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
+from vedette.campaigns.scratch import scratch_folder
 from vedette.errors import InputError, VedetteError
 from vedette.evaluation.runs import children_ignore_interrupts
+from vedette.reading import said
 
 if TYPE_CHECKING:
     from distributed import Client, LocalCluster
@@ -28,18 +31,24 @@ _ADDRESS = re.compile(r"(tcp|tls)://[^\s/]+:[0-9]+")
 def local_workers(num_workers: int) -> Iterator[Client]:
     """As many worker processes on this machine; one that dies is replaced.
 
+    They talk over the loopback device, where any process of the machine can knock, and whoever is let in can have them
+    run code: so with credentials that are made here, for this once, and are in no file.
+
     Raises:
         VedetteError: they cannot be started.
     """
     import dask
     from distributed import Client, LocalCluster
+    from distributed.security import Security
 
-    with TemporaryDirectory(prefix="vedette-workers-", ignore_cleanup_errors=True) as scratch:
+    with scratch_folder() as scratch:
         with dask.config.set({"distributed.scheduler.allowed-failures": 1}):
             cluster = LocalCluster(
                 n_workers=0,
                 threads_per_worker=1,
                 processes=True,
+                protocol="tls://",
+                security=Security.temporary(),
                 host="127.0.0.1",
                 dashboard_address="127.0.0.1:0",
                 memory_limit=None,
@@ -82,9 +91,43 @@ def remote_workers(address: str) -> Iterator[Client]:
 
     for logger in ("distributed", "distributed.client"):  # a lost scheduler is said once, by the error
         logging.getLogger(logger).setLevel(logging.CRITICAL)
+    _check_scheduler(address, f"{expected}; no scheduler answers at {address}")
     try:
         client = Client(address, set_as_default=False, timeout=_CONNECT_SECONDS)
     except (OSError, ValueError) as error:
         raise InputError(f"{expected}; nothing answers at {address}: {error}") from None
     with client:
         yield client
+
+
+def _check_scheduler(address: str, refusal: str) -> None:
+    """`InputError` unless what listens there says in time that it is a scheduler.
+
+    A client of dask would wait for ever for what accepts and is silent, and leave traces where it answers otherwise.
+    """
+    answers: list[object] = []
+
+    async def ask() -> object:
+        arguments = Security().get_connection_args("client")
+        async with rpc(address, timeout=_CONNECT_SECONDS, connection_args=arguments) as there:
+            return await there.identity()
+
+    def wait() -> None:
+        try:
+            answers.append(asyncio.run(asyncio.wait_for(ask(), _CONNECT_SECONDS)))
+        except Exception as error:  # what answers may be anything, and so may what comes of it
+            answers.append(error)
+
+    from distributed.core import rpc
+    from distributed.security import Security
+
+    thread = threading.Thread(target=wait, daemon=True)  # a loop of its own, as this thread may have one
+    thread.start()
+    thread.join(2.0 * _CONNECT_SECONDS)
+    answer = answers[0] if answers else TimeoutError()
+    if isinstance(answer, TimeoutError):
+        raise InputError(f"{refusal}: it is silent for {_CONNECT_SECONDS:g} s")
+    if isinstance(answer, OSError):
+        raise InputError(f"{refusal}: {said(answer)}")
+    if not isinstance(answer, dict) or answer.get("type") != "Scheduler":
+        raise InputError(f"{refusal}, but something else does")

@@ -17,13 +17,14 @@ import numpy as np
 from vedette.errors import InputError
 from vedette.evaluation.metrics import RunMetrics
 from vedette.kernels.types import Floats
+from vedette.reading import parse_json, read_array, read_members, said, short
 from vedette.simulation.columns import check_columns, pack, unpack
 from vedette.simulation.decisions import read_decisions, write_decisions
 from vedette.simulation.encoding import timing_columns, timings_of
 from vedette.simulation.records import RunRecord
 from vedette.simulation.tabulation import TABLES, check_record, record_of, run_facts, tables_of
 
-PAYLOAD_VERSION = 1  # of the layout: another wherever a table or the metrics gain, lose or rename a column
+PAYLOAD_VERSION = 2  # of the layout: another wherever a table or the metrics gain, lose or rename a column
 _METRICS, _RUN, _DECISIONS = "metrics", "run.json", "decisions.json"
 _EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest that a zip archive can say
 _UNIX = 3
@@ -54,22 +55,29 @@ def decode(payload: bytes) -> tuple[RunRecord, RunMetrics]:
     Raises `InputError` for bytes that are not those of a run.
     """
     try:
-        with zipfile.ZipFile(io.BytesIO(payload)) as archive:
-            facts = json.loads(archive.read(_RUN))
-            if facts["payload_version"] != PAYLOAD_VERSION:
-                raise InputError(f"run: expected payload version {PAYLOAD_VERSION}; got {facts['payload_version']}")
-            tables = {name: _read_array(archive.read(f"{name}.npy")) for name in TABLES}
-            for name, kinds in TABLES.items():
-                check_columns(tables[name], kinds, f"run, table {name}")
-            decisions = read_decisions(archive.read(_DECISIONS).decode())
-            metrics = RunMetrics.from_columns(_read_array(archive.read(f"{_METRICS}.npy")))
-        record = record_of(facts, tables, decisions, {})
-    except (zipfile.BadZipFile, KeyError, TypeError, ValueError, AttributeError, EOFError) as error:
-        if isinstance(error, InputError):
-            raise
-        raise InputError(f"run: expected the bytes of a run; got others: {error!r}") from error
+        record, metrics = _decoded(payload)
+    except InputError:
+        raise
+    except Exception as error:  # bytes of no run can raise nearly anything on the way to one
+        raise InputError(
+            f"run: expected the bytes of a run; got others: {type(error).__name__}: {said(error)}"
+        ) from error
     check_record(record)
+    if metrics.num_scans != record.num_scans:
+        raise InputError(f"metrics: expected one entry for each of {record.num_scans} scans; got {metrics.num_scans}")
     return record, metrics
+
+
+def _decoded(payload: bytes) -> tuple[RunRecord, RunMetrics]:
+    members = read_members(payload)
+    facts = parse_json(members[_RUN])
+    if facts["payload_version"] != PAYLOAD_VERSION:
+        raise InputError(f"run: expected payload version {PAYLOAD_VERSION}; got {short(facts['payload_version'])}")
+    tables = {name: unpack(read_array(members[f"{name}.npy"])) for name in TABLES}
+    for name, kinds in TABLES.items():
+        check_columns(tables[name], kinds, f"run, table {name}")
+    metrics = RunMetrics.from_columns(unpack(read_array(members[f"{_METRICS}.npy"])))
+    return record_of(facts, tables, read_decisions(members[_DECISIONS].decode()), {}), metrics
 
 
 def encode_timings(record: RunRecord) -> bytes:
@@ -80,9 +88,9 @@ def encode_timings(record: RunRecord) -> bytes:
 def decode_timings(content: bytes) -> dict[str, Floats]:
     """The timings back from their bytes. Raises `InputError` for other bytes."""
     try:
-        return timings_of(_read_array(content))
-    except (ValueError, EOFError, SyntaxError) as error:
-        raise InputError(f"timings: expected the bytes of an array; got others: {error!r}") from error
+        return timings_of(unpack(read_array(content)))
+    except ValueError as error:
+        raise InputError(f"timings: expected the bytes of an array; got others: {error}") from error
 
 
 def _add(archive: zipfile.ZipFile, name: str, content: bytes) -> None:
@@ -95,7 +103,3 @@ def _array_bytes(array: np.ndarray[Any, Any]) -> bytes:
     out = io.BytesIO()
     np.lib.format.write_array(out, array, version=(1, 0), allow_pickle=False)
     return out.getvalue()
-
-
-def _read_array(content: bytes) -> dict[str, np.ndarray[Any, Any]]:
-    return unpack(np.lib.format.read_array(io.BytesIO(content), allow_pickle=False))

@@ -16,16 +16,19 @@ from pathlib import Path
 from typing import Any
 
 from vedette.errors import InputError
+from vedette.reading import inflate, short
 
 DATABASE, LOCK = "campaign.sqlite", "campaign.lock"
 
 _WAIT = 60.0  # s, for a reader or writer of the same file; each holds it for milliseconds
 _LEVEL = 1  # of zlib: half the size in under a millisecond, and higher levels gain little
 _TABLES = (
-    "CREATE TABLE IF NOT EXISTS campaign (contents TEXT NOT NULL)",
-    "CREATE TABLE IF NOT EXISTS runs (cell TEXT NOT NULL, run INTEGER NOT NULL, session INTEGER NOT NULL, "
+    "CREATE TABLE campaign (contents TEXT NOT NULL)",
+    "CREATE TABLE runs (cell TEXT NOT NULL, run INTEGER NOT NULL, session INTEGER NOT NULL, "
     "payload BLOB NOT NULL, payload_sha256 TEXT NOT NULL, timings BLOB NOT NULL, timings_sha256 TEXT NOT NULL, "
     "PRIMARY KEY (cell, run))",
+    "CREATE TABLE IF NOT EXISTS failures (cell TEXT NOT NULL, run INTEGER NOT NULL, session INTEGER NOT NULL, "
+    "message TEXT NOT NULL, PRIMARY KEY (cell, run))",
 )
 _COLUMNS = "cell, run, session, payload, payload_sha256, timings, timings_sha256"
 
@@ -46,6 +49,16 @@ class Entry:
         return _checksum(self.cell, self.run, self.payload)
 
 
+@dataclass(frozen=True, slots=True)
+class Failure:
+    """A run that could not be finished, in which session (counted from 1), and why: where it stopped."""
+
+    cell: str
+    run: int
+    session: int
+    message: str
+
+
 class Writer:
     """Adds runs to the file of one folder, alone: `InputError` if another writer has it open."""
 
@@ -62,13 +75,14 @@ class Writer:
             database.execute("PRAGMA journal_mode = PERSIST")
             database.execute("PRAGMA synchronous = FULL")
             database.execute("BEGIN IMMEDIATE")
-            for statement in _TABLES:
-                database.execute(statement)
-            found = database.execute("SELECT contents FROM campaign").fetchall()
-            if not found:
+            if self._path.stat().st_size == 0:  # what an interrupted start left is taken back by now
+                for statement in _TABLES:
+                    database.execute(statement)
                 database.execute("INSERT INTO campaign VALUES (?)", (contents,))
+            _check_tables(self._path, database)
+            found = database.execute("SELECT contents FROM campaign").fetchall()
             database.execute("COMMIT")
-        _check_contents(self._path, found or [(contents,)], contents)
+        _check_contents(self._path, found, contents)
 
     def add(self, entry: Entry) -> None:
         """Put the run on the disk; when this returns it stays, whatever happens to this process or its machine."""
@@ -80,17 +94,28 @@ class Writer:
         assert self._database is not None
         try:
             with _explained(self._path, f"cell {entry.cell}, run {entry.run}: "):
-                self._database.execute(f"INSERT INTO runs ({_COLUMNS}) VALUES (?, ?, ?, ?, ?, ?, ?)", row)
+                self._database.execute("BEGIN IMMEDIATE")
+                with self._database:  # both or neither
+                    self._database.execute(f"INSERT INTO runs ({_COLUMNS}) VALUES (?, ?, ?, ?, ?, ?, ?)", row)
+                    self._database.execute("DELETE FROM failures WHERE cell = ? AND run = ?", (entry.cell, entry.run))
         except sqlite3.IntegrityError:
             raise InputError(
                 f"{self._path}: cell {entry.cell}, run {entry.run}: expected another run; it is there"
             ) from None
 
+    def note_failure(self, failure: Failure) -> None:
+        """Keep why a run could not be finished, in place of an earlier reason, until it is."""
+        row = (failure.cell, failure.run, failure.session, failure.message)
+        assert self._database is not None
+        with _explained(self._path, f"cell {failure.cell}, run {failure.run}: "):
+            self._database.execute("INSERT OR REPLACE INTO failures VALUES (?, ?, ?, ?)", row)
+
     def finished(self) -> set[tuple[str, int]]:
         """Cell and number of every run in the file."""
         assert self._database is not None
         with _explained(self._path):
-            return set(self._database.execute("SELECT cell, run FROM runs"))
+            rows = self._database.execute("SELECT cell, run FROM runs").fetchall()
+        return set(_checked_keys(self._path, rows))
 
     def damaged(self) -> tuple[tuple[str, int], ...]:
         """Cell and number of every run whose row is not as it was written."""
@@ -127,7 +152,12 @@ class Reader:
 
     def finished(self) -> list[tuple[str, int]]:
         """Cell and number of every run in the file, sorted."""
-        return self._ask("SELECT cell, run FROM runs ORDER BY cell, run")
+        return _checked_keys(self._path, self._ask("SELECT cell, run FROM runs ORDER BY cell, run"))
+
+    def failures(self) -> list[Failure]:
+        """The runs that were tried and could not be finished, sorted."""
+        rows = self._ask("SELECT cell, run, session, message FROM failures ORDER BY cell, run")
+        return [Failure(*row) for row in rows]
 
     def entry(self, cell: str, run: int) -> Entry:
         """A finished run, its checksums verified. `InputError` where there is none, or its row is damaged."""
@@ -155,10 +185,12 @@ class Reader:
 def _verified(row: tuple[Any, ...]) -> Entry | None:
     """The run in a row; None where it is not as it was written."""
     cell, run, session, payload, payload_checksum, timings, timings_checksum = row
+    if not isinstance(cell, str) or not isinstance(run, int) or not isinstance(session, int):
+        return None
     try:
-        entry = Entry(cell, run, session, zlib.decompress(payload), zlib.decompress(timings))
+        entry = Entry(cell, run, session, inflate(payload), inflate(timings))
         intact = entry.checksum == payload_checksum and _checksum(cell, run, entry.timings) == timings_checksum
-    except (zlib.error, TypeError):
+    except (ValueError, TypeError):
         return None
     return entry if intact else None
 
@@ -166,7 +198,25 @@ def _verified(row: tuple[Any, ...]) -> Entry | None:
 def _answer(path: Path, question: str, values: Sequence[Any], mode: str = "ro") -> list[Any]:
     address = f"{path.resolve().as_uri()}?mode={mode}"
     with closing(sqlite3.connect(address, timeout=_WAIT, uri=True)) as database:
+        _check_tables(path, database)
         return database.execute(question, values).fetchall()
+
+
+def _check_tables(path: Path, database: sqlite3.Connection) -> None:
+    """`InputError` unless the tables are those of a campaign, with nothing that acts or answers in their place."""
+    found = database.execute("SELECT sql FROM sqlite_master WHERE name NOT LIKE 'sqlite~_%' ESCAPE '~'")
+    if sorted(str(sql) for (sql,) in found) != sorted(_TABLES):
+        raise InputError(
+            f"{path}: expected the tables campaign and runs as they were made; the file is cut short or altered"
+        )
+
+
+def _checked_keys(path: Path, rows: Sequence[tuple[Any, Any]]) -> list[tuple[str, int]]:
+    """Cells and numbers of runs, if that is what they are."""
+    for cell, run in rows:
+        if not isinstance(cell, str) or not isinstance(run, int):
+            raise InputError(f"{path}: expected the name and number of a run; got {short(cell)} and {short(run)}")
+    return list(rows)
 
 
 def _lock(folder: Path) -> sqlite3.Connection:

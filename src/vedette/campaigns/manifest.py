@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import itertools
 import json
 import os
 import platform
@@ -11,9 +12,13 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from vedette.campaigns.cells import Campaign, Cell, scenario_text
+from pydantic import BaseModel, ConfigDict, JsonValue, ValidationError
+
+from vedette.campaigns.cells import Campaign, Cell, safe_name, scenario_text
+from vedette.campaigns.spec import spec_from_data
 from vedette.errors import InputError
 from vedette.files import write_whole
+from vedette.reading import parse_json, read_file, said, short
 from vedette.scenarios import Scenario
 from vedette.scenarios.schema import ScenarioModel
 from vedette.scenarios.yaml_reader import read_yaml
@@ -21,9 +26,45 @@ from vedette.simulation.storage import versions
 
 MANIFEST = "manifest.json"
 FORMAT = "vedette-campaign"
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
+_MOST_BYTES = 2**27  # of a manifest: ten thousand cells have a fifth of it
 # What of the manifest can never change. The number of runs is not part of it: a campaign may be made longer.
 _FIXED = ("name", "seed", "axes", "compare", "spec", "cells", "digest")
+
+
+class _Session(BaseModel):
+    """When, with what and on what machine."""
+
+    model_config = ConfigDict(strict=True)
+    started: str
+    versions: dict[str, str]
+    machine: dict[str, str | int | None]
+
+
+class _CellEntry(BaseModel):
+    """One cell, its scenario as YAML."""
+
+    model_config = ConfigDict(strict=True)
+    name: str
+    planner: str
+    settings: dict[str, JsonValue]
+    scenario: str
+
+
+class _Manifest(BaseModel):
+    """The form of a manifest; what its parts say to one another is checked where a campaign is made of it."""
+
+    model_config = ConfigDict(strict=True)
+    name: str
+    seed: int
+    num_runs: int
+    compare: str
+    axes: dict[str, list[JsonValue]]
+    spec: dict[str, JsonValue]
+    digest: str
+    cells: list[_CellEntry]
+    created: str
+    sessions: list[_Session]
 
 
 def new_manifest(campaign: Campaign) -> dict[str, Any]:
@@ -64,7 +105,7 @@ def read_manifest(folder: Path) -> dict[str, Any]:
     """The manifest of a results folder. Raises `InputError`, naming the file, where there is none that can be used."""
     path = folder / MANIFEST
     try:
-        manifest = json.loads(path.read_bytes())
+        manifest = parse_json(read_file(path, _MOST_BYTES))
     except OSError as error:
         raise InputError(f"{path}: expected the manifest of a campaign; {error.strerror or error}") from None
     except ValueError as error:
@@ -73,12 +114,20 @@ def read_manifest(folder: Path) -> dict[str, Any]:
         raise InputError(f"{path}: expected the manifest of a campaign; got another file")
     if manifest.get("format_version") != FORMAT_VERSION:
         raise InputError(
-            f"{path}: expected format version {FORMAT_VERSION}; got {manifest.get('format_version')}, "
+            f"{path}: expected format version {FORMAT_VERSION}; got {short(manifest.get('format_version'))}, "
             "written by another version of this program"
         )
     missing = [field for field in (*_FIXED, "num_runs", "sessions") if field not in manifest]
     if missing:
         raise InputError(f"{path}: expected a field {missing[0]}; it is cut short or altered")
+    try:
+        _Manifest.model_validate(manifest)
+    except ValidationError as error:
+        fault = error.errors(include_url=False)[0]
+        place = ".".join(map(str, fault["loc"]))
+        raise InputError(
+            f"{path}: expected a campaign; it is cut short or altered: {place}: {said(fault['msg'])}"
+        ) from None
     return manifest
 
 
@@ -110,24 +159,63 @@ def check_same(folder: Path, there: Mapping[str, Any], here: Mapping[str, Any]) 
 
 
 def campaign_of(folder: Path, manifest: Mapping[str, Any]) -> Campaign:
-    """The campaign back from its manifest. The files that its scenarios name need not be there."""
+    """The campaign back from its manifest. The files that its scenarios name need not be there.
+
+    Raises `InputError`, naming the file, for a manifest that no specification has: what is opened later relies on it.
+    """
     try:
+        spec = {**manifest["spec"], "runs": manifest["num_runs"]}
+        axes = spec_from_data(spec, "spec").axes()
+        _check_axes(manifest, axes)
         return Campaign(
             name=manifest["name"],
             seed=manifest["seed"],
             num_runs=manifest["num_runs"],
             cells=tuple(_cell(entry) for entry in manifest["cells"]),
-            axes={axis: tuple(values) for axis, values in manifest["axes"].items()},
+            axes=axes,
             compare=manifest["compare"],
-            spec={**manifest["spec"], "runs": manifest["num_runs"]},
+            spec=spec,
         )
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise InputError(f"{folder / MANIFEST}: expected a campaign; it is cut short or altered: {error}") from error
+    except (InputError, ValidationError) as error:
+        raise InputError(
+            f"{folder / MANIFEST}: expected a campaign; it is cut short or altered: {said(error)}"
+        ) from error
+
+
+def _check_axes(manifest: Mapping[str, Any], axes: Mapping[str, tuple[Any, ...]]) -> None:
+    """`InputError` unless the cells are those of the specification, each under a name that a file may have."""
+    for field, value, wanted in (
+        ("name", manifest["name"], manifest["spec"]["name"]),
+        ("seed", manifest["seed"], manifest["spec"]["seed"]),
+        ("axes", list(manifest["axes"].items()), list(axes.items())),
+        ("settings", [list(cell["settings"].items()) for cell in manifest["cells"]], _combinations(axes)),
+        ("planner", [cell["planner"] for cell in manifest["cells"]], [one["planner"] for one in _settings(axes)]),
+    ):
+        if json.dumps(value) != json.dumps(wanted):  # texts, as to Python 1, 1.0 and true are equal
+            raise InputError(f"{field}: expected what the specification says; got other values")
+    names = [cell["name"] for cell in manifest["cells"]]
+    if len(set(names)) < len(names) or any(name != safe_name(name) or name in ("", ".", "..") for name in names):
+        raise InputError(f"cells: expected names that are unique and fit for files; got {short(names)}")
+    if manifest["compare"] not in axes:
+        raise InputError(f"compare: expected one of {', '.join(axes)}; got {short(manifest['compare'])}")
+
+
+def _settings(axes: Mapping[str, tuple[Any, ...]]) -> list[dict[str, Any]]:
+    return [dict(zip(axes, values, strict=True)) for values in itertools.product(*axes.values())]
+
+
+def _combinations(axes: Mapping[str, tuple[Any, ...]]) -> list[list[tuple[str, Any]]]:
+    return [list(settings.items()) for settings in _settings(axes)]
 
 
 def _cell(entry: Mapping[str, Any]) -> Cell:
-    model = ScenarioModel.model_validate(read_yaml(entry["scenario"], "scenario").data)
-    return Cell(entry["name"], entry["settings"], Scenario(model), entry["planner"])
+    place = f"cell {entry['name']}"
+    document = read_yaml(entry["scenario"], place)
+    if document.faults:
+        raise InputError(document.faults[0].message(place))
+    return Cell(
+        entry["name"], entry["settings"], Scenario(ScenarioModel.model_validate(document.data)), entry["planner"]
+    )
 
 
 def _difference(place: str, there: Any, here: Any) -> str:

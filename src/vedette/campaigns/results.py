@@ -11,11 +11,12 @@ from typing import TYPE_CHECKING, Any, SupportsIndex
 from vedette.campaigns.cells import Campaign, Cell
 from vedette.campaigns.codec import decode, decode_timings
 from vedette.campaigns.finished import FinishedRun
-from vedette.campaigns.journal import DATABASE, Entry, Reader
+from vedette.campaigns.journal import DATABASE, Entry, Failure, Reader
 from vedette.campaigns.manifest import campaign_of, contents_checksum, read_manifest
 from vedette.errors import InputError
 from vedette.evaluation.comparison import Comparison, scored
 from vedette.evaluation.metrics import RunMetrics
+from vedette.reading import short
 from vedette.simulation.records import RunRecord
 
 if TYPE_CHECKING:
@@ -61,12 +62,20 @@ class CampaignResults:
     def finished(self, cell: str) -> tuple[int, ...]:
         """Numbers of the finished runs of a cell, increasing. Raises `InputError` for a name of no cell."""
         self.campaign.cell(cell)
-        return tuple(run for name, run in self._reader.finished() if name == cell)
+        return tuple(run for name, run in self._finished() if name == cell)
 
     def missing(self, cell: str) -> tuple[int, ...]:
         """Numbers of the runs of a cell that are still to be done."""
         done = set(self.finished(cell))
         return tuple(run for run in range(self.campaign.num_runs) if run not in done)
+
+    def failures(self) -> tuple[Failure, ...]:
+        """The runs that were tried and could not be finished, each with where and why it stopped; by cell and run.
+
+        The same command that runs the campaign tries them again.
+        """
+        places = {cell.name: place for place, cell in enumerate(self.campaign.cells)}
+        return tuple(sorted(self._reader.failures(), key=lambda each: (places.get(each.cell, -1), each.run)))
 
     def run(self, cell: str, run: SupportsIndex) -> FinishedRun:
         """A finished run. Raises `InputError` for one that is not finished, or damaged."""
@@ -75,7 +84,7 @@ class CampaignResults:
 
     def runs(self) -> Iterator[FinishedRun]:
         """Every finished run, cells in the order of the campaign, each with its runs in order."""
-        finished = self._reader.finished()
+        finished = self._finished()
         for cell in self.campaign.cells:
             for name, run in finished:
                 if name == cell.name:
@@ -104,13 +113,24 @@ class CampaignResults:
         return tables_of_runs(self.campaign, self.runs())
 
     def dataset(self) -> xarray.Dataset:
-        """Measures at each scan as arrays over cell, run and scan; see `vedette.campaigns.dataset`.
+        """Measures at each scan as arrays over cell, run and step; see `vedette.campaigns.dataset`.
 
         Raises `InputError` where xarray is not installed.
         """
         from vedette.campaigns.dataset import dataset_of_runs
 
         return dataset_of_runs(self.campaign, self.runs())
+
+    def _finished(self) -> list[tuple[str, int]]:
+        """Cell and number of every finished run, sorted; `InputError` for one that the campaign does not have."""
+        finished = self._reader.finished()
+        names = {cell.name for cell in self.campaign.cells}
+        for cell, run in finished:
+            if cell not in names or not 0 <= run < self.campaign.num_runs:
+                raise InputError(
+                    f"{self.folder / DATABASE}: expected runs of the campaign; got cell {short(cell)}, run {run}"
+                )
+        return finished
 
     def _comparison(self, cells: tuple[Cell, ...]) -> GroupComparison | None:
         common = sorted(set.intersection(*(set(self.finished(cell.name)) for cell in cells)))

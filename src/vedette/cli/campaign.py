@@ -10,13 +10,12 @@ import typer
 
 from vedette.cli.errors import usage_error
 from vedette.cli.progress import CampaignProgress
-from vedette.cli.results import print_results
-from vedette.cli.running import check_planner, compile_if_cold, interruptible, processors
+from vedette.cli.results import print_failures, print_results
+from vedette.cli.running import TRUST_HELP, Approval, check_planner, compile_if_cold, interruptible, processors
+from vedette.text import counted
 
 if TYPE_CHECKING:
     from vedette.campaigns import Campaign, Failed, Outcome
-
-_SHOWN_FAILURES = 10
 
 
 def campaign(
@@ -40,11 +39,12 @@ def campaign(
         bool, typer.Option("--redo-damaged", help="Run again what was altered since it was kept, in its place.")
     ] = False,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what would be run, and stop.")] = False,
+    trust: Annotated[bool, typer.Option("--trust", help=TRUST_HELP)] = False,
 ) -> None:
     """Run a campaign, or go on with one: every run that its folder does not hold yet."""
     from vedette.campaigns import load_spec, resolve
 
-    resolved = resolve(load_spec(spec), spec.parent)
+    resolved = resolve(load_spec(spec), spec.parent, approve=Approval(trust, spec))
     if runs is not None:
         resolved = resolved.with_runs(runs)
     if dry_run:
@@ -69,6 +69,7 @@ def reproduce(
     out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for results, report and figures.")] = Path(
         "reproduction"
     ),
+    trust: Annotated[bool, typer.Option("--trust", help=TRUST_HELP)] = False,
 ) -> None:
     """Compare strategies over paired runs, as the paper does: a campaign with its report, tables and figures."""
     names = [name.strip() for name in planners.split(",")]
@@ -82,14 +83,14 @@ def reproduce(
     spec = CampaignSpec(
         name="reproduction", scenarios=(scenario,), planners=tuple(names), runs=runs, seed=seed, compare="planner"
     )
-    outcome = carry_out(resolve(spec), out, workers)
+    outcome = carry_out(resolve(spec, approve=Approval(trust)), out, workers)
     opened = open_results(out)
     print_results(opened)
     with interruptible(f"{out} keeps every run; the same command writes the report"):
         typer.echo("drawing the figures and the report ...", err=True)
         write_summary(opened, out)
         write_figures(opened, out / "figures")
-        write_report(opened, out / "report.html")
+        write_report(opened, out / "report.html", trust=True)  # what it names has just been run
     typer.echo(f"wrote {out}; open {out / 'report.html'}")
     report_failures(outcome.failed)
 
@@ -117,13 +118,14 @@ def report_failures(failed: tuple[Failed, ...]) -> None:
     """Name runs that could not be finished, and end with status 1 if there are any."""
     if not failed:
         return
-    typer.echo(f"{len(failed)} runs failed; the same command tries them again:", err=True)
-    for result in failed[:_SHOWN_FAILURES]:
-        typer.echo(f"  cell {result.cell}, run {result.run}: {result.message}", err=True)
+    typer.echo(f"failed: {counted(len(failed), 'run')}, which the same command tries again:", err=True)
+    print_failures(failed, err=True)
     raise typer.Exit(1)
 
 
 def _describe(campaign: Campaign) -> None:
+    from vedette.scenarios.cautions import cautions
+
     typer.echo(
         f"{campaign.name}: {campaign.total} runs, {campaign.num_runs} of each of {len(campaign.cells)} cells, "
         f"seed {campaign.seed}"
@@ -136,5 +138,11 @@ def _describe(campaign: Campaign) -> None:
     for axis, values in campaign.axes.items():
         compared = " (compared)" if axis == campaign.compare else ""
         typer.echo(f"  {axis}: {', '.join(str(value) for value in values)}{compared}")
+    warned: set[tuple[str, ...]] = set()
     for cell in campaign.cells:
         typer.echo(f"  - {cell.name}")
+        lines = cautions(cell.scenario)
+        if lines not in warned:  # once for all planners, filters and values of which it is true alike
+            warned.add(lines)
+            for line in lines:
+                typer.echo(f"cell {cell.name}: {line}", err=True)

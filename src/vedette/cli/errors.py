@@ -19,6 +19,7 @@ class Commands(TyperGroup):
     """The group of all commands; prints the library's own errors instead of raising them."""
 
     def invoke(self, ctx: Any) -> Any:
+        """Run a command; what it raises becomes a line and a status."""
         try:
             return super().invoke(ctx)
         except VedetteError as error:

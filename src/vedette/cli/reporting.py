@@ -26,18 +26,23 @@ def report(
         str | None,
         typer.Option("--runs", metavar="CELL:RUN,...", help="Runs to replay; else the typical one of each strategy."),
     ] = None,
+    trust: Annotated[
+        bool, typer.Option("--trust", help="Run code that the scenarios of the results name, to draw measurements.")
+    ] = False,
 ) -> None:
     """Report on a campaign: one page that opens anywhere, with tables, figures and a replay of runs."""
     replays = None if runs is None else [_cell_and_run(text) for text in runs.split(",")]
     page = out or folder / "report.html"
     with interruptible("what is not yet written is missing; the same command writes it all anew"):
         from vedette.campaigns.results import open_results
-        from vedette.reports import write_figures, write_report
+        from vedette.reports import code_in_replays, write_figures, write_report
 
         results = open_results(folder)
         with _named({"path": "--out", "replays": "--runs", "cell": "--runs"}):
-            write_report(results, page, replays=replays)
+            write_report(results, page, replays=replays, trust=trust)
         typer.echo(f"wrote {page}")
+        if (code := code_in_replays(results)) and not trust:
+            typer.echo(f"without measurements, as drawing them runs {', '.join(code)}: --trust allows it", err=True)
         if figures is not None:
             with _named({"path": "--figures"}):
                 written = write_figures(results, figures)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from vedette.cli.errors import usage_error
+from vedette.cli.running import TRUST_HELP, Approval
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -27,6 +28,7 @@ def show(
     resolved: Annotated[
         bool, typer.Option("--resolved", help="Print YAML instead, with every default written out.")
     ] = False,
+    trust: Annotated[bool, typer.Option("--trust", help=TRUST_HELP)] = False,
 ) -> None:
     """Show a scenario as tables and as a picture.
 
@@ -37,6 +39,8 @@ def show(
     if out is not None and out.suffix[1:].lower() not in PICTURE_FORMATS:
         raise usage_error(f"expected a file ending in {', '.join(PICTURE_FORMATS)}; got {out}", "--out")
     loaded = load_scenario(scenario)
+    if not resolved or out is not None:  # the targets move by its motion model
+        Approval(trust)(loaded)
     if resolved:
         from vedette.scenarios.dumping import dump_scenario
 

@@ -90,7 +90,9 @@ def check_normalised(
     if faulty.any():
         place = _first(faulty)
         run = f"{field}[{offsets[place]}:{offsets[place + 1]}]"
-        raise error(f"{run}: expected weights that sum to 1; got {np.exp(log_sums[place])!r}")
+        with np.errstate(over="ignore"):
+            total = np.exp(log_sums[place])
+        raise error(f"{run}: expected weights that sum to 1; got {total!r}")
 
 
 def check_covariances(field: str, covs: Floats, error: type[VedetteError] = NumericalError) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -17,6 +17,7 @@ from vedette.densities.poisson import Poisson
 from vedette.densities.tracks import TrackTable
 from vedette.errors import InputError, VedetteError
 from vedette.files import write_whole
+from vedette.reading import read_arrays, read_file, said, short
 
 FORMAT_NAME = "vedette-density"
 FORMAT_VERSION = 1
@@ -63,15 +64,16 @@ def load_density(path: str | os.PathLike[str]) -> Density:
     """Read a density that `save_density` wrote.
 
     Raises `InputError` for a file that is missing, damaged, of another origin or a later version, or that holds no
-    valid density.
+    valid density. Compressed arrays are refused: what a file unpacks to is never more than
+    the file.
     """
     source = Path(path)
     try:
-        # Opened here: np.load leaves a damaged archive open.
-        with source.open("rb") as file, np.load(file, allow_pickle=False) as content:
-            arrays = {name: content[name] for name in content.files}
-    except Exception as fault:  # a damaged file can raise nearly anything in the readers of zip and npy
-        raise InputError(f"{source}: expected a density file; {fault}") from fault
+        arrays = read_arrays(read_file(source))
+    except OSError as fault:
+        raise InputError(f"{source}: expected a density file; {fault.strerror or fault}") from fault
+    except ValueError as fault:
+        raise InputError(f"{source}: expected a density file; it is damaged or another: {fault}") from fault
     kind = _kind_of(source, arrays)
     try:
         density = _build(kind, arrays)
@@ -83,18 +85,18 @@ def load_density(path: str | os.PathLike[str]) -> Density:
     return density
 
 
-def _kind_of(source: Path, arrays: dict[str, Any]) -> str:
+def _kind_of(source: Path, arrays: Mapping[str, Any]) -> str:
     if str(arrays.get("format")) != FORMAT_NAME:
         raise InputError(f"{source}: expected a file of format {FORMAT_NAME}; got one of another origin")
     if str(arrays.get("version")) != str(FORMAT_VERSION):
-        raise InputError(f"{source}: expected format version {FORMAT_VERSION}; got {arrays.get('version')}")
+        raise InputError(f"{source}: expected format version {FORMAT_VERSION}; got {said(arrays.get('version'))}")
     kind = str(arrays.get("kind"))
     if kind not in _OWN_FIELDS:
-        raise InputError(f"{source}: expected a kind of density among {', '.join(_OWN_FIELDS)}; got {kind!r}")
+        raise InputError(f"{source}: expected a kind of density among {', '.join(_OWN_FIELDS)}; got {short(kind)}")
     return kind
 
 
-def _build(kind: str, arrays: dict[str, Any]) -> Density:
+def _build(kind: str, arrays: Mapping[str, Any]) -> Density:
     own = [arrays[name] for name in _OWN_FIELDS[kind]]
     container: Callable[..., Density] = _KINDS[kind]
     if kind not in ("glmb", "lmb"):

@@ -2,6 +2,6 @@
 
 from vedette.reports.saving import write_figures
 from vedette.reports.summary import write_summary
-from vedette.reports.writing import write_report
+from vedette.reports.writing import code_in_replays, write_report
 
-__all__ = ["write_figures", "write_report", "write_summary"]
+__all__ = ["code_in_replays", "write_figures", "write_report", "write_summary"]

@@ -15,23 +15,25 @@ from vedette.evaluation.figures.rewards import best_over_others, best_over_pair
 from vedette.kernels.types import Floats
 from vedette.reports.groups import Strategy
 from vedette.scenarios import Scenario
-from vedette.scenarios.build import build_experiment
+from vedette.scenarios.build import build_region, build_sensor
 from vedette.scenarios.names import sensor_names
 from vedette.scenarios.schema.sensors import BearingOnly, BearingRange, LimitedRange, LimitedSector, Position, RangeOnly
 from vedette.scenarios.schema.sensors import Sensor as SensorSection
+from vedette.scenarios.trust import code_of
 from vedette.simulation.records import Decision, RunRecord
-from vedette.simulation.replay import scans_of
+from vedette.simulation.replay import scans_of_sensors
 from vedette.simulation.scans import Scan
 
 _DIGITS = 4  # of an extent that positions are kept to: well under a pixel
 _SIGMAS = 2.0
 
 
-def replay_data(strategy: Strategy, record: RunRecord, group: str) -> dict[str, Any]:
+def replay_data(strategy: Strategy, record: RunRecord, group: str, *, trust: bool) -> dict[str, Any]:
     """Everything that the page shows of a run, as data for JSON; positions rounded to what can be seen.
 
-    Measurements are drawn again by `scans_of`; where the sensor gives no place in the plane, or the models cannot be
-    had, they are left out.
+    Measurements are drawn again by the sensors' models; where a sensor gives no place in the plane, or the models
+    cannot be had, they are left out. Without `trust` they are left out too where drawing them would run code that the
+    scenario names.
     """
     scenario = strategy.cell.scenario
     extent = _extent(record, scenario)
@@ -55,7 +57,7 @@ def replay_data(strategy: Strategy, record: RunRecord, group: str) -> dict[str, 
         "poses": [
             [[*_rounded(pose[:2], places), round(float(pose[2]), 4)] for pose in poses] for poses in record.poses
         ],
-        "scans": _scans(record, scenario, [sensor["kind"] for sensor in sensors], places),
+        "scans": _scans(record, scenario, [sensor["kind"] for sensor in sensors], places, trust),
         "ospa": [_rounded(parts, 2) for parts in record.ospa],
         "decisions": [_decision(decision) for decision in record.decisions],
     }
@@ -131,15 +133,25 @@ def _ellipse(cov: Floats, places: int) -> list[float]:
     return [*_rounded(semi[::-1], places), round(math.atan2(axes[1, 1], axes[0, 1]), 3)]
 
 
-def _scans(record: RunRecord, scenario: Scenario, kinds: Sequence[str], places: int) -> list[list[list[list[float]]]]:
+def code_of_sensors(scenario: Scenario) -> tuple[str, ...]:
+    """Code that drawing the measurements of a scenario would run."""
+    return tuple(dict.fromkeys(name for sensor in scenario.model.sensors for name in code_of(sensor)))
+
+
+def _scans(
+    record: RunRecord, scenario: Scenario, kinds: Sequence[str], places: int, trust: bool
+) -> list[list[list[list[float]]]]:
     """For each scan, for each sensor, its measurements: the target behind it (0: clutter), and where it lies.
 
     Empty where the models of the scenario cannot be had.
     """
-    if all(kind == "none" for kind in kinds):
+    if all(kind == "none" for kind in kinds) or (code_of_sensors(scenario) and not trust):
         return []
+    model = scenario.model
+    region, method = build_region(model.region), model.filter.gaussian_method
     try:
-        scans = scans_of(record, build_experiment(scenario))
+        sensors = [build_sensor(section, region, method, scenario.folder) for section in model.sensors]
+        scans = scans_of_sensors(record, sensors)
     except VedetteError:
         return []
     return [

@@ -24,8 +24,9 @@ from vedette.kernels.types import Floats
 from vedette.reports.claims import Claim, all_pairs, claims
 from vedette.reports.drawings import Drawing, error_drawings, group_drawings, sweep_drawings, typical_records
 from vedette.reports.groups import Group, axis_label, gather
+from vedette.reports.health import group_health, health_table
 from vedette.reports.origin import versions_table
-from vedette.reports.replay import replay_data
+from vedette.reports.replay import code_of_sensors, replay_data
 from vedette.reports.saving import run_errors
 from vedette.reports.spec_text import spec_toml
 from vedette.reports.svg import inline_svg
@@ -44,6 +45,7 @@ class _Section:
     is_brief: bool
     claims: tuple[Claim, ...]
     pairs: tuple[Claim, ...]
+    health: tuple[tuple[str, str], ...]
     tables: tuple[tuple[str, Table], ...]
     figures: tuple[tuple[Drawing, Markup], ...]
 
@@ -58,12 +60,20 @@ class _Section:
         return sum(len(svg) for _, svg in self.figures)
 
 
-def write_report(results: CampaignResults, path: Path, *, replays: Sequence[tuple[str, int]] | None = None) -> None:
+def write_report(
+    results: CampaignResults, path: Path, *, replays: Sequence[tuple[str, int]] | None = None, trust: bool = False
+) -> None:
     """Write a campaign's report as one HTML file that needs nothing else; the same results give the same bytes.
 
+    Without `trust` nothing that the results name is imported or run: where drawing the measurements of a replay would
+    need a sensor model of somebody's own, they are left out, and the page says so.
+
     Args:
+        results: of a finished campaign.
+        path: of the file; its folder is made.
         replays: cell and number of the runs that can be replayed; None: the typical run of each strategy, as many as
             keep the page small.
+        trust: run the code that the scenarios of the results name (`code_in_replays`).
 
     Raises:
         InputError: a run that is not there, or a file that cannot be written.
@@ -77,11 +87,17 @@ def write_report(results: CampaignResults, path: Path, *, replays: Sequence[tupl
         errors.update(run_errors(group))
         is_brief = sum(section.size for section in sections) > MAX_FIGURE_BYTES
         sections.append(_section(group, f"g{number}", is_brief))
-        runs += [_json(data) for data in _replays(results, group, replays)]
+        runs += [_json(data) for data in _replays(results, group, replays, trust)]
     sweeps = _drawn(tuple(sweep_drawings(results.campaign, errors)), "sweep")
     kept = _within(runs, MAX_REPLAY_BYTES) if replays is None else runs
-    page = _render(results, sections, sweeps, kept, len(runs) - len(kept))
+    untrusted = () if trust else code_in_replays(results)
+    page = _render(results, sections, sweeps, kept, len(runs) - len(kept), untrusted)
     _write(path, page)
+
+
+def code_in_replays(results: CampaignResults) -> tuple[str, ...]:
+    """Code that the replays of a report would run if it is trusted: sensor models that are not the library's."""
+    return tuple(dict.fromkeys(name for cell in results.campaign.cells for name in code_of_sensors(cell.scenario)))
 
 
 def _check_replays(results: CampaignResults, replays: Sequence[tuple[str, int]]) -> None:
@@ -121,6 +137,7 @@ def _section(group: Group, prefix: str, is_brief: bool) -> _Section:
         "Errors": error_table(group),
         "Other measures": measure_table(group),
         "Decisions": decision_table(group),
+        "Health": health_table(group),
         "Cost": cost_table(group),
     }
     comparison = group.comparison
@@ -129,6 +146,7 @@ def _section(group: Group, prefix: str, is_brief: bool) -> _Section:
         is_brief=is_brief,
         claims=() if comparison is None else claims(comparison),
         pairs=() if comparison is None or len(comparison.strategies) < 3 else all_pairs(comparison),
+        health=group_health(group),
         tables=tuple((title, table) for title, table in named.items() if table is not None),
         figures=_drawn(
             tuple(error_drawings(group) if is_brief else group_drawings(group)),
@@ -147,16 +165,18 @@ def _drawn(
     )
 
 
-def _replays(results: CampaignResults, group: Group, replays: Sequence[tuple[str, int]] | None) -> list[dict[str, Any]]:
+def _replays(
+    results: CampaignResults, group: Group, replays: Sequence[tuple[str, int]] | None, trust: bool
+) -> list[dict[str, Any]]:
     """The typical runs of a group, or those of the chosen runs that belong to it."""
     if replays is None:
         return [
-            {**replay_data(strategy, record, group.title), "typical": group.comparison is not None}
+            {**replay_data(strategy, record, group.title, trust=trust), "typical": group.comparison is not None}
             for strategy, record in typical_records(group)
         ]
     strategies = {each.cell.name: each for each in group.strategies}
     return [
-        {**replay_data(strategies[name], results.record(name, run), group.title), "typical": False}
+        {**replay_data(strategies[name], results.record(name, run), group.title, trust=trust), "typical": False}
         for name, run in replays
         if name in strategies
     ]
@@ -184,6 +204,7 @@ def _render(
     sweeps: Sequence[tuple[Drawing, Markup]],
     runs: Sequence[str],
     left_out: int,
+    untrusted: Sequence[str],
 ) -> str:
     campaign = results.campaign
     script = _script()
@@ -202,10 +223,12 @@ def _render(
         sections=sections,
         sweeps=sweeps,
         finished=finished,
+        failures=results.failures(),
         planned=campaign.total,
         replays=[json.loads(run) for run in runs],
         replay_json=Markup("[" + ",".join(runs) + "]"),  # safe inside an element: see `_json`
         left_out=left_out,
+        untrusted=untrusted,
         spec=spec_toml(campaign.spec),
         versions=versions_table(results.manifest),
         style=Markup((_FILES / "report.css").read_text("utf-8")),

@@ -12,6 +12,7 @@ import numpy as np
 
 from vedette.errors import InputError
 from vedette.kernels.types import Floats, Ints
+from vedette.reading import said
 
 # Columns of equal length by name; one of shape (num_rows, n) stands for n columns of CSV, `name_0` to `name_(n - 1)`.
 Columns: TypeAlias = dict[str, Ints | Floats]
@@ -53,7 +54,10 @@ def read_csv(text: str, kinds: Mapping[str, Kind], file: str) -> Columns:
     Raises `InputError`, with the name of the file, for text that is no table, a column that is missing, and an entry
     that is not a number.
     """
-    rows = list(csv.reader(io.StringIO(text)))
+    try:
+        rows = list(csv.reader(io.StringIO(text)))
+    except csv.Error as error:
+        raise InputError(f"{file}: expected a table of comma-separated values; {error}") from None
     if not rows or any(len(row) != len(rows[0]) for row in rows):
         raise InputError(f"{file}: expected a header line and rows as long as it")
     texts = {name: [row[index] for row in rows[1:]] for index, name in enumerate(rows[0])}
@@ -78,8 +82,8 @@ def _read_column(texts: Mapping[str, list[str]], name: str, kind: Kind, file: st
         if kind is Kind.INTEGER:
             return np.array([int(entry) for entry in texts[name]], np.int64)
         return np.array([float(entry) for entry in texts[name]], np.float64)
-    except ValueError as error:
-        raise InputError(f"{file}, column {name}: expected {kind.value}; {error}") from error
+    except (ValueError, OverflowError) as error:
+        raise InputError(f"{file}, column {name}: expected {kind.value}; {said(error)}") from error
 
 
 def pack(columns: Mapping[str, np.ndarray[Any, Any]]) -> np.ndarray[Any, Any]:

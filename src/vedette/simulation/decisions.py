@@ -11,6 +11,7 @@ import numpy as np
 from vedette.control.plan import Plan, RewardTable
 from vedette.errors import InputError
 from vedette.kernels.types import Floats
+from vedette.reading import parse_json
 from vedette.simulation.records import Decision
 
 
@@ -27,7 +28,7 @@ def write_decisions(decisions: Sequence[Decision], *, indent: int | None = None)
 
 def read_decisions(text: str) -> tuple[Decision, ...]:
     """The decisions back from their text. Raises `KeyError`, `TypeError` or `ValueError` for data of another form."""
-    return tuple(_decision(entry) for entry in json.loads(text))
+    return tuple(_decision(entry) for entry in parse_json(text))
 
 
 def _data(decision: Decision) -> dict[str, Any]:

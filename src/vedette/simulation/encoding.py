@@ -9,6 +9,7 @@ import numpy as np
 
 from vedette.errors import InputError
 from vedette.kernels.types import Floats
+from vedette.reading import said
 from vedette.simulation.columns import Columns, Kind, csv_header, read_csv, write_csv
 from vedette.simulation.decisions import read_decisions, write_decisions
 from vedette.simulation.records import RunRecord
@@ -34,18 +35,18 @@ def decode_run(run: Mapping[str, Any], files: Mapping[str, str], place: str) -> 
     timings = _read_timings(_text(files, TIMINGS, place), f"{place}/{TIMINGS}")
     try:
         record = record_of(run, tables, read_decisions(_text(files, DECISIONS, place)), timings)
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
-        if isinstance(error, InputError):
-            raise
-        raise InputError(f"{place}: expected the files of a run; they do not fit together: {error!r}") from error
-    check_record(record)
+        check_record(record)
+    except InputError as error:
+        raise InputError(f"{place}: {error}") from error
+    except Exception as error:  # files of no run can raise nearly anything on the way to one
+        raise InputError(f"{place}: expected the files of a run; they do not fit together: {said(error)}") from error
     return record
 
 
 def timing_columns(record: RunRecord) -> Columns:
-    """Scan and seconds by stage, `<stage>_s`."""
+    """Step and seconds by stage, `<stage>_s`."""
     seconds = {f"{stage}_s": spent for stage, spent in record.timings.items()}
-    return {"scan": np.arange(record.num_scans), **seconds}
+    return {"step": np.arange(1, record.num_scans + 1), **seconds}
 
 
 def timings_of(columns: Mapping[str, Any]) -> dict[str, Floats]:

@@ -1,8 +1,9 @@
 """Runs on disk, in open formats.
 
 A run is a folder: `manifest.json` (what ran, on which versions, and a checksum of every other file), `scans.csv`
-(OSPA), `truth.csv`, `tracks.csv` (estimates), `sensors.csv`, `timings.csv`, `decisions.json` (choices with their reward
-tables) and, where it was given, `scenario.yaml`. A folder appears whole or not at all.
+(OSPA, reports of the fusion), `truth.csv`, `tracks.csv` (estimates), `sensors.csv` (poses, reports of the filters),
+`timings.csv`, `decisions.json` (choices with their reward tables) and, where it was given, `scenario.yaml`. A run that
+stopped early says so in the manifest (`stopped`). A folder appears whole or not at all.
 """
 
 from __future__ import annotations
@@ -19,12 +20,13 @@ from pathlib import Path
 from typing import Any
 
 from vedette.errors import InputError
+from vedette.reading import parse_json, read_file, short
 from vedette.simulation.encoding import decode_run, encode_run
 from vedette.simulation.records import RunRecord
 from vedette.simulation.tabulation import run_facts
 
 FORMAT = "vedette-run"
-FORMAT_VERSION = 2
+FORMAT_VERSION = 3
 MANIFEST = "manifest.json"
 SCENARIO = "scenario.yaml"
 _PACKAGES = ("vedette", "numpy", "scipy", "numba")
@@ -36,6 +38,7 @@ def save_run(
     """Write a run as a folder of its own.
 
     Args:
+        record: the run.
         directory: the folder to make; its parents are made too.
         scenario_text: the scenario as it was read, kept beside the results.
         overwrite: replace a folder that holds a run; a folder that holds anything else is never replaced.
@@ -72,11 +75,14 @@ def load_run(directory: Path | str) -> RunRecord:
     files = {}
     for name, checksum in manifest["files"].items():
         if Path(name).name != name:
-            raise InputError(f"{folder / MANIFEST}: expected plain file names; got {name!r}")
+            raise InputError(f"{folder / MANIFEST}: expected plain file names; got {short(name)}")
         content = _read(folder / name)
         if hashlib.sha256(content).hexdigest() != checksum:
             raise InputError(f"{folder / name}: expected the file as it was written; it is cut short or altered")
-        files[name] = content.decode()
+        try:
+            files[name] = content.decode()
+        except UnicodeDecodeError as error:
+            raise InputError(f"{folder / name}: expected UTF-8 text; byte {error.start} is not") from None
     return decode_run(manifest["run"], files, str(folder))
 
 
@@ -84,14 +90,16 @@ def read_manifest(directory: Path | str) -> dict[str, Any]:
     """The manifest of a saved run: format, versions, run, checksums of its files. Raises `InputError` as `load_run`."""
     path = Path(directory) / MANIFEST
     try:
-        manifest = json.loads(_read(path))
+        manifest = parse_json(_read(path))
+    except InputError:
+        raise
     except ValueError as error:
         raise InputError(f"{path}: expected the manifest of a run; it is cut short or altered: {error}") from error
     if not isinstance(manifest, dict) or manifest.get("format") != FORMAT:
         raise InputError(f"{path}: expected the manifest of a run; got another file")
     if manifest.get("format_version") != FORMAT_VERSION:
         raise InputError(
-            f"{path}: expected format version {FORMAT_VERSION}; got {manifest.get('format_version')}, "
+            f"{path}: expected format version {FORMAT_VERSION}; got {short(manifest.get('format_version'))}, "
             "written by another version of this program"
         )
     if not isinstance(manifest.get("files"), dict) or not isinstance(manifest.get("run"), dict):
@@ -124,9 +132,11 @@ def _version(package: str) -> str:
 
 def _read(path: Path) -> bytes:
     try:
-        return path.read_bytes()
+        return read_file(path)
     except OSError as error:
         raise InputError(f"{path}: expected a file of a saved run; {error.strerror or error}") from error
+    except ValueError as error:
+        raise InputError(f"{path}: expected a file of a saved run; {error}") from error
 
 
 def check_free(target: Path, overwrite: bool) -> None:

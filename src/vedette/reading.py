@@ -1,0 +1,152 @@
+"""Content of unknown origin, read within limits: nothing here takes more memory than a small multiple of what is there.
+
+Every function raises `ValueError` for content that it refuses, in words that fit behind "it is damaged: ".
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import math
+import re
+import stat
+import zipfile
+import zlib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+MOST_BYTES = 2**30  # of a file, or of what one unpacks to: a run of 10,000 scans of 100 targets has a fifth of it
+_LONGEST_NUMBER = 300  # digits
+_LONGEST_MESSAGE = 300  # letters of what another library says
+_SURROGATE = re.compile(r"\\u[dD][89a-fA-F]")
+
+
+def read_file(path: Path, most: int = MOST_BYTES) -> bytes:
+    """The bytes of a regular file. Raises `OSError` where it cannot be read."""
+    if not stat.S_ISREG(path.stat().st_mode):  # a pipe would wait for ever, and a device may have no end
+        if path.is_dir():
+            raise IsADirectoryError(21, "it is a folder")
+        raise ValueError("it is no regular file")
+    with path.open("rb") as file:
+        content = file.read(most + 1)
+    if len(content) > most:
+        raise ValueError(f"it has more than {most} bytes")
+    return content
+
+
+def parse_json(content: bytes | str) -> Any:
+    """Plain data of JSON text, with finite numbers, each key once, and text that can be written again."""
+    text = content.decode() if isinstance(content, bytes) else content
+    try:
+        data = json.loads(
+            text, object_pairs_hook=_each_once, parse_constant=_no_constant, parse_float=_finite, parse_int=_whole
+        )
+    except RecursionError:
+        raise ValueError("it is nested too deeply") from None
+    if _SURROGATE.search(text):
+        json.dumps(data, ensure_ascii=False).encode()  # raises for half a letter
+    return data
+
+
+def _each_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    data = dict(pairs)
+    if len(data) < len(pairs):
+        names = [name for name, _ in pairs]
+        twice = next(name for name in names if names.count(name) > 1)
+        raise ValueError(f"the key {short(twice)} stands there twice")
+    return data
+
+
+def _no_constant(name: str) -> Any:
+    raise ValueError(f"{name} is no number")
+
+
+def _finite(text: str) -> float:
+    number = float(text)
+    if not math.isfinite(number):
+        raise ValueError(f"{text[:40]} is too large a number")
+    return number
+
+
+def _whole(text: str) -> int:
+    if len(text) > _LONGEST_NUMBER:
+        raise ValueError(f"a number has {len(text)} digits")
+    return int(text)
+
+
+def inflate(packed: bytes, most: int = MOST_BYTES) -> bytes:
+    """What zlib packed into these bytes, and nothing behind it."""
+    unpacking = zlib.decompressobj()
+    try:
+        content = unpacking.decompress(packed, most)
+    except zlib.error as error:
+        raise ValueError(str(error)) from None
+    if unpacking.unconsumed_tail:
+        raise ValueError(f"it unpacks to more than {most} bytes")
+    if not unpacking.eof or unpacking.unused_data:
+        raise ValueError("it is cut short, or something stands behind it")
+    return content
+
+
+def read_members(archive: bytes) -> dict[str, bytes]:
+    """The members of a zip archive by name; together they are no larger than the archive, as nothing is compressed."""
+    try:
+        with zipfile.ZipFile(io.BytesIO(archive)) as opened:
+            infos = opened.infolist()
+            size = sum(info.file_size for info in infos)
+            if size > len(archive):
+                raise ValueError(f"its {len(archive)} bytes would unpack to {size}")
+            members = {info.filename: opened.read(info) for info in infos}
+    except Exception as error:  # damage can raise nearly anything in there
+        raise ValueError(said(error)) from error
+    if len(members) < len(infos):
+        raise ValueError("it has two members of one name")
+    return members
+
+
+def read_array(content: bytes) -> np.ndarray[Any, Any]:
+    """The array of the bytes of an `.npy` file; never an object."""
+    file = io.BytesIO(content)
+    try:
+        version = np.lib.format.read_magic(file)
+        header = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}[version]
+        shape, _, dtype = header(file)
+        expected = math.prod(shape) * dtype.itemsize
+        if (
+            dtype.hasobject
+            or dtype.itemsize == 0
+            or min(shape, default=0) < 0
+            or expected != len(content) - file.tell()
+        ):
+            raise ValueError(f"expected an array of {dtype} in shape {shape}; got {len(content) - file.tell()} bytes")
+        file.seek(0)
+        array: np.ndarray[Any, Any] = np.lib.format.read_array(file, allow_pickle=False)
+    except Exception as error:  # as above
+        raise ValueError(said(error)) from error
+    return array
+
+
+def read_arrays(archive: bytes) -> Mapping[str, np.ndarray[Any, Any]]:
+    """The arrays of the bytes of an `.npz` file."""
+    arrays = {}
+    for name, content in read_members(archive).items():
+        try:
+            arrays[name.removesuffix(".npy")] = read_array(content)
+        except ValueError as error:
+            raise ValueError(f"{short(name)}: {error}") from error
+    return arrays
+
+
+def said(error: object) -> str:
+    """What an error of another library says, in a line of bounded length."""
+    text = " ".join(str(error).split()) or type(error).__name__
+    return text if len(text) <= _LONGEST_MESSAGE else f"{text[:_LONGEST_MESSAGE]} ..."
+
+
+def short(value: Any) -> str:
+    """A value as a message shows it: what Python would write, in one line of bounded length."""
+    text = ascii(value) if isinstance(value, str) and not value.isprintable() else repr(value)
+    return text if len(text) <= 80 else f"{text[:60]} ... ({len(text)} letters)"

@@ -1,0 +1,57 @@
+"""Code that a scenario names: which it is, and whether it is the user's own."""
+
+from __future__ import annotations
+
+import os
+import stat
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel
+
+from vedette.scenarios.loading import BUILTIN_FOLDER, Scenario
+
+
+def code_of(section: BaseModel) -> tuple[str, ...]:
+    """What of the user's own a scenario, or a section of one, has imported and called, each once, in order."""
+    return tuple(dict.fromkeys(_references(section.model_dump(mode="json"))))
+
+
+def _references(value: Any) -> Iterator[str]:
+    if isinstance(value, dict) and value.get("kind") == "custom":
+        yield value["python"]
+    elif isinstance(value, dict | list):
+        for item in value.values() if isinstance(value, dict) else value:
+            yield from _references(item)
+
+
+def not_own(scenario: Scenario) -> str:
+    """Why the code that a scenario names may be somebody else's, in words; empty where there is no reason.
+
+    It is the user's own where the scenario file, the Python files that it names, and the folders that these are in
+    belong to the user or to the system's administrator, and nobody else may write to them. Systems without owners of
+    files give no reason.
+    """
+    files = [] if scenario.path is None else [scenario.path]
+    names = (reference.rpartition(":")[0] for reference in code_of(scenario.model))
+    files += [scenario.folder / name for name in names if name.endswith(".py")]
+    files = [file for file in files if file.parent != BUILTIN_FOLDER]
+    return next(filter(None, map(others_may_change, files)), "")
+
+
+def others_may_change(file: Path) -> str:
+    """Who else than the user decides what is in a file, in words; empty where nobody does, or there is no such file."""
+    if not hasattr(os, "getuid"):
+        return ""
+    real = file.resolve()
+    for path in (real, real.parent):
+        try:
+            found = path.stat()
+        except OSError:  # is said where it is opened
+            return ""
+        if found.st_uid not in (os.getuid(), 0):
+            return f"{path} belongs to another user"
+        if found.st_mode & stat.S_IWOTH and not (path == real.parent and found.st_mode & stat.S_ISVTX):
+            return f"every user may write to {path}"
+    return ""

@@ -1,0 +1,197 @@
+"""Edits that a careless or a hostile hand makes to JSON, bytes and arrays."""
+
+from __future__ import annotations
+
+import io
+import json
+import zipfile
+from typing import Any
+
+import numpy as np
+
+Generator = np.random.Generator
+
+DEEP = 100_000  # levels; more than any reader's stack
+
+
+def value_of(rng: Generator) -> Any:
+    """A value of any type that JSON can hold, and some that it cannot."""
+    values: list[Any] = [
+        *(None, True, False, 0, 1, -1, 2, 3, 7, 2**31, 2**63, -(2**63) - 1, 10**400, 0.5, -0.0, 1e308, 1e-320),
+        *(float("nan"), float("inf"), float("-inf"), "", " ", "0", "jdm", "still", "paper-a", "x" * 100_000),
+        *("\ud800", "\x00", "\x1b[2J", "[/bold]x", "²", "../../etc/passwd", "/dev/zero", "a\nb", "<script>", "{{7*7}}"),
+        *("planner", "os:system", "sensors.*.clutter.rate", "1e999", "null", [], {}, [[]], {"": None}, [1, 2, 3]),
+        *([0.1] * 1000, {str(i): i for i in range(100)}, ["jdm"], {"kind": "custom", "python": "os:system"}),
+    ]
+    return values[rng.integers(len(values))]
+
+
+def _places(data: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
+    found = [path]
+    items = data.items() if isinstance(data, dict) else enumerate(data) if isinstance(data, list) else ()
+    for key, item in items:
+        found += _places(item, (*path, key))
+    return found
+
+
+def edit_data(data: Any, rng: Generator) -> Any:
+    """The plain data with something else at one place, or one place gone, doubled or filled."""
+    data = json.loads(json.dumps(data))
+    places = _places(data)
+    path = places[rng.integers(len(places))]
+    if not path:
+        return value_of(rng)
+    holder = data
+    for key in path[:-1]:
+        holder = holder[key]
+    what, old = rng.integers(8), holder[path[-1]]
+    if what == 0:
+        del holder[path[-1]]
+    elif what == 1 and isinstance(holder, list):
+        holder.insert(path[-1], old)
+    elif what == 2 and isinstance(holder, dict):
+        holder[f"{path[-1]}x"] = old
+    elif what == 3 and isinstance(old, str) and old:
+        place = int(rng.integers(len(old)))
+        holder[path[-1]] = old[:place] + str(value_of(rng))[:50] + old[place + int(rng.integers(3)) :]
+    elif what == 4 and isinstance(old, int | float):
+        holder[path[-1]] = old * float(rng.choice([-1.0, 0.5, 1e3, 1e300])) if rng.integers(2) else old + 1
+    elif what == 5:
+        holder[path[-1]] = [old]
+    else:
+        holder[path[-1]] = value_of(rng)
+    return data
+
+
+def edit_json(text: bytes, rng: Generator) -> bytes:
+    """JSON text edited as data or as text."""
+    if rng.integers(3):
+        data = json.loads(text)
+        for _ in range(rng.integers(1, 4)):
+            data = edit_data(data, rng)
+        return json.dumps(data).encode()
+    what = rng.integers(6)
+    if what == 0:  # a key twice
+        data = json.loads(text)
+        if isinstance(data, dict) and data:
+            key = list(data)[rng.integers(len(data))]
+            twice = f"{{{json.dumps(key)}: {json.dumps(value_of(rng))}, "
+            return (json.dumps(data)[:-1] + f', {twice[1:]}"z": 0}}').encode()
+    if what == 1:
+        return b"[" * DEEP + (b"]" * DEEP if rng.integers(2) else b"")
+    if what == 2:
+        return b'{"a":' * DEEP + b"1" + b"}" * DEEP
+    return edit_bytes(text, rng)
+
+
+def edit_bytes(content: bytes, rng: Generator) -> bytes:
+    """The bytes cut short, with some flipped, taken out, put in or written over."""
+    what, place = rng.integers(6), int(rng.integers(len(content) + 1))
+    if what == 0:
+        return content[:place]
+    if what == 1:
+        return content + rng.bytes(int(rng.integers(1, 100)))
+    if what == 2:
+        return content[:place] + rng.bytes(int(rng.integers(1, 9))) + content[place:]
+    if what == 3:
+        return content[:place] + content[place + int(rng.integers(1, 50)) :]
+    if what == 4:
+        return rng.bytes(int(rng.integers(100)))
+    edited = bytearray(content)
+    for each in rng.integers(0, max(len(content), 1), int(rng.integers(1, 6))):
+        if content:
+            edited[each] ^= int(rng.integers(1, 256))
+    return bytes(edited)
+
+
+def edit_array(array: np.ndarray[Any, Any], rng: Generator) -> np.ndarray[Any, Any]:
+    """The array with other numbers, of another type or of another shape."""
+    what = rng.integers(7)
+    if array.dtype.names:
+        names = list(array.dtype.names)
+        name = names[rng.integers(len(names))]
+        if what == 0:
+            names.remove(name)
+            return array[names].copy() if names else array
+        if what == 1:
+            return array[: len(array) // 2]
+        if what == 2:
+            return np.concatenate([array, array[:1]])
+        if what == 3:
+            kinds = [(each, rng.choice(["<f4", "<i8", "<f8", "<U3", "<c16"]), array[each].shape[1:]) for each in names]
+            return np.zeros(len(array), np.dtype([(each, str(kind), shape) for each, kind, shape in kinds]))
+        edited = array.copy()
+        if array[name].size:
+            with np.errstate(all="ignore"):
+                edited[name].reshape(-1)[rng.integers(array[name].size)] = _number(array[name].dtype, rng)
+        return edited
+    if what == 0 and array.dtype.kind in "fiu":
+        return array.astype(rng.choice(["<f4", "<i8", "<f8", "<U3", "<c16", "?"]))
+    if what == 1:
+        return array.reshape(-1)
+    if what == 2:
+        return array[:-1] if array.ndim and len(array) else np.zeros((2, 3))
+    if what == 3:
+        return array[None]
+    edited = array.copy()
+    if edited.size and edited.dtype.kind in "fiu":
+        edited.reshape(-1)[rng.integers(edited.size)] = _number(edited.dtype, rng)
+    return edited
+
+
+def _number(dtype: np.dtype[Any], rng: Generator) -> Any:
+    if dtype.kind == "f":
+        return rng.choice([np.nan, np.inf, -np.inf, 0.0, -1.0, 1e300, 1e-300, -1e300, 7.5])
+    if dtype.kind in "iu":
+        return rng.choice([0, 1, -1, 2, 2**31, 2**62, -(2**62)])
+    return np.zeros((), dtype)[()]
+
+
+def npy(array: np.ndarray[Any, Any]) -> bytes:
+    """The bytes of an `.npy` file."""
+    out = io.BytesIO()
+    np.lib.format.write_array(out, array, allow_pickle=False)
+    return out.getvalue()
+
+
+def huge_npy(rng: Generator) -> bytes:
+    """The header of an array far larger than what follows it."""
+    shape = [(10**13,), (2**62, 2**62), (-1,), (10**6, 10**6), (0, 10**18)][rng.integers(5)]
+    header = str(
+        {"descr": str(rng.choice(["<f8", "|V0", "<U0", "|O", "<M8[s]"])), "fortran_order": False, "shape": shape}
+    )
+    return b"\x93NUMPY\x01\x00" + (len(header) + 1).to_bytes(2, "little") + header.encode() + b"\n" + b"\0" * 64
+
+
+def edit_npz(content: bytes, rng: Generator) -> bytes:
+    """An archive of arrays and JSON with a member edited, replaced, gone, doubled or inflated."""
+    if not rng.integers(5):
+        return edit_bytes(content, rng)
+    with zipfile.ZipFile(io.BytesIO(content)) as archive:
+        members = [(name, archive.read(name)) for name in archive.namelist()]
+    place = int(rng.integers(len(members)))
+    name, old = members[place]
+    what, packing = rng.integers(12), zipfile.ZIP_STORED
+    if what == 0:
+        del members[place]
+    elif what == 1:
+        members[place] = (name, edit_bytes(old, rng))
+    elif what == 2:
+        members[place] = (name, huge_npy(rng))
+    elif what == 3:
+        members[place] = (name, npy(np.zeros(2_000_000)))
+        packing = zipfile.ZIP_DEFLATED
+    elif what == 4:
+        members.append((["extra.npy", "../x.npy", "tracks", ""][rng.integers(4)], old))
+    elif what == 5:
+        members[place] = (f"{name}x", old)
+    elif name.endswith(".json"):
+        members[place] = (name, edit_json(old, rng))
+    else:
+        array = np.lib.format.read_array(io.BytesIO(old), allow_pickle=False)
+        members[place] = (name, npy(edit_array(array, rng)))
+    out = io.BytesIO()
+    with zipfile.ZipFile(out, "w", packing) as archive:
+        for each, data in members:
+            archive.writestr(zipfile.ZipInfo(each), data, packing)
+    return out.getvalue()
