@@ -8,22 +8,30 @@ import numpy as np
 
 from vedette.errors import NumericalError
 from vedette.kernels.compile import borrowing, inlined, kernel
-from vedette.kernels.linalg import cholesky, cholesky_of_size, log_sum, solve_lower
+from vedette.kernels.linalg import cholesky, log_sum, solve_lower
 from vedette.kernels.types import Floats, Ints
-
-# A pivot of a Cholesky factor is known to some epsilons of its variance: below these many it says nothing.
-_LEAST_PIVOT = 4.0 * 2.0**-52
 
 
 @inlined
 def _is_definite(cov: Floats, factor: Floats, n: int) -> bool:
-    """Whether `cov` is positive definite beyond the rounding of its entries."""
-    if not cholesky_of_size(cov, factor, n):
-        return False
-    definite = True
+    """Whether `cov` is positive definite beyond rounding, so that any other Cholesky factorisation finds it so too.
+
+    Its correlations are factored with a diagonal lessened by twice what n (n + 2) roundings may take from it.
+    """
+    least = 2.0 * n * (n + 2) * 2.0**-52
     for i in range(n):
-        definite = definite and factor[i, i] * factor[i, i] > n * _LEAST_PIVOT * cov[i, i]
-    return definite
+        for j in range(i + 1):
+            total = cov[i, j]
+            for k in range(j):
+                total -= factor[i, k] * factor[j, k]
+            if i > j:
+                factor[i, j] = total / factor[j, j]
+                continue
+            total -= least * cov[i, i]
+            if not 0.0 < total < math.inf:
+                return False
+            factor[i, i] = math.sqrt(total)
+    return True
 
 
 @kernel
