@@ -15,10 +15,8 @@ from typing import Any
 
 from vedette.scenarios.faults import Finding, Path, describe, named
 from vedette.scenarios.parts import Parts
-from vedette.scenarios.records import record_fault
 from vedette.scenarios.schema.base import Custom, Section
 from vedette.scenarios.schema.world import RecordedTargets
-from vedette.simulation.reports import column_names
 
 
 def _absent(file: str) -> str:
@@ -50,6 +48,8 @@ def _content(recorded: RecordedTargets, parts: Parts) -> Iterator[Finding]:
     for section in (recorded, region, time):
         if any(getattr(section, name) is None for name, field in type(section).model_fields.items() if field.default):
             return
+    from vedette.scenarios.records import record_fault  # with it comes the compiler, which most checks do without
+
     fault = record_fault(recorded, region, time, parts.folder or FilePath())
     if fault is not None:
         yield ("targets", "path"), "a file of recorded targets that a run can use", fault
@@ -65,6 +65,8 @@ def _columns(recorded: RecordedTargets, file: FilePath) -> Iterator[Finding]:
     except (OSError, csv.Error) as error:
         yield ("targets", "path"), "a readable CSV file", f"{describe(recorded.path)}: {error}"
         return
+    from vedette.simulation.reports import column_names
+
     given, shown = recorded.columns.given(), column_names(header)
     for key, name in given.items():
         if name not in header:

@@ -16,9 +16,8 @@ import numpy as np
 
 from vedette.errors import InputError
 from vedette.kernels.types import Floats, Ints
-from vedette.models.arguments import plain
 from vedette.simulation.geography import to_tangent_plane
-from vedette.text import elided, printable
+from vedette.text import elided, plain, printable
 
 # Beyond these, differences and speeds of reports mean nothing.
 _FARTHEST = 1e9  # m, m/s
