@@ -27,7 +27,7 @@ _TABLES = (
     "CREATE TABLE runs (cell TEXT NOT NULL, run INTEGER NOT NULL, session INTEGER NOT NULL, "
     "payload BLOB NOT NULL, payload_sha256 TEXT NOT NULL, timings BLOB NOT NULL, timings_sha256 TEXT NOT NULL, "
     "PRIMARY KEY (cell, run))",
-    "CREATE TABLE IF NOT EXISTS failures (cell TEXT NOT NULL, run INTEGER NOT NULL, session INTEGER NOT NULL, "
+    "CREATE TABLE failures (cell TEXT NOT NULL, run INTEGER NOT NULL, session INTEGER NOT NULL, "
     "message TEXT NOT NULL, PRIMARY KEY (cell, run))",
 )
 _COLUMNS = "cell, run, session, payload, payload_sha256, timings, timings_sha256"
@@ -207,7 +207,7 @@ def _check_tables(path: Path, database: sqlite3.Connection) -> None:
     found = database.execute("SELECT sql FROM sqlite_master WHERE name NOT LIKE 'sqlite~_%' ESCAPE '~'")
     if sorted(str(sql) for (sql,) in found) != sorted(_TABLES):
         raise InputError(
-            f"{path}: expected the tables campaign and runs as they were made; the file is cut short or altered"
+            f"{path}: expected the tables of a campaign as they were made; the file is cut short or altered"
         )
 
 
