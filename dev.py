@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
-"""Set up and run Vedette from a bare clone. Needs Python 3.11 to 3.14 and nothing else.
+"""Set up and run Vedette from a bare clone or source distribution. Needs Python 3.11 to 3.14 and nothing else.
 
 usage: python3 dev.py COMMAND [ARGUMENTS]
 
     reproduce [ARGUMENTS]   run the paper's experiment and draw its figures (`vedette reproduce`)
     check [STAGE ...]       run the whole check, or only the stages named (`check --list` names them)
+    docs [--open]           build the documentation, say where it is, and with --open show it
     vedette [ARGUMENTS]     run any other command of the program
     setup                   only set up the environment for all of these
 
@@ -17,6 +18,7 @@ import os
 import platform
 import subprocess
 import sys
+import webbrowser
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -134,17 +136,31 @@ def install(extent: str, *, dependencies: bool) -> None:
     )
 
 
+def build_docs(*, show: bool) -> int:
+    """Build the documentation as the check does; it can be read from disk."""
+    status = subprocess.call([str(PYTHON), str(ROOT / "tools" / "check.py"), "docs"], cwd=ROOT)
+    if status == 0:
+        start = ROOT / "build" / "site" / "index.html"
+        print(f"the documentation starts at {start}")
+        if show:
+            webbrowser.open(start.as_uri())
+    return status
+
+
 def main(arguments: list[str]) -> int:
     """Run one command; returns the exit status."""
     if not arguments or arguments[0] in ("-h", "--help", "help"):
         print((__doc__ or "").strip())
         return 0 if arguments else 2
     command, rest = arguments[0], arguments[1:]
-    if command not in ("reproduce", "check", "vedette", "setup"):
+    if command not in ("reproduce", "check", "docs", "vedette", "setup"):
         print(f"error: unknown command {command!r}\n\n{(__doc__ or '').strip()}", file=sys.stderr)
         return 2
+    if command == "docs" and rest not in ([], ["--open"]):
+        print(f"error: docs: expected --open or nothing; got {' '.join(rest)}", file=sys.stderr)
+        return 2
     try:
-        set_up("check" if command in ("check", "setup") else "runtime")
+        set_up("runtime" if command in ("reproduce", "vedette") else "check")
     except SetupError as error:
         print(error, file=sys.stderr)
         return 1
@@ -153,6 +169,8 @@ def main(arguments: list[str]) -> int:
         return 0
     if command == "check":
         return subprocess.call([str(PYTHON), str(ROOT / "tools" / "check.py"), *rest], cwd=ROOT)
+    if command == "docs":
+        return build_docs(show="--open" in rest)
     program = [str(SCRIPTS / "vedette")]
     return subprocess.call([*program, *(["reproduce", *rest] if command == "reproduce" else rest)])
 

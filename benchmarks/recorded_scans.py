@@ -2,8 +2,9 @@
 
     python benchmarks/recorded_scans.py [--markdown]
 
-The files lie outside the repository: in the folder that VEDETTE_RECORDED_SCANS names, or in shared/reference beside
-the checkout (docs/recorded-scans.md says what is in them). OSPA with c = 100 m and p = 1, mean over 100 scans, then
+Of this project's own files (tests/filters/recordings), and of those of other programs where they are at hand: in the
+folder that VEDETTE_RECORDED_SCANS names, or in shared/reference beside the checkout (docs/recorded-scans.md).
+OSPA with c = 100 m and p = 1, mean over 100 scans, then
 mean and standard deviation over the files; CPU time of a step, median over scans and files.
 """
 
@@ -45,29 +46,28 @@ CURVED: dict[str, tuple[type, dict[str, Any]]] = {
 FAMILIES = {"lin30": LINEAR, "lin60": LINEAR, "ct15": CURVED}
 
 
-def row(family: str, name: str, seeds: list[int]) -> list[str]:
+def row(source: str, folder: Path, family: str, name: str) -> list[str]:
     kind, options = FAMILIES[family][name]
     ospas, seconds = [], []
-    for seed in seeds:
-        recording = recorded.load(family, seed)
+    for seed in recorded.seeds(family, folder):
+        recording = recorded.load(family, seed, folder)
         estimates, spent = recorded.run(recorded.make_filter(kind, recording, **options), recording)
         ospas.append(recorded.mean_ospa(estimates, recording))
         seconds += spent
     each = " ".join(f"{value:.2f}" for value in ospas)
     summary = f"{np.mean(ospas):.2f} ({np.std(ospas, ddof=1):.2f})" if len(ospas) > 1 else each
-    return [family, name, summary, each, f"{1e3 * np.median(seconds):.2f}", TOOLBOXES.get((family, name), "")]
+    theirs = TOOLBOXES.get((family, name), "") if source == "others" else ""
+    return [source, family, name, summary, each, f"{1e3 * np.median(seconds):.2f}", theirs]
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--markdown", action="store_true", help="print a Markdown table")
     options = parser.parse_args()
-    rows = [["family", "filter", "OSPA m (sd)", "each file", "ms a scan", "toolboxes"]]
-    for family, variants in FAMILIES.items():
-        seeds = recorded.seeds(family)
-        rows += [row(family, name, seeds) for name in variants if seeds]
-    if len(rows) == 1:
-        raise SystemExit(f"no recorded scans in {recorded.folder()}; name their folder in VEDETTE_RECORDED_SCANS")
+    rows = [["files", "family", "filter", "OSPA m (sd)", "each file", "ms a scan", "toolboxes"]]
+    for source, folder in recorded.sources().items():
+        for family, variants in FAMILIES.items():
+            rows += [row(source, folder, family, name) for name in variants if recorded.seeds(family, folder)]
     if options.markdown:
         rows.insert(1, ["---"] * len(rows[0]))
     widths = [max(len(entries[i]) for entries in rows) for i in range(len(rows[0]))]

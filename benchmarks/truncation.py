@@ -45,10 +45,9 @@ def main() -> None:
     parser.add_argument("--family", choices=("lin30", "lin60", "ct15"), default="lin30")
     parser.add_argument("--draws", type=int, default=40)
     options = parser.parse_args()
-    seeds = recorded.seeds(options.family)
-    if not seeds:
-        raise SystemExit(f"no recorded scans in {recorded.folder()}; name their folder in VEDETTE_RECORDED_SCANS")
-    original = recorded.load(options.family, seeds[0])
+    folder = recorded.sources().get("others", recorded.OWN)
+    seeds = recorded.seeds(options.family, folder)
+    original = recorded.load(options.family, seeds[0], folder)
     draws = [recorded.redraw(original, rng=np.random.default_rng(draw)) for draw in range(options.draws)]
     print(f"{'hypotheses kept':28s}  OSPA m          worst  ms a scan")
     for name, (kind, parts) in ROWS.items():

@@ -7,6 +7,7 @@ import os
 import re
 import subprocess
 import sys
+import tarfile
 import tomllib
 import zipfile
 from pathlib import Path
@@ -14,12 +15,14 @@ from types import ModuleType
 
 import numpy as np
 import pytest
+from ruamel.yaml import YAML
 
 import vedette
 from vedette.kernels.compile import JIT_ENABLED, kernel
 
 ROOT = Path(__file__).resolve().parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))
+README = (ROOT / "README.md").read_text("utf-8")
 LOCKS = sorted((ROOT / "requirements").glob("*.txt"))
 
 
@@ -110,7 +113,12 @@ def test_an_unsupported_python_is_told_so_before_anything_else() -> None:
 
 @pytest.mark.parametrize(
     ("arguments", "status", "message"),
-    [(["--help"], 0, "reproduce"), ([], 2, "usage"), (["chekc"], 2, "unknown command 'chekc'")],
+    [
+        (["--help"], 0, "reproduce"),
+        ([], 2, "usage"),
+        (["chekc"], 2, "unknown command 'chekc'"),
+        (["docs", "--opne"], 2, "expected --open or nothing; got --opne"),
+    ],
 )
 def test_the_set_up_script_explains_itself(arguments: list[str], status: int, message: str) -> None:
     command = [sys.executable, str(ROOT / "dev.py"), *arguments]
@@ -150,6 +158,29 @@ def test_an_environment_is_made_again_only_when_its_lock_changed(
     assert steps("check") == ["new", "check True"]
 
 
+def test_the_documentation_is_built_and_where_it_is_is_said(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    dev = load("dev.py")
+    called: list[list[str]] = []
+    shown: list[str] = []
+    monkeypatch.setattr(dev, "ROOT", tmp_path)
+    monkeypatch.setattr(dev, "set_up", lambda extent: called.append([extent]))
+
+    def call(command: list[str], cwd: Path) -> int:
+        called.append(command[-2:])
+        return 0
+
+    monkeypatch.setattr(dev.subprocess, "call", call)
+    monkeypatch.setattr(dev.webbrowser, "open", shown.append)
+    assert dev.main(["docs"]) == 0
+    assert called == [["check"], [str(tmp_path / "tools" / "check.py"), "docs"]]
+    start = tmp_path / "build" / "site" / "index.html"
+    assert str(start) in capsys.readouterr().out
+    assert dev.main(["docs", "--open"]) == 0
+    assert shown == [start.as_uri()]
+
+
 def test_a_failed_step_of_the_set_up_shows_what_it_said() -> None:
     dev = load("dev.py")
     with pytest.raises(dev.SetupError, match=r"(?s)no such thing.*failed\. Try another\."):
@@ -181,30 +212,102 @@ def test_a_failed_stage_fails_the_check_and_the_rest_is_run(
 
 
 def test_links_between_the_files_of_the_project_lead_somewhere() -> None:
-    for page in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md"):
+    for page in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "SECURITY.md"):
         for target in re.findall(r"\]\((?!https?:)([^)#]+)", (ROOT / page).read_text("utf-8")):
             assert (ROOT / target).exists(), f"{page}: {target}"
 
 
-@pytest.mark.parametrize(
-    "block", re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text("utf-8"), re.DOTALL)
-)
+@pytest.mark.parametrize("block", re.findall(r"```python\n(.*?)```", README, re.DOTALL))
 def test_the_example_of_the_readme_runs(block: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     exec(compile(block, "README.md", "exec"), {"__name__": "__main__"})
+
+
+def test_the_example_of_the_readme_has_strict_types(tmp_path: Path) -> None:
+    (block,) = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
+    example = tmp_path / "example.py"
+    example.write_text(block, "utf-8")
+    command = [sys.executable, "-m", "mypy", "--strict", "--config-file", str(ROOT / "pyproject.toml"), str(example)]
+    result = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert result.returncode == 0, result.stdout + result.stderr
+
+
+def test_the_first_screen_of_the_readme_says_how_to_start() -> None:
+    first = "\n".join(README.splitlines()[:45])
+    assert "dev.py reproduce" in first
+    assert "vedette init" in first
+
+
+def test_the_readme_can_be_read_where_there_is_no_repository() -> None:
+    portable = load("tools/readme.py").portable
+    alone = portable(README, None)
+    assert re.findall(r"\]\((?!https?:|#)[^)]*\)", alone) == []
+    assert "examples/own_sensor.py" in alone
+    assert "*Left: four targets, " in alone
+    linked = portable(README, "https://example.org/vedette/")
+    assert "(https://example.org/vedette/raw/main/docs/images/reproduction.png)" in linked
+    assert "(https://example.org/vedette/blob/main/LICENSE)" in linked
+
+
+def test_how_to_cite_says_this_version_and_the_paper() -> None:
+    citation = YAML(typ="safe").load(ROOT / "CITATION.cff")
+    assert citation["cff-version"] == "1.2.0"
+    assert citation["version"] == vedette.__version__
+    assert citation["license"] == PROJECT["project"]["license"]
+    (paper,) = citation["references"]
+    assert " ".join(paper["title"].split()) in " ".join(README.split())
 
 
 def test_the_changelog_speaks_of_this_version() -> None:
     assert vedette.__version__ in (ROOT / "CHANGELOG.md").read_text("utf-8")
 
 
+def build(folder: Path, kind: str, target: Path) -> Path:
+    """The one file that hatchling builds of the project in a folder."""
+    command = [sys.executable, "-m", "hatchling", "build", "--target", kind, "--directory", str(target)]
+    subprocess.run(command, cwd=folder, check=True, capture_output=True)
+    (built,) = target.iterdir()
+    return built
+
+
 @pytest.fixture(scope="module")
-def wheel_files(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
-    target = tmp_path_factory.mktemp("wheel")
-    command = [sys.executable, "-m", "hatchling", "build", "--target", "wheel", "--directory", str(target)]
-    subprocess.run(command, cwd=ROOT, check=True, capture_output=True)
-    (wheel,) = target.glob("*.whl")
-    return zipfile.ZipFile(wheel).namelist()
+def unpacked(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder that the source distribution unpacks to."""
+    place = tmp_path_factory.mktemp("source")
+    with tarfile.open(build(ROOT, "sdist", place / "built")) as archive:
+        archive.extractall(place, filter="data")
+    return place / f"vedette-{vedette.__version__}"
+
+
+@pytest.fixture(scope="module")
+def wheel(unpacked: Path, tmp_path_factory: pytest.TempPathFactory) -> zipfile.ZipFile:
+    """Built from the unpacked source distribution, as an installer does."""
+    return zipfile.ZipFile(build(unpacked, "wheel", tmp_path_factory.mktemp("wheel")))
+
+
+@pytest.fixture
+def wheel_files(wheel: zipfile.ZipFile) -> list[str]:
+    return wheel.namelist()
+
+
+def test_the_source_distribution_holds_all_that_the_project_needs(unpacked: Path) -> None:
+    held = {path.relative_to(unpacked).as_posix() for path in unpacked.rglob("*") if path.is_file()}
+    folders = (".ci", "benchmarks", "docs", "examples", "requirements", "src", "tests", "tools")
+    expected = {path for folder in folders for path in (ROOT / folder).rglob("*") if path.is_file()}
+    expected |= {
+        ROOT / name for name in ("dev.py", "mkdocs.yml", "pyproject.toml", "LICENSE", "CITATION.cff", ".gitignore")
+    }
+    expected |= {ROOT / f"{name}.md" for name in ("README", "CHANGELOG", "CONTRIBUTING", "SECURITY")}
+    names = {path.relative_to(ROOT).as_posix() for path in expected if not {"__pycache__"} & set(path.parts)}
+    assert {name for name in names if not name.endswith((".pyc", ".swp"))} - held == set()
+    assert all((unpacked / target).exists() for target in re.findall(r"\]\((?!https?:|#)([^)#]+)", README))
+
+
+def test_the_package_carries_a_readme_that_stands_alone(wheel: zipfile.ZipFile) -> None:
+    (name,) = (name for name in wheel.namelist() if name.endswith(".dist-info/METADATA"))
+    metadata = wheel.read(name).decode()
+    assert "# Vedette\n" in metadata
+    assert "](docs/" not in metadata
 
 
 def test_the_package_holds_the_whole_library_its_types_data_and_licence(wheel_files: list[str]) -> None:

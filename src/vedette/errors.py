@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from vedette.text import listed
+
 
 class VedetteError(Exception):
     """Base of every error raised on purpose by this library."""
@@ -20,7 +22,7 @@ class NumericalError(VedetteError, ArithmeticError):
 
 
 class ScenarioError(VedetteError):
-    """A scenario with one or more faults.
+    """A scenario with one or more faults. The message lists the first fifty and counts the others.
 
     Attributes:
         faults: one line a fault, in file order: place, field, what was expected, what came.
@@ -28,4 +30,4 @@ class ScenarioError(VedetteError):
 
     def __init__(self, faults: list[str]) -> None:
         self.faults = list(faults)
-        super().__init__("\n".join(self.faults))
+        super().__init__(listed(self.faults))

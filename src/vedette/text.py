@@ -1,4 +1,4 @@
-"""Names of any length where there is little room."""
+"""Numbers of things in words, and names of any length where there is little room."""
 
 from __future__ import annotations
 
@@ -6,6 +6,27 @@ import unicodedata
 from collections.abc import Sequence
 
 ELLIPSIS = "\N{HORIZONTAL ELLIPSIS}"
+_MOST_LINES = 50
+_LONGEST_LINE = 2000
+
+
+def printable(text: str) -> str:
+    """The text with letters that no screen shows (control characters, lone surrogates) written as escapes."""
+    if text.isprintable():
+        return text
+    return "".join(letter if letter.isprintable() else ascii(letter)[1:-1] for letter in text)
+
+
+def listed(lines: Sequence[str]) -> str:
+    """Lines of a message; of very many the first, and how many more there are."""
+    shown = [line if len(line) <= _LONGEST_LINE else line[:_LONGEST_LINE] + ELLIPSIS for line in lines[:_MOST_LINES]]
+    more = len(lines) - len(shown)
+    return "\n".join([*shown, *([f"and {more} more"] if more else [])])
+
+
+def counted(number: int, thing: str) -> str:
+    """`1 sensor`, `2 sensors`."""
+    return f"{number} {thing}" if number == 1 else f"{number} {thing}s"
 
 
 def display_width(text: str) -> int:

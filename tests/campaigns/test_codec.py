@@ -73,13 +73,17 @@ def test_numpy_alone_reads_a_payload():
 
 def test_the_layout_of_this_version_is_as_written_here():
     """Where this fails, results of earlier versions no longer read: raise PAYLOAD_VERSION with the change."""
-    assert PAYLOAD_VERSION == 1
+    assert PAYLOAD_VERSION == 2
     layout = {name: " ".join(kinds) for name, kinds in TABLES.items()}
     assert layout == {
-        "scans": "scan time_s num_targets num_estimates ospa_m localisation_m cardinality_m",
-        "truth": "scan time_s target state",
-        "tracks": "scan time_s birth_step birth_site existence mean cov",
-        "sensors": "scan time_s sensor x_m y_m heading_rad",
+        "scans": "step time_s num_targets num_estimates ospa_m localisation_m cardinality_m "
+        "fusion_num_sets fusion_num_lost_labels fusion_empty_intersection fusion_log_normaliser "
+        "fusion_discarded_weight",
+        "truth": "step time_s target state",
+        "tracks": "step time_s birth_step birth_site existence mean cov",
+        "sensors": "step time_s sensor x_m y_m heading_rad log_likelihood num_hypotheses num_tracks "
+        "discarded_weight_bound dropped_existence num_clutter_raised num_duplicates num_inexact_clusters search_cut "
+        "cap_met num_missing_sets num_missing_labels",
     }
     assert " ".join(make_run("jdm", 0)[1].columns()) == (
         "gospa_m gospa_localisation gospa_missed gospa_false num_missed num_false ospa2_m cardinality_error nees_mean "
@@ -122,8 +126,8 @@ def bad_payloads() -> dict[str, bytes]:
         "expected the bytes of a run": b"",
         "expected the bytes of a run; got others: ValueError: File is not a zip file": payload[: len(payload) // 2],
         "expected the bytes of a run; got others: KeyError": changed(payload, "tracks.npy", None),
-        "payload version 1; got 9": changed(payload, "run.json", json.dumps({**facts, "payload_version": 9}).encode()),
-        "expected a column time_s": changed(payload, "scans.npy", array({"scan": scans["scan"]})),
+        "payload version 2; got 9": changed(payload, "run.json", json.dumps({**facts, "payload_version": 9}).encode()),
+        "expected a column time_s": changed(payload, "scans.npy", array({"step": scans["step"]})),
         "column time_s: expected numbers; got int64": changed(payload, "scans.npy", array(whole)),
         "truth: expected the scan times|expected rows in order": changed(
             payload, "scans.npy", array({name: column[1:] for name, column in scans.items()})

@@ -6,7 +6,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -18,6 +17,7 @@ from vedette.campaigns.clients import local_workers, remote_workers
 from vedette.campaigns.engine import in_process, on_workers
 from vedette.campaigns.tasks import Failed, Landed, TaskQueue
 from vedette.errors import InputError, VedetteError
+from waiting import wait_for_port
 
 pytestmark = pytest.mark.filterwarnings("ignore::ResourceWarning", "ignore::DeprecationWarning")
 RUNS = 30
@@ -53,6 +53,8 @@ def dask(*arguments: str) -> Iterator[subprocess.Popen[bytes]]:
         stderr=subprocess.DEVNULL,
     )
     try:
+        if arguments[0] == "scheduler":
+            wait_for_port(int(arguments[-1]))
         yield process
     finally:
         process.kill()
@@ -92,9 +94,7 @@ def test_a_scheduler_that_is_killed_is_said_to_be_gone(free_port: int) -> None:
 
 def test_an_address_where_nothing_answers(free_port: int, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("vedette.campaigns.clients._CONNECT_SECONDS", 0.5)
-    start = time.monotonic()
     for address in (f"tcp://127.0.0.1:{free_port}", "nonsense://x", ""):
         expected = pytest.raises(InputError, match="scheduler: expected the address of a running dask scheduler")
         with expected, remote_workers(address):
             pass
-    assert time.monotonic() - start < 30.0

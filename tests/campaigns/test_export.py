@@ -123,6 +123,17 @@ def test_actions_that_were_not_evaluated_have_no_row(results):
     assert rows["chosen"].sum() == 1
 
 
+@pytest.mark.parametrize("name", ["scans", "truth", "tracks", "sensors", "timings"])
+def test_every_table_counts_steps_from_one(results, tables, name):
+    rows = tables[name]
+    assert "scan" not in rows.column_names
+    steps, times = rows["step"].to_numpy(), rows["time_s"].to_numpy()
+    record = results.record("jdm-rate-5.0", 0)
+    np.testing.assert_array_equal(times, record.times[steps - 1])
+    if name != "tracks":
+        assert (steps.min(), steps.max()) == (1, record.num_scans)
+
+
 def test_timings_are_by_stage_and_scan(tables):
     rows = part(tables["timings"], "random-rate-10.0", 1)
     record, _ = make_run("random", 1)
@@ -185,7 +196,7 @@ def test_csv_holds_the_same_and_lists_as_json(results, tables, tmp_path):
 
 def test_the_dataset_has_every_measure_and_gaps_where_runs_are_missing(results):
     dataset = results.dataset()
-    assert dict(dataset.sizes) == {"cell": 4, "run": NUM_RUNS, "scan": 40}
+    assert dict(dataset.sizes) == {"cell": 4, "run": NUM_RUNS, "step": 40}
     record, metrics = make_run("jdm", 1)
     chosen = dataset.sel(cell="jdm-rate-10.0", run=1)
     np.testing.assert_array_equal(chosen["ospa_m"], record.ospa[:, 0])
@@ -194,7 +205,7 @@ def test_the_dataset_has_every_measure_and_gaps_where_runs_are_missing(results):
         np.testing.assert_array_equal(chosen[name], column)
     assert bool(dataset["ospa_m"].sel(cell="random-rate-5.0", run=2).isnull().all())
     assert dataset["ospa_m"].attrs["units"] == "m"
-    strategies = dataset.groupby("planner").mean()["ospa_m"].mean(("run", "scan"))
+    strategies = dataset.groupby("planner").mean()["ospa_m"].mean(("run", "step"))
     assert float(strategies.sel(planner="jdm")) < float(strategies.sel(planner="random"))
 
 

@@ -21,6 +21,7 @@ from vedette.campaigns.journal import Reader
 from vedette.campaigns.results import open_results
 from vedette.campaigns.running import Unwatched, run_campaign
 from vedette.errors import InputError
+from waiting import PATIENCE, wait_for_port, wait_until
 
 RUNS = 40
 SPEC = f"""
@@ -88,22 +89,22 @@ class Program:
 
     def wait_for(self, num_runs: int) -> None:
         """Until at least so many runs are in the store."""
-        for _ in range(1200):
+
+        def are_there() -> bool:
             assert self._process is not None
             assert self._process.poll() is None, self._process.communicate()
             try:
-                if len(Reader(self.folder).finished()) >= num_runs:
-                    return
+                return len(Reader(self.folder).finished()) >= num_runs
             except InputError:  # the store is not made yet
-                pass
-            time.sleep(0.05)
-        raise AssertionError("the campaign did not get that far")
+                return False
+
+        wait_until(are_there, f"{num_runs} runs in the store")
 
     def finish(self) -> str:
         """What it printed, once it has ended well."""
         assert self._process is not None
         with closing(self._process.stdout):  # type: ignore[type-var]
-            out, _ = self._process.communicate(timeout=120)
+            out, _ = self._process.communicate(timeout=PATIENCE)
         assert self._process.returncode == 0, out
         return out
 
@@ -120,13 +121,15 @@ def heed_interrupts() -> None:
 
 def assert_gone(group: int) -> None:
     """No process of the group is left, or will be in a moment."""
-    for _ in range(200):
+
+    def is_gone() -> bool:
         try:
             os.killpg(group, 0)
         except ProcessLookupError:
-            return
-        time.sleep(0.05)
-    raise AssertionError("workers outlive the program")
+            return True
+        return False
+
+    wait_until(is_gone, "the end of the program's workers")
 
 
 def test_the_program_killed_at_several_moments_ends_with_the_same_bytes(
@@ -147,7 +150,7 @@ def test_ctrl_c_leaves_a_folder_to_go_on_with(program: Program, undisturbed: dic
     process = program.start("--workers", "2")
     program.wait_for(20)
     os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to every process of the group
-    out, _ = process.communicate(timeout=60)
+    out, _ = process.communicate(timeout=PATIENCE)
     assert process.returncode == 130, out
     assert "the same command goes on from there" in out
     assert "Traceback" not in out
@@ -168,10 +171,11 @@ def test_a_lost_scheduler_leaves_a_folder_to_go_on_with(
         for arguments in (["scheduler", *place], ["worker", address, "--nthreads", "1", "--no-dashboard"])
     )
     try:
+        wait_for_port(free_port)
         process = program.start("--scheduler", address)
         program.wait_for(15)
         scheduler.kill()
-        out, _ = process.communicate(timeout=60)
+        out, _ = process.communicate(timeout=PATIENCE)
     finally:
         for each in (worker, scheduler):
             each.kill()
@@ -242,7 +246,7 @@ def test_ctrl_c_while_workers_start(program: Program, undisturbed: dict[str, str
     program.wait_for(2)  # the first run of each kind is done, and the workers start
     time.sleep(0.7)
     os.killpg(process.pid, signal.SIGINT)
-    out, _ = process.communicate(timeout=60)
+    out, _ = process.communicate(timeout=PATIENCE)
     assert process.returncode == 130, out
     assert_gone(process.pid)
 
@@ -254,6 +258,6 @@ def test_a_script_without_a_guard_is_told_so(tmp_path: Path) -> None:
         f"spec = CampaignSpec.model_validate({SPEC_DATA!r})\n"
         f"run_campaign(resolve(spec), {str(tmp_path / 'results')!r}, num_workers=2)\n"
     )
-    result = subprocess.run([sys.executable, script], capture_output=True, text=True, check=False, timeout=120)
+    result = subprocess.run([sys.executable, script], capture_output=True, text=True, check=False, timeout=PATIENCE)
     assert result.returncode != 0
     assert 'under `if __name__ == "__main__":`' in result.stderr

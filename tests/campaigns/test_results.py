@@ -104,7 +104,7 @@ def test_a_campaign_that_has_just_begun_has_nothing_to_show(tmp_path, campaign):
     assert results.comparisons() == ()
     assert results.tables() == {}
     assert list(results.runs()) == []
-    assert results.dataset().sizes == {"cell": 4, "run": NUM_RUNS, "scan": 0}
+    assert results.dataset().sizes == {"cell": 4, "run": NUM_RUNS, "step": 0}
 
 
 def test_results_are_read_while_they_are_written(tmp_path, campaign):
@@ -209,7 +209,7 @@ def test_what_is_no_results_folder_is_named(folder, tmp_path):
     ("change", "message"),
     [
         ({"format": "photo album"}, "got another file"),
-        ({"format_version": 9}, "expected format version 1; got 9"),
+        ({"format_version": 9}, "expected format version 2; got 9"),
         ({"seed": 8}, r"campaign\.sqlite: expected the runs of the manifest beside it"),
         ({"cells": []}, "the manifest was altered"),
         ({"digest": None}, "expected a field digest"),

@@ -7,8 +7,10 @@ from typer.testing import CliRunner
 
 from vedette.campaigns import open_results
 from vedette.cli import app
+from vedette.errors import NumericalError
+from vedette.filters import DeltaGlmbFilter
 from vedette.scenarios import list_builtin
-from vedette.simulation.storage import load_run
+from vedette.simulation.storage import load_run, read_manifest
 
 
 @pytest.fixture
@@ -45,6 +47,69 @@ def test_run_prints_and_saves(scenario_file, tmp_path):
     replaced = call("run", scenario_file, "--planner", "idm", "--out", out, "--overwrite")
     assert replaced.exit_code == 0, replaced.output
     assert load_run(out).planner == "idm"
+
+
+def fail_at(monkeypatch, step, error):
+    whole = DeltaGlmbFilter.step
+
+    def failing(self, belief, scan, pose, dt, number, *, rng):
+        if number == step:
+            raise error
+        return whole(self, belief, scan, pose, dt, number, rng=rng)
+
+    monkeypatch.setattr(DeltaGlmbFilter, "step", failing)
+
+
+@pytest.mark.parametrize(
+    ("error", "status", "said"),
+    [(NumericalError("no weight"), 1, "no weight"), (KeyboardInterrupt(), 130, "interrupted")],
+)
+def test_a_run_that_stops_keeps_what_it_had(scenario_file, tmp_path, monkeypatch, error, status, said):
+    out = tmp_path / "results"
+    fail_at(monkeypatch, 9, error)
+    result = call("run", scenario_file, "--planner", "idm", "--out", out)
+    assert result.exit_code == status, result.output
+    place = "paper-e, idm, seed 0, run 0: stopped at step 9 of 10 (9 s), in the filter of sensor 1"
+    assert result.stderr == f"{place}: {said}\nwrote {out}, with the 8 scans before\n"
+    record = load_run(out)
+    assert (record.num_scans, len(record.decisions)) == (8, 1)
+    assert read_manifest(out)["run"]["stopped"] == record.stopped == f"{place}: {said}"
+    assert (out / "figures" / "tracks.pdf").exists()
+    assert (out / "figures" / "rewards-8s.pdf").exists()
+    again = call("run", scenario_file, "--planner", "idm", "--out", out, "--overwrite")
+    assert again.exit_code == status
+    monkeypatch.undo()
+    assert call("run", scenario_file, "--planner", "idm", "--out", out, "--overwrite").exit_code == 0
+    assert load_run(out).stopped is None
+    fail_at(monkeypatch, 9, error)
+    kept = call("run", scenario_file, "--planner", "idm", "--out", out, "--overwrite")
+    assert kept.exit_code == status
+    assert "keeps the whole run that was there" in kept.stderr
+    assert load_run(out).num_scans == 10
+
+
+def test_ctrl_c_while_the_figures_are_drawn_says_that_the_run_is_there(scenario_file, tmp_path, monkeypatch):
+    def interrupted(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("vedette.evaluation.figures.tracks_figure", interrupted)
+    result = call("run", scenario_file, "--planner", "still", "--out", tmp_path / "results")
+    assert result.exit_code == 130
+    assert f"interrupted: wrote {tmp_path / 'results'}, but not all of its figures" in result.stderr
+    assert load_run(tmp_path / "results").num_scans == 10
+
+
+def test_a_run_that_stops_at_once_writes_nothing(scenario_file, tmp_path, monkeypatch):
+    fail_at(monkeypatch, 1, NumericalError("no weight"))
+    result = call("run", scenario_file, "--planner", "still", "--out", tmp_path / "results")
+    assert result.exit_code == 1
+    assert result.stderr.endswith("no weight\nnothing was written\n")
+    assert not (tmp_path / "results").exists()
+
+
+def test_a_run_ends_with_its_health(scenario_file):
+    result = call("run", scenario_file, "--planner", "still")
+    assert result.stdout.splitlines()[-1].startswith("health: ")
 
 
 def test_run_without_a_folder_writes_nothing(scenario_file, tmp_path):

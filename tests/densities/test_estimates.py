@@ -117,7 +117,7 @@ def test_track_histories_follow_labels():
     estimates = [_estimate([(1, 0)]), _estimate([]), _estimate([(0, 1), (1, 0)], 0.5), _estimate([(0, 1)], 0.75)]
     histories = track_histories(estimates, np.array([10.0, 11.0, 12.0, 13.0]))
     assert [history.label for history in histories] == [(0, 1), (1, 0)]
-    assert histories[0].scans.tolist() == [2, 3]
+    assert histories[0].steps.tolist() == [3, 4]
     assert histories[0].times.tolist() == [12.0, 13.0]
     assert histories[1].times.tolist() == [10.0, 12.0]
     assert histories[1].means.tolist() == [[1.0, 0.0], [1.5, 0.5]]

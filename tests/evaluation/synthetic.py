@@ -10,6 +10,7 @@ from vedette.control.plan import Plan, RewardTable
 from vedette.densities.estimates import Estimate
 from vedette.evaluation.metrics import ospa_of_run
 from vedette.kernels.types import Floats
+from vedette.simulation.health import Health
 from vedette.simulation.records import Decision, RunRecord
 from vedette.simulation.truth import Truth
 
@@ -71,6 +72,7 @@ def make_record(planner: str = "jdm", run: int = 0, seed: int = 7, num_scans: in
         estimates=estimates,
         decisions=decisions,
         ospa=np.zeros((num_scans, 3)),
+        health=_health(num_scans, rng),
         timings={"filter": np.linspace(0.001, 0.002, num_scans), "planning": np.full(num_scans, 0.1)},
     )
     return replace(record, ospa=ospa_of_run(truth, estimates, cutoff=100.0, order=1.0))
@@ -89,6 +91,18 @@ def _move(planner: str, times: Floats, rng: np.random.Generator) -> tuple[Floats
             pose = np.c_[pose[:, :2], plan.chosen_headings]
             moving = True
     return poses, tuple(decisions)
+
+
+def _health(num_scans: int, rng: np.random.Generator) -> Health:
+    """Two sensors that cut off a little at every scan, and a label that the second lacks at every fourth."""
+    health = Health.unreported(num_scans, 2)
+    health.discarded_weight_bound[:] = rng.uniform(0.0, 1e-3, (num_scans, 2))
+    health.log_likelihood[0] = np.nan
+    health.num_hypotheses[:] = rng.integers(1, 300, (num_scans, 2))
+    health.fusion_num_sets[:] = 10
+    health.num_missing_sets[::4, 1] = health.num_missing_labels[::4, 1] = 1
+    health.fusion_num_lost_labels[::4] = 1
+    return health
 
 
 def _estimate(truth: Truth, scan: int, noise: float, rng: np.random.Generator) -> Estimate:

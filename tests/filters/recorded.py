@@ -1,7 +1,9 @@
-"""Recorded scans that other programs made, with their truth, and the models that their authors state.
+"""Recorded scans with their truth, and the models that they were made with.
 
-The files lie outside the repository: in the folder that `VEDETTE_RECORDED_SCANS` names, or in `shared/reference` beside
-the checkout. Their states are [px vx py vy (omega)], their bearings are measured from +y.
+Those in `recordings/` are of this project's own generator. Scans of the same families that other programs made are
+used too where they are at hand: in the folder that `VEDETTE_RECORDED_SCANS` names, or in `shared/reference` beside the
+checkout.
+The states in the files are [px vx py vy (omega)], those of three sensors [px py vx vy]; bearings are measured from +y.
 """
 
 from __future__ import annotations
@@ -19,24 +21,33 @@ from vedette import models
 from vedette.densities import GLMB, LMB, Estimate, map_estimate
 from vedette.evaluation.metrics import ospa
 from vedette.filters import LabelledFilter
+from vedette.fusion import Fusion
 
 POSE = np.zeros(3)
 PERIOD = 1.0
 CUTOFF, ORDER = 100.0, 1.0
 
-# Their order of the state's components, as places in the file.
-_ORDER = {4: [0, 2, 1, 3], 5: [0, 2, 1, 3, 4]}
+# The order of the state's components, as places in the file.
+STATE_ORDER = {4: [0, 2, 1, 3], 5: [0, 2, 1, 3, 4]}
 
 
-def folder() -> Path:
-    """Where the files should be."""
+OWN = Path(__file__).with_name("recordings")
+
+
+def others() -> Path:
+    """Where the files of other programs would be."""
     named = os.environ.get("VEDETTE_RECORDED_SCANS")
     return Path(named) if named else Path(__file__).resolve().parents[3] / "shared" / "reference"
 
 
-def seeds(family: str) -> list[int]:
+def sources() -> dict[str, Path]:
+    """The folders that hold files: this project's own, and that of other programs where it is at hand."""
+    return {"own": OWN} | ({"others": others()} if any(others().glob("meas_*_s*.npz")) else {})
+
+
+def seeds(family: str, folder: Path = OWN) -> list[int]:
     """Seeds for which there is a file of this family."""
-    return sorted(int(path.stem.rsplit("_s", 1)[1]) for path in folder().glob(f"meas_{family}_s*.npz"))
+    return sorted(int(path.stem.rsplit("_s", 1)[1]) for path in folder.glob(f"meas_{family}_s*.npz"))
 
 
 @dataclass(frozen=True)
@@ -48,14 +59,25 @@ class Recording:
     parameters: dict[str, Any]
 
 
-def load(family: str, seed: int) -> Recording:
-    with np.load(folder() / f"meas_{family}_s{seed}.npz") as archive:
+def load(family: str, seed: int, folder: Path = OWN) -> Recording:
+    """The scans of a file; of several sensors, one after another within each scan (`scans_of` takes them apart)."""
+    with np.load(folder / f"meas_{family}_s{seed}.npz") as archive:
         parameters = {name: archive[name] for name in archive}
+    for name in ("Z", "X_true"):
+        parameters[name] = parameters[name].astype(np.float64)
     numbers = range(1, int(parameters["K"]) + 1)
     scans = tuple(np.ascontiguousarray(parameters["Z"][:, parameters["Zk"] == k].T) for k in numbers)
-    states = parameters["X_true"][[0, 2]]
+    states = parameters["X_true"][[0, 1] if "n_sensors" in parameters else [0, 2]]
     positions = tuple(np.ascontiguousarray(states[:, parameters["Xk_true"] == k].T) for k in numbers)
     return Recording(scans, positions, parameters)
+
+
+def scans_of(recording: Recording, sensor: int) -> list[Any]:
+    """The scans of one of several sensors, counted from 0."""
+    parameters = recording.parameters
+    own = parameters["Zs"] == sensor + 1
+    numbers = range(1, int(parameters["K"]) + 1)
+    return [np.ascontiguousarray(parameters["Z"][:, own & (parameters["Zk"] == k)].T) for k in numbers]
 
 
 def redraw(recording: Recording, *, rng: np.random.Generator) -> Recording:
@@ -96,51 +118,67 @@ def bearing_from_north_and_range_jacobian(state, pose, params, out):
     out[1, 1] = dy / distance
 
 
+@models.model_function("process_noise_cov")
+def white_acceleration(state, dt, params, out):
+    for i in range(4):
+        for j in range(4):
+            out[i, j] = 0.0
+    for i in range(2):
+        out[i, i] = dt**3 / 3.0
+        out[i, i + 2] = out[i + 2, i] = dt**2 / 2.0
+        out[i + 2, i + 2] = dt
+
+
 def birth_model(parameters: dict[str, Any]) -> models.BirthModel:
     existence = parameters["r_birth"] if "r_birth" in parameters else parameters["w_birth"]
-    order = _ORDER[len(parameters["m_birth"])]
+    order = list(range(4)) if "n_sensors" in parameters else STATE_ORDER[len(parameters["m_birth"])]
     covs = np.moveaxis(parameters["P_birth"], 2, 0)[:, order][:, :, order]
     return models.BirthModel(existence, parameters["m_birth"][order].T, covs)
 
 
-def sensor_model(parameters: dict[str, Any], method: str) -> models.SensorModel:
-    low, high = parameters["range_c"].T
-    stds = np.sqrt(np.diagonal(parameters["R"]))
-    polar = len(parameters["X_true"]) == 5
+def sensor_models(parameters: dict[str, Any], method: str) -> tuple[models.SensorModel, ...]:
+    """The sensors of a file: three in `mslin3`, else one."""
+    low, high = parameters["region" if "n_sensors" in parameters else "range_c"].T
     measurement = models.position()
-    if polar:
+    if "sigma_turn" in parameters:
         measurement = models.MeasurementModel(
             2,
             bearing_from_north_and_range,
             jacobian=bearing_from_north_and_range_jacobian,
             angular=np.array([True, False]),
         )
-    return models.SensorModel(
-        measurement,
-        models.constant_noise(stds),
-        models.constant_detection(float(parameters["P_D"][0])),
-        models.measurement_space_clutter(float(parameters["lambda_c"][0]), low, high),
-        method=method,
+    covs = np.moveaxis(parameters["R_sensor"], 2, 0) if "n_sensors" in parameters else [parameters["R"]]
+    return tuple(
+        models.SensorModel(
+            measurement,
+            models.constant_noise(np.sqrt(np.diagonal(cov))),
+            models.constant_detection(float(probability)),
+            models.measurement_space_clutter(float(rate), low, high),
+            method=method,
+        )
+        for cov, probability, rate in zip(covs, parameters["P_D"], parameters["lambda_c"], strict=True)
     )
 
 
 def motion_model(parameters: dict[str, Any], method: str) -> models.MotionModel:
     if "sigma_turn" in parameters:
         return models.coordinated_turn(float(parameters["sigma_vel"]), float(parameters["sigma_turn"]), method=method)
+    if "Qproc" in parameters:
+        return replace(models.constant_velocity(0.0), process_noise_cov=white_acceleration)
     return models.constant_velocity(math.sqrt(float(parameters["Q"][1, 1])))
 
 
 def make_filter(kind: type, recording: Recording, method: str = "ekf", **options: Any) -> LabelledFilter:
     """A filter of this kind with the recording's models; `method` for the motion and the measurement."""
+    return make_filters(kind, recording, method, **options)[0]
+
+
+def make_filters(kind: type, recording: Recording, method: str = "ekf", **options: Any) -> list[LabelledFilter]:
+    """The same, one for each sensor of the recording."""
     parameters = recording.parameters
-    tracker: LabelledFilter = kind(
-        motion_model(parameters, method),
-        models.constant_survival(float(parameters["P_S"])),
-        birth_model(parameters),
-        sensor_model(parameters, method),
-        **options,
-    )
-    return tracker
+    survival = models.constant_survival(float(parameters["P_S"]))
+    motion, birth = motion_model(parameters, method), birth_model(parameters)
+    return [kind(motion, survival, birth, sensor, **options) for sensor in sensor_models(parameters, method)]
 
 
 def run(tracker: LabelledFilter, recording: Recording, *, seed: int = 0) -> tuple[list[Estimate], list[float]]:
@@ -156,6 +194,24 @@ def run(tracker: LabelledFilter, recording: Recording, *, seed: int = 0) -> tupl
         seconds.append(time.process_time() - start)
         estimates.append(map_estimate(belief))
     return estimates, seconds
+
+
+def run_fused(
+    trackers: list[LabelledFilter], fusion: Fusion[Any, Any], recording: Recording, *, seed: int = 0
+) -> list[Estimate]:
+    """Estimates at every scan from the fusion of all sensors' beliefs, which is fed back: with births at every scan
+    sensors would else give one target different labels.
+    """
+    rng = np.random.default_rng(seed)
+    beliefs: list[Any] = [tracker.initial() for tracker in trackers]
+    estimates = []
+    for step, scans in enumerate(zip(*(scans_of(recording, s) for s in range(len(trackers))), strict=True)):
+        for s, (tracker, scan) in enumerate(zip(trackers, scans, strict=True)):
+            beliefs[s], _ = tracker.step(beliefs[s], scan, POSE, PERIOD, step, rng=rng)
+        fused, _ = fusion.fuse(beliefs)
+        beliefs = [fused] * len(trackers)
+        estimates.append(map_estimate(fused))
+    return estimates
 
 
 def mean_ospa(estimates: list[Estimate], recording: Recording) -> float:

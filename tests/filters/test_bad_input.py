@@ -257,6 +257,21 @@ def test_a_motion_to_nowhere(kind: Any) -> None:
         step(make(kind, motion=motion), belief=first_belief(kind), number=1)
 
 
+@models.model_function("process_noise_cov")
+def takes_away(state, dt, params, out):
+    for i in range(4):
+        for j in range(4):
+            out[i, j] = -1e9 if i == j else 0.0
+
+
+@every_kind
+def test_a_process_noise_that_takes_variance_away_is_not_called_infinite(kind: Any) -> None:
+    known = models.constant_velocity(1.0)
+    motion = models.MotionModel(4, known.transition, takes_away, transition_jacobian=known.transition_jacobian)
+    with pytest.raises(ModelError, match="motion model: predicted covariance is not positive definite"):
+        step(make(kind, motion=motion), belief=first_belief(kind), number=1)
+
+
 @every_kind
 def test_a_clutter_intensity_without_bound(kind: Any) -> None:
     clutter = models.ClutterModel(1.0, given_intensity, np.array([math.inf]))

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from vedette.kernels.compile import JIT_ENABLED
+from waiting import PATIENCE
 
 pytestmark = pytest.mark.skipif(not JIT_ENABLED, reason="nothing is compiled")
 
@@ -44,7 +45,7 @@ def start(cache: Path, types: list[str]) -> subprocess.Popen[str]:
 
 def counts(process: subprocess.Popen[str]) -> tuple[int, int]:
     """Entries read from disk, and compiled, by a process that must have ended well."""
-    out, error = process.communicate(timeout=120)
+    out, error = process.communicate(timeout=PATIENCE)
     assert process.returncode == 0, error
     hits, misses = out.split()[-2:]
     return int(hits), int(misses)

@@ -16,8 +16,9 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
+from waiting import PATIENCE
+
 NAMES = ("chromium", "chromium-browser", "google-chrome", "chrome")
-_TIMEOUT = 60.0  # s
 # The child's descriptors must be 3 and 4; a program of its own moves them, as a fork of this process could deadlock.
 _LAUNCH = """
 import fcntl, os, sys
@@ -64,7 +65,7 @@ class Browser:
     ) -> None:
         try:
             self.call("Browser.close")
-            self._process.wait(10.0)
+            self._process.wait(PATIENCE)
         finally:
             self._process.kill()
             self._process.wait()
@@ -91,7 +92,7 @@ class Browser:
             self._wait(lambda got: got.get("method") == method and got.get("sessionId") == session)
 
     def _wait(self, wanted: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
-        deadline = time.monotonic() + _TIMEOUT
+        deadline = time.monotonic() + PATIENCE
         while True:
             message = self._next(deadline)
             if "method" in message:
@@ -104,21 +105,21 @@ class Browser:
             ready, _, _ = select.select([self._events], [], [], max(0.0, deadline - time.monotonic()))
             received = os.read(self._events, 1 << 20) if ready else b""
             if not received:
-                raise RuntimeError(f"the browser said nothing for {_TIMEOUT:g} s, or went away")
+                raise RuntimeError(f"the browser said nothing for {PATIENCE:g} s, or went away")
             self._unread += received
         text, _, self._unread = self._unread.partition(b"\0")
         message: dict[str, Any] = json.loads(text)
         return message
 
-    def open(self, path: Path, *, width: int = 1280, height: int = 900, dark: bool = False) -> Page:
-        """Load a file into a new tab."""
-        return Page(self, path, width, height, dark)
+    def open(self, path: Path, *, width: int = 1280, height: int = 900, dark: bool = False, query: str = "") -> Page:
+        """Load a file into a new tab, with a query in its address."""
+        return Page(self, path, width, height, dark, query)
 
 
 class Page:
     """A tab with a file in it."""
 
-    def __init__(self, browser: Browser, path: Path, width: int, height: int, dark: bool) -> None:
+    def __init__(self, browser: Browser, path: Path, width: int, height: int, dark: bool, query: str) -> None:
         self._browser = browser
         target = browser.call("Target.createTarget", url="about:blank")["targetId"]
         self._session: str = browser.call("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
@@ -131,7 +132,7 @@ class Page:
         )  # fmt: skip
         scheme = {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}
         self.call("Emulation.setEmulatedMedia", features=[scheme])
-        self.url = path.resolve().as_uri()
+        self.url = path.resolve().as_uri() + (f"?{query}" if query else "")
         self.call("Page.navigate", url=self.url)
         browser.wait_for("Page.loadEventFired", self._session)
 

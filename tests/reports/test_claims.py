@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from vedette.evaluation import Comparison
-from vedette.reports.claims import all_pairs, claim, claims, percent
+from vedette.evaluation.health import percent
+from vedette.reports.claims import all_pairs, claim, claims
 
 
 def comparison_of(*errors: list[float]) -> Comparison:

@@ -11,6 +11,7 @@ Data = dict[str, Any]
 finite = st.floats(-1e9, 1e9, allow_nan=False)
 positive = st.floats(1e-9, 1e9)
 zero_or_more = st.floats(0.0, 1e9)
+rates = st.floats(0.0, 1e6)
 probability = st.floats(0.0, 1.0)
 inner = st.floats(1e-6, 1.0 - 1e-6)
 counts = st.integers(1, 10**6)
@@ -70,8 +71,8 @@ def sensors(draw: st.DrawFn) -> Data:
     grown = section("range_dependent", sigma_range=positive, eta_range=zero_or_more, sigma_bearing_deg=positive)
     noises = [needed("constant", std=vector(dim, positive)), custom(), *([] if kind == "position" else [grown])]
     low = draw(vector(dim, st.floats(-100.0, 0.0)))
-    boxes = needed("measurement_space", rate=zero_or_more, low=st.just(low), high=vector(dim, st.floats(1.0, 100.0)))
-    clutters = st.one_of(section("region", rate=zero_or_more), boxes, custom())
+    boxes = needed("measurement_space", rate=rates, low=st.just(low), high=vector(dim, st.floats(1.0, 100.0)))
+    clutters = st.one_of(section("region", rate=rates), boxes, custom())
     fixed = {"position": draw(vector(2)), "measurement": {"kind": kind}, "noise": draw(st.one_of(noises))}
     optional = section(
         heading_deg=finite,
@@ -154,7 +155,7 @@ def scenarios(draw: st.DrawFn) -> Data:
         ideal_measurements=st.sampled_from(["ideal", "expected", "sampled"]),
         detection_threshold=probability,
         reward=section("cauchy_schwarz", unit_volume=st.just("reference") | positive),
-        limits=section(prior_hypotheses=counts, max_hypotheses=counts),
+        limits=section(max_prior_hypotheses=counts, max_hypotheses=counts),
     )
     return {
         "name": draw(names),

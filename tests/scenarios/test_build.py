@@ -143,7 +143,7 @@ def test_models_of_the_users_own_from_a_file_beside_the_scenario() -> None:
 @pytest.mark.parametrize(
     ("python", "arguments", "message"),
     [
-        ("own_models.py:absent", "{}", "expected own_models.py:absent to give a MotionModel; got AttributeError"),
+        ("own_models.py:motion.absent", "{}", "motion.absent to give a MotionModel; got AttributeError"),
         ("own_models.py:bad_motion", "{}", "got ValueError: no such current"),
         ("own_models.py:survival", "{}", "to give a MotionModel; got a SurvivalModel"),
         ("own_models.py:motion", "{pace: 3}", "got TypeError"),

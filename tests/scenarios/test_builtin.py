@@ -97,7 +97,7 @@ def test_the_papers_scenario_has_the_papers_numbers(name: str) -> None:
     assert control.decision_steps == (10, 20, 30)
     assert control.actions_deg == tuple(range(-180, 181, 30))
     assert (control.horizon_steps, control.horizon_period, control.num_samples) == (5, 2.0, 40)
-    assert (control.limits.prior_hypotheses, control.limits.max_hypotheses) == (10, 40)
+    assert (control.limits.max_prior_hypotheses, control.limits.max_hypotheses) == (10, 40)
     assert model.ospa.model_dump() == {"cutoff": 100.0, "order": 1.0, "window": 10, "from_step": 11, "to_step": 40}
 
 

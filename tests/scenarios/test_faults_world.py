@@ -104,7 +104,9 @@ CASES = [
     (
         "std: [5.0, 5.0, 2.0, 2.0]",
         "cov: [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 2], [0, 0, 2, 1]]",
-        ["f.yaml:9:57: birth.sites[0].cov: expected a positive definite matrix, got one that is not"],
+        [
+            "f.yaml:9:57: birth.sites[0].cov: expected a positive definite matrix, got correlations with a least eigenvalue of -1"
+        ],
     ),
     (
         "std: [5.0, 5.0, 2.0, 2.0]",

@@ -12,7 +12,7 @@ import pytest
 from pyarrow import parquet
 
 from scenarios.minimal import changed
-from vedette.errors import InputError, ScenarioError
+from vedette.errors import ScenarioError
 from vedette.scenarios import Scenario, load_scenario, parse_scenario
 from vedette.scenarios.build import build_motion, build_times, build_truth_source
 from vedette.scenarios.dumping import dump_scenario
@@ -104,8 +104,8 @@ def test_the_running_program_is_no_module_to_take_models_from(monkeypatch: pytes
 
 def test_a_recorded_file_that_is_no_table(ships: Path) -> None:
     (ships / "broken.csv").write_text("time,id,x,y\n0,a,1\n", encoding="utf-8")
-    with pytest.raises(InputError, match=r"broken\.csv, row 2: expected 4 cells"):
-        truth_of(load_scenario(written(ships, "  {kind: recorded, path: broken.csv}")))
+    with pytest.raises(ScenarioError, match=r"broken\.csv, row 2: expected 4 cells"):
+        load_scenario(written(ships, "  {kind: recorded, path: broken.csv}"))
 
 
 def test_a_kept_copy_still_finds_its_files(ships: Path) -> None:
@@ -117,7 +117,7 @@ def test_a_kept_copy_still_finds_its_files(ships: Path) -> None:
 
 
 def test_a_kept_copy_still_finds_its_models(tmp_path: Path) -> None:
-    (tmp_path / "own.py").write_text("", encoding="utf-8")
+    (tmp_path / "own.py").write_text("motion = None", encoding="utf-8")
     custom = "{kind: custom, python: 'own.py:motion', arguments: {kind: custom, python: 'a.py:b'}, state_dim: 4}"
     text = changed(("{kind: constant_velocity, sigma_v: 1.0}", custom))
     motion = parse_scenario(dump_scenario(parse_scenario(text, folder=tmp_path), folder=tmp_path)).motion

@@ -3,21 +3,29 @@
 from __future__ import annotations
 
 import dataclasses
+import inspect
 import math
-from typing import Any
+from typing import Any, get_args
 
 import pytest
 from pydantic import BaseModel
 
-from vedette.control import PlanningSettings
-from vedette.filters import Limits
+from vedette.control import CauchySchwarzReward, PlanningSettings
+from vedette.control.settings import IDEAL_MODES
+from vedette.densities import marginal_estimate
+from vedette.filters import DeltaGlmbFilter, Limits
 from vedette.fusion import Clmb, CmDeltaGlmb
+from vedette.fusion.base import _MERGE_DISTANCE
 from vedette.scenarios import json_schema
 from vedette.scenarios.build import build_fusion, build_limits, build_planning_settings
 from vedette.scenarios.diagnostics import kind_of, locate
 from vedette.scenarios.schema.base import Section
+from vedette.scenarios.schema.planning import CauchySchwarzReward as CauchySchwarzSection
 from vedette.scenarios.schema.planning import Control
-from vedette.scenarios.schema.tracking import FilterLimits, Fusion
+from vedette.scenarios.schema.tracking import FilterLimits, Fusion, FusionLimits, GibbsAssignment, MarginalEstimator
+from vedette.scenarios.schema.world import RecordedTargets
+from vedette.simulation import Cleaning
+from vedette.simulation import RecordedTargets as RecordedSource
 
 
 def sections(base: type[BaseModel] = Section) -> list[type[BaseModel]]:
@@ -69,3 +77,40 @@ def test_default_fusions_are_those_of_the_library(kind: Any, library: Any) -> No
     for field in dataclasses.fields(library):
         got, wanted = getattr(built, field.name), getattr(expected, field.name)
         assert got == wanted or math.isclose(got, wanted), field.name
+
+
+def described(section: type[BaseModel], field: str) -> str:
+    return section.model_fields[field].description or ""
+
+
+def test_the_distances_of_merging_that_the_schema_states_are_those_of_the_fusion() -> None:
+    component_wise, quadrature = _MERGE_DISTANCE["component_wise"], _MERGE_DISTANCE["quadrature"]
+    stated = f"none: {component_wise:g} for component_wise, {quadrature:g} for quadrature powers"
+    assert stated in described(FusionLimits, "merge_distance")
+    assert _MERGE_DISTANCE.keys() == set(get_args(Fusion.model_fields["mixture_power"].annotation))
+
+
+def test_the_schema_says_of_ideal_measurements_what_the_kernel_does() -> None:
+    """Never clutter; two kinds by chance, one by the threshold (the tests of the kernel hold that)."""
+    assert "never with clutter" in described(Control, "ideal_measurements")
+    assert get_args(Control.model_fields["ideal_measurements"].annotation) == tuple(IDEAL_MODES)
+
+
+DEFAULTS: list[tuple[type[BaseModel], Any, dict[str, str]]] = [
+    (RecordedTargets, Cleaning, {"max_gap": "max_gap", "min_speed": "min_speed", "max_speed": "max_speed"}),
+    (RecordedTargets, RecordedSource, {"time_origin": "time_origin"}),
+    (CauchySchwarzSection, CauchySchwarzReward, {"unit_volume": "unit_volume"}),
+    (GibbsAssignment, DeltaGlmbFilter, {"num_samples": "num_gibbs_samples"}),
+    (Fusion, Clmb, {"mixture_power": "mixture_power", "missing_existence": "missing_existence"}),
+    (MarginalEstimator, marginal_estimate, {"threshold": "threshold"}),
+]
+
+
+def default_of(made: Any, name: str) -> Any:
+    return inspect.signature(made).parameters[name].default
+
+
+@pytest.mark.parametrize(("section", "made", "names"), DEFAULTS, ids=lambda part: getattr(part, "__name__", ""))
+def test_defaults_are_those_of_the_code(section: type[BaseModel], made: Any, names: dict[str, str]) -> None:
+    for field, name in names.items():
+        assert section.model_fields[field].default == default_of(made, name), field

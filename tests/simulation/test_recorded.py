@@ -169,7 +169,9 @@ def test_moored_targets_are_dropped():
         (table(x=[0.0, "far", 1.0]), "table, row 2, column 'x': expected a finite number; got 'far'"),
         (table(y=[0.0, 1.0, None]), "table, row 3, column 'y': expected a finite number; got None"),
         (table(y=[0.0, math.inf, 1.0]), "table, row 2, column 'y': expected a finite number; got inf"),
-        (table(time=[0.0, 5.0, 5.0]), "table, row 3: expected one report of a a time; row 2 has that time"),
+        (table(x=[0.0, 1e10, 1.0]), "table, row 2, column 'x': expected a number from -1e"),
+        (table(x=[0.0, True, 1.0]), "table, row 2, column 'x': expected a finite number; got True"),
+        (table(x=[0.0, "1_0", 1.0]), "table, row 2, column 'x': expected a finite number; got '1_0'"),
         (table(id=["a", " ", "a"]), "table, row 2, column 'id': expected a name or number; got ' '"),
         (table(time=["2016-01-12", "noon", "x"]), "table, row 2, column 'time': expected an ISO 8601 time; got 'noon'"),
         (table(vx=[1.0, "a", 1.0], vy=[0.0] * 3), "table, row 2, column 'vx'"),
@@ -251,3 +253,10 @@ def test_files_that_are_not_tables(tmp_path):
 def test_scans_at_a_time_without_targets():
     with pytest.raises(InputError, match="times: expected scans between the first and last report, 0 to 20 s"):
         RecordedTargets.from_columns(table(), time_origin=500.0).truth([0.0, 1.0], rng=RNG)
+
+
+def test_of_two_reports_at_one_time_the_first_is_kept_and_the_other_named():
+    columns = table(time=[0.0, 5.0, 5.0 + 1e-9, 10.0], id=["a"] * 4, x=[0.0, 50.0, 99.0, 100.0], y=[0.0] * 4)
+    targets = RecordedTargets.from_columns(columns)
+    assert targets.reports.repeats == ((2, 3),)
+    np.testing.assert_array_equal(targets.tracks[0].positions[:, 0], [0.0, 50.0, 100.0])

@@ -91,8 +91,10 @@ def test_the_same_run_gives_the_same_bytes(tmp_path: Path) -> None:
 
 def test_files_are_open_and_described(saved: Path) -> None:
     assert sorted(path.name for path in saved.iterdir()) == sorted([*FILES, "manifest.json", "scenario.yaml"])
-    assert (saved / "scans.csv").read_text().startswith("scan,time_s,num_targets,num_estimates,ospa_m,localisation_m")
-    assert (saved / "sensors.csv").read_text().startswith("scan,time_s,sensor,x_m,y_m,heading_rad\n")
+    assert (saved / "scans.csv").read_text().startswith("step,time_s,num_targets,num_estimates,ospa_m,localisation_m")
+    assert (
+        (saved / "sensors.csv").read_text().startswith("step,time_s,sensor,x_m,y_m,heading_rad,log_likelihood,num_hyp")
+    )
     decision = json.loads((saved / "decisions.json").read_text())[0]
     assert len(decision["chosen_headings_deg"]) == 2
     manifest = read_manifest(saved)
@@ -157,11 +159,11 @@ def test_altered_and_truncated_files_are_named(saved: Path, file: str) -> None:
         ("{", "cut short or altered"),
         ("[]", "got another file"),
         ('{"format": "photo album"}', "got another file"),
-        ('{"format": "vedette-run", "format_version": 99}', "format version 2; got 99"),
-        ('{"format": "vedette-run", "format_version": 2}', "fields files and run"),
-        ('{"format": "vedette-run", "format_version": 2, "run": {}, "files": {"../x": ""}}', "plain file names"),
+        ('{"format": "vedette-run", "format_version": 99}', "format version 3; got 99"),
+        ('{"format": "vedette-run", "format_version": 3}', "fields files and run"),
+        ('{"format": "vedette-run", "format_version": 3, "run": {}, "files": {"../x": ""}}', "plain file names"),
         (
-            '{"format": "vedette-run", "format_version": 2, "run": {}, "files": {}}',
+            '{"format": "vedette-run", "format_version": 3, "run": {}, "files": {}}',
             "expected a file decisions.json|scans",
         ),
     ],
@@ -191,10 +193,10 @@ def rewrite(saved: Path, file: str, old: str, new: str) -> None:
     [
         ("tracks.csv", "existence", "exists", "expected a column existence"),
         ("truth.csv", "-55.0", "west", "column state_0: expected numbers"),
-        ("truth.csv", "\n0,", "\n0.5,", "column scan: expected whole numbers"),
-        ("truth.csv", "\n0,", "\n39,", "expected rows in order"),
-        ("sensors.csv", "\n0,1.0,0,-745.0,830.0,0.0", "", "do not fit together"),
-        ("scans.csv", "\n0,1.0,3", "\n0,1.0,3,3", "rows as long as"),
+        ("truth.csv", "\n1,", "\n1.5,", "column step: expected whole numbers"),
+        ("truth.csv", "\n1,", "\n40,", "expected rows in order"),
+        ("sensors.csv", "\n1,1.0,0,-745.0,830.0,0.0,nan", "", "rows as long as"),
+        ("scans.csv", "\n1,1.0,3", "\n1,1.0,3,3", "rows as long as"),
         ("decisions.json", '"chosen"', '"choice"', "do not fit together"),
         ("decisions.json", '"sensors": [', '"sensors": [7, ', "reward table"),
     ],
@@ -202,6 +204,13 @@ def rewrite(saved: Path, file: str, old: str, new: str) -> None:
 def test_files_that_do_not_fit_together_are_named(saved: Path, file: str, old: str, new: str, message: str) -> None:
     rewrite(saved, file, old, new)
     with pytest.raises(InputError, match=message):
+        load_run(saved)
+
+
+def test_a_row_that_is_missing_is_named(saved: Path) -> None:
+    last = (saved / "sensors.csv").read_text().splitlines()[-1]
+    rewrite(saved, "sensors.csv", f"{last}\n", "")
+    with pytest.raises(InputError, match="do not fit together"):
         load_run(saved)
 
 
@@ -213,6 +222,7 @@ def contradictions() -> dict[str, RunRecord]:
         "record.estimates": replace(record, estimates=record.estimates[1:]),
         "record.timings": replace(record, timings={"filter": np.zeros(3)}),
         "record.poses": replace(record, poses=record.poses[1:]),
+        "record.health.cap_met": replace(record, health=replace(record.health, cap_met=record.health.cap_met[1:])),
         "record.ospa": replace(record, ospa=record.ospa[:, :2]),
         "plan.chosen": replace(record, decisions=(replace(record.decisions[0], plan=plan),)),
         "record.decisions: expected finite": replace(

@@ -17,6 +17,7 @@ from vedette.evaluation.runs import strategy
 from vedette.scenarios import Scenario, list_builtin, load_scenario
 from vedette.scenarios.dumping import dump_scenario, files_of
 from vedette.scenarios.overrides import with_fields
+from vedette.text import listed
 
 _LONGEST_NAME = 120
 _SECTIONS = {"filter": "filter.kind", "fusion": "fusion.kind"}
@@ -161,7 +162,7 @@ def _cell(
         approve(changed)
         strategy(changed, planner)
     except ScenarioError as error:
-        raise InputError("\n".join(dict.fromkeys(f"cell {name}: {fault}" for fault in error.faults))) from None
+        raise InputError(listed(list(dict.fromkeys(f"cell {name}: {fault}" for fault in error.faults)))) from None
     except InputError as error:
         raise InputError(f"cell {name}: {error}") from None
     return Cell(name, dict(settings), changed, planner)

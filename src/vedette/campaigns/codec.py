@@ -24,7 +24,7 @@ from vedette.simulation.encoding import timing_columns, timings_of
 from vedette.simulation.records import RunRecord
 from vedette.simulation.tabulation import TABLES, check_record, record_of, run_facts, tables_of
 
-PAYLOAD_VERSION = 1  # of the layout: another wherever a table or the metrics gain, lose or rename a column
+PAYLOAD_VERSION = 2  # of the layout: another wherever a table or the metrics gain, lose or rename a column
 _METRICS, _RUN, _DECISIONS = "metrics", "run.json", "decisions.json"
 _EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest that a zip archive can say
 _UNIX = 3

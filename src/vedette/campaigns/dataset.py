@@ -1,4 +1,4 @@
-"""Finished runs as one xarray dataset: every measure of every scan over cell, run and scan."""
+"""Finished runs as one xarray dataset: every measure of every scan over cell, run and step."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ if TYPE_CHECKING:
 
 
 def dataset_of_runs(campaign: Campaign, runs: Iterable[FinishedRun]) -> xarray.Dataset:
-    """Every column of the table `scans` as a float64 variable of dimensions (cell, run, scan).
+    """Every column of the table `scans` as a float64 variable of dimensions (cell, run, step).
 
     NaN where a run is not finished, a cell has fewer scans than another, or a measure has no value. Coordinates: `cell`
-    (name), `run`, `scan` (from 0), the value of each axis of the campaign by cell, and `time_s` by cell and scan.
+    (name), `run`, `step` (from 1), the value of each axis of the campaign by cell, and `time_s` by cell and step.
     `attrs["units"]` of a variable is its unit.
 
     Raises `InputError` where xarray is not installed.
@@ -32,8 +32,8 @@ def dataset_of_runs(campaign: Campaign, runs: Iterable[FinishedRun]) -> xarray.D
     except ImportError:
         raise InputError("dataset: expected xarray, which is not installed; pip install 'vedette[xarray]'") from None
     rows = {(run.cell, run.record.run): scan_rows(run) for run in runs}
-    num_scans = max((len(columns["scan"]) for columns in rows.values()), default=0)
-    names = list(dict.fromkeys(name for columns in rows.values() for name in columns if name != "scan"))
+    num_scans = max((len(columns["step"]) for columns in rows.values()), default=0)
+    names = list(dict.fromkeys(name for columns in rows.values() for name in columns if name != "step"))
     values = {name: np.full((len(campaign.cells), campaign.num_runs, num_scans), np.nan) for name in names}
     places = {cell.name: index for index, cell in enumerate(campaign.cells)}
     for (cell, run), columns in rows.items():
@@ -42,12 +42,12 @@ def dataset_of_runs(campaign: Campaign, runs: Iterable[FinishedRun]) -> xarray.D
             values[name][places[cell], run, : len(column)] = column
     times = _times(values.pop("time_s", np.full((len(campaign.cells), 1, num_scans), np.nan)))
     return xarray.Dataset(
-        {name: (("cell", "run", "scan"), array, _attributes(name)) for name, array in values.items()},
+        {name: (("cell", "run", "step"), array, _attributes(name)) for name, array in values.items()},
         coords={
             "cell": [cell.name for cell in campaign.cells],
             "run": np.arange(campaign.num_runs),
-            "scan": np.arange(num_scans),
-            "time_s": (("cell", "scan"), times, {"units": "s"}),
+            "step": np.arange(1, num_scans + 1),
+            "time_s": (("cell", "step"), times, {"units": "s"}),
             **{axis: ("cell", _values(campaign, axis)) for axis in campaign.axes},
         },
         attrs={"campaign": campaign.name, "seed": str(campaign.seed)},

@@ -35,6 +35,8 @@ def on_workers(
     """Every run, in the order of finishing. The runs of a worker that died are done again by another.
 
     Args:
+        client: of the scheduler.
+        queue: what is to be done.
         tell: is told, in words, when there is no worker to do the work.
         first: tasks to be done before any other, as the kernels that they compile serve the rest.
 

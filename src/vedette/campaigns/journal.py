@@ -27,6 +27,8 @@ _TABLES = (
     "CREATE TABLE runs (cell TEXT NOT NULL, run INTEGER NOT NULL, session INTEGER NOT NULL, "
     "payload BLOB NOT NULL, payload_sha256 TEXT NOT NULL, timings BLOB NOT NULL, timings_sha256 TEXT NOT NULL, "
     "PRIMARY KEY (cell, run))",
+    "CREATE TABLE IF NOT EXISTS failures (cell TEXT NOT NULL, run INTEGER NOT NULL, session INTEGER NOT NULL, "
+    "message TEXT NOT NULL, PRIMARY KEY (cell, run))",
 )
 _COLUMNS = "cell, run, session, payload, payload_sha256, timings, timings_sha256"
 
@@ -45,6 +47,16 @@ class Entry:
     def checksum(self) -> str:
         """SHA-256 of the run's cell, number and payload: equal for equal results, whenever they were computed."""
         return _checksum(self.cell, self.run, self.payload)
+
+
+@dataclass(frozen=True, slots=True)
+class Failure:
+    """A run that could not be finished, in which session (counted from 1), and why: where it stopped."""
+
+    cell: str
+    run: int
+    session: int
+    message: str
 
 
 class Writer:
@@ -82,11 +94,21 @@ class Writer:
         assert self._database is not None
         try:
             with _explained(self._path, f"cell {entry.cell}, run {entry.run}: "):
-                self._database.execute(f"INSERT INTO runs ({_COLUMNS}) VALUES (?, ?, ?, ?, ?, ?, ?)", row)
+                self._database.execute("BEGIN IMMEDIATE")
+                with self._database:  # both or neither
+                    self._database.execute(f"INSERT INTO runs ({_COLUMNS}) VALUES (?, ?, ?, ?, ?, ?, ?)", row)
+                    self._database.execute("DELETE FROM failures WHERE cell = ? AND run = ?", (entry.cell, entry.run))
         except sqlite3.IntegrityError:
             raise InputError(
                 f"{self._path}: cell {entry.cell}, run {entry.run}: expected another run; it is there"
             ) from None
+
+    def note_failure(self, failure: Failure) -> None:
+        """Keep why a run could not be finished, in place of an earlier reason, until it is."""
+        row = (failure.cell, failure.run, failure.session, failure.message)
+        assert self._database is not None
+        with _explained(self._path, f"cell {failure.cell}, run {failure.run}: "):
+            self._database.execute("INSERT OR REPLACE INTO failures VALUES (?, ?, ?, ?)", row)
 
     def finished(self) -> set[tuple[str, int]]:
         """Cell and number of every run in the file."""
@@ -131,6 +153,11 @@ class Reader:
     def finished(self) -> list[tuple[str, int]]:
         """Cell and number of every run in the file, sorted."""
         return _checked_keys(self._path, self._ask("SELECT cell, run FROM runs ORDER BY cell, run"))
+
+    def failures(self) -> list[Failure]:
+        """The runs that were tried and could not be finished, sorted."""
+        rows = self._ask("SELECT cell, run, session, message FROM failures ORDER BY cell, run")
+        return [Failure(*row) for row in rows]
 
     def entry(self, cell: str, run: int) -> Entry:
         """A finished run, its checksums verified. `InputError` where there is none, or its row is damaged."""

@@ -26,7 +26,7 @@ from vedette.simulation.storage import versions
 
 MANIFEST = "manifest.json"
 FORMAT = "vedette-campaign"
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
 _MOST_BYTES = 2**27  # of a manifest: ten thousand cells have a fifth of it
 # What of the manifest can never change. The number of runs is not part of it: a campaign may be made longer.
 _FIXED = ("name", "seed", "axes", "compare", "spec", "cells", "digest")

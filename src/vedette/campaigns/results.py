@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, SupportsIndex
 from vedette.campaigns.cells import Campaign, Cell
 from vedette.campaigns.codec import decode, decode_timings
 from vedette.campaigns.finished import FinishedRun
-from vedette.campaigns.journal import DATABASE, Entry, Reader
+from vedette.campaigns.journal import DATABASE, Entry, Failure, Reader
 from vedette.campaigns.manifest import campaign_of, contents_checksum, read_manifest
 from vedette.errors import InputError
 from vedette.evaluation.comparison import Comparison, scored
@@ -69,6 +69,14 @@ class CampaignResults:
         done = set(self.finished(cell))
         return tuple(run for run in range(self.campaign.num_runs) if run not in done)
 
+    def failures(self) -> tuple[Failure, ...]:
+        """The runs that were tried and could not be finished, each with where and why it stopped; by cell and run.
+
+        The same command that runs the campaign tries them again.
+        """
+        places = {cell.name: place for place, cell in enumerate(self.campaign.cells)}
+        return tuple(sorted(self._reader.failures(), key=lambda each: (places.get(each.cell, -1), each.run)))
+
     def run(self, cell: str, run: SupportsIndex) -> FinishedRun:
         """A finished run. Raises `InputError` for one that is not finished, or damaged."""
         self.campaign.cell(cell)
@@ -105,7 +113,7 @@ class CampaignResults:
         return tables_of_runs(self.campaign, self.runs())
 
     def dataset(self) -> xarray.Dataset:
-        """Measures at each scan as arrays over cell, run and scan; see `vedette.campaigns.dataset`.
+        """Measures at each scan as arrays over cell, run and step; see `vedette.campaigns.dataset`.
 
         Raises `InputError` where xarray is not installed.
         """

@@ -158,7 +158,7 @@ def timing_rows(run: FinishedRun) -> Rows:
     record = run.record
     num = record.num_scans
     return {
-        "scan": np.tile(np.arange(num), len(record.timings)),
+        "step": np.tile(np.arange(1, num + 1), len(record.timings)),
         "time_s": np.tile(record.times, len(record.timings)),
         "stage": [stage for stage in record.timings for _ in range(num)],
         "duration_s": np.concatenate([*record.timings.values(), np.empty(0)]),

@@ -122,6 +122,7 @@ def run_campaign(
             for result in results:
                 if isinstance(result, Failed):
                     failed.append(result)
+                    store.note_failure(result.cell, result.run, result.message)
                     watch.failed(result)
                     continue
                 store.add(result.cell, result.run, result.payload, result.timings)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import tomllib
+from datetime import date, time
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -10,8 +12,15 @@ from pydantic import BaseModel, Field, JsonValue, ValidationError, field_validat
 
 from vedette.errors import InputError
 from vedette.evaluation.runs import STRATEGIES
+from vedette.models.arguments import plain
 from vedette.scenarios.diagnostics import suggestion
+from vedette.scenarios.faults import describe, named
 from vedette.scenarios.schema.base import Name, Section, Whole, expected
+from vedette.text import elided, listed, printable
+
+_MOST_BYTES = 2_000_000
+# A cell is a scenario with its filters built: this many take minutes before the first run.
+_MOST_CELLS, _MOST_VALUES = 10_000, 1000
 
 ShortName = Annotated[Name, Field(max_length=60)]
 Names = Annotated[tuple[Name, ...], Field(strict=False, min_length=1)]
@@ -31,6 +40,7 @@ _WHAT = {
     "less_than_equal": "a number of at most {le}",
     "expected": "{expected}",
     "finite_number": "a finite number",
+    "invalid-json-value": "text, a number, true or false, a list or a table",
     "too_long": "at most {max_length} characters",
 }
 _UNIONS = ("float", "int", "str", "bool", "list", "dict")
@@ -76,7 +86,7 @@ class CampaignSpec(Section):
     def _known(cls, names: tuple[str, ...]) -> tuple[str, ...]:
         for index, name in enumerate(names):
             if name not in STRATEGIES:
-                raise expected(f"one of {', '.join(STRATEGIES)}", at=(index,), got=repr(name))
+                raise expected(f"one of {', '.join(STRATEGIES)}", at=(index,), got=f"'{named(name)}'")
         return names
 
     def axes(self) -> dict[str, tuple[Any, ...]]:
@@ -99,7 +109,11 @@ def parse_spec(text: str, file: str = "<text>") -> CampaignSpec:
     try:
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{file}: expected TOML; {error}") from None
+        raise InputError(f"{file}: expected TOML; {elided(printable(str(error)), 300)}") from None
+    except RecursionError:
+        raise InputError(f"{file}: expected TOML; got brackets inside brackets hundreds of times over") from None
+    except ValueError:  # a date that no calendar has, a number of thousands of digits
+        raise InputError(f"{file}: expected TOML; got a date or number that cannot be") from None
     return spec_from_data(data, file)
 
 
@@ -109,7 +123,7 @@ def spec_from_data(data: Any, place: str = "campaign") -> CampaignSpec:
         spec = CampaignSpec.model_validate(data)
     except ValidationError as error:
         details = error.errors(include_url=False)
-        raise InputError("\n".join(dict.fromkeys(f"{place}: {_fault(detail)}" for detail in details))) from None
+        raise InputError(listed(list(dict.fromkeys(f"{place}: {_fault(detail)}" for detail in details)))) from None
     _check_axes(spec, place)
     return spec
 
@@ -118,6 +132,8 @@ def load_spec(path: Path | str) -> CampaignSpec:
     """Read a specification from its TOML file. Raises `InputError` as `parse_spec`, and where there is no such file."""
     file = Path(path)
     try:
+        if (size := file.stat().st_size) > _MOST_BYTES:
+            raise InputError(f"{file}: expected a campaign file of at most {_MOST_BYTES} bytes; got {size}")
         return parse_spec(file.read_bytes().decode("utf-8-sig"), str(file))
     except UnicodeDecodeError as error:
         raise InputError(f"{file}: expected UTF-8 text; byte {error.start} is not") from None
@@ -130,7 +146,7 @@ def _fault(detail: Any) -> str:
     loc += tuple(context.get("at", ()))
     if detail["type"] == "finite_number":  # the member of a union that was tried
         loc = tuple(part for part in loc if part not in _UNIONS)
-    field = ".".join(str(part) for part in loc) or "the specification"
+    field = ".".join(named(str(part)) for part in loc) or "the specification"
     model: type[BaseModel] = Variant if loc[:1] == ("variants",) else CampaignSpec
     known = [name for name in model.model_fields if name != "kind"]
     template = _WHAT.get(detail["type"], detail["msg"])
@@ -140,7 +156,14 @@ def _fault(detail: Any) -> str:
     if detail["type"] == "extra_forbidden":
         hint = suggestion(str(loc[-1]), known)
         return f"{field}: expected {what}; got an unknown key" + (f" ({hint})" if hint else "")
-    return f"{field}: expected {what}; got {context.get('got') or repr(detail['input'])}"
+    return f"{field}: expected {what}; got {context.get('got') or _shown(detail['input'])}"
+
+
+def _shown(value: Any) -> str:
+    """A value of the file in a few words."""
+    if isinstance(value, date | time):
+        return f"the date or time {value}"
+    return describe(value) if isinstance(value, list | dict) and value else named(plain(value))
 
 
 def _check_axes(spec: CampaignSpec, place: str) -> None:
@@ -149,11 +172,16 @@ def _check_axes(spec: CampaignSpec, place: str) -> None:
         raise InputError(f"{place}: grid: expected paths of scenario fields; got {sorted(reserved)[0]!r}")
     for axis, values in spec.axes().items():
         seen: list[Any] = []
+        if len(values) > _MOST_VALUES:
+            raise InputError(f"{place}: {named(axis)}: expected at most {_MOST_VALUES} values; got {len(values)}")
         for value in values:
             if value in seen:
-                raise InputError(f"{place}: {axis}: expected each value once; got {value!r} again")
+                raise InputError(f"{place}: {named(axis)}: expected each value once; got {_shown(value)} again")
             seen.append(value)
+    if (cells := math.prod(map(len, spec.axes().values()))) > _MOST_CELLS:
+        raise InputError(f"{place}: expected at most {_MOST_CELLS} combinations of settings; got {cells}")
     comparable = [axis for axis in spec.axes() if axis != "scenario"]  # runs of two scenarios are no pairs
     if spec.compare is not None and spec.compare not in comparable:
         why = ", as runs of two scenarios are no pairs" if spec.compare == "scenario" else ""
-        raise InputError(f"{place}: compare: expected one of {', '.join(comparable)}{why}; got {spec.compare!r}")
+        known = ", ".join(map(named, comparable))
+        raise InputError(f"{place}: compare: expected one of {known}{why}; got '{named(spec.compare)}'")

@@ -100,6 +100,10 @@ class Store:
             raise InputError(f"run: expected a number from 0 to {self._num_runs[cell] - 1}; got {run}")
         self._writer.add(journal.Entry(cell, int(run), self.session, payload, timings))
 
+    def note_failure(self, cell: str, run: int, message: str) -> None:
+        """Keep why a run could not be finished, until it is."""
+        self._writer.note_failure(journal.Failure(cell, int(run), self.session, message))
+
     def close(self) -> None:
         """Let another process write."""
         self._writer.close()

@@ -2,8 +2,8 @@
 
 Every table begins with the columns `cell`, one for each axis of the campaign, and `run`; rows are in the order of the
 campaign's cells, then by run, then by time. The unit of a column is the end of its name (`_m`, `_s`, `_rad`) and in the
-metadata of its field; null stands where a measure has no value. Scans are counted from 0; the `step` of a decision is
-the scan that it followed, counted from 1.
+metadata of its field; null stands where a measure has no value. A `step` is the number of a scan, from 1; that of a
+decision is the scan that it followed.
 """
 
 from __future__ import annotations

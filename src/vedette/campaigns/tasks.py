@@ -88,7 +88,7 @@ def _one(cell: Cell, seed: int, run: int) -> Landed | Failed:
         payload, timings = encode(record, metrics), encode_timings(record)
     except VedetteError as error:
         return Failed(cell.name, run, str(error))
-    except Exception as error:  # of a model of the user's own: one bad run must not end a night's work
+    except Exception as error:  # in what surrounds a run: one bad one must not end a night's work
         return Failed(cell.name, run, f"{type(error).__name__}: {error}")
     mean = float(record.ospa[:, 0].mean())
     return Landed(cell.name, run, payload, timings, mean, time.perf_counter() - start)

@@ -10,13 +10,12 @@ import typer
 
 from vedette.cli.errors import usage_error
 from vedette.cli.progress import CampaignProgress
-from vedette.cli.results import print_results
+from vedette.cli.results import print_failures, print_results
 from vedette.cli.running import TRUST_HELP, Approval, check_planner, compile_if_cold, interruptible, processors
+from vedette.text import counted
 
 if TYPE_CHECKING:
     from vedette.campaigns import Campaign, Failed, Outcome
-
-_SHOWN_FAILURES = 10
 
 
 def campaign(
@@ -119,13 +118,14 @@ def report_failures(failed: tuple[Failed, ...]) -> None:
     """Name runs that could not be finished, and end with status 1 if there are any."""
     if not failed:
         return
-    typer.echo(f"{len(failed)} runs failed; the same command tries them again:", err=True)
-    for result in failed[:_SHOWN_FAILURES]:
-        typer.echo(f"  cell {result.cell}, run {result.run}: {result.message}", err=True)
+    typer.echo(f"failed: {counted(len(failed), 'run')}, which the same command tries again:", err=True)
+    print_failures(failed, err=True)
     raise typer.Exit(1)
 
 
 def _describe(campaign: Campaign) -> None:
+    from vedette.scenarios.cautions import cautions
+
     typer.echo(
         f"{campaign.name}: {campaign.total} runs, {campaign.num_runs} of each of {len(campaign.cells)} cells, "
         f"seed {campaign.seed}"
@@ -138,5 +138,11 @@ def _describe(campaign: Campaign) -> None:
     for axis, values in campaign.axes.items():
         compared = " (compared)" if axis == campaign.compare else ""
         typer.echo(f"  {axis}: {', '.join(str(value) for value in values)}{compared}")
+    warned: set[tuple[str, ...]] = set()
     for cell in campaign.cells:
         typer.echo(f"  - {cell.name}")
+        lines = cautions(cell.scenario)
+        if lines not in warned:  # once for all planners, filters and values of which it is true alike
+            warned.add(lines)
+            for line in lines:
+                typer.echo(f"cell {cell.name}: {line}", err=True)

@@ -25,6 +25,7 @@ class Commands(TyperGroup):
         return super().main(*args, **options)
 
     def invoke(self, ctx: Any) -> Any:
+        """Run a command; what it raises becomes a line and a status."""
         try:
             result = super().invoke(ctx)
             sys.stdout.flush()  # here, where a fault can still be told in words

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -9,10 +10,14 @@ import typer
 
 from vedette.cli.comparisons import print_comparison
 from vedette.cli.errors import usage_error
+from vedette.text import counted
 
 if TYPE_CHECKING:
+    from vedette.campaigns import Failed
+    from vedette.campaigns.journal import Failure
     from vedette.campaigns.results import CampaignResults
 
+_SHOWN_FAILURES = 10
 _FORMATS = ("parquet", "csv", "netcdf")
 
 
@@ -44,6 +49,14 @@ def results(
                 typer.echo(f"wrote {path}")
 
 
+def print_failures(failed: Sequence[Failed | Failure], *, err: bool = False) -> None:
+    """The first of the runs that could not be finished, each with where it stopped."""
+    for result in failed[:_SHOWN_FAILURES]:
+        typer.echo(f"  cell {result.cell}, run {result.run}: {result.message}", err=err)
+    if len(failed) > _SHOWN_FAILURES:
+        typer.echo(f"  and {len(failed) - _SHOWN_FAILURES} more", err=err)
+
+
 def print_results(opened: CampaignResults) -> None:
     """One comparison a group of settings, then how many runs there are and how many are missing."""
     campaign = opened.campaign
@@ -60,6 +73,10 @@ def print_results(opened: CampaignResults) -> None:
     for cell, number in missing.items():
         if number:
             typer.echo(f"missing of {cell}: {number}")
+    failures = opened.failures()
+    if failures:
+        typer.echo(f"failed: {counted(len(failures), 'run')}, which the same command tries again:")
+        print_failures(failures)
     tables = opened.folder / "tables"
     if tables.is_dir():
         typer.echo(f"tables: {tables}")

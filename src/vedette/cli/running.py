@@ -6,28 +6,32 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, NoReturn
 
 import typer
 
 from vedette.cli.errors import INTERRUPTED, usage_error
 from vedette.cli.output import console as new_console
+from vedette.cli.scenario_files import warn
 from vedette.errors import InputError
+from vedette.text import counted
 
 if TYPE_CHECKING:
     from vedette.scenarios import Scenario
     from vedette.simulation.records import RunRecord
+    from vedette.simulation.stopping import RunInterrupted, RunStopped
 
 STRATEGY_NAMES = ("jdm", "idm", "random", "fixed", "still")
 
 
 def compile_if_cold(scenario: Scenario) -> None:
-    """The first start compiles for about a minute; say so before it happens."""
+    """The first start in an environment compiles for minutes of processor time; say so before it happens."""
     from vedette.kernels.disk_cache import cache_directory, is_cold
 
     if is_cold():
         where = cache_directory()
-        typer.echo(f"Compiling the kernels: once on this machine, about a minute. They are kept in {where}.", err=True)
+        cost = "once for this environment, about three minutes of processor time"
+        typer.echo(f"Compiling the kernels: {cost}. They are kept in {where}.", err=True)
         from vedette.evaluation.precompile import precompile
 
         precompile(scenario)
@@ -99,27 +103,55 @@ def run(
     from vedette.evaluation.runs import run_scenario
     from vedette.scenarios import load_scenario
     from vedette.scenarios.dumping import dump_scenario
+    from vedette.simulation.stopping import RunInterrupted, RunStopped
+    from vedette.simulation.storage import check_free, save_run
 
     loaded = load_scenario(scenario)
     Approval(trust)(loaded)
+    warn(loaded)
     if out is not None:
-        from vedette.simulation.storage import check_free
-
         check_free(out, overwrite)
+    stop: RunStopped | RunInterrupted | None = None
     with interruptible("nothing was written"):
         compile_if_cold(loaded)
-        record = run_scenario(loaded, planner, seed=seed, run=run_number, num_threads=threads)
+        try:
+            record = run_scenario(loaded, planner, seed=seed, run=run_number, num_threads=threads)
+        except (RunStopped, RunInterrupted) as error:
+            if error.record is None:
+                _end(error, "nothing was written")
+            record, stop = error.record, error
         _print_run(record)
+        if stop is not None and out is None:
+            _end(stop, "nothing was written")
+        if stop is not None and _holds_whole_run(out):
+            _end(stop, f"{out} keeps the whole run that was there")
         if out is not None:
-            from vedette.simulation.storage import save_run
-
             save_run(record, out, scenario_text=dump_scenario(loaded.model, folder=loaded.folder), overwrite=overwrite)
+    if out is not None:
+        with interruptible(f"wrote {out}, but not all of its figures"):
             _draw_run(record, out / "figures")
-            typer.echo(f"wrote {out}")
+        if stop is not None:
+            _end(stop, f"wrote {out}, with the {counted(record.num_scans, 'scan')} before")
+        typer.echo(f"wrote {out}")
+
+
+def _holds_whole_run(folder: Path | None) -> bool:
+    from vedette.simulation.storage import MANIFEST, read_manifest
+
+    return folder is not None and (folder / MANIFEST).exists() and read_manifest(folder)["run"].get("stopped") is None
+
+
+def _end(stop: RunStopped | RunInterrupted, left: str) -> NoReturn:
+    """Say where a run stopped and what is left of it; the exit status says why."""
+    typer.echo(str(stop), err=True)
+    typer.echo(left, err=True)
+    raise typer.Exit(INTERRUPTED if isinstance(stop, KeyboardInterrupt) else 1) from None
 
 
 def _print_run(record: RunRecord) -> None:
     from rich.table import Table
+
+    from vedette.evaluation.health import health_line
 
     console = new_console()
     console.print(
@@ -139,6 +171,7 @@ def _print_run(record: RunRecord) -> None:
     console.print(f"mean OSPA {total:.2f} m (localisation {localisation:.2f}, cardinality {cardinality:.2f})")
     spent = ", ".join(f"{stage} {seconds.sum():.2f} s" for stage, seconds in record.timings.items())
     console.print(f"time spent: {spent}")
+    console.print(health_line(record), soft_wrap=True)
 
 
 def _draw_run(record: RunRecord, folder: Path) -> None:

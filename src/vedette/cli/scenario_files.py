@@ -73,7 +73,8 @@ def _starting_files(scenario: Scenario, target: Path) -> dict[Path, str]:
 def check(files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Scenario files.")]) -> None:
     """Name every fault of scenario files.
 
-    Each by file, line, column and field, with what was expected and what came.
+    Each by file, line, column and field, with what was expected and what came. Warnings, of what is valid but costs
+    accuracy or may not be meant, go to standard error and leave the exit status at 0.
     """
     from vedette.scenarios import load_scenario
     from vedette.scenarios.summary import one_line
@@ -81,12 +82,22 @@ def check(files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="S
     faulty = False
     for file in files:
         try:
-            typer.echo(f"{file}: {one_line(load_scenario(file))}")
+            scenario = load_scenario(file)
+            typer.echo(f"{file}: {one_line(scenario)}")
+            warn(scenario)
         except (ScenarioError, InputError) as error:
             typer.echo(str(error))
             faulty = True
     if faulty:
         raise typer.Exit(1)
+
+
+def warn(scenario: Scenario, before: str = "") -> None:
+    """Print the warnings of a scenario, each with `before` in front, to standard error."""
+    from vedette.scenarios.cautions import cautions
+
+    for line in cautions(scenario):
+        typer.echo(f"{before}{line}", err=True)
 
 
 def schema(

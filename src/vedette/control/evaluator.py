@@ -64,7 +64,7 @@ class Evaluator:
         *,
         rng: np.random.Generator,
     ) -> Evaluator:
-        """Draw the samples, predict, and run the pseudo-updates of every sensor (paper, Algorithm 2, steps 1 to 4).
+        """Draw the samples, predict, and run the pseudo-updates of every sensor (paper section III-B, steps 1 to 4).
 
         Targets move as the first sensor's filter has it. Raises as `JointPlanner.plan`.
         """

@@ -63,6 +63,7 @@ class Plan:
 
     @property
     def num_sensors(self) -> int:
+        """Number of sensors that the plan steers."""
         return len(self.action_values)
 
     @property

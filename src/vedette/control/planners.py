@@ -53,6 +53,7 @@ class JointPlanner:
 
     @property
     def name(self) -> str:
+        """The strategy "jdm"."""
         return "jdm"
 
     def plan(self, beliefs: Sequence[Belief], fused: Belief, poses: Floats, *, rng: np.random.Generator) -> Plan:
@@ -87,7 +88,11 @@ class JointPlanner:
 class IndependentPlanner:
     """Independent decision making: each sensor maximises the reward of its own update alone (paper, Algorithm 3).
 
-    Attributes: as `JointPlanner`; the fusion is not used in the decision itself.
+    Attributes:
+        sensors: the sensors, in the order of the beliefs.
+        fusion: how the beliefs became one; the decision itself does not use it.
+        settings: horizon, samples, caps.
+        reward: Cauchy-Schwarz divergence, or a reward of the user's own.
     """
 
     sensors: tuple[MobileSensor, ...]
@@ -97,6 +102,7 @@ class IndependentPlanner:
 
     @property
     def name(self) -> str:
+        """The strategy "idm"."""
         return "idm"
 
     def plan(self, beliefs: Sequence[Belief], fused: Belief, poses: Floats, *, rng: np.random.Generator) -> Plan:
@@ -122,6 +128,7 @@ class RandomPlanner:
 
     @property
     def name(self) -> str:
+        """The strategy "random"."""
         return "random"
 
     def plan(self, beliefs: Sequence[Belief], fused: Belief, poses: Floats, *, rng: np.random.Generator) -> Plan:
@@ -152,6 +159,7 @@ class FixedPlanner:
 
     @property
     def name(self) -> str:
+        """The strategy "fixed"."""
         return "fixed"
 
     def plan(self, beliefs: Sequence[Belief], fused: Belief, poses: Floats, *, rng: np.random.Generator) -> Plan:

@@ -32,6 +32,7 @@ class PlanningSettings:
         ideal_measurements: "ideal": noise-free, of the sampled targets whose detection probability is at least
             `detection_threshold`; "expected": noise-free, each target seen with its detection probability, so that the
             mean over samples is the expectation over detections; "sampled": seen likewise, with measurement noise.
+        detection_threshold: the probability from which on "ideal" measurements see a target (paper-notes 12).
         max_prior_hypotheses: heaviest hypotheses of each local posterior that enter the pseudo-updates. An LMB enters
             whole.
         limits: caps of the pseudo-updates, which are ranked, not Gibbs sampled, whatever the filter does. Every label

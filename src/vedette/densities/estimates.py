@@ -41,10 +41,12 @@ class Estimate:
 
     @property
     def num_targets(self) -> int:
+        """Number of estimated targets."""
         return len(self.labels)
 
     @classmethod
     def empty(cls, state_dim: int) -> Estimate:
+        """No target."""
         return cls(
             np.empty((0, 2), np.int64), np.empty((0, state_dim)), np.empty((0, state_dim, state_dim)), np.empty(0)
         )
@@ -169,7 +171,7 @@ class TrackHistory:
 
     Attributes:
         label: birth step and birth index.
-        scans: (num,) indices of the scans.
+        steps: (num,) numbers of the scans, from 1.
         times: (num,) s.
         means: (num, state_dim).
         covs: (num, state_dim, state_dim).
@@ -177,7 +179,7 @@ class TrackHistory:
     """
 
     label: tuple[int, int]
-    scans: Ints
+    steps: Ints
     times: Floats
     means: Floats
     covs: Floats
@@ -186,6 +188,8 @@ class TrackHistory:
 
 def track_histories(estimates: Sequence[Estimate], times: Floats) -> tuple[TrackHistory, ...]:
     """Estimates of successive scans at `times` (s), gathered by label; labels in increasing order.
+
+    The first estimate is that of step 1.
 
     Raises `InputError` unless there is one time an estimate.
     """
@@ -201,7 +205,7 @@ def track_histories(estimates: Sequence[Estimate], times: Floats) -> tuple[Track
         histories.append(
             TrackHistory(
                 label,
-                scans,
+                scans + 1,
                 np.asarray(times, np.float64)[scans],
                 np.stack([estimates[scan].means[target] for scan, target in seen]),
                 np.stack([estimates[scan].covs[target] for scan, target in seen]),

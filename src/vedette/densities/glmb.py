@@ -34,10 +34,12 @@ class GLMB:
 
     @property
     def num_hyps(self) -> int:
+        """Number of hypotheses."""
         return len(self.hyp_log_weights)
 
     @property
     def state_dim(self) -> int:
+        """Length of a target's state."""
         return self.tracks.state_dim
 
     @property
@@ -51,6 +53,7 @@ class GLMB:
 
     @classmethod
     def from_kernel(cls, glmb: kt.Glmb) -> GLMB:
+        """From the arrays that kernels work on."""
         return cls(TrackTable.from_kernel(glmb.tracks), glmb.hyp_offsets, glmb.hyp_tracks, glmb.hyp_log_weights)
 
     @classmethod

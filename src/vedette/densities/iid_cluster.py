@@ -35,6 +35,7 @@ class IidCluster:
 
     @property
     def state_dim(self) -> int:
+        """Length of a target's state."""
         return int(self.means.shape[1])
 
     @property
@@ -48,6 +49,7 @@ class IidCluster:
 
     @classmethod
     def from_kernel(cls, log_cardinality: Floats, mixture: kt.Mixture) -> IidCluster:
+        """From the arrays that kernels work on."""
         return cls(log_cardinality, *mixture)
 
     @classmethod

@@ -35,6 +35,7 @@ class LMB:
 
     @property
     def state_dim(self) -> int:
+        """Length of a target's state."""
         return self.tracks.state_dim
 
     def to_kernel(self) -> kt.Lmb:
@@ -43,6 +44,7 @@ class LMB:
 
     @classmethod
     def from_kernel(cls, lmb: kt.Lmb) -> LMB:
+        """From the arrays that kernels work on."""
         return cls(TrackTable.from_kernel(lmb.tracks), lmb.existence_logit)
 
     @classmethod

@@ -34,6 +34,7 @@ class MultiBernoulli:
 
     @property
     def num_bernoullis(self) -> int:
+        """Number of Bernoullis."""
         return len(self.existence_logit)
 
     @property
@@ -43,6 +44,7 @@ class MultiBernoulli:
 
     @property
     def state_dim(self) -> int:
+        """Length of a target's state."""
         return int(self.means.shape[1])
 
     @property

@@ -30,6 +30,7 @@ class Poisson:
 
     @property
     def state_dim(self) -> int:
+        """Length of a target's state."""
         return int(self.means.shape[1])
 
     @property
@@ -43,6 +44,7 @@ class Poisson:
 
     @classmethod
     def from_kernel(cls, mixture: kt.Mixture) -> Poisson:
+        """From the arrays that kernels work on."""
         return cls(*mixture)
 
     @classmethod

@@ -34,6 +34,7 @@ class MultiTargetSamples:
 
     @property
     def num_samples(self) -> int:
+        """Number of samples."""
         return len(self.offsets) - 1
 
     def sample(self, index: int) -> tuple[Ints, Floats]:

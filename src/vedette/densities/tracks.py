@@ -34,10 +34,12 @@ class TrackTable:
 
     @property
     def num_tracks(self) -> int:
+        """Number of tracks."""
         return len(self.labels)
 
     @property
     def state_dim(self) -> int:
+        """Length of a target's state."""
         return int(self.means.shape[1])
 
     def to_kernel(self) -> kt.Tracks:
@@ -46,10 +48,12 @@ class TrackTable:
 
     @classmethod
     def from_kernel(cls, tracks: kt.Tracks) -> TrackTable:
+        """From the arrays that kernels work on."""
         return cls(*tracks)
 
     @classmethod
     def empty(cls, state_dim: int) -> TrackTable:
+        """A table without tracks."""
         return cls(
             np.empty((0, 2), np.int64),
             np.zeros(1, np.int64),

@@ -1,4 +1,7 @@
-"""How good it was: metrics, statistics over paired runs, tables; figures are in `vedette.evaluation.figures`."""
+"""Runs of scenarios and how good they were: metrics, statistics over paired runs, tables.
+
+Figures are in `vedette.evaluation.figures`.
+"""
 
 from vedette.evaluation.comparison import Comparison, chosen_headings_deg, compare
 from vedette.evaluation.metrics import (
@@ -25,10 +28,12 @@ from vedette.evaluation.metrics import (
     ospa2_of_run,
     ospa_of_run,
 )
+from vedette.evaluation.runs import STRATEGIES, run_scenario, strategy
 from vedette.evaluation.statistics import PairedDifference, Summary, paired_difference, summarise
 from vedette.evaluation.tables import decision_rows, strategy_csv, strategy_markdown, strategy_rows
 
 __all__ = [
+    "STRATEGIES",
     "AverageNees",
     "Comparison",
     "Continuity",
@@ -58,6 +63,8 @@ __all__ = [
     "ospa2_of_run",
     "ospa_of_run",
     "paired_difference",
+    "run_scenario",
+    "strategy",
     "strategy_csv",
     "strategy_markdown",
     "strategy_rows",

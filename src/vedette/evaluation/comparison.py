@@ -44,6 +44,7 @@ class Comparison:
 
     @property
     def num_runs(self) -> int:
+        """Number of runs of each strategy."""
         return int(self.ospa.shape[1])
 
     @property

@@ -35,7 +35,13 @@ def strategy(scenario: Scenario, name: str, num_threads: int = 0) -> Planner | N
 
 
 def run_scenario(scenario: Scenario, planner: str, *, seed: int, run: int = 0, num_threads: int = 0) -> RunRecord:
-    """One run. `num_threads` share a decision (0: one a processor) and change no result.
+    """One run of a scenario under one of the `STRATEGIES`.
+
+    Args:
+        scenario: as `vedette.scenarios.load_scenario` reads it.
+        planner: "jdm" (joint), "idm" (independent), "random", "fixed" or "still".
+        seed, run: fix every random number; runs with equal seed and number are paired across strategies.
+        num_threads: share a decision (0: one a processor) and change no result.
 
     Raises:
         VedetteError: the scenario's models, filters or planner cannot do what is asked.

@@ -56,5 +56,6 @@ class CbMemberFilter(ModelledFilter):
             num_duplicates=num_duplicates,
             num_inexact_clusters=0,
             search_cut=False,
+            cap_met=len(posterior.existence_logit) >= limits.max_labels,
         )
         return MultiBernoulli.from_kernel(posterior), info

@@ -60,5 +60,6 @@ class CphdFilter(ModelledFilter):
             num_duplicates=num_duplicates,
             num_inexact_clusters=0,
             search_cut=False,
+            cap_met=len(posterior.log_weights) >= self.limits.max_intensity_components,
         )
         return IidCluster.from_kernel(cardinality, posterior), info

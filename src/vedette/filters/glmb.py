@@ -103,6 +103,7 @@ class DeltaGlmbFilter:
                 posterior, _, report = step_ranked(*arguments, _NO_GROUPS)
         if len(posterior.hyp_log_weights) == 0:
             raise NumericalError(f"step {step}: no hypothesis has positive weight; do the models forbid this scan?")
+        cap_met = len(posterior.hyp_log_weights) >= self.limits.max_hypotheses
         if self.marginalised:
             limits = self.limits
             posterior = marginalise(
@@ -118,5 +119,6 @@ class DeltaGlmbFilter:
             num_duplicates=num_duplicates,
             num_inexact_clusters=0,
             search_cut=bool(report.cut),
+            cap_met=cap_met,
         )
         return GLMB.from_kernel(posterior), info

@@ -26,6 +26,8 @@ class FilterInfo:
         num_inexact_clusters: LMB clusters summed over their heaviest joint choices only; 0 for other filters.
         search_cut: whether ranking stopped at `Limits.max_search_nodes` before it had found all it was asked for; false
             where nothing is ranked.
+        cap_met: whether the posterior was as large as `Limits` allows, so that more may have been cut off: hypotheses
+            of a GLMB, labels of an LMB, Bernoullis of a CB-MeMBer filter, components of a PHD or CPHD filter.
     """
 
     log_likelihood: float
@@ -37,3 +39,4 @@ class FilterInfo:
     num_duplicates: int
     num_inexact_clusters: int
     search_cut: bool
+    cap_met: bool

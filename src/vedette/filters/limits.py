@@ -102,6 +102,7 @@ class Limits:
 
     @property
     def log_min_component_weight(self) -> float:
+        """Logarithm of `min_component_weight`."""
         return math.log(self.min_component_weight) if self.min_component_weight > 0.0 else -math.inf
 
     def reduction(self) -> Reduction:
@@ -120,4 +121,5 @@ class Limits:
 
     @property
     def max_existence_logit(self) -> float:
+        """Log-odds of `max_existence`."""
         return float(logit(self.max_existence))

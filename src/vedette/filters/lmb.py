@@ -55,5 +55,6 @@ class LmbFilter(ModelledFilter):
             num_duplicates=num_duplicates,
             num_inexact_clusters=int(report.num_ranked),
             search_cut=False,
+            cap_met=len(posterior.existence_logit) >= self.limits.max_labels,
         )
         return LMB.from_kernel(posterior), info

@@ -50,5 +50,6 @@ class PhdFilter(ModelledFilter):
             num_duplicates=num_duplicates,
             num_inexact_clusters=0,
             search_cut=False,
+            cap_met=len(posterior.log_weights) >= self.limits.max_intensity_components,
         )
         return Poisson.from_kernel(posterior), info

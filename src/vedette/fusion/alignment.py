@@ -19,8 +19,8 @@ class Aligned(NamedTuple):
 
     set_offsets: (num_sets + 1,) into members. set_of_member: (num_members,). labels: (num_members, 2).
     chosen: (num_members, S) place in `tracks`, -1 where the sensor does not know the label. log_weights, held:
-    (num_sets, S) weight of the set, and whether it is the sensor's own; otherwise a floor. num_missing_labels: number
-    of (label, sensor) pairs in which the sensor does not know the label.
+    (num_sets, S) weight of the set, and whether it is the sensor's own; otherwise a floor. num_missing_labels: (S,)
+    labels that the sensor does not know.
     """
 
     set_offsets: Ints
@@ -30,7 +30,14 @@ class Aligned(NamedTuple):
     tracks: Tracks
     log_weights: Floats
     held: Bools
-    num_missing_labels: int
+    num_missing_labels: Ints
+
+    def existence(self, log_weights: Floats) -> Floats:
+        """(num_labels, n) existence of each label, in increasing order, under (num_sets, n) weights of the sets."""
+        distinct, place = np.unique(self.labels, axis=0, return_inverse=True)
+        existence = np.zeros((len(distinct), log_weights.shape[1]))
+        np.add.at(existence, place.ravel(), np.exp(log_weights)[self.set_of_member])
+        return existence
 
 
 def align(sensors: Sequence[Glmb], missing_log_weight: float, rule: PowerRule) -> Aligned:
@@ -56,13 +63,13 @@ def align(sensors: Sequence[Glmb], missing_log_weight: float, rule: PowerRule) -
     own, sensor = np.nonzero(held[set_of_member])
     entry = stack.hyp_offsets[hyp_of[set_of_member[own], sensor]] + place[own]
     chosen[own, sensor] = stack.hyp_tracks[entry]
-    tracks, num_missing_labels = stack.tracks, 0
+    tracks = stack.tracks
+    num_missing_labels = np.zeros(len(sensors), np.int64)
     for s in np.flatnonzero(~held.all(axis=0)).tolist():
         lacking = np.flatnonzero(~held[set_of_member, s])
         marginal = glmb_to_lmb(sensors[s], *rule.limits).tracks
-        places, unknown = _find_labels(marginal.labels, labels[lacking])
+        places, num_missing_labels[s] = _find_labels(marginal.labels, labels[lacking])
         chosen[lacking, s] = np.where(places >= 0, places + len(tracks.labels), -1)
-        num_missing_labels += unknown
         tracks = stack_tracks([tracks, marginal])
     return Aligned(set_offsets, set_of_member, labels, chosen, tracks, log_weights, held, num_missing_labels)
 

@@ -11,13 +11,16 @@ import numpy as np
 
 from vedette.errors import InputError
 from vedette.fusion.cubature import MAX_DIM, fifth_degree_rule
-from vedette.kernels.types import Floats
+from vedette.kernels.types import Floats, Ints
 
 MixturePower = Literal["moment_matched", "component_wise", "quadrature"]
 MIXTURE_POWERS: tuple[MixturePower, ...] = ("moment_matched", "component_wise", "quadrature")
 
 # Within these distances a merged Gaussian is as near to the truth as the power is: docs/decisions/0003.
 _MERGE_DISTANCE = {"moment_matched": 0.0, "component_wise": 2.0, "quadrature": 0.5}
+
+# Existence from which a sensor is sure of a label, and below which the fusion has lost it.
+SURE, LOST = 0.9, 0.5
 
 _BeliefT_contra = TypeVar("_BeliefT_contra", contravariant=True)
 _FusedT_co = TypeVar("_FusedT_co", covariant=True)
@@ -28,29 +31,46 @@ class FusionInfo:
     """What a fusion had to repair and what it threw away.
 
     Attributes:
-        num_missing_sets: (label set, sensor) pairs in which a floor stood in for the weight of a label set that
-        another
-            sensor has and this one does not; of an LMB, (label, sensor) pairs with a floor for the existence.
-        num_missing_labels: (label, sensor) pairs in which the sensor does not know the label at all, so that its
-        density
-            was left out of that label.
+        missing_sets: one number a sensor, of label sets that another sensor has and this one does not, so that a floor
+            stood in for their weight there; of an LMB, of labels with a floor for the existence. 0 for a sensor of
+            weight 0, which takes no part.
+        missing_labels: one number a sensor, of labels that it does not know at all, so that its density was left out of
+            them.
+        num_sets: label sets (LMB: labels) that were fused, those of all sensors together.
+        num_lost_labels: labels that a sensor is sure of (existence of `SURE` or more) and the fused density has with an
+            existence below `LOST`: targets that one sensor sees, and that a sensor which lacks them, or does not see
+            where they are, pulled down.
         empty_intersection: no label set (LMB: no label) is held by every sensor. False where there is none at all.
         log_normaliser: log of the set integral of the product of the powers, at most 0 but for the floors and the
             inflation of component-wise powers; far below 0 the sensors contradict each other.
         discarded_weight: probability of the fused label sets beyond the cap.
     """
 
-    num_missing_sets: int
-    num_missing_labels: int
+    missing_sets: tuple[int, ...]
+    missing_labels: tuple[int, ...]
+    num_sets: int
+    num_lost_labels: int
     empty_intersection: bool
     log_normaliser: float
     discarded_weight: float
+
+    @property
+    def num_missing_sets(self) -> int:
+        """Label sets missing at a sensor, of all sensors together."""
+        return sum(self.missing_sets)
+
+    @property
+    def num_missing_labels(self) -> int:
+        """Labels unknown to a sensor, of all sensors together."""
+        return sum(self.missing_labels)
 
 
 class Fusion(Protocol[_BeliefT_contra, _FusedT_co]):
     """One belief of all the sensors'. The order of `beliefs` is that of the fusion weights."""
 
-    def fuse(self, beliefs: Sequence[_BeliefT_contra]) -> tuple[_FusedT_co, FusionInfo]: ...
+    def fuse(self, beliefs: Sequence[_BeliefT_contra]) -> tuple[_FusedT_co, FusionInfo]:
+        """The fused belief, and what had to be repaired or thrown away."""
+        ...
 
 
 class FusionLimits(NamedTuple):
@@ -141,3 +161,15 @@ def check_beliefs(beliefs: Sequence[Any], kinds: tuple[type, ...], num_sensors: 
             belief.validate(error=InputError)
         except InputError as fault:
             raise InputError(f"beliefs[{i}]: {fault}") from None
+
+
+def count_lost(existence: Floats, fused: Floats) -> int:
+    """Labels lost by a fusion, of (num_labels, S) existence at the sensors and (num_labels,) fused."""
+    return int(np.count_nonzero((existence.max(axis=1, initial=0.0) >= SURE) & (fused < LOST)))
+
+
+def by_sensor(counts: Ints, active: Sequence[int], num_sensors: int) -> tuple[int, ...]:
+    """A number for each sensor from those of the sensors that take part; 0 for the others."""
+    numbers = np.zeros(num_sensors, np.int64)
+    numbers[list(active)] = counts
+    return tuple(numbers.tolist())

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import log_expit
+from scipy.special import expit, log_expit
 
 from vedette.densities import GLMB, LMB
 from vedette.fusion.base import (
@@ -16,10 +16,12 @@ from vedette.fusion.base import (
     FusionLimits,
     MixturePower,
     PowerRule,
+    by_sensor,
     check_beliefs,
     check_floor,
     check_power,
     check_weights,
+    count_lost,
     power_rule,
 )
 from vedette.fusion.tracks import fused_tracks, reduced_tracks
@@ -40,6 +42,9 @@ class Clmb:
     it is left out of the label's density, where the other sensors' weights are scaled to sum to one; counted in the
     `FusionInfo`. A label in every hypothesis of a sensor's GLMB is certain there, and so in the fusion. (Truncation may
     have cut off the rest; to bound its certainty as its absence is bounded makes joint decisions worse, not better.)
+
+    Assumes that the sensors see the same part of the world and that a target has one label at all of them: what one
+    sensor surely sees is lost where another has none of its label, or does not see there.
 
     Attributes:
         weights: fusion weights, one a sensor, in the order of the beliefs; non-negative, sum 1. A sensor of weight 0
@@ -76,10 +81,13 @@ class Clmb:
         log_present = log_expit(aligned.logits) @ weights + log_overlaps
         log_absent = log_expit(-aligned.logits) @ weights
         held = aligned.chosen >= 0
-        num_missing = int(np.count_nonzero(~held))
-        return LMB(tracks, aligned.logits @ weights + log_overlaps), FusionInfo(
-            num_missing_sets=num_missing,
-            num_missing_labels=num_missing,
+        missing = by_sensor(np.count_nonzero(~held, axis=0), active, len(beliefs))
+        logits = aligned.logits @ weights + log_overlaps
+        return LMB(tracks, logits), FusionInfo(
+            missing_sets=missing,
+            missing_labels=missing,
+            num_sets=len(held),
+            num_lost_labels=count_lost(expit(aligned.logits), expit(logits)),
             empty_intersection=len(held) > 0 and not bool(held.all(axis=1).any()),
             log_normaliser=float(np.logaddexp(log_present, log_absent).sum()),
             discarded_weight=0.0,

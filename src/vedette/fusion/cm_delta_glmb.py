@@ -16,10 +16,12 @@ from vedette.fusion.base import (
     FusionLimits,
     MixturePower,
     PowerRule,
+    by_sensor,
     check_beliefs,
     check_floor,
     check_power,
     check_weights,
+    count_lost,
     power_rule,
 )
 from vedette.fusion.tracks import fused_tracks, take_tracks
@@ -38,6 +40,9 @@ class CmDeltaGlmb:
     label's density is the sensor's marginal density of the label over the sets that it has. Where it does not know
     the label at all, it is left out of the label's density and the other sensors' weights there are scaled to sum to
     one. A hypothesis of weight zero counts as missing. All this is counted in the `FusionInfo`.
+
+    Assumes that the sensors see the same part of the world and that a target has one label at all of them: what one
+    sensor surely sees is lost where another has no set with it, or does not see there.
 
     Attributes:
         weights: fusion weights, one a sensor, in the order of the beliefs; non-negative, sum 1. A sensor of weight 0
@@ -79,11 +84,16 @@ class CmDeltaGlmb:
         log_weights = aligned.log_weights @ weights
         log_weights = log_weights + np.bincount(aligned.set_of_member, log_overlaps, len(log_weights))
         fused, discarded_weight = _heaviest(aligned, tracks, log_weights, self.limits.max_hypotheses)
+        log_normaliser = float(log_sum(log_weights))
+        of_sensors = aligned.existence(np.where(aligned.held, aligned.log_weights, -math.inf))
+        of_fused = aligned.existence((log_weights - log_normaliser)[:, None])[:, 0]
         return fused, FusionInfo(
-            num_missing_sets=int(np.count_nonzero(~aligned.held)),
-            num_missing_labels=aligned.num_missing_labels,
+            missing_sets=by_sensor(np.count_nonzero(~aligned.held, axis=0), active, len(beliefs)),
+            missing_labels=by_sensor(aligned.num_missing_labels, active, len(beliefs)),
+            num_sets=len(aligned.held),
+            num_lost_labels=count_lost(of_sensors, of_fused),
             empty_intersection=not bool(aligned.held.all(axis=1).any()),
-            log_normaliser=float(log_sum(log_weights)),
+            log_normaliser=log_normaliser,
             discarded_weight=discarded_weight,
         )
 

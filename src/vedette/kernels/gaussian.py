@@ -197,8 +197,10 @@ def predict(
     else:
         _predict_sigma_points(motion, dt, mean, cov, out_mean, out_cov, scratch)
     for i in range(n):
-        if not (math.isfinite(out_mean[i]) and out_cov[i, i] > 0.0 and out_cov[i, i] < math.inf):
+        if not (math.isfinite(out_mean[i]) and math.isfinite(out_cov[i, i])):
             raise ModelError("motion model: predicted mean or covariance is not finite")
+        if out_cov[i, i] <= 0.0:
+            raise ModelError("motion model: predicted covariance is not positive definite, as with indefinite noise")
 
 
 @borrowing

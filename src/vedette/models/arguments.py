@@ -10,11 +10,26 @@ import numpy as np
 
 from vedette.errors import InputError
 from vedette.kernels.types import Floats
+from vedette.text import printable
+
+# Squares and products of variances in this range are numbers.
+SMALLEST_VARIANCE, LARGEST_VARIANCE = 1e-60, 1e60
+# Of a correlation matrix: what is below is rounding, and no direction of the state is known so well.
+LEAST_EIGENVALUE = 1e-13
+
+
+def plain(value: Any) -> str:
+    """A value as a person would write it: numbers of NumPy as numbers, also inside lists."""
+    with np.printoptions(legacy="1.25"):  # from 2.0 on the repr of a number names its type
+        try:
+            return repr(value.tolist() if isinstance(value, np.ndarray) else value)
+        except ValueError:  # a whole number of more digits than Python writes
+            return "a number of thousands of digits"
 
 
 def reject(field: str, expected: str, got: Any) -> InputError:
     """The error for one bad argument; a long value is cut short."""
-    text = got if isinstance(got, str) else repr(got)
+    text = printable(got if isinstance(got, str) else plain(got))
     return InputError(f"{field}: expected {expected}; got {text if len(text) <= 200 else text[:197] + '...'}")
 
 
@@ -88,11 +103,26 @@ def state_table(field: str, values: Any, state_dim: int | None = None) -> Floats
     return float_array(field, values, (None, state_dim))
 
 
-def positive_definite(field: str, matrix: Floats) -> None:
-    """Raise unless `matrix` is symmetric positive definite."""
+def covariance_fault(matrix: Floats) -> tuple[str, str] | None:
+    """What a square matrix lacks to be a covariance that filters can compute with, and what it is; None: nothing."""
+    if not np.isfinite(matrix).all():
+        return "finite numbers", "one that is not"
     if not np.allclose(matrix, matrix.T, rtol=1e-9, atol=0.0):
-        raise reject(field, "a symmetric matrix", matrix.tolist())
-    try:
-        np.linalg.cholesky(matrix)
-    except np.linalg.LinAlgError:
-        raise reject(field, "a positive definite matrix", matrix.tolist()) from None
+        return "a symmetric matrix", "one that is not"
+    variances = np.diagonal(matrix)
+    wrong = (variances < SMALLEST_VARIANCE) | (variances > LARGEST_VARIANCE)
+    if wrong.any():
+        wanted = f"a positive definite matrix with variances from {SMALLEST_VARIANCE:g} to {LARGEST_VARIANCE:g}"
+        return wanted, f"a variance of {float(variances[np.argmax(wrong)]):g}"
+    stds = np.sqrt(variances)  # of the correlations, so that metres and radians can stand side by side
+    least = float(np.linalg.eigvalsh(matrix / stds[:, np.newaxis] / stds)[0])
+    if least <= LEAST_EIGENVALUE:
+        return "a positive definite matrix", f"correlations with a least eigenvalue of {least:.3g}"
+    return None
+
+
+def positive_definite(field: str, matrix: Floats) -> None:
+    """Raise unless `matrix` is symmetric positive definite, with variances that can be squared."""
+    fault = covariance_fault(matrix)
+    if fault is not None:
+        raise reject(field, fault[0], f"{fault[1]}, in {plain(matrix)}")

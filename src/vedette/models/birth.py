@@ -13,7 +13,7 @@ from vedette.models.arguments import float_array, positive_definite, reject
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BirthModel:
-    """Each site may give birth to one target a step; its label is (step, site index) (paper-notes row 6).
+    """Each site may give birth to one target a step; its label is (step, site index) (paper-notes 6).
 
     Attributes:
         existence: (num_sites,) birth probability of each site, in (0, 1).
@@ -46,10 +46,12 @@ class BirthModel:
 
     @property
     def num_sites(self) -> int:
+        """Number of birth sites."""
         return len(self.existence)
 
     @property
     def state_dim(self) -> int:
+        """Length of a target's state."""
         return int(self.means.shape[1])
 
     def is_active(self, step: int) -> bool:

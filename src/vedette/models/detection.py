@@ -15,7 +15,7 @@ from vedette.models.functions import ModelFunction, call, model_function, requir
 from vedette.models.probe import probe_probability
 
 # The built-in models stay at or below this: certain detection would make a single missed detection impossible, and with
-# it every hypothesis that holds the target (paper-notes row 4).
+# it every hypothesis that holds the target (paper-notes 4).
 MAX_PROB_DETECTION = 1.0 - 1e-9
 
 
@@ -85,7 +85,7 @@ def constant_detection(prob_detection: float) -> DetectionModel:
 
 
 def gaussian_detection(sigma: float) -> DetectionModel:
-    """exp(-d^2 / (2 sigma^2)) at distance d (paper section IV, sigma_D = 10000 m; paper-notes row 4), capped alike."""
+    """exp(-d^2 / (2 sigma^2)) at distance d (paper section IV, sigma_D = 10000 m; paper-notes 4), capped alike."""
     return DetectionModel(_gaussian, np.array([positive("sigma", sigma)]))
 
 

@@ -1,6 +1,6 @@
 """Built-in motions: nearly constant velocity and the coordinated turn, for any time step.
 
-States: [px, py, vx, vy] (the order of the paper's F and Q; paper-notes row 1), with a turn rate in rad/s, positive to
+States: [px, py, vx, vy] (the order of the paper's F and Q; paper-notes 1), with a turn rate in rad/s, positive to
 the left, appended for the coordinated turn.
 """
 

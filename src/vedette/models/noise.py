@@ -59,14 +59,16 @@ def range_dependent_noise(
     sigma_bearing: float | None = None,
     eta_bearing: float = 0.0,
 ) -> NoiseModel:
-    """Noise that grows with the distance d of the target (paper section IV; paper-notes row 3).
+    """Noise that grows with the distance d of the target (paper section IV; paper-notes 3).
 
     Standard deviations sigma_range + eta_range d^2 and sigma_bearing + eta_bearing d. With only `sigma_bearing` given
     it serves a bearing-only sensor, with only `sigma_range` a range-only one, with both [bearing, range].
 
     Args:
-        sigma_range: m, above 0 (paper: 10). eta_range: 1/m (paper: 5e-5).
-        sigma_bearing: rad, above 0 (paper: pi/180). eta_bearing: rad/m (paper: 5e-6).
+        sigma_range: m, above 0 (paper: 10).
+        eta_range: 1/m (paper: 5e-5).
+        sigma_bearing: rad, above 0 (paper: pi/180).
+        eta_bearing: rad/m (paper: 5e-6).
     """
     ranges = _growth("range", sigma_range, eta_range)
     bearings = _growth("bearing", sigma_bearing, eta_bearing)

@@ -1,6 +1,6 @@
 """Built-in bearing-range, bearing-only and range-only measurements.
 
-A bearing is atan2(dy, dx) from the +x axis in (-pi, pi] rad, not relative to the heading (paper-notes row 2); a range
+A bearing is atan2(dy, dx) from the +x axis in (-pi, pi] rad, not relative to the heading (paper-notes 2); a range
 is in metres. A target exactly at the sensor has no bearing and no direction of range: its Jacobian rows are zero, so
 that such a measurement moves nothing.
 """

@@ -1,7 +1,7 @@
 """Clutter that is uniform in the surveillance region, with the Jacobian of each kind of measurement.
 
 Uniform in x, y is not uniform in bearing and range: the intensity at (bearing, range) is rate * range / area inside the
-region and 0 outside (paper-notes row 5). Bearings or ranges alone are its integrals along the ray or round the arc.
+region and 0 outside (paper-notes 5). Bearings or ranges alone are its integrals along the ray or round the arc.
 """
 
 from __future__ import annotations
@@ -109,7 +109,7 @@ class _RegionSampler:
 
 
 def region_clutter(rate: float, region: Region, kind: str) -> ClutterModel:
-    """Clutter uniform in `region` as a sensor of the given kind measures it (paper section IV; paper-notes row 5).
+    """Clutter uniform in `region` as a sensor of the given kind measures it (paper section IV; paper-notes 5).
 
     It is drawn by putting uniform positions, at rest, through the sensor's measurement function.
 

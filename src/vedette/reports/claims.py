@@ -7,6 +7,7 @@ from typing import Literal
 
 from vedette.evaluation import Comparison, PairedDifference
 from vedette.evaluation.figures.style import strategy_label
+from vedette.evaluation.health import percent
 
 Verdict = Literal["better", "worse", "untold", "unknown"]
 
@@ -111,15 +112,6 @@ def _runs(paired: PairedDifference) -> str:
 def _share(paired: PairedDifference) -> str:
     tied = f", equal in {percent(paired.share_tied)}" if paired.share_tied > 0.0 else ""
     return f"{percent(paired.share_won)} of the runs{tied}"
-
-
-def percent(share: float) -> str:
-    """A share as a whole number of percent; no share but 0 and 1 is written as 0 % or 100 %."""
-    if 0.0 < share < 0.01:
-        return "<1 %"
-    if 0.99 < share < 1.0:
-        return ">99 %"
-    return f"{share:.0%}".replace("%", " %")
 
 
 def _minus(text: str) -> str:

@@ -171,6 +171,7 @@ def sweep_drawings(campaign: Campaign, errors: Mapping[str, Floats]) -> Iterator
     """Mean OSPA against every axis that is a number with several values.
 
     Args:
+        campaign: whose axes they are.
         errors: for each cell by its name, the mean OSPA of its paired runs, m; cells without are left out.
     """
     cells = [cell for cell in campaign.cells if cell.name in errors]

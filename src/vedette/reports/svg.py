@@ -39,6 +39,7 @@ def inline_svg(figure: Figure, prefix: str, description: str, names: Mapping[str
     """An `svg` element that is as wide as its place, at most as wide as reads well.
 
     Args:
+        figure: what to draw.
         prefix: unique on the page; put before every id in the figure.
         description: for readers who do not see it.
         names: elided names and the full ones, which show where a reader points at a text that holds the elided one.

@@ -24,6 +24,7 @@ from vedette.kernels.types import Floats
 from vedette.reports.claims import Claim, all_pairs, claims
 from vedette.reports.drawings import Drawing, error_drawings, group_drawings, sweep_drawings, typical_records
 from vedette.reports.groups import Group, axis_label, gather
+from vedette.reports.health import group_health, health_table
 from vedette.reports.origin import versions_table
 from vedette.reports.replay import code_of_sensors, replay_data
 from vedette.reports.saving import run_errors
@@ -44,6 +45,7 @@ class _Section:
     is_brief: bool
     claims: tuple[Claim, ...]
     pairs: tuple[Claim, ...]
+    health: tuple[tuple[str, str], ...]
     tables: tuple[tuple[str, Table], ...]
     figures: tuple[tuple[Drawing, Markup], ...]
 
@@ -67,6 +69,8 @@ def write_report(
     need a sensor model of somebody's own, they are left out, and the page says so.
 
     Args:
+        results: of a finished campaign.
+        path: of the file; its folder is made.
         replays: cell and number of the runs that can be replayed; None: the typical run of each strategy, as many as
             keep the page small.
         trust: run the code that the scenarios of the results name (`code_in_replays`).
@@ -133,6 +137,7 @@ def _section(group: Group, prefix: str, is_brief: bool) -> _Section:
         "Errors": error_table(group),
         "Other measures": measure_table(group),
         "Decisions": decision_table(group),
+        "Health": health_table(group),
         "Cost": cost_table(group),
     }
     comparison = group.comparison
@@ -141,6 +146,7 @@ def _section(group: Group, prefix: str, is_brief: bool) -> _Section:
         is_brief=is_brief,
         claims=() if comparison is None else claims(comparison),
         pairs=() if comparison is None or len(comparison.strategies) < 3 else all_pairs(comparison),
+        health=group_health(group),
         tables=tuple((title, table) for title, table in named.items() if table is not None),
         figures=_drawn(
             tuple(error_drawings(group) if is_brief else group_drawings(group)),
@@ -217,6 +223,7 @@ def _render(
         sections=sections,
         sweeps=sweeps,
         finished=finished,
+        failures=results.failures(),
         planned=campaign.total,
         replays=[json.loads(run) for run in runs],
         replay_json=Markup("[" + ",".join(runs) + "]"),  # safe inside an element: see `_json`

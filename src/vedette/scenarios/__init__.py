@@ -1,5 +1,9 @@
-"""Named scenarios as data: the schema of their YAML files, their faults by line and column, what is built of them."""
+"""Named scenarios as data: the schema of their YAML files, their faults by line and column.
+
+What is built of them is in `vedette.scenarios.build`.
+"""
 
 from vedette.scenarios.loading import Scenario, json_schema, list_builtin, load_scenario, parse_scenario
+from vedette.scenarios.overrides import with_fields
 
-__all__ = ["Scenario", "json_schema", "list_builtin", "load_scenario", "parse_scenario"]
+__all__ = ["Scenario", "json_schema", "list_builtin", "load_scenario", "parse_scenario", "with_fields"]

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from vedette.models.arguments import SMALLEST_VARIANCE, covariance_fault
 from vedette.scenarios.faults import Finding, Path, describe
 from vedette.scenarios.file_checks import recorded_findings, reference_findings
 from vedette.scenarios.parts import Parts
@@ -61,6 +62,15 @@ def _decision_times(moments: Sequence[float], time: Time) -> Iterator[Finding]:
         elif step_of_time(moment, time.start, time.step_period) is None:
             wanted = f"the time of a scan: {time.start:g} s and every {time.step_period:g} s after it"
             yield ("control", "decision_times", i), wanted, describe(moment)
+
+
+def _clock(parts: Parts) -> Iterator[Finding]:
+    time = parts.time
+    if time is None or _faulty(time.num_steps, time.start, time.step_period):
+        return
+    latest = abs(time.start) + time.num_steps * time.step_period
+    if time.step_period < 1e6 * math.ulp(latest):
+        yield ("time", "step_period"), f"a period that can be told apart at {latest:g} s", describe(time.step_period)
 
 
 def _schedule_order(parts: Parts) -> Iterator[Finding]:
@@ -138,21 +148,19 @@ def _covariance(path: Path, rows: Sequence[Sequence[float]], dim: int) -> Iterat
         shape = f"rows of {', '.join(str(len(row)) for row in rows)}" if len(rows) == dim else describe(rows)
         yield path, f"{dim} rows of {dim} numbers", shape
         return
-    cov = np.array(rows)
-    if not np.allclose(cov, cov.T, rtol=1e-9, atol=0.0):
-        yield path, "a symmetric matrix", "one that is not"
-        return
-    stds = np.sqrt(np.maximum(np.diagonal(cov), 0.0))
-    if (stds == 0.0).any() or np.linalg.eigvalsh(cov / np.outer(stds, stds))[0] <= 0.0:
-        yield path, "a positive definite matrix", "one that is not"
+    fault = covariance_fault(np.array(rows))
+    if fault is not None:
+        yield path, *fault
 
 
 def _births(parts: Parts) -> Iterator[Finding]:
+    seen: set[int] = set()
     for i, step in enumerate(parts.birth_steps):
-        if step in parts.birth_steps[:i]:
+        if step in seen:
             yield ("birth", "steps", i), "each step once", f"{step} again"
         elif parts.num_steps is not None and step > parts.num_steps:
             yield ("birth", "steps", i), f"a step up to the last, {parts.num_steps}", describe(step)
+        seen.add(step)
     for i, site in enumerate(parts.sites):
         if site is not None:
             yield from _birth_site(("birth", "sites", i), site, parts)
@@ -164,6 +172,8 @@ def _birth_site(path: Path, site: BirthSite, parts: Parts) -> Iterator[Finding]:
     for j, std in enumerate(site.std or ()):
         if std <= 0.0:
             yield (*path, "std", j), "a number above 0", describe(std)
+        elif std * std < SMALLEST_VARIANCE:
+            yield (*path, "std", j), f"a number of at least {math.sqrt(SMALLEST_VARIANCE):g}", describe(std)
     if site.cov is not None:
         yield from _covariance((*path, "cov"), site.cov, parts.state_dim or len(site.mean))
 
@@ -199,6 +209,7 @@ def _score(parts: Parts) -> Iterator[Finding]:
 
 
 _CHECKS: tuple[Callable[[Parts], Iterator[Finding]], ...] = (
+    _clock,
     _schedule,
     _schedule_order,
     _weights,

@@ -37,6 +37,7 @@ _EXPECTED = {
 }
 
 _UNKNOWN = "an unknown key"
+_LONGEST_WORD = 100  # comparing words takes the product of their lengths
 
 
 def options(annotation: Any) -> Iterator[Any]:
@@ -95,6 +96,8 @@ def locate(loc: tuple[str | int, ...]) -> tuple[Path, Any]:
 
 def suggestion(word: str, known: list[str]) -> str:
     """`did you mean ...?`, or empty where nothing is near."""
+    if len(word) > _LONGEST_WORD:
+        return ""
     near = difflib.get_close_matches(word, known, n=1, cutoff=0.66)
     return f"did you mean {near[0]}?" if near else ""
 
@@ -195,9 +198,10 @@ def _is_echo(error: ErrorDetails) -> bool:
 
 def _merge_alternatives(found: list[tuple[Path, str, str, str]]) -> list[tuple[Path, str, str, str]]:
     """One entry for each path: the members of a union each say what they expected, unless one got further inside."""
+    around = {path[:length] for path, *_ in found for length in range(len(path))}
     merged: dict[tuple[Path, str], tuple[list[str], str]] = {}
     for path, expected, got, hint in found:
-        if any(len(other) > len(path) and other[: len(path)] == path for other, *_ in found):
+        if path in around:
             continue
         expectations, hints = merged.get((path, got), ([], ""))
         merged[(path, got)] = ([*expectations, *([] if expected in expectations else [expected])], hints or hint)

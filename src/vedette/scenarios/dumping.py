@@ -24,6 +24,7 @@ def dump_scenario(model: ScenarioModel, *, folder: Path | None = None) -> str:
     """YAML text of a scenario with every default written out; it reads back as the same scenario.
 
     Args:
+        model: its sections.
         folder: what the files that it names are relative to; with it, the text can be kept anywhere.
     """
     yaml = YAML(typ="rt", pure=True)

@@ -6,6 +6,9 @@ import json
 from dataclasses import dataclass
 from typing import Any
 
+from vedette.models.arguments import plain
+from vedette.text import elided, printable
+
 Path = tuple[str | int, ...]
 Place = tuple[int, int]  # line and column, from 1
 Finding = tuple[Path, str, str]  # path, expected, got
@@ -34,15 +37,21 @@ class Fault:
         """`file:line:column: field: expected ..., got ...`."""
         field = f" {format_path(self.path)}:" if self.path else ""
         hint = f" ({self.hint})" if self.hint else ""
-        return f"{file}:{self.place[0]}:{self.place[1]}:{field} expected {self.expected}, got {self.got}{hint}"
+        text = f"{file}:{self.place[0]}:{self.place[1]}:{field} expected {self.expected}, got {self.got}{hint}"
+        return printable(text)
 
 
 def format_path(path: Path) -> str:
-    """`("sensors", 0, "noise")` as `sensors[0].noise`."""
+    """`("sensors", 0, "noise")` as `sensors[0].noise`; keys that no screen shows or that are long, as `named`."""
     text = ""
     for part in path:
-        text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else part
+        text += f"[{part}]" if isinstance(part, int) else f".{named(part)}" if text else named(part)
     return text
+
+
+def named(word: str) -> str:
+    """A word of the file in a message: in printable letters, and not long."""
+    return elided(printable(word), _LONGEST)
 
 
 def describe(value: Any) -> str:
@@ -55,5 +64,5 @@ def describe(value: Any) -> str:
         return f"a list of {len(value)}" if value else "an empty list"
     if isinstance(value, dict):
         return "a mapping"
-    text = json.dumps(value, ensure_ascii=False) if isinstance(value, str) else repr(value)
+    text = printable(json.dumps(value, ensure_ascii=False) if isinstance(value, str) else plain(value))
     return text if len(text) <= _LONGEST else text[: _LONGEST - 3] + "..."

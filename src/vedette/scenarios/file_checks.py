@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+import ast
 import csv
 import importlib.util
+import os
+import symtable
+import warnings
 from collections.abc import Iterator
 from pathlib import Path as FilePath
 from typing import Any
 
-from vedette.scenarios.faults import Finding, Path, describe
+from vedette.scenarios.faults import Finding, Path, describe, named
 from vedette.scenarios.parts import Parts
+from vedette.scenarios.records import record_fault
 from vedette.scenarios.schema.base import Custom, Section
 from vedette.scenarios.schema.world import RecordedTargets
+from vedette.simulation.reports import column_names
 
 
 def _absent(file: str) -> str:
@@ -19,35 +25,54 @@ def _absent(file: str) -> str:
 
 
 def recorded_findings(parts: Parts) -> Iterator[Finding]:
-    """What is wrong with the file of recorded targets, as far as its header tells."""
+    """What is wrong with the file of recorded targets: all that a run would refuse."""
     recorded = parts.recorded
     if recorded is None:
         return
     file = (parts.folder or FilePath()) / recorded.path
     if file.suffix.lower() not in (".csv", ".parquet"):
         yield ("targets", "path"), "a .csv or .parquet file", describe(recorded.path)
-    elif not file.is_file():
+    elif not os.path.isfile(file):  # a name can be too long, or hold what no name can: for pathlib, an error
         yield ("targets", "path"), "a file, relative to the scenario file", _absent(recorded.path)
-    elif file.suffix.lower() == ".csv" and recorded.columns is not None:
-        yield from _columns(recorded, file)
+    else:
+        faults = list(_columns(recorded, file)) if recorded.columns is not None else []
+        yield from faults
+        if not faults:
+            yield from _content(recorded, parts)
+
+
+def _content(recorded: RecordedTargets, parts: Parts) -> Iterator[Finding]:
+    """What is wrong with the rows, or with the scans or the region for them; where these are faulty, nothing."""
+    region, time = parts.region, parts.time
+    if region is None or time is None:
+        return
+    for section in (recorded, region, time):
+        if any(getattr(section, name) is None for name, field in type(section).model_fields.items() if field.default):
+            return
+    fault = record_fault(recorded, region, time, parts.folder or FilePath())
+    if fault is not None:
+        yield ("targets", "path"), "a file of recorded targets that a run can use", fault
 
 
 def _columns(recorded: RecordedTargets, file: FilePath) -> Iterator[Finding]:
+    """Names of columns that a CSV file does not have."""
+    if file.suffix.lower() != ".csv":
+        return
     try:
         with file.open(encoding="utf-8-sig", errors="replace", newline="") as lines:
             header = [name.strip() for name in next(csv.reader(lines), [])]
     except (OSError, csv.Error) as error:
         yield ("targets", "path"), "a readable CSV file", f"{describe(recorded.path)}: {error}"
         return
-    given = recorded.columns.given()
+    given, shown = recorded.columns.given(), column_names(header)
     for key, name in given.items():
         if name not in header:
-            yield ("targets", "columns", key), f"a column of {recorded.path}: {', '.join(header)}", describe(name)
+            yield ("targets", "columns", key), f"a column of {named(recorded.path)}: {shown}", describe(name)
     missing = [key for key in ("time", "id") if key not in given and key not in header]
     if "x" not in given and "longitude" not in given and not {"x", "y"} <= set(header):
         missing += [key for key in ("longitude", "latitude") if key not in header]
     if missing:
-        wanted = f"the names of the columns of {', '.join(missing)} among {', '.join(header)}"
+        wanted = f"the names of the columns of {', '.join(missing)} among {shown}"
         yield ("targets", "columns"), wanted, "nothing"
 
 
@@ -66,6 +91,22 @@ def _is_findable(package: str) -> bool:
         return False
 
 
+def _unnamed(file: FilePath, name: str) -> tuple[str, str] | None:
+    """What is wrong where a file is no Python, or does not define the name; nothing of it is run."""
+    try:
+        with warnings.catch_warnings(action="ignore"):  # of the user's style; a run tells them
+            code = file.read_bytes()
+            tree, symbols = ast.parse(code), symtable.symtable(code, str(file), "exec").get_symbols()
+    except (OSError, SyntaxError, ValueError, RecursionError, MemoryError) as error:
+        line = f", line {error.lineno}" if isinstance(error, SyntaxError) and error.lineno else ""
+        return "a file of Python", f"{describe(file.name)}{line}, which is none"
+    known = {symbol.get_name() for symbol in symbols if symbol.is_assigned() or symbol.is_imported()}
+    hidden = any(isinstance(node, ast.ImportFrom) and node.names[0].name == "*" for node in ast.walk(tree))
+    if name in known or hidden or "__getattr__" in known or "globals" in code.decode("utf-8", "replace"):
+        return None
+    return f"a name that {describe(file.name)} defines", describe(name)
+
+
 def reference_findings(parts: Parts) -> Iterator[Finding]:
     """Which models of the user's own are not there. Nothing is imported."""
     sections: list[tuple[Path, Any]] = [(("motion",), parts.motion), (("survival",), parts.survival)]
@@ -73,7 +114,10 @@ def reference_findings(parts: Parts) -> Iterator[Finding]:
     for path, custom in (found for start, section in sections for found in _customs(section, start)):
         module = custom.python.rpartition(":")[0]
         if module.endswith(".py"):
-            if not ((parts.folder or FilePath()) / module).is_file():
+            file = (parts.folder or FilePath()) / module
+            if not os.path.isfile(file):
                 yield (*path, "python"), "a file, relative to the scenario file", _absent(module)
+            elif fault := _unnamed(file, custom.python.rpartition(":")[2].partition(".")[0]):
+                yield (*path, "python"), *fault
         elif not _is_findable(module.partition(".")[0]):
             yield (*path, "python"), "a module that Python finds", describe(module)

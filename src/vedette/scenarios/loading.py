@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path as FilePath
@@ -12,7 +13,7 @@ from pydantic import ValidationError
 from vedette.errors import InputError, ScenarioError
 from vedette.scenarios.checks import findings
 from vedette.scenarios.diagnostics import locate, place_fault, suggestion, validation_faults
-from vedette.scenarios.faults import Fault, Path, describe
+from vedette.scenarios.faults import Fault, Path, describe, named
 from vedette.scenarios.parts import Parts, parts_of_data, parts_of_model
 from vedette.scenarios.schema import ScenarioModel, merge_sensor_defaults
 from vedette.scenarios.yaml_reader import Document, read_yaml
@@ -34,6 +35,7 @@ class Scenario:
 
     @property
     def name(self) -> str:
+        """Name that the scenario gives itself."""
         return self.model.name
 
     @property
@@ -49,11 +51,14 @@ def list_builtin() -> dict[str, FilePath]:
 
 def _without(data: Any, paths: list[Path]) -> Any:
     """A deep copy of plain data without the keys at `paths`."""
+    inner: dict[str | int, list[Path]] = {}
+    for first, *rest in paths:
+        inner.setdefault(first, []).append(tuple(rest))
     if isinstance(data, Mapping):
-        inner = {key: [path[1:] for path in paths if path[0] == key] for key in data}
-        return {key: _without(value, inner[key]) for key, value in data.items() if () not in inner[key]}
+        kept = {key: inner.get(key, []) for key in data}
+        return {key: _without(value, kept[key]) for key, value in data.items() if () not in kept[key]}
     if isinstance(data, list):
-        return [_without(item, [path[1:] for path in paths if path[0] == i]) for i, item in enumerate(data)]
+        return [_without(item, inner.get(i, [])) for i, item in enumerate(data)]
     return data
 
 
@@ -116,11 +121,12 @@ def load_scenario(name_or_path: str | FilePath) -> Scenario:
     """
     builtin = list_builtin()
     path = builtin.get(str(name_or_path), FilePath(name_or_path))
-    if not path.is_file():
+    if not os.path.isfile(path):  # a name can be too long, or hold what no name can: for pathlib, an error
         near = suggestion(str(name_or_path), list(builtin))
         hint = f" ({near})" if near else ""
         known = ", ".join(builtin)
-        raise InputError(f"scenario: expected a YAML file or one of {known}; got {str(name_or_path)!r}{hint}")
+        got = named(str(name_or_path))
+        raise InputError(f"scenario: expected a YAML file or one of {known}; got '{got}'{hint}")
     return Scenario(parse_scenario(_read_text(path), str(path), path.parent), path)
 
 

@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
 from vedette.errors import ScenarioError
 from vedette.scenarios.diagnostics import suggestion
-from vedette.scenarios.faults import Path, format_path
+from vedette.scenarios.faults import Path, format_path, named
 from vedette.scenarios.loading import Scenario, diagnose
 from vedette.scenarios.yaml_reader import Document
 
 EVERY = "*"
+_INDEX = re.compile(r"[0-9]{1,9}")
 
 
 def with_fields(scenario: Scenario, fields: Mapping[str, Any]) -> Scenario:
     """The scenario with other values at some fields, checked as a whole as if its file had said so.
 
     Args:
+        scenario: what is changed; it stays as it is.
         fields: values by path. A path is the keys that lead to a field, joined by dots; a number counts the items of a
             list from 0, and `*` stands for each of them. A value may be a whole section. Sensors hold what
             `sensor_defaults` gave them, so what they share is set by `sensors.*`.
@@ -64,9 +67,10 @@ def _set(data: Any, path: str, value: Any) -> Iterator[str]:
         for key in keys:
             missing = _left_out(holder[key], value)
             if missing:
+                one = f"{named(path)}.{named(str(next(iter(value), missing[0])))}"
                 yield (
-                    f"{path}: expected the whole section, with {missing[0]} too, got a part of it "
-                    f'(a field is set by its path in quotes: "{path}.{next(iter(value), missing[0])}")'
+                    f"{named(path)}: expected the whole section, with {missing[0]} too, got a part of it "
+                    f'(a field is set by its path in quotes: "{one}")'
                 )
                 return
             holder[key] = value
@@ -85,13 +89,14 @@ def _keys(holder: Any, place: Path, part: str, path: str) -> tuple[list[Any], st
     if isinstance(holder, list):
         if part == EVERY:
             return list(range(len(holder))), ""
-        if part.isdigit() and int(part) < len(holder):
+        if _INDEX.fullmatch(part) and int(part) < len(holder):
             return [int(part)], ""
-        return [], f"{path}: expected * or a number below {len(holder)} after {where}, got {part!r}"
+        return [], f"{named(path)}: expected * or a number below {len(holder)} after {where}, got '{named(part)}'"
     if not isinstance(holder, dict):
-        return [], f"{path}: expected a section at {where} for {part!r} to be in, got a single value"
+        return [], f"{named(path)}: expected a section at {where} for '{named(part)}' to be in, got a single value"
     if part not in holder:
         hint = "what sensors share is set by sensors.*" if part == "sensor_defaults" else suggestion(part, list(holder))
         known = ", ".join(sorted(holder))
-        return [], f"{path}: expected one of {known} in {where}, got {part!r}" + (f" ({hint})" if hint else "")
+        found = f"expected one of {known} in {where}, got '{named(part)}'"
+        return [], f"{named(path)}: {found}" + (f" ({hint})" if hint else "")
     return [part], ""

@@ -20,6 +20,7 @@ from vedette.scenarios.schema.world import (
     CustomMotion,
     Motion,
     RecordedTargets,
+    RegionSection,
     ScriptedTarget,
     Steps,
     Survival,
@@ -36,6 +37,7 @@ class Parts:
     """
 
     time: Time | None
+    region: RegionSection | None
     motion: Motion | None
     survival: Survival | None
     birth_steps: tuple[int, ...]
@@ -73,6 +75,7 @@ def parts_of_model(model: ScenarioModel, folder: Path | None) -> Parts:
     targets = model.targets
     return Parts(
         time=model.time,
+        region=model.region,
         motion=model.motion,
         survival=model.survival,
         birth_steps=_listed(model.birth.steps),
@@ -99,6 +102,7 @@ def parts_of_data(data: Mapping[str, Any], folder: Path | None) -> Parts:
     birth = data.get("birth")
     return Parts(
         time=section("time", Time),
+        region=section("region", RegionSection),
         motion=section("motion", Motion),
         survival=section("survival", Survival),
         birth_steps=_listed(_valid(Steps, birth.get("steps")) if isinstance(birth, Mapping) else None),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 from vedette.scenarios.faults import Finding, Path, describe
@@ -19,6 +20,7 @@ from vedette.scenarios.schema.sensors import (
 )
 
 _MEASUREMENT_DIM = {BearingRange: 2, BearingOnly: 1, RangeOnly: 1, Position: 2}
+_ANGULAR = {BearingRange: (0,), BearingOnly: (0,)}
 
 
 def _measurement_dim(sensor: Sensor) -> int | None:
@@ -27,13 +29,14 @@ def _measurement_dim(sensor: Sensor) -> int | None:
 
 def sensor_findings(sensors: tuple[Sensor | None, ...]) -> Iterator[Finding]:
     """What is wrong with the sensors, each by itself and their names together."""
-    names: list[str] = []
+    names: set[str] = set()
     for i, sensor in enumerate(sensors):
         if sensor is None:
             continue
         if sensor.name in names:
             yield ("sensors", i, "name"), "each name once", f"{describe(sensor.name)} again"
-        names += [] if sensor.name is None else [sensor.name]
+        if sensor.name is not None:
+            names.add(sensor.name)
         yield from _noise(("sensors", i, "noise"), sensor)
         yield from _clutter(("sensors", i, "clutter"), sensor)
 
@@ -65,3 +68,5 @@ def _clutter(path: Path, sensor: Sensor) -> Iterator[Finding]:
     for j, (low, high) in enumerate(zip(clutter.low, clutter.high, strict=False)):
         if high <= low:
             yield (*path, "high", j), f"a number above low, {low:g}", describe(high)
+        elif j in _ANGULAR.get(type(sensor.measurement), ()) and high - low > 2.0 * math.pi * (1.0 + 1e-9):
+            yield (*path, "high", j), f"an angle of at most 2 pi above low, {low:g}", describe(high)

@@ -12,11 +12,7 @@ from vedette.scenarios.schema.base import Section
 from vedette.scenarios.schema.sensors import Sensor
 from vedette.scenarios.schema.tracking import Fusion
 from vedette.scenarios.schema.world import RecordedTargets
-
-
-def counted(number: int, thing: str) -> str:
-    """`1 sensor`, `2 sensors`."""
-    return f"{number} {thing}" if number == 1 else f"{number} {thing}s"
+from vedette.text import counted
 
 
 def one_line(scenario: Scenario) -> str:

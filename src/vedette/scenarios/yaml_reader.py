@@ -26,13 +26,16 @@ from ruamel.yaml.events import (
 from vedette.scenarios.faults import Fault, Path, Place, describe
 
 _MAX_DEPTH = 50
-_MAX_NODES = 200_000  # aliases of aliases can stand for any number of nodes
+_MAX_NODES = 100_000  # aliases of aliases can stand for any number of nodes
+_MAX_BYTES = 2_000_000
+_MAX_DIGITS = 300  # thousands of digits are no number of ours, and Python refuses to convert them
 _CORE_TAGS = {f"tag:yaml.org,2002:{name}" for name in ("null", "bool", "int", "float", "str", "seq", "map")}
 _STR_TAGS = ("tag:yaml.org,2002:str", "!")
 _INTEGER = re.compile(r"[-+]?[0-9]+")
 _BASED = re.compile(r"0o[0-7]+|0x[0-9a-fA-F]+")
 _FLOAT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
 _SPECIAL = re.compile(r"[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)")
+_NO_LETTER = re.compile(r"\\U(?!000[0-9a-fA-F]|0010)[0-9a-fA-F]{8}")
 _WORDS: dict[str, Any] = {text: None for text in ("", "~", "null", "Null", "NULL")}
 _WORDS |= {text: True for text in ("true", "True", "TRUE")} | {text: False for text in ("false", "False", "FALSE")}
 
@@ -65,10 +68,9 @@ def plain_scalar(text: str) -> Any:
     if text in _WORDS:
         return _WORDS[text]
     if _INTEGER.fullmatch(text):
-        # Thousands of digits are no number of ours, and Python refuses to convert them.
-        return int(text) if len(text) <= 300 else text
+        return int(text) if len(text) <= _MAX_DIGITS else text
     if _BASED.fullmatch(text):
-        return int(text, 0)
+        return int(text, 0) if len(text) <= _MAX_DIGITS else text
     if _FLOAT.fullmatch(text):
         return float(text)
     return float(text.replace(".", "")) if _SPECIAL.fullmatch(text) else text
@@ -76,8 +78,12 @@ def plain_scalar(text: str) -> Any:
 
 @dataclass(slots=True)
 class _Anchor:
+    """A node that aliases can name: its value, its path, and which of the places read so far are inside it."""
+
     value: Any
     path: Path
+    first: int
+    last: int
 
 
 @dataclass(slots=True)
@@ -87,32 +93,48 @@ class _Reader:
     values: dict[Path, Place] = field(default_factory=dict)
     faults: list[Fault] = field(default_factory=list)
     anchors: dict[str, _Anchor] = field(default_factory=dict)
-    size_reported: bool = False
+    read: list[tuple[Path, Place, bool]] = field(default_factory=list)  # every place in turn, and whether of a key
+
+    def record(self, path: Path, place: Place, *, is_key: bool) -> None:
+        """Keep the place of a key or value."""
+        if len(self.read) >= 2 * _MAX_NODES:
+            raise _Unreadable(Fault(place, (), f"at most {_MAX_NODES} values", "more, aliases and keys counted"))
+        self.read.append((path, place, is_key))
+        (self.keys if is_key else self.values)[path] = place
 
     def fault(self, place: Place, path: Path, expected: str, got: str) -> None:
         self.faults.append(Fault(place, path, expected, got))
 
     def node(self, event: Any, path: Path) -> Any:
         place = _place(event)
-        self.values[path] = place
+        self.record(path, place, is_key=False)
         if isinstance(event, AliasEvent):
             return self.alias(event, path)
+        first = len(self.read)
         tag = event.tag
         if tag is not None and str(tag) not in (*_CORE_TAGS, "!"):
             self.fault(place, path, "plain data without a tag", f"the tag {tag}")
         if isinstance(event, ScalarEvent):
-            value = self.scalar(event)
+            value = self.scalar(event, path)
         elif isinstance(event, SequenceStartEvent):
             value = self.sequence(path)
         else:
             value = self.mapping(path)
         if event.anchor is not None:
-            self.anchors[event.anchor] = _Anchor(value, path)
+            self.anchors[event.anchor] = _Anchor(value, path, first, len(self.read))
         return value
 
-    def scalar(self, event: Any) -> Any:
+    def scalar(self, event: Any, path: Path) -> Any:
         quoted_or_text = event.style in ("'", '"', "|", ">") or (event.tag is not None and str(event.tag) in _STR_TAGS)
-        return str(event.value) if quoted_or_text else plain_scalar(event.value)
+        return self.text(event, path) if quoted_or_text else plain_scalar(event.value)
+
+    def text(self, event: Any, path: Path) -> str:
+        """Quoted text; two escapes that are halves of one letter, as JSON writes it, become that letter."""
+        value = str(event.value)
+        joined = value.encode("utf-16-le", "surrogatepass").decode("utf-16-le", "replace")
+        if joined != value and "\ufffd" in joined:
+            self.fault(_place(event), path, "whole letters", "half of one, as an escape from \\ud800 to \\udfff")
+        return joined
 
     def sequence(self, path: Path) -> list[Any]:
         items: list[Any] = []
@@ -129,7 +151,7 @@ class _Reader:
                 first = self.keys[(*path, key)][0]
                 self.fault(_place(event), (*path, key), "each key once", f"it again, after line {first}")
             elif key is not None:
-                self.keys[inner] = _place(event)
+                self.record(inner, _place(event), is_key=True)
             value = self.child(next(self.events), inner)
             if inner[-1] == key:
                 entries[key] = value
@@ -137,7 +159,7 @@ class _Reader:
 
     def key(self, event: Any, path: Path) -> str | None:
         if isinstance(event, ScalarEvent):
-            value = self.scalar(event)
+            value = self.scalar(event, path)
             if isinstance(value, str):
                 return value
             got = describe(value)
@@ -157,11 +179,8 @@ class _Reader:
             self.fault(_place(event), path, "an alias of a node that stands, complete, before it", f"*{event.anchor}")
             return None
         depth = len(anchor.path)
-        for places in (self.keys, self.values):
-            inside = [(p, place) for p, place in places.items() if len(p) > depth and p[:depth] == anchor.path]
-            if len(places) + len(inside) > _MAX_NODES:
-                raise _Unreadable(Fault(_place(event), (), f"at most {_MAX_NODES} values", "more, by aliases"))
-            places.update(((*path, *p[depth:]), place) for p, place in inside)
+        for inner, place, is_key in self.read[anchor.first : anchor.last]:
+            self.record((*path, *inner[depth:]), place, is_key=is_key)
         return anchor.value
 
 
@@ -195,6 +214,13 @@ def _document_start(events: Iterator[Any]) -> Any:
     return None
 
 
+def _place_of_escape(text: str) -> Place:
+    """The first escape beyond the last letter there is, U+10FFFF."""
+    found = _NO_LETTER.search(text)
+    before = text[: found.start()] if found else ""
+    return before.count("\n") + 1, len(before) - before.rfind("\n")
+
+
 def _read(reader: _Reader) -> Any:
     first = _document_start(reader.events)
     if first is None:
@@ -209,6 +235,9 @@ def _read(reader: _Reader) -> Any:
 
 def read_yaml(text: str, file: str) -> Document:
     """Read YAML 1.2 text. Never raises for what is in the text: the faults are in the result."""
+    if len(text) > _MAX_BYTES:
+        fault = Fault((1, 1), (), f"a file of at most {_MAX_BYTES} letters", f"{len(text)}")
+        return Document(file, None, {}, {}, [fault])
     reader = _Reader(iter(YAML(typ="safe", pure=True).parse(text)))
     data: Any = None
     try:
@@ -221,4 +250,6 @@ def read_yaml(text: str, file: str) -> Document:
         reader.faults.append(_syntax(place, str(error.problem or error.context)))
     except YAMLError as error:
         reader.faults.append(_syntax((1, 1), str(error).splitlines()[0]))
+    except (ValueError, OverflowError):  # what the scanner makes of an escape such as "\U00110000"
+        reader.faults.append(_syntax(_place_of_escape(text), "an escape of what is no letter"))
     return Document(file, data, reader.keys, reader.values, reader.faults)

@@ -1,19 +1,29 @@
-"""The world that the program does not get to see: truth, platforms, scans, and the loop."""
+"""The world that the program does not get to see: truth, platforms, scans; the loop, and what a run leaves behind."""
 
 from vedette.simulation.cleaning import Cleaning, CleaningCounts, RecordedTrack
+from vedette.simulation.experiment import Experiment
+from vedette.simulation.loop import simulate
 from vedette.simulation.recorded import RecordedTargets
+from vedette.simulation.records import Decision, RunRecord
 from vedette.simulation.scans import CLUTTER, Scan, simulate_scan
+from vedette.simulation.storage import load_run, save_run
 from vedette.simulation.truth import ScriptedTargets, TargetSource, Truth
 
 __all__ = [
     "CLUTTER",
     "Cleaning",
     "CleaningCounts",
+    "Decision",
+    "Experiment",
     "RecordedTargets",
     "RecordedTrack",
+    "RunRecord",
     "Scan",
     "ScriptedTargets",
     "TargetSource",
     "Truth",
+    "load_run",
+    "save_run",
+    "simulate",
     "simulate_scan",
 ]

@@ -44,9 +44,9 @@ def decode_run(run: Mapping[str, Any], files: Mapping[str, str], place: str) -> 
 
 
 def timing_columns(record: RunRecord) -> Columns:
-    """Scan and seconds by stage, `<stage>_s`."""
+    """Step and seconds by stage, `<stage>_s`."""
     seconds = {f"{stage}_s": spent for stage, spent in record.timings.items()}
-    return {"scan": np.arange(record.num_scans), **seconds}
+    return {"step": np.arange(1, record.num_scans + 1), **seconds}
 
 
 def timings_of(columns: Mapping[str, Any]) -> dict[str, Floats]:

@@ -11,11 +11,14 @@ import numpy as np
 
 from vedette.control import Plan, Planner, RandomPlanner
 from vedette.densities import Estimate
+from vedette.errors import VedetteError
 from vedette.kernels.types import Floats
 from vedette.models.platforms import advance
 from vedette.simulation.experiment import Experiment
+from vedette.simulation.health import Health
 from vedette.simulation.records import Decision, RunRecord
 from vedette.simulation.scans import simulate_scan
+from vedette.simulation.stopping import RunInterrupted, RunStopped
 from vedette.simulation.truth import Truth
 
 Score: TypeAlias = Callable[[Truth, Sequence[Estimate]], Floats]
@@ -33,14 +36,19 @@ def run_stream(seed: int, run: int, *stream: int) -> np.random.Generator:
 
 
 class _Stopwatch:
-    """Seconds of wall time spent at each scan, by stage; `step` is the scan at hand, counted from 1."""
+    """Seconds of wall time spent at each scan, by stage.
+
+    `step` is the scan at hand, counted from 1, and `under_way` what was last begun, in words.
+    """
 
     def __init__(self, num_scans: int) -> None:
         self.spent = {stage: np.zeros(num_scans) for stage in STAGES}
         self.step = 1
+        self.under_way = "the start"
 
     @contextmanager
-    def timing(self, stage: str) -> Iterator[None]:
+    def timing(self, stage: str, sensor: int | None = None) -> Iterator[None]:
+        self.under_way = f"the {stage}" if sensor is None else f"the {stage} of sensor {sensor + 1}"
         start = time.perf_counter()
         try:
             yield
@@ -65,65 +73,134 @@ class _Course:
         self.moving = np.ones_like(self.moving)
 
 
+class _Journal:
+    """What a run has brought so far, and where it is."""
+
+    def __init__(self, experiment: Experiment, planner: Planner | None, seed: int, run: int, truth: Truth) -> None:
+        num_scans, num_sensors = len(experiment.times), len(experiment.sensors)
+        self.experiment = experiment
+        self.planner = planner.name if planner is not None else "still"
+        self.seed, self.run = seed, run
+        self.truth = truth
+        self.watch = _Stopwatch(num_scans)
+        self.health = Health.unreported(num_scans, num_sensors)
+        self.poses: list[Floats] = []
+        self.estimates: list[Estimate] = []
+        self.decisions: list[Decision] = []
+
+    @property
+    def time(self) -> float:
+        return float(self.experiment.times[self.watch.step - 1])
+
+    def place(self) -> str:
+        """Which run, where in it."""
+        return (
+            f"{self.experiment.name}, {self.planner}, seed {self.seed}, run {self.run}: stopped at step "
+            f"{self.watch.step} of {len(self.experiment.times)} ({self.time:g} s), in {self.watch.under_way}"
+        )
+
+    def record(self, ospa: Floats, stopped: str | None = None) -> RunRecord:
+        """Of the scans that have an estimate."""
+        num = len(self.estimates)
+        return RunRecord(
+            scenario=self.experiment.name,
+            planner=self.planner,
+            seed=self.seed,
+            run=self.run,
+            times=self.experiment.times[:num],
+            truth=self.truth.first(num),
+            poses=np.array(self.poses[:num]),
+            estimates=tuple(self.estimates),
+            decisions=tuple(self.decisions),
+            ospa=ospa,
+            health=self.health.first(num),
+            timings={stage: seconds[:num] for stage, seconds in self.watch.spent.items()},
+            stopped=stopped,
+        )
+
+    def partial(self, score: Score, stopped: str) -> RunRecord | None:
+        """The record of a run that stopped; None where no scan was finished. OSPA is NaN where it cannot be had."""
+        num = len(self.estimates)
+        if num == 0:
+            return None
+        try:
+            ospa = score(self.truth.first(num), self.estimates)
+        except VedetteError:
+            ospa = np.full((num, 3), np.nan)
+        return self.record(ospa, stopped)
+
+
 def simulate(experiment: Experiment, planner: Planner | None, *, seed: int, run: int, score: Score) -> RunRecord:
     """One run of a strategy.
 
     Args:
+        experiment: the parts of the run.
         planner: decides at the experiment's decision steps; None: the sensors never move, and no decision is made.
         seed, run: fix every random number; runs with equal seed and number are paired across planners.
         score: (num_scans, 3) OSPA of the estimates against the truth, see `vedette.evaluation.ospa_of_run`.
 
     Raises:
-        VedetteError: what models, filters, fusion or planner raise.
+        VedetteError: the true targets cannot be had.
+        RunStopped: models, filters, fusion, estimate, planner or score raised; it says where, is chained from what they
+            raised, and carries the record of the scans before.
+        RunInterrupted: a `KeyboardInterrupt`, likewise with the record of the scans before.
     """
     truth = experiment.targets.truth(experiment.times, rng=run_stream(seed, run, TRUTH))
+    journal = _Journal(experiment, planner, seed, run, truth)
+    try:
+        _go(experiment, planner, journal)
+        journal.watch.under_way = "the score"
+        return journal.record(score(truth, journal.estimates))
+    except KeyboardInterrupt as interrupt:
+        message = f"{journal.place()}: interrupted"
+        raise RunInterrupted(message, journal.partial(score, message)) from interrupt
+    except Exception as error:
+        cause = str(error) if isinstance(error, VedetteError) else f"{type(error).__name__}: {error}"
+        message = f"{journal.place()}: {cause}"
+        record = journal.partial(score, message)
+        raise RunStopped(message, journal.watch.step, journal.time, journal.watch.under_way, record) from error
+
+
+def _go(experiment: Experiment, planner: Planner | None, journal: _Journal) -> None:
+    """Every scan of a run, one after the other, written down in the journal."""
+    seed, run, watch, truth = journal.seed, journal.run, journal.watch, journal.truth
     num_sensors = len(experiment.sensors)
     scan_streams = [run_stream(seed, run, SCANS, sensor) for sensor in range(num_sensors)]
     filter_streams = [run_stream(seed, run, FILTER, sensor) for sensor in range(num_sensors)]
     planner_stream = run_stream(seed, run, RANDOM_CONTROL if isinstance(planner, RandomPlanner) else PLANNER)
-    watch, course = _Stopwatch(len(experiment.times)), _Course(experiment)
+    course = _Course(experiment)
     if planner is None:
         course.moving[:] = False
     beliefs: list[Any] = [sensor.filter.initial() for sensor in experiment.sensors]
-    poses, estimates, decisions = [], [], []
     periods = np.diff(experiment.times, prepend=experiment.times[0] - _first_period(experiment.times))
     for step, period in enumerate(periods.tolist(), start=1):
         watch.step = step
         if step > 1:
             course.move(period)
-        poses.append(course.poses)
+        journal.poses.append(course.poses)
         _, states = truth.at(step - 1)
         for s, sensor in enumerate(experiment.sensors):
-            with watch.timing("scans"):
+            with watch.timing("scans", s):
                 scan = simulate_scan(states, course.poses[s], sensor.filter.sensor, rng=scan_streams[s])
-            with watch.timing("filter"):
-                beliefs[s], _ = sensor.filter.step(
+            with watch.timing("filter", s):
+                beliefs[s], info = sensor.filter.step(
                     beliefs[s], scan.measurements, course.poses[s], period, step, rng=filter_streams[s]
                 )
-        with watch.timing("fusion"):
-            fused = beliefs[0] if experiment.fusion is None else experiment.fusion.fuse(beliefs)[0]
+            journal.health.note_filter(step - 1, s, info)
+        fused = beliefs[0]
+        if experiment.fusion is not None:
+            with watch.timing("fusion"):
+                fused, report = experiment.fusion.fuse(beliefs)
+            journal.health.note_fusion(step - 1, report)
         if experiment.feedback:
             beliefs = [fused] * num_sensors
         with watch.timing("estimate"):
-            estimates.append(experiment.estimate(fused, step))
+            journal.estimates.append(experiment.estimate(fused, step))
         if planner is not None and step in experiment.decision_steps:
             with watch.timing("planning"):
                 plan = planner.plan(beliefs, fused, course.poses, rng=planner_stream)
-            decisions.append(Decision(step, float(experiment.times[step - 1]), course.poses, plan))
+            journal.decisions.append(Decision(step, float(experiment.times[step - 1]), course.poses, plan))
             course.follow(plan)
-    return RunRecord(
-        scenario=experiment.name,
-        planner=planner.name if planner is not None else "still",
-        seed=seed,
-        run=run,
-        times=experiment.times,
-        truth=truth,
-        poses=np.array(poses),
-        estimates=tuple(estimates),
-        decisions=tuple(decisions),
-        ospa=score(truth, estimates),
-        timings=watch.spent,
-    )
 
 
 def _first_period(times: Floats) -> float:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from vedette.control.plan import Plan
 from vedette.densities.estimates import Estimate
 from vedette.kernels.types import Floats
+from vedette.simulation.health import Health
 from vedette.simulation.truth import Truth
 
 
@@ -15,7 +16,7 @@ class Decision:
     """A plan and the moment it was made.
 
     Attributes:
-        step: index of the scan after which the plan was made.
+        step: number of the scan, from 1, after which the plan was made.
         time: s.
         poses: (num_sensors, 3) poses [px, py, heading_rad] of the sensors at that moment.
         plan: the choice and its evidence.
@@ -42,8 +43,10 @@ class RunRecord:
         estimates: one a scan.
         decisions: in order of time.
         ospa: (num_scans, 3) total, localisation and cardinality parts, m.
+        health: what the filters and the fusion reported.
         timings: for each stage (`scans`, `filter`, `fusion`, `estimate`, `planning`), (num_scans,) seconds of wall time
             that it took at each scan; of all that is here the only thing that the seed does not fix.
+        stopped: where and why the run ended before its last scan; None: it did not.
     """
 
     scenario: str
@@ -56,12 +59,16 @@ class RunRecord:
     estimates: tuple[Estimate, ...]
     decisions: tuple[Decision, ...]
     ospa: Floats
+    health: Health
     timings: dict[str, Floats]
+    stopped: str | None = None
 
     @property
     def num_scans(self) -> int:
+        """Number of scans."""
         return len(self.times)
 
     @property
     def num_sensors(self) -> int:
+        """Number of sensors."""
         return int(self.poses.shape[1])

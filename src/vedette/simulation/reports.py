@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Mapping, Sequence
+import numbers
+import os
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from datetime import UTC, datetime
+from datetime import UTC, date, datetime, timedelta
+from decimal import Decimal
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +16,18 @@ import numpy as np
 
 from vedette.errors import InputError
 from vedette.kernels.types import Floats, Ints
+from vedette.models.arguments import plain
 from vedette.simulation.geography import to_tangent_plane
+from vedette.text import elided, printable
+
+# Beyond these, differences and speeds of reports mean nothing.
+_FARTHEST = 1e9  # m, m/s
+_LATEST = 1e12  # s
+_SAME_TIME = 1e-6  # s; two reports of one target nearer in time than this are one
+# Larger files would fill the memory before anything could be said of them.
+_MOST_BYTES = 500_000_000
+_MOST_REPORTS = 5_000_000
+_MOST_NAMES = 20
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -27,6 +41,8 @@ class Reports:
         velocities: (n, 2) m/s, or None where the record has none.
         names: the record's own name of each target.
         origin_deg: longitude and latitude of (0, 0) where the record was geographic, else None.
+        bounds_deg: its least and greatest longitude and latitude where it was geographic, else None.
+        repeats: rows of the table, (kept, left out), where a target has a second report at one time: the first is kept.
     """
 
     times: Floats
@@ -35,6 +51,8 @@ class Reports:
     velocities: Floats | None
     names: tuple[str, ...]
     origin_deg: tuple[float, float] | None
+    bounds_deg: tuple[tuple[float, float], tuple[float, float]] | None = None
+    repeats: tuple[tuple[int, int], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,38 +64,42 @@ class Table:
     source: str
 
     def column(self, name: str) -> Sequence[Any]:
+        """The cells of a column, or an error that says which there are."""
         if name not in self.columns:
-            have = ", ".join(self.columns) or "none"
-            raise InputError(f"{self.source}: expected a column {name!r}; got columns {have}")
+            have = column_names(self.columns) or "none"
+            raise InputError(f"{self.source}: expected a column {shown(name)}; got columns {have}")
         return self.columns[name]
 
     def fault(self, index: int, name: str, expected: str) -> InputError:
-        got = self.columns[name][index]
-        return InputError(f"{self.source}, row {self.rows[index]}, column {name!r}: expected {expected}; got {got!r}")
+        """An error that names file, row and column of a cell."""
+        place = f"{self.source}, row {self.rows[index]}, column {shown(name)}"
+        return InputError(f"{place}: expected {expected}; got {shown(self.columns[name][index])}")
 
-    def numbers(self, name: str) -> Floats:
-        """A column of finite numbers."""
+    def numbers(self, name: str, largest: float) -> Floats:
+        """A column of numbers of at most that size."""
         cells = self.column(name)
         values = np.empty(len(cells))
         for i, cell in enumerate(cells):
             try:
-                values[i] = float(cell)
-            except (TypeError, ValueError):
+                values[i] = _number(cell)
+            except (TypeError, ValueError, OverflowError):
                 raise self.fault(i, name, "a finite number") from None
         if not np.isfinite(values).all():
             raise self.fault(int(np.argmin(np.isfinite(values))), name, "a finite number")
+        if (wrong := np.abs(values) > largest).any():
+            raise self.fault(int(np.argmax(wrong)), name, f"a number from {-largest:g} to {largest:g}")
         return values
 
     def times(self, name: str) -> Floats:
         """A column of numbers of seconds, or of ISO 8601 times."""
         cells = self.column(name)
         if not len(cells) or _is_number(cells[0]):
-            return self.numbers(name)
+            return self.numbers(name, _LATEST)
         values = np.empty(len(cells))
         for i, cell in enumerate(cells):
             try:
                 values[i] = seconds(cell)
-            except (TypeError, ValueError):
+            except (TypeError, ValueError, OverflowError):
                 raise self.fault(i, name, "an ISO 8601 time") from None
         return values
 
@@ -89,10 +111,33 @@ class Table:
         return labels
 
 
+def shown(value: Any) -> str:
+    """A cell or name in a message: in quotes where it is text, in printable letters, and not long."""
+    if isinstance(value, date | timedelta):
+        return f"the time {value}"
+    return elided(printable(repr(value) if isinstance(value, str) else plain(value)), 80)
+
+
+def column_names(names: Iterable[str]) -> str:
+    """Names of columns in a message."""
+    listed = [elided(printable(name)) for name in names]
+    return ", ".join(listed[:_MOST_NAMES]) + (f" and {len(listed) - _MOST_NAMES} more" * (len(listed) > _MOST_NAMES))
+
+
+def _number(cell: Any) -> float:
+    """A number, or text of one as every program writes it. Raises `TypeError` or `ValueError` for anything else."""
+    if isinstance(cell, str):
+        if "_" in cell or not cell.isascii():  # Python reads 1_000 and digits of any script
+            raise ValueError(cell)
+    elif isinstance(cell, bool) or not isinstance(cell, numbers.Real | Decimal):
+        raise TypeError(cell)
+    return float(cell)
+
+
 def _is_number(cell: Any) -> bool:
     try:
-        float(cell)
-    except (TypeError, ValueError):
+        _number(cell)
+    except (TypeError, ValueError, OverflowError):
         return False
     return True
 
@@ -100,7 +145,7 @@ def _is_number(cell: Any) -> bool:
 def seconds(time: Any) -> float:
     """A number, or the seconds from 1970 UTC to an ISO 8601 time or `datetime`; without a zone it is taken as UTC."""
     if _is_number(time):
-        return float(time)
+        return _number(time)
     moment = time if isinstance(time, datetime) else datetime.fromisoformat(str(time).strip())
     return (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()
 
@@ -112,10 +157,13 @@ def read_table(path: str | Path) -> Table:
         InputError: not there, another ending, not readable as what it says it is, rows not as long as the header.
     """
     file = Path(path)
+    named = elided(printable(str(file)), 200)
     if file.suffix.lower() not in (".csv", ".parquet"):
-        raise InputError(f"{file}: expected a .csv or .parquet file")
-    if not file.is_file():
-        raise InputError(f"{file}: expected a file; there is none")
+        raise InputError(f"{named}: expected a .csv or .parquet file")
+    if not os.path.isfile(file):  # a name can be too long, or hold what no name can: for pathlib, an error
+        raise InputError(f"{named}: expected a file; there is none")
+    if (size := file.stat().st_size) > _MOST_BYTES:
+        raise InputError(f"{named}: expected a file of at most {_MOST_BYTES} bytes; got {size}")
     return _read_csv(file) if file.suffix.lower() == ".csv" else _read_parquet(file)
 
 
@@ -126,9 +174,9 @@ def _read_csv(file: Path) -> Table:
             header = [name.strip() for name in next(reader, [])]
             rows = [(reader.line_num, cells) for cells in reader if cells]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise InputError(f"{file}: cannot be read as CSV in UTF-8: {error}") from error
+        raise InputError(f"{file}: cannot be read as CSV in UTF-8: {_reason(error)}") from error
     if len(set(header)) != len(header):
-        raise InputError(f"{file}, row 1: expected each column name once; got {', '.join(header)}")
+        raise InputError(f"{file}, row 1: expected each column name once; got {column_names(header)}")
     for line, cells in rows:
         if len(cells) != len(header):
             raise InputError(f"{file}, row {line}: expected {len(header)} cells, as in the header; got {len(cells)}")
@@ -140,11 +188,21 @@ def _read_parquet(file: Path) -> Table:
     from pyarrow import ArrowException, parquet  # here, as most programs never need it
 
     try:
-        table = parquet.read_table(file)
-        columns = {name: table.column(name).to_pylist() for name in table.column_names}
-    except (OSError, ValueError, ArrowException) as error:
-        raise InputError(f"{file}: cannot be read as Parquet: {error}") from error
+        with parquet.ParquetFile(file) as source:
+            if source.metadata.num_rows > _MOST_REPORTS:
+                raise InputError(f"{file}: expected at most {_MOST_REPORTS} rows; got {source.metadata.num_rows}")
+            table = source.read()
+        columns = {name: table.column(name).to_pylist() for name in dict.fromkeys(table.column_names)}
+    except InputError:
+        raise
+    except (OSError, ValueError, KeyError, OverflowError, ArrowException) as error:
+        raise InputError(f"{file}: cannot be read as Parquet: {_reason(error)}") from error
     return Table(columns, range(1, table.num_rows + 1), str(file))
+
+
+def _reason(error: Exception) -> str:
+    """What another library says of a file, on one line."""
+    return elided(printable(" ".join(str(error).split())), 300)
 
 
 def parse_reports(
@@ -165,29 +223,31 @@ def parse_reports(
     if unknown := set(given) - {"time", "id", "x", "y", "longitude", "latitude", "vx", "vy"}:
         raise InputError(f"columns: expected time, id, x, y, longitude, latitude, vx or vy; got {', '.join(unknown)}")
     times, labels = table.times(given.get("time", "time")), table.labels(given.get("id", "id"))
-    positions, origin = _positions(table, given, origin_deg)
+    positions, origin, bounds = _positions(table, given, origin_deg)
     if len(times) == 0:
         raise InputError(f"{table.source}: expected at least one report; got none")
     speed_columns = [given.get(name, name) for name in ("vx", "vy")]
     has_velocity = any(name in given for name in ("vx", "vy")) or all(name in table.columns for name in speed_columns)
-    velocities = np.stack([table.numbers(name) for name in speed_columns], axis=1) if has_velocity else None
+    velocities = _pair(table, speed_columns) if has_velocity else None
     names, tracks = np.unique(labels, return_inverse=True)
-    order = np.lexsort((times, tracks))
-    times, tracks = times[order], tracks[order].astype(np.int64)
-    again = np.flatnonzero((np.diff(times) == 0.0) & (np.diff(tracks) == 0))
-    if again.size:
-        first, second = sorted(table.rows[row] for row in order[again[0] : again[0] + 2])
-        name = names[tracks[again[0]]]
-        raise InputError(
-            f"{table.source}, row {second}: expected one report of {name} a time; row {first} has that time"
-        )
+    order = np.lexsort((times, tracks))  # of equal ones, the order of the file
+    again = (np.diff(times[order], prepend=-np.inf) < _SAME_TIME) & (np.diff(tracks[order], prepend=-1) == 0)
+    repeats = tuple((table.rows[order[i - 1]], table.rows[order[i]]) for i in np.flatnonzero(again))
+    order = order[~again]
     velocities = None if velocities is None else velocities[order]
-    return Reports(times, tracks, positions[order], velocities, tuple(map(str, names)), origin)
+    tracks = tracks[order].astype(np.int64)
+    return Reports(times[order], tracks, positions[order], velocities, tuple(map(str, names)), origin, bounds, repeats)
+
+
+def _pair(table: Table, names: Sequence[str]) -> Floats:
+    """(n, 2) of two columns, in m or m/s."""
+    return np.stack([table.numbers(name, _FARTHEST) for name in names], axis=1)
 
 
 def _positions(
     table: Table, given: Mapping[str, str], origin_deg: tuple[float, float] | None
-) -> tuple[Floats, tuple[float, float] | None]:
+) -> tuple[Floats, tuple[float, float] | None, tuple[tuple[float, float], tuple[float, float]] | None]:
+    """Places in m, where the origin is, and between which degrees they were."""
     named_geographic = "longitude" in given or "latitude" in given
     if named_geographic and ("x" in given or "y" in given):
         raise InputError("columns: expected either x and y, or longitude and latitude; got both")
@@ -196,14 +256,17 @@ def _positions(
     if not named_geographic and (has_plane or not has_globe):
         if origin_deg is not None:
             raise InputError("origin_deg: expected only for longitudes and latitudes; the record has x and y")
-        return np.stack([table.numbers(given.get(name, name)) for name in ("x", "y")], axis=1), None
+        return _pair(table, [given.get(name, name) for name in ("x", "y")]), None, None
     degrees = []
     for name, limit in (("longitude", 360.0), ("latitude", 90.0)):
         column = given.get(name, name)
-        values = table.numbers(column)
+        values = table.numbers(column, np.inf)
         if (wrong := np.abs(values) > limit).any():
             raise table.fault(int(np.argmax(wrong)), column, f"a {name} in degrees, at most {limit:g}")
         degrees.append(values)
     if origin_deg is None:
         origin_deg = (float(np.median(degrees[0])), float(np.median(degrees[1]))) if len(degrees[0]) else (0.0, 0.0)
-    return to_tangent_plane(degrees[0], degrees[1], origin_deg), origin_deg
+    if not len(degrees[0]):
+        return np.empty((0, 2)), origin_deg, None
+    low, high = ((float(end(degrees[0])), float(end(degrees[1]))) for end in (np.min, np.max))
+    return to_tangent_plane(degrees[0], degrees[1], origin_deg), origin_deg, (low, high)

@@ -47,6 +47,7 @@ def simulate_scan(
         pose: (3,) px, py, heading_rad of the sensor.
         sensor: the functions that the filter uses too.
         ids: (num_targets,) ids for `Scan.origins`; None: the place in `truth_states`.
+        rng: every number drawn comes from it.
 
     Raises:
         InputError: states, pose or ids that cannot be used.

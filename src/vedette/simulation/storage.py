@@ -1,8 +1,9 @@
 """Runs on disk, in open formats.
 
 A run is a folder: `manifest.json` (what ran, on which versions, and a checksum of every other file), `scans.csv`
-(OSPA), `truth.csv`, `tracks.csv` (estimates), `sensors.csv`, `timings.csv`, `decisions.json` (choices with their reward
-tables) and, where it was given, `scenario.yaml`. A folder appears whole or not at all.
+(OSPA, reports of the fusion), `truth.csv`, `tracks.csv` (estimates), `sensors.csv` (poses, reports of the filters),
+`timings.csv`, `decisions.json` (choices with their reward tables) and, where it was given, `scenario.yaml`. A run that
+stopped early says so in the manifest (`stopped`). A folder appears whole or not at all.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from vedette.simulation.records import RunRecord
 from vedette.simulation.tabulation import run_facts
 
 FORMAT = "vedette-run"
-FORMAT_VERSION = 2
+FORMAT_VERSION = 3
 MANIFEST = "manifest.json"
 SCENARIO = "scenario.yaml"
 _PACKAGES = ("vedette", "numpy", "scipy", "numba")
@@ -37,6 +38,7 @@ def save_run(
     """Write a run as a folder of its own.
 
     Args:
+        record: the run.
         directory: the folder to make; its parents are made too.
         scenario_text: the scenario as it was read, kept beside the results.
         overwrite: replace a folder that holds a run; a folder that holds anything else is never replaced.

@@ -38,6 +38,7 @@ class Truth:
 
     @property
     def num_scans(self) -> int:
+        """Number of scans."""
         return len(self.times)
 
     def at(self, scan: int) -> tuple[Ints, Floats]:
@@ -46,6 +47,11 @@ class Truth:
             raise reject("scan", f"a scan from 0 to {self.num_scans - 1}", scan)
         rows = slice(self.offsets[scan], self.offsets[scan + 1])
         return self.ids[rows], self.states[rows]
+
+    def first(self, num_scans: int) -> Truth:
+        """The first scans alone."""
+        last = self.offsets[num_scans]
+        return Truth(self.times[:num_scans], self.offsets[: num_scans + 1], self.ids[:last], self.states[:last])
 
     def validate(self) -> None:
         """Raise `InputError` unless the arrays fit together as described above."""

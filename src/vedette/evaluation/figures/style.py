@@ -139,6 +139,7 @@ def legend_columns(labels: Sequence[str], *, width: float = COLUMN_WIDTH) -> int
 
 
 def colour(index: int) -> str:
+    """Colour of the strategy at this place, the same in every figure."""
     return COLOURS[index % len(COLOURS)]
 
 
@@ -150,6 +151,7 @@ def shown_decisions(number: int, most: int = 6) -> tuple[int, ...]:
 
 
 def line_style(index: int) -> Any:
+    """Dashes of the strategy at this place, the same in every figure."""
     return LINE_STYLES[index % len(LINE_STYLES)]
 
 
@@ -158,6 +160,7 @@ def save_figure(figure: Figure, path: Path | str, *, formats: Sequence[str] = _F
     """Write a figure once for each format, beside one another; the same figure gives the same bytes.
 
     Args:
+        figure: what to draw.
         path: file name without its ending, in a folder that exists or can be made.
         formats: some of "pdf", "svg" (vector) and "png" (300 dots an inch).
 

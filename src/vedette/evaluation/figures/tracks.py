@@ -118,17 +118,20 @@ def _draw_truth(axes: Axes, record: RunRecord, scale: float) -> None:
 def _draw_estimates(axes: Axes, record: RunRecord, scale: float) -> None:
     labels = np.concatenate([estimate.labels for estimate in record.estimates])
     points = np.concatenate([estimate.means[:, :2] for estimate in record.estimates]) * scale
-    for index, label in enumerate(_recurring(labels)):
-        mine = points[(labels == label).all(axis=1)] if label is not None else points
+    if _recur(labels):
+        distinct, of_estimate = np.unique(labels, axis=0, return_inverse=True)
+        groups = [points[of_estimate.ravel() == index] for index in range(len(distinct))]
+    else:
+        groups = [points]
+    for index, mine in enumerate(groups):
         axes.plot(
             mine[:, 0], mine[:, 1], linestyle="", marker=".", markersize=3.2, color=colour(index), alpha=0.8, zorder=3
         )
 
 
-def _recurring(labels: Ints) -> list[Ints] | list[None]:
-    """The labels in order; a single None where each is there once, as from a filter that has none."""
-    distinct = np.unique(labels, axis=0)
-    return list(distinct) if len(distinct) < len(labels) else [None]
+def _recur(labels: Ints) -> bool:
+    """Whether a label is there twice or more; each is there once where a filter has none."""
+    return len(np.unique(labels, axis=0)) < len(labels)
 
 
 def _draw_sensor(axes: Axes, record: RunRecord, sensor: int, scale: float) -> None:
@@ -165,12 +168,16 @@ def tracks_legend(record: RunRecord) -> list[Line2D]:
     """What the marks mean, for a legend outside the axes."""
     open_marker: dict[str, Any] = {"color": INK, "markerfacecolor": "white", "markersize": 4.5, "linewidth": 0.9}
     labels = np.concatenate([estimate.labels for estimate in record.estimates])
-    lasting = _recurring(labels) != [None]
     handles = [
         Line2D([], [], marker="o", label="target start", **open_marker),
         Line2D([], [], marker="^", label="target end", **open_marker),
         Line2D(
-            [], [], linestyle="", marker=".", color=colour(0), label="estimates, by label" if lasting else "estimates"
+            [],
+            [],
+            linestyle="",
+            marker=".",
+            color=colour(0),
+            label="estimates, by label" if _recur(labels) else "estimates",
         ),
         Line2D(
             [], [], linestyle=(0, (2.5, 1)), marker="s", color=GREY, markersize=4.5, linewidth=1.6, label="sensor path"

@@ -86,6 +86,7 @@ def power_mean(values: Floats, number: float, order: float) -> float:
     Args:
         values: (num,) at least 0.
         number: what the sum is divided by, above 0; at least `num` for a mean, 1 for a root of the sum.
+        order: exponent, at least 1.
     """
     scale = float(values.max()) if len(values) else 0.0
     if scale == 0.0 or math.isinf(scale) or math.isinf(order):

@@ -41,6 +41,7 @@ class Matching:
 
     @property
     def num_scans(self) -> int:
+        """Number of scans."""
         return len(self.num_targets)
 
     @property
@@ -77,6 +78,8 @@ def match_run(truth: Truth, estimates: Sequence[Estimate], *, cutoff: float, ord
     the cutoff. Where several assignments are equally good, one of them is taken, always the same.
 
     Args:
+        truth: the targets at every scan.
+        estimates: one a scan.
         cutoff: c > 0, m, finite.
         order: p >= 1, finite.
 

@@ -92,6 +92,8 @@ def ospa_of_distances(distances: Floats, cutoff: float, order: float) -> OspaRes
 
     Args:
         distances: (num_first, num_second), none above the cutoff; either number may be 0.
+        cutoff: c > 0, in the unit of the distances.
+        order: exponent p >= 1.
     """
     smaller, larger = sorted(distances.shape)
     if larger == 0:

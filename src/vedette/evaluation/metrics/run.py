@@ -58,6 +58,7 @@ class RunMetrics:
 
     @property
     def num_scans(self) -> int:
+        """Number of scans."""
         return len(self.gospa_m)
 
     def columns(self) -> dict[str, NDArray[np.float64] | NDArray[np.int64]]:
@@ -87,6 +88,7 @@ def measure(record: RunRecord, *, cutoff: float, order: float, window: int) -> R
     """All measures of a run, from one matching a scan; a matching of tracks besides for OSPA(2).
 
     Args:
+        record: the run.
         cutoff: c > 0, m, finite.
         order: p >= 1, finite.
         window: scans of the window of OSPA(2), at least 1.

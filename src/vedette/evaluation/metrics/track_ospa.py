@@ -34,6 +34,7 @@ class TrackSet:
 
     @property
     def num_scans(self) -> int:
+        """Number of scans."""
         return int(self.alive.shape[1])
 
     def validate(self, name: str) -> None:
@@ -85,6 +86,8 @@ def ospa2(estimates: TrackSet, truths: TrackSet, *, cutoff: float, order: float,
     costs is part of it.
 
     Args:
+        estimates: the estimated tracks.
+        truths: the true ones, over the same scans.
         cutoff: c > 0, m, finite.
         order: exponent p >= 1 of the OSPA between the sets; may be infinite. (The average over time is of order 1.)
         window: number of scans, at least 1; the first windows are cut short by the beginning.

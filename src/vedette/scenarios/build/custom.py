@@ -22,6 +22,7 @@ def build_custom(section: Custom, wanted: type[_T], folder: Path, field: str) ->
     This runs the user's code; checking a scenario does not.
 
     Args:
+        section: names it, with its parameters.
         wanted: class of the object.
         folder: what a `file.py` is relative to.
         field: name of the section, for messages.

@@ -20,6 +20,7 @@ from vedette.models import (
     coordinated_turn,
 )
 from vedette.scenarios.build.custom import build_custom
+from vedette.scenarios.records import recorded_source
 from vedette.scenarios.schema.scenario import ScenarioModel
 from vedette.scenarios.schema.tracking import GaussianMethod
 from vedette.scenarios.schema.world import (
@@ -35,9 +36,8 @@ from vedette.scenarios.schema.world import (
     Survival,
     Time,
 )
-from vedette.simulation import Cleaning, TargetSource
-from vedette.simulation import RecordedTargets as RecordedSource
 from vedette.simulation import ScriptedTargets as ScriptedSource
+from vedette.simulation import TargetSource
 
 
 def build_times(section: Time) -> Floats:
@@ -104,18 +104,8 @@ def build_truth_source(model: ScenarioModel, motion: MotionModel, folder: Path) 
         InputError: the recorded file cannot be read, or nothing is left of it.
     """
     if isinstance(model.targets, RecordedTargets):
-        return _recorded(model.targets, build_region(model.region), folder)
+        return recorded_source(model.targets, model.region, folder)
     return _scripted(model.targets, model, motion)
-
-
-def _recorded(section: RecordedTargets, region: Region, folder: Path) -> RecordedSource:
-    return RecordedSource.from_file(
-        folder / section.path,
-        columns=section.columns.given(),
-        origin_deg=section.origin_deg,
-        time_origin=section.time_origin,
-        cleaning=Cleaning(section.max_gap, section.min_speed, section.max_speed, region if section.crop else None),
-    )
 
 
 def _scripted(section: ScriptedTargets, model: ScenarioModel, motion: MotionModel) -> ScriptedSource:

@@ -6,12 +6,15 @@ Each field's description ends with its unit in brackets; [-] is a number without
 from __future__ import annotations
 
 import re
-from typing import Annotated, Any
+from typing import Annotated, Any, Self
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, JsonValue
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, JsonValue, model_validator
 from pydantic_core import PydanticCustomError
 
 _REFERENCE = re.compile(r"([A-Za-z_]\w*(\.[A-Za-z_]\w*)*|[^:]+\.py):[A-Za-z_]\w*(\.[A-Za-z_]\w*)*")
+
+# Squares and products of numbers in this range are numbers, too.
+_SMALLEST, _LARGEST = 1e-30, 1e15
 
 
 def expected(what: str, *, at: tuple[str | int, ...] = (), got: str = "") -> PydanticCustomError:
@@ -36,8 +39,25 @@ def _word(value: str) -> str:
     return value
 
 
+def _not_tiny(value: float) -> float:
+    if 0.0 < value < _SMALLEST:
+        raise expected(f"a number of at least {_SMALLEST:g}")
+    return value
+
+
+def _too_large(value: Any, path: tuple[str | int, ...]) -> tuple[str | int, ...] | None:
+    """Path of the first number in a field that is beyond all sense, or None."""
+    if isinstance(value, float | int):
+        return path if abs(value) > _LARGEST else None
+    if isinstance(value, tuple):
+        found = (_too_large(item, (*path, index)) for index, item in enumerate(value))
+        return next((place for place in found if place), None)
+    return None
+
+
 Whole = Annotated[int, BeforeValidator(_whole)]
 Name = Annotated[str, AfterValidator(_word)]
+Positive = Annotated[float, Field(gt=0.0), AfterValidator(_not_tiny)]
 Probability = Annotated[float, Field(ge=0.0, le=1.0)]
 # Lists in the file are tuples here; `strict=False` admits a list and leaves the items strict.
 Numbers = Annotated[tuple[float, ...], Field(strict=False)]
@@ -50,6 +70,14 @@ class Section(BaseModel):
     """A mapping of the scenario file: no unknown keys, no silent conversion of types, nothing infinite."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False, validate_default=True)
+
+    @model_validator(mode="after")
+    def _within_reason(self) -> Self:
+        for name in type(self).model_fields:
+            path = _too_large(getattr(self, name), (name,))
+            if path:
+                raise expected(f"a number from {-_LARGEST:g} to {_LARGEST:g}", at=path)
+        return self
 
 
 class Custom(Section):

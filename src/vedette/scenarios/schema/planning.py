@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Literal
 
 from pydantic import Field, model_validator
 
-from vedette.scenarios.schema.base import Numbers, Probability, Section, expected
+from vedette.scenarios.schema.base import Numbers, Positive, Probability, Section, expected
 from vedette.scenarios.schema.sensors import Actions, Headings
 from vedette.scenarios.schema.tracking import Count, Share
 from vedette.scenarios.schema.world import Steps
 
 
 class CauchySchwarzReward(Section):
-    """Cauchy-Schwarz divergence between the predicted and the updated density (paper eq. 10 to 15)."""
+    """Cauchy-Schwarz divergence between the predicted and the updated density (paper eqs. 5, 8 and 13 to 17)."""
 
     kind: Literal["cauchy_schwarz"] = Field(default="cauchy_schwarz", description="Kind of reward [-].")
-    unit_volume: Literal["reference"] | Annotated[float, Field(gt=0.0)] = Field(
+    unit_volume: Literal["reference"] | Positive = Field(
         default=1.0,
         description='Unit K of hyper-volume: a number, or "reference" for (4 pi)^(d/2) sqrt(det P) of the predicted '
         "density, under which localisation counts as much as cardinality [-].",
@@ -53,7 +53,7 @@ class Control(Section):
         description="Actions that are one heading (-180 and 180) are evaluated once and shown each [-].",
     )
     horizon_steps: Count = Field(default=5, description="Pseudo-updates over the horizon, H [-].")
-    horizon_period: float = Field(default=2.0, gt=0.0, description="Time between pseudo-updates, T [s].")
+    horizon_period: Positive = Field(default=2.0, description="Time between pseudo-updates, T [s].")
     births_over_horizon: Literal[False] = Field(
         default=False, description="Neither the prediction nor the pseudo-updates give birth to targets [-]."
     )
@@ -63,8 +63,9 @@ class Control(Section):
     num_samples: Count = Field(default=40, description="Multi-target samples of the expected reward, M [-].")
     ideal_measurements: Literal["ideal", "expected", "sampled"] = Field(
         default="ideal",
-        description="Pseudo-measurements of a sample: noise-free where detection is probable; the mean over "
-        "detection; or drawn with detection, noise and clutter [-].",
+        description="Pseudo-measurements of a sample, never with clutter: noise-free, of the targets whose detection "
+        "probability is at least detection_threshold; noise-free, of targets seen by chance with that probability; or "
+        "seen by chance, with measurement noise [-].",
     )
     detection_threshold: Probability = Field(
         default=0.5, description="Ideal measurements see a target when its detection is at least so probable [-]."

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from vedette.scenarios.schema.base import Custom, Name, Point, Probability, Section, SomeNumbers
+from vedette.scenarios.schema.base import Custom, Name, Point, Positive, Probability, Section, SomeNumbers
 
 _BEARING = "Bearing from atan2 of the offset, counter-clockwise from east, in (-pi, pi]; residuals are wrapped [-]."
 
@@ -49,19 +49,19 @@ Measurement = Annotated[
 
 
 class RangeDependentNoise(Section):
-    """Standard deviations that grow with the distance d (paper, section V), evaluated at the predicted state.
+    """Standard deviations that grow with the distance d (paper section IV), evaluated at the predicted state.
 
     Range: sigma_range + eta_range d^2. Bearing: sigma_bearing + eta_bearing d.
     """
 
     kind: Literal["range_dependent"] = Field(default="range_dependent", description="Kind of noise [-].")
-    sigma_range: float = Field(default=10.0, gt=0.0, description="Range, standard deviation at distance 0 [m].")
+    sigma_range: Positive = Field(default=10.0, description="Range, standard deviation at distance 0 [m].")
     eta_range: float = Field(default=5e-5, ge=0.0, description="Range, growth with the square of distance [1/m].")
-    sigma_bearing_deg: float = Field(default=1.0, gt=0.0, description="Bearing, the same at distance 0 [deg].")
+    sigma_bearing_deg: Positive = Field(default=1.0, description="Bearing, the same at distance 0 [deg].")
     eta_bearing: float = Field(default=5e-6, ge=0.0, description="Bearing, growth with distance [rad/m].")
 
 
-PositiveNumbers = Annotated[tuple[Annotated[float, Field(gt=0.0)], ...], Field(strict=False, min_length=1)]
+PositiveNumbers = Annotated[tuple[Positive, ...], Field(strict=False, min_length=1)]
 
 
 class ConstantNoise(Section):
@@ -83,10 +83,10 @@ Noise = Annotated[RangeDependentNoise | ConstantNoise | CustomNoise, Field(discr
 
 
 class GaussianDetection(Section):
-    """Probability of detection exp(-d^2 / (2 sigma^2)) at distance d (paper, section V)."""
+    """Probability of detection exp(-d^2 / (2 sigma^2)) at distance d (paper section IV)."""
 
     kind: Literal["gaussian"] = Field(default="gaussian", description="Kind of detection [-].")
-    sigma: float = Field(default=10000.0, gt=0.0, description="Distance scale of the fall of detection [m].")
+    sigma: Positive = Field(default=10000.0, description="Distance scale of the fall of detection [m].")
 
 
 class ConstantDetection(Section):
@@ -101,7 +101,7 @@ class LimitedRange(Section):
 
     kind: Literal["limited_range"] = Field(default="limited_range", description="Kind of detection [-].")
     probability: Probability = Field(description="Probability of detection within max_range [-].")
-    max_range: float = Field(gt=0.0, description="Greatest distance [m].")
+    max_range: Positive = Field(description="Greatest distance [m].")
 
 
 class LimitedSector(Section):
@@ -109,7 +109,7 @@ class LimitedSector(Section):
 
     kind: Literal["limited_sector"] = Field(default="limited_sector", description="Kind of detection [-].")
     probability: Probability = Field(description="Probability of detection within the sector [-].")
-    max_range: float = Field(gt=0.0, description="Greatest distance [m].")
+    max_range: Positive = Field(description="Greatest distance [m].")
     half_width_deg: float = Field(gt=0.0, le=180.0, description="Greatest angle from the heading, either side [deg].")
 
 
@@ -129,14 +129,14 @@ class RegionClutter(Section):
     """Poisson clutter, uniform over the surveillance region; its intensity carries the Jacobian of the measurement."""
 
     kind: Literal["region"] = Field(default="region", description="Kind of clutter [-].")
-    rate: float = Field(default=25.0, ge=0.0, description="Mean number of clutter measurements a scan [-].")
+    rate: float = Field(default=25.0, ge=0.0, le=1e6, description="Mean number of clutter measurements a scan [-].")
 
 
 class MeasurementSpaceClutter(Section):
     """Poisson clutter, uniform over a box of the sensor's measurement space."""
 
     kind: Literal["measurement_space"] = Field(default="measurement_space", description="Kind of clutter [-].")
-    rate: float = Field(default=25.0, ge=0.0, description="Mean number of clutter measurements a scan [-].")
+    rate: float = Field(default=25.0, ge=0.0, le=1e6, description="Mean number of clutter measurements a scan [-].")
     low: SomeNumbers = Field(description="Lowest value of each measurement component; a bearing in radians [rad, m].")
     high: SomeNumbers = Field(description="Highest value of each measurement component; a bearing in radians [rad, m].")
 

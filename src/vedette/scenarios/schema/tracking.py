@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from vedette.scenarios.schema.base import Probability, Section, Whole
+from vedette.scenarios.schema.base import Positive, Probability, Section, Whole
 
 Count = Annotated[Whole, Field(ge=1, le=1_000_000_000)]
 
@@ -107,7 +107,7 @@ class FusionLimits(Section):
     )
     merge_distance: Annotated[float, Field(ge=0.0)] | None = Field(
         default=None,
-        description="Closer components are merged; none: 2 for component_wise, 1 for quadrature powers [-].",
+        description="Closer components are merged; none: 2 for component_wise, 0.5 for quadrature powers [-].",
     )
     max_combinations: Count = Field(
         default=4096, description="Bound on the combinations of components of one label at all sensors [-]."
@@ -115,7 +115,7 @@ class FusionLimits(Section):
 
 
 class Fusion(Section):
-    """How the sensors' densities become one: generalised covariance intersection (paper, section III)."""
+    """How the sensors' densities become one: generalised covariance intersection (paper section II-D)."""
 
     kind: Literal["cm_delta_glmb", "clmb", "none"] = Field(
         default="cm_delta_glmb",
@@ -163,7 +163,7 @@ Estimator = Annotated[MapEstimator | MarginalEstimator, Field(discriminator="kin
 class Ospa(Section):
     """The score: optimal subpattern assignment distance between estimates and truth, in position."""
 
-    cutoff: float = Field(default=100.0, gt=0.0, description="Cost of a missed or false target, c [m].")
+    cutoff: Positive = Field(default=100.0, description="Cost of a missed or false target, c [m].")
     order: float = Field(default=1.0, ge=1.0, description="Order p [-].")
     window: Count = Field(default=10, description="Scans of the window of OSPA(2) [-].")
     from_step: Count | None = Field(

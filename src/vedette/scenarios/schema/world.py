@@ -10,6 +10,7 @@ from vedette.scenarios.schema.base import (
     Custom,
     Numbers,
     Point,
+    Positive,
     Probability,
     Section,
     SomeNumbers,
@@ -24,7 +25,7 @@ class Time(Section):
     """The scans: step k of 1 .. num_steps is at start + (k - 1) * step_period."""
 
     num_steps: Annotated[Whole, Field(ge=1, le=1_000_000, description="Number of scans [-].")]
-    step_period: float = Field(default=1.0, gt=0.0, description="Time between scans [s].")
+    step_period: Positive = Field(default=1.0, description="Time between scans [s].")
     start: float = Field(default=1.0, description="Time of the first scan [s].")
 
 
@@ -185,12 +186,12 @@ class RecordedTargets(Section):
     origin_deg: Point | None = Field(
         default=None, description="Longitude and latitude of x = y = 0; none: the middle of the reports [deg]."
     )
-    max_gap: float = Field(default=60.0, gt=0.0, description="A longer silence ends the track [s].")
+    max_gap: Positive = Field(default=60.0, description="A longer silence ends the track [s].")
     min_speed: float = Field(
         default=0.0, ge=0.0, description="A track slower than this on average is left out (moored) [m/s]."
     )
-    max_speed: float | None = Field(
-        default=None, gt=0.0, description="Reports that would need more are dropped (jumps); none: no limit [m/s]."
+    max_speed: Positive | None = Field(
+        default=None, description="Reports that would need more are dropped (jumps); none: no limit [m/s]."
     )
     crop: bool = Field(default=True, description="Whether tracks end at the edges of the region [-].")
 

@@ -24,7 +24,7 @@ function startReplay(root) {
     part("decision").textContent = decisionText();
     part("scene").setAttribute("aria-label", `${run().strategy}, run ${run().run}, ${part("summary").textContent}`);
     part("scrubber").value = state.step;
-    part("scrubber").setAttribute("aria-valuetext", `scan ${state.step + 1} of ${last() + 1}, ${time} s`);
+    part("scrubber").setAttribute("aria-valuetext", `step ${state.step + 1} of ${last() + 1}, ${time} s`);
     part("play").textContent = state.playing ? "Pause" : "Play";
     Object.assign(root.dataset, { step: state.step, run: state.run, playing: state.playing, speed: state.speed });
     tellPointer();
@@ -120,9 +120,10 @@ function startReplay(root) {
   root.querySelectorAll("[data-show]").forEach((box) => box.addEventListener("change", draw));
   part("values").addEventListener("toggle", tell);
   root.addEventListener("keydown", (event) => {
-    // Fields and buttons keep the keys that are theirs.
+    // Fields and buttons keep the keys that are theirs; a slider has no use for the space bar.
     const own = event.target.closest("select, input, button, summary");
-    if (own || event.ctrlKey || event.metaKey || event.altKey || !(event.key in keys)) return;
+    const isFree = event.key === " " && own?.type === "range";
+    if ((own && !isFree) || event.ctrlKey || event.metaKey || event.altKey || !(event.key in keys)) return;
     event.preventDefault();
     keys[event.key]();
   });

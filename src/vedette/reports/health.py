@@ -1,0 +1,118 @@
+"""The health of a group's runs as a table: what the filters and the fusion cut off, and what a sensor lacked."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from vedette.evaluation.health import HealthSummary, health_findings, percent, summarise_health
+from vedette.fusion.base import LOST, SURE
+from vedette.reports.groups import Group
+from vedette.reports.tables import Table
+
+
+@dataclass(frozen=True, slots=True)
+class _Row:
+    """What is told, what it is, how it reads of a summary; whether it says something only where there is a fusion."""
+
+    name: str
+    note: str
+    text: Callable[[HealthSummary], str]
+    needs_fusion: bool = False
+
+
+def _weight(share: float) -> str:
+    return "unknown" if math.isnan(share) else percent(share)
+
+
+def _worst_sensor(shares: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> str:
+    worst = int(np.argmax(shares))
+    return f"{percent(float(shares[worst]))} (sensor {worst + 1})" if shares[worst] else "0 %"
+
+
+_SCANS = "share of the scans, at any sensor"
+_ROWS = (
+    _Row("A cap was met", f"the posterior was as large as its limits allow; {_SCANS}", lambda h: percent(h.cap_met)),
+    _Row("Search cut short", f"ranking stopped at max_search_nodes; {_SCANS}", lambda h: percent(h.search_cut)),
+    _Row("Cluster not exact", f"summed over its heaviest joint choices only; {_SCANS}", lambda h: percent(h.inexact)),
+    _Row(
+        "Weight cut off, mean",
+        "upper bound on the share of a filter's weight that its caps left out, mean over scans and sensors",
+        lambda h: _weight(h.mean_discarded),
+    ),
+    _Row("Weight cut off, worst", "the same at the worst scan", lambda h: _weight(h.worst_discarded)),
+    _Row(
+        "Targets dropped, worst",
+        "expected number of targets in labels that a filter dropped at a scan",
+        lambda h: f"{h.worst_dropped:.2g}",
+    ),
+    _Row("Repeated measurements", "left out, in all runs", lambda h: str(h.duplicates)),
+    _Row(
+        "Clutter raised",
+        "measurements where the clutter intensity was below its floor",
+        lambda h: str(h.clutter_raised),
+    ),
+    _Row(
+        "Label sets missing at a sensor",
+        "share of the fused label sets (CLMB: labels) that the sensor which lacks most lacks",
+        lambda h: _worst_sensor(h.missing_sets),
+        needs_fusion=True,
+    ),
+    _Row(
+        "Labels unknown to a sensor",
+        "share of the scans at which the sensor where that is most frequent lacks a label that another has",
+        lambda h: _worst_sensor(h.unknown_labels),
+        needs_fusion=True,
+    ),
+    _Row(
+        "Targets lost by the fusion",
+        f"share of the scans at which a label that a sensor is sure of ({SURE:g} or more) has an existence below "
+        f"{LOST:g} in the fused density, as another sensor lacks it or does not see there",
+        lambda h: percent(h.lost),
+        needs_fusion=True,
+    ),
+    _Row(
+        "Targets lost, worst",
+        "such labels at the worst scan",
+        lambda h: str(h.worst_lost),
+        needs_fusion=True,
+    ),
+    _Row(
+        "No label set in common",
+        "share of the scans at which no label set is held by every sensor",
+        lambda h: percent(h.disjoint),
+        needs_fusion=True,
+    ),
+    _Row(
+        "Fused weight cut off, worst",
+        "share of the fused weight beyond max_hypotheses at the worst scan",
+        lambda h: percent(h.worst_fusion_discarded),
+        needs_fusion=True,
+    ),
+)
+
+
+def health_table(group: Group) -> Table | None:
+    """What the filters and the fusion reported, a column a strategy; None where nothing has run."""
+    strategies = [each for each in group.strategies if each.records]
+    if not strategies:
+        return None
+    has_fusion = any(each.cell.scenario.model.fusion.kind != "none" for each in strategies)
+    summaries = [summarise_health(each.records) for each in strategies]
+    rows = [row for row in _ROWS if has_fusion or not row.needs_fusion]
+    caption = "What filters and fusion had to leave out, over all scans of all runs in common."
+    return Table(
+        caption,
+        ("Report", *(each.name for each in strategies)),
+        tuple((row.name, *(row.text(health) for health in summaries)) for row in rows),
+        tuple(row.note for row in rows),
+    )
+
+
+def group_health(group: Group) -> tuple[tuple[str, str], ...]:
+    """Name and findings, in a sentence, of each strategy whose filters or fusion left out more than a trifle."""
+    said = ((each.name, health_findings(each.records)) for each in group.strategies if each.records)
+    return tuple((name, f"{'; '.join(findings)}.") for name, findings in said if findings)

@@ -1,0 +1,139 @@
+"""What is valid in a scenario but costs accuracy, or may not be meant: warnings, not faults."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from vedette.errors import VedetteError
+from vedette.kernels.types import Floats
+from vedette.scenarios.checks import decision_steps
+from vedette.scenarios.diagnostics import place_fault
+from vedette.scenarios.faults import Path
+from vedette.scenarios.loading import Scenario
+from vedette.scenarios.names import sensor_names
+from vedette.scenarios.record_cautions import record_cautions
+from vedette.scenarios.schema import ScenarioModel
+from vedette.scenarios.schema.sensors import (
+    ConstantDetection,
+    GaussianDetection,
+    LimitedRange,
+    LimitedSector,
+    Sensor,
+)
+from vedette.scenarios.yaml_reader import read_yaml
+
+# Sensors whose probabilities of detection of one place differ by more than this do not see the same.
+MAX_DIFFERENCE = 0.5
+_POINTS_A_SIDE = 21
+
+
+def cautions(scenario: Scenario) -> tuple[str, ...]:
+    """Warnings of a valid scenario, one line each, with file, line and column where it was read from a file."""
+    found = [*record_cautions(scenario), *_views(scenario.model), *_births(scenario.model)]
+    if not found:
+        return ()
+    document = None
+    if scenario.path is not None:
+        try:
+            document = read_yaml(scenario.path.read_bytes().decode("utf-8-sig"), str(scenario.path))
+        except (OSError, ValueError, VedetteError):  # gone or changed since it was read: no line to name
+            document = None
+    lines = []
+    for path, text in found:
+        place = None if document is None else place_fault(document, path, "", "").place
+        where = scenario.name if place is None else f"{scenario.path}:{place[0]}:{place[1]}"
+        lines.append(f"{where}: warning: {text}")
+    return tuple(lines)
+
+
+def _fuses(model: ScenarioModel) -> bool:
+    return len(model.sensors) > 1 and model.fusion.kind != "none"
+
+
+def _births(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
+    steps = model.birth.steps
+    if not _fuses(model) or model.fusion.feedback or (steps != "every" and max(steps, default=1) <= 1):
+        return
+    when = "at every step" if steps == "every" else f"up to step {max(steps)}"
+    yield (
+        ("birth", "steps"),
+        f"births {when} without feedback: sensors may take one target up at different steps, under different labels, "
+        "and GCI, which fuses by label, then loses it (births at step 1 alone, or fusion.feedback with a fusion of the "
+        "filters' kind, avoid this)",
+    )
+
+
+def _views(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
+    if not _fuses(model):
+        return
+    region = model.region
+    axes = (
+        np.linspace(region.x_min, region.x_max, _POINTS_A_SIDE),
+        np.linspace(region.y_min, region.y_max, _POINTS_A_SIDE),
+    )
+    grid = np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, 2)
+    chances = {
+        i: detected for i, sensor in enumerate(model.sensors) if (detected := prob_detection(sensor, grid)) is not None
+    }
+    if len(chances) < 2:
+        return
+    table, names = np.stack(list(chances.values())), [sensor_names(model)[i] for i in chances]
+    spread = table.max(axis=0) - table.min(axis=0)
+    worst = int(spread.argmax())
+    if spread[worst] > MAX_DIFFERENCE:
+        yield ("sensors", list(chances)[int(table[:, worst].argmin())], "detection"), _unlike(names, table, grid)
+    elif decision_steps(model):
+        yield from _limited_and_moving(model)
+
+
+def _unlike(names: list[str], table: Floats, grid: Floats) -> str:
+    """How much (num_sensors, num_places) probabilities of detection differ, and where most."""
+    spread = table.max(axis=0) - table.min(axis=0)
+    worst = int(spread.argmax())
+    chances = ", ".join(f"{name} {chance:.2g}" for name, chance in zip(names, table[:, worst], strict=True))
+    share = f"{(spread > MAX_DIFFERENCE).mean():.0%}".replace("%", " %")
+    return (
+        f"sensors differ in what they see: in {share} of the region by more than {MAX_DIFFERENCE:g} in probability of "
+        f"detection ({chances} at x {grid[worst, 0]:g}, y {grid[worst, 1]:g} m); GCI loses what one sensor sees and "
+        "another does not"
+    )
+
+
+def _limited_and_moving(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
+    """Sensors that see alike where they start, and need not once they have moved."""
+    region = model.region
+    across = math.hypot(region.x_max - region.x_min, region.y_max - region.y_min)
+    for i, sensor in enumerate(model.sensors):
+        limited = isinstance(sensor.detection, LimitedRange | LimitedSector) and sensor.detection.max_range < across
+        if limited and sensor.speed > 0.0:
+            yield (
+                ("sensors", i, "detection"),
+                "sensors that move and see only so far will differ in what they see; GCI loses what one sensor sees "
+                "and another does not",
+            )
+            return
+
+
+def prob_detection(sensor: Sensor, points: Floats) -> Floats | None:
+    """(n,) probabilities of detection at (n, 2) places by a sensor where it starts; None for a model of the user's own.
+
+    In plain NumPy, so that a check compiles nothing: the models are those of `vedette.models.detection`.
+    """
+    section = sensor.detection
+    ahead = points - np.array(sensor.position)
+    distances = np.hypot(ahead[:, 0], ahead[:, 1])
+    if isinstance(section, ConstantDetection):
+        return np.full(len(points), section.probability)
+    if isinstance(section, GaussianDetection):
+        return np.asarray(np.exp(-0.5 * (distances / section.sigma) ** 2))
+    if isinstance(section, LimitedRange | LimitedSector):
+        seen = distances <= section.max_range
+        if isinstance(section, LimitedSector):
+            off = np.arctan2(ahead[:, 1], ahead[:, 0]) - math.radians(sensor.heading_deg)
+            off = np.abs((off + math.pi) % (2.0 * math.pi) - math.pi)
+            seen &= (distances == 0.0) | (off <= math.radians(section.half_width_deg))
+        return np.where(seen, section.probability, 0.0)
+    return None

@@ -1,0 +1,64 @@
+"""What looks odd in the recorded targets of a scenario, though a run accepts it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from vedette.scenarios.faults import Path, format_path
+from vedette.scenarios.loading import Scenario
+from vedette.scenarios.records import recorded_source
+from vedette.scenarios.schema.sensors import Sensor
+from vedette.scenarios.schema.world import RecordedTargets, Time
+from vedette.simulation import RecordedTargets as RecordedSource
+
+_NEAR = 1000.0  # m; what is nearer than this to the targets is not called far
+
+
+def record_cautions(scenario: Scenario) -> Iterator[tuple[Path, str]]:
+    """What a run accepts of recorded targets but may not be meant: where in the scenario, and what it is."""
+    model, folder = scenario.model, scenario.folder
+    if not isinstance(model.targets, RecordedTargets):
+        return
+    source = recorded_source(model.targets, model.region, folder)
+    yield from _repeats(model.targets, source)
+    for index, sensor in enumerate(model.sensors):
+        path: Path = ("sensors", index, "position")
+        place = f"{format_path(path)}: expected metres from the origin"
+        at = f"({sensor.position[0]:g}, {sensor.position[1]:g})"
+        if _is_geographic(sensor, source):
+            yield path, f"{place}, got {at}, which is a longitude and latitude among those of {model.targets.path}"
+        elif (distance := _distance(sensor, source, model.time)) is not None:
+            yield path, f"{place}, got {at}, {distance / 1000.0:.3g} km from the nearest recorded position"
+
+
+def _repeats(section: RecordedTargets, source: RecordedSource) -> Iterator[tuple[Path, str]]:
+    repeats = source.reports.repeats
+    if repeats:
+        first, second = repeats[0]
+        others = f", as are {len(repeats) - 1} more" if len(repeats) > 1 else ""
+        yield (
+            ("targets", "path"),
+            f"targets.path: {section.path}, row {second}: a second report of one target at the time of row {first}; "
+            f"left out{others}",
+        )
+
+
+def _is_geographic(sensor: Sensor, source: RecordedSource) -> bool:
+    """Whether the position of a sensor would lie among the reports if it were in degrees."""
+    bounds = source.reports.bounds_deg
+    if bounds is None:
+        return False
+    low, high = np.array(bounds[0]), np.array(bounds[1])
+    margin = np.maximum(high - low, 0.01)
+    return bool((low - margin <= sensor.position).all() and (sensor.position <= high + margin).all())
+
+
+def _distance(sensor: Sensor, source: RecordedSource, time: Time) -> float | None:
+    """m to the nearest position of a track, where that is beyond the extent of all and what the sensor can travel."""
+    positions = np.concatenate([track.positions for track in source.tracks])
+    extent = float(np.hypot(*np.ptp(positions, axis=0)))
+    reach = max(extent, _NEAR) + sensor.speed * time.step_period * time.num_steps
+    nearest = float(np.hypot(*(positions - sensor.position).T).min())
+    return nearest if nearest > reach else None

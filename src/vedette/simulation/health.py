@@ -1,0 +1,117 @@
+"""What the filters and the fusion of a run reported beside their densities: what was cut off, raised, missing."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+
+from vedette.errors import InputError
+from vedette.filters import FilterInfo
+from vedette.fusion.base import FusionInfo
+from vedette.kernels.types import Floats, Ints
+from vedette.simulation.columns import Columns, Kind
+
+_FUSION = "fusion_"  # in front of the names that are of the fusion as a whole
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Health:
+    """The reports of all filters and fusions of a run; names and meaning as in `FilterInfo` and `FusionInfo`.
+
+    Arrays are (num_scans, num_sensors), those of the fusion as a whole (`fusion_...`) (num_scans,). Truths are 0 or 1.
+    Where there is no fusion, or one of your own that reports no `FusionInfo`, its numbers are 0.
+
+    Attributes:
+        log_likelihood: of the scan, given the prior.
+        num_hypotheses, num_tracks: size of the posterior.
+        discarded_weight_bound: upper bound on the share of posterior weight that was cut off; NaN where it is unknown.
+        dropped_existence: expected number of targets in dropped labels.
+        num_clutter_raised: measurements whose clutter intensity was raised to its floor.
+        num_duplicates: measurements left out because they repeat another.
+        num_inexact_clusters: clusters of an LMB not summed exactly.
+        search_cut: whether the ranking search stopped early.
+        cap_met: whether the posterior was as large as it may be.
+        num_missing_sets: label sets that another sensor has and this one does not (for CLMB, labels).
+        num_missing_labels: labels that this sensor does not know at all.
+        fusion_num_sets: label sets that were fused (for CLMB, labels).
+        fusion_num_lost_labels: labels that a sensor is sure of and the fused density is not.
+        fusion_empty_intersection: whether no label set is held by every sensor.
+        fusion_log_normaliser: log of the set integral of the product of the powers.
+        fusion_discarded_weight: probability of the fused label sets that were cut off.
+    """
+
+    log_likelihood: Floats
+    num_hypotheses: Ints
+    num_tracks: Ints
+    discarded_weight_bound: Floats
+    dropped_existence: Floats
+    num_clutter_raised: Ints
+    num_duplicates: Ints
+    num_inexact_clusters: Ints
+    search_cut: Ints
+    cap_met: Ints
+    num_missing_sets: Ints
+    num_missing_labels: Ints
+    fusion_num_sets: Ints
+    fusion_num_lost_labels: Ints
+    fusion_empty_intersection: Ints
+    fusion_log_normaliser: Floats
+    fusion_discarded_weight: Floats
+
+    @classmethod
+    def unreported(cls, num_scans: int, num_sensors: int) -> Health:
+        """All zero, to be filled in scan by scan."""
+        shapes = {name: (num_scans,) if name in FUSION_COLUMNS else (num_scans, num_sensors) for name in _DTYPES}
+        arrays: dict[str, Any] = {name: np.zeros(shape, _DTYPES[name]) for name, shape in shapes.items()}
+        return cls(**arrays)
+
+    def first(self, num_scans: int) -> Health:
+        """Of the first scans alone."""
+        return Health(**{name: getattr(self, name)[:num_scans] for name in _DTYPES})
+
+    def note_filter(self, scan: int, sensor: int, info: FilterInfo) -> None:
+        """Write down what a filter reported; scans are counted from 0."""
+        for name in _OF_FILTER:
+            getattr(self, name)[scan, sensor] = getattr(info, name)
+
+    def note_fusion(self, scan: int, info: Any) -> None:
+        """Write down what a fusion reported, if it is a `FusionInfo`."""
+        if isinstance(info, FusionInfo):
+            self.num_missing_sets[scan] = info.missing_sets
+            self.num_missing_labels[scan] = info.missing_labels
+            for name in FUSION_COLUMNS:
+                getattr(self, name)[scan] = getattr(info, name.removeprefix(_FUSION))
+
+    def check(self, num_scans: int, num_sensors: int) -> None:
+        """Raise `InputError` unless every array has its shape and type."""
+        for name, dtype in _DTYPES.items():
+            array = getattr(self, name)
+            shape = (num_scans,) if name in FUSION_COLUMNS else (num_scans, num_sensors)
+            if array.shape != shape or array.dtype != dtype:
+                raise InputError(f"record.health.{name}: expected {dtype} of {shape}; got {array.dtype} {array.shape}")
+
+    def sensor_columns(self) -> Columns:
+        """One row a scan and sensor, by scan."""
+        return {name: getattr(self, name).ravel() for name in SENSOR_COLUMNS}
+
+    def fusion_columns(self) -> Columns:
+        """One row a scan."""
+        return {name: getattr(self, name) for name in FUSION_COLUMNS}
+
+    @classmethod
+    def from_columns(cls, sensors: Mapping[str, Any], scans: Mapping[str, Any], num_scans: int) -> Health:
+        """Back from `sensor_columns` and `fusion_columns`."""
+        of_sensors = {name: sensors[name].reshape(num_scans, -1) for name in SENSOR_COLUMNS}
+        return cls(**of_sensors, **{name: scans[name] for name in FUSION_COLUMNS})
+
+
+_DTYPES = {field.name: np.dtype(np.float64 if field.type == "Floats" else np.int64) for field in fields(Health)}
+_KINDS = {name: Kind.NUMBER if dtype == np.float64 else Kind.INTEGER for name, dtype in _DTYPES.items()}
+_OF_FILTER = tuple(field.name for field in fields(FilterInfo) if field.name in _DTYPES)
+
+# The columns of the tables of sensors and of scans.
+FUSION_COLUMNS = {name: kind for name, kind in _KINDS.items() if name.startswith(_FUSION)}
+SENSOR_COLUMNS = {name: kind for name, kind in _KINDS.items() if name not in FUSION_COLUMNS}

@@ -1,0 +1,41 @@
+"""How a run that ends before its last scan says where it stopped, and hands over what it had."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from vedette.errors import VedetteError
+from vedette.simulation.records import RunRecord
+
+
+class RunStopped(VedetteError):
+    """A filter, a fusion, an estimate or a planner raised in the middle of a run; chained from that error.
+
+    Attributes:
+        step: the scan at which it happened, counted from 1.
+        time: of that scan, s.
+        stage: what was under way, in words: "the filter of sensor 2".
+        record: of the scans that were finished, its field `stopped` the message; None where not one was.
+    """
+
+    def __init__(self, message: str, step: int, time: float, stage: str, record: RunRecord | None) -> None:
+        super().__init__(message)
+        self.step = step
+        self.time = time
+        self.stage = stage
+        self.record = record
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (str(self), self.step, self.time, self.stage, self.record)
+
+
+class RunInterrupted(KeyboardInterrupt):
+    """Ctrl-C in the middle of a run.
+
+    Attributes:
+        record: of the scans that were finished, its field `stopped` the message; None where not one was.
+    """
+
+    def __init__(self, message: str, record: RunRecord | None) -> None:
+        super().__init__(message)
+        self.record = record

@@ -1,0 +1,111 @@
+"""Warnings of scenarios that are valid and lose targets: what they say, and where they stay silent."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from scenarios.minimal import MINIMAL, changed
+from vedette.cli import app
+from vedette.scenarios import list_builtin, load_scenario
+from vedette.scenarios.build.sensors import build_detection
+from vedette.scenarios.cautions import cautions, prob_detection
+from vedette.scenarios.schema.sensors import Sensor
+
+STEPS = ("steps: [1, 5]", "steps: [1]")
+SECTOR = "detection: {kind: limited_sector, probability: 0.9, max_range: 60.0, half_width_deg: 40.0}"
+
+
+def of(folder: Path, *changes: tuple[str, str]) -> tuple[str, ...]:
+    file = folder / "scene.yaml"
+    file.write_text(changed(*changes))
+    return cautions(load_scenario(file))
+
+
+@pytest.mark.parametrize("name", list_builtin())
+def test_only_a_built_in_scenario_of_births_at_every_step_and_two_sensors_warns(name: str) -> None:
+    found = cautions(load_scenario(name))
+    assert len(found) == (1 if name == "solent" else 0)
+    assert all("solent.yaml:28:10: warning: births at every step without feedback" in line for line in found)
+
+
+def test_births_after_the_first_step_warn_with_their_line(tmp_path: Path) -> None:
+    (line,) = of(tmp_path)
+    number = MINIMAL.splitlines().index("  steps: [1, 5]") + 1
+    assert line.startswith(f"{tmp_path / 'scene.yaml'}:{number}:10: warning: births up to step 5 without feedback")
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        (STEPS,),
+        (("weights: [0.5, 0.5]}", "weights: [0.5, 0.5], feedback: true}"),),
+        (
+            ("  - {name: south, position: [0.0, -40.0]}\n", ""),
+            ("fusion: {kind: cm_delta_glmb, weights: [0.5, 0.5]}", "fusion: {kind: none}"),
+        ),
+    ],
+)
+def test_births_at_once_with_feedback_or_of_one_sensor_do_not_warn(
+    tmp_path: Path, changes: tuple[tuple[str, str], ...]
+) -> None:
+    assert of(tmp_path, *changes) == ()
+
+
+def test_sensors_of_other_views_warn_at_the_one_that_does_not_see(tmp_path: Path) -> None:
+    south = "{name: south, position: [0.0, -40.0]"
+    (line,) = of(tmp_path, STEPS, (south, f"{south}, heading_deg: 90.0, {SECTOR}"))
+    assert "warning: sensors differ in what they see: in " in line
+    assert "north " in line
+    assert "south 0 at x " in line
+    number = MINIMAL.splitlines().index("  - {name: south, position: [0.0, -40.0]}") + 1
+    assert f"scene.yaml:{number}:" in line
+
+
+@pytest.mark.parametrize(("decisions", "number"), [("[4, 8]", 1), ("[]", 0)])
+def test_sensors_of_one_limited_view_warn_if_they_will_move(tmp_path: Path, decisions: str, number: int) -> None:
+    same = "noise: {kind: constant, std: [0.02, 3.0]}"
+    found = of(
+        tmp_path,
+        STEPS,
+        ("decision_steps: [4, 8]", f"decision_steps: {decisions}"),
+        (same, f"{same}\n  detection: {{kind: limited_range, probability: 0.9, max_range: 160.0}}"),
+    )
+    assert len(found) == number
+    assert all("sensors that move and see only so far" in line for line in found)
+
+
+@pytest.mark.parametrize(
+    "detection",
+    [
+        {"kind": "constant", "probability": 0.7},
+        {"kind": "gaussian", "sigma": 120.0},
+        {"kind": "limited_range", "probability": 0.9, "max_range": 150.0},
+        {"kind": "limited_sector", "probability": 0.9, "max_range": 150.0, "half_width_deg": 70.0},
+    ],
+)
+def test_what_a_sensor_sees_is_what_its_model_says(detection: dict[str, object], tmp_path: Path) -> None:
+    sensor = Sensor.model_validate(
+        {"position": [10.0, -20.0], "heading_deg": 130.0, "noise": {"kind": "constant", "std": [1.0, 1.0]}}
+        | {"detection": detection}
+    )
+    points = np.random.default_rng(1).uniform(-200.0, 200.0, (500, 2))
+    pose = np.array([10.0, -20.0, np.radians(130.0)])
+    expected = build_detection(sensor.detection, tmp_path).prob(np.c_[points, np.zeros((500, 2))], pose)
+    found = prob_detection(sensor, points)
+    assert found is not None
+    np.testing.assert_allclose(found, expected, atol=1e-12)
+
+
+def test_check_run_and_a_dry_run_warn_and_go_on(tmp_path: Path) -> None:
+    file, spec = tmp_path / "scene.yaml", tmp_path / "spec.toml"
+    file.write_text(changed(("num_steps: 20", "num_steps: 8"), ("to_step: 20", "to_step: 8"), ("18", "8")))
+    spec.write_text('name = "small"\nscenarios = ["scene.yaml"]\nplanners = ["still", "random"]\nruns = 1\n')
+    for words in (["check", str(file)], ["run", str(file), "--planner", "still"], ["campaign", str(spec), "--dry-run"]):
+        result = CliRunner().invoke(app, words)
+        assert result.exit_code == 0, result.output
+        assert result.stderr.count("warning: births up to step 5 without feedback") == 1, words
+        assert "warning" not in result.stdout

@@ -1,0 +1,166 @@
+"""What a run would refuse, the check refuses: covariances, numbers beyond sense, files of recorded targets."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from scenarios.minimal import MINIMAL, changed
+from vedette.cli import app
+from vedette.errors import InputError, ScenarioError
+from vedette.models import BirthModel
+from vedette.scenarios import load_scenario, parse_scenario
+from vedette.scenarios.build import build_experiment
+from vedette.scenarios.record_cautions import cautions
+
+TARGETS = MINIMAL[MINIMAL.index("targets:") : MINIMAL.index("sensor_defaults:")]
+SHIPS = "time,id,longitude,latitude\n" + "".join(
+    f"{2.0 * k},{ship},{-1.1 + 0.0001 * k:.4f},{50.78 + 0.0001 * ship:.4f}\n" for k in range(12) for ship in (1, 2)
+)
+
+
+def written(folder: Path, ships: str, *changes: tuple[str, str], targets: str = "") -> Path:
+    """A scenario file, and the file of recorded targets beside it."""
+    (folder / "ships.csv").write_text(ships)
+    text = MINIMAL.replace(TARGETS, f"targets: {{kind: recorded, path: ships.csv, crop: false{targets}}}\n")
+    for old, new in changes:
+        assert text.count(old) == 1
+        text = text.replace(old, new)
+    file = folder / "scenario.yaml"
+    file.write_text(text)
+    return file
+
+
+def fault(file: Path) -> str:
+    with pytest.raises(ScenarioError) as error:
+        load_scenario(file)
+    (only,) = error.value.faults
+    return only
+
+
+@pytest.mark.parametrize(
+    ("rows", "wanted"),
+    [
+        ("[[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1e-320]]", "variances from 1e-60"),
+        ("[[1, 1, 0, 0], [1, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]", "a positive definite matrix"),
+        ("[[1, 0.5, 0, 0], [0.4, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]", "a symmetric matrix"),
+        ("[[1, 2, 0, 0], [2, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]", "least eigenvalue of -1"),
+        ("[[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1e300]]", "a number from -1e+15 to 1e+15"),
+    ],
+)
+def test_a_covariance_that_no_filter_can_use(rows: str, wanted: str) -> None:
+    with pytest.raises(ScenarioError) as error:
+        parse_scenario(changed(("std: [5.0, 5.0, 2.0, 2.0]", f"cov: {rows}")))
+    assert wanted in str(error.value)
+
+
+def test_check_and_birth_model_refuse_the_same() -> None:
+    """A matrix that is definite by rounding alone passed one and not the other."""
+    nearly = [[1.0, 1.0 - 1e-15], [1.0 - 1e-15, 1.0]]
+    with pytest.raises(InputError, match="positive definite"):
+        BirthModel([0.1], [[0.0, 0.0]], [nearly])  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "wanted"),
+    [
+        ("std: [5.0, 5.0, 2.0, 2.0]", "std: [5.0, 5.0, 2.0, 1e-200]", "a number of at least 1e-30"),
+        ("position: [0.0, 40.0]", "position: [0.0, 1e150]", "a number from -1e+15 to 1e+15"),
+        ("std: [0.02, 3.0]", "std: [0.02, 1e-200]", "a number of at least 1e-30"),
+        ("start: 2.0", "start: 1e15", "a period that can be told apart"),
+        ("speed: 4.0", "clutter: {kind: region, rate: 1e9}", "a number of at most 1e"),
+        (
+            "speed: 4.0",
+            "clutter: {kind: measurement_space, low: [0, 0], high: [7, 9]}",
+            "an angle of at most 2 pi above low",
+        ),
+    ],
+)
+def test_numbers_beyond_sense(old: str, new: str, wanted: str) -> None:
+    with pytest.raises(ScenarioError) as error:
+        parse_scenario(changed((old, new)))
+    assert wanted in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("ships", "wanted"),
+    [
+        (SHIPS + "3.0,1,-1.1,north\n", "row 26, column 'latitude': expected a finite number; got 'north'"),
+        (SHIPS + "3.0,1,-1.1\n", "row 26: expected 4 cells"),
+        (SHIPS + "3.0,,-1.1,50.78\n", "row 26, column 'id': expected a name or number"),
+        (SHIPS + "1_0,1,-1.1,50.78\n", "row 26, column 'time': expected a finite number; got '1_0'"),
+        ("time,id,longitude,latitude\n", "expected at least one report"),
+        ("time,id,longitude,latitude\n1,1,0,0\n", "expected at least one track after cleaning"),
+        (SHIPS + "3.0,\xe9,-1.1,50.78\n", "cannot be read as CSV in UTF-8"),
+    ],
+)
+def test_a_file_of_targets_is_read_by_the_check(ships: str, wanted: str, tmp_path: Path) -> None:
+    file = written(tmp_path, ships)
+    if "\xe9" in ships:
+        (tmp_path / "ships.csv").write_bytes(ships.encode("latin-1"))
+    text = fault(file)
+    assert text.startswith(f"{file}:10:33: targets.path: expected a file of recorded targets that a run can use, got ")
+    assert wanted in text
+
+
+def test_scans_at_which_no_target_is_there_are_refused_by_the_check(tmp_path: Path) -> None:
+    assert "expected scans between the first and last report" in fault(
+        written(tmp_path, SHIPS, targets=", time_origin: 1000")
+    )
+
+
+def test_a_second_report_at_one_time_is_left_out_and_told(tmp_path: Path) -> None:
+    repeated = SHIPS + SHIPS.split("\n")[1] + "\n4.0,2,-1.0,50.9\n"
+    scenario, plain = load_scenario(written(tmp_path, repeated)), load_scenario(written(tmp_path, SHIPS))
+    (tmp_path / "ships.csv").write_text(repeated)
+    (line,) = cautions(scenario)
+    assert line == (
+        "targets.path: ships.csv, row 26: a second report of one target at the time of row 2; left out, as are 1 more"
+    )
+    kept = build_experiment(scenario).targets
+    (tmp_path / "ships.csv").write_text(SHIPS)
+    assert cautions(plain) == []
+    for track, other in zip(kept.tracks, build_experiment(plain).targets.tracks, strict=True):  # type: ignore[attr-defined]
+        assert (track.times == other.times).all()
+
+
+def test_a_position_in_degrees_and_one_far_away_are_told(tmp_path: Path) -> None:
+    degrees = written(tmp_path, SHIPS, ("position: [0.0, 40.0]", "position: [-1.1, 50.78]"))
+    (line,) = cautions(load_scenario(degrees))
+    assert line == (
+        "sensors[0].position: expected metres from the origin, got (-1.1, 50.78), which is a longitude and latitude "
+        "among those of ships.csv"
+    )
+    far = written(tmp_path, SHIPS, ("position: [0.0, 40.0]", "position: [0.0, 400000.0]"))
+    (line,) = cautions(load_scenario(far))
+    assert line.startswith(
+        "sensors[0].position: expected metres from the origin, got (0, 400000), 400 km from the nearest"
+    )
+    result = CliRunner().invoke(app, ["check", str(far)])
+    assert result.exit_code == 0
+    assert f"{far}: warning: {line}" in result.output
+
+
+@pytest.mark.parametrize(
+    ("code", "wanted"),
+    [
+        ("def motoin():\n    pass\n", 'expected a name that "own.py" defines, got "motion"'),
+        ("def motion(:\n", 'expected a file of Python, got "own.py", line 1, which is none'),
+        ("from math import *\n", ""),
+        ("motion = print('run')\n", ""),
+    ],
+)
+def test_a_model_of_ones_own_is_looked_for_but_not_run(
+    code: str, wanted: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "own.py").write_text(code)
+    file = tmp_path / "scenario.yaml"
+    motion = "{kind: custom, python: 'own.py:motion', state_dim: 4}"
+    file.write_text(changed(("{kind: constant_velocity, sigma_v: 1.0}", motion)))
+    if wanted:
+        assert wanted in fault(file)
+    else:
+        load_scenario(file)
+    assert capsys.readouterr().out == ""
