@@ -186,14 +186,6 @@ def test_links_between_the_files_of_the_project_lead_somewhere() -> None:
             assert (ROOT / target).exists(), f"{page}: {target}"
 
 
-@pytest.mark.parametrize(
-    "block", re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text("utf-8"), re.DOTALL)
-)
-def test_the_example_of_the_readme_runs(block: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    exec(compile(block, "README.md", "exec"), {"__name__": "__main__"})
-
-
 def test_the_changelog_speaks_of_this_version() -> None:
     assert vedette.__version__ in (ROOT / "CHANGELOG.md").read_text("utf-8")
 

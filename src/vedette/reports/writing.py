@@ -58,7 +58,9 @@ class _Section:
         return sum(len(svg) for _, svg in self.figures)
 
 
-def write_report(results: CampaignResults, path: Path, *, replays: Sequence[tuple[str, int]] | None = None) -> None:
+def write_report(
+    results: CampaignResults, path: str | Path, *, replays: Sequence[tuple[str, int]] | None = None
+) -> None:
     """Write a campaign's report as one HTML file that needs nothing else; the same results give the same bytes.
 
     Args:
@@ -69,7 +71,8 @@ def write_report(results: CampaignResults, path: Path, *, replays: Sequence[tupl
         InputError: a run that is not there, or a file that cannot be written.
     """
     _check_replays(results, replays or ())
-    _make_room(path)
+    target = Path(path)
+    _make_room(target)
     sections: list[_Section] = []
     runs: list[str] = []
     errors: dict[str, Floats] = {}
@@ -81,7 +84,7 @@ def write_report(results: CampaignResults, path: Path, *, replays: Sequence[tupl
     sweeps = _drawn(tuple(sweep_drawings(results.campaign, errors)), "sweep")
     kept = _within(runs, MAX_REPLAY_BYTES) if replays is None else runs
     page = _render(results, sections, sweeps, kept, len(runs) - len(kept))
-    _write(path, page)
+    _write(target, page)
 
 
 def _check_replays(results: CampaignResults, replays: Sequence[tuple[str, int]]) -> None:
