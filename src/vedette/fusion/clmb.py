@@ -11,6 +11,7 @@ import numpy as np
 from scipy.special import log_expit
 
 from vedette.densities import GLMB, LMB
+from vedette.densities.checks import unchecked
 from vedette.fusion.base import (
     FusionInfo,
     FusionLimits,
@@ -77,7 +78,7 @@ class Clmb:
         log_absent = log_expit(-aligned.logits) @ weights
         held = aligned.chosen >= 0
         num_missing = int(np.count_nonzero(~held))
-        return LMB(tracks, aligned.logits @ weights + log_overlaps), FusionInfo(
+        return unchecked(LMB, tracks, aligned.logits @ weights + log_overlaps), FusionInfo(
             num_missing_sets=num_missing,
             num_missing_labels=num_missing,
             empty_intersection=len(held) > 0 and not bool(held.all(axis=1).any()),
