@@ -5,6 +5,7 @@ The cases run in a process of their own, so that a crash of the machine code is 
 
 from __future__ import annotations
 
+import contextlib
 import subprocess
 import sys
 from pathlib import Path
@@ -93,18 +94,24 @@ def one_case(rng: np.random.Generator) -> None:
     except InputError:
         return
     tracker = make([DeltaGlmbFilter, LmbFilter, PhdFilter, CphdFilter, CbMemberFilter][kind])
-    uses = [
+    samplers: list[Any] = [
+        d.sample_glmb,
+        d.sample_lmb,
+        d.sample_poisson,
+        d.sample_iid_cluster,
+        d.sample_multi_bernoulli,
+    ]
+    uses: list[Any] = [
         lambda: tracker.step(spoilt, [[10.0, 10.0], [50.0, 50.0]], POSE, 1.0, 3, rng=rng)[0],
-        lambda: [d.sample_glmb, d.sample_lmb, d.sample_poisson, d.sample_iid_cluster, d.sample_multi_bernoulli][kind](
-            spoilt, 10, rng=rng
-        ),
+        lambda: samplers[kind](spoilt, 10, rng=rng),
     ]
     if kind < 2:
         uses += [lambda: d.map_estimate(spoilt), lambda: d.marginal_estimate(spoilt)]
         uses.append(lambda: (CmDeltaGlmb if kind == 0 else Clmb)((0.5, 0.5)).fuse([spoilt, belief])[0])
         uses.append(lambda: d.glmb_to_lmb(spoilt) if kind == 0 else d.lmb_to_glmb(spoilt, max_hypotheses=5)[0])
     if kind < 3:
-        assert cauchy_schwarz(spoilt, spoilt) >= 0.0
+        with contextlib.suppress(VedetteError):
+            assert cauchy_schwarz(spoilt, spoilt) >= 0.0
     for use in uses:
         try:
             made = use()

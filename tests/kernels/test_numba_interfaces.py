@@ -26,9 +26,11 @@ ROOT = Path(__file__).resolve().parents[2]
 pytestmark = pytest.mark.skipif(not JIT_ENABLED, reason="nothing is compiled")
 
 
-@kernel
-def _doubled(values: np.ndarray) -> float:
+def _double(values: np.ndarray) -> float:
     return float(2.0 * values[0])
+
+
+_doubled: Any = kernel(_double)
 
 
 def takes(function: Callable[..., Any], *names: str) -> bool:
@@ -77,7 +79,12 @@ def test_core_compiler_lock_global_compiler_lock() -> None:
     from numba.core.compiler_lock import global_compiler_lock
 
     done = threading.Event()
-    compiling = threading.Thread(target=lambda: (_doubled(np.ones(1, np.float32)), done.set()))
+
+    def compile_one() -> None:
+        _doubled(np.ones(1, np.float32))
+        done.set()
+
+    compiling = threading.Thread(target=compile_one)
     with global_compiler_lock, global_compiler_lock:
         compiling.start()
         assert not done.wait(0.5)
