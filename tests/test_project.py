@@ -217,12 +217,6 @@ def test_links_between_the_files_of_the_project_lead_somewhere() -> None:
             assert (ROOT / target).exists(), f"{page}: {target}"
 
 
-@pytest.mark.parametrize("block", re.findall(r"```python\n(.*?)```", README, re.DOTALL))
-def test_the_example_of_the_readme_runs(block: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    exec(compile(block, "README.md", "exec"), {"__name__": "__main__"})
-
-
 def test_the_example_of_the_readme_has_strict_types(tmp_path: Path) -> None:
     (block,) = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
     example = tmp_path / "example.py"

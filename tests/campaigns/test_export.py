@@ -1,11 +1,8 @@
-"""The results of a campaign in other tools: Arrow, Parquet, DuckDB, CSV, xarray, NetCDF, and the pages that show it."""
+"""The results of a campaign in other tools: Arrow, Parquet, DuckDB, CSV, xarray, NetCDF."""
 
 from __future__ import annotations
 
-import importlib.util
-import re
 import sys
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,7 +15,6 @@ from vedette.campaigns.export import FORMATS, export_csv, export_netcdf, export_
 from vedette.campaigns.results import open_results
 from vedette.errors import InputError
 
-PAGE = Path(__file__).parents[2] / "docs" / "results.md"
 KEYS = ["cell", "scenario", "planner", "sensors.*.clutter.rate", "run"]
 TABLES = ["runs", "scans", "decisions", "rewards", "tracks", "truth", "sensors", "timings"]
 
@@ -231,20 +227,3 @@ def test_a_place_that_cannot_be_written_is_named(results, tmp_path, kind):
     with pytest.raises(InputError, match="expected a file that can be written"):
         FORMATS[kind](results, tmp_path / "file")
     assert (tmp_path / "file").read_text() == "mine"
-
-
-def test_what_the_page_shows_runs(results, tmp_path, monkeypatch, capsys):
-    """Every block of Python on the page, one after another, in a results folder with its tables."""
-    fill(tmp_path, make_campaign())
-    export_tables(open_results(tmp_path), tmp_path / "tables")
-    monkeypatch.chdir(tmp_path)
-    known: dict[str, object] = {"__name__": "__main__"}
-    blocks = re.findall(r"```python\n(.*?)```", PAGE.read_text("utf-8"), re.DOTALL)
-    assert len(blocks) >= 6
-    for block in blocks:
-        if "polars" in block and importlib.util.find_spec("polars") is None:
-            continue
-        exec(compile(block, str(PAGE), "exec"), known)
-    output = capsys.readouterr().out
-    for shown in ("gospa_m", "margin", "jdm-rate-5.0", "chosen_headings_rad"):
-        assert shown in output

@@ -98,7 +98,7 @@ def _updated(
     local = kind(own.motion, *immortal, own.sensor, settings.limits)
     for h, pose in enumerate(path):
         scan = _scan(own.sensor, pose, states[h][m], uniforms[m][h], normals[m][h], settings)
-        belief, _ = local.step(belief, scan, pose, settings.horizon_period, h, rng=np.random.default_rng(0))
+        belief, _ = local.step(belief, scan, pose, settings.horizon_period, h + 1, rng=np.random.default_rng(0))
     return marginalise(belief, max_components=1) if isinstance(belief, GLMB) else belief
 
 
@@ -126,5 +126,5 @@ def _predicted(fused: Any, motion: models.MotionModel, settings: PlanningSetting
     immortal = models.constant_survival(1.0), models.BirthModel.none(fused.state_dim)
     local = kind(motion, *immortal, blind, settings.limits)
     for h in range(settings.horizon_steps):
-        belief, _ = local.step(belief, [], np.zeros(3), settings.horizon_period, h, rng=np.random.default_rng(0))
+        belief, _ = local.step(belief, [], np.zeros(3), settings.horizon_period, h + 1, rng=np.random.default_rng(0))
     return belief

@@ -24,6 +24,7 @@ from vedette.control import (
     planning_limits,
 )
 from vedette.densities import GLMB, LMB, Poisson
+from vedette.densities.checks import unchecked
 from vedette.errors import InputError, ModelError, NumericalError
 from vedette.filters import CbMemberFilter, CphdFilter, Limits, PhdFilter
 from vedette.fusion import Clmb, CmDeltaGlmb
@@ -150,6 +151,12 @@ def test_state_dimensions(planner: Any) -> None:
     assert refused(replace(example, sensors=sensors), planner) == message
 
 
+def spoilt(density: Any, **fields: Any) -> Any:
+    """The density with other fields, as if its arrays had been changed after it was made."""
+    kind = type(density)
+    return unchecked(kind, *(fields.get(name, getattr(density, name)) for name in kind.__match_args__))
+
+
 @pytest.mark.parametrize("planner", PLANNERS)
 @pytest.mark.parametrize("kind", ["marginal", "lmb"])
 def test_densities_that_are_none(planner: Any, kind: str) -> None:
@@ -157,15 +164,15 @@ def test_densities_that_are_none(planner: Any, kind: str) -> None:
     belief = example.beliefs[1]
     covs = belief.tracks.covs.copy()
     covs[0] = -covs[0]
-    indefinite = replace(belief, tracks=replace(belief.tracks, covs=covs))
+    indefinite = spoilt(belief, tracks=spoilt(belief.tracks, covs=covs))
     message = refused(replace(example, beliefs=(example.beliefs[0], indefinite)), planner)
     assert message.startswith("beliefs[1]: tracks.covs[0]: expected")
     means = example.fused.tracks.means.copy()
     means[0, 1] = np.nan
-    nowhere = replace(example.fused, tracks=replace(example.fused.tracks, means=means))
+    nowhere = spoilt(example.fused, tracks=spoilt(example.fused.tracks, means=means))
     assert refused(replace(example, fused=nowhere), planner).startswith("fused: tracks.means")
     if kind == "marginal":
-        heavy = replace(belief, hyp_log_weights=belief.hyp_log_weights + 0.1)
+        heavy = spoilt(belief, hyp_log_weights=belief.hyp_log_weights + 0.1)
         message = refused(replace(example, beliefs=(heavy, belief)), planner)
         assert message.startswith("beliefs[0]: hyp_log_weights")
 

@@ -62,7 +62,7 @@ def _alone(
         states = futures.states[h, targets]
         seen = own.sensor.detection.prob(states, pose) >= SETTINGS.detection_threshold
         scan = own.sensor.measurement.measure(states[seen], pose)
-        at, info = local.step(at, scan, pose, SETTINGS.horizon_period, h, rng=np.random.default_rng(0))
+        at, info = local.step(at, scan, pose, SETTINGS.horizon_period, h + 1, rng=np.random.default_rng(0))
         total += info.log_likelihood
     return total, at
 

@@ -23,6 +23,7 @@ from vedette.densities import (
     sample_lmb,
     sample_poisson,
 )
+from vedette.densities.checks import unchecked
 from vedette.errors import InputError, NumericalError
 
 MANY = 40_000
@@ -145,7 +146,7 @@ def test_bad_requests_are_refused():
         sample_poisson(random_poisson(rng, 1), -1, rng=rng)
     with pytest.raises(InputError, match="index"):
         sample_glmb(GLMB.empty(2), 3, rng=rng).sample(3)
-    singular = Poisson(np.array([5.0]), np.zeros((1, 2)), np.zeros((1, 2, 2)))
+    singular = unchecked(Poisson, np.array([5.0]), np.zeros((1, 2)), np.zeros((1, 2, 2)))
     with pytest.raises(NumericalError, match="covs"):
         sample_poisson(singular, 3, rng=rng)
 

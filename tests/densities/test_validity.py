@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from vedette.densities import GLMB, LMB, Poisson, TrackTable
+from vedette.densities.checks import unchecked
 from vedette.errors import InputError, NumericalError
 
 TRACKS = TrackTable.from_mixtures(
@@ -60,10 +62,26 @@ TRACK_FAULTS = [
 ]
 
 
+def _spoilt(density: Any, **fields: Any) -> Any:
+    """The density with other fields, as if its arrays had been changed after it was made."""
+    return unchecked(
+        type(density), *(fields.get(name, getattr(density, name)) for name in type(density).__match_args__)
+    )
+
+
+def _refused(density: Any, field: str, value: Any, error: type[Exception], match: str) -> None:
+    """A user cannot make it, and `validate` finds it when it has come about."""
+    with pytest.raises(InputError, match=match):
+        replace(density, **{field: value})
+    with pytest.raises(error, match=match):
+        _spoilt(density, **{field: value}).validate()
+
+
 @pytest.mark.parametrize(("field", "value", "error", "message"), TRACK_FAULTS)
 def test_faults_of_a_track_table(field, value, error, message):
-    tracks = replace(TRACKS, **{field: value})
-    for invalid in (tracks, replace(GOOD_GLMB, tracks=tracks), replace(GOOD_LMB, tracks=tracks)):
+    _refused(TRACKS, field, value, error, rf"^tracks\.{field}.*{message}")
+    tracks = _spoilt(TRACKS, **{field: value})
+    for invalid in (_spoilt(GOOD_GLMB, tracks=tracks), _spoilt(GOOD_LMB, tracks=tracks)):
         with pytest.raises(error, match=rf"^tracks\.{field}.*{message}"):
             invalid.validate()
 
@@ -86,34 +104,50 @@ GLMB_FAULTS = [
 
 @pytest.mark.parametrize(("field", "value", "error", "message"), GLMB_FAULTS)
 def test_faults_of_a_glmb(field, value, error, message):
-    with pytest.raises(error, match=rf"^{field}.*{message}"):
-        replace(GOOD_GLMB, **{field: value}).validate()
+    _refused(GOOD_GLMB, field, value, error, rf"^{field}.*{message}")
 
 
 def test_a_glmb_of_no_hypothesis_is_a_fault():
-    nothing = GLMB(TRACKS, np.zeros(1, np.int64), np.empty(0, np.int64), np.empty(0))
     with pytest.raises(InputError, match="at least one hypothesis"):
-        nothing.validate()
+        GLMB(TRACKS, np.zeros(1, np.int64), np.empty(0, np.int64), np.empty(0))
 
 
 def test_the_last_hypothesis_is_checked_too():
-    glmb = GLMB(TRACKS, np.array([0, 0, 2]), np.array([1, 0]), np.log([0.5, 0.5]))
     with pytest.raises(InputError, match="hypothesis 1"):
-        glmb.validate()
+        GLMB(TRACKS, np.array([0, 0, 2]), np.array([1, 0]), np.log([0.5, 0.5]))
+
+
+@pytest.mark.parametrize("density", [GOOD_GLMB, GOOD_LMB])
+def test_the_tracks_are_a_track_table(density):
+    with pytest.raises(InputError, match="tracks: expected a TrackTable; got tuple"):
+        replace(density, tracks=tuple(TRACKS.to_kernel()))
+
+
+@pytest.mark.parametrize(
+    ("means", "message"),
+    [
+        (np.ma.masked_equal(TRACKS.means, 3.0), "got MaskedArray"),
+        (TRACKS.means.astype(">f8"), "got one of >f8"),
+        (np.broadcast_to(np.zeros(2), (4, 2)).copy().view(np.matrix), "got matrix"),
+        (np.frombuffer(TRACKS.means.tobytes()).reshape(4, 2), "writeable"),
+    ],
+)
+def test_arrays_that_would_be_compiled_for_anew_are_refused(means, message):
+    with pytest.raises(InputError, match=rf"tracks\.means: expected .*{message}"):
+        replace(TRACKS, means=means)
 
 
 @pytest.mark.parametrize("labels", [[[0, 0], [0, 0], [1, 0]], [[0, 1], [0, 0], [1, 0]], [[2, 0], [3, 0], [1, 5]]])
 def test_labels_of_an_lmb_must_increase(labels):
     tracks = replace(TRACKS, labels=np.array(labels))
     with pytest.raises(InputError, match=r"tracks\.labels.*increasing order"):
-        LMB(tracks, np.zeros(3)).validate()
+        LMB(tracks, np.zeros(3))
 
 
 def test_faults_of_existence():
-    with pytest.raises(InputError, match=r"existence_logit.*shape \(3\)"):
-        replace(GOOD_LMB, existence_logit=np.zeros(2)).validate()
-    with pytest.raises(NumericalError, match=r"existence_logit\[1\].*nan"):
-        replace(GOOD_LMB, existence_logit=np.array([0.0, np.nan, 0.0])).validate()
+    _refused(GOOD_LMB, "existence_logit", np.zeros(2), InputError, r"existence_logit.*shape \(3\)")
+    nan = np.array([0.0, np.nan, 0.0])
+    _refused(GOOD_LMB, "existence_logit", nan, NumericalError, r"existence_logit\[1\].*nan")
 
 
 @pytest.mark.parametrize(
@@ -129,8 +163,7 @@ def test_faults_of_existence():
     ],
 )
 def test_faults_of_a_poisson(field, value, error):
-    with pytest.raises(error, match=rf"^{field}"):
-        replace(GOOD_POISSON, **{field: value}).validate()
+    _refused(GOOD_POISSON, field, value, error, rf"^{field}")
 
 
 def test_good_and_empty_densities_pass():

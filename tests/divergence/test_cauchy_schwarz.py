@@ -24,6 +24,7 @@ from fusion.examples import A, B, C, full_glmbs, glmb, lmb
 from reference import set_integral as oracle
 from reference.grid import Grid
 from vedette.densities import GLMB, LMB, Poisson, TrackTable, lmb_to_glmb, marginalise
+from vedette.densities.checks import unchecked
 from vedette.divergence import cauchy_schwarz, log_inner_product, reference_unit_volume
 from vedette.errors import InputError
 
@@ -210,7 +211,7 @@ def test_what_cannot_be_compared():
         with pytest.raises(InputError, match="unit_volume"):
             cauchy_schwarz(labelled, labelled, unit_volume=unit_volume)
     with pytest.raises(InputError, match=r"b: existence_logit\[0\]"):
-        cauchy_schwarz(labelled, LMB(labelled.tracks, np.full(2, math.nan)))
+        cauchy_schwarz(labelled, unchecked(LMB, labelled.tracks, np.full(2, math.nan)))
 
 
 def test_reference_volume_makes_the_inner_product_of_a_gaussian_one():

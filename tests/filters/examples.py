@@ -111,7 +111,7 @@ def linear_scene(existence: float = 0.3, prob_survival: float = 0.9, prob_detect
     return Scene(
         models.constant_velocity(3.0),
         models.constant_survival(prob_survival),
-        models.BirthModel(np.array([existence, 0.2]), means, covs, steps=frozenset({0, 1})),
+        models.BirthModel(np.array([existence, 0.2]), means, covs, steps=frozenset({1, 2})),
         models.SensorModel(
             models.position(),
             models.constant_noise([12.0, 9.0]),
@@ -167,7 +167,7 @@ def polar_scene(method: str) -> Scene:
     return Scene(
         motion,
         models.SurvivalModel(surviving_near_the_origin, np.array([0.97, 2000.0])),
-        models.BirthModel(np.array([0.3, 0.2]), means[:, :dim], covs[:, :dim, :dim], steps=frozenset({0, 1})),
+        models.BirthModel(np.array([0.3, 0.2]), means[:, :dim], covs[:, :dim, :dim], steps=frozenset({1, 2})),
         models.SensorModel(
             models.bearing_range(),
             models.range_dependent_noise(8.0, 2e-5, 0.02, 5e-5),

@@ -190,7 +190,7 @@ def run(tracker: LabelledFilter, recording: Recording, *, seed: int = 0) -> tupl
     estimates, seconds = [], []
     for step, scan in enumerate(recording.scans):
         start = time.process_time()
-        belief, _ = tracker.step(belief, scan, POSE, PERIOD, step, rng=rng)
+        belief, _ = tracker.step(belief, scan, POSE, PERIOD, step + 1, rng=rng)
         seconds.append(time.process_time() - start)
         estimates.append(map_estimate(belief))
     return estimates, seconds

@@ -11,6 +11,7 @@ import pytest
 
 from vedette import models
 from vedette.densities import GLMB, LMB, TrackTable, existence_probabilities
+from vedette.densities.checks import unchecked
 from vedette.errors import InputError, ModelError, NumericalError
 from vedette.filters import CbMemberFilter, CphdFilter, DeltaGlmbFilter, Limits, LmbFilter, PhdFilter
 
@@ -87,7 +88,7 @@ def make(kind: Any, limits: Limits | None = None, **parts: Any) -> Any:
     return kind(motion, survival, births, sensor(**parts), limits or Limits())
 
 
-def step(tracker: Any, scan: Any = NEAR, belief: Any = None, pose: Any = POSE, dt: Any = 1.0, number: int = 0) -> Any:
+def step(tracker: Any, scan: Any = NEAR, belief: Any = None, pose: Any = POSE, dt: Any = 1.0, number: int = 1) -> Any:
     prior = tracker.initial() if belief is None else belief
     return tracker.step(prior, scan, pose, dt, number, rng=np.random.default_rng(0))
 
@@ -103,9 +104,16 @@ def step(tracker: Any, scan: Any = NEAR, belief: Any = None, pose: Any = POSE, d
         (3.0, r"scan: .*got shape \(\)"),
         (np.zeros((0, 2, 0)), r"scan: .*got shape"),
         (None, "scan: .*got None"),
-        ("two targets", "scan: .*got str that is not numbers"),
-        ([["a", "b"]], "scan: .*that is not numbers"),
-        ([[1.0, 2.0], [3.0]], "scan: .*that is not numbers"),
+        ("two targets", "scan: expected numbers in .*; got an array of <U11"),
+        ([["a", "b"]], "scan: expected numbers in "),
+        ([["1", "2"]], "scan: expected numbers in "),
+        ([[1.0, 2.0], [3.0]], r"scan: expected numbers in .*; got \[\[1\.0, 2\.0\], \[3\.0\]\]"),
+        ([[1.0, 2.0 + 1e-3j]], "scan: expected numbers in .*; got an array of complex128"),
+        ([[True, False]], "scan: expected numbers in .*; got an array of bool"),
+        ([[1.0, None]], "scan: expected numbers in .*; got an array of object"),
+        (np.ma.masked_equal([[1.0, 2.0], [3.0, 4.0]], 3.0), "scan: expected numbers in .* without masked entries"),
+        ([np.ma.masked_equal([1.0, 2.0], 2.0)], "scan: expected numbers in .* without masked entries"),
+        ([[1.0, np.ma.masked]], "scan: expected numbers in .* without masked entries"),
     ],
 )
 def test_scans(kind: Any, scan: Any, message: str) -> None:
@@ -176,10 +184,44 @@ def test_time_steps(kind: Any, dt: Any) -> None:
 
 
 @every_kind
-@pytest.mark.parametrize("number", [1.5, None, True, "1"])
+@pytest.mark.parametrize("number", [1.5, None, True, "1", 0, -1, 2**63, np.uint64(2**63)])
 def test_steps(kind: Any, number: Any) -> None:
-    with pytest.raises(InputError, match="step: expected a whole number; got"):
+    with pytest.raises(InputError, match=r"step: expected a whole number from 1 on, below 2\^63; got"):
         step(make(kind), number=number)
+
+
+@every_kind
+def test_the_last_step_that_there_is(kind: Any) -> None:
+    step(make(kind), number=2**63 - 1)[0].validate()
+
+
+@every_kind
+@pytest.mark.parametrize("rng", [0, None, np.random.RandomState(0), np.random.default_rng])
+def test_generators(kind: Any, rng: Any) -> None:
+    tracker = make(kind)
+    with pytest.raises(InputError, match=r"rng: expected a numpy\.random\.Generator"):
+        tracker.step(tracker.initial(), NEAR, POSE, 1.0, 1, rng=rng)
+
+
+@every_kind
+def test_angles(kind: Any) -> None:
+    """Any within a full turn is taken as the direction that it is; beyond that it is in other units."""
+    clutter = models.region_clutter(2.0, REGION, "bearing_range")
+    tracker = make(kind, measurement=models.bearing_range(), clutter=clutter)
+    pose = np.array([60.0, 10.0, 0.0])
+    wanted, info = step(tracker, [[math.pi - 0.05, 50.0]], pose=pose)
+    for bearing in (math.pi - 0.05 - 2.0 * math.pi, -math.pi - 0.05):
+        belief, other = step(tracker, [[bearing, 50.0]], pose=pose)
+        assert other.log_likelihood == pytest.approx(info.log_likelihood, rel=1e-9, nan_ok=True)
+        assert (other.num_duplicates, other.num_clutter_raised) == (0, 0)
+        assert type(belief) is type(wanted)
+    _, twice = step(tracker, [[0.75 * math.pi, 50.0], [-1.25 * math.pi, 50.0]], pose=pose)
+    assert twice.num_duplicates == 1
+    with pytest.raises(
+        InputError, match=r"expected angles in radians, .*\[500\.0, 50\.0\] in row 1, whose component 0"
+    ):
+        step(tracker, [[1.0, 50.0], [500.0, 50.0]], pose=pose)
+    step(tracker, [[1.0, 500.0]], pose=pose)
 
 
 @each_kind
@@ -215,7 +257,7 @@ def test_probabilities_that_are_none(kind: Any, value: float) -> None:
             step(
                 make(kind, survival=models.SurvivalModel(given_survival, np.array([value]))),
                 belief=first_belief(kind),
-                number=1,
+                number=2,
             )
 
 
@@ -241,12 +283,13 @@ def test_a_measurement_that_is_none(kind: Any) -> None:
 
 @each_kind
 def test_a_belief_that_is_no_density(kind: Any) -> None:
-    tracks = TrackTable(np.zeros((1, 2), np.int64), np.arange(2), np.zeros(1), np.zeros((1, 4)), -np.eye(4)[None])
-    glmb = GLMB(tracks, np.arange(2), np.zeros(1, np.int64), np.zeros(1))
-    belief = glmb if kind is DeltaGlmbFilter else LMB(tracks, np.zeros(1))
+    covs = -np.eye(4)[None]
+    tracks = unchecked(TrackTable, np.zeros((1, 2), np.int64), np.arange(2), np.zeros(1), np.zeros((1, 4)), covs)
+    glmb = unchecked(GLMB, tracks, np.arange(2), np.zeros(1, np.int64), np.zeros(1))
+    belief = glmb if kind is DeltaGlmbFilter else unchecked(LMB, tracks, np.zeros(1))
     tracker = make(kind, motion=models.constant_velocity(1.0, method="ukf"))
     with pytest.raises(NumericalError, match="covariance of a track is not positive definite"):
-        step(tracker, belief=belief, number=1)
+        step(tracker, belief=belief, number=2)
 
 
 @every_kind
@@ -254,7 +297,7 @@ def test_a_motion_to_nowhere(kind: Any) -> None:
     known = models.constant_velocity(1.0)
     motion = models.MotionModel(4, drifts_off, known.process_noise_cov, noise_params=known.noise_params)
     with pytest.raises(ModelError, match="motion model: predicted mean or covariance is not finite"):
-        step(make(kind, motion=motion), belief=first_belief(kind), number=1)
+        step(make(kind, motion=motion), belief=first_belief(kind), number=2)
 
 
 @models.model_function("process_noise_cov")
@@ -287,7 +330,7 @@ def test_certain_detection(kind: Any) -> None:
         belief, _ = step(tracker, [[10.0, 10.0], [50.0, 50.0]])
         belief.validate()
         assert _existences(belief).max() > 0.9
-        later, _ = step(tracker, [], belief, number=1)
+        later, _ = step(tracker, [], belief, number=2)
         later.validate()
         assert _existences(later).max(initial=0.0) < 1e-6
 

@@ -61,7 +61,7 @@ def run(kind: str, num_scans: int, seed: int = 0) -> tuple[list[Any], list[Filte
     tracker, scene, rng = make(kind), Scene(seed), np.random.default_rng(seed)
     belief, beliefs, infos = tracker.initial(), [], []
     for step in range(num_scans):
-        belief, info = tracker.step(belief, scene.scan(step), POSE, 1.0, step, rng=rng)
+        belief, info = tracker.step(belief, scene.scan(step), POSE, 1.0, step + 1, rng=rng)
         beliefs.append(belief)
         infos.append(info)
     return beliefs, infos
@@ -89,7 +89,7 @@ def test_a_busy_scene_stays_within_the_caps(kind: str) -> None:
         belief.validate()
         assert np.isfinite(info.log_likelihood)
         assert info.num_tracks == belief.tracks.num_tracks
-        assert belief.tracks.labels[:, 0].max(initial=0) <= step
+        assert belief.tracks.labels[:, 0].max(initial=0) <= step + 1
         if isinstance(belief, LMB):
             assert belief.tracks.num_tracks <= LIMITS.max_labels
             assert belief.existence.min(initial=1.0) >= LIMITS.min_existence
@@ -142,17 +142,17 @@ def test_ranking_draws_nothing() -> None:
     for kind in ("ranked", "marginalised", "lmb"):
         rng, tracker = np.random.default_rng(0), make(kind)
         before = rng.bit_generator.state
-        tracker.step(tracker.initial(), Scene(0).scan(0), POSE, 1.0, 0, rng=rng)
+        tracker.step(tracker.initial(), Scene(0).scan(0), POSE, 1.0, 1, rng=rng)
         assert rng.bit_generator.state == before
 
 
 def test_the_arguments_are_left_as_they_are() -> None:
     for kind in KINDS:
         tracker, scene, rng = make(kind), Scene(1), np.random.default_rng(0)
-        belief, _ = tracker.step(tracker.initial(), scene.scan(0), POSE, 1.0, 0, rng=rng)
+        belief, _ = tracker.step(tracker.initial(), scene.scan(0), POSE, 1.0, 1, rng=rng)
         before, scan = [array.tobytes() for array in arrays(belief)], scene.scan(1)
         given = scan.tobytes()
-        tracker.step(belief, scan, POSE, 1.0, 1, rng=rng)
+        tracker.step(belief, scan, POSE, 1.0, 2, rng=rng)
         assert [array.tobytes() for array in arrays(belief)] == before
         assert scan.tobytes() == given
 
@@ -180,7 +180,7 @@ def test_two_thousand_scans_do_not_grow(kind: str) -> None:
                 peaks.append(tracemalloc.get_traced_memory()[1])
                 tracemalloc.reset_peak()
                 resident.append(resident_bytes())
-            belief, info = tracker.step(belief, scene.scan(step), POSE, 1.0, step, rng=rng)
+            belief, info = tracker.step(belief, scene.scan(step), POSE, 1.0, step + 1, rng=rng)
             work[step] = info.num_hypotheses + int(belief.tracks.offsets[-1])
             belief.validate()
             assert info.num_hypotheses <= limits.max_hypotheses

@@ -28,7 +28,7 @@ BIRTHS = models.BirthModel(
     np.array([0.3, 0.2]),
     np.array([[60.0, 20.0, 2.0, 1.0], [-110.0, -26.0, 0.0, 1.0]]),
     np.array([np.diag([80.0, 60.0, 9.0, 9.0]), np.diag([90.0, 50.0, 4.0, 9.0])]),
-    frozenset({0, 2}),
+    frozenset({1, 3}),
 )
 REGION = models.Region(-400.0, 400.0, -400.0, 400.0)
 RATE = 3.0
@@ -159,7 +159,7 @@ def enumerated(name: str) -> tuple[list[oracle.Hypotheses], list[float]]:
     """Posteriors after each scan, and the log-likelihoods of the scans."""
     example = EXAMPLES[name]()
     hypotheses, posteriors, log_likelihoods = oracle.no_target(), [], []
-    for step, scan in enumerate(example.scans):
+    for step, scan in enumerate(example.scans, 1):
         hypotheses, total = oracle.step(hypotheses, plain_births(step), list(scan), example.model)
         clutter = sum(math.log(example.model.clutter_intensity(z)) for z in scan)
         posteriors.append(hypotheses)
@@ -169,7 +169,7 @@ def enumerated(name: str) -> tuple[list[oracle.Hypotheses], list[float]]:
 
 def run(tracker: Any, example: Example, seed: int = 0) -> tuple[list[Any], list[FilterInfo]]:
     rng, belief, beliefs, infos = np.random.default_rng(seed), tracker.initial(), [], []
-    for step, scan in enumerate(example.scans):
+    for step, scan in enumerate(example.scans, 1):
         belief, info = tracker.step(belief, scan, POSE, DT, step, rng=rng)
         belief.validate()
         beliefs.append(belief)
@@ -256,8 +256,8 @@ def test_gibbs_finds_every_hypothesis_of_an_even_scene() -> None:
     example = EXAMPLES["linear"]()
     for scan in (np.empty((0, 2)), np.array([[81.0, 40.0]])):
         tracker = example.filter(Limits.none(), assignment="gibbs", num_gibbs_samples=20_000)
-        belief, _ = tracker.step(tracker.initial(), scan, POSE, DT, 0, rng=np.random.default_rng(1))
-        hypotheses, _ = oracle.step(oracle.no_target(), plain_births(0), list(scan), example.model)
+        belief, _ = tracker.step(tracker.initial(), scan, POSE, DT, 1, rng=np.random.default_rng(1))
+        hypotheses, _ = oracle.step(oracle.no_target(), plain_births(1), list(scan), example.model)
         assert_same_density(plain_glmb(belief), oracle.as_glmb(hypotheses))
 
 
@@ -267,7 +267,7 @@ def test_lmb_without_limits_is_the_enumeration(name: str) -> None:
     tracker = example.lmb_filter(Limits.none())
     wanted: reference.Lmb = {}
     belief, rng = tracker.initial(), np.random.default_rng(0)
-    for step, scan in enumerate(example.scans):
+    for step, scan in enumerate(example.scans, 1):
         prior = wanted
         wanted = oracle.lmb_step(prior, plain_births(step), list(scan), example.model)
         belief, info = tracker.step(belief, scan, POSE, DT, step, rng=rng)
@@ -306,7 +306,7 @@ def test_the_bound_on_what_was_discarded(name: str, cap: int) -> None:
     example = EXAMPLES[name]()
     limits = dataclasses.replace(Limits.none(), max_hypotheses=cap, min_track_weight=1.0)
     belief, info = _first_step(example, example.scans[0], limits)
-    hypotheses, _ = oracle.step(oracle.no_target(), plain_births(0), list(example.scans[0]), example.model)
+    hypotheses, _ = oracle.step(oracle.no_target(), plain_births(1), list(example.scans[0]), example.model)
     share = _discarded_share(hypotheses, belief)
     assert belief.num_hyps <= cap
     assert info.discarded_weight_bound >= share - 1e-12
@@ -315,7 +315,7 @@ def test_the_bound_on_what_was_discarded(name: str, cap: int) -> None:
 
 def _first_step(example: Example, scan: Any, limits: Limits) -> tuple[GLMB, FilterInfo]:
     tracker = example.filter(limits)
-    return tracker.step(tracker.initial(), scan, POSE, DT, 0, rng=np.random.default_rng(0))
+    return tracker.step(tracker.initial(), scan, POSE, DT, 1, rng=np.random.default_rng(0))
 
 
 @each_example
@@ -326,7 +326,7 @@ def test_the_bound_is_attained_where_nothing_is_contested(name: str, cap: int) -
     limits = dataclasses.replace(Limits.none(), max_hypotheses=cap, min_track_weight=1.0)
     for scan in (np.empty((0, 2)), example.scans[1]):
         belief, info = _first_step(example, scan, limits)
-        hypotheses, _ = oracle.step(oracle.no_target(), plain_births(0), list(scan), example.model)
+        hypotheses, _ = oracle.step(oracle.no_target(), plain_births(1), list(scan), example.model)
         assert info.discarded_weight_bound == pytest.approx(_discarded_share(hypotheses, belief), abs=1e-12)
 
 
@@ -336,7 +336,7 @@ def test_marginalised_keeps_the_weights_of_label_sets(name: str) -> None:
     example = EXAMPLES[name]()
     marginalised, plain = example.filter(Limits.none(), marginalised=True), example.filter(Limits.none())
     rng, belief = np.random.default_rng(0), marginalised.initial()
-    for step, scan in enumerate(example.scans):
+    for step, scan in enumerate(example.scans, 1):
         wanted, wanted_info = plain.step(belief, scan, POSE, DT, step, rng=rng)
         belief, info = marginalised.step(belief, scan, POSE, DT, step, rng=rng)
         assert belief.is_marginalised

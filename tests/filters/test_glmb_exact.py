@@ -26,7 +26,7 @@ pytestmark = pytest.mark.lanes
 
 def enumerate_scene(scene: Scene, hypotheses: oracle.Hypotheses, num_steps: int = 3):
     """Posterior and log-likelihood after each scan, by the oracle."""
-    for step, scan in enumerate(scene.scans[:num_steps]):
+    for step, scan in enumerate(scene.scans[:num_steps], 1):
         hypotheses, total = oracle.step(hypotheses, scene.plain_births(step), list(scan), scene.plain)
         log_clutter = sum(math.log(scene.plain.clutter_intensity(z)) for z in scan)
         yield hypotheses, math.log(total) + log_clutter - scene.sensor.clutter.rate
@@ -38,7 +38,7 @@ def test_ranked_equals_enumeration(name):
     tracker, rng = scene.glmb_filter(), np.random.default_rng(0)
     belief = tracker.initial()
     for step, (expected, log_likelihood) in enumerate(enumerate_scene(scene, oracle.no_target())):
-        belief, info = tracker.step(belief, scene.scans[step], scene.pose, DT, step, rng=rng)
+        belief, info = tracker.step(belief, scene.scans[step], scene.pose, DT, step + 1, rng=rng)
         belief.validate()
         assert_same_glmb(plain_glmb(belief), oracle.as_glmb(expected))
         assert info.log_likelihood == pytest.approx(log_likelihood, abs=1e-10)
@@ -52,7 +52,7 @@ def test_gibbs_with_plenty_of_samples_equals_enumeration():
     tracker = scene.glmb_filter(assignment="gibbs", num_gibbs_samples=2_000_000)
     rng, belief = np.random.default_rng(3), tracker.initial()
     for step, (expected, log_likelihood) in enumerate(enumerate_scene(scene, oracle.no_target(), 2)):
-        belief, info = tracker.step(belief, scene.scans[step], scene.pose, DT, step, rng=rng)
+        belief, info = tracker.step(belief, scene.scans[step], scene.pose, DT, step + 1, rng=rng)
         assert_same_glmb(plain_glmb(belief), oracle.as_glmb(expected))
         assert info.log_likelihood == pytest.approx(log_likelihood, abs=1e-10)
 
@@ -86,7 +86,7 @@ def test_a_prior_of_mixtures(name):
     tracker, rng = scene.glmb_filter(), np.random.default_rng(0)
     belief, hypotheses = prior_of_mixtures(scene)
     for step, (expected, log_likelihood) in enumerate(enumerate_scene(scene, hypotheses, 1)):
-        belief, info = tracker.step(belief, scene.scans[step], scene.pose, DT, step, rng=rng)
+        belief, info = tracker.step(belief, scene.scans[step], scene.pose, DT, step + 1, rng=rng)
         belief.validate()
         assert_same_glmb(plain_glmb(belief), oracle.as_glmb(expected))
         assert info.log_likelihood == pytest.approx(log_likelihood, abs=1e-10)
@@ -96,8 +96,8 @@ def test_no_scan_to_speak_of():
     scene = linear_scene()
     tracker, rng = scene.glmb_filter(), np.random.default_rng(0)
     belief, hypotheses = prior_of_mixtures(scene)
-    expected, total = oracle.step(hypotheses, scene.plain_births(0), [], scene.plain)
-    belief, info = tracker.step(belief, [], scene.pose, DT, 0, rng=rng)
+    expected, total = oracle.step(hypotheses, scene.plain_births(1), [], scene.plain)
+    belief, info = tracker.step(belief, [], scene.pose, DT, 1, rng=rng)
     assert_same_glmb(plain_glmb(belief), oracle.as_glmb(expected))
     assert info.log_likelihood == pytest.approx(math.log(total) - scene.sensor.clutter.rate, abs=1e-10)
 
@@ -105,8 +105,8 @@ def test_no_scan_to_speak_of():
 def test_marginalised_keeps_the_weight_of_each_label_set():
     scene = linear_scene()
     tracker, rng = scene.glmb_filter(marginalised=True), np.random.default_rng(0)
-    expected, _ = oracle.step(oracle.no_target(), scene.plain_births(0), list(scene.scans[0]), scene.plain)
-    posterior, _ = tracker.step(tracker.initial(), scene.scans[0], scene.pose, DT, 0, rng=rng)
+    expected, _ = oracle.step(oracle.no_target(), scene.plain_births(1), list(scene.scans[0]), scene.plain)
+    posterior, _ = tracker.step(tracker.initial(), scene.scans[0], scene.pose, DT, 1, rng=rng)
     posterior.validate()
     assert posterior.is_marginalised
     weights = oracle.label_set_weights(plain_glmb(posterior))

@@ -103,7 +103,7 @@ def test_filter_equals_enumeration(name):
     scene = SCENES[name]()
     tracker, rng = scene.lmb_filter(), np.random.default_rng(0)
     belief, plain = tracker.initial(), reference.Lmb()
-    for step, scan in enumerate(scene.scans):
+    for step, scan in enumerate(scene.scans, 1):
         plain = oracle.lmb_step(plain, scene.plain_births(step), list(scan), scene.plain)
         plain = {label: (existence, together(mixture)) for label, (existence, mixture) in plain.items()}
         belief, info = tracker.step(belief, scan, scene.pose, DT, step, rng=rng)
@@ -131,9 +131,9 @@ def test_caps_drop_and_count():
     scene = linear_scene()
     rng = np.random.default_rng(0)
     limits = Limits(min_existence=0.0, max_labels=1, max_components=2, merge_distance=0.0, min_component_weight=0.0)
-    exact, _ = scene.lmb_filter().step(scene.lmb_filter().initial(), scene.scans[0], scene.pose, DT, 0, rng=rng)
+    exact, _ = scene.lmb_filter().step(scene.lmb_filter().initial(), scene.scans[0], scene.pose, DT, 1, rng=rng)
     capped, info = scene.lmb_filter(limits=limits).step(
-        scene.lmb_filter().initial(), scene.scans[0], scene.pose, DT, 0, rng=rng
+        scene.lmb_filter().initial(), scene.scans[0], scene.pose, DT, 1, rng=rng
     )
     capped.validate()
     order = np.argsort(-exact.existence)
@@ -143,7 +143,7 @@ def test_caps_drop_and_count():
     assert len(capped.tracks.log_weights) == 2
     threshold = float(np.mean(exact.existence))
     few, few_info = scene.lmb_filter(limits=Limits(min_existence=threshold)).step(
-        scene.lmb_filter().initial(), scene.scans[0], scene.pose, DT, 0, rng=rng
+        scene.lmb_filter().initial(), scene.scans[0], scene.pose, DT, 1, rng=rng
     )
     assert np.all(few.existence_logit >= logit(threshold))
     assert few_info.dropped_existence > 0.0

@@ -83,7 +83,7 @@ def test_certain_detection(kind: Any) -> None:
     belief, _ = step(tracker, [[10.0, 10.0], [50.0, 50.0]])
     belief.validate()
     assert belief.expected_number == pytest.approx(2.0, abs=0.2)
-    later, info = step(tracker, [], belief, number=1)
+    later, info = step(tracker, [], belief, number=2)
     later.validate()
     assert later.expected_number < 1e-6
     assert info.num_tracks == 0
@@ -176,7 +176,7 @@ def test_hundreds_of_scans_stay_valid_and_bounded(kind: Any) -> None:
     tracker = kind(local.motion, local.survival, local.birth, local.sensor, limits)
     scene, belief, rng = Scene(4), tracker.initial(), np.random.default_rng(0)
     for number in range(300 if JIT_ENABLED else 5):
-        belief, info = tracker.step(belief, scene.scan(number), np.array([900.0, 900.0, 0.0]), 1.0, number, rng=rng)
+        belief, info = tracker.step(belief, scene.scan(number), np.array([900.0, 900.0, 0.0]), 1.0, number + 1, rng=rng)
         belief.validate()
         assert info.num_tracks <= (50 if kind is CbMemberFilter else 40)
         distribution = cardinality_distribution(belief)
@@ -217,7 +217,7 @@ def test_the_expected_number_is_unbiased_on_a_clean_scene(kind: Any) -> None:
             ]
             states = np.vstack([states, *born])
             scan = simulate_scan(states, np.zeros(3), tracker.sensor, rng=rng).measurements
-            belief, _ = tracker.step(belief, scan, np.zeros(3), 1.0, number, rng=rng)
+            belief, _ = tracker.step(belief, scan, np.zeros(3), 1.0, number + 1, rng=rng)
             error += belief.expected_number - len(states)
             numbers.append(len(states))
         errors.append(error / 20)

@@ -51,7 +51,7 @@ def test_phd_is_the_intensity_of_the_exact_posterior_of_a_poisson_prior(name: st
     scene = SCENES[name]()
     tracker, rng = make(PhdFilter, scene), np.random.default_rng(0)
     belief = tracker.initial()
-    for step, scan in enumerate(scene.scans):
+    for step, scan in enumerate(scene.scans, 1):
         posterior, info = tracker.step(belief, scan, scene.pose, DT, step, rng=rng)
         posterior.validate()
         predicted = unlabelled.predict_intensity(mixture_of(belief), births_of(scene, step), scene.plain)
@@ -70,7 +70,7 @@ def test_cphd_is_cardinality_and_intensity_of_the_exact_posterior_of_an_iid_clus
     scene = SCENES[name]()
     tracker, rng = make(CphdFilter, scene), np.random.default_rng(0)
     belief = tracker.initial()
-    for step, scan in enumerate(scene.scans):
+    for step, scan in enumerate(scene.scans, 1):
         posterior, info = tracker.step(belief, scan, scene.pose, DT, step, rng=rng)
         posterior.validate()
         births = births_of(scene, step)
@@ -94,7 +94,7 @@ def test_cb_member_is_what_the_formulas_say(name: str) -> None:
     scene = SCENES[name]()
     tracker, rng = make(CbMemberFilter, scene), np.random.default_rng(0)
     belief = tracker.initial()
-    for step, scan in enumerate(scene.scans):
+    for step, scan in enumerate(scene.scans, 1):
         posterior, info = tracker.step(belief, scan, scene.pose, DT, step, rng=rng)
         posterior.validate()
         predicted = unlabelled.predict_bernoullis(bernoullis_of(belief), births_of(scene, step), scene.plain)
@@ -116,7 +116,7 @@ def test_gates_and_caps_at_rest_change_next_to_nothing(kind, name: str) -> None:
     limits = Limits(merge_distance=0.0, min_component_weight=0.0, min_existence=0.0, min_relative_weight=0.0)
     exact, kept = make(kind, scene), make(kind, scene, limits)
     beliefs, rng = [exact.initial(), kept.initial()], np.random.default_rng(0)
-    for step, scan in enumerate(scene.scans):
+    for step, scan in enumerate(scene.scans, 1):
         beliefs = [
             tracker.step(belief, scan, scene.pose, DT, step, rng=rng)[0]
             for tracker, belief in zip((exact, kept), beliefs, strict=True)

@@ -13,6 +13,7 @@ from scipy.special import logit
 from densities.examples import lmbs, random_glmb, random_lmb
 from fusion.examples import A, B, C, lmb, mixture_track
 from vedette.densities import LMB, Poisson, TrackTable, glmb_to_lmb
+from vedette.densities.checks import unchecked
 from vedette.errors import InputError
 from vedette.fusion import Clmb
 
@@ -125,4 +126,4 @@ def test_bad_input():
         Clmb((0.5, 0.4))
     tracks = TrackTable.from_gaussians([B, A], [[0.0], [1.0]], np.ones((2, 1, 1)))
     with pytest.raises(InputError, match=r"beliefs\[0\].*increasing order"):
-        Clmb(HALVES).fuse([LMB(tracks, np.zeros(2)), belief])
+        Clmb(HALVES).fuse([unchecked(LMB, tracks, np.zeros(2)), belief])

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from densities.examples import glmbs, random_glmb
 from fusion.examples import ALL_SETS, A, B, C, assert_same_glmb, by_label_set, full_glmbs, glmb
 from vedette.densities import GLMB, LMB, TrackTable, marginalise
+from vedette.densities.checks import unchecked
 from vedette.errors import InputError
 from vedette.fusion import CmDeltaGlmb, FusionLimits
 
@@ -106,18 +107,13 @@ def test_a_truncated_label_set_gets_a_floor_and_the_marginal_density():
     assert (info.num_missing_sets, info.num_missing_labels, info.empty_intersection) == (1, 0, False)
     # The same with the set written out: the floor, and of each label the only density that the sensor has.
     tracks = second.tracks
-    filled = GLMB(tracks, np.array([0, 0, 1, 2, 4]), np.array([0, 1, 0, 1]), np.log([0.1, 0.6, 0.3, 1e-3]))
-    got, expected = by_label_set(fused), by_label_set(_fuse_unnormalised(first, filled))
+    log_weights = np.log([0.1, 0.6, 0.3, 1e-3]) - math.log(1.001)
+    filled = GLMB(tracks, np.array([0, 0, 1, 2, 4]), np.array([0, 1, 0, 1]), log_weights)
+    got, expected = by_label_set(fused), by_label_set(CmDeltaGlmb(HALVES).fuse([first, filled])[0])
     for labels in ALL_SETS:
         assert got[labels][0] == pytest.approx(expected[labels][0], rel=1e-12)
         for label in labels:
             assert got[labels][1][label][0] == pytest.approx(expected[labels][1][label][0], rel=1e-12)
-
-
-def _fuse_unnormalised(first: GLMB, second: GLMB) -> GLMB:
-    total = float(np.exp(second.hyp_log_weights).sum())
-    scaled = GLMB(second.tracks, second.hyp_offsets, second.hyp_tracks, second.hyp_log_weights - math.log(total))
-    return CmDeltaGlmb(HALVES).fuse([first, scaled])[0]
 
 
 def test_the_floor_is_never_above_the_weights_that_are_there():
@@ -218,8 +214,8 @@ def test_beliefs_that_cannot_be_fused():
         CmDeltaGlmb(HALVES).fuse([one, LMB.empty(1)])  # type: ignore[list-item]
     with pytest.raises(InputError, match="expected 2, one for each fusion weight; got 1"):
         CmDeltaGlmb(HALVES).fuse([one])
-    bad = TrackTable(one.tracks.labels, one.tracks.offsets, one.tracks.log_weights, one.tracks.means, -one.tracks.covs)
+    bad = unchecked(TrackTable, *one.tracks.to_kernel()[:4], -one.tracks.covs)
     with pytest.raises(InputError, match=r"beliefs\[0\].*positive definite"):
-        CmDeltaGlmb(HALVES).fuse([GLMB(bad, one.hyp_offsets, one.hyp_tracks, one.hyp_log_weights), one])
+        CmDeltaGlmb(HALVES).fuse([unchecked(GLMB, bad, one.hyp_offsets, one.hyp_tracks, one.hyp_log_weights), one])
     with pytest.raises(InputError, match="quadrature"):
         CmDeltaGlmb(HALVES, "quadrature").fuse([GLMB.empty(9)] * 2)

@@ -82,3 +82,16 @@ def test_a_folder_that_cannot_be_written_leaves_the_kernel_compiled_in_memory(tm
     environment = {**os.environ, "VEDETTE_CACHE_DIR": str(tmp_path / "file" / "below")}
     result = subprocess.run([sys.executable, "-c", PROGRAM, str(tmp_path), "float64"], env=environment, check=False)
     assert result.returncode == 0
+
+
+def test_a_file_may_be_a_script_and_a_module(tmp_path: Path) -> None:
+    """What was compiled under the one name is of no use under the other, and does no harm."""
+    (tmp_path / "package").mkdir()
+    (tmp_path / "package" / "own.py").write_text(
+        "from vedette.models import model_function\n\n\n"
+        "@model_function('prob_survival')\ndef own(state, dt, params):\n    return params[0]\n"
+    )
+    for arguments, folder in ((["-m", "package.own"], tmp_path), (["-c", "import own"], tmp_path / "package")) * 2:
+        command = [sys.executable, "-W", "error", *arguments]
+        result = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=600, check=False)
+        assert result.returncode == 0, result.stderr

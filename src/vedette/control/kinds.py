@@ -15,6 +15,7 @@ from vedette.control.priors import LabelSet, offsets_of
 from vedette.control.pseudo import PseudoPosteriors
 from vedette.control.threads import run_chunks
 from vedette.densities import GLMB, LMB
+from vedette.densities.checks import unchecked
 from vedette.densities.conversions import lmb_on_label_sets
 from vedette.fusion import Clmb, Fusion
 from vedette.kernels.pseudo_glmb import GlmbResults
@@ -65,4 +66,4 @@ def _on_label_sets(lmb: LMB, sets: Sequence[LabelSet]) -> GLMB:
     scale of the weights, and so it is defined also where the GLMB lacks that label in every set.
     """
     logits = np.clip(lmb.existence_logit, -_ALL_BUT_CERTAIN, _ALL_BUT_CERTAIN)
-    return lmb_on_label_sets(LMB(lmb.tracks, logits), sets)
+    return lmb_on_label_sets(unchecked(LMB, lmb.tracks, logits), sets)

@@ -15,6 +15,7 @@ from vedette.control.inputs import Belief
 from vedette.control.priors import Label, LabelSet, label_sets, offsets_of, single_labels, take_hypotheses
 from vedette.control.pseudo import PseudoPosteriors
 from vedette.densities import GLMB, LMB
+from vedette.densities.checks import unchecked
 from vedette.fusion.tracks import take_tracks
 from vedette.kernels.planning import fill_missing
 from vedette.kernels.types import Bools, Floats, Ints
@@ -42,7 +43,7 @@ def common_layout(prediction: Belief, posteriors: Sequence[PseudoPosteriors]) ->
     if isinstance(prediction, GLMB):
         common = take_hypotheses(prediction, places)
     else:
-        common = LMB(take_tracks(prediction.tracks, places), prediction.existence_logit[places])
+        common = unchecked(LMB, take_tracks(prediction.tracks, places), prediction.existence_logit[places])
     members = common.hyp_tracks if isinstance(common, GLMB) else np.arange(len(places))
     chosen = tuple(sets[i] for i in places.tolist())
     references = np.ascontiguousarray(common.tracks.means[members])

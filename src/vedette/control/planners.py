@@ -18,6 +18,7 @@ from vedette.control.search import ExhaustiveSearch, JointProblem, JointSearch, 
 from vedette.control.settings import MobileSensor, PlanningSettings
 from vedette.fusion import Fusion
 from vedette.kernels.types import Floats
+from vedette.models.arguments import generator
 
 
 class Planner(Protocol):
@@ -71,6 +72,7 @@ class JointPlanner:
             InputError: inputs that do not fit, or more joint actions than the search takes.
             ModelError, NumericalError: as the filters; a reward that is not finite.
         """
+        generator(rng)
         evaluator = Evaluator.prepare(
             self.sensors, self.fusion, self.settings, self.reward, beliefs, fused, poses, rng=rng
         )
@@ -107,6 +109,7 @@ class IndependentPlanner:
 
     def plan(self, beliefs: Sequence[Belief], fused: Belief, poses: Floats, *, rng: np.random.Generator) -> Plan:
         """Each sensor's action of largest mean reward; arguments, ties and errors as `JointPlanner.plan`."""
+        generator(rng)
         evaluator = Evaluator.prepare(
             self.sensors, self.fusion, self.settings, self.reward, beliefs, fused, poses, rng=rng
         )
@@ -133,6 +136,7 @@ class RandomPlanner:
 
     def plan(self, beliefs: Sequence[Belief], fused: Belief, poses: Floats, *, rng: np.random.Generator) -> Plan:
         """Drawn from `rng`; the beliefs are not looked at."""
+        generator(rng)
         headings, _ = check_situation(self.sensors, poses)
         chosen = []
         for values in headings:
@@ -164,6 +168,7 @@ class FixedPlanner:
 
     def plan(self, beliefs: Sequence[Belief], fused: Belief, poses: Floats, *, rng: np.random.Generator) -> Plan:
         """The set courses, whatever is believed."""
+        generator(rng)
         check_poses(poses, len(self.headings_deg))
         headings = tuple(np.radians([float(heading)]) for heading in self.headings_deg)
         return Plan(self.name, headings, (0,) * len(headings), (), {})

@@ -8,6 +8,7 @@ import numpy as np
 
 from vedette.control.inputs import Belief
 from vedette.densities import GLMB, LMB, TrackTable, marginalise, track_moments
+from vedette.densities.checks import unchecked
 from vedette.filters import LocalFilter
 from vedette.filters.inputs import model_errors
 from vedette.fusion.tracks import take_tracks
@@ -26,7 +27,7 @@ def heaviest_hypotheses(belief: GLMB, most: int) -> GLMB:
     order = np.argsort(-belief.hyp_log_weights, kind="stable")[:most]
     taken = take_hypotheses(belief, order[belief.hyp_log_weights[order] > -np.inf])
     log_weights = taken.hyp_log_weights - log_sum(taken.hyp_log_weights)
-    return GLMB(taken.tracks, taken.hyp_offsets, taken.hyp_tracks, log_weights)
+    return unchecked(GLMB, taken.tracks, taken.hyp_offsets, taken.hyp_tracks, log_weights)
 
 
 def single_gaussians(tracks: TrackTable) -> TrackTable:
@@ -34,7 +35,7 @@ def single_gaussians(tracks: TrackTable) -> TrackTable:
     num = tracks.num_tracks
     if len(tracks.log_weights) == num:
         return tracks
-    return TrackTable(tracks.labels, np.arange(num + 1), np.zeros(num), *track_moments(tracks))
+    return unchecked(TrackTable, tracks.labels, np.arange(num + 1), np.zeros(num), *track_moments(tracks))
 
 
 def take_hypotheses(belief: GLMB, places: Ints) -> GLMB:
@@ -43,8 +44,12 @@ def take_hypotheses(belief: GLMB, places: Ints) -> GLMB:
     offsets = offsets_of(sizes)
     entries = np.repeat(belief.hyp_offsets[places] - offsets[:-1], sizes) + np.arange(offsets[-1])
     used, renumbered = np.unique(belief.hyp_tracks[entries], return_inverse=True)
-    return GLMB(
-        take_tracks(belief.tracks, used), offsets, np.asarray(renumbered, np.int64), belief.hyp_log_weights[places]
+    return unchecked(
+        GLMB,
+        take_tracks(belief.tracks, used),
+        offsets,
+        np.asarray(renumbered, np.int64),
+        belief.hyp_log_weights[places],
     )
 
 
@@ -92,7 +97,7 @@ def predicted(fused: Belief, local: LocalFilter, num_steps: int, period: float) 
             kernel_motion(local.motion, constant_survival(1.0)), float(period), int(num_steps), means, covs
         )
     num = single.tracks.num_tracks
-    tracks = TrackTable(single.tracks.labels, np.arange(num + 1), np.zeros(num), means, covs)
+    tracks = unchecked(TrackTable, single.tracks.labels, np.arange(num + 1), np.zeros(num), means, covs)
     if isinstance(single, LMB):
-        return LMB(tracks, single.existence_logit)
-    return GLMB(tracks, single.hyp_offsets, single.hyp_tracks, single.hyp_log_weights)
+        return unchecked(LMB, tracks, single.existence_logit)
+    return unchecked(GLMB, tracks, single.hyp_offsets, single.hyp_tracks, single.hyp_log_weights)

@@ -20,6 +20,7 @@ from vedette.control.priors import (
 from vedette.control.settings import IDEAL_MODES, MobileSensor, PlanningSettings
 from vedette.control.threads import run_chunks
 from vedette.densities import GLMB, LMB, TrackTable, sample_glmb, sample_lmb
+from vedette.densities.checks import unchecked
 from vedette.filters.inputs import model_errors
 from vedette.kernels.ideal import Decision, Futures, Horizon, propagate_samples
 from vedette.kernels.pseudo_glmb import GlmbResults, pseudo_update_glmb
@@ -103,7 +104,7 @@ def pseudo_posteriors(
 
 def _run_glmb(belief: GLMB, decision: Decision, settings: PlanningSettings, num_cases: int) -> PseudoPosteriors:
     heaviest = heaviest_hypotheses(belief, settings.max_prior_hypotheses)
-    prior = GLMB(single_gaussians(heaviest.tracks), heaviest.hyp_offsets, heaviest.hyp_tracks, heaviest.hyp_log_weights)
+    prior = unchecked(GLMB, single_gaussians(heaviest.tracks), *heaviest.to_kernel()[1:])
     found, dim = label_sets(prior), prior.tracks.state_dim
     set_offsets = offsets_of([len(labels) for labels in found.sets])
     results = GlmbResults(
@@ -127,7 +128,7 @@ def _run_lmb(belief: LMB, decision: Decision, settings: PlanningSettings, num_ca
     results = LmbResults(
         np.empty((num_cases, num)), np.empty((num_cases, num, dim)), np.empty((num_cases, num, dim, dim))
     )
-    prior = LMB(single_gaussians(belief.tracks), belief.existence_logit).to_kernel()
+    prior = unchecked(LMB, single_gaussians(belief.tracks), belief.existence_logit).to_kernel()
 
     def work(first: int, last: int) -> None:
         pseudo_update_lmb(prior, decision, first, last, results)
@@ -142,9 +143,10 @@ def case_density(posteriors: PseudoPosteriors, case: int) -> Belief:
     labels = np.array([label for labels in posteriors.sets for label in labels], np.int64).reshape(-1, 2)
     num = len(labels)
     means, covs = posteriors.means[case].copy(), posteriors.covs[case].copy()
-    tracks = TrackTable(labels, np.arange(num + 1), np.zeros(num), means, covs)
+    tracks = unchecked(TrackTable, labels, np.arange(num + 1), np.zeros(num), means, covs)
     log_weights = posteriors.log_weights[case].copy()
     if posteriors.is_lmb:
-        return LMB(tracks, log_weights)
+        return unchecked(LMB, tracks, log_weights)
     offsets = offsets_of([len(labels) for labels in posteriors.sets])
-    return take_hypotheses(GLMB(tracks, offsets, np.arange(num), log_weights), np.flatnonzero(log_weights > -np.inf))
+    glmb = unchecked(GLMB, tracks, offsets, np.arange(num), log_weights)
+    return take_hypotheses(glmb, np.flatnonzero(log_weights > -np.inf))

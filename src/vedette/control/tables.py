@@ -18,6 +18,7 @@ from vedette.control.priors import offsets_of
 from vedette.control.pseudo import PseudoPosteriors
 from vedette.control.threads import run_chunks
 from vedette.densities import GLMB, LMB
+from vedette.densities.checks import unchecked
 from vedette.divergence import log_inner_product
 from vedette.errors import InputError
 from vedette.fusion import Clmb, CmDeltaGlmb
@@ -140,5 +141,5 @@ def _log_self_product(prediction: GLMB | LMB, unit_volume: float) -> float:
         return log_inner_product(prediction, prediction, unit_volume=unit_volume)
     total = float(np.logaddexp.reduce(prediction.hyp_log_weights))
     log_weights = prediction.hyp_log_weights - total
-    scaled = GLMB(prediction.tracks, prediction.hyp_offsets, prediction.hyp_tracks, log_weights)
+    scaled = unchecked(GLMB, prediction.tracks, prediction.hyp_offsets, prediction.hyp_tracks, log_weights)
     return log_inner_product(scaled, scaled, unit_volume=unit_volume) + 2.0 * total

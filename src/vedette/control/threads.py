@@ -1,22 +1,79 @@
-"""Sharing independent items of work over threads; kernels run without the interpreter lock."""
+"""Sharing independent items of work over threads, in pieces; kernels run without the interpreter lock."""
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
-from itertools import pairwise
+from concurrent.futures import Future, ThreadPoolExecutor, wait
+from dataclasses import dataclass, field
+from threading import Lock
+
+# s. An interruption (Ctrl-C) is answered between two pieces, and between two waits.
+_PIECE_TIME = 0.1
+_WAIT_TIME = 0.2
 
 
 def run_chunks(work: Callable[[int, int], None], num_items: int, num_threads: int) -> None:
-    """Call `work(first, last)` so that every item in range(num_items) is covered once.
+    """Call `work(first, last)`, piece after piece, so that every item in range(num_items) is covered once.
 
-    Each item writes its own results, so they do not depend on the number of threads. The first exception is raised.
+    Each item writes its own results, so they depend neither on the pieces nor on the number of threads. Of several
+    exceptions that of the first item is raised. An interruption is raised when the pieces that have begun are done:
+    each takes about a tenth of a second, or as long as its one item.
     """
-    num_chunks = max(1, min(num_threads, num_items))
-    if num_chunks == 1:
-        work(0, num_items)
-        return
-    bounds = [num_items * i // num_chunks for i in range(num_chunks + 1)]
-    with ThreadPoolExecutor(num_chunks) as pool:
-        for done in [pool.submit(work, first, last) for first, last in pairwise(bounds)]:
-            done.result()
+    num_workers = max(1, min(num_threads, num_items))
+    pieces = _Pieces(work, num_items, num_workers)
+    if num_workers == 1:
+        pieces.run()
+    else:
+        with ThreadPoolExecutor(num_workers) as pool:
+            try:
+                _wait_for({pool.submit(pieces.run) for _ in range(num_workers)})
+            finally:
+                pieces.stop()
+    if pieces.faults:
+        raise min(pieces.faults, key=lambda fault: fault[0])[1]
+
+
+def _wait_for(running: set[Future[None]]) -> None:
+    while running:
+        finished, running = wait(running, timeout=_WAIT_TIME)  # without an end, it could not be interrupted everywhere
+        for one in finished:
+            one.result()
+
+
+@dataclass(slots=True)
+class _Pieces:
+    """The items that are left, handed out in order; so all before one that fails have begun, and are finished."""
+
+    work: Callable[[int, int], None]
+    num_items: int
+    num_workers: int
+    next_item: int = 0
+    faults: list[tuple[int, Exception]] = field(default_factory=list)
+    lock: Lock = field(default_factory=Lock)
+
+    def run(self) -> None:
+        """Work on pieces until none is left."""
+        most = 1
+        while (piece := self._take(most))[0] < piece[1]:
+            first, last = piece
+            began = time.perf_counter()
+            try:
+                self.work(first, last)
+            except Exception as fault:
+                self.faults.append((first, fault))
+                self.stop()
+            rate = (last - first) / max(time.perf_counter() - began, 1e-9)
+            most = max(1, min(2 * most, int(rate * _PIECE_TIME)))
+
+    def stop(self) -> None:
+        """Hand out no more."""
+        with self.lock:
+            self.num_items = self.next_item
+
+    def _take(self, most: int) -> tuple[int, int]:
+        with self.lock:
+            first = self.next_item
+            fair = -(-(self.num_items - first) // self.num_workers)
+            self.next_item = first + min(most, fair)
+            return first, self.next_item

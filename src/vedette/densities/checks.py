@@ -1,5 +1,8 @@
 """Checks that the containers share. Each raises with the field's name, what was expected and what came.
 
+A container checks itself when it is made, since kernels go by its offsets and indices without looking; those of the
+library's own making are made by `unchecked`.
+
 Faults of form (type, shape, order) raise `InputError`. Faults of value (not finite, not normalised, not positive
 definite) raise the `error` given: `NumericalError` where a computation left them, `InputError` for a user's data.
 """
@@ -7,27 +10,43 @@ definite) raise the `error` given: `NumericalError` where a computation left the
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vedette.errors import InputError, NumericalError, VedetteError
 from vedette.kernels.types import Bools, Floats, Ints
+from vedette.models.arguments import as_array
+
+_Container = TypeVar("_Container")
 
 NORMALISATION_TOLERANCE = 1e-9
 SYMMETRY_TOLERANCE = 1e-9  # of the largest variance
 
 
+def unchecked(container: type[_Container], *fields: Any) -> _Container:
+    """A container of the library's own making, of which the checks would cost more than some steps."""
+    made = object.__new__(container)
+    for name, value in zip(container.__match_args__, fields, strict=True):  # type: ignore[attr-defined]
+        object.__setattr__(made, name, value)
+    return made
+
+
 def check_array(field: str, array: Any, dtype: type, shape: Sequence[int | None]) -> None:
-    """Raise `InputError` unless `array` is a C-contiguous array of this type and shape (None: any length)."""
-    if not isinstance(array, np.ndarray):
+    """Raise `InputError` unless `array` is a C-contiguous array of this type and shape (None: any length).
+
+    Of any other array, a read-only one too, Numba would compile everything anew, for minutes.
+    """
+    if type(array) is not np.ndarray:
         raise InputError(f"{field}: expected an array of {np.dtype(dtype)}; got {type(array).__name__}")
     if array.dtype != np.dtype(dtype):
         raise InputError(f"{field}: expected an array of {np.dtype(dtype)}; got one of {array.dtype}")
     check_shape(field, array, shape)
     if not array.flags.c_contiguous:
         raise InputError(f"{field}: expected a C-contiguous array; got strides {array.strides}")
+    if not (array.flags.writeable and array.flags.aligned):
+        raise InputError(f"{field}: expected a writeable, aligned array; got one that is not (make a copy)")
 
 
 def check_shape(field: str, array: NDArray[Any], shape: Sequence[int | None]) -> None:
@@ -91,7 +110,7 @@ def check_normalised(
         place = _first(faulty)
         run = f"{field}[{offsets[place]}:{offsets[place + 1]}]"
         with np.errstate(over="ignore"):
-            total = np.exp(log_sums[place])
+            total = float(np.exp(log_sums[place]))
         raise error(f"{run}: expected weights that sum to 1; got {total!r}")
 
 
@@ -161,13 +180,8 @@ def as_ints(field: str, values: Any, shape: Sequence[int | None]) -> Ints:
 
 
 def _given(field: str, values: Any, kinds: str, expected: str, shape: Sequence[int | None]) -> NDArray[Any]:
-    try:
-        given = np.asarray(values)
-    except (TypeError, ValueError, OverflowError) as fault:
-        raise InputError(f"{field}: expected an array of {expected}; {fault}") from None
+    given = as_array(field, values, kinds, f"an array of {expected}")
     if given.size == 0 and given.ndim < len(shape):
         given = given.reshape(0, *(0 if length is None else length for length in shape[1:]))
-    if given.size and given.dtype.kind not in kinds:
-        raise InputError(f"{field}: expected an array of {expected}; got one of {given.dtype}")
     check_shape(field, given, shape)
     return given

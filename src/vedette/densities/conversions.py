@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.special import log_expit
 
+from vedette.densities.checks import unchecked
 from vedette.densities.glmb import GLMB
 from vedette.densities.lmb import LMB
 from vedette.errors import InputError
@@ -92,4 +93,5 @@ def lmb_on_label_sets(lmb: LMB, sets: Sequence[Sequence[tuple[int, int]]]) -> GL
         exists[h, hyp] = True
     log_weights = np.where(exists, log_expit(lmb.existence_logit), log_expit(-lmb.existence_logit)).sum(axis=1)
     offsets = np.cumsum([0, *(len(hyp) for hyp in hyps)])
-    return GLMB(lmb.tracks, offsets, np.array([track for hyp in hyps for track in hyp], np.int64), log_weights)
+    members = np.array([track for hyp in hyps for track in hyp], np.int64)
+    return unchecked(GLMB, lmb.tracks, offsets, members, log_weights)

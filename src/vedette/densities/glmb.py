@@ -25,12 +25,22 @@ class GLMB:
         hyp_offsets: (num_hyps + 1,) tracks of hypothesis `h` are `hyp_tracks[hyp_offsets[h]:hyp_offsets[h + 1]]`.
         hyp_tracks: indices into `tracks`, in increasing label order within a hypothesis.
         hyp_log_weights: (num_hyps,) normalised log weights.
+
+    The arrays are held, not copied, and checked once, here: who changes one later must call `validate` before its use.
+
+    Raises:
+        InputError: as `validate`.
     """
 
     tracks: TrackTable
     hyp_offsets: Ints
     hyp_tracks: Ints
     hyp_log_weights: Floats
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.tracks, TrackTable):
+            raise InputError(f"tracks: expected a TrackTable; got {type(self.tracks).__name__}")
+        self._validate_hypotheses(InputError)
 
     @property
     def num_hyps(self) -> int:
@@ -53,8 +63,8 @@ class GLMB:
 
     @classmethod
     def from_kernel(cls, glmb: kt.Glmb) -> GLMB:
-        """From the arrays that kernels work on."""
-        return cls(TrackTable.from_kernel(glmb.tracks), glmb.hyp_offsets, glmb.hyp_tracks, glmb.hyp_log_weights)
+        """The arrays of a bundle as they are; a kernel's own need no check."""
+        return checks.unchecked(cls, TrackTable.from_kernel(glmb.tracks), *glmb[1:])
 
     @classmethod
     def empty(cls, state_dim: int) -> GLMB:
@@ -76,9 +86,7 @@ class GLMB:
             _check_indices(f"hypotheses[{h}]", hyp, tracks.num_tracks)
             hyps[h] = hyp[np.lexsort(tracks.labels[hyp].T[::-1])]
         hyp_offsets = np.cumsum([0, *(len(hyp) for hyp in hyps)])
-        glmb = cls(tracks, hyp_offsets, np.concatenate([np.empty(0, np.int64), *hyps]), hyp_log_weights)
-        glmb.validate(error=InputError)
-        return glmb
+        return cls(tracks, hyp_offsets, np.concatenate([np.empty(0, np.int64), *hyps]), hyp_log_weights)
 
     def validate(self, *, error: type[VedetteError] = NumericalError) -> None:
         """Raise unless this is a normalised density over tracks that exist, in label order, no label twice in one.
@@ -87,6 +95,9 @@ class GLMB:
         that are not symmetric positive definite.
         """
         self.tracks.validate(error=error)
+        self._validate_hypotheses(error)
+
+    def _validate_hypotheses(self, error: type[VedetteError]) -> None:
         checks.check_array("hyp_log_weights", self.hyp_log_weights, np.float64, (None,))
         if self.num_hyps == 0:
             raise InputError("hyp_log_weights: expected at least one hypothesis; got none")

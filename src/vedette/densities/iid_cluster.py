@@ -26,12 +26,20 @@ class IidCluster:
             where the density is certain of no target.
         means: (num_components, state_dim).
         covs: (num_components, state_dim, state_dim).
+
+    The arrays are held, not copied, and checked once, here: who changes one later must call `validate` before its use.
+
+    Raises:
+        InputError: as `validate`.
     """
 
     log_cardinality: Floats
     log_weights: Floats
     means: Floats
     covs: Floats
+
+    def __post_init__(self) -> None:
+        self.validate(error=InputError)
 
     @property
     def state_dim(self) -> int:
@@ -49,8 +57,8 @@ class IidCluster:
 
     @classmethod
     def from_kernel(cls, log_cardinality: Floats, mixture: kt.Mixture) -> IidCluster:
-        """From the arrays that kernels work on."""
-        return cls(log_cardinality, *mixture)
+        """The arrays of a bundle as they are; a kernel's own need no check."""
+        return checks.unchecked(cls, log_cardinality, *mixture)
 
     @classmethod
     def empty(cls, state_dim: int) -> IidCluster:
@@ -68,9 +76,7 @@ class IidCluster:
         log_cardinality, logs = logs_of("cardinality", cardinality), logs_of("weights", weights)
         checked_means = checks.as_floats("means", means, (len(logs), None))
         dim = checked_means.shape[1]
-        cluster = cls(log_cardinality, logs, checked_means, checks.as_floats("covs", covs, (len(logs), dim, dim)))
-        cluster.validate(error=InputError)
-        return cluster
+        return cls(log_cardinality, logs, checked_means, checks.as_floats("covs", covs, (len(logs), dim, dim)))
 
     def validate(self, *, error: type[VedetteError] = NumericalError) -> None:
         """Raise unless the cardinalities and the weights are normalised and every component is a Gaussian.

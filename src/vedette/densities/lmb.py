@@ -23,10 +23,20 @@ class LMB:
         tracks: one track a label, in increasing label order.
         existence_logit: (num_tracks,) log r - log(1 - r); keeps full precision near r = 0 and r = 1, where it may be
             -inf and inf.
+
+    The arrays are held, not copied, and checked once, here: who changes one later must call `validate` before its use.
+
+    Raises:
+        InputError: as `validate`.
     """
 
     tracks: TrackTable
     existence_logit: Floats
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.tracks, TrackTable):
+            raise InputError(f"tracks: expected a TrackTable; got {type(self.tracks).__name__}")
+        self._validate_existence(InputError)
 
     @property
     def existence(self) -> Floats:
@@ -44,8 +54,8 @@ class LMB:
 
     @classmethod
     def from_kernel(cls, lmb: kt.Lmb) -> LMB:
-        """From the arrays that kernels work on."""
-        return cls(TrackTable.from_kernel(lmb.tracks), lmb.existence_logit)
+        """The arrays of a bundle as they are; a kernel's own need no check."""
+        return checks.unchecked(cls, TrackTable.from_kernel(lmb.tracks), lmb.existence_logit)
 
     @classmethod
     def empty(cls, state_dim: int) -> LMB:
@@ -70,9 +80,7 @@ class LMB:
         tracks = TrackTable(
             given.labels[order], given.offsets, given.log_weights, given.means[order], given.covs[order]
         )
-        lmb = cls(tracks, logit[order])
-        lmb.validate(error=InputError)
-        return lmb
+        return cls(tracks, logit[order])
 
     def validate(self, *, error: type[VedetteError] = NumericalError) -> None:
         """Raise unless labels increase, existences are logits and every track is a probability density.
@@ -81,6 +89,9 @@ class LMB:
         that are not symmetric positive definite.
         """
         self.tracks.validate(error=error)
+        self._validate_existence(error)
+
+    def _validate_existence(self, error: type[VedetteError]) -> None:
         checks.check_array("existence_logit", self.existence_logit, np.float64, (self.tracks.num_tracks,))
         in_order = checks.label_step_up(self.tracks.labels)
         if not in_order.all():

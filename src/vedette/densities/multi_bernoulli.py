@@ -24,6 +24,11 @@ class MultiBernoulli:
         log_weights: (num_components,) log mixture weights, normalised within each Bernoulli.
         means: (num_components, state_dim).
         covs: (num_components, state_dim, state_dim), symmetric positive definite.
+
+    The arrays are held, not copied, and checked once, here: who changes one later must call `validate` before its use.
+
+    Raises:
+        InputError: as `validate`.
     """
 
     existence_logit: Floats
@@ -31,6 +36,9 @@ class MultiBernoulli:
     log_weights: Floats
     means: Floats
     covs: Floats
+
+    def __post_init__(self) -> None:
+        self.validate(error=InputError)
 
     @property
     def num_bernoullis(self) -> int:
@@ -59,8 +67,8 @@ class MultiBernoulli:
 
     @classmethod
     def from_kernel(cls, lmb: kt.Lmb) -> MultiBernoulli:
-        """The Bernoullis of a bundle, whatever their labels."""
-        return cls(lmb.existence_logit, *lmb.tracks[1:])
+        """The Bernoullis of a bundle, whatever their labels; a kernel's own need no check."""
+        return checks.unchecked(cls, lmb.existence_logit, *lmb.tracks[1:])
 
     @classmethod
     def empty(cls, state_dim: int) -> MultiBernoulli:
@@ -85,9 +93,7 @@ class MultiBernoulli:
         with np.errstate(divide="ignore"):
             logit = np.log(probabilities) - np.log1p(-probabilities)
         checked_covs = checks.as_floats("covs", covs, (num, dim, dim))
-        density = cls(logit, np.arange(num + 1), np.zeros(num), checked_means, checked_covs)
-        density.validate(error=InputError)
-        return density
+        return cls(logit, np.arange(num + 1), np.zeros(num), checked_means, checked_covs)
 
     def validate(self, *, error: type[VedetteError] = NumericalError) -> None:
         """Raise unless existences are logits and every Bernoulli's mixture is a probability density.

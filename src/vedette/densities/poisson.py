@@ -22,11 +22,19 @@ class Poisson:
         log_weights: (num_components,) log of the expected number of targets that each component carries.
         means: (num_components, state_dim).
         covs: (num_components, state_dim, state_dim).
+
+    The arrays are held, not copied, and checked once, here: who changes one later must call `validate` before its use.
+
+    Raises:
+        InputError: as `validate`.
     """
 
     log_weights: Floats
     means: Floats
     covs: Floats
+
+    def __post_init__(self) -> None:
+        self.validate(error=InputError)
 
     @property
     def state_dim(self) -> int:
@@ -44,8 +52,8 @@ class Poisson:
 
     @classmethod
     def from_kernel(cls, mixture: kt.Mixture) -> Poisson:
-        """From the arrays that kernels work on."""
-        return cls(*mixture)
+        """The arrays of a bundle as they are; a kernel's own need no check."""
+        return checks.unchecked(cls, *mixture)
 
     @classmethod
     def empty(cls, state_dim: int) -> Poisson:
@@ -63,9 +71,7 @@ class Poisson:
         logs = log_weights("expected_numbers", expected_numbers)
         checked_means = checks.as_floats("means", means, (len(logs), None))
         dim = checked_means.shape[1]
-        poisson = cls(logs, checked_means, checks.as_floats("covs", covs, (len(logs), dim, dim)))
-        poisson.validate(error=InputError)
-        return poisson
+        return cls(logs, checked_means, checks.as_floats("covs", covs, (len(logs), dim, dim)))
 
     def validate(self, *, error: type[VedetteError] = NumericalError) -> None:
         """Raise unless every array has its type and shape and every component is a Gaussian.

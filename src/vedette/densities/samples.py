@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import numbers
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -15,6 +17,7 @@ from vedette.densities.poisson import Poisson
 from vedette.densities.tracks import TrackTable
 from vedette.errors import InputError, NumericalError, VedetteError
 from vedette.kernels.types import Floats, Ints
+from vedette.models.arguments import generator
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +60,7 @@ class MultiTargetSamples:
 
 def sample_glmb(density: GLMB, num_samples: int, *, rng: np.random.Generator) -> MultiTargetSamples:
     """Independent samples of a GLMB: a hypothesis, then a state of each of its tracks."""
-    _check_number(num_samples)
+    _check(num_samples, rng)
     hyps = _choose(density.hyp_log_weights, np.array([0, density.num_hyps]), np.zeros(num_samples, np.int64), rng)
     sizes = np.diff(density.hyp_offsets)[hyps]
     offsets = np.concatenate([np.zeros(1, np.int64), np.cumsum(sizes)])
@@ -68,7 +71,7 @@ def sample_glmb(density: GLMB, num_samples: int, *, rng: np.random.Generator) ->
 
 def sample_lmb(density: LMB, num_samples: int, *, rng: np.random.Generator) -> MultiTargetSamples:
     """Independent samples of an LMB: each track exists or not, then a state of each that does."""
-    _check_number(num_samples)
+    _check(num_samples, rng)
     exists = rng.random((num_samples, density.tracks.num_tracks)) < density.existence
     tracks = np.nonzero(exists)[1]
     offsets = np.concatenate([np.zeros(1, np.int64), np.cumsum(exists.sum(axis=1))])
@@ -77,13 +80,13 @@ def sample_lmb(density: LMB, num_samples: int, *, rng: np.random.Generator) -> M
 
 def sample_poisson(density: Poisson, num_samples: int, *, rng: np.random.Generator) -> MultiTargetSamples:
     """Independent samples of a Poisson density: a number of targets, then independent states."""
-    _check_number(num_samples)
+    _check(num_samples, rng)
     return _alike(density, rng.poisson(density.expected_number, num_samples), rng)
 
 
 def sample_iid_cluster(density: IidCluster, num_samples: int, *, rng: np.random.Generator) -> MultiTargetSamples:
     """Independent samples of an iid cluster: a number of targets, then independent states."""
-    _check_number(num_samples)
+    _check(num_samples, rng)
     all_numbers = np.array([0, len(density.log_cardinality)])
     return _alike(density, _choose(density.log_cardinality, all_numbers, np.zeros(num_samples, np.int64), rng), rng)
 
@@ -92,7 +95,7 @@ def sample_multi_bernoulli(
     density: MultiBernoulli, num_samples: int, *, rng: np.random.Generator
 ) -> MultiTargetSamples:
     """Independent samples of a multi-Bernoulli: each Bernoulli exists or not, then a state of each that does."""
-    _check_number(num_samples)
+    _check(num_samples, rng)
     exists = rng.random((num_samples, density.num_bernoullis)) < density.existence
     chosen = np.nonzero(exists)[1]
     offsets = np.concatenate([np.zeros(1, np.int64), np.cumsum(exists.sum(axis=1))])
@@ -121,9 +124,10 @@ def _unlabelled(
     return MultiTargetSamples(offsets, labels, _draw_gaussians(density.means, density.covs, components, rng))
 
 
-def _check_number(num_samples: int) -> None:
-    if num_samples < 0:
-        raise InputError(f"num_samples: expected at least 0; got {num_samples}")
+def _check(num_samples: Any, rng: Any) -> None:
+    if isinstance(num_samples, bool) or not isinstance(num_samples, numbers.Integral) or num_samples < 0:
+        raise InputError(f"num_samples: expected a whole number of at least 0; got {num_samples!r}")
+    generator(rng)
 
 
 def _choose(log_weights: Floats, offsets: Ints, runs: Ints, rng: np.random.Generator) -> Ints:

@@ -24,6 +24,11 @@ class TrackTable:
         log_weights: (num_components,) log mixture weights, normalised within each track.
         means: (num_components, state_dim).
         covs: (num_components, state_dim, state_dim), symmetric positive definite.
+
+    The arrays are held, not copied, and checked once, here: who changes one later must call `validate` before its use.
+
+    Raises:
+        InputError: as `validate`.
     """
 
     labels: Ints
@@ -31,6 +36,9 @@ class TrackTable:
     log_weights: Floats
     means: Floats
     covs: Floats
+
+    def __post_init__(self) -> None:
+        self.validate(error=InputError)
 
     @property
     def num_tracks(self) -> int:
@@ -48,8 +56,8 @@ class TrackTable:
 
     @classmethod
     def from_kernel(cls, tracks: kt.Tracks) -> TrackTable:
-        """From the arrays that kernels work on."""
-        return cls(*tracks)
+        """The arrays of a bundle as they are; a kernel's own need no check."""
+        return checks.unchecked(cls, *tracks)
 
     @classmethod
     def empty(cls, state_dim: int) -> TrackTable:
@@ -73,11 +81,8 @@ class TrackTable:
         num = len(checked)
         checked_means = checks.as_floats("means", means, (num, None))
         dim = checked_means.shape[1]
-        table = cls(
-            checked, np.arange(num + 1), np.zeros(num), checked_means, checks.as_floats("covs", covs, (num, dim, dim))
-        )
-        table.validate(error=InputError)
-        return table
+        checked_covs = checks.as_floats("covs", covs, (num, dim, dim))
+        return cls(checked, np.arange(num + 1), np.zeros(num), checked_means, checked_covs)
 
     @classmethod
     def from_mixtures(cls, labels: Any, mixtures: Sequence[tuple[Any, Any, Any]]) -> TrackTable:
@@ -97,9 +102,7 @@ class TrackTable:
             dim = means[0].shape[1]
             covs.append(checks.as_floats(f"mixtures[{i}] covs", mixture[2], (num, dim, dim)))
         offsets = np.cumsum([0, *(len(weight) for weight in weights)])
-        table = cls(checked, offsets, np.concatenate(weights), np.concatenate(means), np.concatenate(covs))
-        table.validate(error=InputError)
-        return table
+        return cls(checked, offsets, np.concatenate(weights), np.concatenate(means), np.concatenate(covs))
 
     def validate(self, *, error: type[VedetteError] = NumericalError) -> None:
         """Raise unless every array has its type and shape and every track is a probability density.

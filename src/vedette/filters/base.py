@@ -11,7 +11,7 @@ from vedette.filters.limits import Limits
 from vedette.kernels.truncation import Truncation
 from vedette.kernels.types import Floats, Lmb, Motion, Sensor
 from vedette.models import BirthModel, MotionModel, SensorModel, SurvivalModel, kernel_motion
-from vedette.models.arguments import pose_vector, positive
+from vedette.models.arguments import generator, pose_vector, positive
 
 StepArguments = tuple[Lmb, Floats, Floats, float, Motion, Sensor, Truncation]
 
@@ -52,5 +52,6 @@ class ModelledFilter:
             self.limits.truncation(self.sensor.meas_dim),
         )
 
-    def _check_scan(self, scan: Any) -> tuple[Floats, int]:
-        return check_scan(scan, self.sensor.meas_dim)
+    def _check_scan(self, scan: Any, rng: Any) -> tuple[Floats, int]:
+        generator(rng)
+        return check_scan(scan, self.sensor.measurement)

@@ -38,7 +38,7 @@ class CbMemberFilter(ModelledFilter):
 
         Nothing is drawn from `rng`; it is taken so that filters are interchangeable.
         """
-        measurements, num_duplicates = self._check_scan(scan)
+        measurements, num_duplicates = self._check_scan(scan, rng)
         prior = check_belief(belief, MultiBernoulli, self.motion.state_dim)
         arguments = self._arguments(measurements, pose, dt, step)
         limits = self.limits

@@ -23,7 +23,7 @@ from vedette.filters.limits import Limits
 from vedette.kernels.conversions import marginalise
 from vedette.kernels.glmb import step_gibbs, step_ranked
 from vedette.models import BirthModel, MotionModel, SensorModel, SurvivalModel, kernel_motion
-from vedette.models.arguments import dimension, pose_vector, positive
+from vedette.models.arguments import dimension, generator, pose_vector, positive
 
 _NO_GROUPS = np.empty(0, np.int64)
 
@@ -70,21 +70,22 @@ class DeltaGlmbFilter:
 
         Args:
             belief: posterior of the previous step.
-            scan: (num, meas_dim) measurements in any order.
+            scan: (num, meas_dim) measurements in any order; angles in radians, in (-pi, pi].
             pose: (3,) [px, py, heading_rad] of the sensor.
             dt: seconds since the previous step.
-            step: number of this step; births are labelled with it.
+            step: number of this step, from 1 on; births are labelled with it.
             rng: drawn from only if `assignment` is "gibbs".
 
         Returns:
             The posterior, hypotheses by descending weight, and a report.
 
         Raises:
-            InputError: a scan, pose or belief of the wrong shape or kind.
+            InputError: a scan, pose or belief of the wrong shape or kind, an angle beyond a full turn, a step below 1.
             ModelError: a model function raised or gave a value that is none of its kind.
             NumericalError: no hypothesis has positive weight.
         """
-        measurements, num_duplicates = check_scan(scan, self.sensor.meas_dim)
+        generator(rng)
+        measurements, num_duplicates = check_scan(scan, self.sensor.measurement)
         prior = check_belief(belief, GLMB, self.motion.state_dim)
         arguments = (
             prior.to_kernel(),

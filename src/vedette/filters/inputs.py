@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import numbers
+import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any, TypeVar
@@ -10,40 +10,59 @@ from typing import Any, TypeVar
 import numpy as np
 
 from vedette.densities import GLMB, LMB, IidCluster, MultiBernoulli, Poisson, TrackTable
+from vedette.densities.checks import unchecked
 from vedette.errors import InputError, ModelError, VedetteError
 from vedette.filters.limits import Limits
-from vedette.kernels.types import Floats
+from vedette.kernels.types import Bools, Floats
 from vedette.models import BirthModel, MotionModel, SensorModel, SurvivalModel
-from vedette.models.arguments import reject
+from vedette.models.arguments import as_array, reject, step_number
+from vedette.models.measurement import MeasurementModel, wrap_angular
 
 _Density = TypeVar("_Density", GLMB, LMB, Poisson, IidCluster, MultiBernoulli)
 
 
-def check_scan(scan: Any, meas_dim: int) -> tuple[Floats, int]:
+def check_scan(scan: Any, measurement: MeasurementModel) -> tuple[Floats, int]:
     """The scan as a contiguous (num, meas_dim) array without repeated rows, and how many rows were repeats.
 
+    Angles come out in (-pi, pi].
+
     Raises:
-        InputError: not an array of that shape, or a value that is not finite. A scan without measurements is an empty
-            array; None is refused, since a sensor that did not scan must not be updated at all.
+        InputError: not an array of that shape, a value that is not finite, or an angle beyond a full turn either way,
+            which is in other units. A scan without measurements is an empty array; None is refused, since a sensor
+            that did not scan must not be updated at all.
     """
+    meas_dim = measurement.meas_dim
     expected = f"an array of shape (num_measurements, {meas_dim}), empty for a scan without measurements"
     if scan is None:
         raise InputError(f"scan: expected {expected}; got None")
-    try:
-        array = np.array(scan, dtype=np.float64, order="C")
-    except (TypeError, ValueError):
-        raise InputError(f"scan: expected {expected}; got {type(scan).__name__} that is not numbers") from None
-    if array.size == 0 and array.ndim <= 2:
+    given = as_array("scan", scan, "fiu", f"numbers in {expected}")
+    if given.size == 0 and given.ndim <= 2:
         return np.empty((0, meas_dim)), 0
-    if array.ndim != 2 or array.shape[1] != meas_dim:
-        raise InputError(f"scan: expected {expected}; got shape {array.shape}")
+    if given.ndim != 2 or given.shape[1] != meas_dim:
+        raise InputError(f"scan: expected {expected}; got shape {given.shape}")
+    array = np.array(given, dtype=np.float64, order="C")
     bad = np.flatnonzero(~np.isfinite(array).all(axis=1))
     if len(bad):
         raise InputError(f"scan: expected finite numbers; got {array[bad[0]].tolist()} in row {bad[0]}")
+    if measurement.angular.any():
+        array = _in_one_turn(array, measurement.angular)
     _, first = np.unique(array, axis=0, return_index=True)
     if len(first) == len(array):
         return array, 0
     return np.ascontiguousarray(array[np.sort(first)]), len(array) - len(first)
+
+
+def _in_one_turn(scan: Floats, angular: Bools) -> Floats:
+    sizes = np.abs(scan[:, angular])
+    if sizes.max() <= 3.14:  # most scans
+        return scan
+    if sizes.max() > 2.0 * math.pi:
+        row = int(np.argmax(sizes.max(axis=1)))
+        raise InputError(
+            f"scan: expected angles in radians, in (-pi, pi]; got {scan[row].tolist()} in row {row}, whose component "
+            f"{int(np.flatnonzero(angular)[np.argmax(sizes[row])])} is an angle (is it in degrees?)"
+        )
+    return wrap_angular(scan, angular)
 
 
 _PARTS: dict[str, type] = {
@@ -78,15 +97,14 @@ def check_belief(belief: object, kind: type[_Density], state_dim: int) -> _Densi
 
 
 def check_step(step: Any, birth: BirthModel, belief: GLMB | LMB | None = None) -> int:
-    """The step; `InputError` unless it is a whole number, later than the belief's labels where targets may be born."""
-    if isinstance(step, bool) or not isinstance(step, numbers.Integral):
-        raise reject("step", "a whole number", step)
+    """The step; `InputError` unless it is from 1 on, and later than the belief's labels where targets may be born."""
+    number = step_number(step)
     if belief is None:
-        return int(step)
+        return number
     newest = belief.tracks.labels[:, 0].max(initial=np.iinfo(np.int64).min)
-    if newest >= step and birth.is_active(int(step)):
+    if newest >= number and birth.is_active(number):
         raise reject("step", f"a step after those of the labels in the belief, of which the last is {newest}", step)
-    return int(step)
+    return number
 
 
 def births_at(birth: BirthModel, step: int) -> LMB:
@@ -95,8 +113,10 @@ def births_at(birth: BirthModel, step: int) -> LMB:
         return LMB.empty(birth.state_dim)
     sites = np.arange(birth.num_sites)
     labels = np.column_stack([np.full_like(sites, step), sites])
-    tracks = TrackTable(labels, np.arange(birth.num_sites + 1), np.zeros(birth.num_sites), birth.means, birth.covs)
-    return LMB(tracks, np.log(birth.existence) - np.log1p(-birth.existence))
+    tracks = unchecked(
+        TrackTable, labels, np.arange(birth.num_sites + 1), np.zeros(birth.num_sites), birth.means, birth.covs
+    )
+    return unchecked(LMB, tracks, np.log(birth.existence) - np.log1p(-birth.existence))
 
 
 @contextmanager

@@ -39,7 +39,7 @@ class LmbFilter(ModelledFilter):
 
         Nothing is drawn from `rng`; it is taken so that filters are interchangeable.
         """
-        measurements, num_duplicates = self._check_scan(scan)
+        measurements, num_duplicates = self._check_scan(scan, rng)
         prior = check_belief(belief, LMB, self.motion.state_dim)
         arguments = self._arguments(measurements, pose, dt, step, prior)
         with model_errors():

@@ -11,6 +11,7 @@ import numpy as np
 from scipy.special import expit, log_expit
 
 from vedette.densities import GLMB, LMB
+from vedette.densities.checks import unchecked
 from vedette.fusion.base import (
     FusionInfo,
     FusionLimits,
@@ -83,7 +84,7 @@ class Clmb:
         held = aligned.chosen >= 0
         missing = by_sensor(np.count_nonzero(~held, axis=0), active, len(beliefs))
         logits = aligned.logits @ weights + log_overlaps
-        return LMB(tracks, logits), FusionInfo(
+        return unchecked(LMB, tracks, logits), FusionInfo(
             missing_sets=missing,
             missing_labels=missing,
             num_sets=len(held),

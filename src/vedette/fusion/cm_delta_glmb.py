@@ -10,6 +10,7 @@ import numpy as np
 from scipy.special import expit
 
 from vedette.densities import GLMB, TrackTable
+from vedette.densities.checks import unchecked
 from vedette.errors import NumericalError
 from vedette.fusion.alignment import Aligned, align
 from vedette.fusion.base import (
@@ -125,5 +126,6 @@ def _heaviest(aligned: Aligned, tracks: TrackTable, log_weights: Floats, max_hyp
     sizes = np.diff(aligned.set_offsets)[kept]
     hyp_offsets = np.concatenate([np.zeros(1, np.int64), np.cumsum(sizes)])
     members = np.repeat(aligned.set_offsets[kept] - hyp_offsets[:-1], sizes) + np.arange(hyp_offsets[-1])
-    fused = GLMB(take_tracks(tracks, members), hyp_offsets, np.arange(len(members)), relative - log_kept)
+    own = take_tracks(tracks, members)
+    fused = unchecked(GLMB, own, hyp_offsets, np.arange(len(members)), relative - log_kept)
     return fused, float(expit(log_sum(log_weights[cut] - peak) - log_kept))

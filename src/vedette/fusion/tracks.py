@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from vedette.densities import TrackTable
+from vedette.densities.checks import unchecked
 from vedette.errors import NumericalError
 from vedette.fusion.base import PowerRule
 from vedette.kernels.gci import fuse_tracks
@@ -48,7 +49,8 @@ def take_tracks(tracks: TrackTable, places: Ints) -> TrackTable:
     sizes = np.diff(tracks.offsets)[places]
     offsets = np.concatenate([np.zeros(1, np.int64), np.cumsum(sizes)])
     components = np.repeat(tracks.offsets[places] - offsets[:-1], sizes) + np.arange(offsets[-1])
-    return TrackTable(
+    return unchecked(
+        TrackTable,
         tracks.labels[places],
         offsets,
         tracks.log_weights[components],

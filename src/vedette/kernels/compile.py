@@ -12,6 +12,7 @@ from typing import Any, TypeVar, cast
 import numba
 from numba import types
 from numba.core import cgutils, config
+from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import CPUDispatcher
 from numba.experimental.function_type import FunctionModel
 from numba.extending import NativeValue, register_model, typeof_impl, unbox
@@ -99,25 +100,30 @@ class ModelFunction(CPUDispatcher):  # type: ignore[misc]
         return super().__call__(*args)
 
     def bind(self) -> None:
-        """Compile to the signature of the kind and note where the machine code lies."""
-        signature = SIGNATURES[self.kind][1]
-        if not self.overloads:  # an unpickled one comes compiled
-            self.compile(signature)
-            self.disable_compile()
-        compiled = self.get_compile_result(signature)
-        self._numba_type = _ModelFunctionType(compiled.signature)
-        self.c_address = compiled.library.get_pointer_to_function(compiled.fndesc.llvm_cfunc_wrapper_name)
-        self.jit_address = compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name)
+        """Compile to the signature of the kind and note where the machine code lies; any number of threads may ask."""
+        # Numba's own lock: a thread that compiles a kernel holds it when it asks for the types of functions.
+        with global_compiler_lock:
+            if self._numba_type is not None:
+                return
+            signature = SIGNATURES[self.kind][1]
+            if not self.overloads:  # an unpickled one comes compiled
+                self.compile(signature)
+                self.disable_compile()
+            compiled = self.get_compile_result(signature)
+            self.c_address = compiled.library.get_pointer_to_function(compiled.fndesc.llvm_cfunc_wrapper_name)
+            self.jit_address = compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name)
+            self._numba_type = _ModelFunctionType(compiled.signature)  # last, as it is read without the lock
 
     def _reduce_states(self) -> dict[str, Any]:
         return {**super()._reduce_states(), "kind": self.kind}
 
     @classmethod
     def _rebuild(cls, kind: str, **states: Any) -> ModelFunction:
-        """What unpickling in another process calls."""
-        function: ModelFunction = super()._rebuild(**states)
-        function.kind = kind
-        return function
+        """What unpickling in another process calls; another thread must not meet it half built."""
+        with global_compiler_lock:
+            function: ModelFunction = super()._rebuild(**states)
+            function.kind = kind
+            return function
 
 
 class _ModelFunctionType(types.FunctionType):  # type: ignore[misc]

@@ -1,7 +1,8 @@
 """Compiled kernels and model functions on disk, safe for any number of processes at once.
 
 Numba stamps a cache entry with the source file of the function itself and so misses an edit in a file it imports; the
-stamp used here covers the file and every `vedette.kernels` module it reaches.
+stamp used here covers the file and every `vedette.kernels` module it reaches. An entry is a pickle, so it is read only
+where nobody else can have written it, see `vedette.kernels.private_files`.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import hashlib
 import os
 import pickle
 import uuid
+import warnings
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -21,6 +23,8 @@ import numba
 from numba.core import config
 from numba.core.caching import CompileResultCacheImpl, FunctionCache
 from numba.core.serialize import dumps
+
+from vedette.kernels.private_files import fault_of_folder, make_private_folder, read_private, write_private
 
 _PACKAGE_ROOT = Path(__file__).resolve().parents[1]
 _MARK_LENGTH = hashlib.sha256().digest_size
@@ -79,7 +83,7 @@ class _PackageLocator:
         self._line = function.__code__.co_firstlineno
 
     def ensure_cache_path(self) -> None:
-        Path(self.get_cache_path()).mkdir(parents=True, exist_ok=True)
+        make_private_folder(Path(self.get_cache_path()))
 
     def get_cache_path(self) -> str:
         relative = self._path.relative_to(_PACKAGE_ROOT).with_suffix("")
@@ -97,10 +101,7 @@ class _PackageLocator:
         if not path.is_relative_to(_PACKAGE_ROOT):
             return None
         locator = cls(function, path)
-        try:
-            locator.ensure_cache_path()
-        except OSError:
-            return None
+        locator.ensure_cache_path()
         return locator
 
 
@@ -111,8 +112,9 @@ class _EntryFile:
     stand under the other's key. Here every file is whole and says what it is; the last of equal writers wins.
     """
 
-    def __init__(self, folder: str, filename_base: str, source_stamp: str) -> None:
-        self._folder = Path(folder)
+    def __init__(self, folder: Path, filename_base: str, source_stamp: str, source: Path) -> None:
+        self._folder = folder
+        self._source = source
         self._base = filename_base
         self._stamp = source_stamp
 
@@ -123,19 +125,23 @@ class _EntryFile:
         partial = path.with_name(f"{path.name}.{uuid.uuid4().hex[:16]}")
         with contextlib.suppress(OSError):
             try:
-                partial.write_bytes(self._mark(key, content) + content)
+                write_private(partial, self._mark(key, content) + content)
                 partial.replace(path)
             finally:
                 partial.unlink(missing_ok=True)
 
     def load(self, key: Any) -> Any:
-        """The entry; None where there is none, or only one of other sources, or the file is damaged."""
-        try:
-            held = self._path(key).read_bytes()
-        except OSError:
+        """The entry; None where there is none, one of other sources, a damaged one, or one that others can write."""
+        held = read_private(self._path(key), self._source)
+        if held is None:
             return None
         content = held[_MARK_LENGTH:]
-        return pickle.loads(content) if held[:_MARK_LENGTH] == self._mark(key, content) else None
+        if held[:_MARK_LENGTH] != self._mark(key, content):
+            return None
+        try:
+            return pickle.loads(content)
+        except ImportError:  # compiled when its file was a module of another name
+            return None
 
     def flush(self) -> None:
         for path in self._folder.glob(f"{self._base}.*.nbc"):
@@ -158,17 +164,41 @@ class _Cache(FunctionCache):  # type: ignore[misc]
 
     def __init__(self, function: Callable[..., Any]) -> None:
         super().__init__(function)
-        self._cache_file = _EntryFile(self._cache_path, self._impl.filename_base, self._impl.locator.get_source_stamp())
+        self.folder = Path(self._cache_path).resolve()
+        self.source = Path(function.__code__.co_filename).resolve()
+        stamp = self._impl.locator.get_source_stamp()
+        self._cache_file = _EntryFile(self.folder, self._impl.filename_base, stamp, self.source)
 
 
 def attach_cache(dispatcher: Any) -> None:
-    """Cache on disk where that is possible; a function typed at a prompt has no file and is compiled each time."""
+    """Cache on disk where that is possible and safe; elsewhere a function is compiled each time, in memory.
+
+    A function typed at a prompt has no file. Warns once of a folder that others can write.
+    """
     try:
-        dispatcher._cache = _Cache(dispatcher.py_func)
+        found = _Cache(dispatcher.py_func)
+        fault = fault_of_folder(found.folder, found.source)
     except (RuntimeError, OSError):
         return
+    if fault is None:
+        dispatcher._cache = found
+    else:
+        _warn_of(fault)
+
+
+@cache  # once a process, not once a function
+def _warn_of(fault: str) -> None:
+    warnings.warn(
+        f"compiled kernels on disk are not used: {fault}, and they are code; all are compiled anew, for minutes. "
+        "Make the folder your own (chown, chmod go-w), or set VEDETTE_CACHE_DIR to one that is",
+        RuntimeWarning,
+        stacklevel=2,
+    )
 
 
 def is_cold() -> bool:
-    """Whether no kernel of this checkout has been compiled on this machine yet (model functions do not count)."""
-    return not config.DISABLE_JIT and not any(_checkout_directory().glob("kernels_*/*.nbc"))
+    """Whether the kernels of this checkout will now be compiled, and kept (model functions do not count)."""
+    folder = _checkout_directory()
+    if config.DISABLE_JIT or any(folder.glob("kernels_*/*.nbc")):
+        return False
+    return not folder.is_dir() or fault_of_folder(folder.resolve(), Path(__file__).resolve()) is None

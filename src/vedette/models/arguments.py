@@ -7,6 +7,7 @@ import numbers
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vedette.errors import InputError
 from vedette.kernels.types import Floats
@@ -59,21 +60,61 @@ def dimension(field: str, value: Any) -> int:
     return int(value)
 
 
+def step_number(value: Any) -> int:
+    """The number of a step, from 1 on, as labels hold it."""
+    whole = not isinstance(value, bool) and isinstance(value, numbers.Integral)
+    if not whole or not 1 <= value <= np.iinfo(np.int64).max:
+        raise reject("step", "a whole number from 1 on, below 2^63", value)
+    return int(value)
+
+
+def generator(value: Any) -> np.random.Generator:
+    """A random generator; a seed is none, since who passes it again and again gets the same numbers."""
+    if not isinstance(value, np.random.Generator):
+        raise reject("rng", "a numpy.random.Generator, such as numpy.random.default_rng(1)", value)
+    return value
+
+
+def as_array(field: str, values: Any, kinds: str, expected: str) -> NDArray[Any]:
+    """`values` as an array of one of these `numpy.dtype` kinds (an empty one: of any kind).
+
+    Raises `InputError` for what cannot be one without losing something: masked entries, imaginary parts, booleans,
+    texts, objects, rows of several lengths.
+    """
+    if _is_masked(values):
+        raise reject(field, f"{expected} without masked entries", "masked ones")
+    try:
+        array = np.asarray(values)
+    except (TypeError, ValueError, OverflowError):
+        raise reject(field, expected, values) from None
+    if array.size and array.dtype.kind not in kinds:
+        raise reject(field, expected, f"an array of {array.dtype}")
+    return array
+
+
+def _is_masked(values: Any) -> bool:
+    """Whether NumPy would drop a mask: of the array, or of one in a list."""
+    if isinstance(values, list | tuple):
+        return any(_is_masked(value) for value in values if isinstance(value, list | tuple | np.ma.MaskedArray))
+    return isinstance(values, np.ma.MaskedArray) and bool(np.ma.is_masked(values))
+
+
 def float_array(field: str, values: Any, shape: tuple[int | None, ...], *, finite: bool = True) -> Floats:
     """A C-contiguous, writeable float64 copy of `values` with the given shape (None: any length).
 
     NaN is never accepted; infinities only where `finite` is false.
     """
-    wanted = str(tuple("any" if length is None else length for length in shape)).replace("'any'", "any")
-    try:
-        array = np.array(values, dtype=np.float64, order="C")
-    except (TypeError, ValueError):
-        raise reject(field, f"numbers in an array of shape {wanted}", values) from None
-    if array.ndim != len(shape) or any(n is not None and n != m for n, m in zip(shape, array.shape, strict=True)):
-        raise reject(field, f"an array of shape {wanted}", f"shape {array.shape}")
+    given = as_array(field, values, "fiu", f"numbers in an array of shape {_shape_text(shape)}")
+    if given.ndim != len(shape) or any(n is not None and n != m for n, m in zip(shape, given.shape, strict=True)):
+        raise reject(field, f"an array of shape {_shape_text(shape)}", f"shape {given.shape}")
+    array = np.array(given, dtype=np.float64, order="C")
     if not (np.isfinite(array).all() if finite else not np.isnan(array).any()):
         raise reject(field, "finite numbers" if finite else "numbers that are not NaN", values)
     return array
+
+
+def _shape_text(shape: tuple[int | None, ...]) -> str:
+    return str(tuple("any" if length is None else length for length in shape)).replace("'any'", "any")
 
 
 def params_vector(field: str, values: Any) -> Floats:
@@ -88,10 +129,10 @@ def pose_vector(field: str, values: Any) -> Floats:
 
 def state_table(field: str, values: Any, state_dim: int | None = None) -> Floats:
     """(n, state_dim) states; one state may stand alone as a vector."""
-    array = np.asarray(values)
+    array = as_array(field, values, "fiu", "numbers, one state a row")
     if array.ndim == 1 and array.size:
         return float_array(field, array[np.newaxis], (1, state_dim))
-    return float_array(field, values, (None, state_dim))
+    return float_array(field, array, (None, state_dim))
 
 
 def covariance_fault(matrix: Floats) -> tuple[str, str] | None:

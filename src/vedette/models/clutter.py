@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from vedette.errors import InputError, ModelError
 from vedette.kernels.types import Bools, Floats
-from vedette.models.arguments import dimension, float_array, non_negative, params_vector, pose_vector, reject
+from vedette.models.arguments import dimension, float_array, generator, non_negative, params_vector, pose_vector, reject
 from vedette.models.functions import ModelFunction, call, describe, model_function, require_kind
 from vedette.models.measurement import MeasurementModel, angular_flags, wrap_angular
 from vedette.models.probe import probe_log_intensity
@@ -80,7 +80,7 @@ class ClutterModel:
         """
         if self.sampler is None:
             raise reject("ClutterModel.sampler", "a sampler, to simulate a scan", None)
-        at = pose_vector("pose", pose)
+        at, rng = pose_vector("pose", pose), generator(rng)
         try:
             drawn = self.sampler(at, measurement, state_dim=state_dim, rng=rng)
         except (ModelError, InputError):

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from vedette.kernels.gaussian import CUBATURE, LINEARISED, UNSCENTED
 from vedette.kernels.types import Floats, Motion
-from vedette.models.arguments import dimension, params_vector, positive, probability, reject, state_table
+from vedette.models.arguments import dimension, params_vector, positive, probability, real, reject, state_table
 from vedette.models.functions import ModelFunction, call, model_function, require_kind
 from vedette.models.probe import probe_array, probe_covariance, probe_jacobian, probe_probability
 
@@ -80,13 +80,19 @@ class MotionModel:
         table = state_table("states", states, self.state_dim)
         out = np.empty_like(table)
         for state, moved in zip(table, out, strict=True):
-            call(self.transition, state, float(dt), self.transition_params, moved)
+            call(self.transition, state, real("dt", dt), self.transition_params, moved)
         return out
 
     def noise_cov(self, state: ArrayLike, dt: float) -> Floats:
         """(state_dim, state_dim) process noise covariance over `dt` seconds from `state`."""
         out = np.empty((self.state_dim, self.state_dim))
-        call(self.process_noise_cov, state_table("state", state, self.state_dim)[0], float(dt), self.noise_params, out)
+        call(
+            self.process_noise_cov,
+            state_table("state", state, self.state_dim)[0],
+            real("dt", dt),
+            self.noise_params,
+            out,
+        )
         return out
 
     def check(self, states: ArrayLike, dt: float = 1.0) -> None:
@@ -124,7 +130,7 @@ class SurvivalModel:
     def prob(self, states: ArrayLike, dt: float) -> Floats:
         """(n,) survival probabilities over `dt` seconds."""
         table = state_table("states", states)
-        return np.array([call(self.function, state, float(dt), self.params) for state in table])
+        return np.array([call(self.function, state, real("dt", dt), self.params) for state in table])
 
     def check(self, states: ArrayLike, dt: float = 1.0) -> None:
         """Try the function at each state; `ModelError` unless it gives a probability."""

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vedette.kernels.types import Floats
-from vedette.models.arguments import reject
+from vedette.models.arguments import as_array, reject
 from vedette.models.measurement import wrap_angles
 
 
@@ -29,8 +29,10 @@ def advance(pose: ArrayLike, heading_rad: ArrayLike, speed: ArrayLike, dt: float
     Raises:
         InputError: not finite, a negative speed or time, shapes that do not fit together.
     """
-    poses = np.asarray(pose, dtype=np.float64)
-    headings, speeds = np.asarray(heading_rad, dtype=np.float64), np.asarray(speed, dtype=np.float64)
+    poses, headings, speeds = (
+        np.asarray(as_array(field, values, "fiu", "numbers"), dtype=np.float64)
+        for field, values in (("pose", pose), ("heading_rad", heading_rad), ("speed", speed))
+    )
     if poses.ndim == 0 or poses.shape[-1] != 3 or not np.isfinite(poses).all():
         raise reject("pose", "finite px, py, heading_rad in the last axis", poses.tolist())
     if not (math.isfinite(dt) and dt >= 0.0):

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vedette.kernels.types import Bools, Floats
-from vedette.models.arguments import real, reject
+from vedette.models.arguments import as_array, generator, real, reject
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,9 +39,9 @@ class Region:
 
     def contains(self, positions: ArrayLike) -> Bools:
         """(n,) whether each of (n, 2) positions lies inside, the edge included."""
-        x, y = np.moveaxis(np.asarray(positions, dtype=np.float64), -1, 0)
+        x, y = np.moveaxis(as_array("positions", positions, "fiu", "numbers"), -1, 0)
         return np.asarray((x >= self.x_min) & (x <= self.x_max) & (y >= self.y_min) & (y <= self.y_max))
 
     def sample(self, num: int, *, rng: np.random.Generator) -> Floats:
         """(num, 2) positions drawn uniformly."""
-        return rng.uniform([self.x_min, self.y_min], [self.x_max, self.y_max], size=(num, 2))
+        return generator(rng).uniform([self.x_min, self.y_min], [self.x_max, self.y_max], size=(num, 2))

@@ -15,14 +15,15 @@ from vedette.reports.groups import Group, gather
 _LONGEST_NAME, _START, _END = 75, 45, 20  # bytes
 
 
-def write_figures(results: CampaignResults, folder: Path) -> tuple[Path, ...]:
-    """Write every figure of the report into `folder` as PDF, SVG and PNG; the same results give the same bytes.
+def write_figures(results: CampaignResults, path: str | Path) -> tuple[Path, ...]:
+    """Write every figure of the report into a folder as PDF, SVG and PNG; the same results give the same bytes.
 
     With several groups, the names of files begin with that of the group. Returns the files written.
 
     Raises:
         InputError: the folder cannot be written.
     """
+    folder = Path(path)
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:

@@ -61,7 +61,7 @@ class _Section:
 
 
 def write_report(
-    results: CampaignResults, path: Path, *, replays: Sequence[tuple[str, int]] | None = None, trust: bool = False
+    results: CampaignResults, path: str | Path, *, replays: Sequence[tuple[str, int]] | None = None, trust: bool = False
 ) -> None:
     """Write a campaign's report as one HTML file that needs nothing else; the same results give the same bytes.
 
@@ -79,7 +79,8 @@ def write_report(
         InputError: a run that is not there, or a file that cannot be written.
     """
     _check_replays(results, replays or ())
-    _make_room(path)
+    target = Path(path)
+    _make_room(target)
     sections: list[_Section] = []
     runs: list[str] = []
     errors: dict[str, Floats] = {}
@@ -92,7 +93,7 @@ def write_report(
     kept = _within(runs, MAX_REPLAY_BYTES) if replays is None else runs
     untrusted = () if trust else code_in_replays(results)
     page = _render(results, sections, sweeps, kept, len(runs) - len(kept), untrusted)
-    _write(path, page)
+    _write(target, page)
 
 
 def code_in_replays(results: CampaignResults) -> tuple[str, ...]:

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from vedette.errors import ModelError
 from vedette.kernels.types import Floats, Ints
 from vedette.models import SensorModel
-from vedette.models.arguments import float_array, pose_vector, reject
+from vedette.models.arguments import float_array, generator, pose_vector, reject
 from vedette.models.measurement import wrap_angular
 
 CLUTTER = -1
@@ -54,6 +54,7 @@ def simulate_scan(
         ModelError: a model function raised or gave no valid value at a target's state.
     """
     states, pose = float_array("truth_states", truth_states, (None, None)), pose_vector("pose", pose)
+    generator(rng)
     num = len(states)
     names = np.arange(num) if ids is None else np.asarray(ids)
     if names.shape != (num,):

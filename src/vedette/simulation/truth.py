@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from vedette.errors import InputError, ModelError
 from vedette.kernels.types import Bools, Floats, Ints
 from vedette.models import MotionModel
-from vedette.models.arguments import float_array, reject
+from vedette.models.arguments import float_array, generator, reject
 
 # Start times and scan times come from different sums; they count as equal within this share of a second.
 TIME_TOLERANCE = 1e-9
@@ -136,6 +136,7 @@ class ScriptedTargets:
             ModelError: a motion function raised, or gave a state that is not finite.
         """
         scans = scan_times(times)
+        generator(rng)
         num = len(self.initial_states)
         starts = np.full(num, scans[0]) if self.start_times is None else self.start_times
         ends = np.asarray(self.end_times)

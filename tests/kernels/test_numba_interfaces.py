@@ -1,0 +1,155 @@
+"""A canary: each private interface of Numba that the kernels are built on has a test (docs/decisions/0002).
+
+A version of Numba that changes one fails here, by name, before something stranger fails elsewhere.
+"""
+
+from __future__ import annotations
+
+import inspect
+import pickle
+import re
+import threading
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numba
+import numpy as np
+import pytest
+
+from vedette.kernels.compile import JIT_ENABLED, SIGNATURES, kernel
+from vedette.models import constant_survival
+
+ROOT = Path(__file__).resolve().parents[2]
+
+pytestmark = pytest.mark.skipif(not JIT_ENABLED, reason="nothing is compiled")
+
+
+def _double(values: np.ndarray) -> float:
+    return float(2.0 * values[0])
+
+
+_doubled: Any = kernel(_double)
+
+
+def takes(function: Callable[..., Any], *names: str) -> bool:
+    return tuple(inspect.signature(function).parameters) == names
+
+
+def survival() -> Any:
+    function = constant_survival(0.9).function
+    function.bind()
+    return function
+
+
+def test_core_registry_cpu_dispatcher() -> None:
+    from numba.core.registry import CPUDispatcher
+
+    assert isinstance(_doubled, CPUDispatcher)
+    assert isinstance(survival(), CPUDispatcher)
+    for name in ("compile", "disable_compile", "get_compile_result"):
+        assert callable(getattr(CPUDispatcher, name))
+
+
+def test_dispatcher_cache_attribute() -> None:
+    assert {"_cache_file", "_cache_path", "_impl"} <= vars(_doubled._cache).keys()
+
+
+def test_dispatcher_reduce_states_and_rebuild() -> None:
+    from numba.core.registry import CPUDispatcher
+
+    states = ["uuid", "py_func", "locals", "targetoptions", "can_compile", "sigs"]
+    assert sorted(_doubled._reduce_states()) == sorted(states)
+    assert takes(CPUDispatcher._rebuild, *states)
+
+
+def test_dispatcher_overloads_by_argument_types() -> None:
+    assert list(survival().overloads) == [tuple(SIGNATURES["prob_survival"][1].args)]
+
+
+def test_compile_result_library_and_fndesc() -> None:
+    compiled = survival().get_compile_result(SIGNATURES["prob_survival"][1])
+    for name in (compiled.fndesc.llvm_cfunc_wrapper_name, compiled.fndesc.llvm_func_name):
+        assert compiled.library.get_pointer_to_function(name) > 0
+
+
+def test_core_compiler_lock_global_compiler_lock() -> None:
+    """One thread may take it twice, and compiling waits for it."""
+    from numba.core.compiler_lock import global_compiler_lock
+
+    done = threading.Event()
+
+    def compile_one() -> None:
+        _doubled(np.ones(1, np.float32))
+        done.set()
+
+    compiling = threading.Thread(target=compile_one)
+    with global_compiler_lock, global_compiler_lock:
+        compiling.start()
+        assert not done.wait(0.5)
+    compiling.join(timeout=300)
+    assert done.is_set()
+
+
+def test_core_caching_compile_result_cache_impl_and_function_cache() -> None:
+    from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile
+
+    assert FunctionCache._impl_class is CompileResultCacheImpl
+    assert isinstance(CompileResultCacheImpl._locator_classes, list)
+    assert takes(IndexDataCacheFile.save, "self", "key", "data")
+    assert takes(IndexDataCacheFile.load, "self", "key")
+    assert takes(IndexDataCacheFile.flush, "self")
+    assert isinstance(_doubled._cache._impl.filename_base, str)
+
+
+def test_core_caching_locator_protocol() -> None:
+    from numba.core.caching import _CacheLocator
+
+    assert _CacheLocator.__abstractmethods__ == {"get_cache_path", "get_source_stamp", "get_disambiguator"}
+    assert takes(_CacheLocator.from_function, "py_func", "py_file")
+    assert takes(_CacheLocator.ensure_cache_path, "self")
+
+
+def test_core_serialize_dumps() -> None:
+    from numba.core.serialize import dumps
+
+    assert pickle.loads(dumps((1, "one"))) == (1, "one")
+
+
+def test_core_config_switches() -> None:
+    from numba.core import config
+
+    assert config.DISABLE_JIT in (0, 1, False, True)
+    assert config.BOUNDSCHECK in (None, 0, 1, False, True)
+
+
+def test_core_options_nrt_and_forceinline() -> None:
+    from numba.core.options import DefaultOptions
+
+    assert DefaultOptions._nrt.flag_name == "nrt"
+    assert DefaultOptions.forceinline.flag_name == "forceinline"
+
+
+def test_experimental_function_type_function_model() -> None:
+    """The struct that is filled at every call of a kernel, by name; `core.cgutils` makes it."""
+    from numba.core import cgutils
+    from numba.core.datamodel import default_manager
+    from numba.experimental.function_type import FunctionModel
+
+    model = default_manager.lookup(survival().numba_type)
+    assert isinstance(model, FunctionModel)
+    assert sorted(model._fields) == ["c_addr", "jit_addr", "py_addr"]
+    assert callable(cgutils.create_struct_proxy)
+
+
+def test_only_versions_of_numba_below_the_next_are_taken() -> None:
+    """An upper bound, just above the locked version; whoever raises it reads these tests."""
+    dependencies = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]["dependencies"]
+    (bound,) = [entry for entry in dependencies if entry.startswith("numba")]
+    matched = re.fullmatch(r"numba>=0\.(\d+),<0\.(\d+)", bound)
+    assert matched is not None
+    locked = re.search(r"^numba==0\.(\d+)", (ROOT / "requirements/runtime.txt").read_text("utf-8"), re.MULTILINE)
+    assert locked is not None
+    assert int(matched[1]) <= int(locked[1]) == int(matched[2]) - 1
+    assert int(matched[1]) <= int(numba.__version__.split(".")[1]) < int(matched[2])

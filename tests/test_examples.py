@@ -1,0 +1,85 @@
+"""Every example of README and documentation, as a stranger runs it: in a process of its own, warnings as errors.
+
+The blocks of a page are one program, in the order of the page.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import re
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from campaigns.filled import fill, make_campaign
+from vedette.campaigns.export import export_tables
+from vedette.campaigns.results import open_results
+
+ROOT = Path(__file__).resolve().parents[1]
+NEEDED = {"polars": importlib.util.find_spec("polars") is not None}  # what a block may import and the check may lack
+
+
+def blocks(page: Path) -> list[str]:
+    return re.findall(r"```python\n(.*?)```", page.read_text("utf-8"), re.DOTALL)
+
+
+PAGES = {
+    path.relative_to(ROOT).as_posix(): found
+    for path in [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+    if (found := blocks(path))
+}
+SCRIPTS = [path.relative_to(ROOT).as_posix() for path in sorted((ROOT / "examples").glob("*.py"))]
+
+
+def results_folder(place: Path) -> None:
+    """What the pages on results and reports begin with: a folder `results` from a campaign."""
+    fill(place / "results", make_campaign())
+
+
+def tables_folder(place: Path) -> None:
+    """The same seen from within, with its tables."""
+    fill(place, make_campaign())
+    export_tables(open_results(place), place / "tables")
+
+
+# What a page starts from, and words of what it must print.
+BEGINNINGS: dict[str, Callable[[Path], None]] = {"docs/report.md": results_folder, "docs/results.md": tables_folder}
+SHOWN = {
+    "README.md": ["["],
+    "docs/campaigns.md": ["still"],
+    "docs/control.md": ["+-", "joint actions evaluated", "filter_steps"],
+    "docs/filters.md": ["target at"],
+    "docs/metrics.md": ["True"],
+    "docs/report.md": [],
+    "docs/results.md": ["gospa_m", "margin", "jdm-rate-5.0", "chosen_headings_rad"],
+    "examples/own_sensor.py": ["greatest difference between the two"],
+}
+
+
+def run(program: str, place: Path) -> str:
+    """What a program printed, which must have ended well."""
+    (place / "example.py").write_text(program, "utf-8")
+    command = [sys.executable, "-W", "error", "-X", "faulthandler", "example.py"]
+    result = subprocess.run(command, cwd=place, capture_output=True, text=True, timeout=600, check=False)
+    assert result.returncode == 0, result.stdout + result.stderr
+    return result.stdout
+
+
+def test_every_page_and_script_is_listed() -> None:
+    assert [*PAGES, *SCRIPTS] == list(SHOWN)
+
+
+@pytest.mark.parametrize("name", [*PAGES, *SCRIPTS])
+def test_an_example_runs_by_itself(name: str, tmp_path: Path) -> None:
+    if name in PAGES:
+        unmet = [package for package, there in NEEDED.items() if not there]
+        program = "\n".join(block for block in PAGES[name] if not any(f"import {one}" in block for one in unmet))
+    else:
+        program = (ROOT / name).read_text("utf-8")
+    BEGINNINGS.get(name, lambda place: None)(tmp_path)
+    printed = run(program, tmp_path)
+    for words in SHOWN[name]:
+        assert words in printed
