@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import unicodedata
 from collections.abc import Sequence
+from typing import Any
 
 ELLIPSIS = "\N{HORIZONTAL ELLIPSIS}"
 _MOST_LINES = 50
@@ -27,6 +28,17 @@ def listed(lines: Sequence[str]) -> str:
 def counted(number: int, thing: str) -> str:
     """`1 sensor`, `2 sensors`."""
     return f"{number} {thing}" if number == 1 else f"{number} {thing}s"
+
+
+def plain(value: Any) -> str:
+    """A value as a person would write it: numbers of NumPy as numbers, also inside lists."""
+    import numpy as np  # here, as the command line starts without it
+
+    with np.printoptions(legacy="1.25"):  # from 2.0 on the repr of a number names its type
+        try:
+            return repr(value.tolist() if isinstance(value, np.ndarray) else value)
+        except ValueError:  # a whole number of more digits than Python writes
+            return "a number of thousands of digits"
 
 
 def display_width(text: str) -> int:

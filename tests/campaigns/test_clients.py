@@ -19,13 +19,14 @@ from vedette.campaigns import clients
 from vedette.campaigns.clients import local_workers, remote_workers
 from vedette.campaigns.scratch import scratch_folder
 from vedette.errors import InputError
+from waiting import PATIENCE
 
 KNOCK = """
 import sys
 from distributed import Client
 try:
-    with Client(sys.argv[1], timeout=10) as client:
-        print("let in:", client.submit(lambda: 7).result(timeout=30))
+    with Client(sys.argv[1], timeout=float(sys.argv[2])) as client:
+        print("let in:", client.submit(lambda: 7).result())
 except OSError as error:
     print("refused")
 """
@@ -35,10 +36,10 @@ def test_workers_take_no_work_from_another_process() -> None:
     with local_workers(1) as client:
         address = client.cluster.scheduler_address
         assert address.startswith("tls://127.0.0.1:")
-        assert client.submit(sum, [3, 4]).result(timeout=120) == 7
+        assert client.submit(sum, [3, 4]).result(timeout=PATIENCE) == 7
         for without_credentials in (address, address.replace("tls://", "tcp://")):
-            knock = [sys.executable, "-W", "ignore", "-c", KNOCK, without_credentials]
-            said = subprocess.run(knock, capture_output=True, text=True, check=False, timeout=300)
+            knock = [sys.executable, "-W", "ignore", "-c", KNOCK, without_credentials, "10"]
+            said = subprocess.run(knock, capture_output=True, text=True, check=False, timeout=PATIENCE)
             assert "let in" not in said.stdout
             assert "refused" in said.stdout or "TLS" in said.stderr, said
 
@@ -110,7 +111,7 @@ def test_folders_of_killed_campaigns_are_taken_away_by_the_next(
         killed, living = (Path(process.stdout.readline().strip()) for process in holding if process.stdout)
         (killed / "worker-space").mkdir()
         holding[0].send_signal(signal.SIGKILL)
-        holding[0].wait(timeout=60)
+        holding[0].wait(timeout=PATIENCE)
         assert killed.is_dir()
         with scratch_folder() as mine:
             assert {path.name for path in tmp_path.iterdir()} == {living.name, Path(mine).name, somebody_elses.name}

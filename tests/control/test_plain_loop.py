@@ -15,6 +15,7 @@ from control.examples import (
     B,
     C,
     Situation,
+    crowded,
     evaluator_of,
     glmb,
     lmb,
@@ -220,6 +221,19 @@ def test_the_general_path_gives_the_same_rewards(kind: str, num_sensors: int) ->
         general = PlainRewards(posteriors, evaluator.prediction, fusion, evaluator.reward, SETTINGS.num_samples)
         laid_out = evaluator.rewards(which, fusion)
         np.testing.assert_allclose(laid_out(actions), general(actions), rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize("most", [1, 3, 300])
+def test_a_crowd_that_is_summed_in_part_is_still_laid_out(most: int) -> None:
+    """A label that no kept choice has absent, or present, was certain: an infinite reward, or the long way round."""
+    example = crowded(18)
+    settings = replace(example.settings, limits=replace(example.settings.limits, max_hypotheses=most))
+    evaluator = evaluator_of(replace(example, settings=settings))
+    assert all(np.isfinite(own.log_weights).all() for own in evaluator.posteriors)
+    alike = of_one_kind(evaluator.posteriors, evaluator.prediction, example.fusion, 1)
+    assert can_be_laid_out(*alike, example.fusion, evaluator.reward)
+    assert np.isfinite(evaluator.sample_rewards((0, 1), example.fusion)).all()
+    assert np.isfinite(evaluator.sample_rewards((0,), None)).all()
 
 
 def test_a_subclass_is_asked_itself() -> None:

@@ -138,11 +138,21 @@ def spread(num: int) -> tuple[Any, Any]:
 
 def test_a_component_of_weight_two_is_two_targets() -> None:
     means, covs = spread(4)
-    estimate = unlabelled_estimate(Poisson.from_gaussians([0.1, 1.9, 0.95, 0.3], means, covs), 7)
+    estimate = unlabelled_estimate(Poisson.from_gaussians([0.1, 2.1, 0.95, 0.3], means, covs), 7)
     estimate.validate()
     assert estimate.labels.tolist() == [[7, 0], [7, 1], [7, 2]]
-    np.testing.assert_array_equal(estimate.means[:, 0], [10.0, 20.0, 10.0])
-    np.testing.assert_allclose(estimate.existence, [1.0, 0.95, 0.9])
+    np.testing.assert_array_equal(estimate.means[:, 0], [10.0, 10.0, 20.0])
+    np.testing.assert_allclose(estimate.existence, [1.0, 1.0, 0.95])
+
+
+def test_a_component_of_weight_one_and_a_half_is_one_target_before_any_that_is_not_light() -> None:
+    means, covs = spread(4)
+    heavy = unlabelled_estimate(Poisson.from_gaussians([0.1, 1.6, 0.95, 0.3], means, covs), 7)
+    np.testing.assert_array_equal(heavy.means[:, 0], [10.0, 20.0, 30.0])
+    np.testing.assert_allclose(heavy.existence, [1.0, 0.95, 0.3])
+    light = unlabelled_estimate(Poisson.from_gaussians([0.1, 1.6, 0.95, 0.15], means, covs), 7)
+    np.testing.assert_array_equal(light.means[:, 0], [10.0, 20.0, 10.0])
+    np.testing.assert_allclose(light.existence, [1.0, 0.95, 0.6])
 
 
 def test_a_component_with_less_than_half_a_target_left_stands_for_no_other() -> None:

@@ -45,7 +45,7 @@ def marginals_of(options):
 
 def assert_marginals(options, num_columns, num_ranked=None):
     got = np.empty(len(options.columns))
-    total, ranked = option_marginals(options, num_columns, *UNLIMITED, got)
+    total, ranked, _ = option_marginals(options, num_columns, *UNLIMITED, got)
     expected_total, expected = marginals_of(options)
     if expected_total == -math.inf:
         assert total == -math.inf
@@ -87,7 +87,7 @@ def test_a_row_without_options_forbids_all():
     tables_without_choice: list[list[list[tuple[int, float]]]] = [[[]], [[(0, 1.0)], []], [[(0, 0.0)], [(0, 0.0)]]]
     for rows in tables_without_choice:
         options = make_options(rows)
-        total, _ = option_marginals(options, 1, *UNLIMITED, np.empty(len(options.columns)))
+        total, _, _ = option_marginals(options, 1, *UNLIMITED, np.empty(len(options.columns)))
         assert total == -math.inf
 
 

@@ -264,7 +264,7 @@ def nudged(rng: np.random.Generator, value: Any) -> Any:
         return not value
     if isinstance(value, int | float):
         factor = pick(rng, [0, -1, 1 / 3, 10, 1e-3, 1e3, 1e-9, 1e9, 1e-150, 1e150])
-        return value * factor if isinstance(value, float) else int(min(abs(value * factor), 1e12))
+        return value * factor if isinstance(value, float) else int(min(abs(min(value, 10**18) * factor), 1e12))
     if isinstance(value, list) and value:
         return pick(rng, [value[:-1], value + value[-1:], value[::-1], value * 20])
     return value

@@ -169,6 +169,11 @@ def test_moored_targets_are_dropped():
         (table(x=[0.0, "far", 1.0]), "table, row 2, column 'x': expected a finite number; got 'far'"),
         (table(y=[0.0, 1.0, None]), "table, row 3, column 'y': expected a finite number; got None"),
         (table(y=[0.0, math.inf, 1.0]), "table, row 2, column 'y': expected a finite number; got inf"),
+        (
+            table(time=["2016-01-12", "1e308", "x"]),
+            "table, row 2, column 'time': expected an ISO 8601 time; got '1e308'",
+        ),
+        (table(time=["2016-01-12", "inf", "x"]), "table, row 2, column 'time': expected an ISO 8601 time; got 'inf'"),
         (table(x=[0.0, 1e10, 1.0]), "table, row 2, column 'x': expected a number from -1e"),
         (table(x=[0.0, True, 1.0]), "table, row 2, column 'x': expected a finite number; got True"),
         (table(x=[0.0, "1_0", 1.0]), "table, row 2, column 'x': expected a finite number; got '1_0'"),

@@ -117,6 +117,8 @@ def resolve(
     """Load the scenarios (files are relative to `folder`), set the fields of each cell, check that each can be built.
 
     Args:
+        spec: what the file says.
+        folder: what the scenario files in it are relative to.
         approve: is given the scenario of each cell before code that it names is run, and may raise.
 
     Raises:

@@ -160,6 +160,8 @@ class Reader:
 
     def failures(self) -> list[Failure]:
         """The runs that were tried and could not be finished, sorted."""
+        if not self._ask("SELECT 1 FROM sqlite_master WHERE name = 'failures'"):
+            return []
         rows = self._ask("SELECT cell, run, session, message FROM failures ORDER BY cell, run")
         return [Failure(*row) for row in rows]
 

@@ -12,11 +12,10 @@ from pydantic import BaseModel, Field, JsonValue, ValidationError, field_validat
 
 from vedette.errors import InputError
 from vedette.evaluation.runs import STRATEGIES
-from vedette.models.arguments import plain
 from vedette.scenarios.diagnostics import suggestion
 from vedette.scenarios.faults import describe, named
 from vedette.scenarios.schema.base import Name, Section, Whole, expected
-from vedette.text import elided, listed, printable
+from vedette.text import elided, listed, plain, printable
 
 _MOST_BYTES = 2_000_000
 # A cell is a scenario with its filters built: this many take minutes before the first run.

@@ -21,6 +21,8 @@ from vedette.errors import InputError, NumericalError, VedetteError
 from vedette.kernels.types import Floats, Ints
 
 _MARGINAL_COMPONENTS = 10
+# A component of weight 1.5 to 2 is more often one target that two measurements fit than two: docs/filters.md.
+_RANK_OF_HALF_LEFT = 0.2
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,11 +132,11 @@ def unlabelled_estimate(density: Poisson | IidCluster | MultiBernoulli, step: in
     """The targets of a density that names none; at every step they get new labels (step, 0), (step, 1), ...
 
     Multi-Bernoulli: the most probable number of targets, and that many Bernoullis of highest existence, each estimated
-    by its heaviest component. Iid cluster: the most probable number; Poisson: the expected number, rounded; each target
-    is where the intensity has most left, of which it takes one away, and a component stands for another target only
-    where half of one or more is left: one of weight 1.9 for two. Components are fewer than targets where these are all
-    in one place. Existence is what the component had left, at most 1. Ties: the smaller number; the earlier Bernoulli
-    or component.
+    by its heaviest component. Iid cluster: the most probable number; Poisson: the expected number, rounded; that many
+    of the heaviest components, each one target. A component from which one was taken counts again with what is left in
+    it where that is a whole target or more (weight 2 stands for two); half a target or more comes only before
+    components lighter than 0.2. Components are fewer than targets where these are all in one place. Existence is what
+    the component had left, at most 1. Ties: the smaller number; the earlier Bernoulli or component.
     """
     if isinstance(density, MultiBernoulli):
         number = int(np.argmax(cardinality_distribution(density)))
@@ -152,16 +154,17 @@ def unlabelled_estimate(density: Poisson | IidCluster | MultiBernoulli, step: in
 
 
 def _by_units(weights: Floats, number: int) -> tuple[Ints, Floats]:
-    """The component of most remaining weight, up to `number` times, and how much it had, as probabilities."""
-    remaining = weights.copy()
+    """The component of highest rank, up to `number` times, and how much it had, as probabilities."""
+    remaining, rank = weights.copy(), weights.copy()
     chosen: list[int] = []
     had: list[float] = []
-    while len(chosen) < number and remaining.max(initial=-1.0) >= 0.0:
-        heaviest = int(np.argmax(remaining))
+    while len(chosen) < number and rank.max(initial=-1.0) >= 0.0:
+        heaviest = int(np.argmax(rank))
         chosen.append(heaviest)
         had.append(min(float(remaining[heaviest]), 1.0))
-        left = remaining[heaviest] - 1.0
-        remaining[heaviest] = left if left >= 0.5 else -1.0
+        remaining[heaviest] -= 1.0
+        left = remaining[heaviest]
+        rank[heaviest] = left if left >= 1.0 else _RANK_OF_HALF_LEFT if left >= 0.5 else -1.0
     return np.array(chosen, np.int64), np.array(had)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -49,7 +50,7 @@ class LmbFilter(ModelledFilter):
             log_likelihood=report.log_total + report.log_clutter - self.sensor.clutter.rate,
             num_hypotheses=1,
             num_tracks=len(posterior.existence_logit),
-            discarded_weight_bound=float("nan"),
+            discarded_weight_bound=max(0.0, -math.expm1(report.log_kept)),
             dropped_existence=float(report.dropped_existence),
             num_clutter_raised=int(report.num_raised),
             num_duplicates=num_duplicates,

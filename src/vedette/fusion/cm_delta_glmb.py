@@ -10,6 +10,7 @@ import numpy as np
 from scipy.special import expit
 
 from vedette.densities import GLMB, TrackTable
+from vedette.errors import NumericalError
 from vedette.fusion.alignment import Aligned, align
 from vedette.fusion.base import (
     FusionInfo,
@@ -115,9 +116,14 @@ def _heaviest(aligned: Aligned, tracks: TrackTable, log_weights: Floats, max_hyp
     """Normalised GLMB of the `max_hypotheses` heaviest label sets, and the weight of the others."""
     order = np.argsort(-log_weights, kind="stable")
     kept, cut = order[:max_hypotheses], order[max_hypotheses:]
-    log_kept = log_sum(log_weights[kept])
+    peak = log_weights[order[0]]
+    if peak == -math.inf:
+        raise NumericalError("fusion: expected a label set of positive weight; the sensors' densities share no place")
+    # From the heaviest on: logs of -1e12 keep their differences.
+    relative = log_weights[kept] - peak
+    log_kept = log_sum(relative)
     sizes = np.diff(aligned.set_offsets)[kept]
     hyp_offsets = np.concatenate([np.zeros(1, np.int64), np.cumsum(sizes)])
     members = np.repeat(aligned.set_offsets[kept] - hyp_offsets[:-1], sizes) + np.arange(hyp_offsets[-1])
-    fused = GLMB(take_tracks(tracks, members), hyp_offsets, np.arange(len(members)), log_weights[kept] - log_kept)
-    return fused, float(expit(log_sum(log_weights[cut]) - log_kept))
+    fused = GLMB(take_tracks(tracks, members), hyp_offsets, np.arange(len(members)), relative - log_kept)
+    return fused, float(expit(log_sum(log_weights[cut] - peak) - log_kept))

@@ -11,7 +11,7 @@ from vedette.kernels.association import Rows
 from vedette.kernels.children import Children, Parents
 from vedette.kernels.compile import borrowing, inlined, kernel
 from vedette.kernels.gaussian import update_mean
-from vedette.kernels.linalg import log_sum
+from vedette.kernels.linalg import normalise_logs
 from vedette.kernels.mixtures import copy_component
 from vedette.kernels.types import Floats, Glmb, Ints, Tracks
 
@@ -77,10 +77,7 @@ def name_tracks(
             hyp_tracks[filled] = track_of[option]
             filled += 1
         hyp_offsets[h + 1] = filled
-    log_total = log_sum(log_weights[: len(kept)])
-    for h in range(len(kept)):
-        log_weights[h] -= log_total
-    return num_used, filled, log_total
+    return num_used, filled, normalise_logs(log_weights[: len(kept)])
 
 
 @borrowing
@@ -92,8 +89,10 @@ def update_tracks(used_options: Ints, used_rows: Ints, rows: Rows, options: Opti
         row, option = used_rows[i], used_options[i]
         out.labels[i, 0], out.labels[i, 1] = rows.labels[row, 0], rows.labels[row, 1]
         end = write_updated(row, option, rows, options, filled, out.log_weights, out.means, out.covs)
-        for c in range(filled, end):
-            out.log_weights[c] -= options.log_weights[option]
+        if end == filled + 1:
+            out.log_weights[filled] = 0.0
+        else:
+            normalise_logs(out.log_weights[filled:end])
         filled = end
         out.offsets[i + 1] = filled
     return filled

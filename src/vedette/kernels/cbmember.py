@@ -19,6 +19,7 @@ from vedette.kernels.glmb import prepare_rows
 from vedette.kernels.labels import group_members
 from vedette.kernels.linalg import log_add
 from vedette.kernels.lmb import Reduction, append_reduced, labels_to_keep, weigh_by_existence
+from vedette.kernels.mixtures import require_gaussians
 from vedette.kernels.truncation import Truncation
 from vedette.kernels.types import Floats, Ints, Lmb, Motion, Sensor, Tracks
 
@@ -187,4 +188,5 @@ def step_cb_member(
     for i in range(len(kept)):
         sources[i], kept_logits[i] = possible[kept[i]], possible_logits[kept[i]]
     tracks = posterior_mixtures(sources, rows, options, choices, reduction)
+    require_gaussians(tracks.means, tracks.covs)
     return Lmb(tracks, kept_logits), CbMemberReport(num_raised, dropped + lost)

@@ -14,7 +14,7 @@ import numpy as np
 from vedette.kernels.assignment import MISSED
 from vedette.kernels.compile import borrowing, inlined, kernel
 from vedette.kernels.intensity import IntensityReport, corrected_intensity, intensity_options, predict_intensity
-from vedette.kernels.linalg import log_add, log_sum
+from vedette.kernels.linalg import log_add, log_sum, normalise_logs
 from vedette.kernels.lmb import Reduction
 from vedette.kernels.truncation import Truncation
 from vedette.kernels.types import Floats, Ints, Lmb, Mixture, Motion, Sensor
@@ -149,9 +149,7 @@ def trim_cardinality(log_cardinality: Floats, max_log_gap: float) -> tuple[Float
     while num > 1 and (log_cardinality[num - 1] == -math.inf or log_cardinality[num - 1] < peak - max_log_gap):
         num -= 1
     trimmed = log_cardinality[:num].copy()
-    kept = log_sum(trimmed)
-    for n in range(num):
-        trimmed[n] -= kept
+    kept = normalise_logs(trimmed)
     return trimmed, min(kept - total, 0.0)
 
 
@@ -181,11 +179,8 @@ def _predict(log_cardinality: Floats, prior: Mixture, birth: Lmb, rows_log_weigh
 @kernel
 def _normalised(mixture: Mixture) -> Mixture:
     """The mixture with weights that sum to one; none where there is no weight."""
-    log_mass = log_sum(mixture.log_weights)
-    if log_mass == -math.inf:
+    if normalise_logs(mixture.log_weights) == -math.inf:
         return Mixture(mixture.log_weights[:0], mixture.means[:0], mixture.covs[:0])
-    for c in range(len(mixture.log_weights)):
-        mixture.log_weights[c] -= log_mass
     return mixture
 
 

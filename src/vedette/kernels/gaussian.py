@@ -23,6 +23,9 @@ UNSCENTED_KAPPA = 1.0
 
 _TWO_PI = 2.0 * math.pi
 
+# Where a scan leaves less than this of the volume that was expected of it, cov - cross' cross cancels too many digits.
+_LEAST_SHRINKAGE = 1e-8
+
 
 class Scratch(NamedTuple):
     """Working arrays of one thread for a given state and measurement dimension."""
@@ -37,6 +40,7 @@ class Scratch(NamedTuple):
     measurement_noise: Floats
     innovation_cov: Floats
     residual: Floats
+    gain: Floats
     angular_state: Bools
 
 
@@ -70,6 +74,7 @@ def make_scratch(state_dim: int, meas_dim: int) -> Scratch:
         np.empty((meas_dim, meas_dim)),
         np.empty((meas_dim, meas_dim)),
         np.empty(meas_dim),
+        np.empty((meas_dim, state_dim)),
         np.zeros(state_dim, np.bool_),
     )
 
@@ -206,7 +211,8 @@ def predict(
 @borrowing
 def _expect_sigma_points(
     sensor: Sensor, pose: Floats, mean: Floats, cov: Floats, predicted: Floats, cross: Floats, scratch: Scratch
-) -> None:
+) -> tuple[int, float, float]:
+    """Number of sigma points and their weights, as `_sigma_points`; the images are left as deviations."""
     n, m = mean.shape[0], predicted.shape[0]
     points, images = scratch.points, scratch.images
     num, first, other = _sigma_points(sensor.method, mean, cov, points, scratch.factor)
@@ -221,6 +227,7 @@ def _expect_sigma_points(
             for i in range(1, num):
                 total += other * images[i, a] * (points[i, j] - mean[j])
             cross[a, j] = total
+    return num, first, other
 
 
 @inlined
@@ -240,10 +247,35 @@ def _project(jacobian: Floats, cov: Floats, cross: Floats, innovation: Floats, n
 
 
 @inlined
+def _has_volume(noise: Floats, factor: Floats, work: Floats, m: int) -> bool:
+    """Whether the noise has at least `_LEAST_SHRINKAGE` of the determinant of the innovation covariance L L'.
+
+    That share bounds from below what any direction of the state keeps of its variance. work: to be written.
+    """
+    expected = 1.0
+    for a in range(m):
+        expected *= factor[a, a] * factor[a, a]
+    if m == 1:
+        return noise[0, 0] > _LEAST_SHRINKAGE * expected
+    if m == 2:
+        skew = 0.5 * (noise[0, 1] + noise[1, 0])
+        return noise[0, 0] * noise[1, 1] - skew * skew > _LEAST_SHRINKAGE * expected
+    if not cholesky_of_size(noise, work, m):
+        return False
+    own = 1.0
+    for a in range(m):
+        own *= work[a, a] * work[a, a]
+    return own > _LEAST_SHRINKAGE * expected
+
+
+@inlined
 def _condition(
     cov: Floats, noise: Floats, innovation: Floats, factor: Floats, cross: Floats, posterior: Floats, n: int, m: int
-) -> None:
-    """Add the noise to `innovation` and factor it; whiten `cross`; posterior = cov - cross' cross."""
+) -> bool:
+    """Add the noise to `innovation` and factor it; whiten `cross`; posterior = cov - cross' cross.
+
+    False where that difference cancels so much that it must be taken by `_posterior_of_squares`.
+    """
     for a in range(m):
         for b in range(a + 1):
             innovation[a, b] += 0.5 * (noise[a, b] + noise[b, a])
@@ -262,6 +294,72 @@ def _condition(
                 total -= cross[a, i] * cross[a, j]
             posterior[i, j] = total
             posterior[j, i] = total
+    return _has_volume(noise, factor, innovation, m)
+
+
+@borrowing
+def _fill_gain(factor: Floats, whitened_cross: Floats, noise: Floats, gain: Floats, out: Floats) -> None:
+    """gain = K' = factor^-T whitened_cross, and out = K noise K'."""
+    m, n = gain.shape
+    for j in range(n):
+        for a in range(m - 1, -1, -1):
+            total = whitened_cross[a, j]
+            for b in range(a + 1, m):
+                total -= factor[b, a] * gain[b, j]
+            gain[a, j] = total / factor[a, a]
+    for i in range(n):
+        for j in range(i + 1):
+            total = 0.0
+            for a in range(m):
+                for b in range(m):
+                    total += gain[a, i] * 0.5 * (noise[a, b] + noise[b, a]) * gain[b, j]
+            out[i, j] = total
+            out[j, i] = total
+
+
+@borrowing
+def _posterior_of_squares(
+    mean: Floats,
+    cov: Floats,
+    factor: Floats,
+    whitened_cross: Floats,
+    num: int,
+    first: float,
+    other: float,
+    scratch: Scratch,
+    out: Floats,
+) -> None:
+    """Posterior covariance as a sum of squares, in which nothing cancels (Joseph's form).
+
+    With the gain K and the noise R: (I - K H) cov (I - K H)' + K R K'; of sigma points (`num` of them, 0 for none) that
+    deviate by d from the mean and by e from the predicted measurement, sum of w (d - K e) (d - K e)' + K R K'.
+    """
+    n, m = cov.shape[0], factor.shape[0]
+    gain, points, images = scratch.gain, scratch.points, scratch.images
+    _fill_gain(factor, whitened_cross, scratch.measurement_noise, gain, scratch.noise)
+    if num == 0:
+        rest = scratch.jacobian
+        for i in range(n):
+            for j in range(n):
+                total = 1.0 if i == j else 0.0
+                for a in range(m):
+                    total -= gain[a, i] * scratch.measurement_jacobian[a, j]
+                rest[i, j] = total
+        _sandwich(rest, cov, scratch.noise, scratch.product, out, n)
+        return
+    for k in range(num):
+        for j in range(n):
+            total = points[k, j] - mean[j]
+            for a in range(m):
+                total -= gain[a, j] * images[k, a]
+            points[k, j] = total
+    for i in range(n):
+        for j in range(i + 1):
+            total = scratch.noise[i, j] + first * points[0, i] * points[0, j]
+            for k in range(1, num):
+                total += other * points[k, i] * points[k, j]
+            out[i, j] = total
+            out[j, i] = total
 
 
 @inlined
@@ -270,20 +368,22 @@ def expect(sensor: Sensor, pose: Floats, mean: Floats, cov: Floats, at: int, out
     n, m = mean.shape[0], out.predicted.shape[1]
     jacobian, noise, innovation = scratch.measurement_jacobian, scratch.measurement_noise, scratch.innovation_cov
     factor, cross, posterior = out.factor[at], out.whitened_cross[at], out.covs[at]
-    linearised = sensor.method == LINEARISED
+    linearised, num, first, other = sensor.method == LINEARISED, 0, 0.0, 0.0
     if linearised:
         sensor.measurement(mean, pose, sensor.measurement_params, out.predicted[at])
         sensor.measurement_jacobian(mean, pose, sensor.measurement_params, jacobian)
     else:
-        _expect_sigma_points(sensor, pose, mean, cov, out.predicted[at], cross, scratch)
+        num, first, other = _expect_sigma_points(sensor, pose, mean, cov, out.predicted[at], cross, scratch)
     sensor.measurement_noise_cov(mean, pose, sensor.noise_params, noise)
     if linearised and n == 4 and m == 2:
         _project(jacobian, cov, cross, innovation, 4, 2)
-        _condition(cov, noise, innovation, factor, cross, posterior, 4, 2)
+        exact = _condition(cov, noise, innovation, factor, cross, posterior, 4, 2)
     else:
         if linearised:
             _project(jacobian, cov, cross, innovation, n, m)
-        _condition(cov, noise, innovation, factor, cross, posterior, n, m)
+        exact = _condition(cov, noise, innovation, factor, cross, posterior, n, m)
+    if not exact:
+        _posterior_of_squares(mean, cov, factor, cross, num, first, other, scratch, posterior)
     out.log_norm[at] = -0.5 * (log_det_from_factor(factor) + m * LOG_2PI)
     detection = sensor.prob_detection(mean, pose, sensor.detection_params)
     if not 0.0 <= detection <= 1.0:

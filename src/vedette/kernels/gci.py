@@ -15,7 +15,8 @@ import numpy as np
 
 from vedette.kernels.compile import kernel
 from vedette.kernels.information import log_integral, log_value, row_size, to_information, to_moments
-from vedette.kernels.linalg import cholesky, log_add
+from vedette.kernels.linalg import cholesky, log_add, normalise_logs
+from vedette.kernels.mixtures import require_gaussians
 from vedette.kernels.types import Floats, Ints, Tracks
 
 
@@ -179,7 +180,7 @@ def fuse_tracks(
     components.
 
     Returns offsets (num + 1,), log_weights, means and covs of the fused tracks, and log_overlaps (num,). Raises
-    FloatingPointError where a covariance is not positive definite.
+    FloatingPointError where a covariance is not positive definite, NumericalError where a fused one is not.
     """
     num, dim = len(chosen), tracks.means.shape[1]
     offsets, most = _count_combinations(chosen, tracks)
@@ -190,14 +191,11 @@ def fuse_tracks(
         low, high = offsets[item], offsets[item + 1]
         _load(chosen, item, fusion_weights, tracks, powers)
         _multiply(powers, low, high, log_weights, means, covs)
-        log_overlap = -math.inf
         for c in range(low, high):
             if high - low > 1 and len(points) > 0:
                 log_weights[c] += _correct(powers, points, point_weights, means[c], covs[c])
-            log_overlap = log_add(log_overlap, log_weights[c])
-        for c in range(low, high):
-            log_weights[c] -= log_overlap
-        log_overlaps[item] = log_overlap
+        log_overlaps[item] = normalise_logs(log_weights[low:high])
+    require_gaussians(means, covs)
     return offsets, log_weights, means, covs, log_overlaps
 
 

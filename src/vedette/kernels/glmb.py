@@ -23,6 +23,7 @@ from vedette.kernels.coverage import add_uncovered, mark_heaviest, themes_of_opt
 from vedette.kernels.gaussian import Scratch, make_scratch
 from vedette.kernels.gibbs import sample_children
 from vedette.kernels.linalg import log_sum
+from vedette.kernels.mixtures import require_gaussians
 from vedette.kernels.ranked import Children, Parents, rank_children
 from vedette.kernels.truncation import Truncation, heaviest_first, keep_heaviest, merge_equal
 from vedette.kernels.types import Floats, Glmb, Ints, Lmb, Motion, Sensor, Tracks
@@ -145,6 +146,7 @@ def _conclude(
         )
     kept = keep_heaviest(children, order, needed, truncation, parents.groups)
     posterior, log_total = assemble(children, kept, parents, rows, options)
+    require_gaussians(posterior.tracks.means, posterior.tracks.covs)
     report = StepReport(log_total, _log_total_bound(options, parents), log_clutter, num_raised, cut)
     origins = np.empty(len(kept), np.int64)
     for h in range(len(kept)):

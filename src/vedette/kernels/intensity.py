@@ -18,7 +18,7 @@ from vedette.kernels.compile import kernel
 from vedette.kernels.gaussian import make_scratch
 from vedette.kernels.glmb import prepare_rows
 from vedette.kernels.lmb import Reduction
-from vedette.kernels.mixtures import reduce_mixture
+from vedette.kernels.mixtures import reduce_mixture, require_gaussians
 from vedette.kernels.truncation import Truncation
 from vedette.kernels.types import Floats, Lmb, Mixture, Motion, Sensor, Tracks
 
@@ -92,4 +92,5 @@ def corrected_intensity(rows: Rows, options: Options, log_factors: Floats, reduc
     few_weights, few_means, few_covs = reduce_mixture(
         log_weights, means, covs, reduction.log_min_weight, reduction.merge_distance, reduction.max_components
     )
+    require_gaussians(few_means, few_covs)
     return Mixture(few_weights, few_means, few_covs)

@@ -104,6 +104,25 @@ def log_add(a: float, b: float) -> float:
 
 
 @borrowing
+def normalise_logs(values: Floats) -> float:
+    """Make the exponentials sum to one and return the log of what they summed to; -inf, and nothing done, for none.
+
+    Taken from the largest, not from the sum: logs of -1e12 keep their differences, and so still sum to one.
+    """
+    peak, total = -math.inf, 0.0
+    for value in values:
+        peak = max(peak, value)
+    if peak == -math.inf:
+        return peak
+    for value in values:
+        total += math.exp(value - peak)
+    log_total = math.log(total)
+    for i in range(len(values)):
+        values[i] = (values[i] - peak) - log_total
+    return peak + log_total
+
+
+@borrowing
 def log_sum(values: Floats) -> float:
     """log of the sum of exponentials; -inf for no values."""
     peak = -math.inf

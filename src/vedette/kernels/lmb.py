@@ -13,10 +13,10 @@ from vedette.kernels.association import Rows, clutter_levels, list_options
 from vedette.kernels.compile import borrowing, inlined, kernel
 from vedette.kernels.gaussian import make_scratch
 from vedette.kernels.glmb import prepare_rows
-from vedette.kernels.linalg import log_add
+from vedette.kernels.linalg import log_add, normalise_logs
 from vedette.kernels.marginals import option_marginals
 from vedette.kernels.matching import make_mixture, match_rows
-from vedette.kernels.mixtures import copy_component, descending_order, reduce_mixture
+from vedette.kernels.mixtures import copy_component, descending_order, reduce_mixture, require_gaussians
 from vedette.kernels.truncation import Truncation
 from vedette.kernels.types import Floats, Ints, Lmb, Motion, Sensor, Tracks
 
@@ -37,14 +37,16 @@ class Reduction(NamedTuple):
 
 class LmbReport(NamedTuple):
     """log_total: log of the sum of all joint weights, relative to clutter alone. log_clutter, num_raised: as in
-    `StepReport`. num_ranked: clusters summed over their heaviest choices only. dropped_existence: summed existence
-    of dropped labels.
+    `StepReport`. num_ranked: clusters summed over their heaviest choices only. log_kept: log of the least share of
+    all joint weight that is in the sum; 0 where no cluster was ranked. dropped_existence: summed existence of
+    dropped labels.
     """
 
     log_total: float
     log_clutter: float
     num_raised: int
     num_ranked: int
+    log_kept: float
     dropped_existence: float
 
 
@@ -179,11 +181,9 @@ def append_reduced(
         reduction.merge_distance,
         reduction.max_components,
     )
-    total = -math.inf
+    normalise_logs(few_weights)
     for c in range(len(few_weights)):
-        total = log_add(total, few_weights[c])
-    for c in range(len(few_weights)):
-        log_weights[filled] = few_weights[c] - total
+        log_weights[filled] = few_weights[c]
         copy_component(few_means, few_covs, c, means, covs, filled)
         filled += 1
     return filled
@@ -198,7 +198,7 @@ def finish_lmb(
     log_clutter, num_raised = clutter_levels(sensor, scan, pose, truncation.log_clutter_floor, levels)
     options = list_options(rows, scan, levels, sensor, truncation.gate)
     marginals = np.empty(options.offsets[-1])
-    log_total, num_ranked = option_marginals(
+    log_total, num_ranked, log_kept = option_marginals(
         options, len(scan), truncation.max_hypotheses, truncation.max_log_gap, truncation.max_nodes, marginals
     )
     logits = np.empty(len(rows.log_absent))
@@ -208,10 +208,11 @@ def finish_lmb(
         tracks = _matched_tracks(kept, rows, options, marginals)
     else:
         tracks = _reduced_tracks(kept, rows, options, marginals, reduction)
+    require_gaussians(tracks.means, tracks.covs)
     kept_logits = np.empty(len(kept))
     for i in range(len(kept)):
         kept_logits[i] = logits[kept[i]]
-    return Lmb(tracks, kept_logits), LmbReport(log_total, log_clutter, num_raised, num_ranked, dropped)
+    return Lmb(tracks, kept_logits), LmbReport(log_total, log_clutter, num_raised, num_ranked, log_kept, dropped)
 
 
 @kernel

@@ -6,9 +6,50 @@ import math
 
 import numpy as np
 
+from vedette.errors import NumericalError
 from vedette.kernels.compile import borrowing, inlined, kernel
 from vedette.kernels.linalg import cholesky, log_sum, solve_lower
 from vedette.kernels.types import Floats, Ints
+
+
+@inlined
+def _is_definite(cov: Floats, factor: Floats, n: int) -> bool:
+    """Whether `cov` is positive definite beyond rounding, so that any other Cholesky factorisation finds it so too.
+
+    Its correlations are factored with a diagonal lessened by twice what n (n + 2) roundings may take from it.
+    """
+    least = 2.0 * n * (n + 2) * 2.0**-52
+    for i in range(n):
+        for j in range(i + 1):
+            total = cov[i, j]
+            for k in range(j):
+                total -= factor[i, k] * factor[j, k]
+            if i > j:
+                factor[i, j] = total / factor[j, j]
+                continue
+            total -= least * cov[i, i]
+            if not 0.0 < total < math.inf:
+                return False
+            factor[i, i] = math.sqrt(total)
+    return True
+
+
+@kernel
+def require_gaussians(means: Floats, covs: Floats) -> None:
+    """Raise `NumericalError` unless means are finite and covariances positive definite beyond their rounding."""
+    num, n = means.shape
+    factor = np.empty((n, n))
+    for c in range(num):
+        for i in range(n):
+            if not math.isfinite(means[c, i]):
+                raise NumericalError("mean of a track is not finite: the models or the scan lead beyond all numbers")
+        # A constant size is unrolled by the compiler.
+        definite = _is_definite(covs[c], factor, 4) if n == 4 else _is_definite(covs[c], factor, n)
+        if not definite:
+            raise NumericalError(
+                "covariance of a track is not positive definite within the precision of a double: its axes differ by "
+                "too many orders of magnitude (a long time step, far smaller noise, or targets far apart made one)"
+            )
 
 
 @kernel
@@ -202,4 +243,11 @@ def reduce_mixture(
     return out_log_weights, out_means, out_covs
 
 
-__all__ = ["copy_component", "descending_order", "match_components", "moment_match", "reduce_mixture"]
+__all__ = [
+    "copy_component",
+    "descending_order",
+    "match_components",
+    "moment_match",
+    "reduce_mixture",
+    "require_gaussians",
+]

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from vedette.kernels.compile import inlined, kernel
-from vedette.kernels.mixtures import copy_component, match_components, reduce_mixture
+from vedette.kernels.mixtures import copy_component, match_components, reduce_mixture, require_gaussians
 from vedette.kernels.types import Floats, Ints, Tracks
 
 
@@ -102,6 +102,7 @@ def pooled_tracks(
         offsets[i + 1] = used
     if used < room:
         log_weights, means, covs = log_weights[:used].copy(), means[:used].copy(), covs[:used].copy()
+    require_gaussians(means, covs)
     return Tracks(labels, offsets, log_weights, means, covs)
 
 

@@ -125,7 +125,7 @@ def _update(rows: Rows, pose: Floats, num_measurements: int, decision: Decision,
     clutter_levels(decision.sensor, scan, pose, caps.log_clutter_floor, work.levels)
     fill_options(rows, scan, work.levels, decision.sensor, caps.gate, options)
     ranked = MarginalCaps(caps.max_hypotheses, caps.max_log_gap, caps.max_nodes)
-    log_total, _, has_room = fill_marginals(options, num_measurements, ranked, work.clusters, work.marginals)
+    log_total, _, _, has_room = fill_marginals(options, num_measurements, ranked, work.clusters, work.marginals)
     if not has_room:
         return False
     if log_total == -math.inf:

@@ -10,21 +10,12 @@ import numpy as np
 
 from vedette.errors import InputError
 from vedette.kernels.types import Floats
-from vedette.text import printable
+from vedette.text import plain, printable
 
 # Squares and products of variances in this range are numbers.
 SMALLEST_VARIANCE, LARGEST_VARIANCE = 1e-60, 1e60
 # Of a correlation matrix: what is below is rounding, and no direction of the state is known so well.
 LEAST_EIGENVALUE = 1e-13
-
-
-def plain(value: Any) -> str:
-    """A value as a person would write it: numbers of NumPy as numbers, also inside lists."""
-    with np.printoptions(legacy="1.25"):  # from 2.0 on the repr of a number names its type
-        try:
-            return repr(value.tolist() if isinstance(value, np.ndarray) else value)
-        except ValueError:  # a whole number of more digits than Python writes
-            return "a number of thousands of digits"
 
 
 def reject(field: str, expected: str, got: Any) -> InputError:

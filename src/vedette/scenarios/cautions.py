@@ -14,7 +14,6 @@ from vedette.scenarios.diagnostics import place_fault
 from vedette.scenarios.faults import Path
 from vedette.scenarios.loading import Scenario
 from vedette.scenarios.names import sensor_names
-from vedette.scenarios.record_cautions import record_cautions
 from vedette.scenarios.schema import ScenarioModel
 from vedette.scenarios.schema.sensors import (
     ConstantDetection,
@@ -23,6 +22,7 @@ from vedette.scenarios.schema.sensors import (
     LimitedSector,
     Sensor,
 )
+from vedette.scenarios.schema.world import RecordedTargets
 from vedette.scenarios.yaml_reader import read_yaml
 
 # Sensors whose probabilities of detection of one place differ by more than this do not see the same.
@@ -32,7 +32,7 @@ _POINTS_A_SIDE = 21
 
 def cautions(scenario: Scenario) -> tuple[str, ...]:
     """Warnings of a valid scenario, one line each, with file, line and column where it was read from a file."""
-    found = [*record_cautions(scenario), *_views(scenario.model), *_births(scenario.model)]
+    found = [*_records(scenario), *_views(scenario.model), *_births(scenario.model)]
     if not found:
         return ()
     document = None
@@ -47,6 +47,13 @@ def cautions(scenario: Scenario) -> tuple[str, ...]:
         where = scenario.name if place is None else f"{scenario.path}:{place[0]}:{place[1]}"
         lines.append(f"{where}: warning: {text}")
     return tuple(lines)
+
+
+def _records(scenario: Scenario) -> Iterator[tuple[Path, str]]:
+    if isinstance(scenario.model.targets, RecordedTargets):
+        from vedette.scenarios.record_cautions import record_cautions  # with it comes what takes long to import
+
+        yield from record_cautions(scenario)
 
 
 def _fuses(model: ScenarioModel) -> bool:

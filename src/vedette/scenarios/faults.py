@@ -6,8 +6,7 @@ import json
 from dataclasses import dataclass
 from typing import Any
 
-from vedette.models.arguments import plain
-from vedette.text import elided, printable
+from vedette.text import elided, plain, printable
 
 Path = tuple[str | int, ...]
 Place = tuple[int, int]  # line and column, from 1

@@ -7,6 +7,7 @@ import csv
 import importlib.util
 import os
 import symtable
+import tokenize
 import warnings
 from collections.abc import Iterator
 from pathlib import Path as FilePath
@@ -14,10 +15,8 @@ from typing import Any
 
 from vedette.scenarios.faults import Finding, Path, describe, named
 from vedette.scenarios.parts import Parts
-from vedette.scenarios.records import record_fault
 from vedette.scenarios.schema.base import Custom, Section
 from vedette.scenarios.schema.world import RecordedTargets
-from vedette.simulation.reports import column_names
 
 
 def _absent(file: str) -> str:
@@ -49,6 +48,8 @@ def _content(recorded: RecordedTargets, parts: Parts) -> Iterator[Finding]:
     for section in (recorded, region, time):
         if any(getattr(section, name) is None for name, field in type(section).model_fields.items() if field.default):
             return
+    from vedette.scenarios.records import record_fault  # with it comes the compiler, which most checks do without
+
     fault = record_fault(recorded, region, time, parts.folder or FilePath())
     if fault is not None:
         yield ("targets", "path"), "a file of recorded targets that a run can use", fault
@@ -64,6 +65,8 @@ def _columns(recorded: RecordedTargets, file: FilePath) -> Iterator[Finding]:
     except (OSError, csv.Error) as error:
         yield ("targets", "path"), "a readable CSV file", f"{describe(recorded.path)}: {error}"
         return
+    from vedette.simulation.reports import column_names
+
     given, shown = recorded.columns.given(), column_names(header)
     for key, name in given.items():
         if name not in header:
@@ -95,14 +98,15 @@ def _unnamed(file: FilePath, name: str) -> tuple[str, str] | None:
     """What is wrong where a file is no Python, or does not define the name; nothing of it is run."""
     try:
         with warnings.catch_warnings(action="ignore"):  # of the user's style; a run tells them
-            code = file.read_bytes()
+            with tokenize.open(file) as text:  # in the encoding that it says it has
+                code = text.read()
             tree, symbols = ast.parse(code), symtable.symtable(code, str(file), "exec").get_symbols()
     except (OSError, SyntaxError, ValueError, RecursionError, MemoryError) as error:
         line = f", line {error.lineno}" if isinstance(error, SyntaxError) and error.lineno else ""
         return "a file of Python", f"{describe(file.name)}{line}, which is none"
     known = {symbol.get_name() for symbol in symbols if symbol.is_assigned() or symbol.is_imported()}
     hidden = any(isinstance(node, ast.ImportFrom) and node.names[0].name == "*" for node in ast.walk(tree))
-    if name in known or hidden or "__getattr__" in known or "globals" in code.decode("utf-8", "replace"):
+    if name in known or hidden or "__getattr__" in known or "globals" in code:
         return None
     return f"a name that {describe(file.name)} defines", describe(name)
 

@@ -16,9 +16,8 @@ import numpy as np
 
 from vedette.errors import InputError
 from vedette.kernels.types import Floats, Ints
-from vedette.models.arguments import plain
 from vedette.simulation.geography import to_tangent_plane
-from vedette.text import elided, printable
+from vedette.text import elided, plain, printable
 
 # Beyond these, differences and speeds of reports mean nothing.
 _FARTHEST = 1e9  # m, m/s
@@ -101,6 +100,8 @@ class Table:
                 values[i] = seconds(cell)
             except (TypeError, ValueError, OverflowError):
                 raise self.fault(i, name, "an ISO 8601 time") from None
+            if not abs(values[i]) <= _LATEST:  # a number, infinite or not, among times
+                raise self.fault(i, name, "an ISO 8601 time")
         return values
 
     def labels(self, name: str) -> list[str]:
