@@ -280,3 +280,18 @@ def test_mistakes(arguments, status, message):
     assert result.exit_code == status
     assert message in result.output
     assert "Traceback" not in result.output
+
+
+def test_a_folder_of_before_failures_were_kept_is_read_and_gone_on_with(folder, campaign):
+    execute(folder, "DROP TABLE failures")
+    before = len(list(open_results(folder).runs()))
+    with Store.open(folder, campaign) as store:
+        assert len(store.finished()) == before
+
+
+@pytest.mark.parametrize("table", ["runs", "campaign"])
+def test_a_table_that_was_dropped_is_damage_and_not_a_fresh_start(folder, campaign, table):
+    execute(folder, f"DROP TABLE {table}")
+    for ask in (lambda: open_results(folder).finished("jdm-rate-5.0"), lambda: Store.open(folder, campaign)):
+        with pytest.raises(InputError, match=r"campaign\.sqlite: expected the tables of a campaign"):
+            ask()

@@ -131,3 +131,11 @@ def test_other_files_are_refused(tmp_path):
     for name in ("array.npy", "objects.npz", "text.npz", "missing.npz", "."):
         with pytest.raises(InputError, match="expected a density file"):
             load_density(tmp_path / name)
+
+
+def test_a_small_file_that_unpacks_to_much_is_refused(tmp_path):
+    path = tmp_path / "bomb.npz"
+    np.savez_compressed(path, **(_stored(random_lmb(np.random.default_rng(0), 2)) | {"more": np.zeros(5_000_000)}))
+    assert path.stat().st_size < 100_000
+    with pytest.raises(InputError, match=r"bomb\.npz: expected a density file; .* bytes would unpack to 4"):
+        load_density(path)

@@ -21,6 +21,7 @@ Statement = tuple[str, tuple[Any, ...]]
 _STATEMENTS = [
     "DROP TABLE runs",
     "DROP TABLE campaign",
+    "DROP TABLE failures",
     "DELETE FROM campaign",
     "INSERT INTO campaign SELECT * FROM campaign",
     "ALTER TABLE runs DROP COLUMN session",

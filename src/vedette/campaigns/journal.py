@@ -27,8 +27,11 @@ _TABLES = (
     "CREATE TABLE runs (cell TEXT NOT NULL, run INTEGER NOT NULL, session INTEGER NOT NULL, "
     "payload BLOB NOT NULL, payload_sha256 TEXT NOT NULL, timings BLOB NOT NULL, timings_sha256 TEXT NOT NULL, "
     "PRIMARY KEY (cell, run))",
+)
+# Not there in folders of before it was kept why a run could not be finished.
+_FAILURES = (
     "CREATE TABLE failures (cell TEXT NOT NULL, run INTEGER NOT NULL, session INTEGER NOT NULL, "
-    "message TEXT NOT NULL, PRIMARY KEY (cell, run))",
+    "message TEXT NOT NULL, PRIMARY KEY (cell, run))"
 )
 _COLUMNS = "cell, run, session, payload, payload_sha256, timings, timings_sha256"
 
@@ -79,7 +82,8 @@ class Writer:
                 for statement in _TABLES:
                     database.execute(statement)
                 database.execute("INSERT INTO campaign VALUES (?)", (contents,))
-            _check_tables(self._path, database)
+            if not _check_tables(self._path, database):
+                database.execute(_FAILURES)
             found = database.execute("SELECT contents FROM campaign").fetchall()
             database.execute("COMMIT")
         _check_contents(self._path, found, contents)
@@ -156,6 +160,8 @@ class Reader:
 
     def failures(self) -> list[Failure]:
         """The runs that were tried and could not be finished, sorted."""
+        if not self._ask("SELECT 1 FROM sqlite_master WHERE name = 'failures'"):
+            return []
         rows = self._ask("SELECT cell, run, session, message FROM failures ORDER BY cell, run")
         return [Failure(*row) for row in rows]
 
@@ -202,13 +208,16 @@ def _answer(path: Path, question: str, values: Sequence[Any], mode: str = "ro") 
         return database.execute(question, values).fetchall()
 
 
-def _check_tables(path: Path, database: sqlite3.Connection) -> None:
-    """`InputError` unless the tables are those of a campaign, with nothing that acts or answers in their place."""
-    found = database.execute("SELECT sql FROM sqlite_master WHERE name NOT LIKE 'sqlite~_%' ESCAPE '~'")
-    if sorted(str(sql) for (sql,) in found) != sorted(_TABLES):
-        raise InputError(
-            f"{path}: expected the tables of a campaign as they were made; the file is cut short or altered"
-        )
+def _check_tables(path: Path, database: sqlite3.Connection) -> bool:
+    """`InputError` unless the tables are those of a campaign, with nothing that acts or answers in their place.
+
+    Returns whether the table of failures is among them.
+    """
+    rows = database.execute("SELECT sql FROM sqlite_master WHERE name NOT LIKE 'sqlite~_%' ESCAPE '~'")
+    found = sorted(str(sql) for (sql,) in rows)
+    if found not in (sorted(_TABLES), sorted((*_TABLES, _FAILURES))):
+        raise InputError(f"{path}: expected the tables of a campaign; the file is cut short or altered")
+    return _FAILURES in found
 
 
 def _checked_keys(path: Path, rows: Sequence[tuple[Any, Any]]) -> list[tuple[str, int]]:
