@@ -13,7 +13,7 @@ from vedette.errors import InputError, ScenarioError
 from vedette.models import BirthModel
 from vedette.scenarios import load_scenario, parse_scenario
 from vedette.scenarios.build import build_experiment
-from vedette.scenarios.record_cautions import cautions
+from vedette.scenarios.cautions import cautions
 
 TARGETS = MINIMAL[MINIMAL.index("targets:") : MINIMAL.index("sensor_defaults:")]
 SHIPS = "time,id,longitude,latitude\n" + "".join(
@@ -121,7 +121,7 @@ def test_a_second_report_at_one_time_is_left_out_and_told(tmp_path: Path) -> Non
     )
     kept = build_experiment(scenario).targets
     (tmp_path / "ships.csv").write_text(SHIPS)
-    assert cautions(plain) == []
+    assert cautions(plain) == ()
     for track, other in zip(kept.tracks, build_experiment(plain).targets.tracks, strict=True):  # type: ignore[attr-defined]
         assert (track.times == other.times).all()
 

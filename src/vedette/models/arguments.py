@@ -9,14 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vedette.covariances import covariance_fault
 from vedette.errors import InputError
 from vedette.kernels.types import Floats
 from vedette.text import plain, printable
-
-# Squares and products of variances in this range are numbers.
-SMALLEST_VARIANCE, LARGEST_VARIANCE = 1e-60, 1e60
-# Of a correlation matrix: what is below is rounding, and no direction of the state is known so well.
-LEAST_EIGENVALUE = 1e-13
 
 
 def reject(field: str, expected: str, got: Any) -> InputError:
@@ -133,24 +129,6 @@ def state_table(field: str, values: Any, state_dim: int | None = None) -> Floats
     if array.ndim == 1 and array.size:
         return float_array(field, array[np.newaxis], (1, state_dim))
     return float_array(field, array, (None, state_dim))
-
-
-def covariance_fault(matrix: Floats) -> tuple[str, str] | None:
-    """What a square matrix lacks to be a covariance that filters can compute with, and what it is; None: nothing."""
-    if not np.isfinite(matrix).all():
-        return "finite numbers", "one that is not"
-    if not np.allclose(matrix, matrix.T, rtol=1e-9, atol=0.0):
-        return "a symmetric matrix", "one that is not"
-    variances = np.diagonal(matrix)
-    wrong = (variances < SMALLEST_VARIANCE) | (variances > LARGEST_VARIANCE)
-    if wrong.any():
-        wanted = f"a positive definite matrix with variances from {SMALLEST_VARIANCE:g} to {LARGEST_VARIANCE:g}"
-        return wanted, f"a variance of {float(variances[np.argmax(wrong)]):g}"
-    stds = np.sqrt(variances)  # of the correlations, so that metres and radians can stand side by side
-    least = float(np.linalg.eigvalsh(matrix / stds[:, np.newaxis] / stds)[0])
-    if least <= LEAST_EIGENVALUE:
-        return "a positive definite matrix", f"correlations with a least eigenvalue of {least:.3g}"
-    return None
 
 
 def positive_definite(field: str, matrix: Floats) -> None:

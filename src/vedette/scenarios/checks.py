@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from vedette.models.arguments import SMALLEST_VARIANCE, covariance_fault
+from vedette.covariances import SMALLEST_VARIANCE, covariance_fault
 from vedette.scenarios.faults import Finding, Path, describe
 from vedette.scenarios.file_checks import recorded_findings, reference_findings
 from vedette.scenarios.parts import Parts
