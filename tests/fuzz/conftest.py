@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import time
 import traceback
 from collections.abc import Callable, Iterator
@@ -49,7 +50,8 @@ def try_cases(request: pytest.FixtureRequest) -> Callable[[Callable[[np.random.G
                 check(np.random.default_rng([seed, number]))
             except Exception as fault:
                 fault.add_note(f"repeat with --fuzz-seed {seed} --fuzz-case {number}")
-                faults.setdefault(_place(fault), fault)
+                if faults.setdefault(_place(fault), fault) is fault:
+                    traceback.print_exception(fault, file=sys.stdout)  # at once: a long run may be stopped
                 if len(faults) == MOST_FAULTS:
                     break
         print(f"\n{request.node.name}: {tried} cases, {len(faults)} different faults")

@@ -107,8 +107,9 @@ def _sensor(rng: Rng) -> models.SensorModel:
 def _birth(rng: Rng, dim: int) -> models.BirthModel:
     num = int(rng.integers(1, 4))
     existence = [one_of(rng, 1e-12, 0.03, 0.3, 0.9, 1.0 - 1e-12) for _ in range(num)]
-    steps = one_of(rng, None, None, frozenset([0]), frozenset([0, 1]))
-    return models.BirthModel(existence, states(rng, num, dim), [covariance(rng, dim) for _ in range(num)], steps)
+    steps = one_of(rng, None, None, frozenset([1]), frozenset([1, 2]))
+    covs = np.stack([covariance(rng, dim) for _ in range(num)])
+    return models.BirthModel(np.array(existence), states(rng, num, dim), covs, steps)
 
 
 def world(rng: Rng) -> tuple[models.MotionModel, models.SurvivalModel, models.BirthModel]:
@@ -126,20 +127,20 @@ def make_filter(rng: Rng, kind: str, parts: tuple[Any, Any, Any]) -> Any:
     """A filter of the kind, with a sensor and limits of its own."""
     args = (*parts, _sensor(rng), Limits() if rng.random() < 0.3 else _limits(rng))
     if kind in ("ranked", "gibbs", "marginalised"):
-        assignment = "gibbs" if kind == "gibbs" else one_of(rng, "ranked", "ranked", "gibbs")
+        assignment: Any = "gibbs" if kind == "gibbs" else one_of(rng, "ranked", "ranked", "gibbs")
         return DeltaGlmbFilter(*args, assignment, int(rng.integers(1, 40)), kind == "marginalised")
     return {"lmb": LmbFilter, "phd": PhdFilter, "cphd": CphdFilter, "cbmember": CbMemberFilter}[kind](*args)
 
 
 def first_belief(rng: Rng, kind: str, local: Any) -> Any:
-    """No target; or some that were there before step 0, certain ones among them."""
+    """No target; or some that were there before step 1, certain ones among them."""
     dim = local.motion.state_dim
     if rng.random() < 0.6:
         return local.initial()
     num = int(rng.integers(1, 4))
     means, covs = states(rng, num, dim), np.stack([covariance(rng, dim) for _ in range(num)])
     existence = np.array([one_of(rng, 0.0, 1e-12, 0.3, 0.9, 1.0 - 1e-12, 1.0) for _ in range(num)])
-    labels = np.column_stack([np.full(num, -1), np.arange(num)])
+    labels = np.column_stack([np.zeros(num, np.int64), np.arange(num)])
     if kind == "phd":
         return Poisson.from_gaussians(existence + 1e-9, means, covs)
     if kind == "cphd":

@@ -72,14 +72,15 @@ def _check_readings(rng: np.random.Generator, belief: Any) -> None:
         marginalise(belief, max_components=most).validate()
         glmb_to_lmb(belief, max_components=most).validate()
     elif isinstance(belief, LMB):
-        glmb, left_out = lmb_to_glmb(belief, max_hypotheses=int(scenes.one_of(rng, 1, 50)))
-        glmb.validate()
+        listed, left_out = lmb_to_glmb(belief, max_hypotheses=int(scenes.one_of(rng, 1, 50)))
+        listed.validate()
         assert 0.0 <= left_out <= 1.0
 
 
 def _check_fusion(rng: np.random.Generator, beliefs: list[Any]) -> None:
     weights = rng.random(len(beliefs)) + 1e-3
     power = scenes.one_of(rng, "moment_matched", "moment_matched", "component_wise", "quadrature")
+    fused: GLMB | LMB
     if isinstance(beliefs[0], GLMB) and rng.random() < 0.6:
         fused, info = CmDeltaGlmb(weights / weights.sum(), power).fuse([marginalise(belief) for belief in beliefs])
     else:
@@ -102,7 +103,7 @@ def _check_scans(rng: np.random.Generator, kind: str, local: Any, steps: int, co
     belief, beliefs = scenes.first_belief(rng, kind, local), []
     # Who cannot survive is surely gone.
     certain_allowed = _is_certain(belief) or local.survival.params[0] == 0.0
-    for step in range(steps):
+    for step in range(1, steps + 1):
         at, dt = scenes.pose(rng), scenes.time_step(rng)
         if rng.random() < 0.01:
             with pytest.raises(InputError):

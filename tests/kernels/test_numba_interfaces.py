@@ -38,7 +38,7 @@ def takes(function: Callable[..., Any], *names: str) -> bool:
 
 
 def survival() -> Any:
-    function = constant_survival(0.9).function
+    function: Any = constant_survival(0.9).function
     function.bind()
     return function
 
