@@ -232,13 +232,16 @@ def test_altered_and_half_written_tables_are_put_right(tmp_path: Path) -> None:
     assert contents(folder) == before
 
 
-def test_runs_that_were_lost_are_done_again_and_that_is_said(tmp_path: Path) -> None:
+@pytest.mark.parametrize("left", [None, b""])
+def test_runs_that_were_lost_are_done_again_and_that_is_said(tmp_path: Path, left: bytes | None) -> None:
     folder = tmp_path / "results"
     told: list[str] = []
     run_campaign(small_campaign(runs=1), folder)
     (folder / "campaign.sqlite").unlink()
+    if left is not None:
+        (folder / "campaign.sqlite").write_bytes(left)
     assert run_campaign(small_campaign(runs=1), folder, watch=Notes(told)).num_landed == 2
-    assert any("was not there: every run is done again" in text for text in told)
+    assert any("was not there, or empty: every run is done again" in text for text in told)
 
 
 def test_ctrl_c_while_workers_start(program: Program, undisturbed: dict[str, str]) -> None:

@@ -108,10 +108,11 @@ def run_campaign(
         )
     watch = watch or Unwatched()
     failed, num_landed = [], 0
-    lost = (Path(folder) / MANIFEST).is_file() and not (Path(folder) / DATABASE).exists()
+    database = Path(folder) / DATABASE
+    lost = (Path(folder) / MANIFEST).is_file() and (not database.exists() or database.stat().st_size == 0)
     with Store.open(Path(folder), campaign) as store:
         if lost:
-            watch.note(f"{Path(folder) / DATABASE} was not there: every run is done again")
+            watch.note(f"{database} was not there, or empty: every run is done again")
         _check_undamaged(store, redo_damaged, watch)
         queue = TaskQueue(campaign, store.finished())
         num_found = campaign.total - len(queue)
