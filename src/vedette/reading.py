@@ -18,6 +18,8 @@ from typing import Any
 
 import numpy as np
 
+from vedette.text import shown
+
 MOST_BYTES = 2**30  # of a file, or of what one unpacks to: a run of 10,000 scans of 100 targets has a fifth of it
 _LONGEST_NUMBER = 300  # digits
 _LONGEST_MESSAGE = 300  # letters of what another library says
@@ -56,7 +58,7 @@ def _each_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     if len(data) < len(pairs):
         names = [name for name, _ in pairs]
         twice = next(name for name in names if names.count(name) > 1)
-        raise ValueError(f"the key {short(twice)} stands there twice")
+        raise ValueError(f"the key {shown(twice)} stands there twice")
     return data
 
 
@@ -136,7 +138,7 @@ def read_arrays(archive: bytes) -> Mapping[str, np.ndarray[Any, Any]]:
         try:
             arrays[name.removesuffix(".npy")] = read_array(content)
         except ValueError as error:
-            raise ValueError(f"{short(name)}: {error}") from error
+            raise ValueError(f"{shown(name)}: {error}") from error
     return arrays
 
 
@@ -144,9 +146,3 @@ def said(error: object) -> str:
     """What an error of another library says, in a line of bounded length."""
     text = " ".join(str(error).split()) or type(error).__name__
     return text if len(text) <= _LONGEST_MESSAGE else f"{text[:_LONGEST_MESSAGE]} ..."
-
-
-def short(value: Any) -> str:
-    """A value as a message shows it: what Python would write, in one line of bounded length."""
-    text = ascii(value) if isinstance(value, str) and not value.isprintable() else repr(value)
-    return text if len(text) <= 80 else f"{text[:60]} ... ({len(text)} letters)"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import unicodedata
 from collections.abc import Sequence
+from datetime import date, timedelta
 from typing import Any
 
 ELLIPSIS = "\N{HORIZONTAL ELLIPSIS}"
@@ -39,6 +40,11 @@ def plain(value: Any) -> str:
             return repr(value.tolist() if isinstance(value, np.ndarray) else value)
         except ValueError:  # a whole number of more digits than Python writes
             return "a number of thousands of digits"
+
+
+def shown(value: Any) -> str:
+    """A value in a message: in quotes where it is text, in printable letters, and not long."""
+    return elided(printable(f"the time {value}" if isinstance(value, date | timedelta) else plain(value)), 80)
 
 
 def display_width(text: str) -> int:

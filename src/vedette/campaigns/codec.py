@@ -17,12 +17,13 @@ import numpy as np
 from vedette.errors import InputError
 from vedette.evaluation.metrics import RunMetrics
 from vedette.kernels.types import Floats
-from vedette.reading import parse_json, read_array, read_members, said, short
+from vedette.reading import parse_json, read_array, read_members, said
 from vedette.simulation.columns import check_columns, pack, unpack
 from vedette.simulation.decisions import read_decisions, write_decisions
 from vedette.simulation.encoding import timing_columns, timings_of
 from vedette.simulation.records import RunRecord
 from vedette.simulation.tabulation import TABLES, check_record, record_of, run_facts, tables_of
+from vedette.text import shown
 
 PAYLOAD_VERSION = 2  # of the layout: another wherever a table or the metrics gain, lose or rename a column
 _METRICS, _RUN, _DECISIONS = "metrics", "run.json", "decisions.json"
@@ -72,7 +73,7 @@ def _decoded(payload: bytes) -> tuple[RunRecord, RunMetrics]:
     members = read_members(payload)
     facts = parse_json(members[_RUN])
     if facts["payload_version"] != PAYLOAD_VERSION:
-        raise InputError(f"run: expected payload version {PAYLOAD_VERSION}; got {short(facts['payload_version'])}")
+        raise InputError(f"run: expected payload version {PAYLOAD_VERSION}; got {shown(facts['payload_version'])}")
     tables = {name: unpack(read_array(members[f"{name}.npy"])) for name in TABLES}
     for name, kinds in TABLES.items():
         check_columns(tables[name], kinds, f"run, table {name}")

@@ -16,7 +16,8 @@ from pathlib import Path
 from typing import Any
 
 from vedette.errors import InputError
-from vedette.reading import inflate, short
+from vedette.reading import inflate
+from vedette.text import shown
 
 DATABASE, LOCK = "campaign.sqlite", "campaign.lock"
 
@@ -224,7 +225,7 @@ def _checked_keys(path: Path, rows: Sequence[tuple[Any, Any]]) -> list[tuple[str
     """Cells and numbers of runs, if that is what they are."""
     for cell, run in rows:
         if not isinstance(cell, str) or not isinstance(run, int):
-            raise InputError(f"{path}: expected the name and number of a run; got {short(cell)} and {short(run)}")
+            raise InputError(f"{path}: expected the name and number of a run; got {shown(cell)} and {shown(run)}")
     return list(rows)
 
 

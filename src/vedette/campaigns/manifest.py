@@ -18,11 +18,12 @@ from vedette.campaigns.cells import Campaign, Cell, safe_name, scenario_text
 from vedette.campaigns.spec import spec_from_data
 from vedette.errors import InputError
 from vedette.files import write_whole
-from vedette.reading import parse_json, read_file, said, short
+from vedette.reading import parse_json, read_file, said
 from vedette.scenarios import Scenario
 from vedette.scenarios.schema import ScenarioModel
 from vedette.scenarios.yaml_reader import read_yaml
 from vedette.simulation.storage import versions
+from vedette.text import shown
 
 MANIFEST = "manifest.json"
 FORMAT = "vedette-campaign"
@@ -114,7 +115,7 @@ def read_manifest(folder: Path) -> dict[str, Any]:
         raise InputError(f"{path}: expected the manifest of a campaign; got another file")
     if manifest.get("format_version") != FORMAT_VERSION:
         raise InputError(
-            f"{path}: expected format version {FORMAT_VERSION}; got {short(manifest.get('format_version'))}, "
+            f"{path}: expected format version {FORMAT_VERSION}; got {shown(manifest.get('format_version'))}, "
             "written by another version of this program"
         )
     missing = [field for field in (*_FIXED, "num_runs", "sessions") if field not in manifest]
@@ -195,9 +196,9 @@ def _check_axes(manifest: Mapping[str, Any], axes: Mapping[str, tuple[Any, ...]]
             raise InputError(f"{field}: expected what the specification says; got other values")
     names = [cell["name"] for cell in manifest["cells"]]
     if len(set(names)) < len(names) or any(name != safe_name(name) or name in ("", ".", "..") for name in names):
-        raise InputError(f"cells: expected names that are unique and fit for files; got {short(names)}")
+        raise InputError(f"cells: expected names that are unique and fit for files; got {shown(names)}")
     if manifest["compare"] not in axes:
-        raise InputError(f"compare: expected one of {', '.join(axes)}; got {short(manifest['compare'])}")
+        raise InputError(f"compare: expected one of {', '.join(axes)}; got {shown(manifest['compare'])}")
 
 
 def _settings(axes: Mapping[str, tuple[Any, ...]]) -> list[dict[str, Any]]:

@@ -16,8 +16,8 @@ from vedette.campaigns.manifest import campaign_of, contents_checksum, read_mani
 from vedette.errors import InputError
 from vedette.evaluation.comparison import Comparison, scored
 from vedette.evaluation.metrics import RunMetrics
-from vedette.reading import short
 from vedette.simulation.records import RunRecord
+from vedette.text import shown
 
 if TYPE_CHECKING:
     import pyarrow
@@ -128,7 +128,7 @@ class CampaignResults:
         for cell, run in finished:
             if cell not in names or not 0 <= run < self.campaign.num_runs:
                 raise InputError(
-                    f"{self.folder / DATABASE}: expected runs of the campaign; got cell {short(cell)}, run {run}"
+                    f"{self.folder / DATABASE}: expected runs of the campaign; got cell {shown(cell)}, run {run}"
                 )
         return finished
 

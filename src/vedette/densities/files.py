@@ -17,7 +17,8 @@ from vedette.densities.poisson import Poisson
 from vedette.densities.tracks import TrackTable
 from vedette.errors import InputError, VedetteError
 from vedette.files import write_whole
-from vedette.reading import read_arrays, read_file, said, short
+from vedette.reading import read_arrays, read_file, said
+from vedette.text import shown
 
 FORMAT_NAME = "vedette-density"
 FORMAT_VERSION = 1
@@ -92,7 +93,7 @@ def _kind_of(source: Path, arrays: Mapping[str, Any]) -> str:
         raise InputError(f"{source}: expected format version {FORMAT_VERSION}; got {said(arrays.get('version'))}")
     kind = str(arrays.get("kind"))
     if kind not in _OWN_FIELDS:
-        raise InputError(f"{source}: expected a kind of density among {', '.join(_OWN_FIELDS)}; got {short(kind)}")
+        raise InputError(f"{source}: expected a kind of density among {', '.join(_OWN_FIELDS)}; got {shown(kind)}")
     return kind
 
 

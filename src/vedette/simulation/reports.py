@@ -7,7 +7,7 @@ import numbers
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from datetime import UTC, date, datetime, timedelta
+from datetime import UTC, datetime
 from decimal import Decimal
 from pathlib import Path
 from typing import Any
@@ -17,7 +17,7 @@ import numpy as np
 from vedette.errors import InputError
 from vedette.kernels.types import Floats, Ints
 from vedette.simulation.geography import to_tangent_plane
-from vedette.text import elided, plain, printable
+from vedette.text import elided, printable, shown
 
 # Beyond these, differences and speeds of reports mean nothing.
 _FARTHEST = 1e9  # m, m/s
@@ -110,13 +110,6 @@ class Table:
         if "" in labels:
             raise self.fault(labels.index(""), name, "a name or number")
         return labels
-
-
-def shown(value: Any) -> str:
-    """A cell or name in a message: in quotes where it is text, in printable letters, and not long."""
-    if isinstance(value, date | timedelta):
-        return f"the time {value}"
-    return elided(printable(repr(value) if isinstance(value, str) else plain(value)), 80)
 
 
 def column_names(names: Iterable[str]) -> str:

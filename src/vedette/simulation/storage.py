@@ -20,10 +20,11 @@ from pathlib import Path
 from typing import Any
 
 from vedette.errors import InputError
-from vedette.reading import parse_json, read_file, short
+from vedette.reading import parse_json, read_file
 from vedette.simulation.encoding import decode_run, encode_run
 from vedette.simulation.records import RunRecord
 from vedette.simulation.tabulation import run_facts
+from vedette.text import shown
 
 FORMAT = "vedette-run"
 FORMAT_VERSION = 3
@@ -75,7 +76,7 @@ def load_run(directory: Path | str) -> RunRecord:
     files = {}
     for name, checksum in manifest["files"].items():
         if Path(name).name != name:
-            raise InputError(f"{folder / MANIFEST}: expected plain file names; got {short(name)}")
+            raise InputError(f"{folder / MANIFEST}: expected plain file names; got {shown(name)}")
         content = _read(folder / name)
         if hashlib.sha256(content).hexdigest() != checksum:
             raise InputError(f"{folder / name}: expected the file as it was written; it is cut short or altered")
@@ -99,7 +100,7 @@ def read_manifest(directory: Path | str) -> dict[str, Any]:
         raise InputError(f"{path}: expected the manifest of a run; got another file")
     if manifest.get("format_version") != FORMAT_VERSION:
         raise InputError(
-            f"{path}: expected format version {FORMAT_VERSION}; got {short(manifest.get('format_version'))}, "
+            f"{path}: expected format version {FORMAT_VERSION}; got {shown(manifest.get('format_version'))}, "
             "written by another version of this program"
         )
     if not isinstance(manifest.get("files"), dict) or not isinstance(manifest.get("run"), dict):
