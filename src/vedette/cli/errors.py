@@ -21,6 +21,7 @@ class Commands(TyperGroup):
     """The group of all commands; prints the library's own errors instead of raising them."""
 
     def main(self, *args: Any, **options: Any) -> Any:
+        """Run the program, with an output that can print every letter."""
         accept_any_letter()
         return super().main(*args, **options)
 
