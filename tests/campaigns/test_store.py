@@ -112,7 +112,7 @@ def test_a_scenario_that_changed_since_is_named_by_its_line(tmp_path):
     file.write_text(text, encoding="utf-8")
     Store.open(tmp_path / "results", made()).close()
     file.write_text(text.replace("num_samples: 40", "num_samples: 41"), encoding="utf-8")
-    with pytest.raises(InputError, match=r"cells\[0\].scenario, line \d+ is '  num_samples: 40' there and"):
+    with pytest.raises(InputError, match=r"cells\[0\].scenario, line \d+ is ' num_samples: 40' there and"):
         Store.open(tmp_path / "results", made())
 
 

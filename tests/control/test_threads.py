@@ -8,6 +8,7 @@ import subprocess
 import sys
 import threading
 import time
+from collections.abc import Iterator
 from itertools import pairwise
 from typing import Any
 
@@ -16,6 +17,7 @@ import pytest
 
 from vedette.control.threads import run_chunks
 from vedette.kernels.compile import JIT_ENABLED
+from waiting import PATIENCE
 
 each_number_of_threads = pytest.mark.parametrize("num_threads", [1, 2, 5])
 
@@ -54,7 +56,16 @@ def test_the_fault_of_the_first_item_is_raised(num_threads: int) -> None:
         assert len(tried) < 2000
 
 
+@pytest.fixture
+def heeding() -> Iterator[None]:
+    """What is started in the background ignores Ctrl-C, and this test with it."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
 @each_number_of_threads
+@pytest.mark.usefixtures("heeding")
 def test_an_interruption_is_answered_between_two_pieces(num_threads: int) -> None:
     done = np.zeros(100_000, np.bool_)
 
@@ -74,8 +85,11 @@ def test_an_interruption_is_answered_between_two_pieces(num_threads: int) -> Non
 
 # Plans as docs/control.md does, with samples for a minute or more, and counts the cases that were worked on.
 PROGRAM = """
+import signal
 import sys
 import numpy as np
+
+signal.signal(signal.SIGINT, signal.default_int_handler)  # what is started in the background ignores it
 from vedette import models
 from vedette.control import IndependentPlanner, MobileSensor, PlanningSettings, pseudo
 from vedette.densities import LMB
@@ -125,6 +139,6 @@ def test_a_plan_is_left_when_it_is_interrupted(num_threads: int) -> None:
             process.send_signal(signal.SIGINT)
             _, done, total = one_line(process.stdout, "interrupted").split()
             assert int(done) < int(total) / 10
-            assert process.wait(timeout=600) == 0
+            assert process.wait(timeout=PATIENCE) == 0
         finally:
             process.kill()

@@ -205,7 +205,7 @@ def run_fused(
     rng = np.random.default_rng(seed)
     beliefs: list[Any] = [tracker.initial() for tracker in trackers]
     estimates = []
-    for step, scans in enumerate(zip(*(scans_of(recording, s) for s in range(len(trackers))), strict=True)):
+    for step, scans in enumerate(zip(*(scans_of(recording, s) for s in range(len(trackers))), strict=True), start=1):
         for s, (tracker, scan) in enumerate(zip(trackers, scans, strict=True)):
             beliefs[s], _ = tracker.step(beliefs[s], scan, POSE, PERIOD, step, rng=rng)
         fused, _ = fusion.fuse(beliefs)

@@ -312,7 +312,7 @@ def test_a_process_noise_that_takes_variance_away_is_not_called_infinite(kind: A
     known = models.constant_velocity(1.0)
     motion = models.MotionModel(4, known.transition, takes_away, transition_jacobian=known.transition_jacobian)
     with pytest.raises(ModelError, match="motion model: predicted covariance is not positive definite"):
-        step(make(kind, motion=motion), belief=first_belief(kind), number=1)
+        step(make(kind, motion=motion), belief=first_belief(kind), number=2)
 
 
 @every_kind

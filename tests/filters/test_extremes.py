@@ -21,6 +21,7 @@ KINDS: dict[Any, Any] = {
     CbMemberFilter: MultiBernoulli,
 }
 ORIGIN = np.zeros(3)
+RNG = np.random.default_rng(0)  # no filter here draws from it
 
 
 def make(
@@ -69,7 +70,7 @@ def test_noise_far_below_what_was_expected(kind: Any, method: str, std: float) -
     """The variance of a measured position is then that of the noise, which P - K S K' rounds away."""
     tracker, cov = make(kind, (std, 2.0 * std), method), np.diag([1e4, 1e4, 100.0, 100.0])
     cov[0, 2] = cov[2, 0] = 300.0
-    belief, _ = tracker.step(target(kind, [[0.0, 0.0, 1.0, 0.0]], cov), [[3.0, 4.0]], ORIGIN, 1.0, 1, rng=None)
+    belief, _ = tracker.step(target(kind, [[0.0, 0.0, 1.0, 0.0]], cov), [[3.0, 4.0]], ORIGIN, 1.0, 1, rng=RNG)
     belief.validate()
     _, means, covs = components(belief)
     seen = int(np.argmin(covs[:, 0, 0]))
@@ -84,10 +85,10 @@ def test_a_bearing_of_next_to_no_noise() -> None:
         "clutter": models.measurement_space_clutter(1.0, [-np.pi], [np.pi]),
     }
     prior = target(LmbFilter, [[1e3, 1e3, 0.0, 0.0]], np.diag([1e4, 1e4, 100.0, 100.0]))
-    belief, _ = make(LmbFilter, (1e-8,), **parts).step(prior, [[0.786]], ORIGIN, 1.0, 1, rng=None)
+    belief, _ = make(LmbFilter, (1e-8,), **parts).step(prior, [[0.786]], ORIGIN, 1.0, 1, rng=RNG)
     belief.validate()
     with pytest.raises(NumericalError, match="positive definite within the precision"):
-        make(LmbFilter, (1e-11,), **parts).step(prior, [[0.786]], ORIGIN, 1.0, 1, rng=None)
+        make(LmbFilter, (1e-11,), **parts).step(prior, [[0.786]], ORIGIN, 1.0, 1, rng=RNG)
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -95,7 +96,7 @@ def test_what_a_double_cannot_hold_is_refused_by_name(kind: Any) -> None:
     """No process noise and a huge step: position and velocity are one number to sixteen digits."""
     tracker = make(kind, sigma_v=0.0)
     with pytest.raises(NumericalError, match="covariance of a track is not positive definite within the precision"):
-        tracker.step(target(kind, [[0.0] * 4], np.diag([1e-8, 1e-8, 1e8, 1e8])), [], ORIGIN, 1e4, 1, rng=None)
+        tracker.step(target(kind, [[0.0] * 4], np.diag([1e-8, 1e-8, 1e8, 1e8])), [], ORIGIN, 1e4, 1, rng=RNG)
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -104,7 +105,7 @@ def test_scans_far_from_everything_without_a_gate(kind: Any) -> None:
     tracker = make(kind, (1e-3, 1e-3), limits=Limits(gate_probability=1.0, merge_distance=0.0, max_components=5))
     prior = target(kind, [[0.0, 0.0, 0.0, 0.0], [0.5, 0.0, 0.0, 0.0], [0.0, 2.0, 0.0, 0.0]], 1e-6 * np.eye(4))
     scan = [[9e3, 9e3], [-9e3, 9e3], [9e3, -9e3]]
-    belief, _ = tracker.step(prior, scan, ORIGIN, 1e-3, 1, rng=None)
+    belief, _ = tracker.step(prior, scan, ORIGIN, 1e-3, 1, rng=RNG)
     belief.validate()
 
 

@@ -70,8 +70,8 @@ def sensors(draw: st.DrawFn) -> Data:
     dim = MEASUREMENT_DIM[kind]
     grown = section("range_dependent", sigma_range=positive, eta_range=zero_or_more, sigma_bearing_deg=positive)
     noises = [needed("constant", std=vector(dim, positive)), custom(), *([] if kind == "position" else [grown])]
-    low = draw(vector(dim, st.floats(-100.0, 0.0)))
-    boxes = needed("measurement_space", rate=rates, low=st.just(low), high=vector(dim, st.floats(1.0, 100.0)))
+    low = draw(vector(dim, st.floats(-3.0, 0.0)))  # of an angle and its high no further apart than a turn
+    boxes = needed("measurement_space", rate=rates, low=st.just(low), high=vector(dim, st.floats(1.0, 3.0)))
     clutters = st.one_of(section("region", rate=rates), boxes, custom())
     fixed = {"position": draw(vector(2)), "measurement": {"kind": kind}, "noise": draw(st.one_of(noises))}
     optional = section(
@@ -160,7 +160,7 @@ def scenarios(draw: st.DrawFn) -> Data:
     return {
         "name": draw(names),
         "description": draw(st.text(st.characters(exclude_categories=["Cs", "Cc"]), max_size=30)),
-        "time": {"num_steps": last, **draw(section(step_period=positive, start=finite))},
+        "time": {"num_steps": last, **draw(section(step_period=st.floats(1e-3, 1e3), start=finite))},
         "region": {"x_min": x[0], "x_max": x[0] + y[0], "y_min": x[1], "y_max": x[1] + y[1]},
         "motion": draw(motions[dim]),
         "survival": draw(section("constant", probability=probability) | custom()),

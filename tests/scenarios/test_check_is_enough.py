@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -13,7 +14,7 @@ from vedette.errors import InputError, ScenarioError
 from vedette.models import BirthModel
 from vedette.scenarios import load_scenario, parse_scenario
 from vedette.scenarios.build import build_experiment
-from vedette.scenarios.cautions import cautions
+from vedette.scenarios.record_cautions import record_cautions
 
 TARGETS = MINIMAL[MINIMAL.index("targets:") : MINIMAL.index("sensor_defaults:")]
 SHIPS = "time,id,longitude,latitude\n" + "".join(
@@ -115,32 +116,33 @@ def test_a_second_report_at_one_time_is_left_out_and_told(tmp_path: Path) -> Non
     repeated = SHIPS + SHIPS.split("\n")[1] + "\n4.0,2,-1.0,50.9\n"
     scenario, plain = load_scenario(written(tmp_path, repeated)), load_scenario(written(tmp_path, SHIPS))
     (tmp_path / "ships.csv").write_text(repeated)
-    (line,) = cautions(scenario)
+    ((path, line),) = record_cautions(scenario)
+    assert path == ("targets", "path")
     assert line == (
         "targets.path: ships.csv, row 26: a second report of one target at the time of row 2; left out, as are 1 more"
     )
     kept = build_experiment(scenario).targets
     (tmp_path / "ships.csv").write_text(SHIPS)
-    assert cautions(plain) == ()
+    assert list(record_cautions(plain)) == []
     for track, other in zip(kept.tracks, build_experiment(plain).targets.tracks, strict=True):  # type: ignore[attr-defined]
         assert (track.times == other.times).all()
 
 
 def test_a_position_in_degrees_and_one_far_away_are_told(tmp_path: Path) -> None:
     degrees = written(tmp_path, SHIPS, ("position: [0.0, 40.0]", "position: [-1.1, 50.78]"))
-    (line,) = cautions(load_scenario(degrees))
+    ((_, line),) = record_cautions(load_scenario(degrees))
     assert line == (
         "sensors[0].position: expected metres from the origin, got (-1.1, 50.78), which is a longitude and latitude "
         "among those of ships.csv"
     )
     far = written(tmp_path, SHIPS, ("position: [0.0, 40.0]", "position: [0.0, 400000.0]"))
-    (line,) = cautions(load_scenario(far))
+    ((_, line),) = record_cautions(load_scenario(far))
     assert line.startswith(
         "sensors[0].position: expected metres from the origin, got (0, 400000), 400 km from the nearest"
     )
     result = CliRunner().invoke(app, ["check", str(far)])
     assert result.exit_code == 0
-    assert f"{far}: warning: {line}" in result.output
+    assert re.search(rf"{re.escape(str(far))}:\d+:\d+: warning: {re.escape(line)}", result.output)
 
 
 @pytest.mark.parametrize(

@@ -229,7 +229,7 @@ def _difference(place: str, there: Any, here: Any) -> str:
         lines = zip(there.splitlines(), here.splitlines(), strict=False)
         parts = [(f"{place}, line {number}", *pair) for number, pair in enumerate(lines, start=1)]
     else:
-        return "" if there == here else f"{place} is {there!r} there and {here!r} here"
+        return "" if there == here else f"{place} is {shown(there)} there and {shown(here)} here"
     return next(filter(None, (_difference(*part) for part in parts)), "")
 
 

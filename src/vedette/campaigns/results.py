@@ -150,6 +150,9 @@ class CampaignResults:
             record = replace(record, timings=decode_timings(entry.timings))
             if record.run != entry.run:
                 raise InputError(f"run: expected the number {entry.run}; got {record.run}")
+            num_sensors = len(self.campaign.cell(entry.cell).scenario.model.sensors)
+            if record.num_sensors != num_sensors:
+                raise InputError(f"run: expected the {num_sensors} sensors of its scenario; got {record.num_sensors}")
         except InputError as error:
             place = f"{self.folder / DATABASE}: cell {entry.cell}, run {entry.run}"
             raise InputError(f"{place}: {error}") from error
