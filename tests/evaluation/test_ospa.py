@@ -111,6 +111,8 @@ def test_points_of_any_dimension() -> None:
         ([0.0, 0.0], [[0.0, 0.0]], 1.0, 1.0, "estimates: expected shape"),
         ([[0.0, 0.0]], [[0.0, 0.0, 0.0]], 1.0, 1.0, "equal dimension"),
         ([["a", "b"]], [[0.0, 0.0]], 1.0, 1.0, "estimates: expected an array"),
+        ([[1.0j, 0.0]], [[0.0, 0.0]], 1.0, 1.0, "estimates: expected an array"),
+        (np.ma.array([[0.0, 0.0]], mask=[[True, False]]), [[0.0, 0.0]], 1.0, 1.0, "estimates: .* without masked"),
     ],
 )
 def test_bad_input_is_named(estimates: object, truths: object, cutoff: float, order: float, message: str) -> None:

@@ -54,7 +54,9 @@ def test_wins_and_ties_are_counted_apart() -> None:
     assert (paired.share_won, paired.share_tied) == (0.5, 0.25)
 
 
-@pytest.mark.parametrize("values", [[], 3.0, [1.0, np.nan], [np.inf]])
+@pytest.mark.parametrize(
+    "values", [[], 3.0, [1.0, np.nan], [np.inf], [1.0, 2.0j], np.ma.array([1.0, 2.0], mask=[False, True]), ["1.0"]]
+)
 def test_bad_values_are_named(values: object) -> None:
     with pytest.raises(InputError, match="values: expected"):
         summarise(values)  # type: ignore[arg-type]

@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from typing import Any, TypeVar
 
 from vedette.errors import VedetteError
+from waiting import PATIENCE
 
 _T = TypeVar("_T")
 _PRIVATE = re.compile(
@@ -17,8 +18,8 @@ _PRIVATE = re.compile(
     r"ValidationError|Error\(|\b_[A-Z]\w+\b|JsonValue|function-after|datetime\.\w+\(|NoneType|tagged-union"
 )
 _LONGEST_LINE, _MOST_LINES = 4000, 400
-# Work is a few hundredths of a second; on a machine that does much else at once, still far below.
-SECONDS = 60
+# Work is a few hundredths of a second, and seconds for the largest files.
+SECONDS = PATIENCE
 
 
 def outcome(call: Callable[[], _T]) -> _T | None:

@@ -10,6 +10,7 @@ from scipy.special import stdtrit
 
 from vedette.errors import InputError
 from vedette.kernels.types import Floats
+from vedette.models.arguments import as_array
 
 CONFIDENCE = 0.95
 
@@ -55,7 +56,7 @@ def summarise(values: ArrayLike) -> Summary:
 
     Raises `InputError` for no run, or a value that is not finite.
     """
-    runs = np.asarray(values, np.float64)
+    runs = as_array("values", values, "fiu", "numbers, an entry a run").astype(np.float64)
     if runs.ndim == 0 or len(runs) == 0:
         raise InputError(f"values: expected at least one run; got shape {runs.shape}")
     if not np.isfinite(runs).all():
@@ -78,7 +79,9 @@ def paired_difference(first: ArrayLike, second: ArrayLike) -> PairedDifference:
 
     Raises `InputError` if the lengths differ, for no run, or for a value that is not finite.
     """
-    a, b = np.asarray(first, np.float64), np.asarray(second, np.float64)
+    a, b = (
+        as_array("first, second", values, "fiu", "numbers, one a run").astype(np.float64) for values in (first, second)
+    )
     if a.ndim != 1 or a.shape != b.shape:
         raise InputError(f"first, second: expected equally many numbers, one a run; got shapes {a.shape} and {b.shape}")
     summary = summarise(a - b)

@@ -10,6 +10,7 @@ from scipy.optimize import linear_sum_assignment
 
 from vedette.errors import InputError
 from vedette.kernels.types import Bools, Floats, Ints
+from vedette.models.arguments import as_array
 
 _HIGH_ORDER = 30.0
 
@@ -27,10 +28,7 @@ def point_set(values: ArrayLike, name: str) -> Floats:
 
     Raises `InputError`, with `name`, for anything else.
     """
-    try:
-        points = np.asarray(values, np.float64)
-    except (TypeError, ValueError) as error:
-        raise InputError(f"{name}: expected an array of points; got {values!r}") from error
+    points = as_array(name, values, "fiu", "an array of points").astype(np.float64)
     if points.size == 0:
         return points.reshape(0, points.shape[1] if points.ndim == 2 else 0)
     if points.ndim != 2:

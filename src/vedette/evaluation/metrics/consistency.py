@@ -16,7 +16,7 @@ from vedette.densities.checks import check_covariances
 from vedette.evaluation.metrics.matching import Matching
 from vedette.evaluation.statistics import CONFIDENCE
 from vedette.kernels.types import Bools, Floats, Ints
-from vedette.models.arguments import dimension, float_array, reject
+from vedette.models.arguments import as_array, dimension, float_array, reject
 from vedette.simulation.truth import Truth
 
 
@@ -94,7 +94,8 @@ def average_nees(means: ArrayLike, counts: ArrayLike, *, dim: int, confidence: f
     scans of one run are not: average over runs at each scan, and over time only to compare.
     Raises `InputError` for arguments out of range, or a mean that is missing where there are pairs.
     """
-    values, numbers = np.asarray(means, np.float64), np.asarray(counts)
+    values = as_array("means", means, "fiu", "numbers, an entry a run").astype(np.float64)
+    numbers = as_array("counts", counts, "fiu", "numbers, an entry a run")
     if values.ndim == 0 or values.shape != numbers.shape or (numbers < 0).any():
         raise reject("counts", f"numbers of at least 0 in the shape of means, {values.shape}", counts)
     if not np.isfinite(values[numbers > 0]).all():
