@@ -33,6 +33,7 @@ from vedette.scenarios.summary import facts, one_line
 from vedette.scenarios.yaml_reader import read_yaml
 from vedette.simulation.cleaning import Cleaning
 from vedette.simulation.recorded import RecordedTargets
+from vedette.simulation.stopping import RunStopped
 
 Check = Callable[[np.random.Generator], object]
 TryCases = Callable[[Check, int], None]
@@ -177,7 +178,8 @@ def _numbers(data: Any) -> list[tuple[Any, Any]]:
 def is_numerical(error: VedetteError) -> bool:
     """Whether arithmetic ended, at numbers so extreme that no file could tell: a noise of a billionth of the spread."""
     # The second is said of the model, as no filter can tell a noise that is too small from one that is not definite.
-    return isinstance(error, NumericalError) or "innovation covariance is not positive definite" in str(error)
+    cause = error.__cause__ if isinstance(error, RunStopped) else error
+    return isinstance(cause, NumericalError) or "innovation covariance is not positive definite" in str(error)
 
 
 def test_what_is_accepted_can_be_run(try_cases: TryCases, folder: Path) -> None:
