@@ -15,7 +15,7 @@ from typing import Any
 from pydantic import BaseModel, ConfigDict, JsonValue, ValidationError
 
 from vedette.campaigns.cells import Campaign, Cell, safe_name, scenario_text
-from vedette.campaigns.spec import spec_from_data
+from vedette.campaigns.spec import CampaignSpec, spec_from_data
 from vedette.errors import InputError
 from vedette.files import write_whole
 from vedette.reading import parse_json, read_file, said
@@ -166,8 +166,9 @@ def campaign_of(folder: Path, manifest: Mapping[str, Any]) -> Campaign:
     """
     try:
         spec = {**manifest["spec"], "runs": manifest["num_runs"]}
-        axes = spec_from_data(spec, "spec").axes()
-        _check_axes(manifest, axes)
+        specification = spec_from_data(spec, "spec")
+        axes = specification.axes()
+        _check_same_as(specification, manifest)
         return Campaign(
             name=manifest["name"],
             seed=manifest["seed"],
@@ -183,11 +184,12 @@ def campaign_of(folder: Path, manifest: Mapping[str, Any]) -> Campaign:
         ) from error
 
 
-def _check_axes(manifest: Mapping[str, Any], axes: Mapping[str, tuple[Any, ...]]) -> None:
+def _check_same_as(specification: CampaignSpec, manifest: Mapping[str, Any]) -> None:
     """`InputError` unless the cells are those of the specification, each under a name that a file may have."""
+    axes = specification.axes()
     for field, value, wanted in (
-        ("name", manifest["name"], manifest["spec"]["name"]),
-        ("seed", manifest["seed"], manifest["spec"]["seed"]),
+        ("name", manifest["name"], specification.name),
+        ("seed", manifest["seed"], specification.seed),
         ("axes", list(manifest["axes"].items()), list(axes.items())),
         ("settings", [list(cell["settings"].items()) for cell in manifest["cells"]], _combinations(axes)),
         ("planner", [cell["planner"] for cell in manifest["cells"]], [one["planner"] for one in _settings(axes)]),
