@@ -88,7 +88,7 @@ def compare(
     Args:
         runs: for each strategy its runs; the n-th runs of all must be of the same scenario, seed and run number.
         since: only scans after this time (s) count in the mean over time; by default the time of the first decision,
-            before which all strategies are alike, and every scan if none was made.
+            before which all strategies are alike, and every scan if none was made before the last.
         until: only scans up to this time (s) count.
 
     Raises `InputError` if there is no run, or the runs are not paired.
@@ -101,9 +101,10 @@ def compare(
         _check_paired(name, runs[name], strategies[0], reference)
     records = [record for name in strategies for record in runs[name]]
     decision_times = np.unique([decision.time for record in records for decision in record.decisions])
-    if since is None:
-        since = float(decision_times[0]) if len(decision_times) else -np.inf
     times = reference[0].times
+    if since is None:
+        decided = len(decision_times) > 0 and decision_times[0] < times[-1]
+        since = float(decision_times[0]) if decided else -np.inf
     if not ((times > since) & (times <= until)).any():
         raise InputError(
             f"since: expected scans after it and up to until, of {times[0]} to {times[-1]} s; got {since} to {until}"

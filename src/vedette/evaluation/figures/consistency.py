@@ -17,6 +17,7 @@ from vedette.evaluation.figures.style import (
     legend_columns,
     line_style,
     new_figure,
+    span_times,
     styled,
 )
 from vedette.evaluation.metrics import AverageNees
@@ -53,7 +54,7 @@ def consistency_figure(times: Floats, position: Mapping[str, AverageNees]) -> Fi
     axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     axes.yaxis.set_major_formatter("{x:g}")
     axes.yaxis.set_minor_formatter(NullFormatter())
-    axes.set_xlim(times[0], times[-1])
+    span_times(axes, times)
     axes.set_xlabel("Time (s)")
     axes.set_ylabel("Position NEES / 2")
     _, labels = axes.get_legend_handles_labels()

@@ -18,6 +18,7 @@ from vedette.evaluation.figures.style import (
     legend_columns,
     line_style,
     new_figure,
+    span_times,
     styled,
 )
 from vedette.evaluation.statistics import Summary
@@ -74,7 +75,7 @@ def draw_ospa(axes: Axes, comparison: Comparison, part: str) -> None:
         label = "_" if number else "decision"  # named once in the legend
         axes.axvline(time, color=GREY, linestyle=(0, (2, 2)), linewidth=0.9, zorder=1, label=label)
     axes.set_ylim(bottom=0.0)
-    axes.set_xlim(comparison.times[0], comparison.times[-1])
+    span_times(axes, comparison.times)
     axes.set_ylabel(_LABELS[part])
 
 

@@ -13,9 +13,11 @@ from typing import Any, ParamSpec, TypeVar
 
 import matplotlib
 from matplotlib import font_manager
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from vedette.errors import InputError
+from vedette.kernels.types import Floats
 
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
@@ -136,6 +138,12 @@ def legend_columns(labels: Sequence[str], *, width: float = COLUMN_WIDTH) -> int
     """How many entries of a legend stand side by side within a width in inches: at least one, at most five."""
     longest = max(map(len, labels), default=1)
     return max(1, min(5, len(labels), int((width - 0.1) / (0.42 + 0.05 * longest))))
+
+
+def span_times(axes: Axes, times: Floats) -> None:
+    """Let the axis begin with the first time and end with the last; a single one gets a second to either side."""
+    room = 0.0 if times[-1] > times[0] else 1.0
+    axes.set_xlim(times[0] - room, times[-1] + room)
 
 
 def colour(index: int) -> str:
