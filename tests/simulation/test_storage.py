@@ -217,6 +217,7 @@ def test_a_row_that_is_missing_is_named(saved: Path) -> None:
 def contradictions() -> dict[str, RunRecord]:
     record = make_record()
     plan = replace(record.decisions[0].plan, chosen=(0, 99))
+    turned = replace(plan, chosen=(0, 0), action_values=tuple(values + 1e308 for values in plan.action_values))
     return {
         "scan times": replace(record, times=record.times + 0.5),
         "record.estimates": replace(record, estimates=record.estimates[1:]),
@@ -224,6 +225,7 @@ def contradictions() -> dict[str, RunRecord]:
         "record.poses": replace(record, poses=record.poses[1:]),
         "record.health.cap_met": replace(record, health=replace(record.health, cap_met=record.health.cap_met[1:])),
         "record.ospa": replace(record, ospa=record.ospa[:, :2]),
+        r"plan.action_values\[0\]": replace(record, decisions=(replace(record.decisions[0], plan=turned),)),
         "plan.chosen": replace(record, decisions=(replace(record.decisions[0], plan=plan),)),
         "record.decisions: expected finite": replace(
             record, decisions=(replace(record.decisions[0], time=float("nan")),)

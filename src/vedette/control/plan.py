@@ -8,6 +8,9 @@ import numpy as np
 
 from vedette.errors import InputError
 from vedette.kernels.types import Floats
+from vedette.text import plain
+
+_LARGEST = 1e300  # rad; finite in degrees, too
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +84,7 @@ class Plan:
         )
 
     def validate(self) -> None:
-        """Raise `InputError` unless choices are within the actions, and the tables fit them and hold the choice."""
+        """Raise `InputError` unless headings are finite, and the tables fit the actions and hold the choice."""
         if len(self.chosen) != self.num_sensors:
             raise InputError(
                 f"plan.chosen: expected one index for each of {self.num_sensors} sensors; got {self.chosen}"
@@ -89,6 +92,8 @@ class Plan:
         for sensor, (values, index) in enumerate(zip(self.action_values, self.chosen, strict=True)):
             if not 0 <= index < len(values):
                 raise InputError(f"plan.chosen[{sensor}]: expected an index of {len(values)} actions; got {index}")
+            if not (np.abs(values) < _LARGEST).all():
+                raise InputError(f"plan.action_values[{sensor}]: expected finite headings; got {plain(values)}")
         for table in self.tables:
             self._check_table(table)
 
