@@ -88,6 +88,21 @@ def test_a_run_is_saved_drawn_and_shown(scene: Path, tmp_path: Path) -> None:
     assert (tmp_path / "picture.png").stat().st_size > 100
 
 
+# The scenes that draw a page of another kind; the others take as long, and are left to the slow tests.
+TELLING = (
+    "one target",
+    "no target and no estimate",
+    "one sensor",
+    "a decision after the only scan",
+    "one of everything",
+)
+
+
+@pytest.mark.parametrize(
+    "scene",
+    [name if name in TELLING else pytest.param(name, marks=pytest.mark.slow) for name in CHANGES],
+    indirect=True,
+)
 def test_a_campaign_of_one_run_is_reported_and_exported(scene: Path, tmp_path: Path) -> None:
     spec, folder = tmp_path / "spec.toml", tmp_path / "results"
     planners = '["idm", "still"]' if "phd" not in scene.read_text() else '["random", "still"]'
