@@ -65,8 +65,7 @@ def load_density(path: str | os.PathLike[str]) -> Density:
     """Read a density that `save_density` wrote.
 
     Raises `InputError` for a file that is missing, damaged, of another origin or a later version, or that holds no
-    valid density. Compressed arrays are refused: what a file unpacks to is never more than
-    the file.
+    valid density. Compressed arrays are refused: what a file unpacks to is never more than the file.
     """
     source = Path(path)
     try:
@@ -77,13 +76,11 @@ def load_density(path: str | os.PathLike[str]) -> Density:
         raise InputError(f"{source}: expected a density file; it is damaged or another: {fault}") from fault
     kind = _kind_of(source, arrays)
     try:
-        density = _build(kind, arrays)
-        density.validate()
+        return _build(kind, arrays)  # which validates
     except KeyError as fault:
         raise InputError(f"{source}: expected an array {fault.args[0]!r}; got none") from fault
     except VedetteError as fault:
         raise InputError(f"{source}: expected a valid density; {fault}") from fault
-    return density
 
 
 def _kind_of(source: Path, arrays: Mapping[str, Any]) -> str:
