@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 from vedette.densities import GLMB, LMB, TrackTable, glmb_to_lmb
 from vedette.divergence import cauchy_schwarz
 from vedette.fusion import Clmb, CmDeltaGlmb
-from vedette.kernels.compile import kernel
-from vedette.kernels.fused_divergence import Cases, Prediction, fused_glmb_divergence, fused_lmb_divergence
-from vedette.kernels.information import row_size, to_information
+from vedette.kernels.base.compile import kernel
+from vedette.kernels.gaussian.information import row_size, to_information
+from vedette.kernels.planning.fused_divergence import Cases, Prediction, fused_glmb_divergence, fused_lmb_divergence
 
 Floats = NDArray[np.float64]
 DIM, NUM_LABELS, NUM_ACTIONS, NUM_SAMPLES = 4, 4, 12, 40

@@ -18,7 +18,7 @@ import pytest
 from ruamel.yaml import YAML
 
 import vedette
-from vedette.kernels.compile import JIT_ENABLED, kernel
+from vedette.kernels.base.compile import JIT_ENABLED, kernel
 
 ROOT = Path(__file__).resolve().parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))

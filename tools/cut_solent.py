@@ -17,9 +17,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from vedette.simulation.cleaning import longest_reachable
-from vedette.simulation.geography import to_tangent_plane
-from vedette.simulation.reports import seconds
+from vedette.recorded.cleaning import longest_reachable
+from vedette.recorded.geography import to_tangent_plane
+from vedette.recorded.reports import seconds
 
 Path2D = NDArray[np.float64]  # (n, 3): time in s, x east and y north in m
 

@@ -15,7 +15,7 @@ from vedette.control.priors import label_sets
 from vedette.control.pseudo import draw_futures, pseudo_posteriors
 from vedette.densities import GLMB, sample_glmb
 from vedette.filters import DeltaGlmbFilter
-from vedette.kernels.marginals import MAX_EXACT_MEASUREMENTS
+from vedette.kernels.association.marginals import MAX_EXACT_MEASUREMENTS
 from vedette.models.platforms import advance
 
 

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from vedette.control.threads import run_chunks
-from vedette.kernels.compile import JIT_ENABLED
+from vedette.kernels.base.compile import JIT_ENABLED
 from waiting import PATIENCE
 
 each_number_of_threads = pytest.mark.parametrize("num_threads", [1, 2, 5])

@@ -14,8 +14,8 @@ from densities.examples import plain_moments, random_glmb, random_lmb
 from vedette.densities import GLMB, LMB, marginalise
 from vedette.divergence import cauchy_schwarz, log_inner_product
 from vedette.fusion import Clmb, CmDeltaGlmb
-from vedette.kernels.fused_divergence import Cases, Prediction, fused_glmb_divergence, fused_lmb_divergence
-from vedette.kernels.information import row_size, to_information
+from vedette.kernels.gaussian.information import row_size, to_information
+from vedette.kernels.planning.fused_divergence import Cases, Prediction, fused_glmb_divergence, fused_lmb_divergence
 
 pytestmark = pytest.mark.lanes
 

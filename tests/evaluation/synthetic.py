@@ -9,7 +9,7 @@ import numpy as np
 from vedette.control.plan import Plan, RewardTable
 from vedette.densities.estimates import Estimate
 from vedette.evaluation.metrics import ospa_of_run
-from vedette.kernels.types import Floats
+from vedette.kernels.base.types import Floats
 from vedette.simulation.health import Health
 from vedette.simulation.records import Decision, RunRecord
 from vedette.simulation.truth import Truth

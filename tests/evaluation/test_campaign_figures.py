@@ -23,7 +23,7 @@ from vedette.evaluation.figures import (
     tracks_figure,
 )
 from vedette.evaluation.figures.style import legend_columns, shown_decisions
-from vedette.kernels.types import Floats
+from vedette.kernels.base.types import Floats
 
 
 def panels(figure: Figure) -> list[Any]:

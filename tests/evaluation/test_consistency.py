@@ -12,7 +12,7 @@ from scipy.stats import chi2
 
 from vedette.errors import InputError, NumericalError
 from vedette.evaluation import average_nees, nees, nees_interval
-from vedette.kernels.types import Floats
+from vedette.kernels.base.types import Floats
 
 DIM = 4
 COV = np.array([[9.0, 2.0, 1.0, 0.0], [2.0, 4.0, 0.0, 0.5], [1.0, 0.0, 2.0, 0.1], [0.0, 0.5, 0.1, 1.0]])

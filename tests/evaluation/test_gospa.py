@@ -12,7 +12,7 @@ from evaluation.synthetic import make_record
 from reference import gospa as reference
 from vedette.errors import InputError
 from vedette.evaluation import gospa, gospa_distance, gospa_of_run, ospa
-from vedette.kernels.types import Floats
+from vedette.kernels.base.types import Floats
 
 coordinates = st.floats(-1000.0, 1000.0, allow_subnormal=False)
 corners = st.sampled_from([0.0, 3.0, 4.0])  # many equal distances

@@ -12,7 +12,7 @@ from evaluation.synthetic import make_record, make_truth
 from reference import ospa as reference
 from vedette.errors import InputError
 from vedette.evaluation import OspaResult, ospa, ospa_of_run
-from vedette.kernels.types import Floats
+from vedette.kernels.base.types import Floats
 
 coordinates = st.floats(-1000.0, 1000.0, allow_subnormal=False)
 point_sets = st.integers(0, 5).flatmap(lambda num: hnp.arrays(np.float64, (num, 2), elements=coordinates))

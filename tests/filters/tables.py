@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from hypothesis import strategies as st
 
-from vedette.kernels.assignment import ABSENT, MISSED, Options
-from vedette.kernels.ranked import Parents
+from vedette.kernels.association.assignment import ABSENT, MISSED, Options
+from vedette.kernels.association.ranked import Parents
 
 
 def make_options(rows: list[list[tuple[int, float]]]) -> Options:

@@ -13,7 +13,7 @@ import pytest
 from vedette import models
 from vedette.densities import GLMB, LMB, map_estimate
 from vedette.filters import DeltaGlmbFilter, FilterInfo, Limits, LmbFilter
-from vedette.kernels.compile import JIT_ENABLED
+from vedette.kernels.base.compile import JIT_ENABLED
 
 POSE = np.array([900.0, 900.0, 0.0])
 REGION = models.Region(-1000.0, 1000.0, -1000.0, 1000.0)

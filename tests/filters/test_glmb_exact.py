@@ -19,7 +19,7 @@ from filters.examples import (
 )
 from reference import glmb as oracle
 from vedette.densities import GLMB, TrackTable
-from vedette.kernels.compile import JIT_ENABLED
+from vedette.kernels.base.compile import JIT_ENABLED
 
 pytestmark = pytest.mark.lanes
 

@@ -23,8 +23,8 @@ from filters.tables import choices_of, make_options, tables
 from reference import glmb as oracle
 from vedette.densities import LMB, TrackTable
 from vedette.filters import Limits
-from vedette.kernels.assignment import ABSENT, MISSED
-from vedette.kernels.marginals import option_marginals
+from vedette.kernels.association.assignment import ABSENT, MISSED
+from vedette.kernels.association.marginals import option_marginals
 
 pytestmark = pytest.mark.lanes
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from scipy.special import logit
 
 from reference import unlabelled
-from vedette.kernels import cphd
+from vedette.kernels.steps import cphd
 
 pytestmark = pytest.mark.lanes
 

@@ -10,10 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from filters.tables import children_of, choices_of, make_options, make_parents, tables
-from vedette.kernels.assignment import ABSENT, MISSED, make_dual_work, solve_assignment
-from vedette.kernels.coverage import add_uncovered, themes_of_options
-from vedette.kernels.gibbs import sample_children
-from vedette.kernels.ranked import rank_children
+from vedette.kernels.association.assignment import ABSENT, MISSED, make_dual_work, solve_assignment
+from vedette.kernels.association.coverage import add_uncovered, themes_of_options
+from vedette.kernels.association.gibbs import sample_children
+from vedette.kernels.association.ranked import rank_children
 
 pytestmark = pytest.mark.lanes
 

@@ -13,7 +13,7 @@ import pytest
 from filters import record, recorded
 from vedette.filters import DeltaGlmbFilter, LmbFilter
 from vedette.fusion import Clmb, CmDeltaGlmb
-from vedette.kernels.compile import JIT_ENABLED
+from vedette.kernels.base.compile import JIT_ENABLED
 
 pytestmark = pytest.mark.skipif(not JIT_ENABLED, reason="hundreds of scans in plain Python")
 SOURCES = recorded.sources()

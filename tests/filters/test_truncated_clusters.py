@@ -12,8 +12,8 @@ from filters.tables import make_options
 from vedette import models
 from vedette.densities import LMB
 from vedette.filters import Limits, LmbFilter
-from vedette.kernels.assignment import ABSENT, MISSED, Options
-from vedette.kernels.marginals import option_marginals
+from vedette.kernels.association.assignment import ABSENT, MISSED, Options
+from vedette.kernels.association.marginals import option_marginals
 
 NUM_MEASUREMENTS = 14  # more than the exact sum takes
 

@@ -22,7 +22,7 @@ from vedette.densities import (
 )
 from vedette.errors import InputError, NumericalError
 from vedette.filters import CbMemberFilter, CphdFilter, Limits, PhdFilter
-from vedette.kernels.compile import JIT_ENABLED
+from vedette.kernels.base.compile import JIT_ENABLED
 from vedette.scenarios import load_scenario
 from vedette.scenarios.build import build_filters
 from vedette.simulation import simulate_scan

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from densities.examples import random_covs
-from vedette.kernels.information import log_integral, log_value, row_size, to_information, to_moments
+from vedette.kernels.gaussian.information import log_integral, log_value, row_size, to_information, to_moments
 
 pytestmark = pytest.mark.lanes
 

@@ -25,14 +25,14 @@ from vedette.campaigns.spec import load_spec
 from vedette.errors import NumericalError, VedetteError
 from vedette.evaluation.runs import run_scenario, strategy
 from vedette.models import Region
+from vedette.recorded.cleaning import Cleaning
+from vedette.recorded.targets import RecordedTargets
 from vedette.scenarios import Scenario, list_builtin, load_scenario, parse_scenario
 from vedette.scenarios.build import build_experiment
 from vedette.scenarios.dumping import dump_scenario, files_of
 from vedette.scenarios.overrides import with_fields
 from vedette.scenarios.summary import facts, one_line
 from vedette.scenarios.yaml_reader import read_yaml
-from vedette.simulation.cleaning import Cleaning
-from vedette.simulation.recorded import RecordedTargets
 from vedette.simulation.stopping import RunStopped
 
 Check = Callable[[np.random.Generator], object]

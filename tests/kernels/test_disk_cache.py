@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from vedette.kernels.compile import JIT_ENABLED
+from vedette.kernels.base.compile import JIT_ENABLED
 from waiting import PATIENCE
 
 pytestmark = pytest.mark.skipif(not JIT_ENABLED, reason="nothing is compiled")
@@ -20,7 +20,7 @@ PROGRAM = """
 import sys, time
 from pathlib import Path
 import numpy as np
-from vedette.kernels.linalg import log_sum
+from vedette.kernels.gaussian.linalg import log_sum
 
 print("ready", flush=True)
 while not Path(sys.argv[1], "go").exists():

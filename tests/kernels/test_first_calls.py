@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from vedette.kernels.compile import JIT_ENABLED
+from vedette.kernels.base.compile import JIT_ENABLED
 
 pytestmark = pytest.mark.skipif(not JIT_ENABLED, reason="nothing is compiled")
 
@@ -17,7 +17,7 @@ PROGRAM = """
 import pickle, threading
 import numpy as np
 from vedette import models
-from vedette.kernels.linalg import log_sum
+from vedette.kernels.gaussian.linalg import log_sum
 
 NUM_THREADS = 8
 motion = models.constant_velocity(5.0)

@@ -18,7 +18,7 @@ import numba
 import numpy as np
 import pytest
 
-from vedette.kernels.compile import JIT_ENABLED, SIGNATURES, kernel
+from vedette.kernels.base.compile import JIT_ENABLED, SIGNATURES, kernel
 from vedette.models import constant_survival
 
 ROOT = Path(__file__).resolve().parents[2]

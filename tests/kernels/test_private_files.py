@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from vedette.kernels.compile import JIT_ENABLED
-from vedette.kernels.private_files import fault_of_folder, make_private_folder, read_private, write_private
+from vedette.kernels.base.compile import JIT_ENABLED
+from vedette.kernels.base.private_files import fault_of_folder, make_private_folder, read_private, write_private
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="files have no owners and modes")
 
@@ -21,7 +21,7 @@ STRANGER = 54321
 # Compiles one kernel, and prints what came from disk and what was compiled.
 PROGRAM = """
 import numpy as np
-from vedette.kernels.linalg import log_sum
+from vedette.kernels.gaussian.linalg import log_sum
 assert log_sum(np.zeros(1)) == 0.0
 print(sum(log_sum.stats.cache_hits.values()), sum(log_sum.stats.cache_misses.values()))
 """

@@ -12,8 +12,8 @@ import pytest
 from reference.user_models import my_bearing_range, my_bearing_range_jacobian, user_made_bearing_range
 from vedette import models
 from vedette.errors import InputError, ModelError
-from vedette.kernels.compile import JIT_ENABLED
-from vedette.kernels.gaussian import CUBATURE, LINEARISED, UNSCENTED
+from vedette.kernels.base.compile import JIT_ENABLED
+from vedette.kernels.gaussian.kalman import CUBATURE, LINEARISED, UNSCENTED
 
 pytestmark = pytest.mark.lanes
 

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from vedette.kernels.types import Floats
+from vedette.kernels.base.types import Floats
 from vedette.models import (
     DetectionModel,
     MeasurementModel,

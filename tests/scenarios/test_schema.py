@@ -16,6 +16,8 @@ from vedette.densities import marginal_estimate
 from vedette.filters import DeltaGlmbFilter, Limits
 from vedette.fusion import Clmb, CmDeltaGlmb
 from vedette.fusion.base import _MERGE_DISTANCE
+from vedette.recorded import Cleaning
+from vedette.recorded import RecordedTargets as RecordedSource
 from vedette.scenarios import json_schema
 from vedette.scenarios.build import build_fusion, build_limits, build_planning_settings
 from vedette.scenarios.diagnostics import kind_of, locate
@@ -24,8 +26,6 @@ from vedette.scenarios.schema.planning import CauchySchwarzReward as CauchySchwa
 from vedette.scenarios.schema.planning import Control
 from vedette.scenarios.schema.tracking import FilterLimits, Fusion, FusionLimits, GibbsAssignment, MarginalEstimator
 from vedette.scenarios.schema.world import RecordedTargets
-from vedette.simulation import Cleaning
-from vedette.simulation import RecordedTargets as RecordedSource
 
 
 def sections(base: type[BaseModel] = Section) -> list[type[BaseModel]]:

@@ -13,9 +13,9 @@ from pyarrow import parquet
 
 from vedette.errors import InputError
 from vedette.models import Region
-from vedette.simulation import Cleaning, RecordedTargets
-from vedette.simulation.cleaning import longest_reachable
-from vedette.simulation.geography import SEMI_MAJOR_AXIS, to_tangent_plane
+from vedette.recorded import Cleaning, RecordedTargets
+from vedette.recorded.cleaning import longest_reachable
+from vedette.recorded.geography import SEMI_MAJOR_AXIS, to_tangent_plane
 
 RNG = np.random.default_rng(0)
 

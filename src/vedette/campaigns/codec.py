@@ -16,7 +16,7 @@ import numpy as np
 
 from vedette.errors import InputError
 from vedette.evaluation.metrics import RunMetrics
-from vedette.kernels.types import Floats
+from vedette.kernels.base.types import Floats
 from vedette.reading import parse_json, read_array, read_members, said
 from vedette.simulation.columns import check_columns, pack, unpack
 from vedette.simulation.decisions import read_decisions, write_decisions

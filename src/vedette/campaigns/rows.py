@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 
 from vedette.control.plan import Plan, RewardTable
-from vedette.kernels.types import Ints
+from vedette.kernels.base.types import Ints
 from vedette.simulation.columns import flatten
 from vedette.simulation.records import Decision
 from vedette.simulation.tabulation import POSE_COLUMNS, tables_of

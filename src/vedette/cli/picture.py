@@ -13,7 +13,7 @@ from matplotlib.ticker import MaxNLocator
 
 from vedette.evaluation.figures.labels import drawn_text
 from vedette.evaluation.figures.style import COLUMN_WIDTH, GREY, VERMILION, colour, line_style, new_figure, styled
-from vedette.kernels.types import Floats
+from vedette.kernels.base.types import Floats
 from vedette.scenarios import Scenario
 from vedette.scenarios.build import build_birth
 from vedette.scenarios.names import sensor_names

@@ -26,7 +26,7 @@ STRATEGY_NAMES = ("jdm", "idm", "random", "fixed", "still")
 
 def compile_if_cold(scenario: Scenario) -> None:
     """The first start in an environment compiles for minutes of processor time; say so before it happens."""
-    from vedette.kernels.disk_cache import cache_directory, is_cold
+    from vedette.kernels.base.disk_cache import cache_directory, is_cold
 
     if is_cold():
         where = cache_directory()

@@ -10,7 +10,7 @@ from typing import Protocol
 import numpy as np
 
 from vedette.errors import InputError
-from vedette.kernels.types import Floats, Ints
+from vedette.kernels.base.types import Floats, Ints
 from vedette.models.measurement import wrap_angles
 
 PAPER_HEADINGS_DEG = tuple(float(angle) for angle in range(-180, 181, 30))

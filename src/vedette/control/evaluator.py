@@ -21,7 +21,7 @@ from vedette.control.tables import fused_rewards
 from vedette.densities import LMB
 from vedette.errors import NumericalError
 from vedette.fusion import Clmb, CmDeltaGlmb, Fusion
-from vedette.kernels.types import Floats, Ints
+from vedette.kernels.base.types import Floats, Ints
 
 SampleRewards: TypeAlias = Callable[[Ints], Floats]
 

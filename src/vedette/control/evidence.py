@@ -11,7 +11,7 @@ import numpy as np
 from vedette.control.evaluator import Evaluator, SampleRewards
 from vedette.control.plan import RewardTable
 from vedette.errors import InputError
-from vedette.kernels.types import Floats, Ints
+from vedette.kernels.base.types import Floats, Ints
 
 # A joint table of more entries is not formed: it would take more memory than all that was evaluated.
 MAX_TABLE = 2_000_000

@@ -11,7 +11,7 @@ from vedette.control.settings import MobileSensor
 from vedette.densities import GLMB, LMB
 from vedette.errors import InputError
 from vedette.filters import DeltaGlmbFilter, LabelledFilter
-from vedette.kernels.types import Floats
+from vedette.kernels.base.types import Floats
 from vedette.models.arguments import float_array, reject
 
 Belief: TypeAlias = GLMB | LMB

@@ -18,8 +18,8 @@ from vedette.densities import GLMB, LMB
 from vedette.densities.checks import unchecked
 from vedette.densities.conversions import lmb_on_label_sets
 from vedette.fusion import Clmb, Fusion
-from vedette.kernels.pseudo_glmb import GlmbResults
-from vedette.kernels.pseudo_lmb import LmbResults, glmb_cases_to_lmb
+from vedette.kernels.planning.pseudo_glmb import GlmbResults
+from vedette.kernels.planning.pseudo_lmb import LmbResults, glmb_cases_to_lmb
 
 _ALL_BUT_CERTAIN = 700.0  # logit; its exponential is still a number
 

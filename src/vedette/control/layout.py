@@ -17,8 +17,8 @@ from vedette.control.pseudo import PseudoPosteriors
 from vedette.densities import GLMB, LMB
 from vedette.densities.checks import unchecked
 from vedette.fusion.tracks import take_tracks
-from vedette.kernels.planning import fill_missing
-from vedette.kernels.types import Bools, Floats, Ints
+from vedette.kernels.base.types import Bools, Floats, Ints
+from vedette.kernels.planning.rewards import fill_missing
 
 
 class Layout(NamedTuple):

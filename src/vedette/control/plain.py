@@ -14,7 +14,7 @@ from vedette.control.reward import CauchySchwarzReward, Reward
 from vedette.densities import LMB
 from vedette.errors import InputError
 from vedette.fusion import Clmb, CmDeltaGlmb, Fusion
-from vedette.kernels.types import Floats, Ints
+from vedette.kernels.base.types import Floats, Ints
 
 
 @dataclass(frozen=True, slots=True, eq=False)

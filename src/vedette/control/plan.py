@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vedette.errors import InputError
-from vedette.kernels.types import Floats
+from vedette.kernels.base.types import Floats
 from vedette.text import plain
 
 _LARGEST = 1e300  # rad; finite in degrees, too

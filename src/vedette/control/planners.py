@@ -17,7 +17,7 @@ from vedette.control.reward import CauchySchwarzReward, Reward
 from vedette.control.search import ExhaustiveSearch, JointProblem, JointSearch, all_joint_actions, first_best
 from vedette.control.settings import MobileSensor, PlanningSettings
 from vedette.fusion import Fusion
-from vedette.kernels.types import Floats
+from vedette.kernels.base.types import Floats
 from vedette.models.arguments import generator
 
 

@@ -12,10 +12,10 @@ from vedette.densities.checks import unchecked
 from vedette.filters import LocalFilter
 from vedette.filters.inputs import model_errors
 from vedette.fusion.tracks import take_tracks
-from vedette.kernels.labels import group_by_label_set
-from vedette.kernels.linalg import log_sum
-from vedette.kernels.planning import predict_tracks
-from vedette.kernels.types import Ints
+from vedette.kernels.base.types import Ints
+from vedette.kernels.gaussian.linalg import log_sum
+from vedette.kernels.labelled.labels import group_by_label_set
+from vedette.kernels.planning.rewards import predict_tracks
 from vedette.models import constant_survival, kernel_motion
 
 Label: TypeAlias = tuple[int, int]

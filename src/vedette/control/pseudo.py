@@ -22,10 +22,10 @@ from vedette.control.threads import run_chunks
 from vedette.densities import GLMB, LMB, TrackTable, sample_glmb, sample_lmb
 from vedette.densities.checks import unchecked
 from vedette.filters.inputs import model_errors
-from vedette.kernels.ideal import Decision, Futures, Horizon, propagate_samples
-from vedette.kernels.pseudo_glmb import GlmbResults, pseudo_update_glmb
-from vedette.kernels.pseudo_lmb import LmbResults, pseudo_update_lmb
-from vedette.kernels.types import Floats
+from vedette.kernels.base.types import Floats
+from vedette.kernels.planning.ideal import Decision, Futures, Horizon, propagate_samples
+from vedette.kernels.planning.pseudo_glmb import GlmbResults, pseudo_update_glmb
+from vedette.kernels.planning.pseudo_lmb import LmbResults, pseudo_update_lmb
 from vedette.models import constant_survival, kernel_motion
 from vedette.models.platforms import advance
 

@@ -10,7 +10,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from vedette.errors import InputError
-from vedette.kernels.types import Floats, Ints
+from vedette.kernels.base.types import Floats, Ints
 from vedette.models.arguments import dimension
 
 # Rewards nearer than this, relative to the best or to 1, are equal: rounding tells them apart, not what they are worth.

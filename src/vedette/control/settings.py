@@ -9,7 +9,7 @@ from typing import Literal
 from vedette.control.actions import ActionSet, HeadingActions
 from vedette.errors import InputError
 from vedette.filters import Limits, LocalFilter
-from vedette.kernels.ideal import EXPECTED, IDEAL, SAMPLED
+from vedette.kernels.planning.ideal import EXPECTED, IDEAL, SAMPLED
 from vedette.models.arguments import dimension, non_negative, positive, probability, reject
 
 IDEAL_MODES = {"ideal": IDEAL, "expected": EXPECTED, "sampled": SAMPLED}

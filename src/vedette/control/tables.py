@@ -22,10 +22,10 @@ from vedette.densities.checks import unchecked
 from vedette.divergence import log_inner_product
 from vedette.errors import InputError
 from vedette.fusion import Clmb, CmDeltaGlmb
-from vedette.kernels.fused_divergence import Cases, Prediction
-from vedette.kernels.information import row_size
-from vedette.kernels.planning import reward_table, write_rows
-from vedette.kernels.types import Floats, Ints
+from vedette.kernels.base.types import Floats, Ints
+from vedette.kernels.gaussian.information import row_size
+from vedette.kernels.planning.fused_divergence import Cases, Prediction
+from vedette.kernels.planning.rewards import reward_table, write_rows
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,7 +33,8 @@ class FusedRewards:
     """Pseudo-posteriors of some sensors and the prediction, laid out for a kernel that rewards any joint actions.
 
     Attributes:
-        cases, prediction: as `vedette.kernels.fused_divergence` has them; the cases of one sensor follow another's.
+        cases, prediction: as `vedette.kernels.planning.fused_divergence` has them; the cases of one sensor follow
+            another's.
         first_cases: (num_sensors,) first case of each sensor.
         num_samples, state_dim, log_unit_volume, is_lmb, num_threads: what the kernel is told besides.
     """

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vedette.errors import InputError, NumericalError, VedetteError
-from vedette.kernels.types import Bools, Floats, Ints
+from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.models.arguments import as_array
 
 _Container = TypeVar("_Container")

@@ -12,7 +12,7 @@ from vedette.densities.checks import unchecked
 from vedette.densities.glmb import GLMB
 from vedette.densities.lmb import LMB
 from vedette.errors import InputError
-from vedette.kernels import conversions as kernels
+from vedette.kernels.labelled import conversions as kernels
 
 DEFAULT_LOG_MIN_WEIGHT = math.log(1e-5)
 DEFAULT_MERGE_DISTANCE = 2.0

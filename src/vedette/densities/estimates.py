@@ -18,7 +18,7 @@ from vedette.densities.poisson import Poisson
 from vedette.densities.statistics import cardinality_distribution
 from vedette.densities.tracks import TrackTable
 from vedette.errors import InputError, NumericalError, VedetteError
-from vedette.kernels.types import Floats, Ints
+from vedette.kernels.base.types import Floats, Ints
 
 _MARGINAL_COMPONENTS = 10
 # A component of weight 1.5 to 2 is more often one target that two measurements fit than two: docs/filters.md.

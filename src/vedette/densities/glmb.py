@@ -11,9 +11,9 @@ import numpy as np
 from vedette.densities import checks
 from vedette.densities.tracks import TrackTable, log_weights
 from vedette.errors import InputError, NumericalError, VedetteError
-from vedette.kernels import types as kt
-from vedette.kernels.labels import group_by_label_set
-from vedette.kernels.types import Floats, Ints
+from vedette.kernels.base import types as kt
+from vedette.kernels.base.types import Floats, Ints
+from vedette.kernels.labelled.labels import group_by_label_set
 
 
 @dataclass(frozen=True, slots=True)

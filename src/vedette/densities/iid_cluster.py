@@ -10,8 +10,8 @@ import numpy as np
 from vedette.densities import checks
 from vedette.densities.tracks import log_weights as logs_of
 from vedette.errors import InputError, NumericalError, VedetteError
-from vedette.kernels import types as kt
-from vedette.kernels.types import Floats
+from vedette.kernels.base import types as kt
+from vedette.kernels.base.types import Floats
 
 
 @dataclass(frozen=True, slots=True)

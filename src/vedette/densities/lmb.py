@@ -11,8 +11,8 @@ from scipy.special import expit
 from vedette.densities import checks
 from vedette.densities.tracks import TrackTable
 from vedette.errors import InputError, NumericalError, VedetteError
-from vedette.kernels import types as kt
-from vedette.kernels.types import Floats
+from vedette.kernels.base import types as kt
+from vedette.kernels.base.types import Floats
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,7 +16,7 @@ from vedette.densities.multi_bernoulli import MultiBernoulli
 from vedette.densities.poisson import Poisson
 from vedette.densities.tracks import TrackTable
 from vedette.errors import InputError, NumericalError, VedetteError
-from vedette.kernels.types import Floats, Ints
+from vedette.kernels.base.types import Floats, Ints
 from vedette.models.arguments import generator
 
 

@@ -15,7 +15,7 @@ from vedette.densities.multi_bernoulli import MultiBernoulli
 from vedette.densities.poisson import Poisson
 from vedette.densities.tracks import TrackTable
 from vedette.errors import InputError
-from vedette.kernels.types import Floats, Ints
+from vedette.kernels.base.types import Floats, Ints
 
 
 def cardinality_distribution(density: GLMB | LMB | Poisson | IidCluster | MultiBernoulli) -> Floats:

@@ -10,8 +10,8 @@ import numpy as np
 
 from vedette.densities import checks
 from vedette.errors import InputError, NumericalError, VedetteError
-from vedette.kernels import types as kt
-from vedette.kernels.types import Floats, Ints
+from vedette.kernels.base import types as kt
+from vedette.kernels.base.types import Floats, Ints
 
 
 @dataclass(frozen=True, slots=True)

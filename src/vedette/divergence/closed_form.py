@@ -10,10 +10,10 @@ import numpy as np
 from vedette.densities import GLMB, LMB, Poisson
 from vedette.densities.conversions import lmb_on_label_sets
 from vedette.errors import InputError, NumericalError
-from vedette.kernels.inner_products import log_glmbs, log_lmbs, log_tracks
-from vedette.kernels.labels import group_by_label_set
-from vedette.kernels.stacking import stack_glmbs, stack_tracks
-from vedette.kernels.types import Glmb, Tracks
+from vedette.kernels.base.types import Glmb, Tracks
+from vedette.kernels.labelled.inner_products import log_glmbs, log_lmbs, log_tracks
+from vedette.kernels.labelled.labels import group_by_label_set
+from vedette.kernels.labelled.stacking import stack_glmbs, stack_tracks
 
 Density: TypeAlias = GLMB | LMB | Poisson
 Support = Literal["full", "common"]

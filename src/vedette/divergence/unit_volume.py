@@ -8,7 +8,7 @@ import numpy as np
 
 from vedette.densities import GLMB, LMB, Poisson, track_moments
 from vedette.errors import InputError
-from vedette.kernels.types import Floats
+from vedette.kernels.base.types import Floats
 
 
 def reference_unit_volume(density: GLMB | LMB | Poisson) -> float:

@@ -11,7 +11,7 @@ import numpy as np
 
 from vedette.errors import InputError
 from vedette.evaluation.statistics import PairedDifference, Summary, paired_difference, summarise
-from vedette.kernels.types import Bools, Floats
+from vedette.kernels.base.types import Bools, Floats
 from vedette.scenarios import Scenario
 from vedette.simulation.records import RunRecord
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vedette.errors import InputError
-from vedette.kernels.types import Bools, Floats
+from vedette.kernels.base.types import Bools, Floats
 from vedette.simulation.records import RunRecord
 from vedette.text import counted
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from vedette.control.plan import RewardTable
 from vedette.errors import InputError
-from vedette.kernels.types import Floats
+from vedette.kernels.base.types import Floats
 from vedette.models.measurement import wrap_angles
 from vedette.simulation.records import Decision, RunRecord
 

@@ -8,8 +8,8 @@ from typing import Any
 from vedette.densities import LMB
 from vedette.filters.inputs import births_at, check_parts, check_scan, check_step
 from vedette.filters.limits import Limits
-from vedette.kernels.truncation import Truncation
-from vedette.kernels.types import Floats, Lmb, Motion, Sensor
+from vedette.kernels.association.truncation import Truncation
+from vedette.kernels.base.types import Floats, Lmb, Motion, Sensor
 from vedette.models import BirthModel, MotionModel, SensorModel, SurvivalModel, kernel_motion
 from vedette.models.arguments import generator, pose_vector, positive
 

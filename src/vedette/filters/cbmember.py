@@ -12,7 +12,7 @@ from vedette.densities import MultiBernoulli
 from vedette.filters.base import ModelledFilter
 from vedette.filters.info import FilterInfo
 from vedette.filters.inputs import check_belief, model_errors
-from vedette.kernels.cbmember import step_cb_member
+from vedette.kernels.steps.cbmember import step_cb_member
 
 
 @dataclass(frozen=True, slots=True, eq=False)

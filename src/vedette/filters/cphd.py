@@ -13,7 +13,7 @@ from vedette.errors import NumericalError
 from vedette.filters.base import ModelledFilter
 from vedette.filters.info import FilterInfo
 from vedette.filters.inputs import check_belief, model_errors
-from vedette.kernels.cphd import step_cphd
+from vedette.kernels.steps.cphd import step_cphd
 
 
 @dataclass(frozen=True, slots=True, eq=False)

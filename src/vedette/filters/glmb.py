@@ -20,8 +20,8 @@ from vedette.filters.inputs import (
     model_errors,
 )
 from vedette.filters.limits import Limits
-from vedette.kernels.conversions import marginalise
-from vedette.kernels.glmb import step_gibbs, step_ranked
+from vedette.kernels.labelled.conversions import marginalise
+from vedette.kernels.steps.glmb import step_gibbs, step_ranked
 from vedette.models import BirthModel, MotionModel, SensorModel, SurvivalModel, kernel_motion
 from vedette.models.arguments import dimension, generator, pose_vector, positive
 

@@ -13,7 +13,7 @@ from vedette.densities import GLMB, LMB, IidCluster, MultiBernoulli, Poisson, Tr
 from vedette.densities.checks import unchecked
 from vedette.errors import InputError, ModelError, VedetteError
 from vedette.filters.limits import Limits
-from vedette.kernels.types import Bools, Floats
+from vedette.kernels.base.types import Bools, Floats
 from vedette.models import BirthModel, MotionModel, SensorModel, SurvivalModel
 from vedette.models.arguments import as_array, reject, step_number
 from vedette.models.measurement import MeasurementModel, wrap_angular

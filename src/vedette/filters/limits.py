@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 from scipy.special import gammaincinv, logit
 
-from vedette.kernels.lmb import Reduction
-from vedette.kernels.truncation import Truncation
+from vedette.kernels.association.truncation import Truncation
+from vedette.kernels.steps.lmb import Reduction
 from vedette.models.arguments import dimension, non_negative, probability, real, reject
 
 

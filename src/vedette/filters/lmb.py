@@ -13,7 +13,7 @@ from vedette.errors import NumericalError
 from vedette.filters.base import ModelledFilter
 from vedette.filters.info import FilterInfo
 from vedette.filters.inputs import check_belief, model_errors
-from vedette.kernels.lmb import step_lmb
+from vedette.kernels.steps.lmb import step_lmb
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -11,7 +11,7 @@ from vedette.densities import Poisson
 from vedette.filters.base import ModelledFilter
 from vedette.filters.info import FilterInfo
 from vedette.filters.inputs import check_belief, model_errors
-from vedette.kernels.phd import step_phd
+from vedette.kernels.steps.phd import step_phd
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -8,10 +8,10 @@ from typing import NamedTuple
 import numpy as np
 
 from vedette.fusion.base import PowerRule
-from vedette.kernels.conversions import glmb_to_lmb
-from vedette.kernels.labels import group_by_label_set
-from vedette.kernels.stacking import stack_glmbs, stack_tracks
-from vedette.kernels.types import Bools, Floats, Glmb, Ints, Tracks
+from vedette.kernels.base.types import Bools, Floats, Glmb, Ints, Tracks
+from vedette.kernels.labelled.conversions import glmb_to_lmb
+from vedette.kernels.labelled.labels import group_by_label_set
+from vedette.kernels.labelled.stacking import stack_glmbs, stack_tracks
 
 
 class Aligned(NamedTuple):

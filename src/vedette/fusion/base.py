@@ -11,7 +11,7 @@ import numpy as np
 
 from vedette.errors import InputError
 from vedette.fusion.cubature import MAX_DIM, fifth_degree_rule
-from vedette.kernels.types import Floats, Ints
+from vedette.kernels.base.types import Floats, Ints
 
 MixturePower = Literal["moment_matched", "component_wise", "quadrature"]
 MIXTURE_POWERS: tuple[MixturePower, ...] = ("moment_matched", "component_wise", "quadrature")

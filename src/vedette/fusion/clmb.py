@@ -26,9 +26,9 @@ from vedette.fusion.base import (
     power_rule,
 )
 from vedette.fusion.tracks import fused_tracks, reduced_tracks
-from vedette.kernels.conversions import glmb_to_lmb
-from vedette.kernels.stacking import stack_tracks
-from vedette.kernels.types import Floats, Ints, Lmb, Tracks
+from vedette.kernels.base.types import Floats, Ints, Lmb, Tracks
+from vedette.kernels.labelled.conversions import glmb_to_lmb
+from vedette.kernels.labelled.stacking import stack_tracks
 
 
 @dataclass(frozen=True, slots=True)

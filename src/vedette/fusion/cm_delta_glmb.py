@@ -27,9 +27,9 @@ from vedette.fusion.base import (
     power_rule,
 )
 from vedette.fusion.tracks import fused_tracks, take_tracks
-from vedette.kernels.conversions import marginalise
-from vedette.kernels.linalg import log_sum
-from vedette.kernels.types import Floats, Glmb
+from vedette.kernels.base.types import Floats, Glmb
+from vedette.kernels.gaussian.linalg import log_sum
+from vedette.kernels.labelled.conversions import marginalise
 
 
 @dataclass(frozen=True, slots=True)

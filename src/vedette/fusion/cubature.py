@@ -7,7 +7,7 @@ from functools import cache
 
 import numpy as np
 
-from vedette.kernels.types import Floats
+from vedette.kernels.base.types import Floats
 
 MAX_DIM = 7
 

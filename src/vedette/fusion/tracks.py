@@ -8,9 +8,9 @@ from vedette.densities import TrackTable
 from vedette.densities.checks import unchecked
 from vedette.errors import NumericalError
 from vedette.fusion.base import PowerRule
-from vedette.kernels.gci import fuse_tracks
-from vedette.kernels.pooling import pooled_tracks
-from vedette.kernels.types import Floats, Ints, Tracks
+from vedette.kernels.base.types import Floats, Ints, Tracks
+from vedette.kernels.gaussian.pooling import pooled_tracks
+from vedette.kernels.labelled.gci import fuse_tracks
 
 
 def fused_tracks(

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from vedette.covariances import covariance_fault
 from vedette.errors import InputError
-from vedette.kernels.types import Floats
+from vedette.kernels.base.types import Floats
 from vedette.text import plain, printable
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vedette.kernels.types import Floats
+from vedette.kernels.base.types import Floats
 from vedette.models.functions import model_function
 from vedette.models.measurement import MeasurementModel
 

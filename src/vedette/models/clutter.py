@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vedette.errors import InputError, ModelError
-from vedette.kernels.types import Bools, Floats
+from vedette.kernels.base.types import Bools, Floats
 from vedette.models.arguments import dimension, float_array, generator, non_negative, params_vector, pose_vector, reject
 from vedette.models.functions import ModelFunction, call, describe, model_function, require_kind
 from vedette.models.measurement import MeasurementModel, angular_flags, wrap_angular

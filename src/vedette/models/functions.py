@@ -25,7 +25,7 @@ from collections.abc import Callable
 from typing import Any
 
 from vedette.errors import InputError, ModelError
-from vedette.kernels.compile import SIGNATURES, check_arguments, compile_model_function
+from vedette.kernels.base.compile import SIGNATURES, check_arguments, compile_model_function
 from vedette.models.arguments import reject
 
 ModelFunction = Callable[..., Any]

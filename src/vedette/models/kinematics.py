@@ -10,8 +10,8 @@ import math
 
 import numpy as np
 
-from vedette.kernels.compile import kernel
-from vedette.kernels.types import Floats
+from vedette.kernels.base.compile import kernel
+from vedette.kernels.base.types import Floats
 from vedette.models.arguments import non_negative
 from vedette.models.functions import model_function
 from vedette.models.motion import MotionModel

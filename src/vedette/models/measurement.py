@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vedette.kernels.types import Bools, Floats
+from vedette.kernels.base.types import Bools, Floats
 from vedette.models.arguments import dimension, params_vector, pose_vector, reject, state_table
 from vedette.models.functions import ModelFunction, call, require_kind
 from vedette.models.probe import probe_array, probe_covariance, probe_jacobian

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vedette.errors import InputError
-from vedette.kernels.types import Floats
+from vedette.kernels.base.types import Floats
 from vedette.models.arguments import float_array, non_negative, positive, reject
 from vedette.models.functions import model_function
 from vedette.models.measurement import NoiseModel

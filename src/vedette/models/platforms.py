@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vedette.kernels.types import Floats
+from vedette.kernels.base.types import Floats
 from vedette.models.arguments import as_array, reject
 from vedette.models.measurement import wrap_angles
 

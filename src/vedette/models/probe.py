@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from vedette.errors import ModelError
-from vedette.kernels.compile import SIGNATURES
-from vedette.kernels.types import Floats
+from vedette.kernels.base.compile import SIGNATURES
+from vedette.kernels.base.types import Floats
 from vedette.models.functions import ModelFunction, call, describe
 
 # Relative to the largest entry: rounding of products of matrices is far below, a forgotten term far above.

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vedette.kernels.compile import kernel
-from vedette.kernels.types import Floats
+from vedette.kernels.base.compile import kernel
+from vedette.kernels.base.types import Floats
 from vedette.models.arguments import non_negative, reject
 from vedette.models.clutter import ClutterModel, log_or_minus_infinity
 from vedette.models.functions import ModelFunction, model_function

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vedette.kernels.types import Floats, Sensor
+from vedette.kernels.base.types import Floats, Sensor
 from vedette.models.arguments import pose_vector, reject, state_table
 from vedette.models.clutter import ClutterModel
 from vedette.models.detection import DetectionModel

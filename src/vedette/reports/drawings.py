@@ -24,7 +24,7 @@ from vedette.evaluation.figures import (
     tracks_figure,
 )
 from vedette.evaluation.figures.cost import MIN_FOR_TAILS
-from vedette.kernels.types import Floats
+from vedette.kernels.base.types import Floats
 from vedette.reports.groups import Group, Strategy, axis_label, axis_unit, describe_settings
 from vedette.reports.tables import nees_over_runs, stage_seconds
 from vedette.simulation.records import RunRecord

@@ -12,7 +12,7 @@ from vedette.control.plan import Plan
 from vedette.errors import VedetteError
 from vedette.evaluation import match_run
 from vedette.evaluation.figures.rewards import best_over_others, best_over_pair
-from vedette.kernels.types import Floats
+from vedette.kernels.base.types import Floats
 from vedette.reports.groups import Strategy
 from vedette.scenarios import Scenario
 from vedette.scenarios.build import build_region, build_sensor

@@ -8,7 +8,7 @@ from pathlib import Path
 from vedette.campaigns.results import CampaignResults
 from vedette.errors import InputError
 from vedette.evaluation.figures import overview_figure, save_figure
-from vedette.kernels.types import Floats
+from vedette.kernels.base.types import Floats
 from vedette.reports.drawings import group_drawings, sweep_drawings, typical_records
 from vedette.reports.groups import Group, gather
 

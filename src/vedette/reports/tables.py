@@ -12,7 +12,7 @@ from vedette.evaluation.figures.cost import MIN_FOR_TAILS
 from vedette.evaluation.figures.style import strategy_label
 from vedette.evaluation.health import percent
 from vedette.evaluation.tables import HEADER, decision_rows, strategy_rows
-from vedette.kernels.types import Bools, Floats
+from vedette.kernels.base.types import Bools, Floats
 from vedette.reports.groups import Group, Strategy
 from vedette.simulation.records import RunRecord
 from vedette.text import elided_apart

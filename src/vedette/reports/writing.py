@@ -20,7 +20,7 @@ from vedette.campaigns.results import CampaignResults
 from vedette.errors import InputError
 from vedette.evaluation.figures.labels import elided_names
 from vedette.files import write_whole
-from vedette.kernels.types import Floats
+from vedette.kernels.base.types import Floats
 from vedette.reports.claims import Claim, all_pairs, claims
 from vedette.reports.drawings import Drawing, error_drawings, group_drawings, sweep_drawings, typical_records
 from vedette.reports.groups import Group, axis_label, gather

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from vedette.errors import VedetteError
-from vedette.kernels.types import Floats
+from vedette.kernels.base.types import Floats
 from vedette.scenarios.checks import decision_steps
 from vedette.scenarios.diagnostics import place_fault
 from vedette.scenarios.faults import Path

@@ -65,7 +65,7 @@ def _columns(recorded: RecordedTargets, file: FilePath) -> Iterator[Finding]:
     except (OSError, csv.Error) as error:
         yield ("targets", "path"), "a readable CSV file", f"{describe(recorded.path)}: {error}"
         return
-    from vedette.simulation.reports import column_names
+    from vedette.recorded.reports import column_names
 
     given, shown = recorded.columns.given(), column_names(header)
     for key, name in given.items():

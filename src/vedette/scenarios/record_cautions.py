@@ -6,12 +6,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from vedette.recorded import RecordedTargets as RecordedSource
 from vedette.scenarios.faults import Path, format_path
 from vedette.scenarios.loading import Scenario
 from vedette.scenarios.records import recorded_source
 from vedette.scenarios.schema.sensors import Sensor
 from vedette.scenarios.schema.world import RecordedTargets, Time
-from vedette.simulation import RecordedTargets as RecordedSource
 
 _NEAR = 1000.0  # m; what is nearer than this to the targets is not called far
 

@@ -10,9 +10,9 @@ import numpy as np
 
 from vedette.errors import InputError
 from vedette.models import Region
+from vedette.recorded import Cleaning
+from vedette.recorded import RecordedTargets as RecordedSource
 from vedette.scenarios.schema.world import RecordedTargets, RegionSection, Time
-from vedette.simulation import Cleaning
-from vedette.simulation import RecordedTargets as RecordedSource
 
 
 def recorded_source(section: RecordedTargets, region: RegionSection, folder: Path) -> RecordedSource:

@@ -1,9 +1,7 @@
 """The world that the program does not get to see: truth, platforms, scans; the loop, and what a run leaves behind."""
 
-from vedette.simulation.cleaning import Cleaning, CleaningCounts, RecordedTrack
 from vedette.simulation.experiment import Experiment
 from vedette.simulation.loop import simulate
-from vedette.simulation.recorded import RecordedTargets
 from vedette.simulation.records import Decision, RunRecord
 from vedette.simulation.scans import CLUTTER, Scan, simulate_scan
 from vedette.simulation.storage import load_run, save_run
@@ -11,12 +9,8 @@ from vedette.simulation.truth import ScriptedTargets, TargetSource, Truth
 
 __all__ = [
     "CLUTTER",
-    "Cleaning",
-    "CleaningCounts",
     "Decision",
     "Experiment",
-    "RecordedTargets",
-    "RecordedTrack",
     "RunRecord",
     "Scan",
     "ScriptedTargets",

@@ -11,7 +11,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from vedette.errors import InputError
-from vedette.kernels.types import Floats, Ints
+from vedette.kernels.base.types import Floats, Ints
 from vedette.reading import said
 
 # Columns of equal length by name; one of shape (num_rows, n) stands for n columns of CSV, `name_0` to `name_(n - 1)`.

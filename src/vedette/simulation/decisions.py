@@ -10,7 +10,7 @@ import numpy as np
 
 from vedette.control.plan import Plan, RewardTable
 from vedette.errors import InputError
-from vedette.kernels.types import Floats
+from vedette.kernels.base.types import Floats
 from vedette.reading import parse_json
 from vedette.simulation.records import Decision
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from vedette.errors import InputError
-from vedette.kernels.types import Floats
+from vedette.kernels.base.types import Floats
 from vedette.reading import said
 from vedette.simulation.columns import Columns, Kind, csv_header, read_csv, write_csv
 from vedette.simulation.decisions import read_decisions, write_decisions

@@ -13,7 +13,7 @@ from vedette.densities import Estimate
 from vedette.errors import InputError
 from vedette.filters import Belief
 from vedette.fusion import Fusion
-from vedette.kernels.types import Bools, Floats
+from vedette.kernels.base.types import Bools, Floats
 from vedette.simulation.truth import TargetSource
 
 

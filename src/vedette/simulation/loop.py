@@ -12,7 +12,7 @@ import numpy as np
 from vedette.control import Plan, Planner, RandomPlanner
 from vedette.densities import Estimate
 from vedette.errors import VedetteError
-from vedette.kernels.types import Floats
+from vedette.kernels.base.types import Floats
 from vedette.models.platforms import advance
 from vedette.simulation.experiment import Experiment
 from vedette.simulation.health import Health

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from vedette.control.plan import Plan
 from vedette.densities.estimates import Estimate
-from vedette.kernels.types import Floats
+from vedette.kernels.base.types import Floats
 from vedette.simulation.health import Health
 from vedette.simulation.truth import Truth
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vedette.errors import ModelError
-from vedette.kernels.types import Floats, Ints
+from vedette.kernels.base.types import Floats, Ints
 from vedette.models import SensorModel
 from vedette.models.arguments import float_array, generator, pose_vector, reject
 from vedette.models.measurement import wrap_angular

@@ -10,7 +10,7 @@ import numpy as np
 
 from vedette.densities.estimates import Estimate
 from vedette.errors import InputError
-from vedette.kernels.types import Floats, Ints
+from vedette.kernels.base.types import Floats, Ints
 from vedette.simulation.columns import Columns, Kind
 from vedette.simulation.health import FUSION_COLUMNS, SENSOR_COLUMNS, Health
 from vedette.simulation.records import Decision, RunRecord

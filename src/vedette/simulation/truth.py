@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vedette.errors import InputError, ModelError
-from vedette.kernels.types import Bools, Floats, Ints
+from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.models import MotionModel
 from vedette.models.arguments import float_array, generator, reject
 

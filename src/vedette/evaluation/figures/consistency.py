@@ -21,7 +21,7 @@ from vedette.evaluation.figures.style import (
     styled,
 )
 from vedette.evaluation.metrics import AverageNees
-from vedette.kernels.types import Floats
+from vedette.kernels.base.types import Floats
 
 
 @styled

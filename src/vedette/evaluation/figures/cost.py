@@ -11,7 +11,7 @@ from matplotlib.ticker import FuncFormatter
 from vedette.errors import InputError
 from vedette.evaluation.figures.labels import short_labels
 from vedette.evaluation.figures.style import MARKERS, colour, legend_columns, new_figure, styled
-from vedette.kernels.types import Floats
+from vedette.kernels.base.types import Floats
 
 MIN_FOR_TAILS = 20  # values, below which their 5th and 95th percentile are but the outermost ones
 

@@ -10,7 +10,7 @@ from vedette.evaluation.comparison import Comparison
 from vedette.evaluation.figures.labels import short_labels
 from vedette.evaluation.figures.style import GREY, INK, colour, new_figure, styled
 from vedette.evaluation.statistics import Summary, paired_difference
-from vedette.kernels.types import Floats
+from vedette.kernels.base.types import Floats
 from vedette.text import display_width
 
 _ROW = 0.36  # inches

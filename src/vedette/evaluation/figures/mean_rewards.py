@@ -26,7 +26,7 @@ from vedette.evaluation.figures.style import (
     styled,
 )
 from vedette.evaluation.rewards import MeanRewards, mean_rewards
-from vedette.kernels.types import Floats
+from vedette.kernels.base.types import Floats
 from vedette.simulation.records import RunRecord
 
 _COLUMNS = 3

@@ -22,7 +22,7 @@ from vedette.evaluation.figures.style import (
     styled,
 )
 from vedette.evaluation.statistics import Summary
-from vedette.kernels.types import Bools, Floats
+from vedette.kernels.base.types import Bools, Floats
 
 _LABELS = {"total": "OSPA (m)", "localisation": "Localisation (m)", "cardinality": "Cardinality (m)"}
 _DASH = 4.5  # line widths, of curves that lie on one another

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vedette.kernels.types import Bools, Floats
+from vedette.kernels.base.types import Bools, Floats
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,7 +19,7 @@ from vedette.evaluation.figures.style import (
     new_figure,
     styled,
 )
-from vedette.kernels.types import Floats
+from vedette.kernels.base.types import Floats
 
 
 @styled

@@ -18,7 +18,7 @@ from vedette.evaluation.figures.style import (
     shown_decisions,
     styled,
 )
-from vedette.kernels.types import Floats, Ints
+from vedette.kernels.base.types import Floats, Ints
 
 _SIZE = 1.5  # inches of a rose
 _SECTORS = 24  # that headings which are no fixed set are counted in

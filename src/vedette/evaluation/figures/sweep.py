@@ -19,7 +19,7 @@ from vedette.evaluation.figures.style import (
     styled,
 )
 from vedette.evaluation.statistics import Summary
-from vedette.kernels.types import Floats
+from vedette.kernels.base.types import Floats
 
 
 @dataclass(frozen=True, slots=True)

@@ -24,7 +24,7 @@ from vedette.evaluation.figures.style import (
     new_figure,
     styled,
 )
-from vedette.kernels.types import Floats, Ints
+from vedette.kernels.base.types import Floats, Ints
 from vedette.simulation.records import RunRecord
 
 _LARGE = 5000.0  # m, beyond which axes are in kilometres

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from scipy.optimize import linear_sum_assignment
 
 from vedette.errors import InputError
-from vedette.kernels.types import Bools, Floats, Ints
+from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.models.arguments import as_array
 
 _HIGH_ORDER = 30.0

@@ -15,7 +15,7 @@ from scipy.special import gammaincinv
 from vedette.densities.checks import check_covariances
 from vedette.evaluation.metrics.matching import Matching
 from vedette.evaluation.statistics import CONFIDENCE
-from vedette.kernels.types import Bools, Floats, Ints
+from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.models.arguments import as_array, dimension, float_array, reject
 from vedette.simulation.truth import Truth
 

@@ -11,7 +11,7 @@ from vedette.densities.estimates import Estimate
 from vedette.errors import InputError
 from vedette.evaluation.metrics.assignment import assign, check_parameters, cut_distances, point_set
 from vedette.evaluation.metrics.point_ospa import check_scans
-from vedette.kernels.types import Floats, Ints
+from vedette.kernels.base.types import Floats, Ints
 from vedette.simulation.truth import Truth
 
 

@@ -23,7 +23,7 @@ from vedette.evaluation.metrics.assignment import (
     power_mean,
 )
 from vedette.evaluation.metrics.matching import Matching, match_run, sum_by_scan
-from vedette.kernels.types import Floats, Ints
+from vedette.kernels.base.types import Floats, Ints
 from vedette.simulation.truth import Truth
 
 

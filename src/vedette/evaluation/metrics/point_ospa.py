@@ -23,7 +23,7 @@ from vedette.evaluation.metrics.assignment import (
     point_sets,
     power_mean,
 )
-from vedette.kernels.types import Floats
+from vedette.kernels.base.types import Floats
 from vedette.simulation.truth import Truth
 
 

@@ -13,7 +13,7 @@ from vedette.evaluation.metrics.matching import match_run
 from vedette.evaluation.metrics.point_gospa import gospa_of_matching
 from vedette.evaluation.metrics.track_ospa import ospa2_of_run
 from vedette.evaluation.metrics.trajectories import continuity
-from vedette.kernels.types import Floats, Ints
+from vedette.kernels.base.types import Floats, Ints
 from vedette.models.arguments import reject
 from vedette.simulation.records import RunRecord
 

@@ -15,7 +15,7 @@ from vedette.densities.estimates import Estimate
 from vedette.errors import InputError
 from vedette.evaluation.metrics.assignment import check_parameters
 from vedette.evaluation.metrics.point_ospa import check_scans, ospa_of_distances
-from vedette.kernels.types import Bools, Floats, Ints
+from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.models.arguments import dimension
 from vedette.simulation.truth import Truth
 

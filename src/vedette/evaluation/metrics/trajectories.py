@@ -14,7 +14,7 @@ import numpy as np
 
 from vedette.densities.estimates import Estimate
 from vedette.evaluation.metrics.matching import Matching, match_run
-from vedette.kernels.types import Ints
+from vedette.kernels.base.types import Ints
 from vedette.simulation.truth import Truth
 
 

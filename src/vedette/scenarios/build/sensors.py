@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from vedette.kernels.types import Floats
+from vedette.kernels.base.types import Floats
 from vedette.models import (
     ClutterModel,
     DetectionModel,

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from vedette.errors import InputError
-from vedette.kernels.types import Floats
+from vedette.kernels.base.types import Floats
 from vedette.models import (
     BirthModel,
     MotionModel,

@@ -1,0 +1,156 @@
+"""Assignment of the rows (tracks) of a hypothesis to columns (measurements): the optimum and its dual variables.
+
+Every row has a list of options sorted by descending log weight. An option's column is a measurement, which at most one
+row may take, or negative (absent, missed), which any row may take.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from vedette.kernels.base.compile import borrowing, inlined, kernel
+from vedette.kernels.base.types import Floats, Ints
+
+ABSENT = -2
+MISSED = -1
+
+
+class Options(NamedTuple):
+    """What may happen to each row. Options of row `r` are `offsets[r]:offsets[r + 1]`, heaviest first.
+
+    columns: (num_options,) ABSENT, MISSED or a measurement index. log_weights: (num_options,).
+    entries: (num_options,) start of the option's component log weights in `component_log_weights`, -1 if absent.
+    whitened: (num_entries, meas_dim) whitened residuals of the components of a detection.
+    """
+
+    offsets: Ints
+    columns: Ints
+    log_weights: Floats
+    entries: Ints
+    component_log_weights: Floats
+    whitened: Floats
+
+
+class DualWork(NamedTuple):
+    """Working arrays of the assignment solver, sized by rows and columns."""
+
+    row_dual: Floats
+    row_option: Ints
+    row_gap: Floats
+    column_dual: Floats
+    column_row: Ints
+    slack: Floats
+    slack_option: Ints
+    visited: Ints
+
+
+@kernel
+def make_dual_work(num_rows: int, num_columns: int) -> DualWork:
+    return DualWork(
+        np.empty(num_rows),
+        np.empty(num_rows, np.int64),
+        np.empty(num_rows),
+        np.empty(num_columns),
+        np.empty(num_columns, np.int64),
+        np.empty(num_columns),
+        np.empty(num_columns, np.int64),
+        np.empty(num_columns, np.int64),
+    )
+
+
+@borrowing
+def solve_assignment(options: Options, rows: Ints, work: DualWork) -> float:
+    """Cost of the best joint choice, minus its log weight; +inf where none exists.
+
+    Leaves the chosen option of each row in `work.row_option` and optimal dual variables in `work.row_dual` and
+    `work.column_dual` (<= 0), so that cost(option) - row_dual - column_dual >= 0 with equality on the optimum.
+    Rows whose best options do not collide are settled at once; otherwise shortest augmenting paths (Jonker, Volgenant).
+    """
+    total = 0.0
+    collision = False
+    for column in range(len(work.column_dual)):
+        work.column_dual[column] = 0.0
+        work.column_row[column] = -1
+    for i in range(len(rows)):
+        first = options.offsets[rows[i]]
+        if first == options.offsets[rows[i] + 1]:
+            return math.inf
+        work.row_option[i] = first
+        work.row_dual[i] = -options.log_weights[first]
+        total += work.row_dual[i]
+        column = options.columns[first]
+        if column >= 0:
+            collision = collision or work.column_row[column] >= 0
+            work.column_row[column] = i
+    if not collision:
+        return total
+    for column in range(len(work.column_dual)):
+        work.column_row[column] = -1
+    for i in range(len(rows)):
+        if not _augment(options, rows, i, work):
+            return math.inf
+    total = 0.0
+    for i in range(len(rows)):
+        total -= options.log_weights[work.row_option[i]]
+    return total
+
+
+@inlined
+def _augment(options: Options, rows: Ints, start: int, work: DualWork) -> bool:
+    """Assign row `start` along a shortest alternating path, to a free column or a row's own negative column."""
+    num_columns = len(work.column_dual)
+    for column in range(num_columns):
+        work.slack[column] = math.inf
+        work.visited[column] = 0
+    work.row_dual[start] = 0.0
+    own_slack, own_option, own_row = math.inf, -1, -1
+    row = start
+    while True:
+        for option in range(options.offsets[rows[row]], options.offsets[rows[row] + 1]):
+            column = options.columns[option]
+            reduced = -options.log_weights[option] - work.row_dual[row]
+            if column < 0:
+                if reduced < own_slack:
+                    own_slack, own_option, own_row = reduced, option, row
+            elif work.visited[column] == 0 and reduced - work.column_dual[column] < work.slack[column]:
+                work.slack[column] = reduced - work.column_dual[column]
+                work.slack_option[column] = option * len(rows) + row
+        best, best_column = own_slack, -1
+        for column in range(num_columns):
+            if work.visited[column] == 0 and work.slack[column] < best:
+                best, best_column = work.slack[column], column
+        if best == math.inf:
+            return False
+        work.row_dual[start] += best
+        for column in range(num_columns):
+            if work.visited[column] == 1:
+                work.row_dual[work.column_row[column]] += best
+                work.column_dual[column] -= best
+            else:
+                work.slack[column] -= best
+        own_slack -= best
+        if best_column < 0:
+            _flip(options, own_row, own_option, start, len(rows), work)
+            return True
+        if work.column_row[best_column] < 0:
+            packed = work.slack_option[best_column]
+            work.column_row[best_column] = packed % len(rows)
+            _flip(options, packed % len(rows), packed // len(rows), start, len(rows), work)
+            return True
+        work.visited[best_column] = 1
+        row = work.column_row[best_column]
+
+
+@inlined
+def _flip(options: Options, row: int, option: int, start: int, num_rows: int, work: DualWork) -> None:
+    """Give `row` its new option and pass its old column back along the path to `start`."""
+    while row != start:
+        released = options.columns[work.row_option[row]]
+        work.row_option[row] = option
+        packed = work.slack_option[released]
+        option, row = packed // num_rows, packed % num_rows
+        work.column_row[released] = row
+    work.row_option[row] = option

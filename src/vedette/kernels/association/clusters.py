@@ -1,0 +1,124 @@
+"""Clusters of rows that contend for the same measurements, and the arrays in which their marginals are computed."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from vedette.kernels.association.assignment import Options
+from vedette.kernels.association.children import Children, grown_children, make_children
+from vedette.kernels.association.search import WIDEST, Search, grown_search, make_search
+from vedette.kernels.base.arrays import grown_floats
+from vedette.kernels.base.compile import borrowing, inlined, kernel
+from vedette.kernels.base.types import Floats, Ints
+
+
+class MarginalWork(NamedTuple):
+    """Arrays in which the clusters of a scan are found and summed; made once, grown when a cluster needs more.
+
+    leaders: (num_rows,) a row of the same cluster, not after the row itself; the first of a cluster leads itself.
+    owners: (num_columns,) the first row that each measurement is gated by, or -1. members: (num_rows,) rows of the
+    cluster at hand. bits: (num_columns,) number of each measurement within its cluster, or -1.
+    tables: of the exact sum, for which a cluster has asked for `needed` (1,) numbers. search, children, used: of the
+    ranked sum, as in `run_search`, whose one parent has the offsets `single`, the weight `no_weight` and `no_groups`.
+    """
+
+    leaders: Ints
+    members: Ints
+    owners: Ints
+    bits: Ints
+    tables: Floats
+    needed: Ints
+    search: Search
+    children: Children
+    used: Ints
+    single: Ints
+    no_weight: Floats
+    no_groups: Ints
+
+
+@kernel
+def make_marginal_work(num_rows: int, num_columns: int) -> MarginalWork:
+    """Room for the clusters of so many rows and measurements, and for a small exact sum."""
+    return MarginalWork(
+        np.empty(num_rows, np.int64),
+        np.empty(num_rows, np.int64),
+        np.empty(num_columns, np.int64),
+        np.empty(num_columns, np.int64),
+        np.empty(64),
+        np.zeros(1, np.int64),
+        make_search(),
+        make_children(),
+        np.zeros(2, np.int64),
+        np.zeros(2, np.int64),
+        np.zeros(1),
+        np.empty(0, np.int64),
+    )
+
+
+@kernel
+def grown_marginal_work(work: MarginalWork) -> MarginalWork:
+    """Room for what the last cluster has asked for."""
+    return MarginalWork(
+        work.leaders,
+        work.members,
+        work.owners,
+        work.bits,
+        grown_floats(work.tables, work.needed[0]),
+        work.needed,
+        grown_search(work.search),
+        grown_children(work.children, work.used, work.search.sizes[WIDEST]),
+        work.used,
+        work.single,
+        work.no_weight,
+        work.no_groups,
+    )
+
+
+@borrowing
+def find_clusters(options: Options, leaders: Ints, owners: Ints) -> bool:
+    """Lead the rows that share a gated measurement, directly or not, to the first of them; false where none does.
+
+    leaders, owners: as in `MarginalWork`, to be written.
+    """
+    shared = False
+    for column in range(len(owners)):
+        owners[column] = -1
+    for row in range(len(options.offsets) - 1):
+        leaders[row] = row
+        for option in range(options.offsets[row], options.offsets[row + 1]):
+            column = options.columns[option]
+            if column < 0:
+                continue
+            if owners[column] < 0:
+                owners[column] = row
+            else:
+                shared = True
+                a, b = _root(leaders, owners[column]), _root(leaders, row)
+                leaders[max(a, b)] = min(a, b)
+    return shared
+
+
+@inlined
+def _root(leaders: Ints, row: int) -> int:
+    while leaders[row] != row:
+        row = leaders[row]
+    return row
+
+
+@inlined
+def gather_cluster(options: Options, leader: int, work: MarginalWork) -> tuple[int, int]:
+    """Write the rows of a cluster and number its measurements; how many there are of both."""
+    count, num_bits = 0, 0
+    for row in range(leader, len(options.offsets) - 1):
+        if _root(work.leaders, row) != leader:
+            continue
+        work.members[count] = row
+        count += 1
+        for option in range(options.offsets[row], options.offsets[row + 1]):
+            column = options.columns[option]
+            if column >= 0 and work.bits[column] < 0:
+                work.bits[column] = num_bits
+                num_bits += 1
+    return count, num_bits

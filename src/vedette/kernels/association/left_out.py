@@ -1,0 +1,109 @@
+"""What a sum over the heaviest joint choices of a cluster leaves out: a bound on it, and what it must not rule out."""
+
+from __future__ import annotations
+
+import math
+
+from vedette.kernels.association.assignment import ABSENT, DualWork, Options, solve_assignment
+from vedette.kernels.base.compile import borrowing, inlined
+from vedette.kernels.base.types import Floats, Ints
+from vedette.kernels.gaussian.linalg import log_add, log_sum
+
+# Log weight of an option that is to be taken only where there is no other.
+_FORBIDDEN = -1e200
+
+
+@borrowing
+def log_left_out_bound(options: Options, rows: Ints, log_summed: float, log_next: float) -> float:
+    """Upper bound on the log of the total weight of the joint choices that were not summed.
+
+    The lesser of two: all joint choices if rows could share measurements, less those summed; and the number of joint
+    choices times exp(`log_next`), which none of those left out exceeds.
+    """
+    log_all, log_count = 0.0, 0.0
+    for row in rows:
+        start, stop = options.offsets[row], options.offsets[row + 1]
+        log_all += log_sum(options.log_weights[start:stop])
+        log_count += math.log(stop - start)
+    if log_all <= log_summed:
+        return -math.inf
+    return min(log_all + math.log(-math.expm1(log_summed - log_all)), log_count + log_next)
+
+
+@inlined
+def _sides(options: Options, row: int, marginals: Floats) -> tuple[int, float, float]:
+    """The option of being absent (-1: there is none), its log marginal, and the greatest of the other options."""
+    option_absent, absent, present = -1, -math.inf, -math.inf
+    for option in range(options.offsets[row], options.offsets[row + 1]):
+        if options.columns[option] == ABSENT:
+            option_absent, absent = option, marginals[option]
+        else:
+            present = max(present, marginals[option])
+    return option_absent, absent, present
+
+
+@borrowing
+def has_closed_side(options: Options, rows: Ints, marginals: Floats) -> bool:
+    """Whether some row that may be absent and may be present is only ever one of them."""
+    for row in rows:
+        option_absent, absent, present = _sides(options, row, marginals)
+        both_possible = option_absent >= 0 and options.offsets[row + 1] - options.offsets[row] > 1
+        if both_possible and (absent == -math.inf or present == -math.inf):
+            return True
+    return False
+
+
+@borrowing
+def _heaviest_absent(options: Options, rows: Ints, at: int, option_absent: int, work: DualWork) -> float:
+    """Log weight of the heaviest joint choice in which row `rows[at]` is absent."""
+    last = len(rows) - 1
+    rows[at], rows[last] = rows[last], rows[at]
+    cost = solve_assignment(options, rows[:last], work)
+    rows[at], rows[last] = rows[last], rows[at]
+    return options.log_weights[option_absent] - cost
+
+
+@borrowing
+def _heaviest_present(options: Options, rows: Ints, at: int, option_absent: int, work: DualWork) -> tuple[int, float]:
+    """The option of row `rows[at]` in the heaviest joint choice in which it is present, and that choice's log weight.
+
+    Being absent is moved to the end of the row meanwhile, at a weight that nothing possible has.
+    """
+    columns, log_weights, last = options.columns, options.log_weights, options.offsets[rows[at] + 1] - 1
+    log_absent = log_weights[option_absent]
+    for option in range(option_absent, last):
+        columns[option], log_weights[option] = columns[option + 1], log_weights[option + 1]
+    columns[last], log_weights[last] = ABSENT, _FORBIDDEN
+    log_weight, chosen = -solve_assignment(options, rows, work), work.row_option[at]
+    for option in range(last, option_absent, -1):
+        columns[option], log_weights[option] = columns[option - 1], log_weights[option - 1]
+    columns[option_absent], log_weights[option_absent] = ABSENT, log_absent
+    if chosen == last or log_weight <= 0.5 * _FORBIDDEN:
+        return chosen, -math.inf
+    return (chosen + 1 if chosen >= option_absent else chosen), log_weight
+
+
+@borrowing
+def open_sides(options: Options, rows: Ints, log_summed: float, work: DualWork, marginals: Floats) -> None:
+    """Let no row be surely there, or surely not, because every choice that was summed has it so.
+
+    Where none has it absent (or none has it present), the heaviest choice that does, found by one assignment, is added
+    to this row's marginals. It is at most what was left out, so that marginals stay within the share left out of the
+    true ones, and a row's other options keep their proportions. A side that no choice at all has stays impossible.
+    """
+    for at in range(len(rows)):
+        start, stop = options.offsets[rows[at]], options.offsets[rows[at] + 1]
+        option, absent, present = _sides(options, rows[at], marginals)
+        if option < 0 or stop - start == 1 or (absent > -math.inf and present > -math.inf):
+            continue
+        if absent == -math.inf:
+            log_weight = _heaviest_absent(options, rows, at, option, work)
+        else:
+            option, log_weight = _heaviest_present(options, rows, at, option, work)
+        if log_weight == -math.inf:
+            continue
+        share = log_weight - log_summed
+        scale = log_add(0.0, share)
+        for other in range(start, stop):
+            marginals[other] -= scale
+        marginals[option] = share - scale

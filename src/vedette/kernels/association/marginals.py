@@ -1,0 +1,218 @@
+"""Marginal probability of every option of every row, by clusters of rows that contend for the same measurements.
+
+Within a cluster the sum over all joint choices is exact: a forward-backward pass over the rows whose state is the set
+of measurements already taken. A cluster too large for that is summed over its heaviest joint choices, in exact order;
+what it leaves out is bounded, and no row is certain for want of a choice (`vedette.kernels.association.left_out`).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from vedette.kernels.association.assignment import Options
+from vedette.kernels.association.children import Parents
+from vedette.kernels.association.clusters import (
+    MarginalWork,
+    find_clusters,
+    gather_cluster,
+    grown_marginal_work,
+    make_marginal_work,
+)
+from vedette.kernels.association.left_out import has_closed_side, log_left_out_bound, open_sides
+from vedette.kernels.association.openings import size_search, start_search
+from vedette.kernels.association.ranked import run_search
+from vedette.kernels.association.search import HEAP
+from vedette.kernels.base.compile import borrowing, inlined, kernel
+from vedette.kernels.base.types import Floats, Ints
+from vedette.kernels.gaussian.linalg import log_add
+
+MAX_EXACT_MEASUREMENTS = 12
+
+
+class MarginalCaps(NamedTuple):
+    """How a cluster too large for the exact sum is summed: see `ranked.rank_children`."""
+
+    max_choices: int
+    max_log_gap: float
+    max_nodes: int
+
+
+@inlined
+def _single_row(options: Options, row: int, out: Floats) -> float:
+    start, stop = options.offsets[row], options.offsets[row + 1]
+    if start == stop:
+        return -math.inf
+    peak, total = options.log_weights[start], 0.0
+    for option in range(start, stop):
+        total += math.exp(options.log_weights[option] - peak)
+    log_total = peak + math.log(total)
+    for option in range(start, stop):
+        out[option] = options.log_weights[option] - log_total
+    return log_total
+
+
+@borrowing
+def _transfer(options: Options, row: int, bit_of: Ints, source: Floats, target: Floats, forward: bool) -> None:
+    """One row's step of the pass over sets of taken measurements; weights relative to the row's heaviest option."""
+    for mask in range(len(target)):
+        target[mask] = 0.0
+    start = options.offsets[row]
+    for option in range(start, options.offsets[row + 1]):
+        weight = math.exp(options.log_weights[option] - options.log_weights[start])
+        column = options.columns[option]
+        bit = 1 << bit_of[column] if column >= 0 else 0
+        for mask in range(len(source)):
+            if mask & bit == 0:
+                if forward:
+                    target[mask | bit] += weight * source[mask]
+                else:
+                    target[mask] += weight * source[mask | bit]
+
+
+@borrowing
+def _exact_cluster(options: Options, rows: Ints, bit_of: Ints, num_bits: int, tables: Floats, out: Floats) -> float:
+    """Marginals of a cluster by forward-backward; returns its log total weight, -inf if that underflows."""
+    num, size = len(rows), 1 << num_bits
+    backwards = (num + 1) * size
+    for mask in range(size):
+        tables[mask] = 1.0 if mask == 0 else 0.0
+        tables[backwards + num * size + mask] = 1.0
+    scale = 0.0
+    for i in range(num):
+        if options.offsets[rows[i]] == options.offsets[rows[i] + 1]:
+            return -math.inf
+        scale += options.log_weights[options.offsets[rows[i]]]
+        at = i * size
+        _transfer(options, rows[i], bit_of, tables[at : at + size], tables[at + size : at + 2 * size], True)
+    for i in range(num - 1, -1, -1):
+        at = backwards + i * size
+        _transfer(options, rows[i], bit_of, tables[at + size : at + 2 * size], tables[at : at + size], False)
+    total = tables[backwards]
+    if not total > 1e-250:
+        return -math.inf
+    for i in range(num):
+        start = options.offsets[rows[i]]
+        for option in range(start, options.offsets[rows[i] + 1]):
+            column = options.columns[option]
+            bit = 1 << bit_of[column] if column >= 0 else 0
+            joint = 0.0
+            for mask in range(size):
+                if mask & bit == 0:
+                    joint += tables[i * size + mask] * tables[backwards + (i + 1) * size + (mask | bit)]
+            log_joint = math.log(joint / total) if joint > 0.0 else -math.inf
+            out[option] = options.log_weights[option] - options.log_weights[start] + log_joint
+    return scale + math.log(total)
+
+
+@borrowing
+def _ranked_cluster(
+    options: Options, rows: Ints, num_columns: int, caps: MarginalCaps, work: MarginalWork, out: Floats
+) -> tuple[float, float, bool]:
+    """Marginals of a cluster over its heaviest joint choices; the log of their total weight, the log of the least share
+    of all weight that this is, and whether there was room.
+    """
+    work.single[1] = len(rows)
+    parents, children, used = Parents(work.single, rows, work.no_weight, work.no_groups), work.children, work.used
+    used[0] = used[1] = 0
+    if not size_search(options, parents, num_columns, work.search):
+        return 0.0, 0.0, False
+    start_search(options, parents, work.search)
+    if not run_search(
+        options, parents, caps.max_choices, caps.max_log_gap, caps.max_nodes, work.search, children, used
+    ):
+        return 0.0, 0.0, False
+    for row in rows:
+        for option in range(options.offsets[row], options.offsets[row + 1]):
+            out[option] = 0.0
+    if used[0] == 0:
+        return -math.inf, 0.0, True
+    peak, total = children.log_weights[0], 0.0
+    for child in range(used[0]):
+        weight = math.exp(children.log_weights[child] - peak)
+        total += weight
+        for i in range(children.offsets[child], children.offsets[child + 1]):
+            out[children.options[i]] += weight
+    for row in rows:
+        for option in range(options.offsets[row], options.offsets[row + 1]):
+            out[option] = math.log(out[option] / total) if out[option] > 0.0 else -math.inf
+    log_total = peak + math.log(total)
+    # No choice left out is heavier than the best that waits, or than the gap at which the search stops.
+    log_next = peak - caps.max_log_gap
+    if work.search.sizes[HEAP] > 0:
+        log_next = max(log_next, -work.search.heap_bounds[0])
+    log_left_out = log_left_out_bound(options, rows, log_total, log_next)
+    open_sides(options, rows, log_total, work.search.work, out)
+    return log_total, -log_add(0.0, log_left_out - log_total), True
+
+
+@borrowing
+def _open_exact(
+    options: Options, rows: Ints, num_columns: int, log_total: float, work: MarginalWork, out: Floats
+) -> bool:
+    """As `open_sides` where the exact sum has lost a side below the smallest number; false where there is no room."""
+    if not has_closed_side(options, rows, out):
+        return True
+    work.single[1] = len(rows)
+    if not size_search(options, Parents(work.single, rows, work.no_weight, work.no_groups), num_columns, work.search):
+        return False
+    open_sides(options, rows, log_total, work.search.work, out)
+    return True
+
+
+@inlined
+def fill_marginals(
+    options: Options, num_columns: int, caps: MarginalCaps, work: MarginalWork, out: Floats
+) -> tuple[float, int, float, bool]:
+    """As `option_marginals`; the flag is false where `work` must be grown and all done anew.
+
+    Inlined because `work` is a large bundle, of which the usual small clusters need little.
+    """
+    log_total, num_ranked, log_kept = 0.0, 0, 0.0
+    if not find_clusters(options, work.leaders, work.owners):
+        for row in range(len(options.offsets) - 1):
+            log_total += _single_row(options, row, out)
+        return log_total, num_ranked, log_kept, True
+    for column in range(num_columns):
+        work.bits[column] = -1
+    for leader in range(len(options.offsets) - 1):
+        if work.leaders[leader] != leader:
+            continue
+        count, num_bits = gather_cluster(options, leader, work)
+        if count == 1:
+            log_total += _single_row(options, leader, out)
+            continue
+        total, rows = -math.inf, work.members[:count]
+        if num_bits <= MAX_EXACT_MEASUREMENTS:
+            work.needed[0] = 2 * (count + 1) << num_bits
+            if work.needed[0] > len(work.tables):
+                return 0.0, 0, 0.0, False
+            total = _exact_cluster(options, rows, work.bits, num_bits, work.tables, out)
+        if total > -math.inf:
+            has_room = _open_exact(options, rows, num_columns, total, work, out)
+        else:
+            num_ranked += 1
+            total, log_share, has_room = _ranked_cluster(options, rows, num_columns, caps, work, out)
+            log_kept += log_share
+        if not has_room:
+            return 0.0, 0, 0.0, False
+        log_total += total
+    return log_total, num_ranked, log_kept, True
+
+
+@kernel
+def option_marginals(
+    options: Options, num_columns: int, max_choices: int, max_log_gap: float, max_nodes: int, out: Floats
+) -> tuple[float, int, float]:
+    """Log marginal probability of each option in `out`. Returns the log total weight of all joint choices, the
+    number of clusters that were summed over their `max_choices` heaviest choices only, and the log of the least share
+    of all weight that is in the sum (0 without such clusters): 1 less that share bounds the error of each marginal.
+    The total is -inf if no joint choice is possible.
+    """
+    work = make_marginal_work(len(options.offsets) - 1, num_columns)
+    caps = MarginalCaps(max_choices, max_log_gap, max_nodes)
+    log_total, num_ranked, log_kept, done = fill_marginals(options, num_columns, caps, work, out)
+    while not done:
+        work = grown_marginal_work(work)
+        log_total, num_ranked, log_kept, done = fill_marginals(options, num_columns, caps, work, out)
+    return log_total, num_ranked, log_kept

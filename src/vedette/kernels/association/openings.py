@@ -1,0 +1,143 @@
+"""Start of a ranking search, and the layout of a prior hypothesis when it is first visited."""
+
+from __future__ import annotations
+
+import math
+
+from vedette.kernels.association.assignment import DualWork, Options
+from vedette.kernels.association.children import Parents, widest_parent
+from vedette.kernels.association.search import (
+    CHOICES,
+    COLUMNS,
+    OPTIONS,
+    PARENTS,
+    PENALTIES,
+    POSITIONS,
+    ROWS,
+    STAMP,
+    WIDEST,
+    Search,
+    new_node,
+    push,
+)
+from vedette.kernels.base.compile import borrowing, inlined
+from vedette.kernels.base.types import Floats, Ints
+
+
+@borrowing
+def size_search(options: Options, parents: Parents, num_columns: int, search: Search) -> bool:
+    """Note the size of the problem; false where the search must be grown to hold it."""
+    sizes = search.sizes
+    for k in range(len(sizes)):
+        sizes[k] = 0
+    sizes[PARENTS], sizes[ROWS], sizes[COLUMNS] = len(parents.log_weights), len(options.offsets) - 1, num_columns
+    sizes[OPTIONS], sizes[WIDEST] = options.offsets[sizes[ROWS]], widest_parent(parents)
+    sizes[CHOICES] = sizes[OPTIONS]
+    return (
+        sizes[PARENTS] <= len(search.starts)
+        and 2 * sizes[OPTIONS] <= len(search.options)
+        and sizes[PARENTS] + 2 * sizes[WIDEST] + 4 <= len(search.bounds)
+        and num_columns <= len(search.taken)
+        and num_columns <= len(search.work.column_dual)
+        and sizes[WIDEST] <= len(search.work.row_dual)
+    )
+
+
+@borrowing
+def start_search(options: Options, parents: Parents, search: Search) -> None:
+    """Nothing opened; every parent waits with the bound that ignores collisions."""
+    for row in range(search.sizes[ROWS]):
+        first = options.offsets[row]
+        for option in range(first, options.offsets[row + 1]):
+            search.options[option] = option
+            search.costs[option] = options.log_weights[first] - options.log_weights[option]
+    for column in range(search.sizes[COLUMNS]):
+        search.taken[column] = 0
+    for parent in range(search.sizes[PARENTS]):
+        search.starts[parent] = -1
+        bound = -parents.log_weights[parent]
+        for i in range(parents.offsets[parent], parents.offsets[parent + 1]):
+            first = options.offsets[parents.rows[i]]
+            bound += -options.log_weights[first] if first < options.offsets[parents.rows[i] + 1] else math.inf
+        if bound < math.inf:
+            push(search, new_node(search, bound, parent, -1, -1, -1))
+
+
+@inlined
+def _insert_position(search: Search, first: int, count: int, row: int, gap: float, gaps: Floats) -> None:
+    """Place a row among the `count` positions from `first` on, those with the larger gap before it."""
+    gaps[row] = gap
+    slot = first + count
+    while slot > first and gaps[search.position_rows[slot - 1]] < gap:
+        search.position_rows[slot] = search.position_rows[slot - 1]
+        slot -= 1
+    search.position_rows[slot] = row
+
+
+@inlined
+def open_free(parent: int, rows: Ints, options: Options, search: Search) -> bool:
+    """Lay out a parent whose rows' best options do not collide; false where they do."""
+    first_position, gaps = search.sizes[POSITIONS], search.work.row_gap
+    search.sizes[STAMP] += 1
+    stamp = search.sizes[STAMP]
+    for i in range(len(rows)):
+        first, last = options.offsets[rows[i]], options.offsets[rows[i] + 1]
+        column = options.columns[first]
+        if column >= 0:
+            if search.taken[column] == stamp:
+                return False
+            search.taken[column] = stamp
+        gap = search.costs[first + 1] if first + 1 < last else math.inf
+        _insert_position(search, first_position, i, i, gap, gaps)
+    for position in range(first_position, first_position + len(rows)):
+        row = rows[search.position_rows[position]]
+        search.firsts[position], search.lasts[position] = options.offsets[row], options.offsets[row + 1]
+    search.starts[parent] = first_position
+    search.penalty_starts[parent] = search.penalty_ends[parent] = 0
+    search.sizes[POSITIONS] += len(rows)
+    return True
+
+
+@inlined
+def _reduced_cost(options: Options, option: int, row: int, work: DualWork) -> float:
+    cost = -options.log_weights[option] - work.row_dual[row]
+    column = options.columns[option]
+    return cost - work.column_dual[column] if column >= 0 else cost
+
+
+@inlined
+def open_solved(parent: int, rows: Ints, options: Options, search: Search) -> None:
+    """Lay out a parent whose assignment problem has just been solved: rows with the firmest best option first."""
+    work, first_position = search.work, search.sizes[POSITIONS]
+    for i in range(len(rows)):
+        gap = math.inf
+        for option in range(options.offsets[rows[i]], options.offsets[rows[i] + 1]):
+            if option != work.row_option[i]:
+                gap = min(gap, _reduced_cost(options, option, i, work))
+        _insert_position(search, first_position, i, i, gap, work.row_gap)
+    filled = search.sizes[CHOICES]
+    for position in range(first_position, first_position + len(rows)):
+        i = search.position_rows[position]
+        search.firsts[position] = start = filled
+        for option in range(options.offsets[rows[i]], options.offsets[rows[i] + 1]):
+            # The optimum's own option stands first: rounding must not put an equal one before it.
+            cost = 0.0 if option == work.row_option[i] else max(_reduced_cost(options, option, i, work), 0.0)
+            slot = filled
+            while slot > start and (search.costs[slot - 1] > cost or option == work.row_option[i]):
+                search.costs[slot] = search.costs[slot - 1]
+                search.options[slot] = search.options[slot - 1]
+                slot -= 1
+            search.costs[slot] = cost
+            search.options[slot] = option
+            filled += 1
+        search.lasts[position] = filled
+    penalties = search.sizes[PENALTIES]
+    search.starts[parent], search.penalty_starts[parent] = first_position, penalties
+    for column in range(search.sizes[COLUMNS]):
+        if work.column_dual[column] < 0.0:
+            search.penalty_columns[penalties] = column
+            search.penalty_costs[penalties] = -work.column_dual[column]
+            penalties += 1
+    search.penalty_ends[parent] = penalties
+    search.sizes[POSITIONS] += len(rows)
+    search.sizes[CHOICES], search.sizes[PENALTIES] = filled, penalties

@@ -1,0 +1,115 @@
+"""Which of the joint choices of a scan are kept as hypotheses."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from vedette.kernels.association.assignment import ABSENT
+from vedette.kernels.association.children import Children, num_groups
+from vedette.kernels.base.arrays import filled_ints, hashed
+from vedette.kernels.base.compile import borrowing, kernel
+from vedette.kernels.base.types import Ints
+from vedette.kernels.gaussian.mixtures import descending_order
+
+
+class Truncation(NamedTuple):
+    """What is kept. max_hypotheses: how many. max_log_gap: log weight below the best. gate: squared Mahalanobis
+    distance. log_clutter_floor: least log clutter intensity. max_nodes: bound on the ranking search. max_track_gap: log
+    weight below the best to which a hypothesis is kept as the only one of a track; 0: none is.
+    """
+
+    max_hypotheses: int
+    max_log_gap: float
+    gate: float
+    log_clutter_floor: float
+    max_nodes: int
+    max_track_gap: float
+
+
+@borrowing
+def _same_tracks(first: int, second: int, children: Children, columns: Ints) -> bool:
+    """Whether two children are the same hypothesis: the same updated tracks, whoever else died."""
+    i, j = children.offsets[first], children.offsets[second]
+    end_i, end_j = children.offsets[first + 1], children.offsets[second + 1]
+    while True:
+        while i < end_i and columns[children.options[i]] == ABSENT:
+            i += 1
+        while j < end_j and columns[children.options[j]] == ABSENT:
+            j += 1
+        if i == end_i or j == end_j:
+            return i == end_i and j == end_j
+        if children.options[i] != children.options[j]:
+            return False
+        i += 1
+        j += 1
+
+
+@kernel
+def merge_equal(children: Children, columns: Ints) -> Ints:
+    """Add the weight of each repeated hypothesis to its first occurrence; return the first occurrences."""
+    num = len(children.parents)
+    size = 4
+    while size < 2 * num:
+        size *= 2
+    table = filled_ints(size, -1)
+    firsts = np.empty(num, np.int64)
+    num_firsts = 0
+    for child in range(num):
+        key = 0
+        for i in range(children.offsets[child], children.offsets[child + 1]):
+            if columns[children.options[i]] != ABSENT:
+                key = hashed(key, children.options[i])
+        slot = key & (size - 1)
+        while table[slot] >= 0 and not _same_tracks(table[slot], child, children, columns):
+            slot = (slot + 1) & (size - 1)
+        if table[slot] < 0:
+            table[slot] = child
+            firsts[num_firsts] = child
+            num_firsts += 1
+        else:
+            first = table[slot]
+            a, b = children.log_weights[first], children.log_weights[child]
+            children.log_weights[first] = max(a, b) + math.log1p(math.exp(min(a, b) - max(a, b)))
+    return firsts[:num_firsts]
+
+
+@kernel
+def heaviest_first(children: Children, firsts: Ints) -> Ints:
+    """The children `firsts` by descending weight, ties by order of discovery."""
+    log_weights = np.empty(len(firsts))
+    for i in range(len(firsts)):
+        log_weights[i] = children.log_weights[firsts[i]]
+    order = descending_order(log_weights)
+    for i in range(len(order)):
+        order[i] = firsts[order[i]]
+    return order
+
+
+@kernel
+def keep_heaviest(children: Children, order: Ints, needed: Ints, truncation: Truncation, groups: Ints) -> Ints:
+    """The children to keep of those in `order`, heaviest first: those needed; of the others, by number and gap; and the
+    heaviest of each group.
+    """
+    others = truncation.max_hypotheses
+    for child in order:
+        others -= needed[child]
+    kept = np.empty(len(order), np.int64)
+    num_kept = 0
+    seen = filled_ints(num_groups(groups), 0)
+    for child in order:
+        wanted = needed[child] == 1
+        gap = children.log_weights[order[0]] - children.log_weights[child]
+        if not wanted and others > 0 and gap <= truncation.max_log_gap:
+            wanted = True
+            others -= 1
+        if len(groups):
+            group = groups[children.parents[child]]
+            wanted = wanted or seen[group] == 0
+            seen[group] = 1
+        if wanted:
+            kept[num_kept] = child
+            num_kept += 1
+    return kept[:num_kept]

@@ -1,0 +1,1 @@
+"""What every kernel stands on: types, compiling, the cache on disk, arrays."""

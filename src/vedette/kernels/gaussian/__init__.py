@@ -1,0 +1,1 @@
+"""Linear algebra, Kalman steps, information rows, mixtures and pools of Gaussians."""

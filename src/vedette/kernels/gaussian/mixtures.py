@@ -1,0 +1,253 @@
+"""Gaussian mixtures: moment matching, and reduction by pruning, merging and capping."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from vedette.errors import NumericalError
+from vedette.kernels.base.compile import borrowing, inlined, kernel
+from vedette.kernels.base.types import Floats, Ints
+from vedette.kernels.gaussian.linalg import cholesky, log_sum, solve_lower
+
+
+@inlined
+def _is_definite(cov: Floats, factor: Floats, n: int) -> bool:
+    """Whether `cov` is positive definite beyond rounding, so that any other Cholesky factorisation finds it so too.
+
+    Its correlations are factored with a diagonal lessened by twice what n (n + 2) roundings may take from it.
+    """
+    least = 2.0 * n * (n + 2) * 2.0**-52
+    for i in range(n):
+        for j in range(i + 1):
+            total = cov[i, j]
+            for k in range(j):
+                total -= factor[i, k] * factor[j, k]
+            if i > j:
+                factor[i, j] = total / factor[j, j]
+                continue
+            total -= least * cov[i, i]
+            if not 0.0 < total < math.inf:
+                return False
+            factor[i, i] = math.sqrt(total)
+    return True
+
+
+@kernel
+def require_gaussians(means: Floats, covs: Floats) -> None:
+    """Raise `NumericalError` unless means are finite and covariances positive definite beyond their rounding."""
+    num, n = means.shape
+    factor = np.empty((n, n))
+    for c in range(num):
+        for i in range(n):
+            if not math.isfinite(means[c, i]):
+                raise NumericalError("mean of a track is not finite: the models or the scan lead beyond all numbers")
+        # A constant size is unrolled by the compiler.
+        definite = _is_definite(covs[c], factor, 4) if n == 4 else _is_definite(covs[c], factor, n)
+        if not definite:
+            raise NumericalError(
+                "covariance of a track is not positive definite within the precision of a double: its axes differ by "
+                "too many orders of magnitude (a long time step, far smaller noise, or targets far apart made one)"
+            )
+
+
+@kernel
+def descending_order(values: Floats) -> Ints:
+    """Indices that sort `values` from the largest down; equal values keep their order. NaN is not allowed."""
+    count = len(values)
+    order = np.empty(count, np.int64)
+    for i in range(count):
+        order[i] = i
+    run = 16
+    for low in range(0, count, run):
+        for i in range(low + 1, min(low + run, count)):
+            item, j = order[i], i
+            while j > low and values[order[j - 1]] < values[item]:
+                order[j] = order[j - 1]
+                j -= 1
+            order[j] = item
+    while run < count:
+        source = order.copy()
+        for low in range(0, count, 2 * run):
+            _merge_runs(values, source, low, min(low + run, count), min(low + 2 * run, count), order)
+        run *= 2
+    return order
+
+
+@kernel
+def _merge_runs(values: Floats, source: Ints, low: int, middle: int, high: int, out: Ints) -> None:
+    i, j = low, middle
+    for k in range(low, high):
+        if j >= high or (i < middle and values[source[i]] >= values[source[j]]):
+            out[k] = source[i]
+            i += 1
+        else:
+            out[k] = source[j]
+            j += 1
+
+
+@inlined
+def copy_component(means: Floats, covs: Floats, source: int, out_means: Floats, out_covs: Floats, target: int) -> None:
+    """Copy component `source` to place `target`. (Written out: array assignment takes seconds to compile.)"""
+    n = means.shape[1]
+    for i in range(n):
+        out_means[target, i] = means[source, i]
+        for j in range(n):
+            out_covs[target, i, j] = covs[source, i, j]
+
+
+@borrowing
+def match_components(
+    components: Ints, weights: Floats, count: int, means: Floats, covs: Floats, out_mean: Floats, out_cov: Floats
+) -> None:
+    """Mean and covariance of the mixture of the first `count` of `components` (indices into `means` and `covs`).
+
+    weights: (>= count,) linear, not necessarily normalised; components count alike where all are zero.
+    """
+    n = means.shape[1]
+    if count == 1:
+        only = components[0]
+        for i in range(n):
+            out_mean[i] = means[only, i]
+            for j in range(n):
+                out_cov[i, j] = covs[only, i, j]
+        return
+    total = 0.0
+    for c in range(count):
+        total += weights[c]
+    equal = 0.0 if total > 0.0 else 1.0
+    scale = 1.0 / (total + equal * count)
+    for i in range(n):
+        first_moment = 0.0
+        for c in range(count):
+            first_moment += (weights[c] + equal) * means[components[c], i]
+        out_mean[i] = scale * first_moment
+    for i in range(n):
+        for j in range(i + 1):
+            second_moment = 0.0
+            for c in range(count):
+                item = components[c]
+                spread = (means[item, i] - out_mean[i]) * (means[item, j] - out_mean[j])
+                second_moment += (weights[c] + equal) * (covs[item, i, j] + spread)
+            out_cov[i, j] = scale * second_moment
+            out_cov[j, i] = out_cov[i, j]
+
+
+@kernel
+def moment_match(log_weights: Floats, means: Floats, covs: Floats, out_mean: Floats, out_cov: Floats) -> None:
+    """Mean and covariance of a Gaussian mixture.
+
+    log_weights: (num,) not necessarily normalised; components count alike where all are -inf. means: (num, state_dim).
+    covs: (num, state_dim, state_dim). out_mean: (state_dim,). out_cov: (state_dim, state_dim), symmetric.
+    """
+    count = len(log_weights)
+    components, weights = np.empty(count, np.int64), np.empty(count)
+    peak = -math.inf
+    for c in range(count):
+        peak = max(peak, log_weights[c])
+    for c in range(count):
+        components[c] = c
+        weights[c] = math.exp(log_weights[c] - peak) if peak > -math.inf else 0.0
+    match_components(components, weights, count, means, covs, out_mean, out_cov)
+
+
+@kernel
+def _near(heaviest: int, log_weights: Floats, means: Floats, covs: Floats, merge_distance: float, out: Ints) -> int:
+    """Components (-> out, `heaviest` first) still in play within `merge_distance` of `heaviest`; their number."""
+    n = means.shape[1]
+    factor, difference = np.empty((n, n)), np.empty(n)
+    out[0] = heaviest
+    count = 1
+    if not merge_distance > 0.0 or not cholesky(covs[heaviest], factor):
+        return count
+    for c in range(len(log_weights)):
+        if c == heaviest or log_weights[c] == -math.inf:
+            continue
+        for i in range(n):
+            difference[i] = means[c, i] - means[heaviest, i]
+        solve_lower(factor, difference, difference)
+        squared = 0.0
+        for i in range(n):
+            squared += difference[i] * difference[i]
+        if squared < merge_distance * merge_distance:
+            out[count] = c
+            count += 1
+    return count
+
+
+@kernel
+def _merge(
+    log_weights: Floats, means: Floats, covs: Floats, log_floor: float, merge_distance: float
+) -> tuple[Floats, Floats, Floats]:
+    """Greedy merging, heaviest component first, of those of at least `log_floor` (the heaviest always stays)."""
+    num, n = means.shape
+    left, order = log_weights.copy(), descending_order(log_weights)
+    for c in range(num):
+        if c != order[0] and left[c] < log_floor:
+            left[c] = -math.inf
+    near, weights = np.empty(num, np.int64), np.empty(num)
+    merged_log_weights, merged_means, merged_covs = np.empty(num), np.empty((num, n)), np.empty((num, n, n))
+    merged = 0
+    for heaviest in order:
+        if left[heaviest] == -math.inf:
+            continue
+        count = _near(heaviest, left, means, covs, merge_distance, near)
+        total = 0.0
+        for k in range(count):
+            weights[k] = math.exp(left[near[k]] - log_weights[heaviest])
+            total += weights[k]
+            left[near[k]] = -math.inf
+        merged_log_weights[merged] = log_weights[heaviest] + math.log(total)
+        match_components(near, weights, count, means, covs, merged_means[merged], merged_covs[merged])
+        merged += 1
+    return merged_log_weights[:merged], merged_means[:merged], merged_covs[:merged]
+
+
+@kernel
+def reduce_mixture(
+    log_weights: Floats,
+    means: Floats,
+    covs: Floats,
+    log_min_weight: float,
+    merge_distance: float,
+    max_components: int,
+) -> tuple[Floats, Floats, Floats]:
+    """A mixture of at most `max_components` Gaussians, heaviest first, of the same total weight.
+
+    Components lighter than `log_min_weight` (log, relative to the total) are dropped; then, greedily from the heaviest,
+    all components within the Mahalanobis distance `merge_distance` of it (under its covariance; 0 merges nothing) are
+    merged by moment matching; then the heaviest `max_components` stay. With `max_components` 1 the result is the moment
+    match of all components, the light ones too.
+    """
+    num, n = means.shape
+    total = log_sum(log_weights)
+    if max_components == 1 or num <= 1 or total == -math.inf:
+        kept = min(num, 1)
+        one_mean, one_cov, one_log_weight = np.empty((kept, n)), np.empty((kept, n, n)), np.full(kept, total)
+        if kept == 1:
+            moment_match(log_weights, means, covs, one_mean[0], one_cov[0])
+        return one_log_weight, one_mean, one_cov
+    merged_log_weights, merged_means, merged_covs = _merge(
+        log_weights, means, covs, total + log_min_weight, merge_distance
+    )
+    order = descending_order(merged_log_weights)
+    kept = min(len(order), max_components)
+    out_log_weights, out_means, out_covs = np.empty(kept), np.empty((kept, n)), np.empty((kept, n, n))
+    for k in range(kept):
+        out_log_weights[k] = merged_log_weights[order[k]]
+        copy_component(merged_means, merged_covs, order[k], out_means, out_covs, k)
+    shift = total - log_sum(out_log_weights)
+    for k in range(kept):
+        out_log_weights[k] += shift
+    return out_log_weights, out_means, out_covs
+
+
+__all__ = [
+    "copy_component",
+    "descending_order",
+    "match_components",
+    "moment_match",
+    "reduce_mixture",
+    "require_gaussians",
+]

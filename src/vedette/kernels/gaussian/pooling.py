@@ -1,0 +1,109 @@
+"""Pools of weighted tracks, each of which becomes one track: the mixture of the pool, reduced."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from vedette.kernels.base.compile import inlined, kernel
+from vedette.kernels.base.types import Floats, Ints, Tracks
+from vedette.kernels.gaussian.mixtures import copy_component, match_components, reduce_mixture, require_gaussians
+
+
+@inlined
+def add_to_pool(track: int, weight: float, slot_of: Ints, pool: Ints, weights: Floats, end: int) -> int:
+    """Add `weight` to `track`'s place in the open pool, or give it the place `end`; the new end of the pool."""
+    slot = slot_of[track]
+    if slot < 0:
+        slot_of[track] = end
+        pool[end] = track
+        weights[end] = weight
+        return end + 1
+    weights[slot] += weight
+    return end
+
+
+@kernel
+def _gather(
+    tracks: Tracks, pool: Ints, weights: Floats, low: int, high: int, components: Ints, component_weights: Floats
+) -> int:
+    """Components of the pool `low:high` and their linear weights, into the last two arguments; their number."""
+    count = 0
+    for p in range(low, high):
+        for source in range(tracks.offsets[pool[p]], tracks.offsets[pool[p] + 1]):
+            components[count] = source
+            log_weight = tracks.log_weights[source]
+            component_weights[count] = weights[p] if log_weight == 0.0 else weights[p] * math.exp(log_weight)
+            count += 1
+    return count
+
+
+@kernel
+def _reduced_components(
+    tracks: Tracks,
+    components: Ints,
+    weights: Floats,
+    log_min_weight: float,
+    merge_distance: float,
+    max_components: int,
+) -> tuple[Floats, Floats, Floats]:
+    """The normalised, reduced mixture of `components` under linear weights."""
+    num, n = len(components), tracks.means.shape[1]
+    log_weights, means, covs, total = np.empty(num), np.empty((num, n)), np.empty((num, n, n)), 0.0
+    for weight in weights:
+        total += weight
+    for c in range(num):
+        share = weights[c] / total if total > 0.0 else 1.0 / num
+        log_weights[c] = math.log(share) if share > 0.0 else -math.inf
+        copy_component(tracks.means, tracks.covs, components[c], means, covs, c)
+    return reduce_mixture(log_weights, means, covs, log_min_weight, merge_distance, max_components)
+
+
+@kernel
+def pooled_tracks(
+    tracks: Tracks,
+    labels: Ints,
+    pool_offsets: Ints,
+    pool: Ints,
+    weights: Floats,
+    log_min_weight: float,
+    merge_distance: float,
+    max_components: int,
+) -> Tracks:
+    """One track for each pool of tracks: the mixture of the pool under its linear weights, reduced."""
+    num, n, used, largest, room = len(labels), tracks.means.shape[1], 0, 0, 0
+    for i in range(num):
+        size = 0
+        for p in range(pool_offsets[i], pool_offsets[i + 1]):
+            size += tracks.offsets[pool[p] + 1] - tracks.offsets[pool[p]]
+        largest = max(largest, size)
+        room += min(size, max_components)
+    components, component_weights = np.empty(largest, np.int64), np.empty(largest)
+    offsets, log_weights, means, covs = (
+        np.zeros(num + 1, np.int64),
+        np.zeros(room),
+        np.empty((room, n)),
+        np.empty((room, n, n)),
+    )
+    for i in range(num):
+        count = _gather(tracks, pool, weights, pool_offsets[i], pool_offsets[i + 1], components, component_weights)
+        if max_components == 1 or count == 1:
+            match_components(components, component_weights, count, tracks.means, tracks.covs, means[used], covs[used])
+            used += 1
+        else:
+            reduced_log_weights, reduced_means, reduced_covs = _reduced_components(
+                tracks, components[:count], component_weights[:count], log_min_weight, merge_distance, max_components
+            )
+            for c in range(len(reduced_log_weights)):
+                log_weights[used] = reduced_log_weights[c]
+                copy_component(reduced_means, reduced_covs, c, means, covs, used)
+                used += 1
+        offsets[i + 1] = used
+    if used < room:
+        log_weights, means, covs = log_weights[:used].copy(), means[:used].copy(), covs[:used].copy()
+    require_gaussians(means, covs)
+    return Tracks(labels, offsets, log_weights, means, covs)
+
+
+__all__ = ["add_to_pool", "pooled_tracks"]

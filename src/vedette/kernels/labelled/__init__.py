@@ -1,0 +1,1 @@
+"""Label sets, conversions between labelled densities, inner products, generalized covariance intersection."""

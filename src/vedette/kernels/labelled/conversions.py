@@ -1,0 +1,169 @@
+"""Conversions between labelled densities: delta-GLMB to marginalised GLMB and to LMB, LMB to GLMB."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from vedette.kernels.base.compile import kernel
+from vedette.kernels.base.types import Floats, Glmb, Ints, Lmb
+from vedette.kernels.gaussian.linalg import log_sum
+from vedette.kernels.gaussian.mixtures import descending_order
+from vedette.kernels.gaussian.pooling import add_to_pool, pooled_tracks
+from vedette.kernels.labelled.labels import group_by_label_set, group_members, increasing_labels, label_place
+from vedette.kernels.labelled.subsets import smallest_sums
+
+
+@kernel
+def _set_weights(glmb: Glmb, group_of: Ints, num_sets: int) -> tuple[Floats, Floats]:
+    """(num_sets,) log weight of each label set, and (num_hyps,) linear weights relative to the heaviest of the set."""
+    peaks, sums = np.full(num_sets, -math.inf), np.zeros(num_sets)
+    relative = np.zeros(len(group_of))
+    for h in range(len(group_of)):
+        peaks[group_of[h]] = max(peaks[group_of[h]], glmb.hyp_log_weights[h])
+    for h in range(len(group_of)):
+        if glmb.hyp_log_weights[h] > -math.inf:
+            relative[h] = math.exp(glmb.hyp_log_weights[h] - peaks[group_of[h]])
+            sums[group_of[h]] += relative[h]
+    for s in range(num_sets):
+        if peaks[s] > -math.inf:
+            peaks[s] += math.log(sums[s])
+    return peaks, relative
+
+
+@kernel
+def marginalise(glmb: Glmb, log_min_weight: float, merge_distance: float, max_components: int) -> Glmb:
+    """Marginalised GLMB: one hypothesis a label set, over all association histories (paper eq. 10).
+
+    Each track of a label set is the mixture of that label's tracks in the set's hypotheses, weighted by them, and
+    reduced by `kernels.mixtures.reduce_mixture` under the three limits; with `max_components` 1 it is one Gaussian of
+    the mixture's moments. Each (label set, label) has its own entry in the track table, in the order of the hypotheses.
+    Hypotheses come out by descending weight, equal weights in the order of their first occurrence; a label set of
+    weight zero is kept.
+    """
+    group_of, first = group_by_label_set(glmb)
+    num_sets, num_entries = len(first), len(glmb.hyp_tracks)
+    set_log_weights, relative = _set_weights(glmb, group_of, num_sets)
+    order = descending_order(set_log_weights)
+    member_offsets, members = group_members(group_of, num_sets)
+    hyp_offsets, hyp_log_weights = np.zeros(num_sets + 1, np.int64), np.empty(num_sets)
+    for s in range(num_sets):
+        hyp_offsets[s + 1] = hyp_offsets[s] + glmb.hyp_offsets[first[order[s]] + 1] - glmb.hyp_offsets[first[order[s]]]
+        hyp_log_weights[s] = set_log_weights[order[s]]
+    num_tracks = hyp_offsets[num_sets]
+    labels, pool_offsets = np.empty((num_tracks, 2), np.int64), np.zeros(num_tracks + 1, np.int64)
+    pool, weights = np.empty(num_entries, np.int64), np.empty(num_entries)
+    slot_of, i = np.full(len(glmb.tracks.labels), -1, np.int64), 0
+    for s in range(num_sets):
+        low, high = member_offsets[order[s]], member_offsets[order[s] + 1]
+        for k in range(hyp_offsets[s + 1] - hyp_offsets[s]):
+            end = pool_offsets[i]
+            for m in range(low, high):
+                track = glmb.hyp_tracks[glmb.hyp_offsets[members[m]] + k]
+                end = add_to_pool(track, relative[members[m]], slot_of, pool, weights, end)
+            for p in range(pool_offsets[i], end):
+                slot_of[pool[p]] = -1
+            labels[i, 0] = glmb.tracks.labels[pool[end - 1], 0]
+            labels[i, 1] = glmb.tracks.labels[pool[end - 1], 1]
+            i += 1
+            pool_offsets[i] = end
+    tracks = pooled_tracks(
+        glmb.tracks, labels, pool_offsets, pool, weights, log_min_weight, merge_distance, max_components
+    )
+    return Glmb(tracks, hyp_offsets, np.arange(num_tracks), hyp_log_weights)
+
+
+@kernel
+def _log_sum_where(log_weights: Floats, mark: Ints, value: int, equal: bool) -> float:
+    """log-sum-exp over the places whose mark is `value`, or over those where it is not."""
+    peak, total = -math.inf, 0.0
+    for h in range(len(log_weights)):
+        if (mark[h] == value) == equal:
+            peak = max(peak, log_weights[h])
+    if peak == -math.inf:
+        return peak
+    for h in range(len(log_weights)):
+        if (mark[h] == value) == equal:
+            total += math.exp(log_weights[h] - peak)
+    return peak + math.log(total)
+
+
+@kernel
+def glmb_to_lmb(glmb: Glmb, log_min_weight: float, merge_distance: float, max_components: int) -> Lmb:
+    """LMB of the same existence probabilities and, up to the reduction of mixtures, the same track densities.
+
+    Reuter, Vo, Vo and Dietmayer 2014, "The labeled multi-Bernoulli filter", eq. 43-45. The logit of existence is the
+    difference of the log weights with and without the label, so that nothing is lost near existence 1. A label all of
+    whose hypotheses have weight zero keeps logit -inf and the plain mean of its tracks. The limits are those of
+    `kernels.mixtures.reduce_mixture`.
+    """
+    labels, num_entries = increasing_labels(glmb), len(glmb.hyp_tracks)
+    num_labels, log_weights = len(labels), glmb.hyp_log_weights
+    hyp_of, label_of = np.empty(num_entries, np.int64), np.empty(num_entries, np.int64)
+    for h in range(len(log_weights)):
+        for e in range(glmb.hyp_offsets[h], glmb.hyp_offsets[h + 1]):
+            track = glmb.hyp_tracks[e]
+            hyp_of[e] = h
+            label_of[e] = label_place(labels, num_labels, glmb.tracks.labels[track, 0], glmb.tracks.labels[track, 1])
+    entry_offsets, entries = group_members(label_of, num_labels)
+    pool_offsets, existence_logit = np.zeros(num_labels + 1, np.int64), np.empty(num_labels)
+    pool, weights = np.empty(num_entries, np.int64), np.empty(num_entries)
+    slot_of, mark = np.full(len(glmb.tracks.labels), -1, np.int64), np.full(len(log_weights), -1, np.int64)
+    for i in range(num_labels):
+        low, high, end = entry_offsets[i], entry_offsets[i + 1], pool_offsets[i]
+        for m in range(low, high):
+            mark[hyp_of[entries[m]]] = i
+        log_with = _log_sum_where(log_weights, mark, i, True)
+        existence_logit[i] = log_with - _log_sum_where(log_weights, mark, i, False)
+        for m in range(low, high):
+            relative = 0.0 if log_with == -math.inf else math.exp(log_weights[hyp_of[entries[m]]] - log_with)
+            end = add_to_pool(glmb.hyp_tracks[entries[m]], relative, slot_of, pool, weights, end)
+        for p in range(pool_offsets[i], end):
+            slot_of[pool[p]] = -1
+        pool_offsets[i + 1] = end
+    tracks = pooled_tracks(
+        glmb.tracks, labels, pool_offsets, pool, weights, log_min_weight, merge_distance, max_components
+    )
+    return Lmb(tracks, existence_logit)
+
+
+@kernel
+def lmb_to_glmb(lmb: Lmb, max_hypotheses: int) -> tuple[Glmb, float]:
+    """GLMB of the `max_hypotheses` most probable label subsets of an LMB, by descending weight, and the
+    weight left out.
+
+    The GLMB shares the LMB's track table; its weights are normalised. Subsets of weight zero are never listed, so with
+    a large `max_hypotheses` all the others are there and the weight left out is zero. Equal weights come in the order
+    in which the search finds them, which is the same every time.
+    """
+    num = len(lmb.existence_logit)
+    costs, base = np.empty(num), 0.0
+    for i in range(num):
+        costs[i] = abs(lmb.existence_logit[i])
+        base -= math.log1p(math.exp(-costs[i]))
+    flips, previous, order, complete = smallest_sums(costs, max_hypotheses)
+    num_hyps = len(order)
+    hyp_offsets, hyp_log_weights = np.zeros(num_hyps + 1, np.int64), np.empty(num_hyps)
+    hyp_tracks, flipped = np.empty(num_hyps * num, np.int64), np.zeros(num, np.int64)
+    end = 0
+    for h in range(num_hyps):
+        hyp_log_weights[h] = base
+        node = order[h]
+        while node > 0:
+            flipped[flips[node]] = h + 1
+            hyp_log_weights[h] -= costs[flips[node]]
+            node = previous[node]
+        for i in range(num):
+            if (lmb.existence_logit[i] > 0.0) != (flipped[i] == h + 1):
+                hyp_tracks[end] = i
+                end += 1
+        hyp_offsets[h + 1] = end
+    log_kept = log_sum(hyp_log_weights)
+    for h in range(num_hyps):
+        hyp_log_weights[h] -= log_kept
+    discarded = 0.0 if complete else max(0.0, -math.expm1(log_kept))
+    return Glmb(lmb.tracks, hyp_offsets, hyp_tracks[:end].copy(), hyp_log_weights), discarded
+
+
+__all__ = ["glmb_to_lmb", "lmb_to_glmb", "marginalise"]

@@ -1,0 +1,202 @@
+"""Generalized covariance intersection of track densities: weighted geometric means of Gaussian mixtures.
+
+The fused density of one label is proportional to f = prod_i GM_i^(w_i) over the sensors i that know the label. A
+power of a mixture is not a mixture; its component-wise stand-in, q = prod_i sum_c (a_ic N_ic)^(w_i) >= f, is one with
+a Gaussian for every combination of components. With cubature points, each Gaussian N_c of q is given the mass and the
+moments that f = q (f / q) has under it, where 0 < f / q <= 1.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from vedette.kernels.base.compile import kernel
+from vedette.kernels.base.types import Floats, Ints, Tracks
+from vedette.kernels.gaussian.information import log_integral, log_value, row_size, to_information, to_moments
+from vedette.kernels.gaussian.linalg import cholesky, log_add, normalise_logs
+from vedette.kernels.gaussian.mixtures import require_gaussians
+
+
+class Powers(NamedTuple):
+    """Powers of the components of one label at all sensors, and working arrays.
+
+    rows: (S * max_components, row_size) information rows of N^w about `reference`. log_weights: w log a of each.
+    starts: (S + 1,) where the components of each sensor start. weights: (S,) the powers w; 0 where a label is
+    unknown.
+    """
+
+    rows: Floats
+    log_weights: Floats
+    starts: Ints
+    weights: Floats
+    reference: Floats
+    row: Floats
+    factor: Floats
+    matrix: Floats
+    offset: Floats
+
+
+@kernel
+def _make_powers(num_sensors: int, most: int, dim: int) -> Powers:
+    size = row_size(dim)
+    return Powers(
+        np.empty((most, size)),
+        np.empty(most),
+        np.zeros(num_sensors + 1, np.int64),
+        np.empty(num_sensors),
+        np.empty(dim),
+        np.empty(size),
+        np.empty((dim, dim)),
+        np.empty((dim, dim)),
+        np.empty(dim),
+    )
+
+
+@kernel
+def _load(chosen: Ints, item: int, fusion_weights: Floats, tracks: Tracks, powers: Powers) -> None:
+    """Raise the components of the sensors' tracks (-1: unknown there) to their powers."""
+    total, used = 0.0, 0
+    for s in range(len(fusion_weights)):
+        if chosen[item, s] >= 0:
+            total += fusion_weights[s]
+    for s in range(len(fusion_weights)):
+        track = chosen[item, s]
+        powers.starts[s + 1] = used
+        powers.weights[s] = 0.0
+        if track < 0:
+            continue
+        weight = fusion_weights[s] / total
+        powers.weights[s] = weight
+        for c in range(tracks.offsets[track], tracks.offsets[track + 1]):
+            if used == 0:
+                for i in range(tracks.means.shape[1]):
+                    powers.reference[i] = tracks.means[c, i]
+            row, factor, matrix = powers.rows[used], powers.factor, powers.matrix
+            if not to_information(tracks.means[c], tracks.covs[c], powers.reference, weight, row, factor, matrix):
+                raise FloatingPointError("covariance of a track is not positive definite")
+            powers.log_weights[used] = weight * tracks.log_weights[c]
+            used += 1
+        powers.starts[s + 1] = used
+
+
+@kernel
+def _multiply(powers: Powers, low: int, high: int, log_weights: Floats, means: Floats, covs: Floats) -> None:
+    """One Gaussian for every combination of one component a sensor: its log mass and its moments."""
+    dim, row = len(powers.reference), powers.row
+    for combination in range(low, high):
+        rest, total = combination - low, 0.0
+        for k in range(len(row)):
+            row[k] = 0.0
+        for s in range(len(powers.weights)):
+            num = powers.starts[s + 1] - powers.starts[s]
+            if num == 0:
+                continue
+            component = powers.starts[s] + rest % num
+            rest //= num
+            total += powers.log_weights[component]
+            for k in range(len(row)):
+                row[k] += powers.rows[component, k]
+        positive = to_moments(row, powers.reference, means[combination], covs[combination], powers.factor)
+        log_weights[combination] = total + log_integral(row, dim)
+        if not positive or math.isnan(log_weights[combination]):
+            raise FloatingPointError("the product of the track densities of a label is not integrable")
+
+
+@kernel
+def _log_ratio(powers: Powers) -> float:
+    """log (f / q) at reference + `powers.offset`."""
+    ratio = 0.0
+    for s in range(len(powers.weights)):
+        weight, log_power, log_sum_of_powers = powers.weights[s], -math.inf, -math.inf
+        if weight == 0.0 or powers.starts[s + 1] - powers.starts[s] == 1:
+            continue
+        for component in range(powers.starts[s], powers.starts[s + 1]):
+            value = powers.log_weights[component] + log_value(powers.rows[component], powers.offset)
+            log_power = log_add(log_power, value / weight)
+            log_sum_of_powers = log_add(log_sum_of_powers, value)
+        ratio += weight * log_power - log_sum_of_powers
+    return ratio
+
+
+@kernel
+def _correct(powers: Powers, points: Floats, point_weights: Floats, mean: Floats, cov: Floats) -> float:
+    """Give a Gaussian of q the moments of f / q times it, by cubature; returns the log of the mass it keeps."""
+    dim, num = len(mean), len(points)
+    offset, images, masses, total = powers.offset, np.empty((num, dim)), np.empty(num), 0.0
+    if not cholesky(cov, powers.factor):
+        raise FloatingPointError("the product of the track densities of a label is not integrable")
+    for p in range(num):
+        for i in range(dim):
+            images[p, i] = 0.0
+            for j in range(i + 1):
+                images[p, i] += powers.factor[i, j] * points[p, j]
+            offset[i] = mean[i] - powers.reference[i] + images[p, i]
+        masses[p] = point_weights[p] * math.exp(_log_ratio(powers))
+        total += masses[p]
+    for i in range(dim):
+        offset[i] = 0.0
+        for p in range(num):
+            offset[i] += masses[p] / total * images[p, i]
+        mean[i] += offset[i]
+    for i in range(dim):
+        for j in range(i + 1):
+            cov[i, j] = 0.0
+            for p in range(num):
+                cov[i, j] += masses[p] / total * (images[p, i] - offset[i]) * (images[p, j] - offset[j])
+            cov[j, i] = cov[i, j]
+    return math.log(total)
+
+
+@kernel
+def _count_combinations(chosen: Ints, tracks: Tracks) -> tuple[Ints, int]:
+    """Offsets of the combinations of components of each label, and the most components of a label."""
+    num, num_sensors = chosen.shape
+    offsets, most = np.zeros(num + 1, np.int64), 0
+    for item in range(num):
+        combinations, components = 1, 0
+        for s in range(num_sensors):
+            if chosen[item, s] >= 0:
+                size = tracks.offsets[chosen[item, s] + 1] - tracks.offsets[chosen[item, s]]
+                combinations *= size
+                components += size
+        offsets[item + 1] = offsets[item] + combinations
+        most = max(most, components)
+    return offsets, most
+
+
+@kernel
+def fuse_tracks(
+    chosen: Ints, fusion_weights: Floats, tracks: Tracks, points: Floats, point_weights: Floats
+) -> tuple[Ints, Floats, Floats, Floats, Floats]:
+    """Fused density of each label, and the log of the integral of prod_i p_i^(w_i) (paper eqs. 11 and 12).
+
+    chosen: (num, S) track of each sensor, -1 where it does not know the label: its factor is left out and the other
+    sensors' weights are scaled to sum to one. fusion_weights: (S,) positive. points: (num_points, dim),
+    point_weights: (num_points,) a cubature rule for the standard normal without negative weights; with no points the
+    fused mixture is the component-wise power. A fused mixture has a component for every combination of the sensors'
+    components.
+
+    Returns offsets (num + 1,), log_weights, means and covs of the fused tracks, and log_overlaps (num,). Raises
+    FloatingPointError where a covariance is not positive definite, NumericalError where a fused one is not.
+    """
+    num, dim = len(chosen), tracks.means.shape[1]
+    offsets, most = _count_combinations(chosen, tracks)
+    powers, log_overlaps = _make_powers(len(fusion_weights), most, dim), np.empty(num)
+    log_weights = np.empty(offsets[num])
+    means, covs = np.empty((offsets[num], dim)), np.empty((offsets[num], dim, dim))
+    for item in range(num):
+        low, high = offsets[item], offsets[item + 1]
+        _load(chosen, item, fusion_weights, tracks, powers)
+        _multiply(powers, low, high, log_weights, means, covs)
+        for c in range(low, high):
+            if high - low > 1 and len(points) > 0:
+                log_weights[c] += _correct(powers, points, point_weights, means[c], covs[c])
+        log_overlaps[item] = normalise_logs(log_weights[low:high])
+    require_gaussians(means, covs)
+    return offsets, log_weights, means, covs, log_overlaps
+
+
+__all__ = ["fuse_tracks"]

@@ -1,0 +1,1 @@
+"""Ideal scans, pseudo-updates and reward tables of a decision."""

@@ -1,0 +1,107 @@
+"""Predicted ideal measurements: the scan that a sensor would take of a sampled multi-target state (Mahler 2004)."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from vedette.errors import ModelError
+from vedette.kernels.association.truncation import Truncation
+from vedette.kernels.base.compile import borrowing, inlined, kernel
+from vedette.kernels.base.types import Floats, Ints, Motion, Sensor
+from vedette.kernels.gaussian.kalman import Scratch, wrap_angle
+from vedette.kernels.gaussian.linalg import cholesky
+
+IDEAL = 0
+EXPECTED = 1
+SAMPLED = 2
+
+
+class Futures(NamedTuple):
+    """Sampled multi-target states over the horizon, and the random numbers of their measurements.
+
+    Targets of sample `j` are `offsets[j]:offsets[j + 1]`. states: (horizon_steps, num_targets, state_dim).
+    uniforms: (horizon_steps, num_targets) decide detection. normals: (horizon_steps, num_targets, meas_dim) the noise.
+    """
+
+    offsets: Ints
+    states: Floats
+    uniforms: Floats
+    normals: Floats
+
+
+@kernel
+def propagate_samples(motion: Motion, states: Floats, dt: float, horizon_steps: int) -> Floats:
+    """(horizon_steps, num_targets, state_dim) noise-free future of the sampled states."""
+    num, dim = states.shape
+    out = np.empty((horizon_steps, num, dim))
+    for h in range(horizon_steps):
+        for i in range(num):
+            before = states[i] if h == 0 else out[h - 1, i]
+            motion.transition(before, dt, motion.transition_params, out[h, i])
+    return out
+
+
+class Horizon(NamedTuple):
+    """poses: (num_actions, horizon_steps, 3) where each action takes the sensor. dt: seconds a step.
+    mode, threshold: of the ideal measurements.
+    """
+
+    poses: Floats
+    dt: float
+    mode: int
+    threshold: float
+
+
+class Decision(NamedTuple):
+    """What the pseudo-updates of one sensor depend on besides its prior. futures: as this sensor sees them."""
+
+    motion: Motion
+    sensor: Sensor
+    horizon: Horizon
+    futures: Futures
+    truncation: Truncation
+
+
+@borrowing
+def most_targets(futures: Futures) -> int:
+    """Number of targets of the sample that has most."""
+    most = 0
+    for sample in range(len(futures.offsets) - 1):
+        most = max(most, futures.offsets[sample + 1] - futures.offsets[sample])
+    return most
+
+
+@inlined
+def _add_noise(sensor: Sensor, state: Floats, pose: Floats, normals: Floats, scratch: Scratch, out: Floats) -> None:
+    noise, factor = scratch.measurement_noise, scratch.innovation_cov
+    sensor.measurement_noise_cov(state, pose, sensor.noise_params, noise)
+    if not cholesky(noise, factor):
+        raise ModelError("measurement noise model: covariance is not positive definite or not finite")
+    for a in range(out.shape[0]):
+        for b in range(a + 1):
+            out[a] += factor[a, b] * normals[b]
+        if sensor.angular[a]:
+            out[a] = wrap_angle(out[a])
+
+
+@inlined
+def ideal_scan(decision: Decision, action: int, sample: int, step: int, scratch: Scratch, out: Floats) -> int:
+    """Write the ideal measurements of a sample at a step of an action into `out`; returns their number.
+
+    IDEAL: without noise, of the targets whose detection probability is at least the threshold. EXPECTED: without noise,
+    each target seen with its detection probability. SAMPLED: seen likewise, with measurement noise. Never any clutter.
+    """
+    sensor, horizon, futures = decision.sensor, decision.horizon, decision.futures
+    pose, count = horizon.poses[action, step], 0
+    for i in range(futures.offsets[sample], futures.offsets[sample + 1]):
+        state = futures.states[step, i]
+        detection = sensor.prob_detection(state, pose, sensor.detection_params)
+        seen = detection >= horizon.threshold if horizon.mode == IDEAL else futures.uniforms[step, i] < detection
+        if seen:
+            sensor.measurement(state, pose, sensor.measurement_params, out[count])
+            if horizon.mode == SAMPLED:
+                _add_noise(sensor, state, pose, futures.normals[step, i], scratch, out[count])
+            count += 1
+    return count

@@ -1,0 +1,125 @@
+"""The one Gaussian of the moments of a row's mixture over what may have happened to it."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from vedette.kernels.association.assignment import ABSENT, MISSED, Options
+from vedette.kernels.association.options import Rows
+from vedette.kernels.base.compile import borrowing, inlined, kernel
+from vedette.kernels.base.types import Floats, Ints
+from vedette.kernels.gaussian.kalman import update_mean
+
+
+class Mixture(NamedTuple):
+    """Room for the components of one row's mixture, an entry for each option and component.
+
+    weights: linear, relative to the likeliest option. means: (num_entries, state_dim), then their deviations from the
+    mean of the mixture. sources: twice the number of the component among the rows', and one more where it is detected.
+    """
+
+    weights: Floats
+    means: Floats
+    sources: Ints
+
+
+@kernel
+def make_mixture(num_entries: int, state_dim: int) -> Mixture:
+    """Room for so many components."""
+    return Mixture(np.empty(num_entries), np.empty((num_entries, state_dim)), np.empty(num_entries, np.int64))
+
+
+@inlined
+def _gather(row: int, rows: Rows, options: Options, marginals: Floats, out: Mixture) -> int:
+    """Write weights and updated means of the components that can be there; returns their number."""
+    first, last, count, peak = rows.offsets[row], rows.offsets[row + 1], 0, -math.inf
+    for option in range(options.offsets[row], options.offsets[row + 1]):
+        if options.columns[option] != ABSENT:
+            peak = max(peak, marginals[option])
+    for option in range(options.offsets[row], options.offsets[row + 1]):
+        if options.columns[option] == ABSENT or marginals[option] == -math.inf:
+            continue
+        entry, detected = options.entries[option], options.columns[option] != MISSED
+        scale = math.exp(marginals[option] - peak)
+        for c in range(first, last):
+            at = entry + c - first
+            log_weight = options.component_log_weights[at] - options.log_weights[option]
+            if log_weight == -math.inf:
+                continue
+            out.weights[count] = scale if log_weight == 0.0 else scale * math.exp(log_weight)
+            out.sources[count] = 2 * c + (1 if detected else 0)
+            if detected:
+                update_mean(rows.innovation, c, options.whitened[at], rows.means[c], out.means[count])
+            else:
+                for i in range(out.means.shape[1]):
+                    out.means[count, i] = rows.means[c, i]
+            count += 1
+    return count
+
+
+@inlined
+def _gather_predicted(row: int, rows: Rows, out: Mixture) -> int:
+    """Write the components as they were predicted, all of one weight; returns their number."""
+    first, last = rows.offsets[row], rows.offsets[row + 1]
+    for c in range(first, last):
+        out.weights[c - first], out.sources[c - first] = 1.0, 2 * c
+        for i in range(out.means.shape[1]):
+            out.means[c - first, i] = rows.means[c, i]
+    return last - first
+
+
+@inlined
+def _moments(count: int, rows: Rows, mixture: Mixture, out_mean: Floats, out_cov: Floats, n: int) -> None:
+    """Mean and covariance of the first `count` components; their means are left as deviations from the mean."""
+    weights, means, sources = mixture.weights, mixture.means, mixture.sources
+    total = 0.0
+    for k in range(count):
+        total += weights[k]
+    for i in range(n):
+        moment = 0.0
+        for k in range(count):
+            moment += weights[k] * means[k, i]
+        out_mean[i] = moment / total
+        for k in range(count):
+            means[k, i] -= out_mean[i]
+        for j in range(i + 1):
+            out_cov[i, j] = 0.0
+    for k in range(count):
+        c, share = sources[k] // 2, weights[k] / total
+        if sources[k] % 2 == 1:
+            for i in range(n):
+                for j in range(i + 1):
+                    out_cov[i, j] += share * (rows.innovation.covs[c, i, j] + means[k, i] * means[k, j])
+        else:
+            for i in range(n):
+                for j in range(i + 1):
+                    out_cov[i, j] += share * (rows.covs[c, i, j] + means[k, i] * means[k, j])
+    for i in range(n):
+        for j in range(i):
+            out_cov[j, i] = out_cov[i, j]
+
+
+@borrowing
+def match_rows(
+    chosen: Ints, rows: Rows, options: Options, marginals: Floats, mixture: Mixture, means: Floats, covs: Floats
+) -> None:
+    """Mean and covariance of the mixture of each chosen row, where it is there, over its options and components.
+
+    marginals: log probability of each option. mixture: to work in. means, covs: (len(chosen), ...) the result. A row
+    that cannot be there has its predicted moments.
+    """
+    for k in range(len(chosen)):
+        count = _gather(chosen[k], rows, options, marginals, mixture)
+        if count == 0:
+            count = _gather_predicted(chosen[k], rows, mixture)
+        # A constant size is unrolled by the compiler.
+        if means.shape[1] == 4:
+            _moments(count, rows, mixture, means[k], covs[k], 4)
+        else:
+            _moments(count, rows, mixture, means[k], covs[k], means.shape[1])
+
+
+__all__ = ["Mixture", "make_mixture", "match_rows"]

@@ -1,0 +1,142 @@
+"""Making tracks of recorded reports: jumps, silences, moored ships and the edges of the region."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from vedette.kernels.base.types import Floats, Ints
+from vedette.models import Region
+from vedette.models.arguments import non_negative, positive, reject
+from vedette.recorded.reports import Reports
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RecordedTrack:
+    """One uninterrupted track of a recorded target.
+
+    Attributes:
+        name: the record's own name of the target; several tracks may share it.
+        times: (n,) s, increasing, at least two.
+        positions: (n, 2) m.
+        velocities: (n, 2) m/s, as recorded or from finite differences.
+    """
+
+    name: str
+    times: Floats
+    positions: Floats
+    velocities: Floats
+
+
+@dataclass(frozen=True, slots=True)
+class CleaningCounts:
+    """Reports in all, those removed as jumps and as outside the region; tracks dropped as short, as slow, and kept."""
+
+    reports: int
+    jumps: int
+    outside: int
+    short_tracks: int
+    slow_tracks: int
+    tracks: int
+
+
+@dataclass(frozen=True, slots=True)
+class Cleaning:
+    """How reports become tracks, in this order.
+
+    Attributes:
+        max_speed: m/s; as few reports as possible are removed so that no two that follow one another need more (jumps).
+            None: no limit.
+        region: reports outside it are removed, and a track ends where it leaves; None: everywhere.
+        max_gap: s; a longer silence ends a track, and the next report begins another.
+        min_speed: m/s; a track that is slower on average (path length over duration) is dropped, such as a moored ship.
+
+    A track left with one report is dropped.
+    """
+
+    max_gap: float = 60.0
+    min_speed: float = 0.0
+    max_speed: float | None = None
+    region: Region | None = None
+
+    def __post_init__(self) -> None:
+        positive("max_gap", self.max_gap)
+        non_negative("min_speed", self.min_speed)
+        if self.max_speed is not None:
+            positive("max_speed", self.max_speed)
+        if self.region is not None and not isinstance(self.region, Region):
+            raise reject("region", "a Region or None", self.region)
+
+    def apply(self, reports: Reports) -> tuple[tuple[RecordedTrack, ...], CleaningCounts]:
+        """Tracks in order of their first report, and what was left out."""
+        jumps = outside = short = slow = 0
+        tracks: list[RecordedTrack] = []
+        for target in range(len(reports.names)):
+            rows = np.flatnonzero(reports.tracks == target)
+            reachable = self._without_jumps(reports, rows)
+            jumps += len(rows) - len(reachable)
+            runs = list(self._runs(reports, reachable))
+            outside += len(reachable) - sum(map(len, runs))
+            for run in runs:
+                if len(run) < 2:
+                    short += 1
+                elif _mean_speed(reports, run) < self.min_speed:
+                    slow += 1
+                else:
+                    tracks.append(_track(reports, run))
+        tracks.sort(key=lambda track: (track.times[0], track.name))
+        counts = CleaningCounts(len(reports.times), jumps, outside, short, slow, len(tracks))
+        return tuple(tracks), counts
+
+    def _without_jumps(self, reports: Reports, rows: Ints) -> Ints:
+        if self.max_speed is None:
+            return rows
+        return rows[longest_reachable(reports.times[rows], reports.positions[rows], self.max_speed)]
+
+    def _runs(self, reports: Reports, rows: Ints) -> Iterator[Ints]:
+        """Stretches without a silence and without a report outside the region."""
+        inside = np.ones(len(rows), np.bool_) if self.region is None else self.region.contains(reports.positions[rows])
+        kept = np.flatnonzero(inside)
+        left_region = np.diff(kept) > 1
+        silent = np.diff(reports.times[rows[kept]]) > self.max_gap
+        for run in np.split(kept, np.flatnonzero(left_region | silent) + 1):
+            if len(run):
+                yield rows[run]
+
+
+def longest_reachable(times: Floats, positions: Floats, max_speed: float) -> Ints:
+    """Indices of the most reports of one target that it could have made at `max_speed`, in order of time.
+
+    What can be reached from a report that can be reached can itself be reached, so the longest chain over pairs in
+    order is exact; a bad first report cannot take the good ones with it.
+    """
+    num = len(times)
+    length, previous = np.ones(num, np.int64), np.full(num, -1)
+    for i in range(1, num):
+        distances = np.hypot(*(positions[:i] - positions[i]).T)
+        # The last of the longest: where all is well this is the report just before.
+        lengths = np.where(distances <= max_speed * (times[i] - times[:i]), length[:i], 0)
+        best = i - 1 - int(np.argmax(lengths[::-1]))
+        if lengths[best] > 0:
+            length[i], previous[i] = lengths[best] + 1, best
+    chain = [int(np.argmax(length))]
+    while previous[chain[-1]] >= 0:
+        chain.append(int(previous[chain[-1]]))
+    return np.array(chain[::-1], dtype=np.int64)
+
+
+def _mean_speed(reports: Reports, run: Ints) -> float:
+    steps = np.diff(reports.positions[run], axis=0)
+    return float(np.hypot(steps[:, 0], steps[:, 1]).sum() / (reports.times[run[-1]] - reports.times[run[0]]))
+
+
+def _track(reports: Reports, run: Ints) -> RecordedTrack:
+    times, positions = reports.times[run], reports.positions[run]
+    if reports.velocities is not None:
+        velocities = reports.velocities[run]
+    else:
+        before, after = np.maximum(np.arange(len(run)) - 1, 0), np.minimum(np.arange(len(run)) + 1, len(run) - 1)
+        velocities = (positions[after] - positions[before]) / (times[after] - times[before])[:, None]
+    return RecordedTrack(reports.names[reports.tracks[run[0]]], times, positions, velocities)

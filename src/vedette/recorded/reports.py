@@ -1,0 +1,266 @@
+"""Recorded positions of real targets: CSV and Parquet files, and tables in memory, as checked arrays."""
+
+from __future__ import annotations
+
+import csv
+import numbers
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from decimal import Decimal
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from vedette.errors import InputError
+from vedette.kernels.base.types import Floats, Ints
+from vedette.recorded.geography import to_tangent_plane
+from vedette.text import elided, printable, shown
+
+# Beyond these, differences and speeds of reports mean nothing.
+_FARTHEST = 1e9  # m, m/s
+_LATEST = 1e12  # s
+_SAME_TIME = 1e-6  # s; two reports of one target nearer in time than this are one
+# Larger files would fill the memory before anything could be said of them.
+_MOST_BYTES = 500_000_000
+_MOST_REPORTS = 5_000_000
+_MOST_NAMES = 20
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Reports:
+    """Positions of targets, sorted by target and time.
+
+    Attributes:
+        times: (n,) s; of ISO 8601 times, seconds since 1970 UTC.
+        tracks: (n,) index into `names`.
+        positions: (n, 2) m.
+        velocities: (n, 2) m/s, or None where the record has none.
+        names: the record's own name of each target.
+        origin_deg: longitude and latitude of (0, 0) where the record was geographic, else None.
+        bounds_deg: its least and greatest longitude and latitude where it was geographic, else None.
+        repeats: rows of the table, (kept, left out), where a target has a second report at one time: the first is kept.
+    """
+
+    times: Floats
+    tracks: Ints
+    positions: Floats
+    velocities: Floats | None
+    names: tuple[str, ...]
+    origin_deg: tuple[float, float] | None
+    bounds_deg: tuple[tuple[float, float], tuple[float, float]] | None = None
+    repeats: tuple[tuple[int, int], ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """Columns as they came, the row number of each entry in its file, and a name for messages."""
+
+    columns: Mapping[str, Sequence[Any]]
+    rows: Sequence[int]
+    source: str
+
+    def column(self, name: str) -> Sequence[Any]:
+        """The cells of a column, or an error that says which there are."""
+        if name not in self.columns:
+            have = column_names(self.columns) or "none"
+            raise InputError(f"{self.source}: expected a column {shown(name)}; got columns {have}")
+        return self.columns[name]
+
+    def fault(self, index: int, name: str, expected: str) -> InputError:
+        """An error that names file, row and column of a cell."""
+        place = f"{self.source}, row {self.rows[index]}, column {shown(name)}"
+        return InputError(f"{place}: expected {expected}; got {shown(self.columns[name][index])}")
+
+    def numbers(self, name: str, largest: float) -> Floats:
+        """A column of numbers of at most that size."""
+        cells = self.column(name)
+        values = np.empty(len(cells))
+        for i, cell in enumerate(cells):
+            try:
+                values[i] = _number(cell)
+            except (TypeError, ValueError, OverflowError):
+                raise self.fault(i, name, "a finite number") from None
+        if not np.isfinite(values).all():
+            raise self.fault(int(np.argmin(np.isfinite(values))), name, "a finite number")
+        if (wrong := np.abs(values) > largest).any():
+            raise self.fault(int(np.argmax(wrong)), name, f"a number from {-largest:g} to {largest:g}")
+        return values
+
+    def times(self, name: str) -> Floats:
+        """A column of numbers of seconds, or of ISO 8601 times."""
+        cells = self.column(name)
+        if not len(cells) or _is_number(cells[0]):
+            return self.numbers(name, _LATEST)
+        values = np.empty(len(cells))
+        for i, cell in enumerate(cells):
+            try:
+                values[i] = seconds(cell)
+            except (TypeError, ValueError, OverflowError):
+                raise self.fault(i, name, "an ISO 8601 time") from None
+            if not abs(values[i]) <= _LATEST:  # a number, infinite or not, among times
+                raise self.fault(i, name, "an ISO 8601 time")
+        return values
+
+    def labels(self, name: str) -> list[str]:
+        """A column of names or numbers, none empty."""
+        labels = ["" if cell is None else str(cell).strip() for cell in self.column(name)]
+        if "" in labels:
+            raise self.fault(labels.index(""), name, "a name or number")
+        return labels
+
+
+def column_names(names: Iterable[str]) -> str:
+    """Names of columns in a message."""
+    listed = [elided(printable(name)) for name in names]
+    return ", ".join(listed[:_MOST_NAMES]) + (f" and {len(listed) - _MOST_NAMES} more" * (len(listed) > _MOST_NAMES))
+
+
+def _number(cell: Any) -> float:
+    """A number, or text of one as every program writes it. Raises `TypeError` or `ValueError` for anything else."""
+    if isinstance(cell, str):
+        if "_" in cell or not cell.isascii():  # Python reads 1_000 and digits of any script
+            raise ValueError(cell)
+    elif isinstance(cell, bool) or not isinstance(cell, numbers.Real | Decimal):
+        raise TypeError(cell)
+    return float(cell)
+
+
+def _is_number(cell: Any) -> bool:
+    try:
+        _number(cell)
+    except (TypeError, ValueError, OverflowError):
+        return False
+    return True
+
+
+def seconds(time: Any) -> float:
+    """A number, or the seconds from 1970 UTC to an ISO 8601 time or `datetime`; without a zone it is taken as UTC."""
+    if _is_number(time):
+        return _number(time)
+    moment = time if isinstance(time, datetime) else datetime.fromisoformat(str(time).strip())
+    return (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()
+
+
+def read_table(path: str | Path) -> Table:
+    """A .csv file with a header line, or a .parquet file.
+
+    Raises:
+        InputError: not there, another ending, not readable as what it says it is, rows not as long as the header.
+    """
+    file = Path(path)
+    named = elided(printable(str(file)), 200)
+    if file.suffix.lower() not in (".csv", ".parquet"):
+        raise InputError(f"{named}: expected a .csv or .parquet file")
+    if not os.path.isfile(file):  # a name can be too long, or hold what no name can: for pathlib, an error
+        raise InputError(f"{named}: expected a file; there is none")
+    if (size := file.stat().st_size) > _MOST_BYTES:
+        raise InputError(f"{named}: expected a file of at most {_MOST_BYTES} bytes; got {size}")
+    return _read_csv(file) if file.suffix.lower() == ".csv" else _read_parquet(file)
+
+
+def _read_csv(file: Path) -> Table:
+    try:
+        with file.open(encoding="utf-8-sig", newline="") as lines:
+            reader = csv.reader(lines, strict=True)
+            header = [name.strip() for name in next(reader, [])]
+            rows = [(reader.line_num, cells) for cells in reader if cells]
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise InputError(f"{file}: cannot be read as CSV in UTF-8: {_reason(error)}") from error
+    if len(set(header)) != len(header):
+        raise InputError(f"{file}, row 1: expected each column name once; got {column_names(header)}")
+    for line, cells in rows:
+        if len(cells) != len(header):
+            raise InputError(f"{file}, row {line}: expected {len(header)} cells, as in the header; got {len(cells)}")
+    columns = {name: [cells[i] for _, cells in rows] for i, name in enumerate(header)}
+    return Table(columns, [line for line, _ in rows], str(file))
+
+
+def _read_parquet(file: Path) -> Table:
+    from pyarrow import ArrowException, parquet  # here, as most programs never need it
+
+    try:
+        with parquet.ParquetFile(file) as source:
+            if source.metadata.num_rows > _MOST_REPORTS:
+                raise InputError(f"{file}: expected at most {_MOST_REPORTS} rows; got {source.metadata.num_rows}")
+            table = source.read()
+        columns = {name: table.column(name).to_pylist() for name in dict.fromkeys(table.column_names)}
+    except InputError:
+        raise
+    except (OSError, ValueError, KeyError, OverflowError, ArrowException) as error:
+        raise InputError(f"{file}: cannot be read as Parquet: {_reason(error)}") from error
+    return Table(columns, range(1, table.num_rows + 1), str(file))
+
+
+def _reason(error: Exception) -> str:
+    """What another library says of a file, on one line."""
+    return elided(printable(" ".join(str(error).split())), 300)
+
+
+def parse_reports(
+    table: Table, *, columns: Mapping[str, str] | None = None, origin_deg: tuple[float, float] | None = None
+) -> Reports:
+    """Reports out of a table with columns time, id and x, y or longitude, latitude; vx, vy where there are any.
+
+    Args:
+        table: see `read_table`.
+        columns: names in the table where they differ: {"time": "Time", "id": "MMSI", ...}. Naming a longitude and
+            latitude makes the record geographic; otherwise x, y are used if they are there.
+        origin_deg: longitude and latitude of (0, 0) for a geographic record; None: the median of the reports.
+
+    Raises:
+        InputError: names the file, row, column, what was expected and what came.
+    """
+    given = dict(columns or {})
+    if unknown := set(given) - {"time", "id", "x", "y", "longitude", "latitude", "vx", "vy"}:
+        raise InputError(f"columns: expected time, id, x, y, longitude, latitude, vx or vy; got {', '.join(unknown)}")
+    times, labels = table.times(given.get("time", "time")), table.labels(given.get("id", "id"))
+    positions, origin, bounds = _positions(table, given, origin_deg)
+    if len(times) == 0:
+        raise InputError(f"{table.source}: expected at least one report; got none")
+    speed_columns = [given.get(name, name) for name in ("vx", "vy")]
+    has_velocity = any(name in given for name in ("vx", "vy")) or all(name in table.columns for name in speed_columns)
+    velocities = _pair(table, speed_columns) if has_velocity else None
+    names, tracks = np.unique(labels, return_inverse=True)
+    order = np.lexsort((times, tracks))  # of equal ones, the order of the file
+    again = (np.diff(times[order], prepend=-np.inf) < _SAME_TIME) & (np.diff(tracks[order], prepend=-1) == 0)
+    repeats = tuple((table.rows[order[i - 1]], table.rows[order[i]]) for i in np.flatnonzero(again))
+    order = order[~again]
+    velocities = None if velocities is None else velocities[order]
+    tracks = tracks[order].astype(np.int64)
+    return Reports(times[order], tracks, positions[order], velocities, tuple(map(str, names)), origin, bounds, repeats)
+
+
+def _pair(table: Table, names: Sequence[str]) -> Floats:
+    """(n, 2) of two columns, in m or m/s."""
+    return np.stack([table.numbers(name, _FARTHEST) for name in names], axis=1)
+
+
+def _positions(
+    table: Table, given: Mapping[str, str], origin_deg: tuple[float, float] | None
+) -> tuple[Floats, tuple[float, float] | None, tuple[tuple[float, float], tuple[float, float]] | None]:
+    """Places in m, where the origin is, and between which degrees they were."""
+    named_geographic = "longitude" in given or "latitude" in given
+    if named_geographic and ("x" in given or "y" in given):
+        raise InputError("columns: expected either x and y, or longitude and latitude; got both")
+    has_plane = all(given.get(name, name) in table.columns for name in ("x", "y"))
+    has_globe = all(given.get(name, name) in table.columns for name in ("longitude", "latitude"))
+    if not named_geographic and (has_plane or not has_globe):
+        if origin_deg is not None:
+            raise InputError("origin_deg: expected only for longitudes and latitudes; the record has x and y")
+        return _pair(table, [given.get(name, name) for name in ("x", "y")]), None, None
+    degrees = []
+    for name, limit in (("longitude", 360.0), ("latitude", 90.0)):
+        column = given.get(name, name)
+        values = table.numbers(column, np.inf)
+        if (wrong := np.abs(values) > limit).any():
+            raise table.fault(int(np.argmax(wrong)), column, f"a {name} in degrees, at most {limit:g}")
+        degrees.append(values)
+    if origin_deg is None:
+        origin_deg = (float(np.median(degrees[0])), float(np.median(degrees[1]))) if len(degrees[0]) else (0.0, 0.0)
+    if not len(degrees[0]):
+        return np.empty((0, 2)), origin_deg, None
+    low, high = ((float(end(degrees[0])), float(end(degrees[1]))) for end in (np.min, np.max))
+    return to_tangent_plane(degrees[0], degrees[1], origin_deg), origin_deg, (low, high)

@@ -1,0 +1,117 @@
+"""Recorded trajectories as targets: aircraft, ships, or anything that reports where it is."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.interpolate import CubicHermiteSpline
+
+from vedette.errors import InputError
+from vedette.models.arguments import real, reject
+from vedette.recorded.cleaning import Cleaning, CleaningCounts, RecordedTrack
+from vedette.recorded.reports import Reports, Table, parse_reports, read_table, seconds
+from vedette.simulation.truth import TIME_TOLERANCE, Truth, scan_times
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RecordedTargets:
+    """Targets that follow recorded reports; between them, a cubic through positions and velocities (Hermite).
+
+    A target is there from its first report to its last. States are [px, py, vx, vy]; ids count the tracks in order of
+    their first report.
+
+    Attributes:
+        reports: see `from_file` and `from_columns`.
+        time_origin: recorded time of the first scan: seconds, or an ISO 8601 time; None: the earliest report.
+        cleaning: how reports become tracks.
+        tracks: the tracks, in order of target id.
+        counts: what the cleaning left out.
+
+    Raises:
+        InputError: no track is left after the cleaning.
+    """
+
+    reports: Reports
+    time_origin: float | str | None = None
+    cleaning: Cleaning = field(default_factory=Cleaning)
+    tracks: tuple[RecordedTrack, ...] = field(init=False)
+    counts: CleaningCounts = field(init=False)
+
+    def __post_init__(self) -> None:
+        tracks, counts = self.cleaning.apply(self.reports)
+        if not tracks:
+            raise InputError(f"recorded targets: expected at least one track after cleaning; got none of {counts}")
+        try:
+            origin = float(self.reports.times.min()) if self.time_origin is None else seconds(self.time_origin)
+        except (TypeError, ValueError):
+            raise reject("time_origin", "a number of seconds or an ISO 8601 time", self.time_origin) from None
+        for name, value in (("tracks", tracks), ("counts", counts), ("time_origin", real("time_origin", origin))):
+            object.__setattr__(self, name, value)
+
+    @classmethod
+    def from_file(
+        cls,
+        path: str | Path,
+        *,
+        columns: Mapping[str, str] | None = None,
+        origin_deg: tuple[float, float] | None = None,
+        time_origin: float | str | None = None,
+        cleaning: Cleaning | None = None,
+    ) -> RecordedTargets:
+        """Of a .csv or .parquet file with columns time, id and x, y or longitude, latitude (and vx, vy if it has them).
+
+        Args:
+            path: the file.
+            columns: names in the file where they differ, {"time": "Time", "id": "MMSI", "longitude": "lon", ...}.
+            origin_deg: longitude and latitude of (0, 0), for the tangent plane; None: the median of the reports.
+            time_origin, cleaning: see the class.
+
+        Raises:
+            InputError: names the file, row, column, what was expected and what came.
+        """
+        reports = parse_reports(read_table(path), columns=columns, origin_deg=origin_deg)
+        return cls(reports, time_origin, cleaning or Cleaning())
+
+    @classmethod
+    def from_columns(
+        cls,
+        table: Mapping[str, Sequence[Any]],
+        *,
+        columns: Mapping[str, str] | None = None,
+        origin_deg: tuple[float, float] | None = None,
+        time_origin: float | str | None = None,
+        cleaning: Cleaning | None = None,
+    ) -> RecordedTargets:
+        """Of columns in memory; rows count from 1 in messages. See `from_file`."""
+        lengths = {name: len(cells) for name, cells in table.items()}
+        if len(set(lengths.values())) > 1:
+            raise reject("table", "columns of one length", lengths)
+        rows = range(1, max(lengths.values(), default=0) + 1)
+        reports = parse_reports(Table(table, rows, "table"), columns=columns, origin_deg=origin_deg)
+        return cls(reports, time_origin, cleaning or Cleaning())
+
+    def truth(self, times: ArrayLike, *, rng: np.random.Generator) -> Truth:
+        """The tracks at the scan times, the first of which is at `time_origin`; `rng` is not used.
+
+        Raises:
+            InputError: no track is there at any of the scans.
+        """
+        scans = scan_times(times)
+        recorded = real("time_origin", self.time_origin) + (scans - scans[0])
+        alive = np.zeros((len(self.tracks), len(scans)), np.bool_)
+        states = np.zeros((len(self.tracks), len(scans), 4))
+        for i, track in enumerate(self.tracks):
+            alive[i] = (recorded >= track.times[0] - TIME_TOLERANCE) & (recorded <= track.times[-1] + TIME_TOLERANCE)
+            path = CubicHermiteSpline(track.times, track.positions, track.velocities)
+            states[i, alive[i], :2] = path(recorded[alive[i]])
+            states[i, alive[i], 2:] = path(recorded[alive[i]], 1)
+        if not alive.any():
+            first, last = min(track.times[0] for track in self.tracks), max(track.times[-1] for track in self.tracks)
+            expected = f"scans between the first and last report, {first:g} to {last:g} s"
+            raise reject("times", expected, f"{recorded[0]:g} to {recorded[-1]:g} s of recorded time")
+        return Truth.from_arrays(scans, alive, states)
