@@ -10,7 +10,6 @@ import pytest
 
 from control.examples import SETTINGS, evaluator_of, situation
 from vedette.control import CauchySchwarzReward, IndependentPlanner, JointPlanner
-from vedette.control.pseudo import case_density
 from vedette.densities import cardinality_distribution
 from vedette.divergence import cauchy_schwarz
 from vedette.errors import InputError, NumericalError
@@ -32,7 +31,7 @@ def test_a_reward_of_the_users_own(kind: str) -> None:
     evaluator = evaluator_of(example)
     densities = [
         [
-            case_density(own, action * SETTINGS.num_samples + m)
+            own.density(action * SETTINGS.num_samples + m)
             for action in range(3)
             for m in range(SETTINGS.num_samples)
         ]

@@ -11,7 +11,7 @@ import pytest
 from control.examples import EXACT_LIMITS, POSES, SETTINGS, crowded, evaluator_of, mobile_sensor, situation
 from control.plain_loop import plain_rewards
 from vedette import models
-from vedette.control.priors import label_sets
+from vedette.densities.label_sets import label_sets
 from vedette.control.pseudo import draw_futures, pseudo_posteriors
 from vedette.densities import GLMB, sample_glmb
 from vedette.filters import DeltaGlmbFilter
@@ -106,7 +106,7 @@ def test_a_target_is_seen_with_or_above_its_detection_probability(mode: Any) -> 
         certain = type(example.fused)(example.fused.tracks, np.full(example.fused.tracks.num_tracks, 40.0))
         (futures,) = draw_futures(certain, (sensor,), settings, rng=np.random.default_rng(0))
         own = pseudo_posteriors(example.beliefs[0], sensor, POSES[0], np.zeros(1), futures, settings)
-        rose = own.log_weights > example.beliefs[0].existence_logit
+        rose = own.existence_logits > example.beliefs[0].existence_logit
         assert abs(rose.mean() - share[mode]) < 0.15
 
 

@@ -4,7 +4,7 @@ from vedette.control.actions import PAPER_HEADINGS_DEG, ActionSet, HeadingAction
 from vedette.control.evaluator import Evaluator
 from vedette.control.plan import Plan, RewardTable
 from vedette.control.planners import FixedPlanner, IndependentPlanner, JointPlanner, Planner, RandomPlanner
-from vedette.control.reward import CauchySchwarzReward, Reward
+from vedette.control.reward import CauchySchwarzReward, PowerReward, RenyiReward, Reward
 from vedette.control.search import CoordinateAscent, ExhaustiveSearch, JointProblem, JointSearch
 from vedette.control.settings import MobileSensor, PlanningSettings, planning_limits
 
@@ -25,7 +25,9 @@ __all__ = [
     "Plan",
     "Planner",
     "PlanningSettings",
+    "PowerReward",
     "RandomPlanner",
+    "RenyiReward",
     "Reward",
     "RewardTable",
     "planning_limits",

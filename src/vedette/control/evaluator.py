@@ -10,17 +10,16 @@ import numpy as np
 
 from vedette.control.actions import distinct_headings
 from vedette.control.inputs import Belief, check_beliefs, check_headings, check_poses, check_sensors
-from vedette.control.kinds import of_one_kind
-from vedette.control.plain import PlainRewards, can_be_laid_out
+from vedette.control.laid_rewards import lay_out_rewards, warn_slow
+from vedette.control.plain import PlainRewards
 from vedette.control.priors import predicted
-from vedette.control.pseudo import PseudoPosteriors, draw_futures, pseudo_posteriors
-from vedette.control.reward import CauchySchwarzReward, Reward
+from vedette.control.pseudo import draw_futures, pseudo_posteriors
+from vedette.control.reward import PowerReward, Reward
 from vedette.control.search import all_joint_actions, first_best
 from vedette.control.settings import MobileSensor, PlanningSettings
-from vedette.control.tables import fused_rewards
-from vedette.densities import LMB
+from vedette.densities.cases import LabelledCases
 from vedette.errors import NumericalError
-from vedette.fusion import Clmb, CmDeltaGlmb, Fusion
+from vedette.fusion import Fusion
 from vedette.kernels.base.types import Floats, Ints
 
 SampleRewards: TypeAlias = Callable[[Ints], Floats]
@@ -38,18 +37,20 @@ class Evaluator:
         prediction: the fused density predicted to the horizon, one Gaussian a track.
         posteriors: the pseudo-posteriors of each sensor.
         counts: how many filter steps, fusions and divergences have been evaluated so far.
+        notes: what a reader of the decision must know, in the order in which it came up (keys; no values).
     """
 
     sensors: tuple[MobileSensor, ...]
     fusion: Fusion[Any, Any]
     settings: PlanningSettings
-    reward: Reward
+    reward: Reward | PowerReward
     headings: tuple[Floats, ...]
     distinct: tuple[Floats, ...]
     which: tuple[Ints, ...]
     prediction: Belief
-    posteriors: tuple[PseudoPosteriors, ...]
+    posteriors: tuple[LabelledCases, ...]
     counts: dict[str, int] = field(default_factory=dict)
+    notes: dict[str, None] = field(default_factory=dict)
 
     @classmethod
     def prepare(
@@ -57,7 +58,7 @@ class Evaluator:
         sensors: Sequence[MobileSensor],
         fusion: Fusion[Any, Any],
         settings: PlanningSettings,
-        reward: Reward,
+        reward: Reward | PowerReward,
         beliefs: Sequence[Belief],
         fused: Belief,
         poses: Any,
@@ -106,15 +107,13 @@ class Evaluator:
 
         return evaluate
 
-    def _compute(self, posteriors: Sequence[PseudoPosteriors], fusion: Fusion[Any, Any] | None) -> SampleRewards:
-        num_samples, threads = self.settings.num_samples, self.settings.threads()
-        alike, prediction = of_one_kind(posteriors, self.prediction, fusion, threads)
-        if not can_be_laid_out(alike, prediction, fusion, self.reward):
-            return PlainRewards(posteriors, self.prediction, fusion, self.reward, num_samples)
-        assert isinstance(self.reward, CauchySchwarzReward)
-        alone = Clmb((1.0,)) if isinstance(prediction, LMB) else CmDeltaGlmb((1.0,))
-        rule = fusion if isinstance(fusion, CmDeltaGlmb | Clmb) else alone
-        return fused_rewards(alike, prediction, rule, num_samples, self.reward.volume(self.prediction), threads)
+    def _compute(self, posteriors: Sequence[LabelledCases], fusion: Fusion[Any, Any] | None) -> SampleRewards:
+        laid = lay_out_rewards(posteriors, self.prediction, fusion, self.reward)
+        if not isinstance(laid, str):
+            return laid
+        self.notes[f"rewards were computed one by one: {laid}"] = None
+        warn_slow(laid)
+        return PlainRewards(posteriors, self.prediction, fusion, self.reward, self.settings.num_samples)
 
     def sample_rewards(self, which: Sequence[int], fusion: Fusion[Any, Any] | None) -> Floats:
         """(num_joint, num_samples) rewards of all joint actions of the sensors `which`, the last one's fastest."""

@@ -13,7 +13,7 @@ from vedette.control.evaluator import Evaluator, check_situation
 from vedette.control.evidence import Evidence
 from vedette.control.inputs import Belief, check_choice, check_headings, check_poses
 from vedette.control.plan import Plan, RewardTable
-from vedette.control.reward import CauchySchwarzReward, Reward
+from vedette.control.reward import CauchySchwarzReward, PowerReward, Reward
 from vedette.control.search import ExhaustiveSearch, JointProblem, JointSearch, all_joint_actions, first_best
 from vedette.control.settings import MobileSensor, PlanningSettings
 from vedette.fusion import Fusion
@@ -42,14 +42,14 @@ class JointPlanner:
         sensors: the sensors, in the order of the beliefs and of the fusion weights.
         fusion: how their pseudo-updated densities become one.
         settings: horizon, samples, caps.
-        reward: Cauchy-Schwarz divergence, or a reward of the user's own.
+        reward: Cauchy-Schwarz or Renyi divergence, or a reward of the user's own.
         search: which joint actions are evaluated: all of them, as in the paper, or fewer.
     """
 
     sensors: tuple[MobileSensor, ...]
     fusion: Fusion[Any, Any]
     settings: PlanningSettings = field(default_factory=PlanningSettings)
-    reward: Reward = field(default_factory=CauchySchwarzReward)
+    reward: Reward | PowerReward = field(default_factory=CauchySchwarzReward)
     search: JointSearch = field(default_factory=ExhaustiveSearch)
 
     @property
@@ -94,13 +94,13 @@ class IndependentPlanner:
         sensors: the sensors, in the order of the beliefs.
         fusion: how the beliefs became one; the decision itself does not use it.
         settings: horizon, samples, caps.
-        reward: Cauchy-Schwarz divergence, or a reward of the user's own.
+        reward: Cauchy-Schwarz or Renyi divergence, or a reward of the user's own.
     """
 
     sensors: tuple[MobileSensor, ...]
     fusion: Fusion[Any, Any]
     settings: PlanningSettings = field(default_factory=PlanningSettings)
-    reward: Reward = field(default_factory=CauchySchwarzReward)
+    reward: Reward | PowerReward = field(default_factory=CauchySchwarzReward)
 
     @property
     def name(self) -> str:

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from vedette.control.threads import run_chunks
+from vedette.threads import run_chunks
 from vedette.kernels.base.compile import JIT_ENABLED
 from waiting import PATIENCE
 

@@ -1,0 +1,245 @@
+"""Power integrals of labelled densities: the one primitive behind all rewards of a planner.
+
+Of a prediction p and the product g = prod_s pi_s^(w_s) of chosen cases of some sensors, each a product of factors with
+a weighted list of label sets (a GLMB is one factor, an LMB one a label, with the sets {} and {l}),
+
+    Z(a, b) = log of the set integral of K^((a + b - 1) |X|) p(X)^a g(X)^b
+            = sum over factors of logsumexp over the factor's label sets L of
+              a w_p(L) + b sum_s w_s log weight_s(L) + (a + b - 1) |L| log K + sum over l in L of log integral p^a g^b,
+
+where the last p and g are of one label. Every case is laid out once on the label sets of the prediction, its log
+weights and information rows scaled by its sensor's power; a product is then a sum of rows. Single Gaussians only; the
+rows of one label share one reference.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from vedette.errors import NumericalError
+from vedette.kernels.base.compile import borrowing, inlined, kernel
+from vedette.kernels.base.types import Bools, Floats, Ints
+from vedette.kernels.gaussian.information import log_integral, to_information
+from vedette.kernels.gaussian.linalg import log_add
+from vedette.kernels.gaussian.mixtures import match_components
+
+_SAME_POWER = 1e-12
+
+
+class SensorCases(NamedTuple):
+    """One sensor's densities on its own label sets; a member is a (label set, label)."""
+
+    log_weights: Floats  # (num_cases, num_sets)
+    held: Bools  # (num_cases, num_sets) false where the case has lost the set
+    means: Floats  # (num_cases, num_members, state_dim)
+    covs: Floats  # (num_cases, num_members, state_dim, state_dim)
+
+
+class Places(NamedTuple):
+    """Where a sensor's members stand among those of a layout."""
+
+    members: Ints  # (num_members,) the sensor's own member, -1 where it lacks the label set
+    version_offsets: Ints  # (num_members + 1,) into versions
+    versions: Ints  # the sensor's members of the same label
+    own_sets: Ints  # (num_own_members,) label set of each of the sensor's members
+    references: Floats  # (num_members, state_dim) about which the rows are taken
+
+
+class Laid(NamedTuple):
+    """Cases of all sensors on one list of factors, label sets and members; w is the power of the case's sensor."""
+
+    factor_offsets: Ints  # (num_factors + 1,) into the label sets
+    set_offsets: Ints  # (num_sets + 1,) into the members
+    log_weights: Floats  # (num_cases, num_sets) w times the log weight, or that of a stand-in
+    held: Bools  # (num_cases, num_sets) false where a stand-in is put
+    rows: Floats  # (num_cases, num_members, row_size) of p^w; zeros where the case does not know the label
+
+
+class Terms(NamedTuple):
+    """What exponents and prediction contribute, whatever is chosen: pairs (0, b), then (a, b), then (a, 0)."""
+
+    alone: Floats  # (num_alone,) b of each pair (0, b)
+    crossed: Floats  # (num_crossed, 2) pairs of which neither is 0
+    log_weights: Floats  # (num_alone + num_crossed, num_sets) the part of a term that is the same for all cases
+    rows: Floats  # (num_crossed, num_members, row_size) a times the prediction's rows
+    own: Floats  # (num_own, num_sets) whole terms of pairs (a, 0)
+    own_totals: Floats  # (num_own,) their Z where no label set is left out
+    dim: int  # of a target's state
+
+
+class Work(NamedTuple):
+    """Working arrays of one product."""
+
+    product: Floats  # (row_size,)
+    joint: Floats  # (row_size,)
+    terms: Floats  # (num_alone + num_crossed,) of one label set
+    sums: Floats  # (num_alone + num_crossed,) over the label sets of a factor
+
+
+@kernel
+def write_rows(cases: SensorCases, places: Places, power: float, first: int, last: int, rows: Floats) -> None:
+    """Information rows of cases `first:last`, scaled by the sensor's power.
+
+    Where a case lacks a label set, the row is of the Gaussian of the label's mean and covariance over the sets that it
+    has; zeros where it knows the label in none.
+    """
+    dim, most = cases.means.shape[2], 1
+    for m in range(len(places.members)):
+        most = max(most, places.version_offsets[m + 1] - places.version_offsets[m])
+    factor, precision, mean, cov = np.empty((dim, dim)), np.empty((dim, dim)), np.empty(dim), np.empty((dim, dim))
+    pool, shares = np.empty(most, np.int64), np.empty(most)
+    for case in range(first, last):
+        peak = -math.inf
+        for weight in cases.log_weights[case]:
+            peak = max(peak, weight)
+        for m in range(len(places.members)):
+            own, count = places.members[m], 0
+            if own >= 0 and cases.held[case, places.own_sets[own]]:
+                pool[0], count = own, 1
+            else:
+                for v in range(places.version_offsets[m], places.version_offsets[m + 1]):
+                    at = places.own_sets[places.versions[v]]
+                    if cases.held[case, at]:
+                        pool[count] = places.versions[v]
+                        shares[count] = math.exp(cases.log_weights[case, at] - peak)
+                        count += 1
+            if count == 0:
+                for k in range(rows.shape[2]):
+                    rows[case, m, k] = 0.0
+                continue
+            match_components(pool, shares, count, cases.means[case], cases.covs[case], mean, cov)
+            if not to_information(mean, cov, places.references[m], power, rows[case, m], factor, precision):
+                raise NumericalError("covariance of a track is not positive definite")
+
+
+@borrowing
+def _log_integral(row: Floats, dim: int) -> float:
+    # The compiler unrolls a call of constant dimension, which makes the two usual ones more than twice as fast.
+    if dim == 4:
+        return log_integral(row, 4)
+    if dim == 5:
+        return log_integral(row, 5)
+    return log_integral(row, dim)
+
+
+@inlined
+def _multiply(laid: Laid, chosen: Ints, member: int, product: Floats) -> None:
+    """Row of the product of the chosen cases' powers; where some do not know the label, the others' sum to one."""
+    last = product.shape[0] - 1
+    for k in range(last + 1):
+        product[k] = laid.rows[chosen[0], member, k]
+    for s in range(1, chosen.shape[0]):
+        for k in range(last + 1):
+            product[k] += laid.rows[chosen[s], member, k]
+    if abs(product[last] - 1.0) > _SAME_POWER:
+        scale = 1.0 / product[last]
+        for k in range(last + 1):
+            product[k] *= scale
+
+
+@inlined
+def _add_integrals(member: int, terms: Terms, work: Work) -> None:
+    """Add log integral p^a g^b of one label to each term. `work.product`, the row of g, is used up."""
+    product, joint, num_alone, last = work.product, work.joint, terms.alone.shape[0], work.product.shape[0] - 1
+    for e in range(terms.crossed.shape[0]):
+        power = terms.crossed[e, 1]
+        for k in range(last + 1):
+            joint[k] = power * product[k] + terms.rows[e, member, k]
+        value = _log_integral(joint, terms.dim)
+        if math.isnan(value) and min(terms.crossed[e, 0], power) < 0.0:
+            # A quotient of Gaussians that is not integrable; it does not matter where the weights are zero.
+            value = math.inf if work.terms[num_alone + e] > -math.inf else 0.0
+        work.terms[num_alone + e] += value
+    if num_alone > 0:
+        # One elimination serves every b: g^b has b times the row of g, so that
+        # 2 log integral g^b = d log(2 pi) - log det Y - d log b - b q, with q = s - y'Y^-1 y left by the elimination.
+        overlap = _log_integral(product, terms.dim)
+        for e in range(num_alone):
+            work.terms[e] += overlap - 0.5 * (terms.alone[e] - 1.0) * product[last - 1]
+
+
+@inlined
+def _start_terms(terms: Terms, at: int, weight: float, values: Floats) -> bool:
+    """The terms of a label set but for its integrals; false where all are zero (their logs -inf)."""
+    num_alone, positive = terms.alone.shape[0], False
+    for e in range(values.shape[0]):
+        power = terms.alone[e] if e < num_alone else terms.crossed[e - num_alone, 1]
+        values[e] = terms.log_weights[e, at] + power * weight
+        if math.isnan(values[e]) and not math.isnan(weight):
+            values[e] = -math.inf  # both densities are zero, and the positive exponent rules
+        positive |= values[e] != -math.inf
+    return positive
+
+
+@borrowing
+def _power_integrals(laid: Laid, chosen: Ints, terms: Terms, work: Work, out: Floats) -> None:
+    """Z of all pairs for one product. A label set that no case holds is left out, also of Z(a, 0)."""
+    num, all_held = work.terms.shape[0], True
+    for e in range(num):
+        out[e] = 0.0
+    for factor in range(laid.factor_offsets.shape[0] - 1):
+        any_held = False
+        for e in range(num):
+            work.sums[e] = -math.inf
+        for at in range(laid.factor_offsets[factor], laid.factor_offsets[factor + 1]):
+            weight, held = 0.0, False
+            for s in range(chosen.shape[0]):
+                weight += laid.log_weights[chosen[s], at]
+                held |= laid.held[chosen[s], at]
+            if not held:
+                all_held = False
+                continue
+            any_held = True
+            if not _start_terms(terms, at, weight, work.terms):
+                continue
+            for member in range(laid.set_offsets[at], laid.set_offsets[at + 1]):
+                _multiply(laid, chosen, member, work.product)
+                _add_integrals(member, terms, work)
+            for e in range(num):
+                if work.sums[e] < math.inf:
+                    work.sums[e] = log_add(work.sums[e], work.terms[e])
+        if any_held:
+            for e in range(num):
+                out[e] += work.sums[e]
+    for e in range(terms.own_totals.shape[0]):
+        out[num + e] = terms.own_totals[e] if all_held else _own_of_held(laid, chosen, terms.own[e])
+
+
+@borrowing
+def _own_of_held(laid: Laid, chosen: Ints, own: Floats) -> float:
+    """Z(a, 0) over the label sets that some chosen case holds."""
+    total = 0.0
+    for factor in range(laid.factor_offsets.shape[0] - 1):
+        factor_sum, any_held = -math.inf, False
+        for at in range(laid.factor_offsets[factor], laid.factor_offsets[factor + 1]):
+            held = False
+            for s in range(chosen.shape[0]):
+                held |= laid.held[chosen[s], at]
+            if held:
+                factor_sum, any_held = log_add(factor_sum, own[at]), True
+        if any_held:
+            total += factor_sum
+    return total
+
+
+@kernel
+def power_table(laid: Laid, first_cases: Ints, actions: Ints, terms: Terms, first: int, last: int, out: Floats) -> None:
+    """Z (num_joint, num_samples, num_pairs) of joint actions `first:last`, the pairs in the order of `terms`.
+
+    actions: (num_joint, num_sensors) one action of each sensor; with a sample it is the sensor's case
+    `first_cases + action * num_samples + sample`. NaN where a precision of positive powers is not positive definite.
+    """
+    num_sensors, num_samples, size = len(first_cases), out.shape[1], laid.rows.shape[2]
+    chosen, num = np.empty(num_sensors, np.int64), len(terms.log_weights)
+    work = Work(np.empty(size), np.empty(size), np.empty(num), np.empty(num))
+    for joint in range(first, last):
+        for sample in range(num_samples):
+            for s in range(num_sensors):
+                chosen[s] = first_cases[s] + actions[joint, s] * num_samples + sample
+            _power_integrals(laid, chosen, terms, work, out[joint, sample])
+
+
+__all__ = ["Laid", "Places", "SensorCases", "Terms", "power_table", "write_rows"]
