@@ -147,7 +147,7 @@ def test_state_dimensions(planner: Any) -> None:
     assert refused(replace(example, beliefs=(example.beliefs[0], wide)), planner) == f"beliefs[1]: {expected}"
     assert refused(replace(example, fused=wide), planner) == f"fused: {expected}"
     sensors = (example.sensors[0], mobile_sensor("marginal", dim=5))
-    message = "sensors: expected filters of one state dimension; got [4, 5]"
+    message = "filters[1].targets: expected the target model of filters[0]; got another"
     assert refused(replace(example, sensors=sensors), planner) == message
 
 
@@ -270,7 +270,7 @@ def test_sensors() -> None:
     for speed in (-1.0, np.nan, np.inf, "fast"):
         with pytest.raises(InputError, match="speed: expected"):
             MobileSensor(local, speed)  # type: ignore[arg-type]
-    with pytest.raises(InputError, match=r"filter: expected a filter of vedette\.filters"):
+    with pytest.raises(InputError, match="filter: expected a Filter, with targets, sensor"):
         MobileSensor("filter", 1.0)  # type: ignore[arg-type]
     with pytest.raises(InputError, match="actions: expected an ActionSet"):
         MobileSensor(local, 1.0, (0.0, 90.0))  # type: ignore[arg-type]
@@ -280,7 +280,7 @@ def test_sensors() -> None:
 @pytest.mark.parametrize("planner", [JointPlanner, IndependentPlanner])
 def test_filters_without_labels_cannot_be_planned_with(planner: Any, kind: Any) -> None:
     known = mobile_sensor("lmb").filter
-    local = kind(known.motion, known.survival, known.birth, known.sensor)
+    local = kind(known.targets, known.sensor)
     sensors = (MobileSensor(local, 1.0),)
     belief = local.initial()
     with pytest.raises(InputError, match=rf"sensors\[0\].filter: expected one that labels its .*; got {kind.__name__}"):

@@ -130,9 +130,9 @@ def test_models_of_the_users_own_from_a_file_beside_the_scenario() -> None:
         ("speed: 4.0", sensor),
     )
     north, south = build.build_filters(loaded)
-    assert north.motion.state_dim == 3
-    np.testing.assert_allclose(north.motion.propagate([1.0, 2.0, 3.0], 2.0), [[6.0, 2.0, 3.0]])
-    assert north.survival.prob([[0.0, 0.0, 0.0]], 1.0) == 0.75
+    assert north.targets.motion.state_dim == 3
+    np.testing.assert_allclose(north.targets.motion.propagate([1.0, 2.0, 3.0], 2.0), [[6.0, 2.0, 3.0]])
+    assert north.targets.survival.prob([[0.0, 0.0, 0.0]], 1.0) == 0.75
     assert (north.sensor.clutter.rate, south.sensor.clutter.rate) == (3.0, 25.0)
     np.testing.assert_allclose(north.sensor.noise.covs([0.0, 0.0, 0.0], [0.0, 0.0, 0.0], 1), [[[4.0]]])
     step: Any = north.step
@@ -173,7 +173,7 @@ def test_filters_of_each_kind() -> None:
     gibbs, _ = build.build_filters(scenario(("kind: m_delta_glmb", text)))
     assert isinstance(gibbs, DeltaGlmbFilter)
     assert (gibbs.marginalised, gibbs.assignment, gibbs.num_gibbs_samples) == (False, "gibbs", 77)
-    assert (gibbs.motion.method, gibbs.sensor.method, gibbs.limits.max_hypotheses) == ("ckf", "ckf", 9)
+    assert (gibbs.targets.motion.method, gibbs.sensor.method, gibbs.limits.max_hypotheses) == ("ckf", "ckf", 9)
     lmb, _ = build.build_filters(scenario(("kind: m_delta_glmb", "kind: lmb"), ("kind: cm_delta_glmb", "kind: clmb")))
     assert isinstance(lmb, LmbFilter)
 
@@ -242,7 +242,7 @@ def tracked(loaded: Scenario, num_steps: int, rng: np.random.Generator) -> tuple
     """Filters, their beliefs after some scans with the sensors at rest, the fused belief, and the truth."""
     model, poses = loaded.model, build.build_poses(loaded.model)
     filters: Any = build.build_filters(loaded)
-    source = build.build_truth_source(model, filters[0].motion, loaded.folder)
+    source = build.build_truth_source(model, filters[0].targets.motion, loaded.folder)
     truth = source.truth(build.build_times(model.time), rng=rng)
     fusion: Any = build.build_fusion(model.fusion, len(filters))
     beliefs = [local.initial() for local in filters]

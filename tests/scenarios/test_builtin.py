@@ -54,7 +54,7 @@ NOTE_ROWS = {
 
 
 def truth_of(scenario: Scenario) -> Truth:
-    motion = build_filters(scenario)[0].motion
+    motion = build_filters(scenario)[0].targets.motion
     source = build_truth_source(scenario.model, motion, scenario.folder)
     return source.truth(build_times(scenario.model.time), rng=np.random.default_rng(0))
 

@@ -13,7 +13,7 @@ import pytest
 from vedette.control import FixedPlanner
 from vedette.errors import NumericalError
 from vedette.evaluation.health import health_findings, health_line, summarise_health
-from vedette.filters import FilterInfo, Limits
+from vedette.filters import FilterInfo
 from vedette.fusion import CmDeltaGlmb
 from vedette.fusion.base import FusionInfo
 from vedette.models import limited_range
@@ -91,13 +91,9 @@ def test_a_cap_that_is_met_is_recorded(experiment: Experiment) -> None:
 
 def test_labels_that_a_sensor_lacks_are_counted_at_that_sensor(experiment: Experiment) -> None:
     first, second = experiment.sensors
-    birth = first.filter.birth
-    blind = replace(birth, existence=np.full(len(birth.existence), 1e-9))
-    lopsided = replace(
-        experiment,
-        sensors=(first, replace(second, filter=replace(second.filter, birth=blind, limits=Limits(max_hypotheses=1)))),
-    )
-    record = run(lopsided)
+    near = replace(second.filter.sensor, detection=limited_range(0.98, 1.0))
+    blind = replace(second.filter, sensor=near, limits=replace(second.filter.limits, max_hypotheses=1))
+    record = run(replace(experiment, sensors=(first, replace(second, filter=blind))))
     assert record.health.num_missing_labels[-1].tolist() == [0, 4]
     summary = summarise_health([record, record])
     assert summary.num_scans == 16

@@ -66,12 +66,13 @@ class Evaluator:
     ) -> Evaluator:
         """Draw the samples, predict, and run the pseudo-updates of every sensor (paper section III-B, steps 1 to 4).
 
-        Targets move as the first sensor's filter has it. Raises as `JointPlanner.plan`.
+        Raises as `JointPlanner.plan`.
         """
+        targets = check_sensors(sensors)
         headings, at = check_situation(sensors, poses)
         check_beliefs(sensors, beliefs, fused)
         pairs = [distinct_headings(values) for values in headings]
-        prediction = predicted(fused, sensors[0].filter, settings.horizon_steps, settings.horizon_period)
+        prediction = predicted(fused, targets.motion, settings.horizon_steps, settings.horizon_period)
         futures = draw_futures(fused, sensors, settings, rng=rng)
         posteriors = tuple(
             pseudo_posteriors(belief, sensor, pose, pair[0], future, settings)

@@ -8,7 +8,7 @@ from typing import Literal
 
 from vedette.control.actions import ActionSet, HeadingActions
 from vedette.errors import InputError
-from vedette.filters import Limits, LocalFilter
+from vedette.filters import Filter, Limits
 from vedette.kernels.planning.ideal import EXPECTED, IDEAL, SAMPLED
 from vedette.models.arguments import dimension, non_negative, positive, probability, reject
 
@@ -82,7 +82,7 @@ class MobileSensor:
 
     Attributes:
         filter: its local filter, with the models of the targets and of the sensor. The joint and the independent
-            planner need one that labels its targets: a `DeltaGlmbFilter` or an `LmbFilter`.
+            planner need one that labels its targets: that believes in a `GLMB` or an `LMB`.
         speed: m/s, constant along its heading once it moves.
         actions: the headings it may take.
 
@@ -90,13 +90,13 @@ class MobileSensor:
         InputError: something else than a filter, a speed that is negative or not finite, actions without headings.
     """
 
-    filter: LocalFilter
+    filter: Filter
     speed: float
     actions: ActionSet = field(default_factory=HeadingActions)
 
     def __post_init__(self) -> None:
-        if not isinstance(self.filter, LocalFilter):
-            raise reject("filter", "a filter of vedette.filters", self.filter)
+        if not isinstance(self.filter, Filter):
+            raise reject("filter", "a Filter, with targets, sensor, initial() and step()", self.filter)
         non_negative("speed", self.speed)
         if not callable(getattr(self.actions, "headings", None)):
             raise reject("actions", "an ActionSet, with a method headings(pose)", self.actions)

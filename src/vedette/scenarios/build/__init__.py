@@ -25,6 +25,7 @@ from vedette.scenarios.build.world import (
     build_motion,
     build_region,
     build_survival,
+    build_targets,
     build_times,
     build_truth_source,
 )
@@ -49,6 +50,7 @@ __all__ = [
     "build_reward",
     "build_sensor",
     "build_survival",
+    "build_targets",
     "build_times",
     "build_truth_source",
     "fusion_weights",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from vedette.filters import shared_targets
 from vedette.scenarios.build.planning import build_mobile_sensors
 from vedette.scenarios.build.sensors import build_poses
 from vedette.scenarios.build.tracking import build_estimator, build_filters, build_fusion
@@ -24,7 +25,7 @@ def build_experiment(scenario: Scenario) -> Experiment:
     return Experiment(
         name=model.name,
         times=build_times(model.time),
-        targets=build_truth_source(model, filters[0].motion, scenario.folder),
+        targets=build_truth_source(model, shared_targets(filters).motion, scenario.folder),
         sensors=build_mobile_sensors(model, filters),
         poses=build_poses(model),
         moving=np.array([sensor.moves_from == "start" for sensor in model.sensors]),

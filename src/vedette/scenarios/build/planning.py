@@ -17,8 +17,9 @@ from vedette.control import (
     RandomPlanner,
     planning_limits,
 )
+from vedette.densities import LMB
 from vedette.errors import InputError
-from vedette.filters import DeltaGlmbFilter, LabelledFilter, LocalFilter
+from vedette.filters import Filter, labels_targets
 from vedette.fusion import Clmb, CmDeltaGlmb
 from vedette.scenarios.build.tracking import build_fusion
 from vedette.scenarios.schema.planning import CauchySchwarzReward as RewardSection
@@ -35,7 +36,7 @@ def build_actions(control: Control, sensor: Sensor) -> HeadingActions:
     return HeadingActions(sensor.actions_deg or control.actions_deg, relative=headings == "relative")
 
 
-def build_mobile_sensors(model: ScenarioModel, filters: Sequence[LocalFilter]) -> tuple[MobileSensor, ...]:
+def build_mobile_sensors(model: ScenarioModel, filters: Sequence[Filter]) -> tuple[MobileSensor, ...]:
     """The sensors as planners steer them, with the filter of each."""
     return tuple(
         MobileSensor(local, sensor.speed, build_actions(model.control, sensor))
@@ -66,15 +67,15 @@ def build_reward(section: RewardSection) -> CauchySchwarzReward:
     return CauchySchwarzReward(section.unit_volume)
 
 
-def planning_fusion(model: ScenarioModel, filters: Sequence[LocalFilter]) -> CmDeltaGlmb | Clmb:
+def planning_fusion(model: ScenarioModel, filters: Sequence[Filter]) -> CmDeltaGlmb | Clmb:
     """The fusion that joint decisions use; a single sensor is fused with nobody."""
     fusion = build_fusion(model.fusion, len(filters))
     if fusion is not None:
         return fusion
-    return CmDeltaGlmb((1.0,)) if isinstance(filters[0], DeltaGlmbFilter) else Clmb((1.0,))
+    return Clmb((1.0,)) if isinstance(filters[0].initial(), LMB) else CmDeltaGlmb((1.0,))
 
 
-def build_planner(model: ScenarioModel, filters: Sequence[LocalFilter], name: str) -> Planner:
+def build_planner(model: ScenarioModel, filters: Sequence[Filter], name: str) -> Planner:
     """The planner called `jdm` (joint), `idm` (independent), `random`, or `fixed` (sensors keep their first heading).
 
     Raises:
@@ -88,7 +89,7 @@ def build_planner(model: ScenarioModel, filters: Sequence[LocalFilter], name: st
     if name not in PLANNERS:
         raise InputError(f"planner: expected one of {', '.join(PLANNERS)}; got {name!r}")
     planner = JointPlanner if name == "jdm" else IndependentPlanner
-    if not isinstance(filters[0], LabelledFilter):
+    if not labels_targets(filters[0]):
         kinds = "delta_glmb, m_delta_glmb or lmb"
         raise InputError(f"filter.kind: expected {kinds}, as planner {name} needs labels; got {model.filter.kind}")
     settings, reward = build_planning_settings(model.control), build_reward(model.control.reward)

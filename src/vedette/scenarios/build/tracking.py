@@ -11,17 +11,18 @@ from vedette.filters import (
     CbMemberFilter,
     CphdFilter,
     DeltaGlmbFilter,
+    Filter,
     Limits,
     LmbFilter,
-    LocalFilter,
     PhdFilter,
 )
 from vedette.fusion import Clmb, CmDeltaGlmb, FusionLimits
-from vedette.models import BirthModel, MotionModel, SensorModel, SurvivalModel
+from vedette.models import SensorModel, TargetModel
 from vedette.scenarios.build.sensors import build_sensor
-from vedette.scenarios.build.world import build_birth, build_motion, build_region, build_survival
+from vedette.scenarios.build.world import build_region, build_targets
 from vedette.scenarios.loading import Scenario
-from vedette.scenarios.schema.tracking import Estimator, Filter, FilterLimits, Fusion, GibbsAssignment, MapEstimator
+from vedette.scenarios.schema.tracking import Estimator, FilterLimits, Fusion, GibbsAssignment, MapEstimator
+from vedette.scenarios.schema.tracking import Filter as FilterSection
 
 _WITHOUT_ASSIGNMENT: dict[str, type[LmbFilter | PhdFilter | CphdFilter | CbMemberFilter]] = {
     "lmb": LmbFilter,
@@ -36,18 +37,14 @@ def build_limits(section: FilterLimits) -> Limits:
     return Limits(**section.model_dump())
 
 
-def build_filter(
-    section: Filter, motion: MotionModel, survival: SurvivalModel, birth: BirthModel, sensor: SensorModel
-) -> LocalFilter:
+def build_filter(section: FilterSection, targets: TargetModel, sensor: SensorModel) -> Filter:
     """The filter of one sensor."""
     limits = build_limits(section.limits)
     if section.kind in _WITHOUT_ASSIGNMENT:
-        return _WITHOUT_ASSIGNMENT[section.kind](motion, survival, birth, sensor, limits)
+        return _WITHOUT_ASSIGNMENT[section.kind](targets, sensor, limits)
     gibbs = section.assignment if isinstance(section.assignment, GibbsAssignment) else GibbsAssignment()
     return DeltaGlmbFilter(
-        motion,
-        survival,
-        birth,
+        targets,
         sensor,
         limits,
         assignment=section.assignment.kind,
@@ -56,18 +53,16 @@ def build_filter(
     )
 
 
-def build_filters(scenario: Scenario) -> tuple[LocalFilter, ...]:
+def build_filters(scenario: Scenario) -> tuple[Filter, ...]:
     """The filter of each sensor; they share the models of the targets.
 
     Raises:
         InputError: a custom model that cannot be had, or parts that do not fit together.
     """
     model, folder = scenario.model, scenario.folder
-    method = model.filter.gaussian_method
-    motion, survival = build_motion(model.motion, method, folder), build_survival(model.survival, folder)
-    birth, region = build_birth(model.birth, model.motion), build_region(model.region)
-    sensors = (build_sensor(sensor, region, method, folder) for sensor in model.sensors)
-    return tuple(build_filter(model.filter, motion, survival, birth, sensor) for sensor in sensors)
+    targets, region = build_targets(model, folder), build_region(model.region)
+    sensors = (build_sensor(sensor, region, model.filter.gaussian_method, folder) for sensor in model.sensors)
+    return tuple(build_filter(model.filter, targets, sensor) for sensor in sensors)
 
 
 def fusion_weights(section: Fusion, num_sensors: int) -> tuple[float, ...]:

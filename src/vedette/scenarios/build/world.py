@@ -15,6 +15,7 @@ from vedette.models import (
     MotionModel,
     Region,
     SurvivalModel,
+    TargetModel,
     constant_survival,
     constant_velocity,
     coordinated_turn,
@@ -95,6 +96,16 @@ def build_birth(section: Birth, motion: Motion) -> BirthModel:
 
 def _covariance(site: BirthSite) -> Floats:
     return np.array(site.cov) if site.cov is not None else np.diag(np.square(site.std or ()))
+
+
+def build_targets(model: ScenarioModel, folder: Path) -> TargetModel:
+    """The targets as every filter knows them.
+
+    Raises:
+        InputError: a custom model that cannot be had, or parts that do not fit together.
+    """
+    motion = build_motion(model.motion, model.filter.gaussian_method, folder)
+    return TargetModel(motion, build_survival(model.survival, folder), build_birth(model.birth, model.motion))
 
 
 def build_truth_source(model: ScenarioModel, motion: MotionModel, folder: Path) -> TargetSource:
