@@ -16,7 +16,6 @@ from vedette.control.pseudo import draw_futures, pseudo_posteriors
 from vedette.densities import GLMB, sample_glmb
 from vedette.filters import DeltaGlmbFilter
 from vedette.kernels.association.marginals import MAX_EXACT_MEASUREMENTS
-from vedette.models.platforms import advance
 
 
 @pytest.mark.lanes
@@ -32,12 +31,13 @@ def test_every_label_set_keeps_its_heaviest_hypothesis_beyond_the_caps() -> None
         assert set(own.sets) == set(sets)
         rng = np.random.default_rng(5)
         (futures, *_) = draw_futures(example.fused, example.sensors, example.settings, rng=rng)
-        for case, (heading, sample) in enumerate(np.ndindex(len(sensor.actions.headings(pose)), SETTINGS.num_samples)):
-            angle = float(sensor.actions.headings(pose)[heading])
+        actions = sensor.platform.actions(pose)
+        for case, (action, sample) in enumerate(np.ndindex(len(actions), SETTINGS.num_samples)):
+            course = sensor.platform.course(pose, actions[action], SETTINGS.horizon_times())
             weights, start = {}, 0
             for group, labels in enumerate(sets):
                 hyps = np.flatnonzero(groups == group)
-                log_weight, end = _alone(belief, hyps, sensor, pose, angle, futures, sample, limits)
+                log_weight, end = _alone(belief, hyps, sensor, course, futures, sample, limits)
                 weights[labels] = log_weight
                 place = own.sets.index(labels)
                 start = sum(len(other) for other in own.sets[:place])
@@ -48,7 +48,7 @@ def test_every_label_set_keeps_its_heaviest_hypothesis_beyond_the_caps() -> None
 
 
 def _alone(
-    belief: GLMB, hyps: Any, sensor: Any, pose: Any, heading: float, futures: Any, sample: int, limits: Any
+    belief: GLMB, hyps: Any, sensor: Any, course: Any, futures: Any, sample: int, limits: Any
 ) -> tuple[float, GLMB]:
     """Log weight and end of one label set's hypotheses, followed by a filter of their own."""
     own = sensor.filter
@@ -57,8 +57,7 @@ def _alone(
     total = float(np.logaddexp.reduce(belief.hyp_log_weights[hyps]))
     at = GLMB.from_hypotheses(belief.tracks, chosen, np.exp(belief.hyp_log_weights[hyps] - total))
     targets = slice(futures.offsets[sample], futures.offsets[sample + 1])
-    for h in range(SETTINGS.horizon_steps):
-        pose = advance(pose, heading, sensor.speed, SETTINGS.horizon_period)
+    for h, pose in enumerate(course):
         states = futures.states[h, targets]
         seen = own.sensor.detection.prob(states, pose) >= SETTINGS.detection_threshold
         scan = own.sensor.measurement.measure(states[seen], pose)

@@ -9,7 +9,7 @@ import pytest
 
 from vedette.control import FixedPlanner, RandomPlanner
 from vedette.errors import InputError
-from vedette.models.platforms import advance
+from vedette.platforms import Actions
 from vedette.scenarios import load_scenario
 from vedette.scenarios.build import build_experiment
 from vedette.simulation.loop import STAGES, simulate
@@ -39,19 +39,23 @@ def test_without_a_planner_sensors_never_move(shortened):
 
 
 def test_sensors_lie_still_until_the_first_decision_and_then_keep_its_course(shortened):
-    record = run(shortened, FixedPlanner((-30.0, 45.0)))
+    record = run(shortened, FixedPlanner((Actions.of(heading_deg=-30.0), Actions.of(heading_deg=45.0))))
     (decision,) = record.decisions
     assert (decision.step, decision.time) == (10, 10.0)
     np.testing.assert_array_equal(record.poses[9], shortened.poses)
-    speeds = np.array([sensor.speed for sensor in shortened.sensors])
     for later in range(10, 14):
-        expected = advance(shortened.poses, np.radians([-30.0, 45.0]), speeds, later - 9.0)
+        expected = shortened.poses.copy()
+        for pose, angle, sensor in zip(expected, np.radians([-30.0, 45.0]), shortened.sensors, strict=True):
+            pose += (later - 9.0) * sensor.platform.speed * np.array([np.cos(angle), np.sin(angle), 0.0])
+            pose[2] = angle
         np.testing.assert_allclose(record.poses[later], expected, atol=1e-9)
 
 
 def test_a_sensor_may_be_under_way_from_the_start(shortened):
-    record = run(replace(shortened, moving=np.array([True, False])), FixedPlanner((0.0, 0.0)))
-    assert record.poses[1, 0, 0] == pytest.approx(shortened.poses[0, 0] + shortened.sensors[0].speed)
+    record = run(
+        replace(shortened, first_actions=(np.zeros(1), None)), FixedPlanner((Actions.of(heading_deg=0.0),) * 2)
+    )
+    assert record.poses[1, 0, 0] == pytest.approx(shortened.poses[0, 0] + shortened.sensors[0].platform.speed)
     np.testing.assert_array_equal(record.poses[1, 1], shortened.poses[1])
 
 

@@ -4,10 +4,11 @@ from vedette.scenarios.build.custom import build_custom
 from vedette.scenarios.build.experiment import build_experiment
 from vedette.scenarios.build.planning import (
     PLANNERS,
-    build_actions,
+    build_first_actions,
     build_mobile_sensors,
     build_planner,
     build_planning_settings,
+    build_platform,
     build_reward,
     planning_fusion,
 )
@@ -31,19 +32,20 @@ from vedette.scenarios.build.world import (
 
 __all__ = [
     "PLANNERS",
-    "build_actions",
     "build_birth",
     "build_custom",
     "build_estimator",
     "build_experiment",
     "build_filter",
     "build_filters",
+    "build_first_actions",
     "build_fusion",
     "build_limits",
     "build_mobile_sensors",
     "build_motion",
     "build_planner",
     "build_planning_settings",
+    "build_platform",
     "build_poses",
     "build_region",
     "build_reward",

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import numpy as np
-
-from vedette.scenarios.build.planning import build_mobile_sensors
+from vedette.scenarios.build.planning import build_first_actions, build_mobile_sensors
 from vedette.scenarios.build.sensors import build_poses
 from vedette.scenarios.build.tracking import build_estimator, build_filters, build_fusion
 from vedette.scenarios.build.world import build_times, build_truth_source
@@ -27,7 +25,7 @@ def build_experiment(scenario: Scenario) -> Experiment:
         targets=build_truth_source(model, filters[0].motion, scenario.folder),
         sensors=build_mobile_sensors(model, filters),
         poses=build_poses(model),
-        moving=np.array([sensor.moves_from == "start" for sensor in model.sensors]),
+        first_actions=build_first_actions(model),
         fusion=build_fusion(model.fusion, len(filters)),
         feedback=model.fusion.feedback,
         estimate=build_estimator(model.estimator),

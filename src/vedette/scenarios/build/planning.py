@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from vedette.control import (
     CauchySchwarzReward,
     FixedPlanner,
-    HeadingActions,
     IndependentPlanner,
     JointPlanner,
     MobileSensor,
@@ -20,6 +21,8 @@ from vedette.control import (
 from vedette.errors import InputError
 from vedette.filters import DeltaGlmbFilter, LabelledFilter, LocalFilter
 from vedette.fusion import Clmb, CmDeltaGlmb
+from vedette.kernels.base.types import Floats
+from vedette.platforms import Actions, Courses
 from vedette.scenarios.build.tracking import build_fusion
 from vedette.scenarios.schema.planning import CauchySchwarzReward as RewardSection
 from vedette.scenarios.schema.planning import Control
@@ -29,16 +32,21 @@ from vedette.scenarios.schema.sensors import Sensor
 PLANNERS = ("jdm", "idm", "random", "fixed")
 
 
-def build_actions(control: Control, sensor: Sensor) -> HeadingActions:
-    """The actions of one sensor: its own, or those of all."""
+def build_platform(control: Control, sensor: Sensor) -> Courses:
+    """What carries one sensor, with its own actions or those of all."""
     headings = sensor.headings or control.headings
-    return HeadingActions(sensor.actions_deg or control.actions_deg, relative=headings == "relative")
+    return Courses(sensor.speed, sensor.actions_deg or control.actions_deg, relative=headings == "relative")
+
+
+def build_first_actions(model: ScenarioModel) -> tuple[Floats | None, ...]:
+    """What each sensor is under from the start; None: it lies still until the first decision."""
+    return tuple(np.array([sensor.heading_deg]) if sensor.moves_from == "start" else None for sensor in model.sensors)
 
 
 def build_mobile_sensors(model: ScenarioModel, filters: Sequence[LocalFilter]) -> tuple[MobileSensor, ...]:
     """The sensors as planners steer them, with the filter of each."""
     return tuple(
-        MobileSensor(local, sensor.speed, build_actions(model.control, sensor))
+        MobileSensor(local, build_platform(model.control, sensor))
         for local, sensor in zip(filters, model.sensors, strict=True)
     )
 
@@ -82,9 +90,9 @@ def build_planner(model: ScenarioModel, filters: Sequence[LocalFilter], name: st
     """
     sensors = build_mobile_sensors(model, filters)
     if name == "random":
-        return RandomPlanner(sensors)
+        return RandomPlanner(sensors, build_planning_settings(model.control))
     if name == "fixed":
-        return FixedPlanner(tuple(sensor.heading_deg for sensor in model.sensors))
+        return FixedPlanner(tuple(Actions.of(heading_deg=sensor.heading_deg) for sensor in model.sensors))
     if name not in PLANNERS:
         raise InputError(f"planner: expected one of {', '.join(PLANNERS)}; got {name!r}")
     planner = JointPlanner if name == "jdm" else IndependentPlanner
