@@ -17,10 +17,16 @@ from vedette.evaluation.figures.rewards import best_over_others, best_over_pair
 from vedette.kernels.base.types import Floats
 from vedette.reports.groups import Strategy
 from vedette.scenarios import Scenario
-from vedette.scenarios.build import build_region, build_sensor
 from vedette.scenarios.names import sensor_names
-from vedette.scenarios.schema.sensors import BearingOnly, BearingRange, LimitedRange, LimitedSector, Position, RangeOnly
-from vedette.scenarios.schema.sensors import Sensor as SensorSection
+from vedette.scenarios.sections.sensing import (
+    BearingOnly,
+    BearingRange,
+    LimitedRange,
+    LimitedSector,
+    Position,
+    RangeOnly,
+)
+from vedette.scenarios.sections.sensors import Sensor as SensorSection
 from vedette.scenarios.trust import code_of
 from vedette.simulation.records import Decision, RunRecord
 from vedette.simulation.replay import scans_of_sensors
@@ -150,9 +156,9 @@ def _scans(
     if all(kind == "none" for kind in kinds) or (code_of_sensors(scenario) and not trust):
         return []
     model = scenario.model
-    region, method = build_region(model.region), model.filter.gaussian_method
+    region, method = model.region.build(), model.filter.gaussian_method
     try:
-        sensors = [build_sensor(section, region, method, scenario.folder) for section in model.sensors]
+        sensors = [section.build(region, method, scenario.folder) for section in model.sensors]
         scans = scans_of_sensors(record, sensors)
     except VedetteError:
         return []
