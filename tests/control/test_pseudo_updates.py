@@ -16,6 +16,7 @@ from vedette.control.pseudo import draw_futures, pseudo_posteriors
 from vedette.densities import GLMB, sample_glmb
 from vedette.filters import DeltaGlmbFilter
 from vedette.kernels.association.marginals import MAX_EXACT_MEASUREMENTS
+from vedette.platforms import options_at
 
 
 @pytest.mark.lanes
@@ -87,9 +88,10 @@ def test_an_action_is_updated_alike_whatever_the_others_are(kind: str, mode: Any
     settings = replace(SETTINGS, ideal_measurements=mode)
     example = situation(kind, settings=settings)
     (futures, *_) = draw_futures(example.fused, example.sensors, settings, rng=np.random.default_rng(2))
-    given = example.beliefs[0], example.sensors[0], example.poses[0]
-    together = pseudo_posteriors(*given, np.array([0.0, 1.0, -2.0]), futures, settings)
-    alone = pseudo_posteriors(*given, np.array([1.0]), futures, settings)
+    belief, sensor = example.beliefs[0], example.sensors[0]
+    courses = options_at("platform", sensor.platform, example.poses[0], settings.horizon_times()).courses
+    together = pseudo_posteriors(belief, sensor, courses, futures, settings)
+    alone = pseudo_posteriors(belief, sensor, courses[1:2], futures, settings)
     cases = slice(SETTINGS.num_samples, 2 * SETTINGS.num_samples)
     for several, one in zip(together[1:4], alone[1:4], strict=True):
         np.testing.assert_array_equal(several[cases], one)
@@ -104,7 +106,7 @@ def test_a_target_is_seen_with_or_above_its_detection_probability(mode: Any) -> 
         example = situation("lmb", settings=settings)
         certain = type(example.fused)(example.fused.tracks, np.full(example.fused.tracks.num_tracks, 40.0))
         (futures,) = draw_futures(certain, (sensor,), settings, rng=np.random.default_rng(0))
-        own = pseudo_posteriors(example.beliefs[0], sensor, POSES[0], np.zeros(1), futures, settings)
+        own = pseudo_posteriors(example.beliefs[0], sensor, POSES[:1, np.newaxis], futures, settings)
         rose = own.log_weights > example.beliefs[0].existence_logit
         assert abs(rose.mean() - share[mode]) < 0.15
 

@@ -88,8 +88,8 @@ def test_feedback_gives_every_sensor_the_fused_belief(shortened):
 def test_unequal_scan_times_move_sensors_by_the_time_between(shortened):
     times = np.array([1.0, 2.0, 4.0, 4.5])
     uneven = replace(shortened, times=times, decision_steps=(1,))
-    record = run(uneven, FixedPlanner((0.0, 0.0)))
-    np.testing.assert_allclose(np.diff(record.poses[:, 0, 0]), np.diff(times) * uneven.sensors[0].speed)
+    record = run(uneven, FixedPlanner((Actions.of(heading_deg=0.0),) * 2))
+    np.testing.assert_allclose(np.diff(record.poses[:, 0, 0]), np.diff(times) * uneven.sensors[0].platform.speed)
 
 
 def test_time_is_taken_by_stage_and_scan(shortened):
@@ -106,7 +106,7 @@ def test_time_is_taken_by_stage_and_scan(shortened):
         ({"fusion": None}, "fusion: expected one for 2 sensors"),
         ({"decision_steps": (99,)}, "decision_steps: expected scans from 1 to 14; got 99"),
         ({"poses": np.zeros((3, 3))}, "poses: expected finite numbers"),
-        ({"moving": np.zeros(3, bool)}, "moving: expected 2 flags"),
+        ({"first_actions": (None,)}, "first_actions: expected 2, one a sensor; got 1"),
     ],
 )
 def test_parts_that_do_not_fit(shortened, change, message):
