@@ -8,11 +8,10 @@ from vedette.control.inputs import Belief
 from vedette.densities import GLMB, LMB, TrackTable, marginalise, track_moments
 from vedette.densities.checks import unchecked
 from vedette.densities.label_sets import take_hypotheses
-from vedette.filters import LocalFilter
 from vedette.filters.inputs import model_errors
 from vedette.kernels.gaussian.linalg import log_sum
 from vedette.kernels.planning.prediction import predict_tracks
-from vedette.models import constant_survival, kernel_motion
+from vedette.models import MotionModel, constant_survival, kernel_motion
 
 
 def heaviest_hypotheses(belief: GLMB, most: int) -> GLMB:
@@ -23,7 +22,7 @@ def heaviest_hypotheses(belief: GLMB, most: int) -> GLMB:
     return unchecked(GLMB, taken.tracks, taken.hyp_offsets, taken.hyp_tracks, log_weights)
 
 
-def predicted(fused: Belief, local: LocalFilter, num_steps: int, period: float) -> Belief:
+def predicted(fused: Belief, motion: MotionModel, num_steps: int, period: float) -> Belief:
     """The fused density at the end of the horizon, without birth or death (paper, "pseudo-prediction").
 
     Tracks are first collapsed to one Gaussian each (a GLMB is marginalised), as those of the pseudo-updates are. Label
@@ -36,7 +35,7 @@ def predicted(fused: Belief, local: LocalFilter, num_steps: int, period: float) 
     means, covs = track_moments(single.tracks)
     with model_errors():
         means, covs = predict_tracks(
-            kernel_motion(local.motion, constant_survival(1.0)), float(period), int(num_steps), means, covs
+            kernel_motion(motion, constant_survival(1.0)), float(period), int(num_steps), means, covs
         )
     num = single.tracks.num_tracks
     tracks = unchecked(TrackTable, single.tracks.labels, np.arange(num + 1), np.zeros(num), means, covs)
