@@ -14,6 +14,9 @@ from vedette.densities import cardinality_distribution
 from vedette.divergence import cauchy_schwarz
 from vedette.errors import InputError, NumericalError
 
+# Own rewards and fusions are mostly computed one by one, which is said once.
+pytestmark = pytest.mark.filterwarnings("ignore::vedette.errors.SlowRewardWarning")
+
 
 def minus_cardinality_variance(predicted: Any, updated: Any) -> float:
     """How sure one would be of the number of targets."""

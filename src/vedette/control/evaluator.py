@@ -114,6 +114,10 @@ class Evaluator:
         shape = self.joint_shape()
         return self.rewards(which, fusion)(all_joint_actions(tuple(shape[s] for s in which)))
 
+    def account(self) -> tuple[dict[str, int], tuple[str, ...]]:
+        """Counts and notes so far, as a plan holds them."""
+        return dict(self.counts), tuple(self.notes)
+
     def independent_choice(self) -> tuple[int, ...]:
         """The course that is best for each sensor alone (paper, Algorithm 3); of equal ones the first."""
         everyone = range(len(self.sensors))

@@ -12,11 +12,11 @@ from vedette.control.inputs import Belief
 from vedette.control.reward import PowerReward, Reward, combined, unit_volume_of
 from vedette.densities.cases import LabelledCases
 from vedette.errors import SlowRewardWarning
-from vedette.fusion import Fusion, LaidOut, lay_out_alone
+from vedette.fusion import Fusion, LaidOut, LaysOut, lay_out_alone
 from vedette.kernels.base.types import Floats, Ints
 
-# Measured by benchmarks/rewards.py: how many times longer rewards take that are computed one by one.
-SLOWER_BY = "20 to 60"
+# How many times longer rewards take that are computed one by one; measured by benchmarks/fusion_divergence.py.
+SLOWER_BY = "some 600 to 3000"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,12 +42,12 @@ def lay_out_rewards(
     cases: Sequence[LabelledCases], prediction: Belief, fusion: Fusion[Any, Any] | None, reward: Reward | PowerReward
 ) -> LaidRewards | str:
     """The rewards laid out, or why they cannot be. fusion: None for a sensor alone."""
-    if not _speaks_for(reward, "combine", "__call__"):
+    if not isinstance(reward, PowerReward) or not _speaks_for(reward, "combine", "__call__"):
         return f"{_name(reward)} is a function of two densities"
     laid: LaidOut | None = None
     if fusion is None:
         laid = lay_out_alone(cases[0], prediction)
-    elif _speaks_for(fusion, "lay_out", "fuse"):
+    elif isinstance(fusion, LaysOut) and _speaks_for(fusion, "lay_out", "fuse"):
         laid = fusion.lay_out(cases, prediction)
     if laid is None:
         return f"{'a sensor alone' if fusion is None else _name(fusion)} cannot lay out these beliefs"
@@ -59,7 +59,7 @@ def _speaks_for(thing: Any, fast: str, plain: str) -> bool:
     for owner in type(thing).__mro__:
         if fast in vars(owner) or plain in vars(owner):
             return fast in vars(owner)
-    return hasattr(thing, fast)
+    return True  # methods of the object itself
 
 
 def _name(thing: Any) -> str:
@@ -70,8 +70,8 @@ def _name(thing: Any) -> str:
 def warn_slow(why: str) -> None:
     """Warn, once in a process, that rewards are computed one by one."""
     warnings.warn(
-        f"{why}: rewards are computed for one joint action and sample at a time, which takes {SLOWER_BY} times as long "
-        f"as rewards that are laid out (a PowerReward, and a fusion with lay_out)",
+        f"rewards are computed one by one, which takes {SLOWER_BY} times as long as for a PowerReward under a fusion "
+        f"that lays out: {why}",
         SlowRewardWarning,
         stacklevel=2,
     )

@@ -84,7 +84,7 @@ class JointPlanner:
             evidence.evaluate(np.array([best]))
         chosen = tuple(own.first_action(course) for own, course in zip(evaluator.options, best, strict=True))
         actions = tuple(own.actions for own in evaluator.options)
-        return Plan(self.name, actions, chosen, evidence.tables(best), dict(evaluator.counts))
+        return Plan(self.name, actions, chosen, evidence.tables(best), *evaluator.account())
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -122,7 +122,7 @@ class IndependentPlanner:
             chosen.append(own.first_action(best))
             tables.extend(evidence.tables((best,)))
         actions = tuple(own.actions for own in evaluator.options)
-        return Plan(self.name, actions, tuple(chosen), tuple(tables), dict(evaluator.counts))
+        return Plan(self.name, actions, tuple(chosen), tuple(tables), *evaluator.account())
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, Literal, Protocol, TypeAlias
+from typing import Any, ClassVar, Literal, Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
 
@@ -29,6 +29,7 @@ class Reward(Protocol):
     def __call__(self, predicted: GLMB | LMB, updated: GLMB | LMB) -> float: ...
 
 
+@runtime_checkable
 class PowerReward(Protocol):
     """A reward made of power integrals Z(a, b) of prediction and update: then no fused density need be formed.
 

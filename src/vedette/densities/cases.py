@@ -89,7 +89,7 @@ class LabelledCases:
     @property
     def state_dim(self) -> int:
         """Length of a target's state."""
-        return self.means.shape[2]
+        return int(self.means.shape[2])
 
     @property
     def set_offsets(self) -> Ints:

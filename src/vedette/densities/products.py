@@ -64,7 +64,8 @@ class PowerProducts:
         pairs = check_exponents(exponents)
         kinds = [pairs[:, 0] == 0.0, (pairs != 0.0).all(axis=1), pairs[:, 1] == 0.0]
         order = np.concatenate([np.flatnonzero(kind) for kind in kinds])
-        terms = self._terms(*(pairs[kind] for kind in kinds), math.log(unit_volume))
+        alone, crossed, own = (pairs[kind] for kind in kinds)
+        terms = self._terms(alone, crossed, own, math.log(unit_volume))
         found = np.empty((len(actions), self.num_samples, len(pairs)))
         taken = np.ascontiguousarray(actions[:, self.sensors])
 
@@ -87,9 +88,8 @@ class PowerProducts:
         terms = terms + sums[:, ends[1:]] - sums[:, ends[:-1]]
         starts = self.laid.factor_offsets[:-1]
         totals = np.logaddexp.reduceat(terms, starts, axis=1).sum(axis=1) if len(starts) else np.zeros(len(own))
-        return Terms(
-            alone[:, 1].copy(), crossed, weights, crossed[:, 0, None, None] * self.rows, terms, totals, self.state_dim
-        )  # fmt: skip
+        rows = crossed[:, 0, None, None] * self.rows
+        return Terms(changing[:, 1].copy(), crossed[:, 0].copy(), weights, rows, terms, totals, dim)
 
 
 def _given(pairs: Floats, log_weights: Floats) -> Floats:
@@ -129,8 +129,9 @@ def lay_out_products(
     references = target.means[0].copy()
     parts = [_lay_out(share, target, references) for share in shares]
     own = _lay_out(Share.whole(target, np.ones((1, len(target.sets)), np.bool_)), target, references)
-    stacked = [np.ascontiguousarray(np.concatenate(arrays)) for arrays in zip(*parts, strict=True)]
-    laid = Laid(target.factor_offsets, target.set_offsets, *stacked)
+    log_weights, held, rows = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
+    all_held = bool(np.any([part[1].all(axis=0) for part in parts], axis=0).all())
+    laid = Laid(target.factor_offsets, target.set_offsets, log_weights, held, all_held, rows)
     columns = np.arange(len(shares)) if sensors is None else np.array(sensors, np.int64)
     first_cases = offsets_of([share.cases.num_cases for share in shares])[:-1].copy()
     log_dets = np.linalg.slogdet(target.covs[0])[1]

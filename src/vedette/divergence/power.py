@@ -8,7 +8,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from vedette.densities import GLMB, LMB, Poisson, marginalise
+from vedette.densities import GLMB, LMB, marginalise
 from vedette.densities.cases import LabelledCases
 from vedette.densities.checks import unchecked
 from vedette.densities.conversions import lmb_on_label_sets
@@ -66,7 +66,7 @@ def power_integrals(
     """(num_exponents,) `power_integral` of each pair (a, b)."""
     log_unit_volume = check_densities({"p": p, "q": q}, unit_volume)
     check_support(support)
-    if isinstance(p, Poisson) or isinstance(q, Poisson):
+    if not isinstance(p, GLMB | LMB):
         raise InputError("p, q: expected labelled densities, GLMB or LMB; got two Poisson densities")
     pairs = [(float(a), float(b)) for a, b in check_exponents(exponents).tolist()]
     mixed = not (_is_single(p) and _is_single(q))
@@ -145,8 +145,8 @@ def _of_singles(
 
 def _has_more_sets(lmb: LMB, on_sets: GLMB) -> bool:
     """Whether the LMB has label sets of positive weight beyond these."""
-    num_uncertain = int(np.isfinite(lmb.existence_logit).sum())
-    return 2**num_uncertain > int((on_sets.hyp_log_weights > -math.inf).sum())
+    num_sets = int(2 ** np.count_nonzero(np.isfinite(lmb.existence_logit)))
+    return num_sets > np.count_nonzero(on_sets.hyp_log_weights > -math.inf)
 
 
 def _of_one_kind(
@@ -158,7 +158,7 @@ def _of_one_kind(
         raise InputError("support: 'common' is for densities that share a label set; got two that share none")
     whole = Share.whole(q, np.ones_like(q.possible))
     laid = lay_out_products([whole], p)
-    return laid.z(np.zeros((1, 1), np.int64), pairs, unit_volume)[0, 0]
+    return np.asarray(laid.z(np.zeros((1, 1), np.int64), pairs, unit_volume)[0, 0])
 
 
 def _extended(own: LabelledCases, other: LabelledCases) -> LabelledCases:

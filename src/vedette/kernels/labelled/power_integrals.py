@@ -55,15 +55,16 @@ class Laid(NamedTuple):
     set_offsets: Ints  # (num_sets + 1,) into the members
     log_weights: Floats  # (num_cases, num_sets) w times the log weight, or that of a stand-in
     held: Bools  # (num_cases, num_sets) false where a stand-in is put
+    all_held: bool  # whether every label set is held by some case of any choice
     rows: Floats  # (num_cases, num_members, row_size) of p^w; zeros where the case does not know the label
 
 
 class Terms(NamedTuple):
     """What exponents and prediction contribute, whatever is chosen: pairs (0, b), then (a, b), then (a, 0)."""
 
-    alone: Floats  # (num_alone,) b of each pair (0, b)
-    crossed: Floats  # (num_crossed, 2) pairs of which neither is 0
-    log_weights: Floats  # (num_alone + num_crossed, num_sets) the part of a term that is the same for all cases
+    powers: Floats  # (num_changing,) b of each pair (0, b), then of each (a, b)
+    own_powers: Floats  # (num_crossed,) a of each pair (a, b)
+    log_weights: Floats  # (num_changing, num_sets) the part of a term that is the same for all cases
     rows: Floats  # (num_crossed, num_members, row_size) a times the prediction's rows
     own: Floats  # (num_own, num_sets) whole terms of pairs (a, 0)
     own_totals: Floats  # (num_own,) their Z where no label set is left out
@@ -75,8 +76,8 @@ class Work(NamedTuple):
 
     product: Floats  # (row_size,)
     joint: Floats  # (row_size,)
-    terms: Floats  # (num_alone + num_crossed,) of one label set
-    sums: Floats  # (num_alone + num_crossed,) over the label sets of a factor
+    crossed: Floats  # (num_crossed,) log integrals of p^a g^b over the labels of a set
+    sums: Floats  # (num_changing,) over the label sets of a factor
 
 
 @kernel
@@ -130,10 +131,10 @@ def _multiply(laid: Laid, chosen: Ints, member: int, product: Floats) -> None:
     """Row of the product of the chosen cases' powers; where some do not know the label, the others' sum to one."""
     last = product.shape[0] - 1
     for k in range(last + 1):
-        product[k] = laid.rows[chosen[0], member, k]
-    for s in range(1, chosen.shape[0]):
-        for k in range(last + 1):
-            product[k] += laid.rows[chosen[s], member, k]
+        total = 0.0
+        for s in range(chosen.shape[0]):
+            total += laid.rows[chosen[s], member, k]
+        product[k] = total
     if abs(product[last] - 1.0) > _SAME_POWER:
         scale = 1.0 / product[last]
         for k in range(last + 1):
@@ -141,43 +142,62 @@ def _multiply(laid: Laid, chosen: Ints, member: int, product: Floats) -> None:
 
 
 @inlined
-def _add_integrals(member: int, terms: Terms, work: Work) -> None:
-    """Add log integral p^a g^b of one label to each term. `work.product`, the row of g, is used up."""
-    product, joint, num_alone, last = work.product, work.joint, terms.alone.shape[0], work.product.shape[0] - 1
-    for e in range(terms.crossed.shape[0]):
-        power = terms.crossed[e, 1]
-        for k in range(last + 1):
-            joint[k] = power * product[k] + terms.rows[e, member, k]
-        value = _log_integral(joint, terms.dim)
-        if math.isnan(value) and min(terms.crossed[e, 0], power) < 0.0:
-            # A quotient of Gaussians that is not integrable; it does not matter where the weights are zero.
-            value = math.inf if work.terms[num_alone + e] > -math.inf else 0.0
-        work.terms[num_alone + e] += value
-    if num_alone > 0:
-        # One elimination serves every b: g^b has b times the row of g, so that
-        # 2 log integral g^b = d log(2 pi) - log det Y - d log b - b q, with q = s - y'Y^-1 y left by the elimination.
-        overlap = _log_integral(product, terms.dim)
-        for e in range(num_alone):
-            work.terms[e] += overlap - 0.5 * (terms.alone[e] - 1.0) * product[last - 1]
+def _integrate(laid: Laid, chosen: Ints, at: int, terms: Terms, work: Work) -> tuple[float, float]:
+    """Integrals over the labels of a set: the sums of log integral g and of q (see `_add_terms`), and `work.crossed`."""
+    product, joint, last = work.product, work.joint, work.product.shape[0] - 1
+    overlap, quadratic, num_crossed = 0.0, 0.0, terms.own_powers.shape[0]
+    num_alone = terms.powers.shape[0] - num_crossed
+    for e in range(num_crossed):
+        work.crossed[e] = 0.0
+    for member in range(laid.set_offsets[at], laid.set_offsets[at + 1]):
+        _multiply(laid, chosen, member, product)
+        for e in range(num_crossed):
+            power = terms.powers[num_alone + e]
+            for k in range(last + 1):
+                joint[k] = power * product[k] + terms.rows[e, member, k]
+            value = _log_integral(joint, terms.dim)
+            if math.isnan(value) and min(terms.own_powers[e], power) < 0.0:
+                value = math.inf  # a quotient of Gaussians that is not integrable
+            work.crossed[e] += value
+        if num_alone > 0:
+            overlap += _log_integral(product, terms.dim)
+            quadratic += product[last - 1]
+    return overlap, quadratic
 
 
 @inlined
-def _start_terms(terms: Terms, at: int, weight: float, values: Floats) -> bool:
-    """The terms of a label set but for its integrals; false where all are zero (their logs -inf)."""
-    num_alone, positive = terms.alone.shape[0], False
-    for e in range(values.shape[0]):
-        power = terms.alone[e] if e < num_alone else terms.crossed[e - num_alone, 1]
-        values[e] = terms.log_weights[e, at] + power * weight
-        if math.isnan(values[e]) and not math.isnan(weight):
-            values[e] = -math.inf  # both densities are zero, and the positive exponent rules
-        positive |= values[e] != -math.inf
-    return positive
+def _add_terms(at: int, weight: float, overlap: float, quadratic: float, terms: Terms, work: Work) -> None:
+    """Add the terms of a label set to the sums of its factor.
+
+    One elimination serves every b: g^b has b times the row of g, so that, with q = s - y'Y^-1 y left by the elimination,
+    log integral g^b = (d log(2 pi) - log det Y - d log b - b q) / 2 = log integral g - (b - 1) q / 2 - d log(b) / 2.
+    """
+    num_alone = terms.powers.shape[0] - terms.own_powers.shape[0]
+    for e in range(terms.powers.shape[0]):
+        given = terms.log_weights[e, at]  # with - d log(b) / 2 of each label
+        term = given + terms.powers[e] * weight
+        if e < num_alone:
+            term += overlap - 0.5 * (terms.powers[e] - 1.0) * quadratic
+        else:
+            term += work.crossed[e - num_alone]
+        if math.isnan(term) and (math.isinf(weight) or math.isinf(given)):
+            term = -math.inf  # both densities are zero, or one is whose power is positive
+        if work.sums[e] < math.inf:
+            work.sums[e] = log_add(work.sums[e], term)
 
 
-@borrowing
+@inlined
+def _is_held(laid: Laid, chosen: Ints, at: int) -> bool:
+    held = False
+    for s in range(chosen.shape[0]):
+        held |= laid.held[chosen[s], at]
+    return held
+
+
+@inlined
 def _power_integrals(laid: Laid, chosen: Ints, terms: Terms, work: Work, out: Floats) -> None:
     """Z of all pairs for one product. A label set that no case holds is left out, also of Z(a, 0)."""
-    num, all_held = work.terms.shape[0], True
+    num, all_held = work.sums.shape[0], True
     for e in range(num):
         out[e] = 0.0
     for factor in range(laid.factor_offsets.shape[0] - 1):
@@ -185,22 +205,14 @@ def _power_integrals(laid: Laid, chosen: Ints, terms: Terms, work: Work, out: Fl
         for e in range(num):
             work.sums[e] = -math.inf
         for at in range(laid.factor_offsets[factor], laid.factor_offsets[factor + 1]):
-            weight, held = 0.0, False
-            for s in range(chosen.shape[0]):
-                weight += laid.log_weights[chosen[s], at]
-                held |= laid.held[chosen[s], at]
-            if not held:
+            if not (laid.all_held or _is_held(laid, chosen, at)):
                 all_held = False
                 continue
-            any_held = True
-            if not _start_terms(terms, at, weight, work.terms):
-                continue
-            for member in range(laid.set_offsets[at], laid.set_offsets[at + 1]):
-                _multiply(laid, chosen, member, work.product)
-                _add_integrals(member, terms, work)
-            for e in range(num):
-                if work.sums[e] < math.inf:
-                    work.sums[e] = log_add(work.sums[e], work.terms[e])
+            any_held, weight = True, 0.0
+            for s in range(chosen.shape[0]):
+                weight += laid.log_weights[chosen[s], at]
+            overlap, quadratic = _integrate(laid, chosen, at, terms, work)
+            _add_terms(at, weight, overlap, quadratic, terms, work)
         if any_held:
             for e in range(num):
                 out[e] += work.sums[e]
@@ -215,10 +227,7 @@ def _own_of_held(laid: Laid, chosen: Ints, own: Floats) -> float:
     for factor in range(laid.factor_offsets.shape[0] - 1):
         factor_sum, any_held = -math.inf, False
         for at in range(laid.factor_offsets[factor], laid.factor_offsets[factor + 1]):
-            held = False
-            for s in range(chosen.shape[0]):
-                held |= laid.held[chosen[s], at]
-            if held:
+            if _is_held(laid, chosen, at):
                 factor_sum, any_held = log_add(factor_sum, own[at]), True
         if any_held:
             total += factor_sum
@@ -234,7 +243,7 @@ def power_table(laid: Laid, first_cases: Ints, actions: Ints, terms: Terms, firs
     """
     num_sensors, num_samples, size = len(first_cases), out.shape[1], laid.rows.shape[2]
     chosen, num = np.empty(num_sensors, np.int64), len(terms.log_weights)
-    work = Work(np.empty(size), np.empty(size), np.empty(num), np.empty(num))
+    work = Work(np.empty(size), np.empty(size), np.empty(len(terms.own_powers)), np.empty(num))
     for joint in range(first, last):
         for sample in range(num_samples):
             for s in range(num_sensors):
