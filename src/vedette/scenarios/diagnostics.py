@@ -112,6 +112,8 @@ def _unknown_key(path: Path, loc: tuple[str | int, ...]) -> tuple[str, str, str]
     hint = suggestion(str(path[-1]), known)
     if path[-1] == "<<":
         hint = "YAML 1.2 has no merge keys; sensor_defaults holds what sensors share"
+    if path[-1] in ("speed", "actions_deg", "headings") and "platform" not in path:
+        hint = "the platform of a sensor has it: `platform: {kind: courses, speed: 50.0, headings_deg: [0, 90]}`"
     return _one_of(known), _UNKNOWN, hint
 
 

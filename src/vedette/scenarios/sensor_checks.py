@@ -7,6 +7,7 @@ from collections.abc import Iterator
 
 from vedette.scenarios.faults import Finding, Path, describe
 from vedette.scenarios.sections.sensing import (
+    CameraDetection,
     ConstantNoise,
     CustomMeasurement,
     MeasurementSpaceClutter,
@@ -34,6 +35,8 @@ def sensor_findings(sensors: tuple[Sensor | None, ...]) -> Iterator[Finding]:
             names.add(sensor.name)
         yield from _noise(("sensors", i, "noise"), sensor)
         yield from _clutter(("sensors", i, "clutter"), sensor)
+        if isinstance(sensor.detection, CameraDetection) and len(sensor.pose) < 5:
+            yield ("sensors", i, "platform"), "a camera, as its detection is a camera's", sensor.platform.kind
 
 
 def _noise(path: Path, sensor: Sensor) -> Iterator[Finding]:
