@@ -87,7 +87,7 @@ def _move(planner: str, times: Floats, rng: np.random.Generator) -> tuple[Floats
         poses[scan] = pose
         if scan in DECISION_STEPS and planner != "fixed":
             plan = make_plan(planner, rng)
-            decisions.append(Decision(scan, float(time), pose.copy(), plan))
+            decisions.append(Decision(scan + 1, float(time), pose.copy(), plan))
             pose = np.c_[pose[:, :2], plan.chosen_headings]
             moving = True
     return poses, tuple(decisions)
