@@ -17,9 +17,11 @@ from hypothesis.extra import numpy as hnp
 from campaigns.filled import make_run
 from simulation.test_storage import assert_same
 from vedette.campaigns.codec import decode, encode
+from vedette.control.plan import Plan
 from vedette.densities.estimates import Estimate
 from vedette.errors import InputError
 from vedette.evaluation.metrics import decode_metrics, encode_metrics
+from vedette.platforms import Actions
 from vedette.simulation.arrow import read_table, write_table
 from vedette.simulation.kept import FORMAT_VERSION, decode_timings, encode_timings
 from vedette.simulation.tables import LAYOUTS
@@ -97,6 +99,37 @@ def test_the_layout_of_this_version_is_as_written_here():
         "actions": "decision step time_s sensor action chosen *",
         "rewards": "decision step time_s reward_table reward reward_se chosen action_*",
     }
+
+
+def test_actions_of_several_kinds_and_notes_are_decoded():
+    """Sensors with other columns than another, with none, and with names that tables have; counts that come and go."""
+    record, _ = make_run("random", 0)
+    kinds = (
+        Actions.of(heading_deg=30.0, speed=-0.0),
+        Actions((), np.empty((3, 0))),
+        Actions(("step", "action_step"), np.arange(6.0).reshape(3, 2)),
+        Actions(("dx", "heading_deg"), np.arange(6.0).reshape(3, 2)),
+    )
+    plans = [
+        Plan("own", (kinds[0], kinds[1]), (0, 2), (), {"samples": 1}, ("rewards one by one", "² and more")),
+        Plan("own", (kinds[2], kinds[3]), (2, 0), (), {"samples": 2, "others": 0}),
+        Plan("own", (kinds[1], kinds[0]), (1, 0), (), {}),
+    ]
+    decisions = tuple(replace(each, plan=plan) for each, plan in zip(record.decisions, plans, strict=True))
+    record = replace(record, decisions=decisions)
+    with pytest.raises(
+        InputError, match="expected columns in the order heading_deg, speed, step, action_step, dx; got"
+    ):
+        encode(record)
+    plans[1] = replace(plans[1], actions=(kinds[2], Actions(("heading_deg", "dx"), kinds[3].values)))
+    decisions = tuple(replace(each, plan=plan) for each, plan in zip(record.decisions, plans, strict=True))
+    record = replace(record, decisions=decisions)
+    again = decode(encode(record), encode_timings(record))
+    assert_same(again, record)
+    assert encode(again) == encode(record)
+    two_lines = replace(plans[0], notes=("one\ntwo",))
+    with pytest.raises(InputError, match=r"plan\.notes: expected notes of one line each"):
+        encode(replace(record, decisions=(replace(record.decisions[0], plan=two_lines),)))
 
 
 def test_what_cannot_be_encoded_is_named():

@@ -73,14 +73,14 @@ def test_rows_of_decisions_actions_and_rewards_are_those_of_the_plans(tables):
     rewards = part(tables["rewards"], "jdm-rate-5.0", 2)
     shape = (len(record.decisions), 13, 13)
     reward, chosen = np.array(rewards["reward"]).reshape(shape), np.array(rewards["chosen"]).reshape(shape)
-    could = np.array(actions["heading_rad"]).reshape(len(record.decisions), 2, 13)
+    could = np.array(actions["heading_deg"]).reshape(len(record.decisions), 2, 13)
     did = np.array(actions["chosen"]).reshape(could.shape)
     for index, decision in enumerate(record.decisions):
         plan = decision.plan
         assert (rows["step"][index], rows["time_s"][index]) == (decision.step, decision.time)
         assert rows["num_samples"][index] == 40
-        np.testing.assert_array_equal(could[index], plan.action_values)
-        np.testing.assert_array_equal(could[index][did[index]], plan.chosen_headings)
+        np.testing.assert_array_equal(could[index], [own.values[:, 0] for own in plan.actions])
+        np.testing.assert_array_equal(could[index][did[index]], np.ravel(plan.chosen_actions))
         np.testing.assert_array_equal(reward[index], plan.tables[0].mean)
         assert [tuple(place) for place in np.argwhere(chosen[index])] == [plan.chosen]
     assert (rewards["action_0"][14], rewards["action_1"][14]) == (1, 1)

@@ -95,13 +95,17 @@ from vedette.control import IndependentPlanner, MobileSensor, PlanningSettings, 
 from vedette.densities import LMB
 from vedette.filters import LmbFilter
 from vedette.fusion import Clmb
+from vedette.platforms import Courses
 
 region = models.Region(-1000.0, 1000.0, -1000.0, 1000.0)
 sensor = models.SensorModel(
     models.bearing_range(), models.constant_noise([0.02, 10.0]), models.constant_detection(0.9),
     models.region_clutter(25.0, region, "bearing_range"),
 )
-tracker = LmbFilter(models.constant_velocity(5.0), models.constant_survival(0.98), models.BirthModel.none(4), sensor)
+targets = models.TargetModel(
+    models.constant_velocity(5.0), models.constant_survival(0.98), models.BirthModel.none(4)
+)
+tracker = LmbFilter(targets, sensor)
 num = 4
 belief = LMB.from_bernoullis(
     [(1, i) for i in range(num)], [0.9] * num,
@@ -116,7 +120,7 @@ def counted(prior, decision, first, last, results):
     done.append(last - first)
 
 pseudo.pseudo_update_lmb = counted
-planner = IndependentPlanner((MobileSensor(tracker, 50.0),), Clmb((1.0,)), settings)
+planner = IndependentPlanner((MobileSensor(tracker, Courses(50.0)),), Clmb((1.0,)), settings)
 try:
     planner.plan([belief], belief, [[-700.0, 0.0, 0.0]], rng=np.random.default_rng(1))
 except KeyboardInterrupt:

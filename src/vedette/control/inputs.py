@@ -7,39 +7,52 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from vedette.control.settings import MobileSensor
+from vedette.control.settings import MobileSensor, PlanningSettings
 from vedette.densities import GLMB, LMB
 from vedette.errors import InputError
-from vedette.filters import DeltaGlmbFilter, LabelledFilter
+from vedette.filters import labels_targets, shared_targets
 from vedette.kernels.base.types import Floats
+from vedette.models import TargetModel
 from vedette.models.arguments import float_array, reject
+from vedette.platforms import Options, options_at
 
 Belief: TypeAlias = GLMB | LMB
 
 
-def check_sensors(sensors: Sequence[MobileSensor]) -> None:
-    """`InputError` unless there is at least one sensor, and all track states of one dimension."""
+def check_sensors(sensors: Sequence[MobileSensor]) -> TargetModel:
+    """The targets that the sensors track; `InputError` unless there is a sensor, and all track the same."""
     if len(sensors) == 0 or not all(isinstance(sensor, MobileSensor) for sensor in sensors):
         raise reject("sensors", "at least one MobileSensor", sensors)
-    dims = [sensor.filter.motion.state_dim for sensor in sensors]
-    if len(set(dims)) > 1:
-        raise InputError(f"sensors: expected filters of one state dimension; got {dims}")
+    return shared_targets([sensor.filter for sensor in sensors])
 
 
 def check_poses(poses: Any, num_sensors: int) -> Floats:
-    """The poses as a (num_sensors, 3) array; `InputError` if they are not that or not finite."""
-    return float_array("poses", poses, (num_sensors, 3))
+    """The poses as a (num_sensors, 3 or more) array; `InputError` if they are not that or not finite."""
+    checked = float_array("poses", poses, (num_sensors, None))
+    if checked.shape[1] < 3:
+        raise reject("poses", f"an array of shape ({num_sensors}, 3 or more)", f"shape {checked.shape}")
+    return checked
+
+
+def options_of(sensors: Sequence[MobileSensor], poses: Any, settings: PlanningSettings) -> tuple[Options, ...]:
+    """For each sensor what it may do over the horizon; `InputError` for sensors, poses or platforms that do not fit."""
+    check_sensors(sensors)
+    at, times = check_poses(poses, len(sensors)), settings.horizon_times()
+    return tuple(
+        options_at(f"sensors[{s}].platform", sensor.platform, pose, times)
+        for s, (sensor, pose) in enumerate(zip(sensors, at, strict=True))
+    )
 
 
 def check_beliefs(sensors: Sequence[MobileSensor], beliefs: Sequence[Any], fused: Any) -> None:
     """`InputError` unless there is a valid belief of the right kind for each sensor's filter, and a valid fused one."""
     if len(beliefs) != len(sensors):
         raise InputError(f"beliefs: expected {len(sensors)}, one a sensor; got {len(beliefs)}")
-    state_dim = sensors[0].filter.motion.state_dim
+    state_dim = shared_targets([sensor.filter for sensor in sensors]).state_dim
     for i, (belief, sensor) in enumerate(zip(beliefs, sensors, strict=True)):
-        if not isinstance(sensor.filter, LabelledFilter):
+        if not labels_targets(sensor.filter):
             raise reject(f"sensors[{i}].filter", "one that labels its targets", type(sensor.filter).__name__)
-        kind = GLMB if isinstance(sensor.filter, DeltaGlmbFilter) else LMB
+        kind = GLMB if isinstance(sensor.filter.initial(), GLMB) else LMB
         _check_density(f"beliefs[{i}]", belief, (kind,), state_dim)
     _check_density("fused", fused, (GLMB, LMB), state_dim)
 
@@ -54,14 +67,6 @@ def _check_density(name: str, density: Any, kinds: tuple[type[Belief], ...], sta
         density.validate(error=InputError)
     except InputError as fault:
         raise InputError(f"{name}: {fault}") from None
-
-
-def check_headings(name: str, headings: Any) -> Floats:
-    """The headings of an action set as an array; `InputError` unless there is at least one and all are finite."""
-    values = float_array(name, headings, (None,))
-    if len(values) == 0:
-        raise InputError(f"{name}: expected at least one heading; got none")
-    return values
 
 
 def check_choice(name: str, choice: Any, shape: tuple[int, ...]) -> tuple[int, ...]:

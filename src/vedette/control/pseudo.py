@@ -21,13 +21,13 @@ from vedette.control.settings import IDEAL_MODES, MobileSensor, PlanningSettings
 from vedette.control.threads import run_chunks
 from vedette.densities import GLMB, LMB, TrackTable, sample_glmb, sample_lmb
 from vedette.densities.checks import unchecked
+from vedette.filters import shared_targets
 from vedette.filters.inputs import model_errors
 from vedette.kernels.base.types import Floats
 from vedette.kernels.planning.ideal import Decision, Futures, Horizon, propagate_samples
 from vedette.kernels.planning.pseudo_glmb import GlmbResults, pseudo_update_glmb
 from vedette.kernels.planning.pseudo_lmb import LmbResults, pseudo_update_lmb
 from vedette.models import constant_survival, kernel_motion
-from vedette.models.platforms import advance
 
 
 class PseudoPosteriors(NamedTuple):
@@ -52,7 +52,8 @@ def draw_futures(
 
     The random numbers of detections and noise are each sensor's own, and the same for all its actions.
     """
-    motion = kernel_motion(sensors[0].filter.motion, sensors[0].filter.survival)
+    targets = shared_targets([sensor.filter for sensor in sensors])
+    motion = kernel_motion(targets.motion, targets.survival)
     num = settings.num_samples
     samples = sample_glmb(fused, num, rng=rng) if isinstance(fused, GLMB) else sample_lmb(fused, num, rng=rng)
     with model_errors():
@@ -66,37 +67,28 @@ def draw_futures(
     return tuple(futures)
 
 
-def horizon_poses(pose: Floats, headings: Floats, speed: float, settings: PlanningSettings) -> Floats:
-    """(num_actions, horizon_steps, 3) poses at the pseudo-updates under each heading."""
-    poses = np.empty((len(headings), settings.horizon_steps, 3))
-    at = np.tile(pose, (len(headings), 1))
-    for h in range(settings.horizon_steps):
-        at = advance(at, headings, speed, settings.horizon_period)
-        poses[:, h] = at
-    return poses
-
-
 def pseudo_posteriors(
-    belief: Belief, sensor: MobileSensor, pose: Floats, headings: Floats, futures: Futures, settings: PlanningSettings
+    belief: Belief, sensor: MobileSensor, courses: Floats, futures: Futures, settings: PlanningSettings
 ) -> PseudoPosteriors:
-    """Run the sensor's filter over the horizon for every heading and sample, without births or deaths.
+    """Run the sensor's filter over the horizon for every course and sample, without births or deaths.
 
+    courses: (num_courses, horizon_steps, pose_dim) poses at the pseudo-updates.
     The belief is one of the filter's kind. Raises `ModelError` and `NumericalError` as the filter.
     """
     horizon = Horizon(
-        horizon_poses(pose, headings, sensor.speed, settings),
+        courses,
         float(settings.horizon_period),
         IDEAL_MODES[settings.ideal_measurements],
         float(settings.detection_threshold),
     )
     decision = Decision(
-        kernel_motion(sensor.filter.motion, constant_survival(1.0)),
+        kernel_motion(sensor.filter.targets.motion, constant_survival(1.0)),
         sensor.filter.sensor.to_kernel(),
         horizon,
         futures,
         settings.limits.truncation(sensor.filter.sensor.meas_dim),
     )
-    num_cases = len(headings) * settings.num_samples
+    num_cases = len(courses) * settings.num_samples
     if isinstance(belief, GLMB):
         return _run_glmb(belief, decision, settings, num_cases)
     return _run_lmb(belief, decision, settings, num_cases)

@@ -12,8 +12,10 @@ import numpy as np
 from vedette.control.plan import Plan, RewardTable
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats, Ints
+from vedette.platforms import Actions
 from vedette.simulation.arrow import Columns, Kind, Layout
 from vedette.simulation.records import Decision
+from vedette.text import shown
 
 _DECISION = {"decision": Kind.INTEGER, "step": Kind.INTEGER, "time_s": Kind.NUMBER}
 
@@ -44,7 +46,7 @@ def planned_tables(decisions: Sequence[Decision], num_sensors: int) -> dict[str,
     of_decisions = {
         **_columns_of(enumerate(decisions)),
         "planner": [decision.plan.planner for decision in decisions],
-        "notes": ["" for _ in decisions],
+        "notes": [_notes(decision.plan) for decision in decisions],
         **{f"num_{name}": np.array([each.plan.counts.get(name, -1) for each in decisions]) for name in counted},
     }
     return {"decisions": of_decisions, "actions": _actions(decisions), "rewards": _rewards(decisions, num_sensors)}
@@ -67,6 +69,7 @@ def decisions_of(tables: Mapping[str, Mapping[str, Any]], poses: Floats) -> tupl
             table["planner"][index],
             {name: column[of_actions[index]] for name, column in actions.items()},
             {name: column[of_rewards[index]] for name, column in rewards.items()},
+            table["notes"][index],
             {name.removeprefix("num_"): int(table[name][index]) for name in counted if table[name][index] >= 0},
             room,
         )
@@ -76,7 +79,12 @@ def decisions_of(tables: Mapping[str, Mapping[str, Any]], poses: Floats) -> tupl
 
 
 def _plan(
-    planner: str, actions: Mapping[str, Any], rewards: Mapping[str, Any], counts: dict[str, int], room: int
+    planner: str,
+    actions: Mapping[str, Any],
+    rewards: Mapping[str, Any],
+    notes: str,
+    counts: dict[str, int],
+    room: int,
 ) -> Plan:
     options, chosen = [], []
     for rows in _rows_by("sensor", actions):
@@ -86,13 +94,16 @@ def _plan(
         (choice,) = np.flatnonzero(own["chosen"])
         chosen.append(int(choice))
         names = [name for name in PLANNED["actions"].others(own) if not np.isnan(own[name]).all()]
-        options.append(np.stack([own[name] for name in names], axis=1)[:, 0])
+        values = np.empty((len(own["action"]), len(names)))
+        for place, name in enumerate(names):
+            values[:, place] = own[name]
+        options.append(Actions(tuple(name.removeprefix("action_") for name in names), values))
     shape = tuple(len(values) for values in options)
     tables: list[RewardTable] = []
     for rows in _rows_by("reward_table", rewards):
         tables.append(_table(rewards, rows, shape, room))
         room -= tables[-1].mean.size
-    return Plan(planner, tuple(options), tuple(chosen), tuple(tables), counts)
+    return Plan(planner, tuple(options), tuple(chosen), tuple(tables), counts, tuple(notes.splitlines()))
 
 
 def _table(rewards: Mapping[str, Any], rows: slice, num_actions: tuple[int, ...], room: int) -> RewardTable:
@@ -109,12 +120,20 @@ def _table(rewards: Mapping[str, Any], rows: slice, num_actions: tuple[int, ...]
     return RewardTable(tuple(sensors.tolist()), mean, error)
 
 
+def _notes(plan: Plan) -> str:
+    """A line each."""
+    text = "\n".join(plan.notes)
+    if text.splitlines() != list(plan.notes):
+        raise InputError(f"plan.notes: expected notes of one line each; got {shown(text)}")
+    return text
+
+
 def _actions(decisions: Sequence[Decision]) -> Columns:
     """One row a decision, sensor and action; null where a number is none of the sensor's."""
     parts = [
-        (number, decision, sensor, ("heading_rad",), values[:, None])
+        (number, decision, sensor, own.columns, own.values)
         for number, decision in enumerate(decisions)
-        for sensor, values in enumerate(decision.plan.action_values)
+        for sensor, own in enumerate(decision.plan.actions)
     ]
     lengths = [len(values) for *_, values in parts]
     names = dict.fromkeys(name for *_, names, _ in parts for name in names)
