@@ -11,7 +11,6 @@ from vedette.control import FixedPlanner, IndependentPlanner, JointPlanner, Mobi
 from vedette.errors import InputError
 from vedette.filters import DeltaGlmbFilter, LabelledFilter, LocalFilter
 from vedette.fusion import Clmb, CmDeltaGlmb
-from vedette.scenarios.checks import decision_steps
 from vedette.scenarios.loading import Scenario
 from vedette.simulation.experiment import Experiment
 from vedette.simulation.truth import TargetSource
@@ -37,7 +36,7 @@ def build_experiment(scenario: Scenario) -> Experiment:
         fusion=model.fusion.build(len(sensors)),
         feedback=model.fusion.feedback,
         estimate=model.estimator.build(),
-        decision_steps=decision_steps(model),
+        decision_steps=model.decision_steps,
     )
 
 
