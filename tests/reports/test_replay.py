@@ -90,7 +90,7 @@ def test_a_joint_decision_is_a_map_and_curves_with_the_choice(strategies: Mappin
     plan = record.decisions[0].plan
     i, j = decision["map"]["chosen"]
     assert decision["scan"] == 9
-    assert [decision["map"]["degrees"][0][i], decision["map"]["degrees"][1][j]] == decision["headings"]
+    assert f"{decision['map']['labels'][0][i]}, {decision['map']['labels'][1][j]}" == decision["actions"]
     table = np.array(decision["map"]["mean"])
     assert table[i, j] == table.max() == pytest.approx(plan.expected_rewards[0][0], rel=1e-4)
     for curve, chosen in zip(decision["curves"], (i, j), strict=True):

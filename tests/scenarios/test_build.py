@@ -231,10 +231,10 @@ def test_the_marginal_estimator_has_its_threshold() -> None:
 
 def test_actions_of_one_sensor_and_of_all() -> None:
     model = scenario(("speed: 4.0", "actions_deg: [-10, 10], headings: relative")).model
-    own, common = (model.control.build_actions(sensor) for sensor in model.sensors)
+    own, common = (model.control.build_platform(sensor) for sensor in model.sensors)
     pose = np.array([0.0, 0.0, math.pi / 2])
-    np.testing.assert_allclose(np.degrees(own.headings(pose)), [80.0, 100.0])
-    np.testing.assert_allclose(np.degrees(common.headings(pose)), np.arange(-180, 181, 30))
+    np.testing.assert_allclose(own.actions(pose)[:, 0], [80.0, 100.0])
+    np.testing.assert_allclose(common.actions(pose)[:, 0], np.arange(-180, 181, 30))
 
 
 def test_an_unknown_planner() -> None:
@@ -271,4 +271,4 @@ def test_decisions_of_the_papers_scenario_are_the_printed_ones() -> None:
     experiment, beliefs, fused, _ = tracked(loaded, 10, rng)
     for planner in ("jdm", "idm"):
         plan = build.build_planner(loaded, planner).plan(beliefs, fused, experiment.poses, rng=rng)
-        np.testing.assert_allclose(np.degrees(plan.chosen_headings), [-30.0, 30.0])
+        np.testing.assert_allclose(np.ravel(plan.chosen_actions), [-30.0, 30.0])

@@ -11,6 +11,7 @@ from vedette.control import FixedPlanner, IndependentPlanner, JointPlanner, Mobi
 from vedette.errors import InputError
 from vedette.filters import DeltaGlmbFilter, LabelledFilter, LocalFilter
 from vedette.fusion import Clmb, CmDeltaGlmb
+from vedette.platforms import Actions
 from vedette.scenarios.loading import Scenario
 from vedette.simulation.experiment import Experiment
 from vedette.simulation.truth import TargetSource
@@ -32,7 +33,9 @@ def build_experiment(scenario: Scenario) -> Experiment:
         targets=model.targets.build(model, sensors[0].filter.motion, scenario.folder),
         sensors=sensors,
         poses=np.array([sensor.pose for sensor in model.sensors]),
-        moving=np.array([sensor.moves_from == "start" for sensor in model.sensors]),
+        first_actions=tuple(
+            np.array([sensor.heading_deg]) if sensor.moves_from == "start" else None for sensor in model.sensors
+        ),
         fusion=model.fusion.build(len(sensors)),
         feedback=model.fusion.feedback,
         estimate=model.estimator.build(),
@@ -53,8 +56,7 @@ def build_sensors(scenario: Scenario) -> tuple[MobileSensor, ...]:
     return tuple(
         MobileSensor(
             model.filter.build(motion, survival, birth, sensor.build(region, method, folder)),
-            sensor.speed,
-            model.control.build_actions(sensor),
+            model.control.build_platform(sensor),
         )
         for sensor in model.sensors
     )
@@ -74,9 +76,9 @@ def build_planner(scenario: Scenario, name: str) -> Planner:
     """
     model, sensors = scenario.model, build_sensors(scenario)
     if name == "random":
-        return RandomPlanner(sensors)
+        return RandomPlanner(sensors, model.control.build())
     if name == "fixed":
-        return FixedPlanner(tuple(sensor.heading_deg for sensor in model.sensors))
+        return FixedPlanner(tuple(Actions.of(heading_deg=sensor.heading_deg) for sensor in model.sensors))
     if name not in PLANNERS:
         raise InputError(f"planner: expected one of {', '.join(PLANNERS)}; got {name!r}")
     planner = JointPlanner if name == "jdm" else IndependentPlanner

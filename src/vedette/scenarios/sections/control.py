@@ -15,7 +15,8 @@ from vedette.scenarios.sections.sensors import Actions, Headings, Sensor
 
 if TYPE_CHECKING:  # with the planners comes the compiler, which a check does without
     from vedette.control import CauchySchwarzReward as Reward
-    from vedette.control import HeadingActions, PlanningSettings
+    from vedette.control import PlanningSettings
+    from vedette.platforms import Courses
 
 
 class CauchySchwarzReward(Section):
@@ -116,9 +117,9 @@ class Control(Section):
             ),
         )
 
-    def build_actions(self, sensor: Sensor) -> HeadingActions:
-        """The actions of one sensor: its own, or those of all."""
-        from vedette.control import HeadingActions
+    def build_platform(self, sensor: Sensor) -> Courses:
+        """What carries one sensor, with its own actions or those of all."""
+        from vedette.platforms import Courses
 
         headings = sensor.headings or self.headings
-        return HeadingActions(sensor.actions_deg or self.actions_deg, relative=headings == "relative")
+        return Courses(sensor.speed, sensor.actions_deg or self.actions_deg, relative=headings == "relative")
