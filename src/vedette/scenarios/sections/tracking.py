@@ -12,9 +12,10 @@ from vedette.scenarios.faults import Finding
 from vedette.scenarios.sections.base import Chance, Count, GaussianMethod, Probability, Section, Share, check
 
 if TYPE_CHECKING:  # with the filters comes the compiler, which a check does without
-    from vedette.filters import Limits, LocalFilter
+    from vedette.filters import Filter as LocalFilter
+    from vedette.filters import Limits
     from vedette.fusion import Clmb, CmDeltaGlmb
-    from vedette.models import BirthModel, MotionModel, SensorModel, SurvivalModel
+    from vedette.models import SensorModel, TargetModel
 
 
 _WEIGHT_TOLERANCE = 1e-6
@@ -105,27 +106,23 @@ class Filter(Section):
         if self.kind in ("lmb", *UNLABELLED) and self.assignment.kind == "gibbs":
             yield ("assignment", "kind"), f"ranked, as the filter is {self.kind}", '"gibbs"'
 
-    def build(
-        self, motion: MotionModel, survival: SurvivalModel, birth: BirthModel, sensor: SensorModel
-    ) -> LocalFilter:
+    def build(self, targets: TargetModel, sensor: SensorModel) -> LocalFilter:
         """The filter of one sensor."""
         from vedette.filters import CbMemberFilter, CphdFilter, DeltaGlmbFilter, LmbFilter, PhdFilter
 
         limits = self.limits.build()
         match self.kind:
             case "lmb":
-                return LmbFilter(motion, survival, birth, sensor, limits)
+                return LmbFilter(targets, sensor, limits)
             case "phd":
-                return PhdFilter(motion, survival, birth, sensor, limits)
+                return PhdFilter(targets, sensor, limits)
             case "cphd":
-                return CphdFilter(motion, survival, birth, sensor, limits)
+                return CphdFilter(targets, sensor, limits)
             case "cb_member":
-                return CbMemberFilter(motion, survival, birth, sensor, limits)
+                return CbMemberFilter(targets, sensor, limits)
         gibbs = self.assignment if isinstance(self.assignment, GibbsAssignment) else GibbsAssignment()
         return DeltaGlmbFilter(
-            motion,
-            survival,
-            birth,
+            targets,
             sensor,
             limits,
             assignment=self.assignment.kind,
