@@ -16,7 +16,6 @@ from vedette.kernels.base.types import Floats
 from vedette.models import TargetModel
 from vedette.platforms import Actions
 from vedette.platforms.base import actions_at
-from vedette.scenarios.checks import decision_steps
 from vedette.scenarios.loading import Scenario
 from vedette.simulation.experiment import Experiment
 from vedette.simulation.truth import TargetSource
@@ -46,7 +45,7 @@ def build_experiment(scenario: Scenario) -> Experiment:
         fusion=model.fusion.build(len(sensors)),
         feedback=model.fusion.feedback,
         estimate=model.estimator.build(),
-        decision_steps=decision_steps(model),
+        decision_steps=model.decision_steps,
     )
 
 

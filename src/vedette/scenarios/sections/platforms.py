@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
-from vedette.scenarios.sections.base import Numbers, Point, Positive, Section, SomeNumbers, expected
+from vedette.scenarios.faults import Finding
+from vedette.scenarios.sections.base import Numbers, Point, Positive, Section, SomeNumbers, check
 from vedette.scenarios.sections.custom import Custom
 
 if TYPE_CHECKING:  # with the platforms come the models, and the compiler, which a check does without
@@ -70,11 +72,10 @@ class Courses(_PlatformSection):
     )
     relative: bool = Field(default=False, description="Whether they are changes of heading, added to it [-].")
 
-    @model_validator(mode="after")
-    def _one_of_both(self) -> Courses:
+    @check
+    def _one_of_both(self) -> Iterator[Finding]:
         if (self.speed is None) == (self.speeds is None):
-            raise expected("either speed or speeds", got="neither" if self.speed is None else "both")
-        return self
+            yield (), "either speed or speeds", "neither" if self.speed is None else "both"
 
     def build(self, folder: Path) -> Platform:
         """Courses at one speed or several."""
