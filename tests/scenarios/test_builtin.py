@@ -111,7 +111,7 @@ def test_every_choice_that_the_paper_leaves_open_is_a_field_with_its_default(row
         "region": {"x_min": 0.0, "x_max": 1.0, "y_min": 0.0, "y_max": 1.0},
         "birth": {"sites": [{"existence": 0.1, "mean": [0.0] * 4, "std": [1.0] * 4}]},
         "targets": {"kind": "scripted", "tracks": []},
-        "sensors": [{"position": [0.0, 0.0]}],
+        "sensors": [{"position": [0.0, 0.0], "platform": {"kind": "courses", "speed": 1.0}}],
     }
     assert field_at(ScenarioModel.model_validate(least), path) == default
 
