@@ -1,19 +1,20 @@
-"""Section about control: when to decide, between which actions, and how an action is valued."""
+"""Section about control: when to decide, and how an action is valued."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import pairwise
 from typing import TYPE_CHECKING, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
-from vedette.scenarios.sections.base import Count, Numbers, Positive, Probability, Section, Share, Steps, expected
-from vedette.scenarios.sections.sensors import Actions, Headings, Sensor
+from vedette.scenarios.faults import Finding, describe
+from vedette.scenarios.sections.base import Count, Numbers, Positive, Probability, Section, Share, Steps, check
 
 if TYPE_CHECKING:  # with the planners comes the compiler, which a check does without
     from vedette.control import CauchySchwarzReward as Reward
     from vedette.control import PlanningSettings
-    from vedette.platforms import Courses
 
 
 class CauchySchwarzReward(Section):
@@ -43,6 +44,12 @@ class PlanningLimits(Section):
     )
 
 
+def _order(name: str, moments: Sequence[float]) -> Iterator[Finding]:
+    for i, (before, after) in enumerate(pairwise(moments)):
+        if after <= before:
+            yield (name, i + 1), f"more than the one before it, {before:g}", describe(after)
+
+
 class Control(Section):
     """When and how the sensors decide where to go. Without decisions they keep their course.
 
@@ -52,15 +59,6 @@ class Control(Section):
     decision_steps: Steps | None = Field(default=None, description="Scans after which they decide [-].")
     decision_times: Numbers | None = Field(
         default=None, description="The same as times, instead of decision_steps; each the time of a scan [s]."
-    )
-    actions_deg: Actions = Field(
-        default=tuple(range(-180, 181, 30)),
-        description="Actions of every sensor, in the order of tables and figures. Those that are one heading (-180 and "
-        "180) are evaluated once and shown each; of equal rewards the first action wins [deg].",
-    )
-    headings: Headings = Field(
-        default="absolute",
-        description="Whether an action is a heading, counter-clockwise from east, or a change of heading [-].",
     )
     horizon_steps: Count = Field(default=5, description="Pseudo-updates over the horizon, H [-].")
     horizon_period: Positive = Field(default=2.0, description="Time between pseudo-updates, T [s].")
@@ -77,11 +75,18 @@ class Control(Section):
     reward: CauchySchwarzReward = Field(default=CauchySchwarzReward(), description="Value of a density [-].")
     limits: PlanningLimits = Field(default=PlanningLimits(), description="How much it works with [-].")
 
-    @model_validator(mode="after")
-    def _one_schedule(self) -> Control:
+    @check
+    def _one_schedule(self) -> Iterator[Finding]:
         if self.decision_steps is not None and self.decision_times is not None:
-            raise expected("either decision_steps or decision_times", got="both")
-        return self
+            yield (), "either decision_steps or decision_times", "both"
+
+    @check
+    def _steps_in_order(self) -> Iterator[Finding]:
+        yield from _order("decision_steps", self.decision_steps or ())
+
+    @check
+    def _times_in_order(self) -> Iterator[Finding]:
+        yield from _order("decision_times", self.decision_times or ())
 
     def build(self) -> PlanningSettings:
         """Horizon, samples and caps of a decision."""
@@ -100,10 +105,3 @@ class Control(Section):
                 min_relative_weight=self.limits.min_relative_weight,
             ),
         )
-
-    def build_platform(self, sensor: Sensor) -> Courses:
-        """What carries one sensor, with its own actions or those of all."""
-        from vedette.platforms import Courses
-
-        headings = sensor.headings or self.headings
-        return Courses(sensor.speed, sensor.actions_deg or self.actions_deg, relative=headings == "relative")
