@@ -239,6 +239,10 @@ def test_a_subclass_is_asked_itself() -> None:
         def __call__(self, predicted: Any, updated: Any) -> float:
             return 2.0 * CauchySchwarzReward.__call__(self, predicted, updated)
 
+    class Tripled(CauchySchwarzReward):
+        def combine(self, z: Any) -> Any:
+            return 3.0 * CauchySchwarzReward.combine(self, z)
+
     class Fused(CmDeltaGlmb):
         def fuse(self, beliefs: Any) -> Any:
             return CmDeltaGlmb((1.0,)).fuse(beliefs[:1])
@@ -246,8 +250,15 @@ def test_a_subclass_is_asked_itself() -> None:
     example = situation("marginal")
     evaluator = evaluator_of(example)
     expected = evaluator.sample_rewards((0, 1), example.fusion)
-    doubled = evaluator_of(example, Doubled())
-    np.testing.assert_allclose(doubled.sample_rewards((0, 1), example.fusion), 2.0 * expected, rtol=1e-9, atol=1e-9)
+    assert not evaluator.notes
+    for reward, factor, laid_out in ((Doubled(), 2.0, False), (Tripled(), 3.0, True)):
+        other = evaluator_of(example, reward)
+        for fusion, rewards in ((example.fusion, expected), (Fused((0.5, 0.5)), None)):
+            found = other.sample_rewards((0, 1), fusion)
+            rewards = factor * (evaluator.sample_rewards((0, 1), fusion) if rewards is None else rewards)
+            np.testing.assert_allclose(found, rewards, rtol=1e-9, atol=1e-9)
+            if fusion is example.fusion:
+                assert laid_out == (not other.notes)
     fused = evaluator.sample_rewards((0, 1), Fused((0.5, 0.5)))
     first = evaluator.sample_rewards((0,), None)
     np.testing.assert_allclose(fused, np.repeat(first, 3, axis=0), rtol=1e-9, atol=1e-9)

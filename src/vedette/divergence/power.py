@@ -146,7 +146,7 @@ def _of_singles(
 def _has_more_sets(lmb: LMB, on_sets: GLMB) -> bool:
     """Whether the LMB has label sets of positive weight beyond these."""
     num_sets = int(2 ** np.count_nonzero(np.isfinite(lmb.existence_logit)))
-    return num_sets > np.count_nonzero(on_sets.hyp_log_weights > -math.inf)
+    return bool(num_sets > np.count_nonzero(on_sets.hyp_log_weights > -math.inf))
 
 
 def _of_one_kind(

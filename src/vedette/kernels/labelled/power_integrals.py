@@ -143,7 +143,7 @@ def _multiply(laid: Laid, chosen: Ints, member: int, product: Floats) -> None:
 
 @inlined
 def _integrate(laid: Laid, chosen: Ints, at: int, terms: Terms, work: Work) -> tuple[float, float]:
-    """Integrals over the labels of a set: the sums of log integral g and of q (see `_add_terms`), and `work.crossed`."""
+    """Over the labels of a set: the sums of log integral g and of q (see `_add_terms`), and those of `work.crossed`."""
     product, joint, last = work.product, work.joint, work.product.shape[0] - 1
     overlap, quadratic, num_crossed = 0.0, 0.0, terms.own_powers.shape[0]
     num_alone = terms.powers.shape[0] - num_crossed
@@ -169,7 +169,7 @@ def _integrate(laid: Laid, chosen: Ints, at: int, terms: Terms, work: Work) -> t
 def _add_terms(at: int, weight: float, overlap: float, quadratic: float, terms: Terms, work: Work) -> None:
     """Add the terms of a label set to the sums of its factor.
 
-    One elimination serves every b: g^b has b times the row of g, so that, with q = s - y'Y^-1 y left by the elimination,
+    One elimination serves every b: g^b has b times the row of g, so that, with q = s - y'Y^-1 y which it leaves,
     log integral g^b = (d log(2 pi) - log det Y - d log b - b q) / 2 = log integral g - (b - 1) q / 2 - d log(b) / 2.
     """
     num_alone = terms.powers.shape[0] - terms.own_powers.shape[0]
