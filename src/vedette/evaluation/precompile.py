@@ -10,10 +10,10 @@ import numpy as np
 
 from vedette.control import JointPlanner
 from vedette.densities import GLMB, LMB
-from vedette.evaluation.runs import children_ignore_interrupts, strategy
+from vedette.evaluation.runs import children_ignore_interrupts
 from vedette.filters import labels_targets
 from vedette.scenarios import Scenario
-from vedette.scenarios.build import build_experiment
+from vedette.scenarios.build import build_experiment, build_planner
 from vedette.simulation.experiment import Experiment
 from vedette.simulation.loop import run_stream
 
@@ -52,7 +52,7 @@ def _compile_planning(scenario: Scenario) -> None:
     fusion = experiment.fusion
     fused = beliefs[0] if fusion is None else fusion.fuse(beliefs)[0]
     experiment.estimate(fused, 1)
-    planner = strategy(scenario, "jdm")
+    planner = build_planner(scenario, "jdm")
     assert isinstance(planner, JointPlanner)
     quick = replace(planner, settings=replace(planner.settings, num_samples=2, horizon_steps=1, num_threads=1))
     quick.plan(beliefs, fused, experiment.poses, rng=run_stream(0, 0))

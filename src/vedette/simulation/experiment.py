@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from vedette.control import MobileSensor
-from vedette.densities import Estimate
+from vedette.densities import Estimator
 from vedette.errors import InputError
-from vedette.filters import Belief
 from vedette.fusion import Fusion
 from vedette.kernels.base.types import Floats
 from vedette.simulation.truth import TargetSource
@@ -47,7 +45,7 @@ class Experiment:
     first_actions: tuple[Floats | None, ...]
     fusion: Fusion[Any, Any] | None
     feedback: bool
-    estimate: Callable[[Belief, int], Estimate]
+    estimate: Estimator
     decision_steps: tuple[int, ...]
 
     def __post_init__(self) -> None:

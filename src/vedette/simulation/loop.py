@@ -18,7 +18,7 @@ from vedette.simulation.experiment import Experiment
 from vedette.simulation.health import Health
 from vedette.simulation.records import Decision, RunRecord
 from vedette.simulation.scans import simulate_scan
-from vedette.simulation.stopping import RunInterrupted, RunStopped
+from vedette.simulation.stopping import RunInterrupted, RunStopped, cause_of
 from vedette.simulation.truth import Truth
 
 Score: TypeAlias = Callable[[Truth, Sequence[Estimate]], Floats]
@@ -138,8 +138,7 @@ def simulate(experiment: Experiment, planner: Planner | None, *, seed: int, run:
         message = f"{journal.place()}: interrupted"
         raise RunInterrupted(message, journal.partial(score, message)) from interrupt
     except Exception as error:
-        cause = str(error) if isinstance(error, VedetteError) else f"{type(error).__name__}: {error}"
-        message = f"{journal.place()}: {cause}"
+        message = f"{journal.place()}: {cause_of(error)}"
         record = journal.partial(score, message)
         raise RunStopped(message, journal.watch.step, journal.time, journal.watch.under_way, record) from error
 

@@ -1,4 +1,4 @@
-"""Things of the user's own that a scenario names: imported, made, and held against the protocol that they are to meet."""
+"""Things of the user's own that a scenario names: imported, made, and held against the protocol they are to meet."""
 
 from __future__ import annotations
 
@@ -8,10 +8,11 @@ import importlib.util
 import inspect
 import re
 import sys
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from types import ModuleType
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 from pydantic import AfterValidator, Field, JsonValue
 
@@ -51,6 +52,7 @@ class Custom(Section):
     function: Annotated[str, AfterValidator(_reference)] = Field(
         description="Where it is: `package.module:attribute`, or `file.py:attribute` relative to the scenario file [-]."
     )
+    spared: ClassVar[tuple[str, ...]] = ()  # members of the protocol that it need not have
     arguments: dict[str, JsonValue] = Field(
         default={}, description="Keyword arguments, where the attribute is a class or function that is called [-]."
     )
@@ -81,7 +83,7 @@ class Custom(Section):
     def made(self, folder: Path, **parts: Any) -> Any:
         """The object, of `parts` where it has to be made. Raises `NotGiven` for anything but what is wanted."""
         found, wanted = self.named(folder), self.protocol()
-        as_it_is = not isinstance(found, type) and (_is_function(wanted) or not lacks(found, wanted))
+        as_it_is = not isinstance(found, type) and (_is_function(wanted) or not lacks(found, wanted, self.spared))
         try:
             if as_it_is and _is_function(wanted) and self.arguments:
                 found = partial(found, **self.arguments)
@@ -94,7 +96,7 @@ class Custom(Section):
             raise
         except Exception as error:
             raise self._not_given(f"{type(error).__name__}: {error}") from error
-        if fault := lacks(found, wanted):
+        if fault := lacks(found, wanted, self.spared):
             raise self._not_given(fault)
         return found
 
@@ -117,13 +119,13 @@ def _asked_for(made: Any, parts: dict[str, Any]) -> dict[str, Any]:
     return {name: part for name, part in parts.items() if name in parameters}
 
 
-def lacks(found: Any, wanted: type) -> str:
-    """What an object lacks of a class or protocol, in words; empty where it lacks nothing."""
+def lacks(found: Any, wanted: type, spared: Sequence[str] = ()) -> str:
+    """What an object lacks of a class or protocol but for what is spared, in words; empty where it lacks nothing."""
     if not getattr(wanted, "_is_protocol", False):
         return "" if isinstance(found, wanted) else f"a {type(found).__name__}"
     what = f"a {type(found).__name__}"
     for name, member in _members(wanted).items():
-        if not hasattr(found, name):
+        if name not in spared and not hasattr(found, name):
             return f"{what} without {_shown(name, member)}"
         own = found if name == "__call__" else getattr(found, name)
         if inspect.isfunction(member) and not _takes(own, member):

@@ -13,9 +13,8 @@ from vedette.scenarios.sections.base import Chance, Count, Positive, Section, ch
 from vedette.scenarios.sections.custom import Custom
 
 if TYPE_CHECKING:  # with the densities comes the compiler, which a check does without
-    from vedette.densities import Estimate
+    from vedette.densities import Estimate, Estimator
     from vedette.filters import Belief
-    from vedette.simulation.experiment import Estimator
 
 
 class MapEstimator(Section):
@@ -60,7 +59,7 @@ class CustomEstimator(Custom):
     @classmethod
     def protocol(cls) -> type:
         """What it gives."""
-        from vedette.simulation.experiment import Estimator
+        from vedette.densities import Estimator
 
         return Estimator
 
@@ -81,9 +80,9 @@ class CustomMetric(Custom):
     @classmethod
     def protocol(cls) -> type:
         """What it gives."""
-        from vedette.simulation.records import ScanMeasure
+        from vedette.simulation.records import Measure
 
-        return ScanMeasure
+        return Measure
 
 
 class Ospa(Section):
