@@ -125,7 +125,9 @@ def lacks(found: Any, wanted: type, spared: Sequence[str] = ()) -> str:
         return "" if isinstance(found, wanted) else f"a {type(found).__name__}"
     what = f"a {type(found).__name__}"
     for name, member in _members(wanted).items():
-        if name not in spared and not hasattr(found, name):
+        if name in spared:
+            continue
+        if not hasattr(found, name):
             return f"{what} without {_shown(name, member)}"
         own = found if name == "__call__" else getattr(found, name)
         if inspect.isfunction(member) and not _takes(own, member):
@@ -165,8 +167,8 @@ def _takes(own: Any, member: Any) -> bool:
         inspect.signature(own).bind(*in_order, **by_name)
     except TypeError:
         return False
-    except ValueError:  # written in C
-        return True
+    except ValueError:  # written in C, or bound to arguments that it does not take
+        return not isinstance(own, partial)
     return True
 
 
