@@ -10,7 +10,7 @@ import numpy as np
 from vedette.control import FixedPlanner, IndependentPlanner, JointPlanner, MobileSensor, Planner, RandomPlanner
 from vedette.densities import LMB
 from vedette.errors import InputError
-from vedette.filters import Filter, labels_targets, shared_targets
+from vedette.filters import Filter, labels_targets
 from vedette.fusion import Clmb, CmDeltaGlmb
 from vedette.models import TargetModel
 from vedette.platforms import Actions
@@ -18,6 +18,7 @@ from vedette.scenarios.checks import decision_steps
 from vedette.scenarios.loading import Scenario
 from vedette.simulation.experiment import Experiment
 from vedette.simulation.truth import TargetSource
+from vedette.tracking import Distributed
 
 PLANNERS = ("jdm", "idm", "random", "fixed")
 
@@ -30,18 +31,18 @@ def build_experiment(scenario: Scenario) -> Experiment:
     """
     model = scenario.model
     sensors = build_sensors(scenario)
-    motion = shared_targets([sensor.filter for sensor in sensors]).motion
+    fusion = model.fusion.build(len(sensors))
+    tracker = Distributed(tuple(sensor.filter for sensor in sensors), fusion, model.fusion.feedback)
     return Experiment(
         name=model.name,
         times=model.time.build(),
-        targets=model.targets.build(model, motion, scenario.folder),
-        sensors=sensors,
+        targets=model.targets.build(model, tracker.targets.motion, scenario.folder),
+        tracker=tracker,
+        platforms=tuple(sensor.platform for sensor in sensors),
         poses=np.array([sensor.pose for sensor in model.sensors]),
         first_actions=tuple(
             np.array([sensor.heading_deg]) if sensor.moves_from == "start" else None for sensor in model.sensors
         ),
-        fusion=model.fusion.build(len(sensors)),
-        feedback=model.fusion.feedback,
         estimate=model.estimator.build(),
         decision_steps=decision_steps(model),
     )
