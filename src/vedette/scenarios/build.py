@@ -14,7 +14,6 @@ from vedette.filters import Filter, labels_targets
 from vedette.fusion import Clmb, CmDeltaGlmb
 from vedette.models import TargetModel
 from vedette.platforms import Actions
-from vedette.scenarios.checks import decision_steps
 from vedette.scenarios.loading import Scenario
 from vedette.simulation.experiment import Experiment
 from vedette.simulation.truth import TargetSource
@@ -44,7 +43,7 @@ def build_experiment(scenario: Scenario) -> Experiment:
             np.array([sensor.heading_deg]) if sensor.moves_from == "start" else None for sensor in model.sensors
         ),
         estimate=model.estimator.build(),
-        decision_steps=decision_steps(model),
+        decision_steps=model.decision_steps,
     )
 
 
