@@ -36,7 +36,7 @@ def filters_of(loaded: Scenario) -> Any:
 
 
 def test_times_and_poses() -> None:
-    experiment = build.build_experiment(scenario(("speed: 4.0", "heading_deg: 90")))
+    experiment = build.build_experiment(scenario(("heading_deg: 4.0", "heading_deg: 90")))
     np.testing.assert_allclose(experiment.times, 2.0 + 0.5 * np.arange(20))
     np.testing.assert_allclose(experiment.poses, [[0.0, 40.0, math.pi / 2], [0.0, -40.0, 0.0]])
 
@@ -88,7 +88,7 @@ def test_no_target_is_a_scenario_too() -> None:
     ],
 )
 def test_measurements_and_their_noise(text: str, dim: int, angular: list[bool]) -> None:
-    sensor = filters_of(scenario(("speed: 4.0", text)))[0].sensor
+    sensor = filters_of(scenario(("heading_deg: 4.0", text)))[0].sensor
     assert sensor.meas_dim == dim
     assert list(sensor.measurement.angular) == angular
     sensor.check([[10.0, 20.0, 1.0, 1.0]], [0.0, 40.0, 0.0])
@@ -96,21 +96,21 @@ def test_measurements_and_their_noise(text: str, dim: int, angular: list[bool]) 
 
 def test_degrees_become_radians() -> None:
     text = "noise: {kind: range_dependent, sigma_range: 3.0, eta_range: 0.0, sigma_bearing_deg: 2.0, eta_bearing: 0.0}"
-    sensor = filters_of(scenario(("speed: 4.0", text)))[0].sensor
+    sensor = filters_of(scenario(("heading_deg: 4.0", text)))[0].sensor
     cov = sensor.noise.covs([10.0, 20.0, 0.0, 0.0], [0.0, 0.0, 0.0], 2)
     np.testing.assert_allclose(cov[0], np.diag([math.radians(2.0) ** 2, 9.0]))
 
 
 def test_a_sector_is_around_the_heading() -> None:
     text = "detection: {kind: limited_sector, probability: 0.9, max_range: 50.0, half_width_deg: 30.0}"
-    detection = filters_of(scenario(("speed: 4.0", text)))[0].sensor.detection
+    detection = filters_of(scenario(("heading_deg: 4.0", text)))[0].sensor.detection
     states = [[10.0, 5.0, 0.0, 0.0], [10.0, 8.0, 0.0, 0.0], [60.0, 0.0, 0.0, 0.0]]
     np.testing.assert_allclose(detection.prob(states, [0.0, 0.0, 0.0]), [0.9, 0.0, 0.0])
 
 
 def test_clutter_of_the_region_and_of_measurement_space() -> None:
     text = "clutter: {kind: measurement_space, rate: 7, low: [0.0, 0.0], high: [6.283185307179586, 100.0]}"
-    north, south = (local.sensor.clutter for local in filters_of(scenario(("speed: 4.0", text))))
+    north, south = (local.sensor.clutter for local in filters_of(scenario(("heading_deg: 4.0", text))))
     assert (north.rate, south.rate) == (7.0, 25.0)
 
 
@@ -132,7 +132,7 @@ def test_models_of_the_users_own_from_a_file_beside_the_scenario() -> None:
             "  noise: {kind: constant, std: [0.02, 3.0]}",
             "  measurement: {kind: custom, function: 'own_models.py:measurement'}\n  noise: {kind: constant, std: [3.0]}\n  clutter: {kind: measurement_space, low: [0], high: [100]}",
         ),
-        ("speed: 4.0", sensor),
+        ("heading_deg: 4.0", sensor),
     )
     north, south = filters_of(loaded)
     assert north.targets.motion.state_dim == 3
@@ -231,8 +231,10 @@ def test_the_marginal_estimator_has_its_threshold() -> None:
 
 
 def test_actions_of_one_sensor_and_of_all() -> None:
-    model = scenario(("speed: 4.0", "actions_deg: [-10, 10], headings: relative")).model
-    own, common = (model.control.build_platform(sensor) for sensor in model.sensors)
+    text = "platform: {kind: courses, speed: 5.0, headings_deg: [-10, 10], relative: true}"
+    shared = "sensor_defaults:\n  platform: {kind: courses, speed: 5.0}"
+    loaded = scenario(("heading_deg: 4.0", text), ("sensor_defaults:", shared))
+    own, common = (sensor.platform for sensor in build.build_sensors(loaded))
     pose = np.array([0.0, 0.0, math.pi / 2])
     np.testing.assert_allclose(own.actions(pose)[:, 0], [80.0, 100.0])
     np.testing.assert_allclose(common.actions(pose)[:, 0], np.arange(-180, 181, 30))
