@@ -10,7 +10,7 @@ import numpy as np
 from vedette.control import MobileSensor, Planner
 from vedette.densities import LMB
 from vedette.errors import InputError
-from vedette.filters import Filter, labels_targets, shared_targets
+from vedette.filters import Filter, labels_targets
 from vedette.fusion import Clmb, CmDeltaGlmb
 from vedette.kernels.base.types import Floats
 from vedette.models import TargetModel
@@ -20,6 +20,7 @@ from vedette.scenarios.loading import Scenario
 from vedette.scenarios.sections.planners import STRATEGIES, Parts
 from vedette.simulation.experiment import Experiment
 from vedette.simulation.truth import TargetSource
+from vedette.tracking import Distributed
 
 
 def build_experiment(scenario: Scenario) -> Experiment:
@@ -30,19 +31,19 @@ def build_experiment(scenario: Scenario) -> Experiment:
     """
     model = scenario.model
     sensors = build_sensors(scenario)
-    motion = shared_targets([sensor.filter for sensor in sensors]).motion
+    fusion = model.fusion.build(len(sensors), scenario.folder)
+    tracker = Distributed(tuple(sensor.filter for sensor in sensors), fusion, model.fusion.feedback)
     return Experiment(
         name=model.name,
         times=model.time.build(),
-        targets=model.targets.build(model, motion, scenario.folder),
-        sensors=sensors,
+        targets=model.targets.build(model, tracker.targets.motion, scenario.folder),
+        tracker=tracker,
+        platforms=tuple(sensor.platform for sensor in sensors),
         poses=build_poses(scenario),
         first_actions=tuple(
             own.values[0] if section.moves_from == "start" else None
             for own, section in zip(_first_actions(scenario, sensors), model.sensors, strict=True)
         ),
-        fusion=model.fusion.build(len(sensors), scenario.folder),
-        feedback=model.fusion.feedback,
         estimate=model.estimator.build(scenario.folder),
         decision_steps=model.decision_steps,
     )
