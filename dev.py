@@ -136,9 +136,17 @@ def install(extent: str, *, dependencies: bool) -> None:
     )
 
 
+def attend(command: list[str], folder: Path | None = None) -> int:
+    """Run a program to its end. Ctrl-C reaches it too: it is given the time to tidy up."""
+    with subprocess.Popen(command, cwd=folder) as process:
+        while True:
+            with contextlib.suppress(KeyboardInterrupt):
+                return process.wait()
+
+
 def build_docs(*, show: bool) -> int:
     """Build the documentation as the check does; it can be read from disk."""
-    status = subprocess.call([str(PYTHON), str(ROOT / "tools" / "check.py"), "docs"], cwd=ROOT)
+    status = attend([str(PYTHON), str(ROOT / "tools" / "check.py"), "docs"], ROOT)
     if status == 0:
         start = ROOT / "build" / "site" / "index.html"
         print(f"the documentation starts at {start}")
@@ -168,11 +176,11 @@ def main(arguments: list[str]) -> int:
         print(f"ready: {VENV}")
         return 0
     if command == "check":
-        return subprocess.call([str(PYTHON), str(ROOT / "tools" / "check.py"), *rest], cwd=ROOT)
+        return attend([str(PYTHON), str(ROOT / "tools" / "check.py"), *rest], ROOT)
     if command == "docs":
         return build_docs(show="--open" in rest)
     program = [str(SCRIPTS / "vedette")]
-    return subprocess.call([*program, *(["reproduce", *rest] if command == "reproduce" else rest)])
+    return attend([*program, *(["reproduce", *rest] if command == "reproduce" else rest)])
 
 
 if __name__ == "__main__":

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib.util
 import os
 import re
+import signal
 import subprocess
 import sys
 import tarfile
@@ -19,6 +21,7 @@ from ruamel.yaml import YAML
 
 import vedette
 from vedette.kernels.base.compile import JIT_ENABLED, kernel
+from waiting import PATIENCE, heed_interrupts, wait_until
 
 ROOT = Path(__file__).resolve().parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))
@@ -167,11 +170,11 @@ def test_the_documentation_is_built_and_where_it_is_is_said(
     monkeypatch.setattr(dev, "ROOT", tmp_path)
     monkeypatch.setattr(dev, "set_up", lambda extent: called.append([extent]))
 
-    def call(command: list[str], cwd: Path) -> int:
+    def attend(command: list[str], folder: Path) -> int:
         called.append(command[-2:])
         return 0
 
-    monkeypatch.setattr(dev.subprocess, "call", call)
+    monkeypatch.setattr(dev, "attend", attend)
     monkeypatch.setattr(dev.webbrowser, "open", shown.append)
     assert dev.main(["docs"]) == 0
     assert called == [["check"], [str(tmp_path / "tools" / "check.py"), "docs"]]
@@ -209,6 +212,56 @@ def test_a_failed_stage_fails_the_check_and_the_rest_is_run(
     assert all(f"ran {name}" in output for name in stages)
     assert output.splitlines()[-1].endswith("FAILED: second")
     assert check.main(["first", "third"]) == 0
+
+
+def test_stages_side_by_side_keep_their_outputs_apart(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    check = load("tools/check.py")
+    # Each waits for the other, so that neither ends before both have begun.
+    script = (
+        "import pathlib, sys, time; mine, other = map(pathlib.Path, sys.argv[1:]); print(mine.name, 1, flush=True)\n"
+        "mine.touch()\nwhile not other.exists(): time.sleep(0.01)\nprint(mine.name, 2, file=sys.stderr)"
+    )
+    places = [str(tmp_path / name) for name in ("left", "right")]
+    orders = {"left": places, "right": places[::-1]}
+    stages = {name: check.Stage("a trial", [sys.executable, "-c", script, *order]) for name, order in orders.items()}
+    monkeypatch.setattr(check, "STAGES", stages)
+    monkeypatch.setattr(check, "LOGS", tmp_path / "logs")
+    assert check.main([]) == 0
+    shown = capfd.readouterr().out
+    assert all(f"== {name}: a trial\n{name} 1\n{name} 2\n== {name}: passed" in shown for name in stages)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
+def test_an_interrupted_check_leaves_no_stage_behind(tmp_path: Path) -> None:
+    wait = f"import pathlib, time; pathlib.Path({str(tmp_path)!r}, NAME).touch(); time.sleep({PATIENCE})"
+    program = (
+        "import check, pathlib, sys\n"
+        f"command = lambda name: [sys.executable, '-c', {wait!r}.replace('NAME', repr(name))]\n"
+        "check.STAGES = {name: check.Stage('a trial', command(name)) for name in ('one', 'two', 'three')}\n"
+        f"check.LOGS, check.GRACE = pathlib.Path({str(tmp_path / 'logs')!r}), 0.5\n"
+        "sys.exit(check.main([]))"
+    )
+    check = subprocess.Popen(
+        [sys.executable, "-c", program],
+        cwd=ROOT / "tools",
+        stdout=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        preexec_fn=heed_interrupts,
+    )
+    try:
+        wait_until(lambda: all((tmp_path / name).exists() for name in ("one", "two")), "two stages")
+        check.send_signal(signal.SIGINT)  # to the check alone: its stages are ended by it
+        shown, _ = check.communicate(timeout=PATIENCE)
+    finally:
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(check.pid, signal.SIGKILL)
+            pytest.fail("a stage was left behind")
+    assert check.returncode == 130
+    assert shown.count("FAILED with status -15") == 2
+    assert not (tmp_path / "three").exists()
 
 
 def test_links_between_the_files_of_the_project_lead_somewhere() -> None:

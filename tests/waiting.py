@@ -1,7 +1,8 @@
-"""How long tests wait for what other processes do."""
+"""How tests wait for other processes, and interrupt them."""
 
 from __future__ import annotations
 
+import signal
 import socket
 import time
 from collections.abc import Callable
@@ -27,3 +28,8 @@ def wait_for_port(port: int) -> None:
             return probe.connect_ex(("127.0.0.1", port)) == 0
 
     wait_until(is_open, f"something that listens at port {port}")
+
+
+def heed_interrupts() -> None:
+    """As a program started from a terminal does; one started in the background is told to ignore them."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)

@@ -1,8 +1,10 @@
 """Run every check of the project, each as a stage with its time; started by `python3 dev.py check`.
 
-usage: check.py [--list] [STAGE ...]
+usage: check.py [--list] [--one-by-one] [STAGE ...]
 
-With no stage named, all but the long ones (`slow`, `fuzz`) are run. A stage that fails does not stop the others.
+With no stage named, all but the long ones (`slow`, `fuzz`) are run. A stage that fails does not stop the others. Two
+stages run side by side; what each prints goes to build/check/ and is shown when it ends. A stage alone, or each of
+them with --one-by-one, shows it at once.
 """
 
 from __future__ import annotations
@@ -11,11 +13,19 @@ import os
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 BUILD = ROOT / "build"
+LOGS = BUILD / "check"
+GRACE = 10.0  # seconds that an interrupted stage has to tidy up
+
+# Tests that run the program as a user does, many in processes of their own; the others are of the library's parts.
+PROGRAM = [f"tests/{name}" for name in ("campaigns", "cli", "evaluation", "fuzz", "reports", "scenarios", "simulation")]
+PROGRAM += ["tests/test_examples.py", "tests/test_project.py"]
 
 
 @dataclass(frozen=True)
@@ -38,55 +48,117 @@ def lane(purpose: str, name: str, **environment: str) -> Stage:
     return Stage(purpose, python("pytest", "-q", "-m", "lanes and not slow"), environment)
 
 
+# In the order in which they start: what takes longest comes first, and what starts processes when kernels are there.
 STAGES = {
-    "format": Stage("the layout of the source", python("ruff", "format", "--check", "--output-format=concise", ".")),
-    "lint": Stage("likely mistakes", python("ruff", "check", "--output-format=concise", ".")),
+    "tests-library": Stage(
+        "models, filters, fusion, control and all below",
+        python("pytest", "-q", "--durations=10", "tests", *(f"--ignore={path}" for path in PROGRAM)),
+    ),
     "types": Stage("strict types of the library", python("mypy")),
     "types-tests": Stage("types of the tests", python("mypy", "--config-file", "tests/mypy.ini")),
-    "imports": Stage(
-        "which package may import which", [str(Path(sys.executable).with_name("lint-imports")), "--no-logo"]
+    "jit-off": lane("kernels as plain Python", "jit-off", NUMBA_DISABLE_JIT="1"),
+    # An index is out of bounds however well the code is optimised, and little optimisation compiles faster.
+    "bounds": lane("kernels with bounds checks", "bounds", NUMBA_BOUNDSCHECK="1", NUMBA_OPT="1"),
+    "tests-program": Stage(
+        "campaigns, command line, reports, examples and what they stand on",
+        python("pytest", "-q", "--durations=10", *PROGRAM),
     ),
     "docs": Stage(
         "the documentation, without warnings", python("mkdocs", "build", "--strict", "-q", "-d", "build/site")
     ),
-    "jit-off": lane("kernels as plain Python", "jit-off", NUMBA_DISABLE_JIT="1"),
-    "bounds": lane("kernels with bounds checks", "bounds", NUMBA_BOUNDSCHECK="1"),
+    "format": Stage("the layout of the source", python("ruff", "format", "--check", "--output-format=concise", ".")),
+    "lint": Stage("likely mistakes", python("ruff", "check", "--output-format=concise", ".")),
+    "imports": Stage(
+        "which package may import which", [str(Path(sys.executable).with_name("lint-imports")), "--no-logo"]
+    ),
     "slow": Stage("tests that take long", python("pytest", "-q", "-m", "slow"), by_default=False),
     "fuzz": Stage(
         "random files, scans and results folders, an hour each",
         python("pytest", "-q", "-s", "-m", "fuzz", "--fuzz-seconds=3600"),
         by_default=False,
     ),
-    "tests": Stage("everything else", python("pytest", "-q", "--durations=10")),
 }
 
 
-def run(name: str) -> tuple[bool, float]:
-    """Run one stage, its output passed through; returns whether it passed, and its seconds."""
-    stage = STAGES[name]
-    print(f"== {name}: {stage.purpose}", flush=True)
-    start = time.perf_counter()
-    status = subprocess.call(stage.command, cwd=ROOT, env={**os.environ, **stage.environment})
-    seconds = time.perf_counter() - start
-    print(f"== {name}: {'passed' if status == 0 else f'FAILED with status {status}'} in {seconds:.1f} s\n", flush=True)
-    return status == 0, seconds
+class Running:
+    """A stage that has been started; what it prints is passed through, or kept in a file until it ends."""
+
+    def __init__(self, name: str, *, apart: bool) -> None:
+        self.name = name
+        self._purpose, self._start = STAGES[name].purpose, time.perf_counter()
+        self._log = LOGS / f"{name}.log" if apart else None
+        print(f"{'--' if apart else '=='} {name}: {self._purpose}", flush=True)
+        with self._log.open("wb") if self._log else nullcontext() as output:
+            self.process = subprocess.Popen(
+                STAGES[name].command,
+                cwd=ROOT,
+                env={**os.environ, **STAGES[name].environment},
+                stdout=output,
+                stderr=subprocess.STDOUT if apart else None,
+            )
+
+    def tell(self) -> None:
+        """Show what was kept of its output, and how it ended."""
+        seconds, status = time.perf_counter() - self._start, self.process.returncode
+        if self._log is not None:
+            print(f"\n== {self.name}: {self._purpose}", flush=True)
+            print(self._log.read_text("utf-8", errors="replace"), end="")
+        verdict = "passed" if status == 0 else f"FAILED with status {status}"
+        print(f"== {self.name}: {verdict} in {seconds:.1f} s\n", flush=True)
+
+
+@contextmanager
+def ended_at_last(running: list[Running]) -> Iterator[None]:
+    """Leave no stage behind: an interrupted one tidies up, and says how far it came."""
+    try:
+        yield
+    finally:
+        deadline = time.monotonic() + GRACE
+        for one in running:
+            try:
+                one.process.wait(max(0.0, deadline - time.monotonic()))
+            except subprocess.TimeoutExpired:
+                one.process.terminate()
+                one.process.wait()
+            one.tell()
+
+
+def run(names: list[str], at_once: int) -> list[str]:
+    """Run the stages named, so many side by side; returns those that failed."""
+    LOGS.mkdir(parents=True, exist_ok=True)
+    waiting, running, failed = list(names), list[Running](), list[str]()
+    with ended_at_last(running):
+        while waiting or running:
+            while waiting and len(running) < at_once:
+                running.append(Running(waiting.pop(0), apart=at_once > 1))
+            time.sleep(0.05)
+            for one in [one for one in running if one.process.poll() is not None]:
+                running.remove(one)
+                one.tell()
+                failed += [one.name] * (one.process.returncode != 0)
+    return failed
 
 
 def main(arguments: list[str]) -> int:
     """Run the stages named; returns the exit status."""
     if "--list" in arguments:
-        print("\n".join(f"{name:12} {stage.purpose}" for name, stage in STAGES.items()))
+        print("\n".join(f"{name:14} {stage.purpose}" for name, stage in STAGES.items()))
         return 0
-    unknown = [name for name in arguments if name not in STAGES]
+    named = [name for name in arguments if name != "--one-by-one"]
+    unknown = [name for name in named if name not in STAGES]
     if unknown:
         print(f"error: unknown stage {', '.join(unknown)}; expected some of {', '.join(STAGES)}", file=sys.stderr)
         return 2
-    names = arguments or [name for name, stage in STAGES.items() if stage.by_default]
-    results = {name: run(name) for name in names}
-    failed = [name for name, (passed, _) in results.items() if not passed]
-    total = sum(seconds for _, seconds in results.values())
+    names = named or [name for name, stage in STAGES.items() if stage.by_default]
+    alone = len(names) == 1 or "--one-by-one" in arguments
+    start = time.perf_counter()
+    try:
+        failed = run(names, 1 if alone else 2)
+    except KeyboardInterrupt:
+        print("interrupted", file=sys.stderr)
+        return 130
     verdict = f"FAILED: {', '.join(failed)}" if failed else "all passed"
-    print(f"check of {len(results)} stages in {total:.0f} s: {verdict}")
+    print(f"check of {len(names)} stages in {time.perf_counter() - start:.0f} s: {verdict}")
     return 1 if failed else 0
 
 

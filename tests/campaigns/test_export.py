@@ -76,7 +76,7 @@ def test_rows_of_decisions_and_rewards_are_those_of_the_plans(tables):
         plan = decision.plan
         assert (rows["step"][index], rows["time_s"][index]) == (decision.step, decision.time)
         assert rows["chosen_actions"][index] == list(plan.chosen)
-        np.testing.assert_array_equal(rows["chosen_headings_rad"][index], plan.chosen_headings)
+        np.testing.assert_array_equal(rows["chosen_heading_deg"][index], np.ravel(plan.chosen_actions))
         np.testing.assert_array_equal(rows["sensor_x_m"][index], decision.poses[:, 0])
         assert rows["expected_rewards"][index] == [mean for mean, _ in plan.expected_rewards]
         assert rows["num_samples"][index] == 40
@@ -84,7 +84,7 @@ def test_rows_of_decisions_and_rewards_are_those_of_the_plans(tables):
         assert [tuple(place) for place in np.argwhere(chosen[index])] == [plan.chosen]
     assert rewards["sensors"][0] == [0, 1]
     assert rewards["actions"][14] == [1, 1]
-    np.testing.assert_array_equal(rewards["headings_rad"][14], plan.action_values[0][[1, 1]])
+    np.testing.assert_array_equal(rewards["action_heading_deg"][14], plan.actions[0].values[[1, 1], 0])
 
 
 def test_a_measure_without_a_value_is_null_and_leaves_averages_alone(tables):

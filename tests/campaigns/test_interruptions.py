@@ -21,7 +21,7 @@ from vedette.campaigns.journal import Reader
 from vedette.campaigns.results import open_results
 from vedette.campaigns.running import Unwatched, run_campaign
 from vedette.errors import InputError
-from waiting import PATIENCE, wait_for_port, wait_until
+from waiting import PATIENCE, heed_interrupts, wait_for_port, wait_until
 
 RUNS = 40
 SPEC = f"""
@@ -112,11 +112,6 @@ class Program:
         if self._process is not None and self._process.poll() is None:
             os.killpg(self._process.pid, signal.SIGKILL)
             self._process.communicate()
-
-
-def heed_interrupts() -> None:
-    """As a program started from a terminal does; one started in the background is told to ignore them."""
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 def assert_gone(group: int) -> None:

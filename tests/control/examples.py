@@ -12,7 +12,6 @@ from vedette import models
 from vedette.control import (
     CauchySchwarzReward,
     Evaluator,
-    HeadingActions,
     MobileSensor,
     PlanningSettings,
     planning_limits,
@@ -20,6 +19,7 @@ from vedette.control import (
 from vedette.densities import GLMB, LMB, TrackTable
 from vedette.filters import DeltaGlmbFilter, LmbFilter
 from vedette.fusion import Clmb, CmDeltaGlmb
+from vedette.platforms import Courses
 
 Label = tuple[int, int]
 LabelSet = tuple[Label, ...]
@@ -50,13 +50,13 @@ def sensor_model(**parts: Any) -> models.SensorModel:
     return models.SensorModel(**(standard | parts))
 
 
-def mobile_sensor(kind: str, speed: float = 30.0, actions: Any = None, dim: int = 4, **parts: Any) -> MobileSensor:
+def mobile_sensor(kind: str, platform: Any = None, dim: int = 4, **parts: Any) -> MobileSensor:
     """A sensor with a filter of a `kind`: lmb, or else delta-GLMB. dim: 4, or 5 with a turn rate."""
     build = LmbFilter if kind == "lmb" else DeltaGlmbFilter
     motion = models.constant_velocity(2.0) if dim == 4 else models.coordinated_turn(2.0, 0.02)
     birth = models.BirthModel(np.full(1, 0.05), np.zeros((1, dim)), 2.0 * np.diag(STD[:dim] ** 2)[np.newaxis])
     local = build(motion, models.constant_survival(0.9), birth, sensor_model(**parts))
-    return MobileSensor(local, speed, HeadingActions(HEADINGS) if actions is None else actions)
+    return MobileSensor(local, Courses(30.0, HEADINGS) if platform is None else platform)
 
 
 def mixture(label: Label, num_components: int, dim: int, rng: np.random.Generator) -> tuple[Any, Any, Any]:
@@ -143,7 +143,7 @@ def crowded(num_targets: int) -> Situation:
         for _ in range(2)
     )
     fusion = Clmb((0.5, 0.5))
-    sensors = tuple(mobile_sensor("lmb", actions=HeadingActions((-90.0, 30.0))) for _ in range(2))
+    sensors = tuple(mobile_sensor("lmb", platform=Courses(30.0, (-90.0, 30.0))) for _ in range(2))
     settings = replace(SETTINGS, limits=planning_limits(), num_samples=4)
     return Situation(sensors, fusion, settings, beliefs, fusion.fuse(beliefs)[0], POSES[:2])
 

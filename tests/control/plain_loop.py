@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from dataclasses import replace
 from typing import Any
 
@@ -14,6 +15,7 @@ from vedette.control import MobileSensor, PlanningSettings
 from vedette.densities import GLMB, LMB, TrackTable, marginalise, sample_glmb, sample_lmb, track_moments
 from vedette.divergence import cauchy_schwarz, reference_unit_volume
 from vedette.filters import DeltaGlmbFilter, LmbFilter
+from vedette.platforms import Courses
 
 
 def plain_rewards(situation: Situation, unit_volume: Any, seed: int) -> tuple[Any, list[Any]]:
@@ -25,10 +27,10 @@ def plain_rewards(situation: Situation, unit_volume: Any, seed: int) -> tuple[An
     updated = [
         [
             [
-                _updated(belief, sensor, _path(pose, heading, sensor.speed, settings), *future, sample, settings)
+                _updated(belief, sensor, _path(sensor, pose, action, settings), *future, sample, settings)
                 for sample in range(num_samples)
             ]
-            for heading in sensor.actions.headings(pose)
+            for action in sensor.platform.actions(pose)
         ]
         for belief, sensor, pose, future in zip(
             situation.beliefs, situation.sensors, situation.poses, futures, strict=True
@@ -66,8 +68,11 @@ def _draw(situation: Situation, rng: np.random.Generator) -> list[tuple[Any, Any
     return drawn
 
 
-def _path(pose: Any, heading: float, speed: float, settings: PlanningSettings) -> list[Any]:
-    away = np.array([np.cos(heading), np.sin(heading)]) * speed * settings.horizon_period
+def _path(sensor: MobileSensor, pose: Any, action: Any, settings: PlanningSettings) -> list[Any]:
+    platform = sensor.platform
+    assert isinstance(platform, Courses)
+    heading = math.radians(action[0])
+    away = np.array([np.cos(heading), np.sin(heading)]) * platform.speed * settings.horizon_period
     return [np.array([*(pose[:2] + (h + 1) * away), heading]) for h in range(settings.horizon_steps)]
 
 

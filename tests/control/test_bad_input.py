@@ -13,7 +13,6 @@ from vedette import models
 from vedette.control import (
     CauchySchwarzReward,
     FixedPlanner,
-    HeadingActions,
     IndependentPlanner,
     JointPlanner,
     MobileSensor,
@@ -28,6 +27,7 @@ from vedette.densities.checks import unchecked
 from vedette.errors import InputError, ModelError, NumericalError
 from vedette.filters import CbMemberFilter, CphdFilter, Limits, PhdFilter
 from vedette.fusion import Clmb, CmDeltaGlmb
+from vedette.platforms import Actions, Courses
 
 PLANNERS = [JointPlanner, IndependentPlanner]
 
@@ -69,45 +69,51 @@ def refused(example: Situation, planner: Any, error: type[Exception] = InputErro
     return str(raised.value)
 
 
-def test_actions() -> None:
-    for headings in ((), (np.nan,), (0.0, np.inf), ("north",), None, 3.0):
-        with pytest.raises(InputError, match="headings_deg: expected at least one finite angle in degrees; got"):
-            HeadingActions(headings)  # type: ignore[arg-type]
-
-
 class Gives:
-    """An action set that gives what it was told to."""
+    """A platform that gives the actions, or the course, that it was told to."""
 
-    def __init__(self, headings: Any) -> None:
-        self.given = headings
+    def __init__(self, actions: Any, course: Any = None, pushes: bool = False) -> None:
+        self.columns = ("heading_deg",)
+        self.given, self.way, self.pushes = actions, course, pushes
 
-    def headings(self, pose: Any) -> Any:
+    def actions(self, pose: Any) -> Any:
+        if self.pushes:
+            pose[:] = 1e6
         return self.given
 
+    def course(self, pose: Any, action: Any, times: Any) -> Any:
+        poses = Courses(30.0).course(pose, action, times) if self.way is None else self.way
+        if self.pushes:
+            pose[:], action[:], times[:] = 1e6, 1e6, 1e6
+        return poses
 
-@pytest.mark.parametrize("given", [[], [np.nan], [[0.0, 1.0]], None, ["north"], 1.0])
+
+@pytest.mark.parametrize("given", [[], [[np.nan]], [[0.0, 1.0]], None, [["north"]], 1.0, [0.0]])
 @pytest.mark.parametrize("planner", [*PLANNERS, RandomPlanner])
-def test_action_sets_that_give_no_headings(planner: Any, given: Any) -> None:
+def test_platforms_that_give_no_actions(planner: Any, given: Any) -> None:
     example = situation("lmb")
-    sensors = (example.sensors[0], replace(example.sensors[1], actions=Gives(given)))
+    sensors = (example.sensors[0], replace(example.sensors[1], platform=Gives(given)))
     built = planner(sensors) if planner is RandomPlanner else planner(sensors, example.fusion, SETTINGS)
-    with pytest.raises(InputError, match=r"sensors\[1\]\.actions: expected"):
+    with pytest.raises(InputError, match=r"sensors\[1\]\.platform\.actions.*: expected"):
         built.plan(*example.arguments, rng=np.random.default_rng(0))
 
 
-def test_an_action_set_cannot_move_its_sensor() -> None:
-    class Pushes(Gives):
-        def headings(self, pose: Any) -> Any:
-            pose[:] = 1e6
-            return self.given
+@pytest.mark.parametrize("way", [np.zeros((1, 3)), np.zeros((2, 2)), np.zeros((2, 4)), np.full((2, 3), np.inf), "on"])
+def test_platforms_that_give_no_course(way: Any) -> None:
+    example = situation("lmb")
+    sensors = (example.sensors[0], replace(example.sensors[1], platform=Gives([[0.0]], way)))
+    with pytest.raises(InputError, match=r"sensors\[1\]\.platform\.course: expected"):
+        JointPlanner(sensors, example.fusion, SETTINGS).plan(*example.arguments, rng=np.random.default_rng(0))
 
+
+def test_a_platform_cannot_move_its_sensor() -> None:
     example = situation("lmb")
     before = example.poses.copy()
     plans = [
-        JointPlanner(tuple(replace(s, actions=actions) for s in example.sensors), example.fusion, SETTINGS).plan(
+        JointPlanner(tuple(replace(s, platform=platform) for s in example.sensors), example.fusion, SETTINGS).plan(
             *example.arguments, rng=np.random.default_rng(0)
         )
-        for actions in (Gives([0.0, 1.0]), Pushes([0.0, 1.0]))
+        for platform in (Gives([[0.0], [1.0]]), Gives([[0.0], [1.0]], pushes=True))
     ]
     np.testing.assert_array_equal(example.poses, before)
     np.testing.assert_array_equal(plans[0].tables[0].mean, plans[1].tables[0].mean)
@@ -267,13 +273,10 @@ def test_settings(changes: dict[str, Any], message: str) -> None:
 
 def test_sensors() -> None:
     local = mobile_sensor("lmb").filter
-    for speed in (-1.0, np.nan, np.inf, "fast"):
-        with pytest.raises(InputError, match="speed: expected"):
-            MobileSensor(local, speed)  # type: ignore[arg-type]
     with pytest.raises(InputError, match=r"filter: expected a filter of vedette\.filters"):
-        MobileSensor("filter", 1.0)  # type: ignore[arg-type]
-    with pytest.raises(InputError, match="actions: expected an ActionSet"):
-        MobileSensor(local, 1.0, (0.0, 90.0))  # type: ignore[arg-type]
+        MobileSensor("filter", Courses(1.0))  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="platform: expected a platform, with columns"):
+        MobileSensor(local, (0.0, 90.0))  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("kind", [PhdFilter, CphdFilter, CbMemberFilter])
@@ -281,7 +284,7 @@ def test_sensors() -> None:
 def test_filters_without_labels_cannot_be_planned_with(planner: Any, kind: Any) -> None:
     known = mobile_sensor("lmb").filter
     local = kind(known.motion, known.survival, known.birth, known.sensor)
-    sensors = (MobileSensor(local, 1.0),)
+    sensors = (MobileSensor(local, Courses(1.0)),)
     belief = local.initial()
     with pytest.raises(InputError, match=rf"sensors\[0\].filter: expected one that labels its .*; got {kind.__name__}"):
         planner(sensors, Clmb((1.0,))).plan([belief], belief, np.zeros((1, 3)), rng=np.random.default_rng(0))
@@ -294,12 +297,13 @@ def test_unit_volumes(value: Any) -> None:
 
 
 def test_fixed_and_random_courses() -> None:
-    for headings in ((), (np.nan,), ("east",)):
-        with pytest.raises(InputError, match="headings_deg: expected"):
-            FixedPlanner(headings)  # type: ignore[arg-type]
+    east = Actions.of(heading_deg=0.0)
+    for actions in ((), (0.0,), (east, Actions(("heading_deg",), np.zeros((2, 1))))):
+        with pytest.raises(InputError, match="actions: expected one action of each sensor"):
+            FixedPlanner(actions)  # type: ignore[arg-type]
     rng = np.random.default_rng(0)
     nothing: Any = None
-    for planner in (FixedPlanner((0.0, 90.0)), RandomPlanner((mobile_sensor("lmb"),) * 2)):
+    for planner in (FixedPlanner((east, east)), RandomPlanner((mobile_sensor("lmb"),) * 2)):
         for poses in (np.zeros((1, 3)), np.full((2, 3), np.nan)):
             with pytest.raises(InputError, match="poses: expected"):
                 planner.plan(nothing, nothing, poses, rng=rng)
@@ -337,7 +341,9 @@ def table(mean: Any, error: Any, sensors: tuple[int, ...] = (0,)) -> RewardTable
     ],
 )
 def test_plans_that_are_none(bad: RewardTable, message: str) -> None:
-    good = Plan("jdm", (np.array([0.0, 1.0]),), (0,), (table([1.0, np.nan], [0.0, np.nan]),), {})
+    good = Plan(
+        "jdm", (Actions(("heading_deg",), np.array([[0.0], [1.0]])),), (0,), (table([1.0, np.nan], [0.0, np.nan]),), {}
+    )
     good.validate()
     with pytest.raises(InputError, match=message):
         replace(good, tables=(bad,)).validate()

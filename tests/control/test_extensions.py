@@ -52,22 +52,28 @@ def test_a_reward_of_the_users_own(kind: str) -> None:
 
 @dataclass(frozen=True)
 class TurnsAtMost:
-    """Actions of the user's own: as many headings as the sensor can turn to, more of them further out."""
+    """A platform of the user's own: it turns on the spot as far as it can, to more sides further out."""
 
     turn_rad: float
+    columns = ("turn_rad", "reach")
 
-    def headings(self, pose: Any) -> Any:
+    def actions(self, pose: Any) -> Any:
         number = 2 + int(np.hypot(pose[0], pose[1]) > 510.0)
-        return pose[2] + np.linspace(-self.turn_rad, self.turn_rad, number)
+        return np.column_stack([np.linspace(-self.turn_rad, self.turn_rad, number), np.ones(number)])
+
+    def course(self, pose: Any, action: Any, times: Any) -> Any:
+        heading = pose[2] + action[0]
+        return pose[:3] + np.outer(times * 30.0, [np.cos(heading), np.sin(heading), 0.0])
 
 
 def test_actions_of_the_users_own() -> None:
-    example = situation("marginal", actions=TurnsAtMost(0.6))
+    example = situation("marginal", platform=TurnsAtMost(0.6))
     plan = JointPlanner(example.sensors, example.fusion, SETTINGS).plan(
         *example.arguments, rng=np.random.default_rng(5)
     )
-    np.testing.assert_allclose(plan.action_values[0], example.poses[0, 2] + np.array([-0.6, 0.0, 0.6]))
-    np.testing.assert_allclose(plan.action_values[1], example.poses[1, 2] + np.array([-0.6, 0.0, 0.6]))
+    for own in plan.actions:
+        assert own.columns == ("turn_rad", "reach")
+        np.testing.assert_array_equal(own.values, [[-0.6, 1.0], [0.0, 1.0], [0.6, 1.0]])
     near = replace(example, poses=example.poses * [[1.0, 1.0, 1.0], [0.5, 0.5, 1.0]])
     plan = JointPlanner(example.sensors, example.fusion, SETTINGS).plan(*near.arguments, rng=np.random.default_rng(5))
     assert plan.tables[0].mean.shape == (3, 2)
@@ -106,7 +112,8 @@ def test_a_reward_that_is_not_finite_is_named_with_action_and_sample(bad: float)
     with pytest.raises(NumericalError) as error:
         planner.plan(*example.arguments, rng=np.random.default_rng(5))
     assert str(error.value) == (
-        f"reward of headings [0.0, 45.0] degrees of sensors [0, 1], sample 2: expected a finite number; got {bad}"
+        f"reward of action heading_deg 0 of sensor 1 and action heading_deg 45 of sensor 2, sample 2: "
+        f"expected a finite number; got {bad}"
     )
 
 

@@ -11,10 +11,8 @@ import pytest
 from control.examples import HEADINGS, SETTINGS, A, B, Situation, evaluator_of, glmb, mobile_sensor, situation
 from vedette import models
 from vedette.control import (
-    PAPER_HEADINGS_DEG,
     CauchySchwarzReward,
     FixedPlanner,
-    HeadingActions,
     IndependentPlanner,
     JointPlanner,
     Plan,
@@ -23,9 +21,10 @@ from vedette.control import (
 )
 from vedette.densities import GLMB, LMB, TrackTable
 from vedette.fusion import Clmb, CmDeltaGlmb
+from vedette.platforms import PAPER_HEADINGS_DEG, Actions, Courses
 
 KINDS = ["delta", "marginal", "lmb"]
-PAPER = HeadingActions()
+PAPER = Courses(30.0)
 
 
 def planners(example: Situation, reward: Any = None) -> tuple[JointPlanner, IndependentPlanner]:
@@ -80,7 +79,7 @@ def test_one_sample_has_no_spread() -> None:
 @pytest.mark.parametrize("kind", ["marginal", "lmb"])
 def test_west_and_west_share_a_value_and_are_evaluated_once(kind: str) -> None:
     example = situation(kind)
-    example = replace(example, sensors=tuple(replace(sensor, actions=PAPER) for sensor in example.sensors))
+    example = replace(example, sensors=tuple(replace(sensor, platform=PAPER) for sensor in example.sensors))
     joint, independent = plans(example)
     num_samples, num_steps = SETTINGS.num_samples, SETTINGS.horizon_steps
     table = joint.tables[0].mean
@@ -88,7 +87,8 @@ def test_west_and_west_share_a_value_and_are_evaluated_once(kind: str) -> None:
     np.testing.assert_array_equal(table[0], table[-1])
     np.testing.assert_array_equal(table[:, 0], table[:, -1])
     assert [len(own.mean) for own in independent.tables] == [13, 13]
-    np.testing.assert_allclose(np.degrees(joint.action_values[0]), PAPER_HEADINGS_DEG)
+    assert joint.actions[0].columns == ("heading_deg",)
+    np.testing.assert_array_equal(joint.actions[0].values[:, 0], PAPER_HEADINGS_DEG)
     filter_steps = 2 * 12 * num_samples * num_steps
     pairs = 12 * 12 * num_samples
     assert joint.counts == {"filter_steps": filter_steps, "fusions": pairs, "divergences": pairs}
@@ -102,8 +102,7 @@ def test_west_and_west_share_a_value_and_are_evaluated_once(kind: str) -> None:
 @pytest.mark.parametrize("kind", KINDS)
 def test_equal_rewards_go_to_the_first_in_printed_order(kind: str) -> None:
     # At no speed all headings are one place.
-    actions = HeadingActions((120.0, -60.0, 0.0))
-    joint, independent = plans(situation(kind, speed=0.0, actions=actions))
+    joint, independent = plans(situation(kind, platform=Courses(0.0, (120.0, -60.0, 0.0))))
     assert np.ptp(joint.tables[0].mean) == 0.0
     assert joint.chosen == independent.chosen == (0, 0)
 
@@ -111,7 +110,7 @@ def test_equal_rewards_go_to_the_first_in_printed_order(kind: str) -> None:
 def symmetric(kind: str, headings: tuple[float, ...]) -> Situation:
     """One target known to be straight ahead of both sensors, which stand behind each other on its course."""
     detection = models.constant_detection(0.95)
-    sensors = tuple(mobile_sensor(kind, actions=HeadingActions(headings), detection=detection) for _ in range(2))
+    sensors = tuple(mobile_sensor(kind, platform=Courses(30.0, headings), detection=detection) for _ in range(2))
     known = [600.0, 0.0, 10.0, 0.0]
     cov = np.diag([900.0, 900.0, 25.0, 25.0])
     belief: Any = LMB.from_bernoullis([A], [0.99], [known], [cov])
@@ -153,7 +152,7 @@ def test_a_sensor_that_sees_only_what_is_near_goes_there(kind: str) -> None:
     example = symmetric(kind, (180.0, 90.0, 0.0, -90.0))
     short_sighted = models.limited_range(0.95, 450.0)
     sensors = tuple(
-        mobile_sensor(kind, actions=sensor.actions, detection=short_sighted, noise=models.constant_noise([0.02, 10.0]))
+        mobile_sensor(kind, sensor.platform, detection=short_sighted, noise=models.constant_noise([0.02, 10.0]))
         for sensor in example.sensors
     )
     example = replace(example, sensors=sensors)
@@ -220,7 +219,7 @@ def plan_bytes(plan: Plan) -> Any:
 def test_an_action_has_the_same_reward_whatever_the_others_are() -> None:
     example = situation("marginal")
     fewer = replace(
-        example, sensors=tuple(replace(sensor, actions=HeadingActions(HEADINGS[1:])) for sensor in example.sensors)
+        example, sensors=tuple(replace(sensor, platform=Courses(30.0, HEADINGS[1:])) for sensor in example.sensors)
     )
     for all_of_them, some in zip(plans(example), plans(fewer), strict=True):
         for large, small in zip(all_of_them.tables, some.tables, strict=True):
@@ -245,27 +244,27 @@ def test_changes_of_heading_are_headings_from_the_present_one() -> None:
         example,
         poses=poses,
         sensors=tuple(
-            replace(sensor, actions=HeadingActions((-30.0, 0.0, 30.0), relative=True)) for sensor in example.sensors
+            replace(sensor, platform=Courses(30.0, (-30.0, 0.0, 30.0), relative=True)) for sensor in example.sensors
         ),
     )
     headings = ((140.0, 170.0, -160.0), (-60.0, -30.0, 0.0))
     absolute = replace(
         turns,
         sensors=tuple(
-            replace(sensor, actions=HeadingActions(values))
+            replace(sensor, platform=Courses(30.0, values))
             for sensor, values in zip(example.sensors, headings, strict=True)
         ),
     )
     for first, second in zip(plans(turns), plans(absolute), strict=True):
-        np.testing.assert_allclose(np.degrees(first.chosen_headings), np.degrees(second.chosen_headings))
-        for values, expected in zip(first.action_values, headings, strict=True):
-            np.testing.assert_allclose(np.degrees(values), expected)
+        np.testing.assert_allclose(first.chosen_actions, second.chosen_actions, atol=1e-9)
+        for own, expected in zip(first.actions, headings, strict=True):
+            np.testing.assert_allclose(own.values[:, 0], expected, atol=1e-9)
         for a, b in zip(first.tables, second.tables, strict=True):
             np.testing.assert_allclose(a.mean, b.mean, rtol=1e-9)
 
 
 def test_one_sensor_with_one_action() -> None:
-    example = situation("marginal", 1, actions=HeadingActions((25.0,)))
+    example = situation("marginal", 1, platform=Courses(30.0, (25.0,)))
     joint, independent = plans(example)
     assert joint.chosen == independent.chosen == (0,)
     assert joint.tables[0].mean.shape == (1,)
@@ -301,7 +300,7 @@ def test_the_default_settings_take_the_papers_number_of_steps() -> None:
 
 
 def test_random_control_takes_each_direction_equally_often() -> None:
-    sensors = (mobile_sensor("lmb", actions=PAPER), mobile_sensor("lmb", actions=HeadingActions((10.0,))))
+    sensors = (mobile_sensor("lmb", PAPER), mobile_sensor("lmb", Courses(30.0, (10.0,))))
     planner, rng = RandomPlanner(sensors), np.random.default_rng(0)
     chosen = [planner.plan((), None, np.zeros((2, 3)), rng=rng) for _ in range(1200)]  # type: ignore[arg-type]
     counts = np.bincount([plan.chosen[0] for plan in chosen], minlength=13)
@@ -311,8 +310,8 @@ def test_random_control_takes_each_direction_equally_often() -> None:
     assert (chosen[0].planner, chosen[0].tables, chosen[0].counts) == ("random", (), {})
 
 
-def test_a_fixed_course_is_kept() -> None:
-    planner = FixedPlanner((30.0, -45.0))
+def test_a_fixed_action_is_kept() -> None:
+    planner = FixedPlanner((Actions.of(heading_deg=30.0), Actions.of(dx=-45.0, dy=1.0)))
     plan = planner.plan((), None, np.zeros((2, 3)), rng=np.random.default_rng(0))  # type: ignore[arg-type]
-    np.testing.assert_allclose(np.degrees(plan.chosen_headings), [30.0, -45.0])
+    assert [row.tolist() for row in plan.chosen_actions] == [[30.0], [-45.0, 1.0]]
     plan.validate()

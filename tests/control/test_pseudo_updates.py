@@ -16,7 +16,7 @@ from vedette.control.pseudo import draw_futures, pseudo_posteriors
 from vedette.densities import GLMB, sample_glmb
 from vedette.filters import DeltaGlmbFilter
 from vedette.kernels.association.marginals import MAX_EXACT_MEASUREMENTS
-from vedette.models.platforms import advance
+from vedette.platforms import options_at
 
 
 @pytest.mark.lanes
@@ -32,12 +32,13 @@ def test_every_label_set_keeps_its_heaviest_hypothesis_beyond_the_caps() -> None
         assert set(own.sets) == set(sets)
         rng = np.random.default_rng(5)
         (futures, *_) = draw_futures(example.fused, example.sensors, example.settings, rng=rng)
-        for case, (heading, sample) in enumerate(np.ndindex(len(sensor.actions.headings(pose)), SETTINGS.num_samples)):
-            angle = float(sensor.actions.headings(pose)[heading])
+        actions = sensor.platform.actions(pose)
+        for case, (action, sample) in enumerate(np.ndindex(len(actions), SETTINGS.num_samples)):
+            course = sensor.platform.course(pose, actions[action], SETTINGS.horizon_times())
             weights, start = {}, 0
             for group, labels in enumerate(sets):
                 hyps = np.flatnonzero(groups == group)
-                log_weight, end = _alone(belief, hyps, sensor, pose, angle, futures, sample, limits)
+                log_weight, end = _alone(belief, hyps, sensor, course, futures, sample, limits)
                 weights[labels] = log_weight
                 place = own.sets.index(labels)
                 start = sum(len(other) for other in own.sets[:place])
@@ -48,7 +49,7 @@ def test_every_label_set_keeps_its_heaviest_hypothesis_beyond_the_caps() -> None
 
 
 def _alone(
-    belief: GLMB, hyps: Any, sensor: Any, pose: Any, heading: float, futures: Any, sample: int, limits: Any
+    belief: GLMB, hyps: Any, sensor: Any, course: Any, futures: Any, sample: int, limits: Any
 ) -> tuple[float, GLMB]:
     """Log weight and end of one label set's hypotheses, followed by a filter of their own."""
     own = sensor.filter
@@ -57,8 +58,7 @@ def _alone(
     total = float(np.logaddexp.reduce(belief.hyp_log_weights[hyps]))
     at = GLMB.from_hypotheses(belief.tracks, chosen, np.exp(belief.hyp_log_weights[hyps] - total))
     targets = slice(futures.offsets[sample], futures.offsets[sample + 1])
-    for h in range(SETTINGS.horizon_steps):
-        pose = advance(pose, heading, sensor.speed, SETTINGS.horizon_period)
+    for h, pose in enumerate(course):
         states = futures.states[h, targets]
         seen = own.sensor.detection.prob(states, pose) >= SETTINGS.detection_threshold
         scan = own.sensor.measurement.measure(states[seen], pose)
@@ -88,9 +88,10 @@ def test_an_action_is_updated_alike_whatever_the_others_are(kind: str, mode: Any
     settings = replace(SETTINGS, ideal_measurements=mode)
     example = situation(kind, settings=settings)
     (futures, *_) = draw_futures(example.fused, example.sensors, settings, rng=np.random.default_rng(2))
-    given = example.beliefs[0], example.sensors[0], example.poses[0]
-    together = pseudo_posteriors(*given, np.array([0.0, 1.0, -2.0]), futures, settings)
-    alone = pseudo_posteriors(*given, np.array([1.0]), futures, settings)
+    belief, sensor = example.beliefs[0], example.sensors[0]
+    courses = options_at("platform", sensor.platform, example.poses[0], settings.horizon_times()).courses
+    together = pseudo_posteriors(belief, sensor, courses, futures, settings)
+    alone = pseudo_posteriors(belief, sensor, courses[1:2], futures, settings)
     cases = slice(SETTINGS.num_samples, 2 * SETTINGS.num_samples)
     for several, one in zip(together[1:4], alone[1:4], strict=True):
         np.testing.assert_array_equal(several[cases], one)
@@ -105,7 +106,7 @@ def test_a_target_is_seen_with_or_above_its_detection_probability(mode: Any) -> 
         example = situation("lmb", settings=settings)
         certain = type(example.fused)(example.fused.tracks, np.full(example.fused.tracks.num_tracks, 40.0))
         (futures,) = draw_futures(certain, (sensor,), settings, rng=np.random.default_rng(0))
-        own = pseudo_posteriors(example.beliefs[0], sensor, POSES[0], np.zeros(1), futures, settings)
+        own = pseudo_posteriors(example.beliefs[0], sensor, POSES[:1, np.newaxis], futures, settings)
         rose = own.log_weights > example.beliefs[0].existence_logit
         assert abs(rose.mean() - share[mode]) < 0.15
 

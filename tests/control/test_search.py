@@ -17,7 +17,6 @@ from vedette.control import (
     CauchySchwarzReward,
     CoordinateAscent,
     ExhaustiveSearch,
-    HeadingActions,
     IndependentPlanner,
     JointPlanner,
     JointProblem,
@@ -27,6 +26,7 @@ from vedette.control import (
 )
 from vedette.control.search import all_joint_actions, first_best
 from vedette.errors import InputError
+from vedette.platforms import Courses
 
 
 @dataclass
@@ -129,13 +129,13 @@ def joint_plan(example: Situation, search: JointSearch) -> Plan:
     return plan
 
 
-ACTIONS = HeadingActions((-180.0, -90.0, 0.0, 45.0, 90.0, 180.0))
+COURSES = Courses(30.0, (-180.0, -90.0, 0.0, 45.0, 90.0, 180.0))
 
 
 @pytest.mark.parametrize("kind", ["delta", "marginal", "lmb"])
 @pytest.mark.parametrize("seed", range(3))
 def test_a_partial_search_has_the_rewards_of_the_exhaustive_one(kind: str, seed: int) -> None:
-    example = situation(kind, 3, seed, actions=ACTIONS)
+    example = situation(kind, 3, seed, platform=COURSES)
     full, partial = joint_plan(example, ExhaustiveSearch()), joint_plan(example, CoordinateAscent())
     (table,), (some,) = full.tables, partial.tables
     evaluated = np.isfinite(some.mean)
@@ -154,7 +154,7 @@ def test_a_partial_search_has_the_rewards_of_the_exhaustive_one(kind: str, seed:
 
 
 def test_restarts_are_drawn_from_the_planners_generator() -> None:
-    example = situation("lmb", 3, actions=ACTIONS)
+    example = situation("lmb", 3, platform=COURSES)
     first, again = (joint_plan(example, CoordinateAscent(3)) for _ in range(2))
     np.testing.assert_array_equal(first.tables[0].mean, again.tables[0].mean)
     more = np.isfinite(first.tables[0].mean).sum()
@@ -162,7 +162,7 @@ def test_restarts_are_drawn_from_the_planners_generator() -> None:
 
 
 def test_a_table_too_large_to_hold_is_kept_as_a_line_a_sensor(monkeypatch: pytest.MonkeyPatch) -> None:
-    example = situation("marginal", 3, actions=ACTIONS)
+    example = situation("marginal", 3, platform=COURSES)
     whole = joint_plan(example, CoordinateAscent())
     monkeypatch.setattr(evidence, "MAX_TABLE", 6**3 - 1)
     lines = joint_plan(example, CoordinateAscent())
@@ -185,7 +185,7 @@ def test_many_sensors() -> None:
         fused=four.fused,
         poses=np.concatenate([four.poses + np.array([0.0, 40.0 * i, 0.0]) for i in range(4)]),
     )
-    example = replace(example, sensors=tuple(replace(sensor, actions=HeadingActions()) for sensor in example.sensors))
+    example = replace(example, sensors=tuple(replace(sensor, platform=Courses(30.0)) for sensor in example.sensors))
     with pytest.raises(InputError, match="CoordinateAscent"):
         joint_plan(example, ExhaustiveSearch())
     plan = joint_plan(example, CoordinateAscent())

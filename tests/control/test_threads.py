@@ -95,6 +95,7 @@ from vedette.control import IndependentPlanner, MobileSensor, PlanningSettings, 
 from vedette.densities import LMB
 from vedette.filters import LmbFilter
 from vedette.fusion import Clmb
+from vedette.platforms import Courses
 
 region = models.Region(-1000.0, 1000.0, -1000.0, 1000.0)
 sensor = models.SensorModel(
@@ -116,7 +117,7 @@ def counted(prior, decision, first, last, results):
     done.append(last - first)
 
 pseudo.pseudo_update_lmb = counted
-planner = IndependentPlanner((MobileSensor(tracker, 50.0),), Clmb((1.0,)), settings)
+planner = IndependentPlanner((MobileSensor(tracker, Courses(50.0)),), Clmb((1.0,)), settings)
 try:
     planner.plan([belief], belief, [[-700.0, 0.0, 0.0]], rng=np.random.default_rng(1))
 except KeyboardInterrupt:

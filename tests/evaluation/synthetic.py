@@ -10,13 +10,15 @@ from vedette.control.plan import Plan, RewardTable
 from vedette.densities.estimates import Estimate
 from vedette.evaluation.metrics import ospa_of_run
 from vedette.kernels.base.types import Floats
+from vedette.platforms import Actions
 from vedette.simulation.health import Health
 from vedette.simulation.records import Decision, RunRecord
 from vedette.simulation.truth import Truth
 
 TARGETS = np.array([[-55.0, 875, 15, -6], [-180, -205, -5.5, -19], [-320, 485, 5.5, -5.5], [340, -5, 10, 6]])
 SENSORS = np.array([[-745.0, 830.0, 0.0], [-580.0, 220.0, 0.0]])
-ACTIONS = np.deg2rad(np.arange(-180, 181, 30))
+DEGREES = np.arange(-180.0, 181.0, 30.0)
+ACTIONS = Actions(("heading_deg",), DEGREES[:, np.newaxis])
 DECISION_STEPS = (9, 19, 29)
 SPEED = 50.0
 NOISE = {"jdm": 6.0, "idm": 6.5, "random": 14.0, "fixed": 12.0}
@@ -39,7 +41,7 @@ def make_truth(num_scans: int = 40) -> Truth:
 def make_plan(planner: str, rng: np.random.Generator, num_sensors: int = 2) -> Plan:
     """A plan of the kind that the named planner makes, with smooth rewards."""
     peaks = np.deg2rad([-40.0, 20.0, 120.0])[:num_sensors]
-    curves = [2.0 + np.cos(ACTIONS - peak) + 0.05 * rng.standard_normal(len(ACTIONS)) for peak in peaks]
+    curves = [2.0 + np.cos(np.deg2rad(DEGREES) - peak) + 0.05 * rng.standard_normal(len(ACTIONS)) for peak in peaks]
     errors = [np.full(len(ACTIONS), 0.12)] * num_sensors
     if planner == "idm":
         tables = tuple(RewardTable((sensor,), curve, errors[sensor]) for sensor, curve in enumerate(curves))
@@ -88,7 +90,7 @@ def _move(planner: str, times: Floats, rng: np.random.Generator) -> tuple[Floats
         if scan in DECISION_STEPS and planner != "fixed":
             plan = make_plan(planner, rng)
             decisions.append(Decision(scan, float(time), pose.copy(), plan))
-            pose = np.c_[pose[:, :2], plan.chosen_headings]
+            pose = np.c_[pose[:, :2], np.deg2rad(plan.chosen_actions)]
             moving = True
     return poses, tuple(decisions)
 

@@ -12,7 +12,7 @@ import pytest
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from evaluation.synthetic import ACTIONS, make_plan, make_record
+from evaluation.synthetic import DEGREES, make_plan, make_record
 from vedette.control.plan import Plan
 from vedette.densities.estimates import Estimate
 from vedette.errors import InputError
@@ -28,6 +28,7 @@ from vedette.evaluation.figures import (
     svg_text,
     tracks_figure,
 )
+from vedette.platforms import Actions
 
 
 def labels(figure: Figure) -> list[tuple[str, str]]:
@@ -87,7 +88,7 @@ def test_independent_rewards_are_one_curve_a_sensor_in_degrees() -> None:
     (axes,) = reward_figure(decision).axes
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("Heading (deg)", "Reward (CS divergence)")
     curve = axes.lines[0]
-    np.testing.assert_allclose(curve.get_xdata(), np.rad2deg(ACTIONS))  # type: ignore[arg-type]
+    np.testing.assert_allclose(curve.get_xdata(), DEGREES)  # type: ignore[arg-type]
     np.testing.assert_allclose(curve.get_ydata(), decision.tables[0].mean)  # type: ignore[arg-type]
     assert curve.get_markevery() == [decision.chosen[0]]
     assert len(axes.collections) == 2  # the bands
@@ -95,14 +96,16 @@ def test_independent_rewards_are_one_curve_a_sensor_in_degrees() -> None:
 
 def test_curves_run_from_west_to_west_whatever_the_order_of_the_actions() -> None:
     decision = plan("idm")
-    turned = np.roll(ACTIONS[:12], 5)
+    turned = np.roll(DEGREES[:12], 5)
     table = replace(decision.tables[0], mean=decision.tables[0].mean[:12], standard_error=np.zeros(12))
-    decision = replace(decision, action_values=(turned,) * 2, chosen=(3, 3), tables=(table,))
+    decision = replace(
+        decision, actions=(Actions(("heading_deg",), turned[:, np.newaxis]),) * 2, chosen=(3, 3), tables=(table,)
+    )
     curve = reward_figure(decision).axes[0].lines[0]
     headings = np.asarray(curve.get_xdata())
-    np.testing.assert_allclose(headings, np.rad2deg(ACTIONS[:12]))
+    np.testing.assert_allclose(headings, DEGREES[:12])
     (marked,) = curve.get_markevery()  # type: ignore[misc]
-    assert np.deg2rad(headings[marked]) == pytest.approx(turned[3])
+    assert headings[marked] == pytest.approx(turned[3])
 
 
 def test_joint_rewards_are_a_heat_map_with_the_choice_framed_and_the_best_over_the_others() -> None:

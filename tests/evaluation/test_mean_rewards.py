@@ -5,10 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from evaluation.synthetic import ACTIONS, make_record
+from evaluation.synthetic import ACTIONS, DEGREES, make_record
 from vedette.control.plan import RewardTable
 from vedette.errors import InputError
 from vedette.evaluation.rewards import mean_rewards
+from vedette.platforms import Actions
 from vedette.simulation.records import RunRecord
 
 
@@ -32,7 +33,8 @@ def test_independent_rewards_are_averaged_entry_by_entry() -> None:
         np.testing.assert_allclose(found.tables[sensor].standard_error, values.std(axis=0, ddof=1) / np.sqrt(5))
         chosen = [record.decisions[1].plan.chosen[sensor] for record in records]
         np.testing.assert_allclose(found.shares[sensor], np.bincount(chosen, minlength=len(ACTIONS)) / 5)
-    assert (found.num_runs, found.are_turns, found.time) == (5, False, records[0].decisions[1].time)
+    assert (found.num_runs, found.time) == (5, records[0].decisions[1].time)
+    assert found.actions[0].columns == ("heading_deg",)
 
 
 def test_joint_rewards_keep_their_axes_and_count_pairs_of_actions() -> None:
@@ -63,16 +65,18 @@ def test_runs_with_other_headings_but_the_same_turns_are_averaged_over_turns() -
     turned = replace(
         second.decisions[0],
         poses=second.decisions[0].poses + np.array([0.0, 0.0, 0.5]),
-        plan=replace(second.decisions[0].plan, action_values=(ACTIONS + 0.5,) * 2),
+        plan=replace(
+            second.decisions[0].plan, actions=(Actions(("heading_deg",), ACTIONS.values + np.degrees(0.5)),) * 2
+        ),
     )
     found = mean_rewards([first, replace(second, decisions=(turned,))], 0)
-    assert found.are_turns
-    np.testing.assert_allclose(np.cos(found.action_values[0]), np.cos(ACTIONS))
+    assert found.actions[0].columns == ("turn_deg",)
+    np.testing.assert_allclose(np.cos(np.deg2rad(found.actions[0].values[:, 0])), np.cos(np.deg2rad(DEGREES)))
 
 
 def test_runs_with_nothing_in_common_are_refused() -> None:
     first, second = records_of("idm", 2)
-    other = with_plan(second, action_values=(ACTIONS + 0.1,) * 2)
+    other = with_plan(second, actions=(Actions(("heading_deg",), ACTIONS.values + 0.1),) * 2)
     with pytest.raises(InputError, match="expected the same actions in every run"):
         mean_rewards([first, other], 0)
     with pytest.raises(InputError, match="expected runs with rewards at decision 0"):

@@ -24,7 +24,7 @@ from vedette.errors import InputError, NumericalError
 from vedette.filters import CbMemberFilter, CphdFilter, Limits, PhdFilter
 from vedette.kernels.base.compile import JIT_ENABLED
 from vedette.scenarios import load_scenario
-from vedette.scenarios.build import build_filters
+from vedette.scenarios.build import build_sensors
 from vedette.simulation import simulate_scan
 
 BELIEFS = {PhdFilter: Poisson, CphdFilter: IidCluster, CbMemberFilter: MultiBernoulli}
@@ -171,7 +171,7 @@ def test_a_certain_bernoulli_is_bounded_so_that_the_scan_counts() -> None:
 
 @each_kind
 def test_hundreds_of_scans_stay_valid_and_bounded(kind: Any) -> None:
-    local = build_filters(load_scenario("linear-10"))[0]
+    local = build_sensors(load_scenario("linear-10"))[0].filter
     limits = Limits(max_intensity_components=40, max_labels=50)
     tracker = kind(local.motion, local.survival, local.birth, local.sensor, limits)
     scene, belief, rng = Scene(4), tracker.initial(), np.random.default_rng(0)

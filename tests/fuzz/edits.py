@@ -21,7 +21,7 @@ def value_of(rng: Generator) -> Any:
         *(float("nan"), float("inf"), float("-inf"), "", " ", "0", "jdm", "still", "paper-a", "x" * 100_000),
         *("\ud800", "\x00", "\x1b[2J", "[/bold]x", "²", "../../etc/passwd", "/dev/zero", "a\nb", "<script>", "{{7*7}}"),
         *("planner", "os:system", "sensors.*.clutter.rate", "1e999", "null", [], {}, [[]], {"": None}, [1, 2, 3]),
-        *([0.1] * 1000, {str(i): i for i in range(100)}, ["jdm"], {"kind": "custom", "python": "os:system"}),
+        *([0.1] * 1000, {str(i): i for i in range(100)}, ["jdm"], {"kind": "custom", "function": "os:system"}),
     ]
     return values[rng.integers(len(values))]
 

@@ -38,7 +38,7 @@ pytestmark = pytest.mark.fuzz
 Cases = Callable[[Callable[[np.random.Generator], object], int], None]
 SCANS = 25
 REPORT_EVERY = 12  # cases; a report takes a second
-RUN_CODE = "motion:\n  kind: custom\n  python: {file}:boom\n  state_dim: 4\n"
+RUN_CODE = "motion:\n  kind: custom\n  function: {file}:boom\n  state_dim: 4\n"
 
 
 @dataclass(frozen=True)
@@ -148,7 +148,7 @@ def _edit_results(folder: Path, originals: Originals, rng: np.random.Generator) 
 def _name_code(folder: Path, file: Path, rng: np.random.Generator) -> None:
     """A manifest whose scenarios name code in some of their sections."""
     manifest = json.loads((folder / "manifest.json").read_bytes())
-    reference = f"{{kind: custom, python: '{file}:boom'}}"
+    reference = f"{{kind: custom, function: '{file}:boom'}}"
     for cell in manifest["cells"]:
         section = ["detection", "noise", "clutter", "measurement"][rng.integers(4)]
         lines = []

@@ -165,7 +165,7 @@ def test_the_scrubber_shows_a_scan_with_its_decision(page: Page) -> None:
     empty = ink(page, "rewards")
     choose(page, "scrubber", "25")
     assert state(page)["step"] == "25"
-    assert text(page, "decision").startswith("Decision at 20 s: headings ")
+    assert text(page, "decision").startswith("Decision at 20 s: ")
     assert ink(page, "rewards") > empty + 20
     assert page.evaluate("document.querySelector('[data-part=scrubber]').getAttribute('aria-valuetext')") == (
         "step 26 of 40, 26 s"

@@ -11,10 +11,10 @@ import pytest
 
 from reports.examples import MIXED_SENSORS, campaign_of, results_of
 from vedette.errors import InputError
-from vedette.reports import replay
 from vedette.reports.groups import Strategy, gather
 from vedette.reports.replay import replay_data
 from vedette.scenarios.build import build_experiment
+from vedette.scenarios.sections.sensors import Sensor
 from vedette.simulation.replay import scans_of
 
 
@@ -90,7 +90,7 @@ def test_a_joint_decision_is_a_map_and_curves_with_the_choice(strategies: Mappin
     plan = record.decisions[0].plan
     i, j = decision["map"]["chosen"]
     assert decision["scan"] == 9
-    assert [decision["map"]["degrees"][0][i], decision["map"]["degrees"][1][j]] == decision["headings"]
+    assert f"{decision['map']['labels'][0][i]}, {decision['map']['labels'][1][j]}" == decision["actions"]
     table = np.array(decision["map"]["mean"])
     assert table[i, j] == table.max() == pytest.approx(plan.expected_rewards[0][0], rel=1e-4)
     for curve, chosen in zip(decision["curves"], (i, j), strict=True):
@@ -110,7 +110,7 @@ def test_without_the_models_there_are_no_measurements(
     strategies: Mapping[str, Strategy], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def missing(*_: object) -> None:
-        raise InputError("python: expected a file; got none")
+        raise InputError("function: expected a file; got none")
 
-    monkeypatch.setattr(replay, "build_sensor", missing)
+    monkeypatch.setattr(Sensor, "build", missing)
     assert replay_data(strategies["fixed"], strategies["fixed"].records[0], "", trust=True)["scans"] == []

@@ -40,7 +40,7 @@ def scenario(tmp_path: Path) -> Path:
     place.mkdir()
     (place / "models.py").write_text(MODELS)
     path = place / "own.yaml"
-    own = {"sensors.*.detection": {"kind": "custom", "python": "models.py:sees"}}
+    own = {"sensors.*.detection": {"kind": "custom", "function": "models.py:sees"}}
     path.write_text("")
     built_in = Scenario(load_scenario("paper-a").model, path)  # its paths are relative to the new file
     path.write_text(dump_scenario(with_fields(built_in, own).model))

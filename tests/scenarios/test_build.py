@@ -16,8 +16,9 @@ from vedette.errors import InputError
 from vedette.filters import CbMemberFilter, CphdFilter, DeltaGlmbFilter, LmbFilter, PhdFilter
 from vedette.fusion import Clmb, CmDeltaGlmb
 from vedette.scenarios import Scenario, build, list_builtin, load_scenario, parse_scenario
-from vedette.scenarios.schema.tracking import Fusion, MarginalEstimator
-from vedette.simulation import simulate_scan
+from vedette.scenarios.sections.scoring import MarginalEstimator
+from vedette.scenarios.sections.tracking import Fusion
+from vedette.simulation import Truth, simulate_scan
 
 OWN_MODELS = Path(__file__).with_name("own_models.py")
 
@@ -26,11 +27,18 @@ def scenario(*changes: tuple[str, str]) -> Scenario:
     return Scenario(parse_scenario(changed(*changes), folder=OWN_MODELS.parent), OWN_MODELS.with_name("x.yaml"))
 
 
+def truth_of(loaded: Scenario) -> Truth:
+    return build.build_targets(loaded).truth(loaded.model.time.build(), rng=np.random.default_rng(0))
+
+
+def filters_of(loaded: Scenario) -> Any:
+    return [sensor.filter for sensor in build.build_sensors(loaded)]
+
+
 def test_times_and_poses() -> None:
-    model = scenario(("speed: 4.0", "heading_deg: 90")).model
-    times = build.build_times(model.time)
-    np.testing.assert_allclose(times, 2.0 + 0.5 * np.arange(20))
-    np.testing.assert_allclose(build.build_poses(model), [[0.0, 40.0, math.pi / 2], [0.0, -40.0, 0.0]])
+    experiment = build.build_experiment(scenario(("speed: 4.0", "heading_deg: 90")))
+    np.testing.assert_allclose(experiment.times, 2.0 + 0.5 * np.arange(20))
+    np.testing.assert_allclose(experiment.poses, [[0.0, 40.0, math.pi / 2], [0.0, -40.0, 0.0]])
 
 
 def test_births_are_in_the_librarys_state_order() -> None:
@@ -39,7 +47,7 @@ def test_births_are_in_the_librarys_state_order() -> None:
         ("mean: [0.0, 0.0, 0.0, 0.0], std: [5.0, 5.0, 2.0, 2.0]", "mean: [1, 2, 3, 4], std: [5, 6, 7, 8]"),
     )
     model = parse_scenario(text)
-    birth = build.build_birth(model.birth, model.motion)
+    birth = model.birth.build(model.motion)
     np.testing.assert_array_equal(birth.means, [[1, 3, 2, 4]])
     np.testing.assert_array_equal(birth.covs, [np.diag([25.0, 49.0, 36.0, 64.0])])
     assert birth.steps == frozenset({1, 5})
@@ -50,26 +58,23 @@ def test_a_covariance_of_births_is_reordered_both_ways() -> None:
     model = scenario(
         ("sigma_v: 1.0", "sigma_v: 1.0, state_order: interleaved"), ("std: [5.0, 5.0, 2.0, 2.0]", rows)
     ).model
-    cov = build.build_birth(model.birth, model.motion).covs[0]
+    cov = model.birth.build(model.motion).covs[0]
     np.testing.assert_array_equal(cov, [[4, 0, 1, 0], [0, 16, 0, 2], [1, 0, 9, 0], [0, 2, 0, 25]])
 
 
 def test_scripted_targets_live_from_step_to_step() -> None:
-    model = scenario(
-        ("state: [1.0, 2.0, 0.5, -0.5]", "state: [1, 0.5, 2, -0.5]"), ("sigma_v: 1.0", "state_order: interleaved")
-    ).model
-    motion = build.build_motion(model.motion, "auto", Path())
-    source = build.build_truth_source(model, motion, Path())
-    truth = source.truth(build.build_times(model.time), rng=np.random.default_rng(0))
+    truth = truth_of(
+        scenario(
+            ("state: [1.0, 2.0, 0.5, -0.5]", "state: [1, 0.5, 2, -0.5]"), ("sigma_v: 1.0", "state_order: interleaved")
+        )
+    )
     np.testing.assert_array_equal(np.diff(truth.offsets), [0] + [1] * 17 + [0] * 2)
     np.testing.assert_allclose(truth.states[0], [1.0, 2.0, 0.5, -0.5])
     np.testing.assert_allclose(truth.states[-1], [1.0 + 16 * 0.25, 2.0 - 16 * 0.25, 0.5, -0.5])
 
 
 def test_no_target_is_a_scenario_too() -> None:
-    model = scenario(("    - {state: [1.0, 2.0, 0.5, -0.5], start_step: 2, end_step: 18}", "    []")).model
-    source = build.build_truth_source(model, build.build_motion(model.motion, "auto", Path()), Path())
-    truth = source.truth(build.build_times(model.time), rng=np.random.default_rng(0))
+    truth = truth_of(scenario(("    - {state: [1.0, 2.0, 0.5, -0.5], start_step: 2, end_step: 18}", "    []")))
     assert len(truth.ids) == 0
 
 
@@ -83,7 +88,7 @@ def test_no_target_is_a_scenario_too() -> None:
     ],
 )
 def test_measurements_and_their_noise(text: str, dim: int, angular: list[bool]) -> None:
-    sensor = build.build_filters(scenario(("speed: 4.0", text)))[0].sensor
+    sensor = filters_of(scenario(("speed: 4.0", text)))[0].sensor
     assert sensor.meas_dim == dim
     assert list(sensor.measurement.angular) == angular
     sensor.check([[10.0, 20.0, 1.0, 1.0]], [0.0, 40.0, 0.0])
@@ -91,45 +96,45 @@ def test_measurements_and_their_noise(text: str, dim: int, angular: list[bool]) 
 
 def test_degrees_become_radians() -> None:
     text = "noise: {kind: range_dependent, sigma_range: 3.0, eta_range: 0.0, sigma_bearing_deg: 2.0, eta_bearing: 0.0}"
-    sensor = build.build_filters(scenario(("speed: 4.0", text)))[0].sensor
+    sensor = filters_of(scenario(("speed: 4.0", text)))[0].sensor
     cov = sensor.noise.covs([10.0, 20.0, 0.0, 0.0], [0.0, 0.0, 0.0], 2)
     np.testing.assert_allclose(cov[0], np.diag([math.radians(2.0) ** 2, 9.0]))
 
 
 def test_a_sector_is_around_the_heading() -> None:
     text = "detection: {kind: limited_sector, probability: 0.9, max_range: 50.0, half_width_deg: 30.0}"
-    detection = build.build_filters(scenario(("speed: 4.0", text)))[0].sensor.detection
+    detection = filters_of(scenario(("speed: 4.0", text)))[0].sensor.detection
     states = [[10.0, 5.0, 0.0, 0.0], [10.0, 8.0, 0.0, 0.0], [60.0, 0.0, 0.0, 0.0]]
     np.testing.assert_allclose(detection.prob(states, [0.0, 0.0, 0.0]), [0.9, 0.0, 0.0])
 
 
 def test_clutter_of_the_region_and_of_measurement_space() -> None:
     text = "clutter: {kind: measurement_space, rate: 7, low: [0.0, 0.0], high: [6.283185307179586, 100.0]}"
-    north, south = (local.sensor.clutter for local in build.build_filters(scenario(("speed: 4.0", text))))
+    north, south = (local.sensor.clutter for local in filters_of(scenario(("speed: 4.0", text))))
     assert (north.rate, south.rate) == (7.0, 25.0)
 
 
 def test_models_of_the_users_own_from_a_file_beside_the_scenario() -> None:
     own = {
-        name: f"{{kind: custom, python: 'own_models.py:{name}'}}"
+        name: f"{{kind: custom, function: 'own_models.py:{name}'}}"
         for name in ("survival", "noise", "detection", "clutter")
     }
     sensor = ", ".join(f"{name}: {own[name]}" for name in ("noise", "detection", "clutter"))
     loaded = scenario(
         (
             "{kind: constant_velocity, sigma_v: 1.0}",
-            "{kind: custom, python: 'own_models.py:motion', arguments: {speed: 2.5}, state_dim: 3}",
+            "{kind: custom, function: 'own_models.py:motion', arguments: {speed: 2.5}, state_dim: 3}",
         ),
         ("{kind: constant, probability: 0.95}", own["survival"]),
         ("mean: [0.0, 0.0, 0.0, 0.0], std: [5.0, 5.0, 2.0, 2.0]", "mean: [0, 0, 0], std: [1, 1, 1]"),
         ("state: [1.0, 2.0, 0.5, -0.5]", "state: [1, 2, 3]"),
         (
             "  noise: {kind: constant, std: [0.02, 3.0]}",
-            "  measurement: {kind: custom, python: 'own_models.py:measurement'}\n  noise: {kind: constant, std: [3.0]}\n  clutter: {kind: measurement_space, low: [0], high: [100]}",
+            "  measurement: {kind: custom, function: 'own_models.py:measurement'}\n  noise: {kind: constant, std: [3.0]}\n  clutter: {kind: measurement_space, low: [0], high: [100]}",
         ),
         ("speed: 4.0", sensor),
     )
-    north, south = build.build_filters(loaded)
+    north, south = filters_of(loaded)
     assert north.motion.state_dim == 3
     np.testing.assert_allclose(north.motion.propagate([1.0, 2.0, 3.0], 2.0), [[6.0, 2.0, 3.0]])
     assert north.survival.prob([[0.0, 0.0, 0.0]], 1.0) == 0.75
@@ -141,7 +146,7 @@ def test_models_of_the_users_own_from_a_file_beside_the_scenario() -> None:
 
 
 @pytest.mark.parametrize(
-    ("python", "arguments", "message"),
+    ("function", "arguments", "message"),
     [
         ("own_models.py:motion.absent", "{}", "motion.absent to give a MotionModel; got AttributeError"),
         ("own_models.py:bad_motion", "{}", "got ValueError: no such current"),
@@ -151,30 +156,30 @@ def test_models_of_the_users_own_from_a_file_beside_the_scenario() -> None:
         ("json:dumps", "{obj: 1}", "to give a MotionModel; got a str"),
     ],
 )
-def test_models_that_cannot_be_had(python: str, arguments: str, message: str) -> None:
-    text = f"{{kind: custom, python: '{python}', arguments: {arguments}, state_dim: 4}}"
+def test_models_that_cannot_be_had(function: str, arguments: str, message: str) -> None:
+    text = f"{{kind: custom, function: '{function}', arguments: {arguments}, state_dim: 4}}"
     loaded = scenario(("{kind: constant_velocity, sigma_v: 1.0}", text))
-    with pytest.raises(InputError, match=r"^motion\.python: ") as error:
-        build.build_filters(loaded)
+    with pytest.raises(InputError, match=r"^motion\.function: ") as error:
+        filters_of(loaded)
     assert message in str(error.value)
 
 
 def test_a_state_dimension_that_is_not_the_models() -> None:
-    text = "{kind: custom, python: 'own_models.py:motion', state_dim: 4}"
+    text = "{kind: custom, function: 'own_models.py:motion', state_dim: 4}"
     with pytest.raises(InputError, match=r"motion\.state_dim: expected that of own_models\.py:motion, 3; got 4"):
-        build.build_filters(scenario(("{kind: constant_velocity, sigma_v: 1.0}", text)))
+        filters_of(scenario(("{kind: constant_velocity, sigma_v: 1.0}", text)))
 
 
 def test_filters_of_each_kind() -> None:
-    ranked, _ = build.build_filters(scenario())
+    ranked, _ = filters_of(scenario())
     assert isinstance(ranked, DeltaGlmbFilter)
     assert (ranked.marginalised, ranked.assignment) == (True, "ranked")
     text = "kind: delta_glmb, gaussian_method: ckf, assignment: {kind: gibbs, num_samples: 77}, limits: {max_hypotheses: 9}"
-    gibbs, _ = build.build_filters(scenario(("kind: m_delta_glmb", text)))
+    gibbs, _ = filters_of(scenario(("kind: m_delta_glmb", text)))
     assert isinstance(gibbs, DeltaGlmbFilter)
     assert (gibbs.marginalised, gibbs.assignment, gibbs.num_gibbs_samples) == (False, "gibbs", 77)
     assert (gibbs.motion.method, gibbs.sensor.method, gibbs.limits.max_hypotheses) == ("ckf", "ckf", 9)
-    lmb, _ = build.build_filters(scenario(("kind: m_delta_glmb", "kind: lmb"), ("kind: cm_delta_glmb", "kind: clmb")))
+    lmb, _ = filters_of(scenario(("kind: m_delta_glmb", "kind: lmb"), ("kind: cm_delta_glmb", "kind: clmb")))
     assert isinstance(lmb, LmbFilter)
 
 
@@ -190,84 +195,80 @@ UNLABELLED = [("phd", PhdFilter), ("cphd", CphdFilter), ("cb_member", CbMemberFi
 def test_a_filter_without_labels_runs_alone_and_names_its_estimates_by_the_scan(kind: str, container: type) -> None:
     text = f"kind: {kind}, limits: {{max_intensity_components: 7, max_existence: 0.5}}"
     loaded = scenario(*ALONE, ("kind: m_delta_glmb", text))
-    (local,) = build.build_filters(loaded)
+    (local,) = filters_of(loaded)
     assert isinstance(local, container)
     assert (local.limits.max_intensity_components, local.limits.max_existence) == (7, 0.5)
-    filters, beliefs, fused, _ = tracked(loaded, 8, np.random.default_rng(1))
-    estimate = build.build_estimator(loaded.model.estimator)(fused, 8)
+    experiment, beliefs, fused, _ = tracked(loaded, 8, np.random.default_rng(1))
+    estimate = experiment.estimate(fused, 8)
     estimate.validate()
     assert estimate.labels.tolist() == [[8, i] for i in range(estimate.num_targets)]
-    poses = build.build_poses(loaded.model)
     for planner in ("random", "fixed"):
-        build.build_planner(loaded.model, filters, planner).plan(beliefs, fused, poses, rng=np.random.default_rng(0))
+        made = build.build_planner(loaded, planner)
+        made.plan(beliefs, fused, experiment.poses, rng=np.random.default_rng(0))
     for planner in ("jdm", "idm"):
         with pytest.raises(
             InputError, match=rf"^filter\.kind: expected .*, as planner {planner} needs labels; got {kind}"
         ):
-            build.build_planner(loaded.model, filters, planner)
+            build.build_planner(loaded, planner)
 
 
 def test_fusions_of_each_kind_have_weights_that_sum_to_one() -> None:
-    cm = build.build_fusion(Fusion(weights=(0.3333333, 0.3333333, 0.3333333), missing_weight=1e-3), 3)
+    cm = Fusion(weights=(0.3333333, 0.3333333, 0.3333333), missing_weight=1e-3).build(3)
     assert isinstance(cm, CmDeltaGlmb)
     assert math.fsum(cm.weights) == pytest.approx(1.0, abs=1e-12)
     assert cm.missing_log_weight == math.log(1e-3)
-    clmb = build.build_fusion(Fusion(kind="clmb", missing_existence=0.01), 4)
+    clmb = Fusion(kind="clmb", missing_existence=0.01).build(4)
     assert isinstance(clmb, Clmb)
     assert (clmb.weights, clmb.missing_existence) == ((0.25,) * 4, 0.01)
-    assert build.build_fusion(Fusion(kind="none"), 1) is None
+    assert Fusion(kind="none").build(1) is None
 
 
 def test_the_marginal_estimator_has_its_threshold() -> None:
-    estimate = build.build_estimator(MarginalEstimator(threshold=0.9))
+    estimate = MarginalEstimator(threshold=0.9).build()
     for empty in (GLMB.empty(4), LMB.empty(4)):
         assert len(estimate(empty, 1).labels) == 0
 
 
 def test_actions_of_one_sensor_and_of_all() -> None:
     model = scenario(("speed: 4.0", "actions_deg: [-10, 10], headings: relative")).model
-    own, common = (build.build_actions(model.control, sensor) for sensor in model.sensors)
+    own, common = (model.control.build_platform(sensor) for sensor in model.sensors)
     pose = np.array([0.0, 0.0, math.pi / 2])
-    np.testing.assert_allclose(np.degrees(own.headings(pose)), [80.0, 100.0])
-    np.testing.assert_allclose(np.degrees(common.headings(pose)), np.arange(-180, 181, 30))
+    np.testing.assert_allclose(own.actions(pose)[:, 0], [80.0, 100.0])
+    np.testing.assert_allclose(common.actions(pose)[:, 0], np.arange(-180, 181, 30))
 
 
 def test_an_unknown_planner() -> None:
     loaded = scenario()
     with pytest.raises(InputError, match="planner: expected one of jdm, idm, random, fixed; got 'greedy'"):
-        build.build_planner(loaded.model, build.build_filters(loaded), "greedy")
+        build.build_planner(loaded, "greedy")
 
 
 def tracked(loaded: Scenario, num_steps: int, rng: np.random.Generator) -> tuple[Any, Any, Any, Any]:
-    """Filters, their beliefs after some scans with the sensors at rest, the fused belief, and the truth."""
-    model, poses = loaded.model, build.build_poses(loaded.model)
-    filters: Any = build.build_filters(loaded)
-    source = build.build_truth_source(model, filters[0].motion, loaded.folder)
-    truth = source.truth(build.build_times(model.time), rng=rng)
-    fusion: Any = build.build_fusion(model.fusion, len(filters))
+    """The experiment, its beliefs after some scans with the sensors at rest, the fused belief, and the truth."""
+    experiment: Any = build.build_experiment(loaded)
+    poses, filters = experiment.poses, [sensor.filter for sensor in experiment.sensors]
+    truth = experiment.targets.truth(experiment.times, rng=rng)
     beliefs = [local.initial() for local in filters]
     for step in range(1, num_steps + 1):
         for i, local in enumerate(filters):
             scan = simulate_scan(truth.at(step - 1)[1], poses[i], local.sensor, rng=rng).measurements
-            beliefs[i], _ = local.step(beliefs[i], scan, poses[i], model.time.step_period, step, rng=rng)
-    return filters, beliefs, beliefs[0] if fusion is None else fusion.fuse(beliefs)[0], truth
+            beliefs[i], _ = local.step(beliefs[i], scan, poses[i], loaded.model.time.step_period, step, rng=rng)
+    return experiment, beliefs, experiment.fusion.fuse(beliefs)[0] if experiment.fusion else beliefs[0], truth
 
 
 @pytest.mark.parametrize("name", list_builtin())
 def test_built_in_scenarios_run(name: str) -> None:
     loaded, rng = load_scenario(name), np.random.default_rng(1)
-    filters, beliefs, fused, truth = tracked(loaded, 12, rng)
-    estimate = build.build_estimator(loaded.model.estimator)(fused, 12)
-    assert abs(len(estimate.labels) - len(truth.at(11)[0])) <= 1
+    experiment, beliefs, fused, truth = tracked(loaded, 12, rng)
+    assert abs(len(experiment.estimate(fused, 12).labels) - len(truth.at(11)[0])) <= 1
     for planner in ("random", "fixed"):
-        plan = build.build_planner(loaded.model, filters, planner)
-        assert plan.plan(beliefs, fused, build.build_poses(loaded.model), rng=rng).num_sensors == len(filters)
+        plan = build.build_planner(loaded, planner).plan(beliefs, fused, experiment.poses, rng=rng)
+        assert plan.num_sensors == len(experiment.sensors)
 
 
 def test_decisions_of_the_papers_scenario_are_the_printed_ones() -> None:
     loaded, rng = load_scenario("paper-e"), np.random.default_rng(3)
-    filters, beliefs, fused, _ = tracked(loaded, 10, rng)
+    experiment, beliefs, fused, _ = tracked(loaded, 10, rng)
     for planner in ("jdm", "idm"):
-        built = build.build_planner(loaded.model, filters, planner)
-        plan = built.plan(beliefs, fused, build.build_poses(loaded.model), rng=rng)
-        np.testing.assert_allclose(np.degrees(plan.chosen_headings), [-30.0, 30.0])
+        plan = build.build_planner(loaded, planner).plan(beliefs, fused, experiment.poses, rng=rng)
+        np.testing.assert_allclose(np.ravel(plan.chosen_actions), [-30.0, 30.0])

@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 
 from vedette.scenarios import list_builtin, load_scenario
-from vedette.scenarios.build import build_filters, build_times, build_truth_source
+from vedette.scenarios.build import build_targets
 from vedette.scenarios.loading import Scenario
-from vedette.scenarios.schema import ScenarioModel
-from vedette.scenarios.schema.sensors import BearingRange, GaussianDetection, RangeDependentNoise, RegionClutter
-from vedette.scenarios.schema.world import ConstantVelocity, RecordedTargets, ScriptedTargets
+from vedette.scenarios.sections import ScenarioModel
+from vedette.scenarios.sections.sensing import BearingRange, GaussianDetection, RangeDependentNoise, RegionClutter
+from vedette.scenarios.sections.targets import RecordedTargets, ScriptedTargets
+from vedette.scenarios.sections.world import ConstantVelocity
 from vedette.simulation import Truth
 
 LAYOUTS: dict[str, dict[str, Any]] = {
@@ -33,7 +34,6 @@ LAYOUTS: dict[str, dict[str, Any]] = {
 # Row of the notes on the paper -> field, the default asked for.
 NOTE_ROWS = {
     1: ("motion.state_order", "grouped"),
-    2: ("sensors.0.measurement.bearing_function", "atan2"),
     3: ("sensors.0.noise", RangeDependentNoise()),
     4: ("sensors.0.detection", GaussianDetection()),
     5: ("sensors.0.clutter", RegionClutter()),
@@ -42,21 +42,15 @@ NOTE_ROWS = {
     8: ("fusion.mixture_power", "moment_matched"),
     9: ("fusion.feedback", False),
     10: ("control.horizon_period", 2.0),
-    11: ("control.deaths_over_horizon", False),
     12: ("control.ideal_measurements", "ideal"),
-    13: ("control.merge_equal_headings", True),
     14: ("control.headings", "absolute"),
     15: ("control.reward.unit_volume", 1.0),
-    16: ("control.non_finite_reward", "error"),
     17: ("ospa.cutoff", 100.0),
-    18: ("control.ties", "first"),
 }
 
 
 def truth_of(scenario: Scenario) -> Truth:
-    motion = build_filters(scenario)[0].motion
-    source = build_truth_source(scenario.model, motion, scenario.folder)
-    return source.truth(build_times(scenario.model.time), rng=np.random.default_rng(0))
+    return build_targets(scenario).truth(scenario.model.time.build(), rng=np.random.default_rng(0))
 
 
 def test_they_are_all_there_and_valid() -> None:

@@ -11,9 +11,8 @@ from typer.testing import CliRunner
 from scenarios.minimal import MINIMAL, changed
 from vedette.cli import app
 from vedette.scenarios import list_builtin, load_scenario
-from vedette.scenarios.build.sensors import build_detection
 from vedette.scenarios.cautions import cautions, prob_detection
-from vedette.scenarios.schema.sensors import Sensor
+from vedette.scenarios.sections.sensors import Sensor
 
 STEPS = ("steps: [1, 5]", "steps: [1]")
 SECTOR = "detection: {kind: limited_sector, probability: 0.9, max_range: 60.0, half_width_deg: 40.0}"
@@ -94,7 +93,7 @@ def test_what_a_sensor_sees_is_what_its_model_says(detection: dict[str, object],
     )
     points = np.random.default_rng(1).uniform(-200.0, 200.0, (500, 2))
     pose = np.array([10.0, -20.0, np.radians(130.0)])
-    expected = build_detection(sensor.detection, tmp_path).prob(np.c_[points, np.zeros((500, 2))], pose)
+    expected = sensor.detection.build(tmp_path).prob(np.c_[points, np.zeros((500, 2))], pose)
     found = prob_detection(sensor, points)
     assert found is not None
     np.testing.assert_allclose(found, expected, atol=1e-12)

@@ -159,7 +159,7 @@ def test_a_model_of_ones_own_is_looked_for_but_not_run(
 ) -> None:
     (tmp_path / "own.py").write_text(code)
     file = tmp_path / "scenario.yaml"
-    motion = "{kind: custom, python: 'own.py:motion', state_dim: 4}"
+    motion = "{kind: custom, function: 'own.py:motion', state_dim: 4}"
     file.write_text(changed(("{kind: constant_velocity, sigma_v: 1.0}", motion)))
     if wanted:
         assert wanted in fault(file)

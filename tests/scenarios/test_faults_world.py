@@ -60,20 +60,20 @@ CASES = [
     ),
     (
         "{kind: constant_velocity, sigma_v: 1.0}",
-        "{kind: custom, python: nowhere, state_dim: 4}",
-        ['f.yaml:4:32: motion.python: expected "package.module:attribute" or "file.py:attribute", got "nowhere"'],
+        "{kind: custom, function: nowhere, state_dim: 4}",
+        ['f.yaml:4:34: motion.function: expected "package.module:attribute" or "file.py:attribute", got "nowhere"'],
     ),
     (
         "{kind: constant_velocity, sigma_v: 1.0}",
-        "{kind: custom, python: 'absent.py:motion', state_dim: 4}",
+        "{kind: custom, function: 'absent.py:motion', state_dim: 4}",
         [
-            'f.yaml:4:32: motion.python: expected a file, relative to the scenario file, got "absent.py", which is not there'
+            'f.yaml:4:34: motion.function: expected a file, relative to the scenario file, got "absent.py", which is not there'
         ],
     ),
     (
         "{kind: constant_velocity, sigma_v: 1.0}",
-        "{kind: custom, python: 'no_such_module_here:motion', state_dim: 4}",
-        ['f.yaml:4:32: motion.python: expected a module that Python finds, got "no_such_module_here"'],
+        "{kind: custom, function: 'no_such_module_here:motion', state_dim: 4}",
+        ['f.yaml:4:34: motion.function: expected a module that Python finds, got "no_such_module_here"'],
     ),
     (
         "probability: 0.95",

@@ -14,7 +14,7 @@ from pyarrow import parquet
 from scenarios.minimal import changed
 from vedette.errors import ScenarioError
 from vedette.scenarios import Scenario, load_scenario, parse_scenario
-from vedette.scenarios.build import build_motion, build_times, build_truth_source
+from vedette.scenarios.build import build_targets
 from vedette.scenarios.dumping import dump_scenario
 from vedette.simulation import Truth
 
@@ -27,9 +27,7 @@ SHIPS = "when,ship,lon,lat\n" + "".join(
 
 
 def truth_of(scenario: Scenario) -> Truth:
-    motion = build_motion(scenario.model.motion, "auto", scenario.folder)
-    source = build_truth_source(scenario.model, motion, scenario.folder)
-    return source.truth(build_times(scenario.model.time), rng=np.random.default_rng(0))
+    return build_targets(scenario).truth(scenario.model.time.build(), rng=np.random.default_rng(0))
 
 
 def written(folder: Path, targets: str) -> Path:
@@ -97,8 +95,8 @@ def test_columns_that_are_not_there(ships: Path, targets: str, fault: str) -> No
 
 def test_the_running_program_is_no_module_to_take_models_from(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "typed_at_a_prompt", ModuleType("typed_at_a_prompt"))
-    custom = "{kind: custom, python: 'typed_at_a_prompt:motion', state_dim: 4}"
-    with pytest.raises(ScenarioError, match=r"motion\.python: expected a module that Python finds"):
+    custom = "{kind: custom, function: 'typed_at_a_prompt:motion', state_dim: 4}"
+    with pytest.raises(ScenarioError, match=r"motion\.function: expected a module that Python finds"):
         parse_scenario(changed(("{kind: constant_velocity, sigma_v: 1.0}", custom)))
 
 
@@ -118,8 +116,8 @@ def test_a_kept_copy_still_finds_its_files(ships: Path) -> None:
 
 def test_a_kept_copy_still_finds_its_models(tmp_path: Path) -> None:
     (tmp_path / "own.py").write_text("motion = None", encoding="utf-8")
-    custom = "{kind: custom, python: 'own.py:motion', arguments: {kind: custom, python: 'a.py:b'}, state_dim: 4}"
+    custom = "{kind: custom, function: 'own.py:motion', arguments: {kind: custom, function: 'a.py:b'}, state_dim: 4}"
     text = changed(("{kind: constant_velocity, sigma_v: 1.0}", custom))
     motion = parse_scenario(dump_scenario(parse_scenario(text, folder=tmp_path), folder=tmp_path)).motion
-    assert motion.model_dump()["python"] == f"{tmp_path.resolve() / 'own.py'}:motion"
-    assert motion.model_dump()["arguments"] == {"kind": "custom", "python": "a.py:b"}
+    assert motion.model_dump()["function"] == f"{tmp_path.resolve() / 'own.py'}:motion"
+    assert motion.model_dump()["arguments"] == {"kind": "custom", "function": "a.py:b"}

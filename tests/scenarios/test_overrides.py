@@ -50,10 +50,10 @@ def test_files_beside_the_scenario_stay_beside_it(tmp_path: Path) -> None:
     path = tmp_path / "mine.yaml"
     path.write_text(text)
     loaded = load_scenario(path)
-    custom = {"kind": "custom", "python": "own.py:motion", "state_dim": 4}
+    custom = {"kind": "custom", "function": "own.py:motion", "state_dim": 4}
     assert with_fields(loaded, {"motion": custom}).folder == tmp_path
-    with pytest.raises(ScenarioError, match=r"motion\.python: expected a file.*other\.py"):
-        with_fields(loaded, {"motion": {**custom, "python": "other.py:motion"}})
+    with pytest.raises(ScenarioError, match=r"motion\.function: expected a file.*other\.py"):
+        with_fields(loaded, {"motion": {**custom, "function": "other.py:motion"}})
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ from scenarios.minimal import changed
 from scenarios.strategies import scenarios
 from vedette.scenarios import list_builtin, load_scenario, parse_scenario
 from vedette.scenarios.dumping import dump_scenario
-from vedette.scenarios.schema import ScenarioModel
+from vedette.scenarios.sections import ScenarioModel
 
 
 @settings(max_examples=60)

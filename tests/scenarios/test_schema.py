@@ -19,13 +19,13 @@ from vedette.fusion.base import _MERGE_DISTANCE
 from vedette.recorded import Cleaning
 from vedette.recorded import RecordedTargets as RecordedSource
 from vedette.scenarios import json_schema
-from vedette.scenarios.build import build_fusion, build_limits, build_planning_settings
 from vedette.scenarios.diagnostics import kind_of, locate
-from vedette.scenarios.schema.base import Section
-from vedette.scenarios.schema.planning import CauchySchwarzReward as CauchySchwarzSection
-from vedette.scenarios.schema.planning import Control
-from vedette.scenarios.schema.tracking import FilterLimits, Fusion, FusionLimits, GibbsAssignment, MarginalEstimator
-from vedette.scenarios.schema.world import RecordedTargets
+from vedette.scenarios.sections.base import Section
+from vedette.scenarios.sections.control import CauchySchwarzReward as CauchySchwarzSection
+from vedette.scenarios.sections.control import Control
+from vedette.scenarios.sections.scoring import MarginalEstimator
+from vedette.scenarios.sections.targets import RecordedTargets
+from vedette.scenarios.sections.tracking import FilterLimits, Fusion, FusionLimits, GibbsAssignment
 
 
 def sections(base: type[BaseModel] = Section) -> list[type[BaseModel]]:
@@ -62,16 +62,16 @@ def test_json_schema_describes_fields_and_forbids_others() -> None:
 
 
 def test_default_limits_are_those_of_the_library() -> None:
-    assert build_limits(FilterLimits()) == Limits()
+    assert FilterLimits().build() == Limits()
 
 
 def test_default_planning_settings_are_those_of_the_library() -> None:
-    assert build_planning_settings(Control()) == PlanningSettings()
+    assert Control().build() == PlanningSettings()
 
 
 @pytest.mark.parametrize(("kind", "library"), [("cm_delta_glmb", CmDeltaGlmb), ("clmb", Clmb)])
 def test_default_fusions_are_those_of_the_library(kind: Any, library: Any) -> None:
-    built, expected = build_fusion(Fusion(kind=kind), 2), library((0.5, 0.5))
+    built, expected = Fusion(kind=kind).build(2), library((0.5, 0.5))
     assert isinstance(built, CmDeltaGlmb | Clmb)
     assert type(built) is library
     for field in dataclasses.fields(library):

@@ -17,6 +17,7 @@ from vedette.filters import FilterInfo, Limits
 from vedette.fusion import CmDeltaGlmb
 from vedette.fusion.base import FusionInfo
 from vedette.models import limited_range
+from vedette.platforms import Actions
 from vedette.scenarios import load_scenario
 from vedette.scenarios.build import build_experiment
 from vedette.simulation.experiment import Experiment
@@ -251,8 +252,8 @@ def test_an_estimate_that_cannot_be_scored_leaves_all_scans(experiment: Experime
 
 def test_an_interrupt_keeps_what_was_before(experiment: Experiment) -> None:
     with pytest.raises(RunInterrupted, match=r"step 6 of 8 \(6 s\), in the filter of sensor 2: interrupted") as caught:
-        run(failing(experiment, KeyboardInterrupt(), 6), FixedPlanner((0.0, 0.0)))
+        run(failing(experiment, KeyboardInterrupt(), 6), FixedPlanner((Actions.of(heading_deg=0.0),) * 2))
     assert isinstance(caught.value, KeyboardInterrupt)
     assert caught.value.record is not None
-    assert_first_scans(caught.value.record, run(experiment, FixedPlanner((0.0, 0.0))), 5)
+    assert_first_scans(caught.value.record, run(experiment, FixedPlanner((Actions.of(heading_deg=0.0),) * 2)), 5)
     assert len(caught.value.record.decisions) == 1

@@ -9,7 +9,7 @@ import pytest
 
 from vedette.control import FixedPlanner, RandomPlanner
 from vedette.errors import InputError
-from vedette.models.platforms import advance
+from vedette.platforms import Actions
 from vedette.scenarios import load_scenario
 from vedette.scenarios.build import build_experiment
 from vedette.simulation.loop import STAGES, simulate
@@ -39,19 +39,23 @@ def test_without_a_planner_sensors_never_move(shortened):
 
 
 def test_sensors_lie_still_until_the_first_decision_and_then_keep_its_course(shortened):
-    record = run(shortened, FixedPlanner((-30.0, 45.0)))
+    record = run(shortened, FixedPlanner((Actions.of(heading_deg=-30.0), Actions.of(heading_deg=45.0))))
     (decision,) = record.decisions
     assert (decision.step, decision.time) == (10, 10.0)
     np.testing.assert_array_equal(record.poses[9], shortened.poses)
-    speeds = np.array([sensor.speed for sensor in shortened.sensors])
     for later in range(10, 14):
-        expected = advance(shortened.poses, np.radians([-30.0, 45.0]), speeds, later - 9.0)
+        expected = shortened.poses.copy()
+        for pose, angle, sensor in zip(expected, np.radians([-30.0, 45.0]), shortened.sensors, strict=True):
+            pose += (later - 9.0) * sensor.platform.speed * np.array([np.cos(angle), np.sin(angle), 0.0])
+            pose[2] = angle
         np.testing.assert_allclose(record.poses[later], expected, atol=1e-9)
 
 
 def test_a_sensor_may_be_under_way_from_the_start(shortened):
-    record = run(replace(shortened, moving=np.array([True, False])), FixedPlanner((0.0, 0.0)))
-    assert record.poses[1, 0, 0] == pytest.approx(shortened.poses[0, 0] + shortened.sensors[0].speed)
+    record = run(
+        replace(shortened, first_actions=(np.zeros(1), None)), FixedPlanner((Actions.of(heading_deg=0.0),) * 2)
+    )
+    assert record.poses[1, 0, 0] == pytest.approx(shortened.poses[0, 0] + shortened.sensors[0].platform.speed)
     np.testing.assert_array_equal(record.poses[1, 1], shortened.poses[1])
 
 
@@ -84,8 +88,8 @@ def test_feedback_gives_every_sensor_the_fused_belief(shortened):
 def test_unequal_scan_times_move_sensors_by_the_time_between(shortened):
     times = np.array([1.0, 2.0, 4.0, 4.5])
     uneven = replace(shortened, times=times, decision_steps=(1,))
-    record = run(uneven, FixedPlanner((0.0, 0.0)))
-    np.testing.assert_allclose(np.diff(record.poses[:, 0, 0]), np.diff(times) * uneven.sensors[0].speed)
+    record = run(uneven, FixedPlanner((Actions.of(heading_deg=0.0),) * 2))
+    np.testing.assert_allclose(np.diff(record.poses[:, 0, 0]), np.diff(times) * uneven.sensors[0].platform.speed)
 
 
 def test_time_is_taken_by_stage_and_scan(shortened):
@@ -102,7 +106,7 @@ def test_time_is_taken_by_stage_and_scan(shortened):
         ({"fusion": None}, "fusion: expected one for 2 sensors"),
         ({"decision_steps": (99,)}, "decision_steps: expected scans from 1 to 14; got 99"),
         ({"poses": np.zeros((3, 3))}, "poses: expected finite numbers"),
-        ({"moving": np.zeros(3, bool)}, "moving: expected 2 flags"),
+        ({"first_actions": (None,)}, "first_actions: expected 2, one a sensor; got 1"),
     ],
 )
 def test_parts_that_do_not_fit(shortened, change, message):

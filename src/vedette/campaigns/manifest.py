@@ -20,7 +20,7 @@ from vedette.errors import InputError
 from vedette.files import write_whole
 from vedette.reading import parse_json, read_file, said
 from vedette.scenarios import Scenario
-from vedette.scenarios.schema import ScenarioModel
+from vedette.scenarios.sections import ScenarioModel
 from vedette.scenarios.yaml_reader import read_yaml
 from vedette.simulation.storage import versions
 from vedette.text import shown

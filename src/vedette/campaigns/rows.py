@@ -10,6 +10,7 @@ import numpy as np
 
 from vedette.control.plan import Plan, RewardTable
 from vedette.kernels.base.types import Ints
+from vedette.platforms import Actions
 from vedette.simulation.columns import flatten
 from vedette.simulation.records import Decision
 from vedette.simulation.tabulation import POSE_COLUMNS, tables_of
@@ -83,7 +84,7 @@ def sensor_rows(run: FinishedRun) -> Rows:
 
 
 def decision_rows(run: FinishedRun) -> Rows:
-    """One row a decision: poses before it and headings chosen, a sensor each; expected rewards, a reward table each.
+    """One row a decision: poses before it and actions chosen, a sensor each; expected rewards, a reward table each.
 
     The last columns count what was evaluated, `num_` and its name; null where a planner counts no such thing.
     """
@@ -99,7 +100,10 @@ def decision_rows(run: FinishedRun) -> Rows:
             for axis, name in enumerate(POSE_COLUMNS)
         },
         "chosen_actions": Lists.of((plan.chosen for plan in plans), np.int64),
-        "chosen_headings_rad": Lists.of((plan.chosen_headings for plan in plans), np.float64),
+        **{
+            f"chosen_{name}": Lists.of(([_number(*each, name) for each in _chosen(plan)] for plan in plans), np.float64)
+            for name in dict.fromkeys(name for plan in plans for own in plan.actions for name in own.columns)
+        },
         "expected_rewards": Lists.of(([mean for mean, _ in plan.expected_rewards] for plan in plans), np.float64),
         "expected_reward_ses": Lists.of(([error for _, error in plan.expected_rewards] for plan in plans), np.float64),
         **{f"num_{name}": [plan.counts.get(name) for plan in plans] for name in counted},
@@ -109,7 +113,8 @@ def decision_rows(run: FinishedRun) -> Rows:
 def reward_rows(run: FinishedRun) -> Rows:
     """One row an action, or a combination of actions, of a reward table: what it was expected to bring.
 
-    `sensors` are the sensors of the table, `actions` the index of the action of each, `headings_rad` their directions.
+    `sensors` are the sensors of the table, `actions` the index of the action of each, and `action_` with the name of a
+    column its number; NaN of a sensor without that column.
     Combinations that were not evaluated have no row.
     """
     tables = [
@@ -117,7 +122,8 @@ def reward_rows(run: FinishedRun) -> Rows:
         for number, decision in enumerate(run.record.decisions)
         for place, table in enumerate(decision.plan.tables)
     ]
-    parts = [_no_rewards(), *(_rewards_of(*each) for each in tables)]
+    columns = dict.fromkeys(name for _, decision, *_ in tables for own in decision.plan.actions for name in own.columns)
+    parts = [_no_rewards(tuple(columns)), *(_rewards_of(*each, tuple(columns)) for each in tables)]
     return {
         name: Lists.joined(part[name] for part in parts)
         if isinstance(column, Lists)
@@ -126,11 +132,23 @@ def reward_rows(run: FinishedRun) -> Rows:
     }
 
 
-def _rewards_of(number: int, decision: Decision, place: int, table: RewardTable) -> dict[str, Any]:
+def _chosen(plan: Plan) -> list[tuple[Actions, int]]:
+    return list(zip(plan.actions, plan.chosen, strict=True))
+
+
+def _number(actions: Actions, index: Any, column: str) -> Any:
+    """The number of an action, or of several, in a column; NaN where there is no such column."""
+    if column not in actions.columns:
+        return np.full(np.shape(index), np.nan)
+    return actions.values[index, actions.columns.index(column)]
+
+
+def _rewards_of(
+    number: int, decision: Decision, place: int, table: RewardTable, columns: tuple[str, ...]
+) -> dict[str, Any]:
     plan: Plan = decision.plan
     actions = np.argwhere(~np.isnan(table.mean))
     num, width = actions.shape
-    headings = [plan.action_values[sensor][actions[:, axis]] for axis, sensor in enumerate(table.sensors)]
     index, lengths = tuple(actions.T), np.full(num, width)
     return {
         "decision": np.full(num, number),
@@ -139,18 +157,26 @@ def _rewards_of(number: int, decision: Decision, place: int, table: RewardTable)
         "reward_table": np.full(num, place),
         "sensors": Lists(np.tile(np.array(table.sensors, np.int64), num), lengths),
         "actions": Lists(actions.ravel(), lengths),
-        "headings_rad": Lists(np.stack(headings, axis=1).ravel(), lengths),
+        **{
+            f"action_{name}": Lists(
+                np.stack(
+                    [_number(plan.actions[s], actions[:, axis], name) for axis, s in enumerate(table.sensors)], axis=1
+                ).ravel(),
+                lengths,
+            )
+            for name in columns
+        },
         "reward": table.mean[index],
         "reward_se": table.standard_error[index],
         "chosen": (actions == [plan.chosen[sensor] for sensor in table.sensors]).all(axis=1),
     }
 
 
-def _no_rewards() -> dict[str, Any]:
+def _no_rewards(columns: tuple[str, ...]) -> dict[str, Any]:
     """The columns of `_rewards_of` without a row."""
-    plan = Plan("", (np.zeros(1),), (0,), (), {})
+    plan = Plan("", (Actions((), np.empty((1, 0))),), (0,), (), {})
     table = RewardTable((0,), np.full(1, np.nan), np.full(1, np.nan))
-    return _rewards_of(0, Decision(0, 0.0, np.zeros((1, 3)), plan), 0, table)
+    return _rewards_of(0, Decision(0, 0.0, np.zeros((1, 3)), plan), 0, table, columns)
 
 
 def timing_rows(run: FinishedRun) -> Rows:

@@ -14,7 +14,7 @@ from vedette.errors import InputError
 from vedette.evaluation.runs import STRATEGIES
 from vedette.scenarios.diagnostics import suggestion
 from vedette.scenarios.faults import describe, named
-from vedette.scenarios.schema.base import Name, Section, Whole, expected
+from vedette.scenarios.sections.base import Name, Section, Whole, expected
 from vedette.text import elided, listed, plain, printable
 
 _MOST_BYTES = 2_000_000

@@ -58,6 +58,7 @@ def _of_cell(campaign: Campaign, cell: Cell, runs: list[FinishedRun], rows: list
 
 
 def _column(parts: list[Any]) -> Any:
+    parts = [part for part in parts if len(part)] or parts[:1]
     if all(isinstance(part, np.ndarray) for part in parts):
         return pa.array(np.concatenate(parts), from_pandas=True)  # null for NaN, which SQL takes for a number
     if all(isinstance(part, Lists) for part in parts):

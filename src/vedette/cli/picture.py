@@ -15,7 +15,6 @@ from vedette.evaluation.figures.labels import drawn_text
 from vedette.evaluation.figures.style import COLUMN_WIDTH, GREY, VERMILION, colour, line_style, new_figure, styled
 from vedette.kernels.base.types import Floats
 from vedette.scenarios import Scenario
-from vedette.scenarios.build import build_birth
 from vedette.scenarios.names import sensor_names
 from vedette.simulation import Truth
 
@@ -69,7 +68,7 @@ def _draw_region(axes: Axes, scenario: Scenario, scale: float) -> None:
 
 def _draw_births(axes: Axes, scenario: Scenario, scale: float) -> None:
     """A cross at each site, and the ellipse of two standard deviations."""
-    birth = build_birth(scenario.model.birth, scenario.model.motion)
+    birth = scenario.model.birth.build(scenario.model.motion)
     for mean, cov in zip(birth.means[:, :2], birth.covs[:, :2, :2], strict=True):
         variances, axes_of = np.linalg.eigh(cov)
         width, height = 4.0 * np.sqrt(variances) * scale

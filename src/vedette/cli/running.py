@@ -151,6 +151,8 @@ def _end(stop: RunStopped | RunInterrupted, left: str) -> NoReturn:
 def _print_run(record: RunRecord) -> None:
     from rich.table import Table
 
+    from vedette.evaluation.actions import choice_words
+    from vedette.evaluation.comparison import choices_of
     from vedette.evaluation.health import health_line
 
     console = new_console()
@@ -159,13 +161,11 @@ def _print_run(record: RunRecord) -> None:
     )
     if record.decisions:
         table = Table(box=None, pad_edge=False)
-        for heading in ("time", "headings", "expected reward"):
+        for heading in ("time", "actions", "expected reward"):
             table.add_column(heading)
-        for decision in record.decisions:
-            plan = decision.plan
-            degrees = ", ".join(f"{round(float(h * 57.29577951308232))}°" for h in plan.chosen_headings)
-            rewards = ", ".join(f"{mean:.3f} ± {error:.3f}" for mean, error in plan.expected_rewards)
-            table.add_row(f"{decision.time:g} s", degrees, rewards)
+        for decision, choice in zip(record.decisions, choices_of(record), strict=True):
+            rewards = ", ".join(f"{mean:.3f} ± {error:.3f}" for mean, error in decision.plan.expected_rewards)
+            table.add_row(f"{decision.time:g} s", choice_words(choice), rewards)
         console.print(table)
     total, localisation, cardinality = record.ospa.mean(axis=0)
     console.print(f"mean OSPA {total:.2f} m (localisation {localisation:.2f}, cardinality {cardinality:.2f})")

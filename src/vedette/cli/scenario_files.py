@@ -58,7 +58,7 @@ def init(
 def _starting_files(scenario: Scenario, target: Path) -> dict[Path, str]:
     """The text of a built-in scenario for `target`; beside it its data, if it has any, and where they come from."""
     from vedette.scenarios import list_builtin
-    from vedette.scenarios.schema.world import RecordedTargets
+    from vedette.scenarios.sections.targets import RecordedTargets
 
     text = list_builtin()[scenario.name].read_text(encoding="utf-8")
     files: dict[Path, str] = {}

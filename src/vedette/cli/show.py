@@ -137,12 +137,9 @@ def truth_of(scenario: Scenario) -> Truth:
     """The targets as one run has them; with process noise every run has others."""
     import numpy as np
 
-    from vedette.scenarios.build import build_motion, build_times, build_truth_source
+    from vedette.scenarios.build import build_targets
 
-    model = scenario.model
-    motion = build_motion(model.motion, "auto", scenario.folder)
-    source = build_truth_source(model, motion, scenario.folder)
-    return source.truth(build_times(model.time), rng=np.random.default_rng(0))
+    return build_targets(scenario).truth(scenario.model.time.build(), rng=np.random.default_rng(0))
 
 
 def _draw(scenario: Scenario, out: Path) -> None:

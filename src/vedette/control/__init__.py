@@ -1,6 +1,5 @@
-"""Where to send the sensors next: actions, ideal measurements, rewards, joint action search, planners."""
+"""Where to send the sensors next: ideal measurements, rewards, joint action search, planners."""
 
-from vedette.control.actions import PAPER_HEADINGS_DEG, ActionSet, HeadingActions
 from vedette.control.evaluator import Evaluator
 from vedette.control.plan import Plan, RewardTable
 from vedette.control.planners import FixedPlanner, IndependentPlanner, JointPlanner, Planner, RandomPlanner
@@ -9,14 +8,11 @@ from vedette.control.search import CoordinateAscent, ExhaustiveSearch, JointProb
 from vedette.control.settings import MobileSensor, PlanningSettings, planning_limits
 
 __all__ = [
-    "PAPER_HEADINGS_DEG",
-    "ActionSet",
     "CauchySchwarzReward",
     "CoordinateAscent",
     "Evaluator",
     "ExhaustiveSearch",
     "FixedPlanner",
-    "HeadingActions",
     "IndependentPlanner",
     "JointPlanner",
     "JointProblem",

@@ -8,8 +8,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from vedette.control.actions import distinct_headings
-from vedette.control.inputs import Belief, check_beliefs, check_headings, check_poses, check_sensors
+from vedette.control.inputs import Belief, check_beliefs, options_of
 from vedette.control.kinds import of_one_kind
 from vedette.control.plain import PlainRewards, can_be_laid_out
 from vedette.control.priors import predicted
@@ -22,6 +21,7 @@ from vedette.densities import LMB
 from vedette.errors import NumericalError
 from vedette.fusion import Clmb, CmDeltaGlmb, Fusion
 from vedette.kernels.base.types import Floats, Ints
+from vedette.platforms import Options
 
 SampleRewards: TypeAlias = Callable[[Ints], Floats]
 
@@ -32,9 +32,8 @@ class Evaluator:
 
     Attributes:
         sensors, fusion, settings, reward: as in the planners.
-        headings: for each sensor, its headings in printed order.
-        distinct: for each sensor, the different directions among them, which are what is evaluated.
-        which: for each sensor, which distinct direction each heading is.
+        options: for each sensor, its actions in printed order and the different courses that they lead to, which are
+            what is evaluated.
         prediction: the fused density predicted to the horizon, one Gaussian a track.
         posteriors: the pseudo-posteriors of each sensor.
         counts: how many filter steps, fusions and divergences have been evaluated so far.
@@ -44,9 +43,7 @@ class Evaluator:
     fusion: Fusion[Any, Any]
     settings: PlanningSettings
     reward: Reward
-    headings: tuple[Floats, ...]
-    distinct: tuple[Floats, ...]
-    which: tuple[Ints, ...]
+    options: tuple[Options, ...]
     prediction: Belief
     posteriors: tuple[PseudoPosteriors, ...]
     counts: dict[str, int] = field(default_factory=dict)
@@ -68,30 +65,26 @@ class Evaluator:
 
         Targets move as the first sensor's filter has it. Raises as `JointPlanner.plan`.
         """
-        headings, at = check_situation(sensors, poses)
+        options = options_of(sensors, poses, settings)
         check_beliefs(sensors, beliefs, fused)
-        pairs = [distinct_headings(values) for values in headings]
         prediction = predicted(fused, sensors[0].filter, settings.horizon_steps, settings.horizon_period)
         futures = draw_futures(fused, sensors, settings, rng=rng)
         posteriors = tuple(
-            pseudo_posteriors(belief, sensor, pose, pair[0], future, settings)
-            for belief, sensor, pose, pair, future in zip(beliefs, sensors, at, pairs, futures, strict=True)
+            pseudo_posteriors(belief, sensor, own.courses, future, settings)
+            for belief, sensor, own, future in zip(beliefs, sensors, options, futures, strict=True)
         )
-        steps = sum(len(pair[0]) for pair in pairs) * settings.num_samples * settings.horizon_steps
+        steps = sum(len(own.courses) for own in options) * settings.num_samples * settings.horizon_steps
         counts = {"filter_steps": steps, "fusions": 0, "divergences": 0}
-        return cls(
-            tuple(sensors), fusion, settings, reward, headings, tuple(pair[0] for pair in pairs),
-            tuple(pair[1] for pair in pairs), prediction, posteriors, counts,
-        )  # fmt: skip
+        return cls(tuple(sensors), fusion, settings, reward, options, prediction, posteriors, counts)
 
     def joint_shape(self) -> tuple[int, ...]:
-        """Number of distinct directions of each sensor."""
-        return tuple(len(values) for values in self.distinct)
+        """Number of different courses of each sensor."""
+        return tuple(len(own.courses) for own in self.options)
 
     def rewards(self, which: Sequence[int], fusion: Fusion[Any, Any] | None) -> SampleRewards:
         """The function that gives (num_joint, num_samples) rewards of joint actions (num_joint, num of `which`).
 
-        which: the sensors that act. Their actions are numbers of distinct directions. fusion: None for a single sensor,
+        which: the sensors that act. Their actions are numbers of different courses. fusion: None for a single sensor,
         whose own density is then compared with the prediction. The function raises `NumericalError` where a reward is
         not finite, which names the action and the sample.
         """
@@ -122,7 +115,7 @@ class Evaluator:
         return self.rewards(which, fusion)(all_joint_actions(tuple(shape[s] for s in which)))
 
     def independent_choice(self) -> tuple[int, ...]:
-        """The direction that is best for each sensor alone (paper, Algorithm 3); of equal ones the first."""
+        """The course that is best for each sensor alone (paper, Algorithm 3); of equal ones the first."""
         everyone = range(len(self.sensors))
         return tuple(first_best(self.sample_rewards((s,), None).mean(axis=1)) for s in everyone)
 
@@ -130,23 +123,12 @@ class Evaluator:
         bad = np.argwhere(~np.isfinite(rewards))
         if len(bad):
             joint, sample = bad[0].tolist()
-            radians = [self.distinct[s][action] for s, action in zip(which, actions[joint].tolist(), strict=True)]
-            raise NumericalError(
-                f"reward of headings {np.degrees(radians).round(6).tolist()} degrees of sensors {list(which)}, "
-                f"sample {sample}: expected a finite number; got {rewards[joint, sample]}"
+            courses = zip(which, actions[joint].tolist(), strict=True)
+            named = (
+                f"action {self.options[s].actions.text(self.options[s].first_action(course))} of sensor {s + 1}"
+                for s, course in courses
             )
-
-    def first_heading(self, sensor: int, direction: int) -> int:
-        """Index in printed order of the first heading that is this distinct direction."""
-        return int(np.flatnonzero(self.which[sensor] == direction)[0])
-
-
-def check_situation(sensors: Sequence[MobileSensor], poses: Any) -> tuple[tuple[Floats, ...], Floats]:
-    """For each sensor its headings in printed order, and the poses (num_sensors, 3); `InputError` for unfit ones."""
-    check_sensors(sensors)
-    at = check_poses(poses, len(sensors))
-    headings = tuple(
-        check_headings(f"sensors[{s}].actions", sensor.actions.headings(pose.copy()))
-        for s, (sensor, pose) in enumerate(zip(sensors, at, strict=True))
-    )
-    return headings, at
+            raise NumericalError(
+                f"reward of {' and '.join(named)}, sample {sample}: expected a finite number; "
+                f"got {rewards[joint, sample]}"
+            )

@@ -1,4 +1,4 @@
-"""The rewards that a decision was made on, kept as tables over the headings in printed order."""
+"""The rewards that a decision was made on, kept as tables over the actions in printed order."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Evidence:
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Number of different directions of each of the sensors."""
+        """Number of different courses of each of the sensors."""
         shape = self.evaluator.joint_shape()
         return tuple(shape[s] for s in self.which)
 
@@ -75,18 +75,18 @@ class Evidence:
 
         A line holds one sensor's actions with the others at their `choice`.
         """
-        num_entries = math.prod(len(self.evaluator.headings[s]) for s in self.which)
+        num_entries = math.prod(len(self.evaluator.options[s].actions) for s in self.which)
         if num_entries <= MAX_TABLE and len(self.which) <= _MAX_AXES:
             return (self._table(self.which, range(len(self.which)), choice),)
         return tuple(self._table((s,), (axis,), choice) for axis, s in enumerate(self.which))
 
     def _table(self, sensors: tuple[int, ...], axes: Sequence[int], choice: Sequence[int]) -> RewardTable:
-        """Rewards over the directions on `axes` where all others are chosen, spread over the headings."""
+        """Rewards over the courses on `axes` where all others are chosen, spread over the actions."""
         actions = np.concatenate(self._actions)
         others = [axis for axis in range(len(self.which)) if axis not in axes]
         rows = (actions[:, others] == np.array(choice, np.int64)[others]).all(axis=1)
         place = tuple(actions[rows][:, axis] for axis in axes)
-        spread = np.ix_(*(self.evaluator.which[s] for s in sensors))
+        spread = np.ix_(*(self.evaluator.options[s].which for s in sensors))
         filled = []
         for values in (self._means, self._errors):
             table = np.full([self.shape[axis] for axis in axes], math.nan)

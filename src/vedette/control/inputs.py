@@ -7,12 +7,13 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from vedette.control.settings import MobileSensor
+from vedette.control.settings import MobileSensor, PlanningSettings
 from vedette.densities import GLMB, LMB
 from vedette.errors import InputError
 from vedette.filters import DeltaGlmbFilter, LabelledFilter
 from vedette.kernels.base.types import Floats
 from vedette.models.arguments import float_array, reject
+from vedette.platforms import Options, options_at
 
 Belief: TypeAlias = GLMB | LMB
 
@@ -27,8 +28,21 @@ def check_sensors(sensors: Sequence[MobileSensor]) -> None:
 
 
 def check_poses(poses: Any, num_sensors: int) -> Floats:
-    """The poses as a (num_sensors, 3) array; `InputError` if they are not that or not finite."""
-    return float_array("poses", poses, (num_sensors, 3))
+    """The poses as a (num_sensors, 3 or more) array; `InputError` if they are not that or not finite."""
+    checked = float_array("poses", poses, (num_sensors, None))
+    if checked.shape[1] < 3:
+        raise reject("poses", f"an array of shape ({num_sensors}, 3 or more)", f"shape {checked.shape}")
+    return checked
+
+
+def options_of(sensors: Sequence[MobileSensor], poses: Any, settings: PlanningSettings) -> tuple[Options, ...]:
+    """For each sensor what it may do over the horizon; `InputError` for sensors, poses or platforms that do not fit."""
+    check_sensors(sensors)
+    at, times = check_poses(poses, len(sensors)), settings.horizon_times()
+    return tuple(
+        options_at(f"sensors[{s}].platform", sensor.platform, pose, times)
+        for s, (sensor, pose) in enumerate(zip(sensors, at, strict=True))
+    )
 
 
 def check_beliefs(sensors: Sequence[MobileSensor], beliefs: Sequence[Any], fused: Any) -> None:
@@ -54,14 +68,6 @@ def _check_density(name: str, density: Any, kinds: tuple[type[Belief], ...], sta
         density.validate(error=InputError)
     except InputError as fault:
         raise InputError(f"{name}: {fault}") from None
-
-
-def check_headings(name: str, headings: Any) -> Floats:
-    """The headings of an action set as an array; `InputError` unless there is at least one and all are finite."""
-    values = float_array(name, headings, (None,))
-    if len(values) == 0:
-        raise InputError(f"{name}: expected at least one heading; got none")
-    return values
 
 
 def check_choice(name: str, choice: Any, shape: tuple[int, ...]) -> tuple[int, ...]:

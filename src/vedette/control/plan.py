@@ -8,9 +8,7 @@ import numpy as np
 
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats
-from vedette.text import plain
-
-_LARGEST = 1e300  # rad; finite in degrees, too
+from vedette.platforms import Actions
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,29 +48,31 @@ class Plan:
 
     Attributes:
         planner: name of the planner.
-        action_values: for each sensor, (num_actions,) the heading in radians of each action, in printed order.
-        chosen: for each sensor, the index of its chosen action in `action_values`.
+        actions: for each sensor, what it could do, in printed order.
+        chosen: for each sensor, the index of its chosen action in `actions`.
         tables: independent decisions: one 1-D table a sensor; joint decisions: one table with one axis a sensor (where
             that would be too large to hold, one 1-D table a sensor, the others at their chosen actions);
             random and fixed control: none.
         counts: how many of each thing was evaluated.
+        notes: what a reader must know, such as that rewards were taken one by one.
     """
 
     planner: str
-    action_values: tuple[Floats, ...]
+    actions: tuple[Actions, ...]
     chosen: tuple[int, ...]
     tables: tuple[RewardTable, ...]
     counts: dict[str, int]
+    notes: tuple[str, ...] = ()
 
     @property
     def num_sensors(self) -> int:
         """Number of sensors that the plan steers."""
-        return len(self.action_values)
+        return len(self.actions)
 
     @property
-    def chosen_headings(self) -> Floats:
-        """(num_sensors,) chosen headings in radians."""
-        return np.array([values[index] for values, index in zip(self.action_values, self.chosen, strict=True)])
+    def chosen_actions(self) -> tuple[Floats, ...]:
+        """The chosen row of each sensor's actions."""
+        return tuple(own.values[index] for own, index in zip(self.actions, self.chosen, strict=True))
 
     @property
     def expected_rewards(self) -> tuple[tuple[float, float], ...]:
@@ -84,16 +84,14 @@ class Plan:
         )
 
     def validate(self) -> None:
-        """Raise `InputError` unless headings are finite, and the tables fit the actions and hold the choice."""
+        """Raise `InputError` unless the tables fit the actions and hold the choice."""
         if len(self.chosen) != self.num_sensors:
             raise InputError(
                 f"plan.chosen: expected one index for each of {self.num_sensors} sensors; got {self.chosen}"
             )
-        for sensor, (values, index) in enumerate(zip(self.action_values, self.chosen, strict=True)):
-            if not 0 <= index < len(values):
-                raise InputError(f"plan.chosen[{sensor}]: expected an index of {len(values)} actions; got {index}")
-            if not (np.abs(values) < _LARGEST).all():
-                raise InputError(f"plan.action_values[{sensor}]: expected finite headings; got {plain(values)}")
+        for sensor, (own, index) in enumerate(zip(self.actions, self.chosen, strict=True)):
+            if not 0 <= index < len(own):
+                raise InputError(f"plan.chosen[{sensor}]: expected an index of {len(own)} actions; got {index}")
         for table in self.tables:
             self._check_table(table)
 
@@ -101,7 +99,7 @@ class Plan:
         table.validate()
         if not all(0 <= sensor < self.num_sensors for sensor in table.sensors):
             raise InputError(f"plan.tables: expected sensors below {self.num_sensors}; got {table.sensors}")
-        expected = tuple(len(self.action_values[sensor]) for sensor in table.sensors)
+        expected = tuple(len(self.actions[sensor]) for sensor in table.sensors)
         if table.mean.shape != expected:
             raise InputError(f"plan.tables: expected shape {expected} for {table.sensors}; got {table.mean.shape}")
         choice = tuple(self.chosen[sensor] for sensor in table.sensors)

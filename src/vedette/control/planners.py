@@ -1,4 +1,4 @@
-"""Planners: joint and independent decision making (paper, Algorithms 2 and 3), random and fixed courses."""
+"""Planners: joint and independent decision making (paper, Algorithms 2 and 3), random and fixed actions."""
 
 from __future__ import annotations
 
@@ -8,21 +8,21 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from vedette.control.actions import distinct_headings
-from vedette.control.evaluator import Evaluator, check_situation
+from vedette.control.evaluator import Evaluator
 from vedette.control.evidence import Evidence
-from vedette.control.inputs import Belief, check_choice, check_headings, check_poses
+from vedette.control.inputs import Belief, check_choice, check_poses, options_of
 from vedette.control.plan import Plan, RewardTable
 from vedette.control.reward import CauchySchwarzReward, Reward
 from vedette.control.search import ExhaustiveSearch, JointProblem, JointSearch, all_joint_actions, first_best
 from vedette.control.settings import MobileSensor, PlanningSettings
 from vedette.fusion import Fusion
 from vedette.kernels.base.types import Floats
-from vedette.models.arguments import generator
+from vedette.models.arguments import generator, reject
+from vedette.platforms import Actions
 
 
 class Planner(Protocol):
-    """Chooses a heading for every sensor."""
+    """Chooses an action for every sensor."""
 
     @property
     def name(self) -> str:
@@ -30,7 +30,7 @@ class Planner(Protocol):
         ...
 
     def plan(self, beliefs: Sequence[Belief], fused: Belief, poses: Floats, *, rng: np.random.Generator) -> Plan:
-        """Decide from the local posteriors, the fused one and the poses (num_sensors, 3)."""
+        """Decide from the local posteriors, the fused one and the poses (num_sensors, 3 or more)."""
         ...
 
 
@@ -65,7 +65,7 @@ class JointPlanner:
         Args:
             beliefs: local posterior of each sensor, as its filter left it.
             fused: their fusion, from which samples and prediction are taken.
-            poses: (num_sensors, 3) present poses.
+            poses: (num_sensors, 3 or more) present poses.
             rng: draws the samples, then whatever the search draws.
 
         Raises:
@@ -82,8 +82,9 @@ class JointPlanner:
         best = check_choice("search", self.search.search(problem, rng=rng), evidence.shape)
         if not evidence.holds(best):
             evidence.evaluate(np.array([best]))
-        chosen = tuple(evaluator.first_heading(s, direction) for s, direction in enumerate(best))
-        return Plan(self.name, evaluator.headings, chosen, evidence.tables(best), dict(evaluator.counts))
+        chosen = tuple(own.first_action(course) for own, course in zip(evaluator.options, best, strict=True))
+        actions = tuple(own.actions for own in evaluator.options)
+        return Plan(self.name, actions, chosen, evidence.tables(best), dict(evaluator.counts))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -115,19 +116,26 @@ class IndependentPlanner:
         )
         chosen: list[int] = []
         tables: list[RewardTable] = []
-        for s, num_directions in enumerate(evaluator.joint_shape()):
+        for s, own in enumerate(evaluator.options):
             evidence = Evidence(evaluator, (s,), evaluator.rewards((s,), None))
-            best = first_best(evidence.evaluate(all_joint_actions((num_directions,))))
-            chosen.append(evaluator.first_heading(s, best))
+            best = first_best(evidence.evaluate(all_joint_actions((len(own.courses),))))
+            chosen.append(own.first_action(best))
             tables.extend(evidence.tables((best,)))
-        return Plan(self.name, evaluator.headings, tuple(chosen), tuple(tables), dict(evaluator.counts))
+        actions = tuple(own.actions for own in evaluator.options)
+        return Plan(self.name, actions, tuple(chosen), tuple(tables), dict(evaluator.counts))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RandomPlanner:
-    """Every sensor takes one of its different directions at random, each as likely (the paper's baseline)."""
+    """Every sensor takes one of its different courses at random, each as likely (the paper's baseline).
+
+    Attributes:
+        sensors: the sensors.
+        settings: the horizon, over which courses are told apart.
+    """
 
     sensors: tuple[MobileSensor, ...]
+    settings: PlanningSettings = field(default_factory=PlanningSettings)
 
     @property
     def name(self) -> str:
@@ -137,29 +145,27 @@ class RandomPlanner:
     def plan(self, beliefs: Sequence[Belief], fused: Belief, poses: Floats, *, rng: np.random.Generator) -> Plan:
         """Drawn from `rng`; the beliefs are not looked at."""
         generator(rng)
-        headings, _ = check_situation(self.sensors, poses)
-        chosen = []
-        for values in headings:
-            distinct, which = distinct_headings(values)
-            chosen.append(int(np.flatnonzero(which == rng.integers(len(distinct)))[0]))
-        return Plan(self.name, headings, tuple(chosen), (), {})
+        options = options_of(self.sensors, poses, self.settings)
+        chosen = tuple(own.first_action(int(rng.integers(len(own.courses)))) for own in options)
+        return Plan(self.name, tuple(own.actions for own in options), chosen, (), {})
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FixedPlanner:
-    """Every sensor keeps to a course set beforehand.
+    """Every sensor keeps to an action set beforehand.
 
     Attributes:
-        headings_deg: absolute heading of each sensor in degrees.
+        actions: for each sensor its one action, in the columns of its platform: `Actions.of(heading_deg=30.0)`.
 
     Raises:
-        InputError: no heading, or one that is not finite.
+        InputError: no sensor, or not one action of each.
     """
 
-    headings_deg: tuple[float, ...]
+    actions: tuple[Actions, ...]
 
     def __post_init__(self) -> None:
-        check_headings("headings_deg", self.headings_deg)
+        if len(self.actions) == 0 or not all(isinstance(own, Actions) and len(own) == 1 for own in self.actions):
+            raise reject("actions", "one action of each sensor, such as Actions.of(heading_deg=30.0)", self.actions)
 
     @property
     def name(self) -> str:
@@ -167,8 +173,7 @@ class FixedPlanner:
         return "fixed"
 
     def plan(self, beliefs: Sequence[Belief], fused: Belief, poses: Floats, *, rng: np.random.Generator) -> Plan:
-        """The set courses, whatever is believed."""
+        """The set actions, whatever is believed."""
         generator(rng)
-        check_poses(poses, len(self.headings_deg))
-        headings = tuple(np.radians([float(heading)]) for heading in self.headings_deg)
-        return Plan(self.name, headings, (0,) * len(headings), (), {})
+        check_poses(poses, len(self.actions))
+        return Plan(self.name, self.actions, (0,) * len(self.actions), (), {})

@@ -27,7 +27,6 @@ from vedette.kernels.planning.ideal import Decision, Futures, Horizon, propagate
 from vedette.kernels.planning.pseudo_glmb import GlmbResults, pseudo_update_glmb
 from vedette.kernels.planning.pseudo_lmb import LmbResults, pseudo_update_lmb
 from vedette.models import constant_survival, kernel_motion
-from vedette.models.platforms import advance
 
 
 class PseudoPosteriors(NamedTuple):
@@ -66,25 +65,16 @@ def draw_futures(
     return tuple(futures)
 
 
-def horizon_poses(pose: Floats, headings: Floats, speed: float, settings: PlanningSettings) -> Floats:
-    """(num_actions, horizon_steps, 3) poses at the pseudo-updates under each heading."""
-    poses = np.empty((len(headings), settings.horizon_steps, 3))
-    at = np.tile(pose, (len(headings), 1))
-    for h in range(settings.horizon_steps):
-        at = advance(at, headings, speed, settings.horizon_period)
-        poses[:, h] = at
-    return poses
-
-
 def pseudo_posteriors(
-    belief: Belief, sensor: MobileSensor, pose: Floats, headings: Floats, futures: Futures, settings: PlanningSettings
+    belief: Belief, sensor: MobileSensor, courses: Floats, futures: Futures, settings: PlanningSettings
 ) -> PseudoPosteriors:
-    """Run the sensor's filter over the horizon for every heading and sample, without births or deaths.
+    """Run the sensor's filter over the horizon for every course and sample, without births or deaths.
 
+    courses: (num_courses, horizon_steps, pose_dim) poses at the pseudo-updates.
     The belief is one of the filter's kind. Raises `ModelError` and `NumericalError` as the filter.
     """
     horizon = Horizon(
-        horizon_poses(pose, headings, sensor.speed, settings),
+        courses,
         float(settings.horizon_period),
         IDEAL_MODES[settings.ideal_measurements],
         float(settings.detection_threshold),
@@ -96,7 +86,7 @@ def pseudo_posteriors(
         futures,
         settings.limits.truncation(sensor.filter.sensor.meas_dim),
     )
-    num_cases = len(headings) * settings.num_samples
+    num_cases = len(courses) * settings.num_samples
     if isinstance(belief, GLMB):
         return _run_glmb(belief, decision, settings, num_cases)
     return _run_lmb(belief, decision, settings, num_cases)

@@ -6,11 +6,15 @@ import os
 from dataclasses import dataclass, field
 from typing import Literal
 
-from vedette.control.actions import ActionSet, HeadingActions
+import numpy as np
+
 from vedette.errors import InputError
 from vedette.filters import Limits, LocalFilter
+from vedette.kernels.base.types import Floats
 from vedette.kernels.planning.ideal import EXPECTED, IDEAL, SAMPLED
-from vedette.models.arguments import dimension, non_negative, positive, probability, reject
+from vedette.models.arguments import dimension, positive, probability, reject
+from vedette.platforms import Platform
+from vedette.platforms.base import check_platform
 
 IDEAL_MODES = {"ideal": IDEAL, "expected": EXPECTED, "sampled": SAMPLED}
 
@@ -68,6 +72,10 @@ class PlanningSettings:
                 "limits: expected max_components 1, min_existence 0 and min_track_weight 1, as in planning_limits()"
             )
 
+    def horizon_times(self) -> Floats:
+        """(horizon_steps,) s from the decision to each pseudo-update."""
+        return self.horizon_period * np.arange(1.0, self.horizon_steps + 1)
+
     def threads(self) -> int:
         """Number of threads to use."""
         if self.num_threads:
@@ -83,20 +91,16 @@ class MobileSensor:
     Attributes:
         filter: its local filter, with the models of the targets and of the sensor. The joint and the independent
             planner need one that labels its targets: a `DeltaGlmbFilter` or an `LmbFilter`.
-        speed: m/s, constant along its heading once it moves.
-        actions: the headings it may take.
+        platform: what it may do, and where that takes it.
 
     Raises:
-        InputError: something else than a filter, a speed that is negative or not finite, actions without headings.
+        InputError: something else than a filter or a platform.
     """
 
     filter: LocalFilter
-    speed: float
-    actions: ActionSet = field(default_factory=HeadingActions)
+    platform: Platform
 
     def __post_init__(self) -> None:
         if not isinstance(self.filter, LocalFilter):
             raise reject("filter", "a filter of vedette.filters", self.filter)
-        non_negative("speed", self.speed)
-        if not callable(getattr(self.actions, "headings", None)):
-            raise reject("actions", "an ActionSet, with a method headings(pose)", self.actions)
+        check_platform("platform", self.platform)

@@ -3,7 +3,7 @@
 Figures are in `vedette.evaluation.figures`.
 """
 
-from vedette.evaluation.comparison import Comparison, chosen_headings_deg, compare
+from vedette.evaluation.comparison import Comparison, choices_of, compare
 from vedette.evaluation.metrics import (
     AverageNees,
     Continuity,
@@ -46,7 +46,7 @@ __all__ = [
     "Summary",
     "TrackSet",
     "average_nees",
-    "chosen_headings_deg",
+    "choices_of",
     "compare",
     "continuity",
     "continuity_of_run",

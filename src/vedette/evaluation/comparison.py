@@ -10,13 +10,15 @@ from typing import TypeAlias
 import numpy as np
 
 from vedette.errors import InputError
+from vedette.evaluation.actions import Row, rounded
 from vedette.evaluation.statistics import PairedDifference, Summary, paired_difference, summarise
 from vedette.kernels.base.types import Bools, Floats
 from vedette.scenarios import Scenario
 from vedette.simulation.records import RunRecord
 
 PARTS = ("total", "localisation", "cardinality")
-Headings: TypeAlias = tuple[int, ...]
+# What was chosen at one decision, one row a sensor.
+Choice: TypeAlias = tuple[Row, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +32,7 @@ class Comparison:
         decision_times: (num_decisions,) s, of all strategies together.
         ospa: (num_strategies, num_runs, num_scans, 3) total, localisation and cardinality parts, m.
         since, until: scans after `since` (s) and up to `until` (s) count in the mean over time.
-        headings: for each strategy, for each run, the chosen headings of its decisions in whole degrees.
+        choices: for each strategy, for each run, what each of its decisions chose.
     """
 
     scenario: str
@@ -40,7 +42,7 @@ class Comparison:
     ospa: Floats
     since: float
     until: float
-    headings: tuple[tuple[tuple[Headings, ...], ...], ...]
+    choices: tuple[tuple[tuple[Choice, ...], ...], ...]
 
     @property
     def num_runs(self) -> int:
@@ -69,10 +71,10 @@ class Comparison:
         """How much more OSPA a strategy has than the reference (the first strategy unless named), run by run."""
         return paired_difference(self.run_means(strategy), self.run_means(reference or self.strategies[0]))
 
-    def decision_shares(self, strategy: str, decision: int) -> dict[Headings, float]:
-        """Share of the runs in which each combination of headings (deg) was chosen; the most frequent first."""
-        chosen = Counter(run[decision] for run in self.headings[self._index(strategy)] if decision < len(run))
-        return {headings: count / self.num_runs for headings, count in chosen.most_common()}
+    def decision_shares(self, strategy: str, decision: int) -> dict[Choice, float]:
+        """Share of the runs in which each combination of actions was chosen; the most frequent first."""
+        chosen = Counter(run[decision] for run in self.choices[self._index(strategy)] if decision < len(run))
+        return {choice: count / self.num_runs for choice, count in chosen.most_common()}
 
     def _index(self, strategy: str) -> int:
         if strategy not in self.strategies:
@@ -117,7 +119,7 @@ def compare(
         ospa=np.array([[record.ospa for record in runs[name]] for name in strategies]),
         since=since,
         until=until,
-        headings=tuple(tuple(chosen_headings_deg(record) for record in runs[name]) for name in strategies),
+        choices=tuple(tuple(choices_of(record) for record in runs[name]) for name in strategies),
     )
 
 
@@ -136,11 +138,12 @@ def typical_run(comparison: Comparison, strategy: str, records: Sequence[RunReco
     return records[int(np.argsort(means, kind="stable")[(len(means) - 1) // 2])]
 
 
-def chosen_headings_deg(record: RunRecord) -> tuple[Headings, ...]:
-    """Headings chosen at each decision of a run, in whole degrees, one a sensor."""
+def choices_of(record: RunRecord) -> tuple[Choice, ...]:
+    """What each decision of a run chose, rounded."""
+    plans = [decision.plan for decision in record.decisions]
     return tuple(
-        tuple(int(heading) for heading in np.rint(np.rad2deg(decision.plan.chosen_headings)))
-        for decision in record.decisions
+        tuple(rounded(own.columns, row) for own, row in zip(plan.actions, plan.chosen_actions, strict=True))
+        for plan in plans
     )
 
 

@@ -11,6 +11,7 @@ from vedette.control.plan import RewardTable
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats
 from vedette.models.measurement import wrap_angles
+from vedette.platforms import Actions
 from vedette.simulation.records import Decision, RunRecord
 
 
@@ -20,8 +21,8 @@ class MeanRewards:
 
     Attributes:
         time: s.
-        action_values: for each sensor, (num_actions,) rad: headings, or turns from the heading before.
-        are_turns: whether they are turns, as every run came with another heading.
+        actions: for each sensor its actions; where every run came with another heading, `turn_deg` from it in the place
+            of `heading_deg`.
         tables: as those of a plan, averaged over the runs that evaluated an entry; the standard error is over the runs
             (0 for a single one), and entries that no run evaluated are NaN.
         shares: for each table, the share of the runs in which each of its entries was chosen.
@@ -29,8 +30,7 @@ class MeanRewards:
     """
 
     time: float
-    action_values: tuple[Floats, ...]
-    are_turns: bool
+    actions: tuple[Actions, ...]
     tables: tuple[RewardTable, ...]
     shares: tuple[Floats, ...]
     num_runs: int
@@ -44,7 +44,7 @@ def mean_rewards(records: Sequence[RunRecord], decision: int) -> MeanRewards:
     made = [record.decisions[decision] for record in records if decision < len(record.decisions)]
     if not made or not all(each.plan.tables for each in made):
         raise InputError(f"records: expected runs with rewards at decision {decision}; got none")
-    values, are_turns = _common_actions(made)
+    actions = _common_actions(made)
     tables, shares = [], []
     for place, table in enumerate(made[0].plan.tables):
         if any(each.plan.tables[place].mean.shape != table.mean.shape for each in made):
@@ -55,29 +55,43 @@ def mean_rewards(records: Sequence[RunRecord], decision: int) -> MeanRewards:
         for each in made:
             share[tuple(each.plan.chosen[sensor] for sensor in table.sensors)] += 1.0 / len(made)
         shares.append(share)
-    return MeanRewards(made[0].time, values, are_turns, tuple(tables), tuple(shares), len(made))
+    return MeanRewards(made[0].time, actions, tuple(tables), tuple(shares), len(made))
 
 
-def _common_actions(made: Sequence[Decision]) -> tuple[tuple[Floats, ...], bool]:
-    headings = [each.plan.action_values for each in made]
-    if _all_alike(headings):
-        return headings[0], False
+def _common_actions(made: Sequence[Decision]) -> tuple[Actions, ...]:
+    actions = [each.plan.actions for each in made]
+    if _all_alike(actions):
+        return actions[0]
     turns = [
-        tuple(wrap_angles(values - pose[2]) for values, pose in zip(each.plan.action_values, each.poses, strict=True))
-        for each in made
+        tuple(_as_turns(own, pose[2]) for own, pose in zip(each.plan.actions, each.poses, strict=True)) for each in made
     ]
     if _all_alike(turns):
-        return turns[0], True
+        return turns[0]
     raise InputError("records: expected the same actions in every run; got others")
 
 
-def _all_alike(actions: Sequence[tuple[Floats, ...]]) -> bool:
+def _as_turns(actions: Actions, heading: float) -> Actions:
+    if "heading_deg" not in actions.columns:
+        return actions
+    values, column = actions.values.copy(), actions.columns.index("heading_deg")
+    values[:, column] = np.degrees(wrap_angles(np.radians(values[:, column]) - heading))
+    return Actions(tuple("turn_deg" if name == "heading_deg" else name for name in actions.columns), values)
+
+
+def _all_alike(actions: Sequence[tuple[Actions, ...]]) -> bool:
     """Whether all runs had the same actions, up to rounding and full turns."""
     return all(
-        len(mine) == len(first) and float(np.abs(wrap_angles(mine - first)).max(initial=0.0)) < 1e-6
-        for values in actions
-        for mine, first in zip(values, actions[0], strict=True)
+        mine.columns == first.columns and len(mine) == len(first) and _off(mine, first) < 1e-4
+        for run in actions
+        for mine, first in zip(run, actions[0], strict=True)
     )
+
+
+def _off(mine: Actions, first: Actions) -> float:
+    off = np.abs(mine.values - first.values)
+    angles = [name.endswith("_deg") for name in mine.columns]
+    off[:, angles] = np.abs(np.remainder(off[:, angles] + 180.0, 360.0) - 180.0)
+    return float(off.max(initial=0.0))
 
 
 def _mean_and_error(stacked: Floats) -> tuple[Floats, Floats]:

@@ -12,8 +12,7 @@ from functools import partial
 from vedette.control import IndependentPlanner, JointPlanner, Planner
 from vedette.evaluation.metrics import ospa_of_run
 from vedette.scenarios import Scenario
-from vedette.scenarios.build import build_filters, build_planner
-from vedette.scenarios.build.experiment import build_experiment
+from vedette.scenarios.build import build_experiment, build_planner
 from vedette.simulation.loop import simulate
 from vedette.simulation.records import RunRecord
 
@@ -28,7 +27,7 @@ def strategy(scenario: Scenario, name: str, num_threads: int = 0) -> Planner | N
     """
     if name == "still":
         return None
-    planner = build_planner(scenario.model, build_filters(scenario), name)
+    planner = build_planner(scenario, name)
     if isinstance(planner, JointPlanner | IndependentPlanner):
         return replace(planner, settings=replace(planner.settings, num_threads=num_threads))
     return planner

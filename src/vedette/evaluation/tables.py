@@ -7,6 +7,7 @@ import io
 
 import numpy as np
 
+from vedette.evaluation.actions import choice_words
 from vedette.evaluation.comparison import Comparison
 from vedette.evaluation.statistics import PairedDifference, Summary
 
@@ -23,13 +24,13 @@ def strategy_rows(comparison: Comparison) -> list[tuple[str, ...]]:
 
 
 def decision_rows(comparison: Comparison, strategy: str, *, at_most: int = 3) -> list[tuple[str, str]]:
-    """For each decision that a strategy took: its time, and the most frequent combinations of headings with shares."""
+    """For each decision that a strategy took: its time, and the most frequent combinations of actions with shares."""
     rows = []
     for decision, time in enumerate(comparison.decision_times):
         shares = list(comparison.decision_shares(strategy, decision).items())[:at_most]
         if not shares:
             continue
-        rows.append((f"{time:g} s", ", ".join(f"({_degrees(headings)}) {share:.0%}" for headings, share in shares)))
+        rows.append((f"{time:g} s", ", ".join(f"({choice_words(choice)}) {share:.0%}" for choice, share in shares)))
     return rows
 
 
@@ -42,7 +43,7 @@ def strategy_markdown(comparison: Comparison) -> str:
 
 def decisions_markdown(comparison: Comparison) -> str:
     """What each strategy decided, and how often, as Markdown."""
-    lines = ["| Strategy | Time | Headings and share of the runs |", "| --- | --- | --- |"]
+    lines = ["| Strategy | Time | Actions and share of the runs |", "| --- | --- | --- |"]
     for strategy in comparison.strategies:
         lines += [f"| {strategy} | {time} | {shares} |" for time, shares in decision_rows(comparison, strategy)]
     return "\n".join(lines) + "\n"
@@ -103,7 +104,3 @@ def _won(difference: PairedDifference) -> str:
 def _with_error(summary: Summary, sign: str = "") -> str:
     mean = f"{float(summary.mean):{sign}.2f}"
     return mean if np.isnan(summary.standard_error) else f"{mean} ± {float(summary.standard_error):.2f}"
-
-
-def _degrees(headings: tuple[int, ...]) -> str:
-    return ", ".join(f"{heading}°" for heading in headings)

@@ -71,7 +71,7 @@ class DeltaGlmbFilter:
         Args:
             belief: posterior of the previous step.
             scan: (num, meas_dim) measurements in any order; angles in radians, in (-pi, pi].
-            pose: (3,) [px, py, heading_rad] of the sensor.
+            pose: (3 or more,) [px, py, heading_rad, ...] of the sensor.
             dt: seconds since the previous step.
             step: number of this step, from 1 on; births are labelled with it.
             rng: drawn from only if `assignment` is "gibbs".

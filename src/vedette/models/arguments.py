@@ -119,8 +119,11 @@ def params_vector(field: str, values: Any) -> Floats:
 
 
 def pose_vector(field: str, values: Any) -> Floats:
-    """A sensor pose [px, py, heading_rad]."""
-    return float_array(field, values, (3,))
+    """A sensor pose [px, py, heading_rad, ...]."""
+    pose = float_array(field, values, (None,))
+    if len(pose) < 3:
+        raise reject(field, "an array of shape (3 or more,)", f"shape {pose.shape}")
+    return pose
 
 
 def state_table(field: str, values: Any, state_dim: int | None = None) -> Floats:

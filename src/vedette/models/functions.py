@@ -15,7 +15,8 @@ A model function sees one state at a time and writes its result into the last ar
 | `prob_detection` | state, pose, params | probability in [0, 1] |
 | `log_clutter_intensity` | measurement, pose, params | log of the expected clutter per unit of measurement space |
 
-`state[0:2]` is always the position in metres; `pose` is [px, py, heading_rad]; `params` is the model's own vector.
+`state[0:2]` is always the position in metres; `pose` is [px, py, heading_rad], and further components that
+the platform has; `params` is the model's own vector.
 """
 
 from __future__ import annotations

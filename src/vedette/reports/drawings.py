@@ -112,11 +112,11 @@ def error_drawings(group: Group) -> Iterator[Drawing]:
 
 def _decision_drawings(group: Group) -> Iterator[Drawing]:
     comparison = group.comparison
-    if comparison is not None and any(any(runs) for runs in comparison.headings):
+    if comparison is not None and any(any(runs) for runs in comparison.choices):
         yield Drawing(
-            "headings",
+            "decisions",
             "Where the sensors were sent",
-            "Share of the runs that chose each heading at each decision; areas are in proportion to shares.",
+            "Share of the runs that chose each action at each decision; areas are in proportion to shares.",
             roses_figure(comparison),
         )
 

@@ -17,7 +17,7 @@ from vedette.evaluation import Comparison, RunMetrics
 from vedette.evaluation.comparison import scored
 from vedette.evaluation.figures.style import strategy_label
 from vedette.kernels.base.types import Bools
-from vedette.scenarios.schema.tracking import UNLABELLED
+from vedette.scenarios.sections.tracking import UNLABELLED
 from vedette.simulation.records import RunRecord
 
 

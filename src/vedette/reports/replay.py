@@ -10,15 +10,23 @@ import numpy as np
 
 from vedette.control.plan import Plan
 from vedette.errors import VedetteError
-from vedette.evaluation import match_run
+from vedette.evaluation import choices_of, match_run
+from vedette.evaluation.actions import action_axis, choice_words
+from vedette.evaluation.comparison import Choice
 from vedette.evaluation.figures.rewards import best_over_others, best_over_pair
 from vedette.kernels.base.types import Floats
 from vedette.reports.groups import Strategy
 from vedette.scenarios import Scenario
-from vedette.scenarios.build import build_region, build_sensor
 from vedette.scenarios.names import sensor_names
-from vedette.scenarios.schema.sensors import BearingOnly, BearingRange, LimitedRange, LimitedSector, Position, RangeOnly
-from vedette.scenarios.schema.sensors import Sensor as SensorSection
+from vedette.scenarios.sections.sensing import (
+    BearingOnly,
+    BearingRange,
+    LimitedRange,
+    LimitedSector,
+    Position,
+    RangeOnly,
+)
+from vedette.scenarios.sections.sensors import Sensor as SensorSection
 from vedette.scenarios.trust import code_of
 from vedette.simulation.records import Decision, RunRecord
 from vedette.simulation.replay import scans_of_sensors
@@ -59,7 +67,7 @@ def replay_data(strategy: Strategy, record: RunRecord, group: str, *, trust: boo
         ],
         "scans": _scans(record, scenario, [sensor["kind"] for sensor in sensors], places, trust),
         "ospa": [_rounded(parts, 2) for parts in record.ospa],
-        "decisions": [_decision(decision) for decision in record.decisions],
+        "decisions": [_decision(*each) for each in zip(record.decisions, choices_of(record), strict=True)],
     }
 
 
@@ -148,9 +156,9 @@ def _scans(
     if all(kind == "none" for kind in kinds) or (code_of_sensors(scenario) and not trust):
         return []
     model = scenario.model
-    region, method = build_region(model.region), model.filter.gaussian_method
+    region, method = model.region.build(), model.filter.gaussian_method
     try:
-        sensors = [build_sensor(section, region, method, scenario.folder) for section in model.sensors]
+        sensors = [section.build(region, method, scenario.folder) for section in model.sensors]
         scans = scans_of_sensors(record, sensors)
     except VedetteError:
         return []
@@ -176,28 +184,35 @@ def _measurements(scan: Scan, kind: str, pose: Floats, places: int) -> list[list
     return found
 
 
-def _decision(decision: Decision) -> dict[str, Any]:
+def _decision(decision: Decision, choice: Choice) -> dict[str, Any]:
     plan = decision.plan
-    headings = [round(float(value)) for value in np.rad2deg(plan.chosen_headings)]
-    return {"scan": decision.step - 1, "headings": headings, "curves": _curves(plan), "map": _map(plan)}
+    return {
+        "scan": decision.step - 1,
+        "actions": choice_words(choice),
+        "notes": plan.notes,
+        "curves": _curves(plan),
+        "map": _map(plan),
+    }
 
 
 def _curves(plan: Plan) -> list[dict[str, Any]]:
-    """Reward against heading, one curve a sensor; of a joint table the largest over the other sensors' actions."""
+    """Reward against action, one curve a sensor; of a joint table the largest over the other sensors' actions."""
     curves = []
     for table in plan.tables:
         for axis, sensor in enumerate(table.sensors):
-            degrees = np.rad2deg(plan.action_values[sensor])
-            order = np.argsort(degrees, kind="stable")
+            along = action_axis(plan.actions[sensor])
+            order = np.argsort(along.places, kind="stable")
             mean, error = best_over_others(table, axis)
-            chosen = int(np.flatnonzero(order == plan.chosen[sensor])[0])
             curves.append(
                 {
                     "sensor": sensor,
-                    "degrees": _rounded(degrees[order], 1),
+                    "axis": along.title(),
+                    "numeric": along.is_numeric,
+                    "places": _rounded(along.places[order], 1),
+                    "labels": [along.labels[i] for i in order],
                     "mean": [_number(value) for value in mean[order]],
                     "error": [_number(value) for value in error[order]],
-                    "chosen": chosen,
+                    "chosen": int(np.flatnonzero(order == plan.chosen[sensor])[0]),
                 }
             )
     return curves
@@ -209,14 +224,16 @@ def _map(plan: Plan) -> dict[str, Any] | None:
     if joint is None:
         return None
     pair = (joint.sensors[0], joint.sensors[1])
-    orders = [np.argsort(plan.action_values[sensor], kind="stable") for sensor in pair]
-    ordered = tuple(zip(pair, orders, strict=True))
+    axes = [action_axis(plan.actions[sensor]) for sensor in pair]
+    orders = [np.argsort(along.places, kind="stable") for along in axes]
     reward = best_over_pair(joint, pair)[np.ix_(*orders)]
     return {
         "sensors": pair,
-        "degrees": [_rounded(np.rad2deg(plan.action_values[sensor])[order], 1) for sensor, order in ordered],
+        "labels": [[along.labels[i] for i in order] for along, order in zip(axes, orders, strict=True)],
         "mean": [[_number(value) for value in row] for row in reward],
-        "chosen": [int(np.flatnonzero(order == plan.chosen[sensor])[0]) for sensor, order in ordered],
+        "chosen": [
+            int(np.flatnonzero(order == plan.chosen[sensor])[0]) for sensor, order in zip(pair, orders, strict=True)
+        ],
     }
 
 

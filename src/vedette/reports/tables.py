@@ -237,5 +237,7 @@ def decision_table(group: Group) -> Table | None:
     ]
     if not rows:
         return None
-    caption = "Headings of the sensors, in order, and the share of the runs that chose them; at most three a decision."
-    return Table(caption, ("Strategy", "Time", "Headings"), tuple(rows), is_words=True)
+    caption = (
+        "What the sensors were sent to do, in order, and the share of the runs that chose it; at most three a decision."
+    )
+    return Table(caption, ("Strategy", "Time", "Actions"), tuple(rows), is_words=True)

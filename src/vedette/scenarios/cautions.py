@@ -14,15 +14,10 @@ from vedette.scenarios.diagnostics import place_fault
 from vedette.scenarios.faults import Path
 from vedette.scenarios.loading import Scenario
 from vedette.scenarios.names import sensor_names
-from vedette.scenarios.schema import ScenarioModel
-from vedette.scenarios.schema.sensors import (
-    ConstantDetection,
-    GaussianDetection,
-    LimitedRange,
-    LimitedSector,
-    Sensor,
-)
-from vedette.scenarios.schema.world import RecordedTargets
+from vedette.scenarios.sections import ScenarioModel
+from vedette.scenarios.sections.sensing import ConstantDetection, GaussianDetection, LimitedRange, LimitedSector
+from vedette.scenarios.sections.sensors import Sensor
+from vedette.scenarios.sections.targets import RecordedTargets
 from vedette.scenarios.yaml_reader import read_yaml
 
 # Sensors whose probabilities of detection of one place differ by more than this do not see the same.

@@ -13,9 +13,11 @@ from vedette.covariances import SMALLEST_VARIANCE, covariance_fault
 from vedette.scenarios.faults import Finding, Path, describe
 from vedette.scenarios.file_checks import recorded_findings, reference_findings
 from vedette.scenarios.parts import Parts
-from vedette.scenarios.schema import ScenarioModel
-from vedette.scenarios.schema.tracking import UNLABELLED, GibbsAssignment, MarginalEstimator
-from vedette.scenarios.schema.world import BirthSite, ScriptedTarget, Time
+from vedette.scenarios.sections import ScenarioModel
+from vedette.scenarios.sections.scoring import MarginalEstimator
+from vedette.scenarios.sections.targets import ScriptedTarget
+from vedette.scenarios.sections.tracking import UNLABELLED, GibbsAssignment
+from vedette.scenarios.sections.world import BirthSite, Time
 from vedette.scenarios.sensor_checks import sensor_findings
 
 # How far a decision time may be from the time of a scan, in scans: rounding of sums of decimal fractions.

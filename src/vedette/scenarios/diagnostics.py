@@ -12,7 +12,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from vedette.scenarios.faults import Fault, Path, describe
-from vedette.scenarios.schema import ScenarioModel
+from vedette.scenarios.sections import ScenarioModel
 from vedette.scenarios.yaml_reader import Document
 
 # pydantic's error types and what was expected; `{}` takes a value of the error's context.

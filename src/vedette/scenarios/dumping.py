@@ -12,7 +12,7 @@ from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
 from ruamel.yaml.scalarstring import DoubleQuotedScalarString
 
-from vedette.scenarios.schema import ScenarioModel
+from vedette.scenarios.sections import ScenarioModel
 from vedette.scenarios.yaml_reader import plain_scalar
 
 _LONGEST_LINE = 100
@@ -48,8 +48,8 @@ def _files(value: Any, folder: Path) -> Iterator[Path]:
     if isinstance(value, dict):
         if value.get("kind") == "recorded":
             yield folder / value["path"]
-        elif value.get("kind") == "custom" and ".py:" in value["python"]:
-            yield folder / value["python"].rpartition(":")[0]
+        elif value.get("kind") == "custom" and ".py:" in value["function"]:
+            yield folder / value["function"].rpartition(":")[0]
 
 
 def _anchored(value: Any, folder: Path) -> Any:
@@ -61,8 +61,8 @@ def _anchored(value: Any, folder: Path) -> Any:
     anchored = {key: _anchored(item, folder) for key, item in value.items()}
     if value.get("kind") == "recorded":
         anchored["path"] = str((folder / value["path"]).resolve())
-    elif value.get("kind") == "custom" and ".py:" in value["python"]:
-        anchored = {**value, "python": str(folder / value["python"])}
+    elif value.get("kind") == "custom" and ".py:" in value["function"]:
+        anchored = {**value, "function": str(folder / value["function"])}
     return anchored
 
 

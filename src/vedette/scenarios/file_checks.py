@@ -15,8 +15,9 @@ from typing import Any
 
 from vedette.scenarios.faults import Finding, Path, describe, named
 from vedette.scenarios.parts import Parts
-from vedette.scenarios.schema.base import Custom, Section
-from vedette.scenarios.schema.world import RecordedTargets
+from vedette.scenarios.sections.base import Section
+from vedette.scenarios.sections.custom import Custom
+from vedette.scenarios.sections.targets import RecordedTargets
 
 
 def _absent(file: str) -> str:
@@ -116,12 +117,12 @@ def reference_findings(parts: Parts) -> Iterator[Finding]:
     sections: list[tuple[Path, Any]] = [(("motion",), parts.motion), (("survival",), parts.survival)]
     sections += [(("sensors", i), sensor) for i, sensor in enumerate(parts.sensors)]
     for path, custom in (found for start, section in sections for found in _customs(section, start)):
-        module = custom.python.rpartition(":")[0]
+        module = custom.function.rpartition(":")[0]
         if module.endswith(".py"):
             file = (parts.folder or FilePath()) / module
             if not os.path.isfile(file):
-                yield (*path, "python"), "a file, relative to the scenario file", _absent(module)
-            elif fault := _unnamed(file, custom.python.rpartition(":")[2].partition(".")[0]):
-                yield (*path, "python"), *fault
+                yield (*path, "function"), "a file, relative to the scenario file", _absent(module)
+            elif fault := _unnamed(file, custom.function.rpartition(":")[2].partition(".")[0]):
+                yield (*path, "function"), *fault
         elif not _is_findable(module.partition(".")[0]):
-            yield (*path, "python"), "a module that Python finds", describe(module)
+            yield (*path, "function"), "a module that Python finds", describe(module)

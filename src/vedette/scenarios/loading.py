@@ -15,7 +15,7 @@ from vedette.scenarios.checks import findings
 from vedette.scenarios.diagnostics import locate, place_fault, suggestion, validation_faults
 from vedette.scenarios.faults import Fault, Path, describe, named
 from vedette.scenarios.parts import Parts, parts_of_data, parts_of_model
-from vedette.scenarios.schema import ScenarioModel, merge_sensor_defaults
+from vedette.scenarios.sections import ScenarioModel, merge_sensor_defaults
 from vedette.scenarios.yaml_reader import Document, read_yaml
 
 BUILTIN_FOLDER = FilePath(__file__).parent / "builtin"
@@ -26,7 +26,7 @@ class Scenario:
     """A valid scenario.
 
     Attributes:
-        model: its sections (`vedette.scenarios.schema`), defaults filled in.
+        model: its sections (`vedette.scenarios.sections`), defaults filled in.
         path: the file it was read from; the paths in it are relative to that file's folder.
     """
 

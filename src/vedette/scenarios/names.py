@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from vedette.scenarios.schema import ScenarioModel
+from vedette.scenarios.sections import ScenarioModel
 
 
 def sensor_names(model: ScenarioModel) -> tuple[str, ...]:

@@ -10,22 +10,14 @@ from typing import Any
 from pydantic import TypeAdapter, ValidationError
 from pydantic_core import PydanticUndefined
 
-from vedette.scenarios.schema import ScenarioModel
-from vedette.scenarios.schema.planning import Control
-from vedette.scenarios.schema.sensors import Sensor
-from vedette.scenarios.schema.tracking import Estimator, Filter, Fusion, Ospa
-from vedette.scenarios.schema.world import (
-    BirthSite,
-    CoordinatedTurn,
-    CustomMotion,
-    Motion,
-    RecordedTargets,
-    RegionSection,
-    ScriptedTarget,
-    Steps,
-    Survival,
-    Time,
-)
+from vedette.scenarios.sections import ScenarioModel
+from vedette.scenarios.sections.base import Steps
+from vedette.scenarios.sections.control import Control
+from vedette.scenarios.sections.scoring import Estimator, Ospa
+from vedette.scenarios.sections.sensors import Sensor
+from vedette.scenarios.sections.targets import RecordedTargets, ScriptedTarget
+from vedette.scenarios.sections.tracking import Filter, Fusion
+from vedette.scenarios.sections.world import BirthSite, Motion, RegionSection, Survival, Time
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,19 +47,12 @@ class Parts:
     @property
     def state_dim(self) -> int | None:
         """Length of a state under the motion model."""
-        return None if self.motion is None else state_dim(self.motion)
+        return None if self.motion is None else self.motion.state_dim
 
     @property
     def num_steps(self) -> int | None:
         """Number of scans."""
         return None if self.time is None else self.time.num_steps
-
-
-def state_dim(motion: Motion) -> int:
-    """Length of a state under a motion section."""
-    if isinstance(motion, CustomMotion):
-        return motion.state_dim
-    return 5 if isinstance(motion, CoordinatedTurn) else 4
 
 
 def parts_of_model(model: ScenarioModel, folder: Path | None) -> Parts:

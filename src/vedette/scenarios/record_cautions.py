@@ -10,8 +10,9 @@ from vedette.recorded import RecordedTargets as RecordedSource
 from vedette.scenarios.faults import Path, format_path
 from vedette.scenarios.loading import Scenario
 from vedette.scenarios.records import recorded_source
-from vedette.scenarios.schema.sensors import Sensor
-from vedette.scenarios.schema.world import RecordedTargets, Time
+from vedette.scenarios.sections.sensors import Sensor
+from vedette.scenarios.sections.targets import RecordedTargets
+from vedette.scenarios.sections.world import Time
 
 _NEAR = 1000.0  # m; what is nearer than this to the targets is not called far
 

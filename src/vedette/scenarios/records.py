@@ -12,7 +12,8 @@ from vedette.errors import InputError
 from vedette.models import Region
 from vedette.recorded import Cleaning
 from vedette.recorded import RecordedTargets as RecordedSource
-from vedette.scenarios.schema.world import RecordedTargets, RegionSection, Time
+from vedette.scenarios.sections.targets import RecordedTargets
+from vedette.scenarios.sections.world import RegionSection, Time
 
 
 def recorded_source(section: RecordedTargets, region: RegionSection, folder: Path) -> RecordedSource:

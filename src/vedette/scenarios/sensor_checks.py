@@ -6,25 +6,20 @@ import math
 from collections.abc import Iterator
 
 from vedette.scenarios.faults import Finding, Path, describe
-from vedette.scenarios.schema.sensors import (
-    BearingOnly,
-    BearingRange,
+from vedette.scenarios.sections.sensing import (
     ConstantNoise,
     CustomMeasurement,
     MeasurementSpaceClutter,
     Position,
     RangeDependentNoise,
-    RangeOnly,
     RegionClutter,
-    Sensor,
 )
-
-_MEASUREMENT_DIM = {BearingRange: 2, BearingOnly: 1, RangeOnly: 1, Position: 2}
-_ANGULAR = {BearingRange: (0,), BearingOnly: (0,)}
+from vedette.scenarios.sections.sensors import Sensor
 
 
-def _measurement_dim(sensor: Sensor) -> int | None:
-    return _MEASUREMENT_DIM.get(type(sensor.measurement))
+def _dim(sensor: Sensor) -> int | None:
+    # A sensor of a faulty file has None where the schema promises a value.
+    return None if sensor.measurement is None else sensor.measurement.dim
 
 
 def sensor_findings(sensors: tuple[Sensor | None, ...]) -> Iterator[Finding]:
@@ -42,7 +37,7 @@ def sensor_findings(sensors: tuple[Sensor | None, ...]) -> Iterator[Finding]:
 
 
 def _noise(path: Path, sensor: Sensor) -> Iterator[Finding]:
-    noise, dim = sensor.noise, _measurement_dim(sensor)
+    noise, dim = sensor.noise, _dim(sensor)
     if isinstance(noise, RangeDependentNoise) and isinstance(sensor.measurement, Position | CustomMeasurement):
         yield path, f"constant or custom noise for a {sensor.measurement.kind} measurement", "range_dependent noise"
     elif isinstance(noise, ConstantNoise) and dim is not None and len(noise.std) != dim:
@@ -55,7 +50,7 @@ def _components(dim: int, sensor: Sensor) -> str:
 
 
 def _clutter(path: Path, sensor: Sensor) -> Iterator[Finding]:
-    clutter, dim = sensor.clutter, _measurement_dim(sensor)
+    clutter, dim = sensor.clutter, _dim(sensor)
     if isinstance(clutter, RegionClutter) and isinstance(sensor.measurement, CustomMeasurement):
         yield path, "measurement_space or custom clutter for a custom measurement", "region clutter"
     if not isinstance(clutter, MeasurementSpaceClutter):
@@ -68,5 +63,9 @@ def _clutter(path: Path, sensor: Sensor) -> Iterator[Finding]:
     for j, (low, high) in enumerate(zip(clutter.low, clutter.high, strict=False)):
         if high <= low:
             yield (*path, "high", j), f"a number above low, {low:g}", describe(high)
-        elif j in _ANGULAR.get(type(sensor.measurement), ()) and high - low > 2.0 * math.pi * (1.0 + 1e-9):
+        elif (
+            sensor.measurement is not None
+            and j in sensor.measurement.angular
+            and high - low > 2.0 * math.pi * (1.0 + 1e-9)
+        ):
             yield (*path, "high", j), f"an angle of at most 2 pi above low, {low:g}", describe(high)

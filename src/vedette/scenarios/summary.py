@@ -7,11 +7,11 @@ from typing import Literal
 
 from vedette.scenarios.checks import decision_steps
 from vedette.scenarios.loading import Scenario
-from vedette.scenarios.schema import ScenarioModel
-from vedette.scenarios.schema.base import Section
-from vedette.scenarios.schema.sensors import Sensor
-from vedette.scenarios.schema.tracking import Fusion
-from vedette.scenarios.schema.world import RecordedTargets
+from vedette.scenarios.sections import ScenarioModel
+from vedette.scenarios.sections.base import Section
+from vedette.scenarios.sections.sensors import Sensor
+from vedette.scenarios.sections.targets import RecordedTargets
+from vedette.scenarios.sections.tracking import Fusion
 from vedette.text import counted
 
 

@@ -20,7 +20,7 @@ def code_of(section: BaseModel) -> tuple[str, ...]:
 
 def _references(value: Any) -> Iterator[str]:
     if isinstance(value, dict) and value.get("kind") == "custom":
-        yield value["python"]
+        yield value["function"]
     elif isinstance(value, dict | list):
         for item in value.values() if isinstance(value, dict) else value:
             yield from _references(item)

@@ -1,4 +1,4 @@
-"""The world that the program does not get to see: truth, platforms, scans; the loop, and what a run leaves behind."""
+"""The world that the program does not get to see: truth, scans; the loop, and what a run leaves behind."""
 
 from vedette.simulation.experiment import Experiment
 from vedette.simulation.loop import simulate

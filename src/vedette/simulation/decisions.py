@@ -11,6 +11,7 @@ import numpy as np
 from vedette.control.plan import Plan, RewardTable
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats
+from vedette.platforms import Actions
 from vedette.reading import parse_json
 from vedette.simulation.records import Decision
 
@@ -38,10 +39,11 @@ def _data(decision: Decision) -> dict[str, Any]:
         "time_s": float(decision.time),
         "poses": decision.poses.tolist(),
         "planner": plan.planner,
-        "action_headings_rad": [values.tolist() for values in plan.action_values],
+        "actions": [{"columns": list(own.columns), "values": own.values.tolist()} for own in plan.actions],
         "chosen": [int(index) for index in plan.chosen],
-        "chosen_headings_deg": np.rad2deg(plan.chosen_headings).tolist(),
+        "chosen_actions": [row.tolist() for row in plan.chosen_actions],
         "counts": {name: int(count) for name, count in plan.counts.items()},
+        "notes": list(plan.notes),
         "reward_tables": [
             {
                 "sensors": [int(sensor) for sensor in table.sensors],
@@ -66,7 +68,13 @@ def _with_gaps(values: Floats) -> Any:
 def _decision(entry: Mapping[str, Any]) -> Decision:
     plan = Plan(
         planner=str(entry["planner"]),
-        action_values=tuple(np.array(values, np.float64) for values in entry["action_headings_rad"]),
+        actions=tuple(
+            Actions(
+                tuple(str(name) for name in own["columns"]),
+                np.array(own["values"], np.float64).reshape(len(own["values"]), len(own["columns"])),
+            )
+            for own in entry["actions"]
+        ),
         chosen=tuple(int(index) for index in entry["chosen"]),
         tables=tuple(
             RewardTable(
@@ -77,5 +85,6 @@ def _decision(entry: Mapping[str, Any]) -> Decision:
             for table in entry["reward_tables"]
         ),
         counts={str(name): int(count) for name, count in entry["counts"].items()},
+        notes=tuple(str(note) for note in entry["notes"]),
     )
     return Decision(int(entry["step"]), float(entry["time_s"]), np.array(entry["poses"], np.float64), plan)

@@ -13,7 +13,7 @@ from vedette.densities import Estimate
 from vedette.errors import InputError
 from vedette.filters import Belief
 from vedette.fusion import Fusion
-from vedette.kernels.base.types import Bools, Floats
+from vedette.kernels.base.types import Floats
 from vedette.simulation.truth import TargetSource
 
 
@@ -26,9 +26,10 @@ class Experiment:
         times: (num_scans,) s of the scans.
         targets: where the true targets come from.
         sensors: the sensors with their local filters.
-        poses: (num_sensors, 3) poses at the first scan.
-        moving: (num_sensors,) whether a sensor is under way from the start; the others lie still until the first
-            decision.
+        poses: (num_sensors, 3 or more) poses at the first scan, all as long as the longest; components that are not a
+            sensor's own are 0.
+        first_actions: for each sensor, the row of the action that it is under from the start; None: it lies still until
+            the first decision.
         fusion: of the local beliefs; None for a single sensor.
         feedback: whether the fused belief replaces the local ones (paper-notes 9).
         estimate: reads the targets off the fused belief, given the number of the scan (from 1).
@@ -43,7 +44,7 @@ class Experiment:
     targets: TargetSource
     sensors: tuple[MobileSensor, ...]
     poses: Floats
-    moving: Bools
+    first_actions: tuple[Floats | None, ...]
     fusion: Fusion[Any, Any] | None
     feedback: bool
     estimate: Callable[[Belief, int], Estimate]
@@ -53,10 +54,11 @@ class Experiment:
         num = len(self.sensors)
         if num == 0 or (self.fusion is None and num > 1):
             raise InputError(f"fusion: expected one for {num} sensors; got none")
-        if self.poses.shape != (num, 3) or not np.isfinite(self.poses).all():
-            raise InputError(f"poses: expected finite numbers of shape ({num}, 3); got {self.poses.tolist()}")
-        if self.moving.shape != (num,):
-            raise InputError(f"moving: expected {num} flags; got shape {self.moving.shape}")
+        shape = self.poses.shape
+        if len(shape) != 2 or len(self.poses) != num or shape[1] < 3 or not np.isfinite(self.poses).all():
+            raise InputError(f"poses: expected finite numbers of shape ({num}, 3 or more); got {self.poses.tolist()}")
+        if len(self.first_actions) != num:
+            raise InputError(f"first_actions: expected {num}, one a sensor; got {len(self.first_actions)}")
         bad = [step for step in self.decision_steps if not 1 <= step <= len(self.times)]
         if bad:
             raise InputError(f"decision_steps: expected scans from 1 to {len(self.times)}; got {bad[0]}")

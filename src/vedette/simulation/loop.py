@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from time import perf_counter
 from typing import Any, TypeAlias
 
 import numpy as np
 
-from vedette.control import Plan, Planner, RandomPlanner
+from vedette.control import Planner, RandomPlanner
 from vedette.densities import Estimate
 from vedette.errors import VedetteError
 from vedette.kernels.base.types import Floats
-from vedette.models.platforms import advance
+from vedette.platforms import Fleet
 from vedette.simulation.experiment import Experiment
 from vedette.simulation.health import Health
 from vedette.simulation.records import Decision, RunRecord
@@ -49,28 +49,11 @@ class _Stopwatch:
     @contextmanager
     def timing(self, stage: str, sensor: int | None = None) -> Iterator[None]:
         self.under_way = f"the {stage}" if sensor is None else f"the {stage} of sensor {sensor + 1}"
-        start = time.perf_counter()
+        start = perf_counter()
         try:
             yield
         finally:
-            self.spent[stage][self.step - 1] += time.perf_counter() - start
-
-
-class _Course:
-    """Where the sensors are and how they move."""
-
-    def __init__(self, experiment: Experiment) -> None:
-        self.poses = experiment.poses.copy()
-        self.speeds = np.array([sensor.speed for sensor in experiment.sensors])
-        self.moving = experiment.moving.copy()
-
-    def move(self, seconds: float) -> None:
-        self.poses = advance(self.poses, self.poses[:, 2], np.where(self.moving, self.speeds, 0.0), seconds)
-
-    def follow(self, plan: Plan) -> None:
-        self.poses = self.poses.copy()
-        self.poses[:, 2] = plan.chosen_headings
-        self.moving = np.ones_like(self.moving)
+            self.spent[stage][self.step - 1] += perf_counter() - start
 
 
 class _Journal:
@@ -168,23 +151,23 @@ def _go(experiment: Experiment, planner: Planner | None, journal: _Journal) -> N
     scan_streams = [run_stream(seed, run, SCANS, sensor) for sensor in range(num_sensors)]
     filter_streams = [run_stream(seed, run, FILTER, sensor) for sensor in range(num_sensors)]
     planner_stream = run_stream(seed, run, RANDOM_CONTROL if isinstance(planner, RandomPlanner) else PLANNER)
-    course = _Course(experiment)
-    if planner is None:
-        course.moving[:] = False
+    platforms = tuple(sensor.platform for sensor in experiment.sensors)
+    under_way = experiment.first_actions if planner is not None else (None,) * num_sensors
+    fleet = Fleet(platforms, experiment.poses, under_way, float(experiment.times[0]))
     beliefs: list[Any] = [sensor.filter.initial() for sensor in experiment.sensors]
     periods = np.diff(experiment.times, prepend=experiment.times[0] - _first_period(experiment.times))
     for step, period in enumerate(periods.tolist(), start=1):
         watch.step = step
-        if step > 1:
-            course.move(period)
-        journal.poses.append(course.poses)
+        time = float(experiment.times[step - 1])
+        poses = fleet.poses(time)
+        journal.poses.append(poses)
         _, states = truth.at(step - 1)
         for s, sensor in enumerate(experiment.sensors):
             with watch.timing("scans", s):
-                scan = simulate_scan(states, course.poses[s], sensor.filter.sensor, rng=scan_streams[s])
+                scan = simulate_scan(states, poses[s], sensor.filter.sensor, rng=scan_streams[s])
             with watch.timing("filter", s):
                 beliefs[s], info = sensor.filter.step(
-                    beliefs[s], scan.measurements, course.poses[s], period, step, rng=filter_streams[s]
+                    beliefs[s], scan.measurements, poses[s], period, step, rng=filter_streams[s]
                 )
             journal.health.note_filter(step - 1, s, info)
         fused = beliefs[0]
@@ -198,9 +181,9 @@ def _go(experiment: Experiment, planner: Planner | None, journal: _Journal) -> N
             journal.estimates.append(experiment.estimate(fused, step))
         if planner is not None and step in experiment.decision_steps:
             with watch.timing("planning"):
-                plan = planner.plan(beliefs, fused, course.poses, rng=planner_stream)
-            journal.decisions.append(Decision(step, float(experiment.times[step - 1]), course.poses, plan))
-            course.follow(plan)
+                plan = planner.plan(beliefs, fused, poses, rng=planner_stream)
+            journal.decisions.append(Decision(step, time, poses, plan))
+            fleet = fleet.follow(plan.chosen_actions, time)
 
 
 def _first_period(times: Floats) -> float:

@@ -18,7 +18,7 @@ class Decision:
     Attributes:
         step: number of the scan, from 1, after which the plan was made.
         time: s.
-        poses: (num_sensors, 3) poses [px, py, heading_rad] of the sensors at that moment.
+        poses: (num_sensors, 3 or more) poses [px, py, heading_rad, ...] of the sensors at that moment.
         plan: the choice and its evidence.
     """
 
@@ -39,7 +39,7 @@ class RunRecord:
         run: index of the run within the campaign.
         times: (num_scans,) s.
         truth: the targets, scan by scan.
-        poses: (num_scans, num_sensors, 3) sensor poses [px, py, heading_rad] at each scan.
+        poses: (num_scans, num_sensors, 3 or more) sensor poses [px, py, heading_rad, ...] at each scan.
         estimates: one a scan.
         decisions: in order of time.
         ospa: (num_scans, 3) total, localisation and cardinality parts, m.

@@ -44,7 +44,7 @@ def simulate_scan(
 
     Args:
         truth_states: (num_targets, state_dim).
-        pose: (3,) px, py, heading_rad of the sensor.
+        pose: (3 or more,) px, py, heading_rad, ... of the sensor.
         sensor: the functions that the filter uses too.
         ids: (num_targets,) ids for `Scan.origins`; None: the place in `truth_states`.
         rng: every number drawn comes from it.

@@ -12,14 +12,14 @@ from matplotlib.figure import Figure
 
 from vedette.control.plan import RewardTable
 from vedette.errors import InputError
-from vedette.evaluation.figures.rewards import best_over_others, best_over_pair
+from vedette.evaluation.actions import action_axis
+from vedette.evaluation.figures.rewards import best_over_others, best_over_pair, map_ticks, mark_actions
 from vedette.evaluation.figures.style import (
     HEAT_MAP,
     INK,
     MARKERS,
     TEXT_WIDTH,
     colour,
-    degrees_label,
     line_style,
     new_figure,
     shown_decisions,
@@ -37,7 +37,7 @@ _LEVELS = 48  # of colour, which a vector file holds one by one
 
 @styled
 def mean_rewards_figure(records: Sequence[RunRecord]) -> Figure:
-    """Mean reward over the runs of one strategy against heading, a panel a decision, with how often each was chosen.
+    """Mean reward over the runs of one strategy against action, a panel a decision, with how often each was chosen.
 
     Independent decisions: one curve a sensor with a band of one standard error over the runs. Joint decisions: a heat
     map over the first two sensors, the largest over the others where there are more; where the joint table was too
@@ -69,11 +69,11 @@ def mean_rewards_figure(records: Sequence[RunRecord]) -> Figure:
 
 
 def _label(figure: Figure, panels: Any, rewards: MeanRewards, joint: bool) -> None:
-    what = "Turn" if rewards.are_turns else "Heading"
     for panel in panels[-1]:
-        panel.set_xlabel(f"{what} of sensor {_PAIR[0] + 1} (deg)" if joint else f"{what} (deg)")
+        if joint:
+            panel.set_xlabel(action_axis(rewards.actions[_PAIR[0]]).title(_PAIR[0]))
     for row in panels[:, 0]:
-        row.set_ylabel(f"{what} of sensor {_PAIR[1] + 1} (deg)" if joint else "Mean reward")
+        row.set_ylabel(action_axis(rewards.actions[_PAIR[1]]).title(_PAIR[1]) if joint else "Mean reward")
     if not joint:
         handles, labels = panels[0, 0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside upper center", ncols=min(len(labels), 6))
@@ -84,26 +84,30 @@ def _draw_curves(axes: Axes, rewards: MeanRewards) -> None:
         for axis, sensor in enumerate(table.sensors):
             others = tuple(other for other in range(share.ndim) if other != axis)
             _draw_curve(axes, rewards, sensor, best_over_others(table, axis), share.sum(axis=others))
-    _mark_headings(axes)
+    along = [action_axis(rewards.actions[sensor]) for table in rewards.tables for sensor in table.sensors]
+    mark_actions(axes, along[0], 90)
+    if len({each.title() if each.is_numeric else each.labels for each in along}) > 1:
+        axes.set_xlabel("Action")
 
 
 def _draw_curve(axes: Axes, rewards: MeanRewards, sensor: int, curve: tuple[Floats, Floats], share: Floats) -> None:
-    order = np.argsort(rewards.action_values[sensor], kind="stable")
-    degrees = np.rad2deg(rewards.action_values[sensor])[order]
+    along = action_axis(rewards.actions[sensor])
+    order = np.argsort(along.places, kind="stable")
+    places = along.places[order]
     mean, error, share = curve[0][order], curve[1][order], share[order]
     shade = colour(sensor)
-    axes.fill_between(degrees, mean - error, mean + error, color=shade, alpha=0.2, linewidth=0)
-    axes.plot(degrees, mean, color=shade, linestyle=line_style(sensor), label=f"sensor {sensor + 1}")
+    axes.fill_between(places, mean - error, mean + error, color=shade, alpha=0.2, linewidth=0)
+    axes.plot(
+        places,
+        mean,
+        color=shade,
+        linestyle=line_style(sensor) if along.is_numeric else "",
+        label=f"sensor {sensor + 1}",
+    )
     axes.scatter(
-        degrees, mean, s=_LARGEST_MARK * share, color=shade, marker=MARKERS[sensor % len(MARKERS)],
+        places, mean, s=_LARGEST_MARK * share, color=shade, marker=MARKERS[sensor % len(MARKERS)],
         edgecolors=INK, linewidths=np.where(share > 0.0, 0.5, 0.0).tolist(), zorder=3,
     )  # fmt: skip
-
-
-def _mark_headings(axes: Axes) -> None:
-    low, high = axes.get_xlim()
-    if high - low > 300.0:
-        axes.set_xticks(np.arange(-180, 181, 90), [degrees_label(value) for value in range(-180, 181, 90)])
 
 
 def _draw_joint(figure: Figure, axes: Axes, rewards: MeanRewards) -> None:
@@ -120,9 +124,7 @@ def _draw_joint(figure: Figure, axes: Axes, rewards: MeanRewards) -> None:
     axes.grid(False)
     axes.set_aspect("equal" if reward.shape[0] == reward.shape[1] else "auto")
     for axis, sensor in zip((axes.xaxis, axes.yaxis), _PAIR, strict=True):
-        degrees = np.rad2deg(rewards.action_values[sensor])
-        every = max(1, -(-len(degrees) // 5))
-        axis.set_ticks(range(0, len(degrees), every), [degrees_label(value) for value in degrees[::every]])
+        map_ticks(axis, action_axis(rewards.actions[sensor]), 5)
     bar = figure.colorbar(image, ax=axes, shrink=0.9)
     bar.ax.tick_params(labelsize=6)
     bar.ax.set_title("reward", fontsize=6, pad=4)

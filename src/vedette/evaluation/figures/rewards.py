@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -9,6 +12,7 @@ from matplotlib.patches import Rectangle
 
 from vedette.control.plan import Plan, RewardTable
 from vedette.errors import InputError
+from vedette.evaluation.actions import ActionAxis, action_axis, with_minus
 from vedette.evaluation.figures.style import (
     COLUMN_WIDTH,
     HEAT_MAP,
@@ -20,12 +24,14 @@ from vedette.evaluation.figures.style import (
     styled,
 )
 from vedette.kernels.base.types import Floats
+from vedette.platforms import Actions
 
 
 @styled
 def reward_figure(plan: Plan, *, pair: tuple[int, int] = (0, 1)) -> Figure:
-    """Reward against heading, one curve a sensor, the choice marked, with bands of one standard error over the samples.
+    """Reward against action, one curve a sensor, the choice marked, with bands of one standard error over the samples.
 
+    Actions of one column lie at its number, and others side by side; sensors of other columns have panels of their own.
     A plan made independently has its curves as they are. A joint plan has above them a heat map of the joint table with
     the chosen actions framed; its curves are the most that a sensor's action can bring with the best actions of the
     others. With more than two sensors the heat map is likewise the maximum over the sensors outside `pair`. What a
@@ -41,24 +47,33 @@ def reward_figure(plan: Plan, *, pair: tuple[int, int] = (0, 1)) -> Figure:
     if not plan.tables:
         raise InputError(f"plan: expected reward tables; got none, as planner {plan.planner!r} weighs no actions")
     joint = [table for table in plan.tables if len(table.sensors) > 1]
-    if not joint:
-        figure = new_figure(2.3)
-        _draw_curves(figure.subplots(), plan)
-        return figure
-    figure = new_figure(COLUMN_WIDTH + 1.4)
-    upper, lower = figure.subplots(2, 1, height_ratios=(1.55, 1.0))
-    _draw_heat_map(figure, upper, plan, joint[0], pair)
-    _draw_curves(lower, plan)
+    groups = alike(plan.actions, [sensor for table in plan.tables for sensor in table.sensors])
+    heights = [1.55] * len(joint[:1]) + [1.0] * len(groups)
+    figure = new_figure((COLUMN_WIDTH + 1.4 if joint else 2.3) + 1.9 * (len(groups) - 1))
+    panels = figure.subplots(len(heights), 1, height_ratios=heights, squeeze=False)[:, 0]
+    if joint:
+        _draw_heat_map(figure, panels[0], plan, joint[0], pair)
+    for axes, sensors in zip(panels[-len(groups) :], groups, strict=True):
+        _draw_curves(axes, plan, sensors)
     return figure
 
 
-def _draw_curves(axes: Axes, plan: Plan) -> None:
+def alike(actions: Sequence[Actions], sensors: Sequence[int]) -> list[list[int]]:
+    """The sensors, gathered by what can be drawn along one axis."""
+    groups: dict[Any, list[int]] = {}
+    for sensor in sensors:
+        axis = action_axis(actions[sensor])
+        groups.setdefault(axis.title() if axis.is_numeric else axis.labels, []).append(sensor)
+    return list(groups.values())
+
+
+def _draw_curves(axes: Axes, plan: Plan, sensors: Sequence[int]) -> None:
     for table in plan.tables:
         for axis, sensor in enumerate(table.sensors):
-            mean, error = best_over_others(table, axis)
-            _draw_curve(axes, plan, sensor, mean, error)
+            if sensor in sensors:
+                _draw_curve(axes, plan, sensor, *best_over_others(table, axis))
     joint = any(len(table.sensors) > 1 for table in plan.tables)
-    axes.set_xlabel("Heading (deg)")
+    mark_actions(axes, action_axis(plan.actions[sensors[0]]))
     axes.set_ylabel("Largest joint reward" if joint else "Reward (CS divergence)")
     # Above the panel: wherever a legend would lie inside, some curve passes.
     axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2, frameon=False, handlelength=1.8)
@@ -66,25 +81,41 @@ def _draw_curves(axes: Axes, plan: Plan) -> None:
 
 def _draw_curve(axes: Axes, plan: Plan, sensor: int, mean: Floats, error: Floats) -> None:
     # Changes of heading come in another order than the headings that they lead to.
-    order = np.argsort(plan.action_values[sensor], kind="stable")
-    headings, mean, error = np.rad2deg(plan.action_values[sensor])[order], mean[order], error[order]
+    axis = action_axis(plan.actions[sensor])
+    order = np.argsort(axis.places, kind="stable")
+    places, mean, error = axis.places[order], mean[order], error[order]
     chosen = int(np.flatnonzero(order == plan.chosen[sensor])[0])
     shade = colour(sensor)
-    axes.fill_between(headings, mean - error, mean + error, color=shade, alpha=0.2, linewidth=0)
+    axes.fill_between(places, mean - error, mean + error, color=shade, alpha=0.2, linewidth=0)
     axes.plot(
-        headings,
+        places,
         mean,
         color=shade,
-        linestyle=line_style(sensor),
+        linestyle=line_style(sensor) if axis.is_numeric else "",
         marker=MARKERS[sensor % len(MARKERS)],
         markersize=6,
         markeredgecolor="black",
         markevery=[chosen],
-        label=f"sensor {sensor + 1}: {degrees_label(headings[chosen])}°",
+        label=f"sensor {sensor + 1}: {with_minus(axis.labels[order[chosen]])}",
     )
-    axes.plot(headings, mean, color=shade, linestyle="", marker=".", markersize=3)
-    if headings.min() >= -180.5 and headings.max() <= 180.5 and np.ptp(headings) > 180:
-        axes.set_xticks(np.arange(-180, 181, 60))
+    axes.plot(places, mean, color=shade, linestyle="", marker=".", markersize=3)
+
+
+def mark_actions(axes: Axes, along: ActionAxis, every: int = 60) -> None:
+    """Title and ticks of an axis of actions: `every` so many degrees, or each action in words."""
+    axes.set_xlabel(along.title())
+    low, high = axes.get_xlim()
+    if not along.is_numeric:
+        axes.set_xticks(along.places, [with_minus(label) for label in along.labels], rotation=90, fontsize=5)
+    elif along.unit == "deg" and 180.0 < high - low < 420.0 and low > -220.0 and high < 220.0:
+        axes.set_xticks(np.arange(-180, 181, every), [degrees_label(value) for value in range(-180, 181, every)])
+
+
+def map_ticks(axis: Any, along: ActionAxis, most: int) -> None:
+    """Ticks of one side of a map of joint actions, at most so many."""
+    every = max(1, -(-len(along.places) // most))
+    words = [degrees_label(place) for place in along.places] if along.unit == "deg" else list(along.labels)
+    axis.set_ticks(range(0, len(words), every), [with_minus(word) for word in words[::every]])
 
 
 def best_over_others(table: RewardTable, axis: int) -> tuple[Floats, Floats]:
@@ -114,11 +145,9 @@ def _draw_heat_map(figure: Figure, axes: Axes, plan: Plan, table: RewardTable, p
     image = axes.imshow(reward.T, origin="lower", cmap=HEAT_MAP, aspect="auto", interpolation="nearest")
     axes.grid(False)
     for axis, sensor in zip((axes.xaxis, axes.yaxis), pair, strict=True):
-        headings = np.rad2deg(plan.action_values[sensor])
-        every = max(1, -(-len(headings) // 7))
-        axis.set_ticks(range(0, len(headings), every), [degrees_label(value) for value in headings[::every]])
-    axes.set_xlabel(f"Heading of sensor {pair[0] + 1} (deg)")
-    axes.set_ylabel(f"Heading of sensor {pair[1] + 1} (deg)")
+        along = action_axis(plan.actions[sensor])
+        map_ticks(axis, along, 7)
+        axis.set_label_text(along.title(sensor))
     column, row = plan.chosen[pair[0]], plan.chosen[pair[1]]
     for shade, width in (("black", 2.6), ("white", 1.2)):  # legible on the dark and on the light end of the scale
         axes.add_patch(Rectangle((column - 0.5, row - 0.5), 1, 1, fill=False, edgecolor=shade, linewidth=width))

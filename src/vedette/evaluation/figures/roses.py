@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from vedette.errors import InputError
-from vedette.evaluation.comparison import Comparison
+from vedette.evaluation.actions import row_words, with_minus
+from vedette.evaluation.comparison import Choice, Comparison
 from vedette.evaluation.figures.labels import short_labels
 from vedette.evaluation.figures.style import (
     GREY,
@@ -21,31 +23,39 @@ from vedette.evaluation.figures.style import (
 from vedette.kernels.base.types import Floats, Ints
 
 _SIZE = 1.5  # inches of a rose
+_MOST_BARS = 4  # of a sensor
 _SECTORS = 24  # that headings which are no fixed set are counted in
 
 
 @styled
 def roses_figure(comparison: Comparison) -> Figure:
-    """Shares of the runs in which each heading was chosen: a row a strategy that decides, a column a decision.
+    """Shares of the runs in which each action was chosen: a row a strategy that decides, a column a decision.
 
-    Headings are counter-clockwise from east (0). Sensors stand side by side within the sector of a heading. The area of
-    a bar is in proportion to the share: the radius goes with its square root. Of many decisions at most six are shown,
+    A rose where every sensor was sent on a heading, and bars of the actions in words elsewhere. Headings are
+    counter-clockwise from east (0). Sensors stand side by side within the sector of a heading. The area of a bar of a
+    rose is in proportion to the share: the radius goes with its square root. Of many decisions at most six are shown,
     evenly spread, the first and the last among them.
 
     Raises `InputError` where no strategy made a decision.
     """
-    rows = [index for index, runs in enumerate(comparison.headings) if any(runs)]
+    rows = [index for index, runs in enumerate(comparison.choices) if any(runs)]
     if not rows:
         raise InputError("comparison: expected decisions; got none")
     columns = shown_decisions(len(comparison.decision_times))
     num_sensors, names = _num_sensors(comparison), short_labels(comparison.strategies, 20)
     size = min(TEXT_WIDTH / (len(columns) + 0.35), _SIZE)
     figure = new_figure(size * len(rows) + 0.5, width=size * (len(columns) + 0.35))
-    panels = figure.subplots(len(rows), len(columns), subplot_kw={"projection": "polar"}, squeeze=False)
+    are_headings = all("heading_deg" in dict(row) for choice in _all_choices(comparison) for row in choice)
+    polar = {"projection": "polar"} if are_headings else {}
+    panels = figure.subplots(len(rows), len(columns), subplot_kw=polar, squeeze=False)
     for row, index in enumerate(rows):
         for column, decision in enumerate(columns):
             panel = panels[row, column]
-            _draw_rose(panel, _chosen(comparison, index, decision), num_sensors)
+            chosen = [run[decision] for run in comparison.choices[index] if decision < len(run)]
+            if are_headings and chosen:
+                _draw_rose(panel, _headings(chosen), num_sensors)
+            else:
+                _draw_bars(panel, chosen)
             if row == 0:
                 panel.set_title(f"{comparison.decision_times[decision]:g} s", pad=9)
         panels[row, 0].set_ylabel(names[index], labelpad=22, fontsize=8)
@@ -55,13 +65,32 @@ def roses_figure(comparison: Comparison) -> Figure:
 
 
 def _num_sensors(comparison: Comparison) -> int:
-    return max(len(chosen) for runs in comparison.headings for run in runs for chosen in run)
+    return max(map(len, _all_choices(comparison)))
 
 
-def _chosen(comparison: Comparison, strategy: int, decision: int) -> Ints:
-    """(num_runs, num_sensors) headings in whole degrees, from the runs that made this decision."""
-    chosen = [run[decision] for run in comparison.headings[strategy] if decision < len(run)]
-    return np.array(chosen, np.int64).reshape(len(chosen), -1) % 360
+def _all_choices(comparison: Comparison) -> list[Choice]:
+    return [choice for runs in comparison.choices for run in runs for choice in run]
+
+
+def _headings(chosen: list[Choice]) -> Ints:
+    """(num_runs, num_sensors) headings in whole degrees."""
+    degrees = [[dict(row)["heading_deg"] for row in choice] for choice in chosen]
+    return np.array(degrees, np.int64).reshape(len(chosen), -1) % 360
+
+
+def _draw_bars(axes: Any, chosen: list[Choice]) -> None:
+    """One bar a sensor and action that was chosen, the most frequent of each sensor on top."""
+    place, ticks = 0, []
+    for sensor, rows in enumerate(zip(*chosen, strict=True)):
+        for number, (row, count) in enumerate(Counter(rows).most_common(_MOST_BARS)):
+            label = {"label": f"sensor {sensor + 1}"} if number == 0 else {}
+            axes.barh(place, count / len(chosen), color=colour(sensor), height=0.8, **label)
+            ticks.append(with_minus(row_words(row)))
+            place += 1
+    axes.set_yticks(range(place), ticks, fontsize=4)
+    axes.invert_yaxis()
+    axes.set_xlim(0.0, 1.0)
+    axes.set_xticks([0.0, 0.5, 1.0], ["0", "50 %", "100 %"], fontsize=6)
 
 
 def _draw_rose(axes: Any, chosen: Ints, num_sensors: int) -> None:

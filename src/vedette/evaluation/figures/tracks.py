@@ -25,7 +25,7 @@ from vedette.evaluation.figures.style import (
     styled,
 )
 from vedette.kernels.base.types import Floats, Ints
-from vedette.simulation.records import RunRecord
+from vedette.simulation.records import Decision, RunRecord
 
 _LARGE = 5000.0  # m, beyond which axes are in kilometres
 _SENSOR_MARKERS = "sDpP*X"
@@ -146,18 +146,22 @@ def _draw_sensor(axes: Axes, record: RunRecord, sensor: int, scale: float) -> No
         axes.annotate(f"S{sensor + 1}", _point(path[-1]), xytext=(3, 3), **style)
     for number, decision in enumerate(record.decisions, start=1):
         place = _point(decision.poses[sensor, :2] * scale)
-        heading = decision.plan.chosen_headings[sensor]
-        ahead = 13.0 * np.array([np.cos(heading), np.sin(heading)])
-        axes.annotate(
-            "",
-            place,
-            xytext=tuple(ahead),
-            textcoords="offset points",
-            arrowprops={"arrowstyle": "<|-", "color": INK, "linewidth": 0.9, "shrinkA": 0, "shrinkB": 0},
-            zorder=7,
-        )
+        arrow = {"arrowstyle": "<|-", "color": INK, "linewidth": 0.9, "shrinkA": 0, "shrinkB": 0}
+        ahead = 13.0 * _direction(decision, sensor)
+        if ahead.any():
+            axes.annotate("", place, xytext=_point(ahead), textcoords="offset points", arrowprops=arrow, zorder=7)
         axes.plot(*place, marker="o", markersize=6.0, color=INK, markerfacecolor="white", markeredgewidth=0.7, zorder=8)
         axes.annotate(str(number), place, ha="center", va="center_baseline", fontsize=5, zorder=9)
+
+
+def _direction(decision: Decision, sensor: int) -> Floats:
+    """Where the sensor was sent, of length 1; 0 where its action is no heading and no step."""
+    plan = decision.plan
+    row = dict(zip(plan.actions[sensor].columns, plan.chosen_actions[sensor].tolist(), strict=True))
+    if "heading_deg" in row:
+        return np.array([np.cos(np.deg2rad(row["heading_deg"])), np.sin(np.deg2rad(row["heading_deg"]))])
+    step = np.array([row.get("dx", 0.0), row.get("dy", 0.0)])
+    return np.asarray(step / max(float(np.hypot(*step)), np.finfo(float).tiny))
 
 
 def _point(values: Floats) -> tuple[float, float]:

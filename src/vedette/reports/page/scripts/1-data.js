@@ -1,7 +1,7 @@
 // The runs that can be replayed, and numbers as a reader wants them.
 const runs = JSON.parse(document.getElementById("runs").textContent);
 
-const minus = (text) => text.replace("-", "\u2212");
+const minus = (text) => text.replaceAll("-", "\u2212");
 const fixed = (value, digits) => minus(value.toFixed(digits));
 const bounded = (value, low, high) => Math.min(high, Math.max(low, value));
 const degrees = (radians) => minus(String(Math.round((radians * 180) / Math.PI)));

@@ -48,88 +48,93 @@ function drawHeatScale(context, x, top, size, low, high) {
 }
 
 function labelMap(context, map, left, top, size) {
-  const [across, up] = map.degrees;
+  const [across, up] = map.labels;
   context.fillStyle = colours.grey;
   const place = (list, k) => ((k + 0.5) * size) / list.length;
   for (const k of [0, Math.floor(across.length / 2), across.length - 1]) {
     context.textAlign = "center";
     context.textBaseline = "top";
-    context.fillText(minus(String(Math.round(across[k]))), left + place(across, k), top + size + 3);
+    context.fillText(minus(across[k]), left + place(across, k), top + size + 3);
   }
   for (const k of [0, Math.floor(up.length / 2), up.length - 1]) {
     context.textAlign = "right";
     context.textBaseline = "middle";
-    context.fillText(minus(String(Math.round(up[k]))), left - 4, top + size - place(up, k));
+    context.fillText(minus(up[k]), left - 4, top + size - place(up, k));
   }
   context.textAlign = "center";
   context.textBaseline = "top";
-  context.fillText(`sensor ${map.sensors[0] + 1} (deg)`, left + size / 2, top + size + 18);
+  context.fillText(`sensor ${map.sensors[0] + 1}`, left + size / 2, top + size + 18);
   context.save();
   context.translate(8, top + size / 2);
   context.rotate(-Math.PI / 2);
   context.textBaseline = "middle";
-  context.fillText(`sensor ${map.sensors[1] + 1} (deg)`, 0, 0);
+  context.fillText(`sensor ${map.sensors[1] + 1}`, 0, 0);
   context.restore();
 }
+
+// Curves along other axes than the first one's count their actions.
+const placesOf = (curves, curve) =>
+  (curves.every(({ axis, numeric }) => numeric && axis === curves[0].axis) ? curve.places : curve.labels.map((_, k) => k + 1));
 
 // Where the curves lie in their canvas.
 function curvesFrame(width, height, curves) {
   const all = curves.flatMap((curve) => curve.mean).filter((value) => value !== null);
-  const headings = curves.flatMap((curve) => curve.degrees);
+  const places = curves.flatMap((curve) => placesOf(curves, curve));
   return {
     left: 40, right: width - 10, top: 22, bottom: height - 34,
-    x: [Math.min(...headings), Math.max(...headings)], y: [Math.min(...all), Math.max(...all)],
+    x: [Math.min(...places), Math.max(...places)], y: [Math.min(...all), Math.max(...all)],
   };
 }
 
 function drawCurves(context, width, height, curves) {
   const frame = curvesFrame(width, height, curves);
-  const { x, y } = drawFrame(context, frame, "heading (deg)");
+  const { x, y } = drawFrame(context, frame, placesOf(curves, curves[0]) === curves[0].places ? curves[0].axis.toLowerCase() : "action");
   curves.forEach((curve, place) => {
     const shade = seriesColour(curve.sensor);
+    const places = placesOf(curves, curve);
     context.strokeStyle = shade;
     context.lineWidth = 1.6;
     context.beginPath();
-    curve.mean.forEach((value, k) => value !== null && context.lineTo(x(curve.degrees[k]), y(value)));
+    curve.mean.forEach((value, k) => value !== null && context.lineTo(x(places[k]), y(value)));
     context.stroke();
     context.fillStyle = shade;
-    disc(context, x(curve.degrees[curve.chosen]), y(curve.mean[curve.chosen]), 4.5);
+    disc(context, x(places[curve.chosen]), y(curve.mean[curve.chosen]), 4.5);
     context.textAlign = "left";
     context.textBaseline = "middle";
-    const name = `sensor ${curve.sensor + 1}: ${minus(String(Math.round(curve.degrees[curve.chosen])))}\u00b0`;
+    const name = `sensor ${curve.sensor + 1}: ${minus(curve.labels[curve.chosen])}`;
     context.fillText(name, frame.left + (place % 3) * 100, 9);
   });
 }
 
 const rewardText = (value) => (value === null ? "not evaluated" : `reward ${minus(value.toPrecision(4))}`);
-const headingText = (sensor, heading) => `sensor ${sensor + 1} to ${minus(String(Math.round(heading)))}\u00b0`;
+const actionText = (sensor, label) => `sensor ${sensor + 1} to ${minus(label)}`;
 
 // The reward under the pointer, in words; nothing beside the map or the curves.
 function describeReward(canvas, decision, x, y) {
   if (!decision?.curves.length) return [];
   const [width, height] = [canvas.clientWidth, canvas.clientHeight];
   return decision.map ? describeCell(mapFrame(width, height, decision.map), decision.map, x, y)
-    : describeHeading(curvesFrame(width, height, decision.curves), decision.curves, x);
+    : describeAction(curvesFrame(width, height, decision.curves), decision.curves, x);
 }
 
 function describeCell({ left, top, size, columns, rows }, map, x, y) {
   const i = Math.floor(((x - left) / size) * columns);
   const j = rows - 1 - Math.floor(((y - top) / size) * rows);
   if (i < 0 || j < 0 || i >= columns || j >= rows) return [];
-  const joint = map.sensors.map((sensor, axis) => headingText(sensor, map.degrees[axis][axis ? j : i])).join(", ");
+  const joint = map.sensors.map((sensor, axis) => actionText(sensor, map.labels[axis][axis ? j : i])).join(", ");
   const chosen = i === map.chosen[0] && j === map.chosen[1] ? " (chosen)" : "";
   return [`${joint}: ${rewardText(map.mean[i][j])}${chosen}`];
 }
 
-function describeHeading(frame, curves, x) {
+function describeAction(frame, curves, x) {
   const share = (x - frame.left) / (frame.right - frame.left);
-  const heading = frame.x[0] + share * (frame.x[1] - frame.x[0]);
+  const place = frame.x[0] + share * (frame.x[1] - frame.x[0]);
   if (share < -0.02 || share > 1.02) return [];
   return curves.map((curve) => {
-    const off = curve.degrees.map((each) => Math.abs(each - heading));
+    const off = placesOf(curves, curve).map((each) => Math.abs(each - place));
     const k = off.indexOf(Math.min(...off));
     const error = curve.error[k] ? ` \u00b1 ${curve.error[k].toPrecision(2)}` : "";
     const chosen = k === curve.chosen ? " (chosen)" : "";
-    return `${headingText(curve.sensor, curve.degrees[k])}: ${rewardText(curve.mean[k])}${error}${chosen}`;
+    return `${actionText(curve.sensor, curve.labels[k])}: ${rewardText(curve.mean[k])}${error}${chosen}`;
   });
 }

@@ -34,9 +34,8 @@ function startReplay(root) {
   function decisionText() {
     const decision = decisionAt(run(), state.step);
     if (!decision) return "No decision yet.";
-    const headings = decision.headings.map((heading) => `${minus(String(heading))}\u00b0`).join(", ");
     const without = decision.curves.length ? "" : ", without rewards";
-    return `Decision at ${+run().times[decision.scan].toFixed(3)} s${without}: headings ${headings}.`;
+    return `Decision at ${+run().times[decision.scan].toFixed(3)} s${without}: ${minus(decision.actions)}.${decision.notes.map((note) => ` ${note}.`).join("")}`;
   }
 
   function underPointer() {

@@ -1,24 +1,31 @@
-"""Sections about the world: time, region, motion, survival, births and the true targets."""
+"""Sections about the world: time, region, motion, survival and births."""
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
 
+import numpy as np
 from pydantic import Field, model_validator
 
-from vedette.scenarios.schema.base import (
-    Custom,
-    Numbers,
-    Point,
+from vedette.errors import InputError
+from vedette.scenarios.sections.base import (
+    GaussianMethod,
     Positive,
     Probability,
     Section,
     SomeNumbers,
+    Steps,
     Whole,
     expected,
 )
+from vedette.scenarios.sections.custom import Custom
 
-Step = Annotated[Whole, Field(ge=1)]
+if TYPE_CHECKING:  # with the models comes the compiler, which a check does without
+    from vedette.kernels.base.types import Floats
+    from vedette.models import BirthModel, MotionModel, Region, SurvivalModel
 
 
 class Time(Section):
@@ -27,6 +34,10 @@ class Time(Section):
     num_steps: Annotated[Whole, Field(ge=1, le=1_000_000, description="Number of scans [-].")]
     step_period: Positive = Field(default=1.0, description="Time between scans [s].")
     start: float = Field(default=1.0, description="Time of the first scan [s].")
+
+    def build(self) -> Floats:
+        """(num_steps,) times of the scans in s; that of step k is entry k - 1."""
+        return self.start + self.step_period * np.arange(self.num_steps, dtype=np.float64)
 
 
 class RegionSection(Section):
@@ -44,6 +55,12 @@ class RegionSection(Section):
         if self.y_max <= self.y_min:
             raise expected(f"a number above y_min, {self.y_min:g}", at=("y_max",))
         return self
+
+    def build(self) -> Region:
+        """The surveillance region."""
+        from vedette.models import Region
+
+        return Region(self.x_min, self.x_max, self.y_min, self.y_max)
 
 
 StateOrder = Annotated[
@@ -63,6 +80,17 @@ class ConstantVelocity(Section):
     sigma_v: float = Field(default=5.0, ge=0.0, description="Standard deviation of the acceleration [m/s^2].")
     state_order: StateOrder = "grouped"
 
+    @property
+    def state_dim(self) -> int:
+        """Number of components of a state."""
+        return 4
+
+    def build(self, method: GaussianMethod, folder: Path) -> MotionModel:
+        """The motion model."""
+        from vedette.models import constant_velocity
+
+        return constant_velocity(self.sigma_v, method=method)
+
 
 class CoordinatedTurn(Section):
     """Turn at an unknown rate. State [px, py, vx, vy, turn rate in rad/s]."""
@@ -74,6 +102,17 @@ class CoordinatedTurn(Section):
     )
     state_order: StateOrder = "grouped"
 
+    @property
+    def state_dim(self) -> int:
+        """Number of components of a state."""
+        return 5
+
+    def build(self, method: GaussianMethod, folder: Path) -> MotionModel:
+        """The motion model."""
+        from vedette.models import coordinated_turn
+
+        return coordinated_turn(self.sigma_v, math.radians(self.sigma_turn_rate_deg), method=method)
+
 
 class CustomMotion(Custom):
     """A user's `MotionModel`."""
@@ -81,8 +120,30 @@ class CustomMotion(Custom):
     kind: Literal["custom"] = Field(default="custom", description="Kind of motion [-].")
     state_dim: Annotated[Whole, Field(ge=2, le=100, description="Number of components of its state [-].")]
 
+    @property
+    def state_order(self) -> Literal["grouped"]:
+        """States are written as the model has them."""
+        return "grouped"
+
+    def build(self, method: GaussianMethod, folder: Path) -> MotionModel:
+        """The motion model. Raises `InputError` where it has another state dimension than it says."""
+        from vedette.models import MotionModel
+
+        motion = self.imported(MotionModel, folder, "motion")
+        if motion.state_dim != self.state_dim:
+            wanted = f"that of {self.function}, {motion.state_dim}"
+            raise InputError(f"motion.state_dim: expected {wanted}; got {self.state_dim}")
+        return motion if method == "auto" else replace(motion, method=method)
+
 
 Motion = Annotated[ConstantVelocity | CoordinatedTurn | CustomMotion, Field(discriminator="kind")]
+
+
+def grouped_order(motion: Motion) -> list[int]:
+    """Place in the file's states of each component of the library's states [px, py, vx, vy, ...]."""
+    if motion.state_order == "grouped":
+        return list(range(motion.state_dim))
+    return [0, 2, 1, 3, *range(4, motion.state_dim)]
 
 
 class ConstantSurvival(Section):
@@ -91,16 +152,27 @@ class ConstantSurvival(Section):
     kind: Literal["constant"] = Field(default="constant", description="Kind of survival [-].")
     probability: Probability = Field(default=0.98, description="Probability of living on to the next scan [-].")
 
+    def build(self, folder: Path) -> SurvivalModel:
+        """The survival model."""
+        from vedette.models import constant_survival
+
+        return constant_survival(self.probability)
+
 
 class CustomSurvival(Custom):
     """A user's `SurvivalModel`."""
 
     kind: Literal["custom"] = Field(default="custom", description="Kind of survival [-].")
 
+    def build(self, folder: Path) -> SurvivalModel:
+        """The survival model."""
+        from vedette.models import SurvivalModel
+
+        return self.imported(SurvivalModel, folder, "survival")
+
 
 Survival = Annotated[ConstantSurvival | CustomSurvival, Field(discriminator="kind")]
 CovRows = Annotated[tuple[SomeNumbers, ...], Field(strict=False)]
-Steps = Annotated[tuple[Step, ...], Field(strict=False)]
 
 
 class BirthSite(Section):
@@ -121,6 +193,10 @@ class BirthSite(Section):
             raise expected("either std or cov", got="both" if self.std else "neither")
         return self
 
+    def covariance(self) -> Floats:
+        """Covariance of the state, in the order of the file."""
+        return np.array(self.cov) if self.cov is not None else np.diag(np.square(self.std or ()))
+
 
 class Birth(Section):
     """LMB births, the same at every sensor: all share one label space. Label = (birth step, index of the site)."""
@@ -130,90 +206,14 @@ class Birth(Section):
     )
     sites: Annotated[tuple[BirthSite, ...], Field(strict=False, min_length=1)] = Field(description="The sites [-].")
 
+    def build(self, motion: Motion) -> BirthModel:
+        """The birth sites, shared by all sensors."""
+        from vedette.models import BirthModel
 
-class ScriptedTarget(Section):
-    """One true target that follows the motion model."""
-
-    state: SomeNumbers = Field(description="State at its first scan [m, m/s, ...].")
-    start_step: Step = Field(default=1, description="First scan at which it is there [-].")
-    end_step: Step | None = Field(default=None, description="Last scan at which it is there; none: to the end [-].")
-    process_noise: bool = Field(default=False, description="Whether its motion is disturbed by the process noise [-].")
-
-
-class ScriptedTargets(Section):
-    """Targets written out here."""
-
-    kind: Literal["scripted"] = Field(default="scripted", description="Kind of targets [-].")
-    tracks: Annotated[tuple[ScriptedTarget, ...], Field(strict=False)] = Field(description="The targets [-].")
-
-
-class Columns(Section):
-    """Names of the columns, where they differ from the names of these keys. Places are x, y or longitude, latitude."""
-
-    time: str | None = Field(default=None, description="Time: a number of seconds, or ISO 8601 [s].")
-    id: str | None = Field(default=None, description="Which target [-].")
-    x: str | None = Field(default=None, description="East [m].")
-    y: str | None = Field(default=None, description="North [m].")
-    longitude: str | None = Field(default=None, description="Longitude, WGS84 [deg].")
-    latitude: str | None = Field(default=None, description="Latitude, WGS84 [deg].")
-    vx: str | None = Field(default=None, description="Velocity to the east, if it is recorded [m/s].")
-    vy: str | None = Field(default=None, description="Velocity to the north, if it is recorded [m/s].")
-
-    @model_validator(mode="after")
-    def _one_pair(self) -> Columns:
-        given = self.given()
-        for first, second in (("x", "y"), ("longitude", "latitude"), ("vx", "vy")):
-            if (first in given) != (second in given):
-                raise expected(f"{first} and {second} together", got=f"only {first if first in given else second}")
-        if "x" in given and "longitude" in given:
-            raise expected("either x and y, or longitude and latitude", got="both")
-        return self
-
-    def given(self) -> dict[str, str]:
-        """The names that are given: key -> name in the file."""
-        return {key: name for key in type(self).model_fields if (name := getattr(self, key)) is not None}
-
-
-class RecordedTargets(Section):
-    """Targets from a CSV or Parquet file of reports: time, which target, where. Interpolated at the scans."""
-
-    kind: Literal["recorded"] = Field(default="recorded", description="Kind of targets [-].")
-    path: str = Field(min_length=1, description="CSV or Parquet file, relative to the scenario file [-].")
-    columns: Columns = Field(default=Columns(), description="Names of its columns [-].")
-    time_origin: float | str | None = Field(
-        default=None, description="Recorded time of the first scan, a number or ISO 8601; none: the earliest [s]."
-    )
-    origin_deg: Point | None = Field(
-        default=None, description="Longitude and latitude of x = y = 0; none: the middle of the reports [deg]."
-    )
-    max_gap: Positive = Field(default=60.0, description="A longer silence ends the track [s].")
-    min_speed: float = Field(
-        default=0.0, ge=0.0, description="A track slower than this on average is left out (moored) [m/s]."
-    )
-    max_speed: Positive | None = Field(
-        default=None, description="Reports that would need more are dropped (jumps); none: no limit [m/s]."
-    )
-    crop: bool = Field(default=True, description="Whether tracks end at the edges of the region [-].")
-
-
-Targets = Annotated[ScriptedTargets | RecordedTargets, Field(discriminator="kind")]
-
-__all__ = [
-    "Birth",
-    "BirthSite",
-    "Columns",
-    "ConstantSurvival",
-    "ConstantVelocity",
-    "CoordinatedTurn",
-    "CustomMotion",
-    "CustomSurvival",
-    "Motion",
-    "Numbers",
-    "RecordedTargets",
-    "RegionSection",
-    "ScriptedTarget",
-    "ScriptedTargets",
-    "Survival",
-    "Targets",
-    "Time",
-]
+        order = grouped_order(motion)
+        return BirthModel(
+            np.array([site.existence for site in self.sites]),
+            np.array([site.mean for site in self.sites])[:, order],
+            np.array([site.covariance() for site in self.sites])[:, order][:, :, order],
+            None if self.steps == "every" else frozenset(self.steps),
+        )

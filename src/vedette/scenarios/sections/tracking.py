@@ -1,14 +1,18 @@
-"""Sections about tracking: the local filters, the fusion of their densities, the estimates and their score."""
+"""Sections about tracking: the local filters, and the fusion of their densities."""
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+import math
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field
 
-from vedette.scenarios.schema.base import Positive, Probability, Section, Whole
+from vedette.scenarios.sections.base import Chance, Count, GaussianMethod, Probability, Section, Share
 
-Count = Annotated[Whole, Field(ge=1, le=1_000_000_000)]
+if TYPE_CHECKING:  # with the filters comes the compiler, which a check does without
+    from vedette.filters import Limits, LocalFilter
+    from vedette.fusion import Clmb, CmDeltaGlmb
+    from vedette.models import BirthModel, MotionModel, SensorModel, SurvivalModel
 
 
 class RankedAssignment(Section):
@@ -27,9 +31,6 @@ class GibbsAssignment(Section):
 Assignment = Annotated[RankedAssignment | GibbsAssignment, Field(discriminator="kind")]
 
 
-Share = Annotated[float, Field(ge=0.0, lt=1.0)]
-
-
 class FilterLimits(Section):
     """Caps and thresholds of a filter: what it throws away, and so what it costs."""
 
@@ -39,7 +40,7 @@ class FilterLimits(Section):
         description="Hypotheses (of a cphd: large numbers of targets) lighter than this times the heaviest are dropped "
         "[-].",
     )
-    min_track_weight: Annotated[float, Field(ge=0.0, le=1.0)] = Field(
+    min_track_weight: Probability = Field(
         default=1e-5,
         description="Each label's heaviest hypothesis is kept unless lighter than this times the heaviest of all [-].",
     )
@@ -64,15 +65,19 @@ class FilterLimits(Section):
     max_intensity_components: Count = Field(
         default=100, description="Most Gaussian components of the intensity of a phd or cphd, all targets together [-]."
     )
-    max_existence: Annotated[float, Field(gt=0.0, lt=1.0)] = Field(
+    max_existence: Chance = Field(
         default=0.999, description="Bernoullis of a cb_member surer than this are taken as this sure [-]."
     )
+
+    def build(self) -> Limits:
+        """Caps and thresholds of the filters."""
+        from vedette.filters import Limits
+
+        return Limits(**self.model_dump())
 
 
 # Filters that keep no identity of their targets.
 UNLABELLED = ("phd", "cphd", "cb_member")
-
-GaussianMethod = Literal["auto", "ekf", "ukf", "ckf"]
 
 
 class Filter(Section):
@@ -90,9 +95,36 @@ class Filter(Section):
     assignment: Assignment = Field(default=RankedAssignment(), description="How associations are truncated [-].")
     limits: FilterLimits = Field(default=FilterLimits(), description="What is thrown away [-].")
 
+    def build(
+        self, motion: MotionModel, survival: SurvivalModel, birth: BirthModel, sensor: SensorModel
+    ) -> LocalFilter:
+        """The filter of one sensor."""
+        from vedette.filters import CbMemberFilter, CphdFilter, DeltaGlmbFilter, LmbFilter, PhdFilter
+
+        limits = self.limits.build()
+        match self.kind:
+            case "lmb":
+                return LmbFilter(motion, survival, birth, sensor, limits)
+            case "phd":
+                return PhdFilter(motion, survival, birth, sensor, limits)
+            case "cphd":
+                return CphdFilter(motion, survival, birth, sensor, limits)
+            case "cb_member":
+                return CbMemberFilter(motion, survival, birth, sensor, limits)
+        gibbs = self.assignment if isinstance(self.assignment, GibbsAssignment) else GibbsAssignment()
+        return DeltaGlmbFilter(
+            motion,
+            survival,
+            birth,
+            sensor,
+            limits,
+            assignment=self.assignment.kind,
+            num_gibbs_samples=gibbs.num_samples,
+            marginalised=self.kind == "m_delta_glmb",
+        )
+
 
 Weights = Annotated[tuple[Probability, ...], Field(strict=False, min_length=1)]
-Floor = Annotated[float, Field(gt=0.0, lt=1.0)]
 
 
 class FusionLimits(Section):
@@ -102,7 +134,7 @@ class FusionLimits(Section):
     max_components: Count = Field(
         default=4, description="Most components of a track before its power is taken; unused when moment matched [-]."
     )
-    min_component_weight: Annotated[float, Field(gt=0.0, lt=1.0)] = Field(
+    min_component_weight: Chance = Field(
         default=1e-5, description="Lighter components are dropped; unused when moment matched [-]."
     )
     merge_distance: Annotated[float, Field(ge=0.0)] | None = Field(
@@ -129,10 +161,10 @@ class Fusion(Section):
         description="Power of a Gaussian mixture: of the Gaussian with its moments; of each component, which is valid "
         "for well separated ones; or the latter corrected by cubature [-].",
     )
-    missing_weight: Floor = Field(
+    missing_weight: Chance = Field(
         default=1e-6, description="Weight of a label set where a sensor lost it by truncation (cm_delta_glmb) [-]."
     )
-    missing_existence: Floor = Field(
+    missing_existence: Chance = Field(
         default=1e-4, description="Existence of a label where a sensor lost it by truncation (clmb) [-]."
     )
     feedback: bool = Field(
@@ -140,33 +172,25 @@ class Fusion(Section):
     )
     limits: FusionLimits = Field(default=FusionLimits(), description="What is thrown away [-].")
 
+    def scaled_weights(self, num_sensors: int) -> tuple[float, ...]:
+        """Weight of each sensor: equal where none are given; scaled to sum to one beyond the rounding of the file."""
+        given = self.weights or (1.0,) * num_sensors
+        return tuple(weight / math.fsum(given) for weight in given)
 
-class MapEstimator(Section):
-    """Most probable number of targets, then the best hypothesis with that number (as in the paper). Of a filter without
-    labels, the heaviest components or Bernoullis instead, newly labelled at each scan; a phd's number is the mean."""
+    def build(self, num_sensors: int) -> CmDeltaGlmb | Clmb | None:
+        """The fusion of the sensors' densities; None where there is none."""
+        from vedette.fusion import Clmb, CmDeltaGlmb, FusionLimits
 
-    kind: Literal["map"] = Field(default="map", description="Kind of estimate [-].")
-
-
-class MarginalEstimator(Section):
-    """Every label whose existence is probable enough; for filters that have labels."""
-
-    kind: Literal["marginal"] = Field(default="marginal", description="Kind of estimate [-].")
-    threshold: Annotated[float, Field(gt=0.0, lt=1.0)] = Field(
-        default=0.5, description="Least probability of existence [-]."
-    )
-
-
-Estimator = Annotated[MapEstimator | MarginalEstimator, Field(discriminator="kind")]
-
-
-class Ospa(Section):
-    """The score: optimal subpattern assignment distance between estimates and truth, in position."""
-
-    cutoff: Positive = Field(default=100.0, description="Cost of a missed or false target, c [m].")
-    order: float = Field(default=1.0, ge=1.0, description="Order p [-].")
-    window: Count = Field(default=10, description="Scans of the window of OSPA(2) [-].")
-    from_step: Count | None = Field(
-        default=None, description="First scan of the reported mean; none: the one after the first decision, or 1 [-]."
-    )
-    to_step: Count | None = Field(default=None, description="Last scan of the reported mean; none: the last scan [-].")
+        if self.kind == "none":
+            return None
+        weights, caps = self.scaled_weights(num_sensors), self.limits
+        limits = FusionLimits(
+            math.log(caps.min_component_weight),
+            caps.merge_distance,
+            caps.max_components,
+            caps.max_combinations,
+            caps.max_hypotheses,
+        )
+        if self.kind == "clmb":
+            return Clmb(weights, self.mixture_power, self.missing_existence, limits)
+        return CmDeltaGlmb(weights, self.mixture_power, math.log(self.missing_weight), limits)

@@ -1,17 +1,14 @@
-"""What the sections of a scenario share: the strict base model and the types of their fields.
+"""What the sections of a scenario share: the strict base class and the types of their fields.
 
 Each field's description ends with its unit in brackets; [-] is a number without a unit.
 """
 
 from __future__ import annotations
 
-import re
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, JsonValue, model_validator
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 from pydantic_core import PydanticCustomError
-
-_REFERENCE = re.compile(r"([A-Za-z_]\w*(\.[A-Za-z_]\w*)*|[^:]+\.py):[A-Za-z_]\w*(\.[A-Za-z_]\w*)*")
 
 # Squares and products of numbers in this range are numbers, too.
 _SMALLEST, _LARGEST = 1e-30, 1e15
@@ -25,12 +22,6 @@ def expected(what: str, *, at: tuple[str | int, ...] = (), got: str = "") -> Pyd
 def _whole(value: Any) -> Any:
     # In YAML 1.2 `1e3` is a floating-point number; where a count is wanted it is 1000.
     return int(value) if isinstance(value, float) and value.is_integer() else value
-
-
-def _reference(value: str) -> str:
-    if not _REFERENCE.fullmatch(value):
-        raise expected('"package.module:attribute" or "file.py:attribute"')
-    return value
 
 
 def _word(value: str) -> str:
@@ -63,7 +54,12 @@ Probability = Annotated[float, Field(ge=0.0, le=1.0)]
 Numbers = Annotated[tuple[float, ...], Field(strict=False)]
 SomeNumbers = Annotated[tuple[float, ...], Field(strict=False, min_length=1)]
 Point = Annotated[tuple[float, float], Field(strict=False)]
-PythonReference = Annotated[str, AfterValidator(_reference)]
+Step = Annotated[Whole, Field(ge=1)]
+Steps = Annotated[tuple[Step, ...], Field(strict=False)]
+Count = Annotated[Whole, Field(ge=1, le=1_000_000_000)]
+Share = Annotated[float, Field(ge=0.0, lt=1.0)]
+Chance = Annotated[float, Field(gt=0.0, lt=1.0)]
+GaussianMethod = Literal["auto", "ekf", "ukf", "ckf"]
 
 
 class Section(BaseModel):
@@ -78,14 +74,3 @@ class Section(BaseModel):
             if path:
                 raise expected(f"a number from {-_LARGEST:g} to {_LARGEST:g}", at=path)
         return self
-
-
-class Custom(Section):
-    """Something of the user's own, written in Python. Imported when a scenario is built, not when checked."""
-
-    python: PythonReference = Field(
-        description="Where it is: `package.module:attribute`, or `file.py:attribute` relative to the scenario file [-]."
-    )
-    arguments: dict[str, JsonValue] = Field(
-        default={}, description="Keyword arguments, where the attribute is a function that returns the object [-]."
-    )

@@ -1,46 +1,88 @@
-"""Sections about the sensors: where they are, what they measure, with what noise, detection and clutter."""
+"""Sections about what a sensor measures, with what noise, detection and clutter."""
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 from pydantic import Field
 
-from vedette.scenarios.schema.base import Custom, Name, Point, Positive, Probability, Section, SomeNumbers
+from vedette.scenarios.sections.base import Positive, Probability, Section, SomeNumbers
+from vedette.scenarios.sections.custom import Custom
 
-_BEARING = "Bearing from atan2 of the offset, counter-clockwise from east, in (-pi, pi]; residuals are wrapped [-]."
+if TYPE_CHECKING:  # with the models comes the compiler, which a check does without
+    from vedette.models import ClutterModel, DetectionModel, MeasurementModel, NoiseModel, Region
 
 
 class BearingRange(Section):
-    """z = [bearing in rad, range in m]."""
+    """z = [bearing in rad, range in m]; the bearing counter-clockwise from east, in (-pi, pi]."""
 
     kind: Literal["bearing_range"] = Field(default="bearing_range", description="Kind of measurement [-].")
-    bearing_function: Literal["atan2"] = Field(default="atan2", description=_BEARING)
+    dim: ClassVar[int | None] = 2
+    angular: ClassVar[tuple[int, ...]] = (0,)
+
+    def build(self, folder: Path) -> MeasurementModel:
+        """What a sensor measures."""
+        from vedette.models import bearing_range
+
+        return bearing_range()
 
 
 class BearingOnly(Section):
-    """z = [bearing in rad]."""
+    """z = [bearing in rad], counter-clockwise from east, in (-pi, pi]."""
 
     kind: Literal["bearing_only"] = Field(default="bearing_only", description="Kind of measurement [-].")
-    bearing_function: Literal["atan2"] = Field(default="atan2", description=_BEARING)
+    dim: ClassVar[int | None] = 1
+    angular: ClassVar[tuple[int, ...]] = (0,)
+
+    def build(self, folder: Path) -> MeasurementModel:
+        """What a sensor measures."""
+        from vedette.models import bearing_only
+
+        return bearing_only()
 
 
 class RangeOnly(Section):
     """z = [range in m]."""
 
     kind: Literal["range_only"] = Field(default="range_only", description="Kind of measurement [-].")
+    dim: ClassVar[int | None] = 1
+    angular: ClassVar[tuple[int, ...]] = ()
+
+    def build(self, folder: Path) -> MeasurementModel:
+        """What a sensor measures."""
+        from vedette.models import range_only
+
+        return range_only()
 
 
 class Position(Section):
     """z = [px, py] in m, independent of where the sensor is."""
 
     kind: Literal["position"] = Field(default="position", description="Kind of measurement [-].")
+    dim: ClassVar[int | None] = 2
+    angular: ClassVar[tuple[int, ...]] = ()
+
+    def build(self, folder: Path) -> MeasurementModel:
+        """What a sensor measures."""
+        from vedette.models import position
+
+        return position()
 
 
 class CustomMeasurement(Custom):
     """A user's `MeasurementModel`."""
 
     kind: Literal["custom"] = Field(default="custom", description="Kind of measurement [-].")
+    dim: ClassVar[int | None] = None
+    angular: ClassVar[tuple[int, ...]] = ()
+
+    def build(self, folder: Path) -> MeasurementModel:
+        """What a sensor measures."""
+        from vedette.models import MeasurementModel
+
+        return self.imported(MeasurementModel, folder, "measurement")
 
 
 Measurement = Annotated[
@@ -60,6 +102,17 @@ class RangeDependentNoise(Section):
     sigma_bearing_deg: Positive = Field(default=1.0, description="Bearing, the same at distance 0 [deg].")
     eta_bearing: float = Field(default=5e-6, ge=0.0, description="Bearing, growth with distance [rad/m].")
 
+    def build(self, measurement: Measurement, folder: Path) -> NoiseModel:
+        """Measurement noise: the parts that the measurement has."""
+        from vedette.models import range_dependent_noise
+
+        ranges = {"sigma_range": self.sigma_range, "eta_range": self.eta_range}
+        bearings = {"sigma_bearing": math.radians(self.sigma_bearing_deg), "eta_bearing": self.eta_bearing}
+        return range_dependent_noise(
+            **(ranges if measurement.kind != "bearing_only" else {}),
+            **(bearings if measurement.kind != "range_only" else {}),
+        )
+
 
 PositiveNumbers = Annotated[tuple[Positive, ...], Field(strict=False, min_length=1)]
 
@@ -72,11 +125,23 @@ class ConstantNoise(Section):
         description="Standard deviation of each measurement component; a bearing in radians [rad, m]."
     )
 
+    def build(self, measurement: Measurement, folder: Path) -> NoiseModel:
+        """Measurement noise."""
+        from vedette.models import constant_noise
+
+        return constant_noise(self.std)
+
 
 class CustomNoise(Custom):
     """A user's `NoiseModel`."""
 
     kind: Literal["custom"] = Field(default="custom", description="Kind of noise [-].")
+
+    def build(self, measurement: Measurement, folder: Path) -> NoiseModel:
+        """Measurement noise."""
+        from vedette.models import NoiseModel
+
+        return self.imported(NoiseModel, folder, "noise")
 
 
 Noise = Annotated[RangeDependentNoise | ConstantNoise | CustomNoise, Field(discriminator="kind")]
@@ -88,12 +153,24 @@ class GaussianDetection(Section):
     kind: Literal["gaussian"] = Field(default="gaussian", description="Kind of detection [-].")
     sigma: Positive = Field(default=10000.0, description="Distance scale of the fall of detection [m].")
 
+    def build(self, folder: Path) -> DetectionModel:
+        """Probability of detection."""
+        from vedette.models import gaussian_detection
+
+        return gaussian_detection(self.sigma)
+
 
 class ConstantDetection(Section):
     """The same probability of detection everywhere."""
 
     kind: Literal["constant"] = Field(default="constant", description="Kind of detection [-].")
     probability: Probability = Field(description="Probability of detection [-].")
+
+    def build(self, folder: Path) -> DetectionModel:
+        """Probability of detection."""
+        from vedette.models import constant_detection
+
+        return constant_detection(self.probability)
 
 
 class LimitedRange(Section):
@@ -102,6 +179,12 @@ class LimitedRange(Section):
     kind: Literal["limited_range"] = Field(default="limited_range", description="Kind of detection [-].")
     probability: Probability = Field(description="Probability of detection within max_range [-].")
     max_range: Positive = Field(description="Greatest distance [m].")
+
+    def build(self, folder: Path) -> DetectionModel:
+        """Probability of detection."""
+        from vedette.models import limited_range
+
+        return limited_range(self.probability, self.max_range)
 
 
 class LimitedSector(Section):
@@ -112,11 +195,23 @@ class LimitedSector(Section):
     max_range: Positive = Field(description="Greatest distance [m].")
     half_width_deg: float = Field(gt=0.0, le=180.0, description="Greatest angle from the heading, either side [deg].")
 
+    def build(self, folder: Path) -> DetectionModel:
+        """Probability of detection."""
+        from vedette.models import limited_sector
+
+        return limited_sector(self.probability, self.max_range, math.radians(self.half_width_deg))
+
 
 class CustomDetection(Custom):
     """A user's `DetectionModel`."""
 
     kind: Literal["custom"] = Field(default="custom", description="Kind of detection [-].")
+
+    def build(self, folder: Path) -> DetectionModel:
+        """Probability of detection."""
+        from vedette.models import DetectionModel
+
+        return self.imported(DetectionModel, folder, "detection")
 
 
 Detection = Annotated[
@@ -131,6 +226,12 @@ class RegionClutter(Section):
     kind: Literal["region"] = Field(default="region", description="Kind of clutter [-].")
     rate: float = Field(default=25.0, ge=0.0, le=1e6, description="Mean number of clutter measurements a scan [-].")
 
+    def build(self, measurement: MeasurementModel, kind: str, region: Region, folder: Path) -> ClutterModel:
+        """False measurements; `kind` is that of the measurement."""
+        from vedette.models import region_clutter
+
+        return region_clutter(self.rate, region, kind)
+
 
 class MeasurementSpaceClutter(Section):
     """Poisson clutter, uniform over a box of the sensor's measurement space."""
@@ -140,48 +241,23 @@ class MeasurementSpaceClutter(Section):
     low: SomeNumbers = Field(description="Lowest value of each measurement component; a bearing in radians [rad, m].")
     high: SomeNumbers = Field(description="Highest value of each measurement component; a bearing in radians [rad, m].")
 
+    def build(self, measurement: MeasurementModel, kind: str, region: Region, folder: Path) -> ClutterModel:
+        """False measurements; `kind` is that of the measurement."""
+        from vedette.models import measurement_space_clutter
+
+        return measurement_space_clutter(self.rate, self.low, self.high, angular=measurement.angular)
+
 
 class CustomClutter(Custom):
     """A user's `ClutterModel`."""
 
     kind: Literal["custom"] = Field(default="custom", description="Kind of clutter [-].")
 
+    def build(self, measurement: MeasurementModel, kind: str, region: Region, folder: Path) -> ClutterModel:
+        """False measurements; `kind` is that of the measurement."""
+        from vedette.models import ClutterModel
+
+        return self.imported(ClutterModel, folder, "clutter")
+
 
 Clutter = Annotated[RegionClutter | MeasurementSpaceClutter | CustomClutter, Field(discriminator="kind")]
-
-Headings = Literal["absolute", "relative"]
-Actions = Annotated[tuple[float, ...], Field(strict=False, min_length=1)]
-
-
-class Sensor(Section):
-    """One sensor and the platform that carries it."""
-
-    name: Name | None = Field(default=None, description="What to call it; none: `sensor 1`, `sensor 2`, ... [-].")
-    position: Point = Field(description="Where it starts [m].")
-    heading_deg: float = Field(default=0.0, description="Heading at the start, counter-clockwise from east [deg].")
-    speed: float = Field(default=0.0, ge=0.0, description="Speed when under way; 0: a fixed sensor [m/s].")
-    moves_from: Literal["first_decision", "start"] = Field(
-        default="first_decision", description="Whether it lies still until its first decision, as in the paper [-]."
-    )
-    actions_deg: Actions | None = Field(default=None, description="Its own actions; none: those of control [deg].")
-    headings: Headings | None = Field(default=None, description="What its own actions mean; none: as control says [-].")
-    measurement: Measurement = Field(default=BearingRange(), description="What it measures [-].")
-    noise: Noise = Field(default=RangeDependentNoise(), description="Measurement noise [-].")
-    detection: Detection = Field(default=GaussianDetection(), description="Probability of detection [-].")
-    clutter: Clutter = Field(default=RegionClutter(), description="False measurements [-].")
-
-
-class SensorDefaults(Section):
-    """What every sensor has unless it says otherwise; key by key, a sensor's own value replaces the whole default."""
-
-    heading_deg: float | None = Field(default=None, description="Heading at the start [deg].")
-    speed: Annotated[float, Field(ge=0.0)] | None = Field(default=None, description="Speed when under way [m/s].")
-    moves_from: Literal["first_decision", "start"] | None = Field(
-        default=None, description="Whether they lie still until the first decision [-]."
-    )
-    actions_deg: Actions | None = Field(default=None, description="Their actions [deg].")
-    headings: Headings | None = Field(default=None, description="What these actions mean [-].")
-    measurement: Measurement | None = Field(default=None, description="What they measure [-].")
-    noise: Noise | None = Field(default=None, description="Measurement noise [-].")
-    detection: Detection | None = Field(default=None, description="Probability of detection [-].")
-    clutter: Clutter | None = Field(default=None, description="False measurements [-].")

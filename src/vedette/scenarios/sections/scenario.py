@@ -7,18 +7,19 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, field_validator, model_validator
 
-from vedette.scenarios.schema.base import Name, Section
-from vedette.scenarios.schema.planning import Control
-from vedette.scenarios.schema.sensors import Sensor, SensorDefaults
-from vedette.scenarios.schema.tracking import Estimator, Filter, Fusion, MapEstimator, Ospa
-from vedette.scenarios.schema.world import (
+from vedette.scenarios.sections.base import Name, Section
+from vedette.scenarios.sections.control import Control
+from vedette.scenarios.sections.scoring import Estimator, MapEstimator, Ospa
+from vedette.scenarios.sections.sensors import Sensor, SensorDefaults
+from vedette.scenarios.sections.targets import Targets
+from vedette.scenarios.sections.tracking import Filter, Fusion
+from vedette.scenarios.sections.world import (
     Birth,
     ConstantSurvival,
     ConstantVelocity,
     Motion,
     RegionSection,
     Survival,
-    Targets,
     Time,
 )
 

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from dataclasses import replace
+from typing import TYPE_CHECKING, Literal
 
 from pydantic import Field, model_validator
 
-from vedette.scenarios.schema.base import Numbers, Positive, Probability, Section, expected
-from vedette.scenarios.schema.sensors import Actions, Headings
-from vedette.scenarios.schema.tracking import Count, Share
-from vedette.scenarios.schema.world import Steps
+from vedette.scenarios.sections.base import Count, Numbers, Positive, Probability, Section, Share, Steps, expected
+from vedette.scenarios.sections.sensors import Actions, Headings, Sensor
+
+if TYPE_CHECKING:  # with the planners comes the compiler, which a check does without
+    from vedette.control import CauchySchwarzReward as Reward
+    from vedette.control import PlanningSettings
+    from vedette.platforms import Courses
 
 
 class CauchySchwarzReward(Section):
@@ -21,6 +25,12 @@ class CauchySchwarzReward(Section):
         description='Unit K of hyper-volume: a number, or "reference" for (4 pi)^(d/2) sqrt(det P) of the predicted '
         "density, under which localisation counts as much as cardinality [-].",
     )
+
+    def build(self) -> Reward:
+        """The value of an updated density."""
+        from vedette.control import CauchySchwarzReward
+
+        return CauchySchwarzReward(self.unit_volume)
 
 
 class PlanningLimits(Section):
@@ -34,7 +44,10 @@ class PlanningLimits(Section):
 
 
 class Control(Section):
-    """When and how the sensors decide where to go. Without decisions they keep their course."""
+    """When and how the sensors decide where to go. Without decisions they keep their course.
+
+    Over the horizon no target is born and none dies (paper-notes 11).
+    """
 
     decision_steps: Steps | None = Field(default=None, description="Scans after which they decide [-].")
     decision_times: Numbers | None = Field(
@@ -42,24 +55,15 @@ class Control(Section):
     )
     actions_deg: Actions = Field(
         default=tuple(range(-180, 181, 30)),
-        description="Actions of every sensor, in the order of tables and figures [deg].",
+        description="Actions of every sensor, in the order of tables and figures. Those that are one heading (-180 and "
+        "180) are evaluated once and shown each; of equal rewards the first action wins [deg].",
     )
     headings: Headings = Field(
         default="absolute",
         description="Whether an action is a heading, counter-clockwise from east, or a change of heading [-].",
     )
-    merge_equal_headings: Literal[True] = Field(
-        default=True,
-        description="Actions that are one heading (-180 and 180) are evaluated once and shown each [-].",
-    )
     horizon_steps: Count = Field(default=5, description="Pseudo-updates over the horizon, H [-].")
     horizon_period: Positive = Field(default=2.0, description="Time between pseudo-updates, T [s].")
-    births_over_horizon: Literal[False] = Field(
-        default=False, description="Neither the prediction nor the pseudo-updates give birth to targets [-]."
-    )
-    deaths_over_horizon: Literal[False] = Field(
-        default=False, description="Targets survive the prediction and the pseudo-updates with probability 1 [-]."
-    )
     num_samples: Count = Field(default=40, description="Multi-target samples of the expected reward, M [-].")
     ideal_measurements: Literal["ideal", "expected", "sampled"] = Field(
         default="ideal",
@@ -71,10 +75,6 @@ class Control(Section):
         default=0.5, description="Ideal measurements see a target when its detection is at least so probable [-]."
     )
     reward: CauchySchwarzReward = Field(default=CauchySchwarzReward(), description="Value of a density [-].")
-    non_finite_reward: Literal["error"] = Field(
-        default="error", description="What a reward that is not a number does: an error that names its sample [-]."
-    )
-    ties: Literal["first"] = Field(default="first", description="Which of equal rewards wins: the first action [-].")
     limits: PlanningLimits = Field(default=PlanningLimits(), description="How much it works with [-].")
 
     @model_validator(mode="after")
@@ -82,3 +82,28 @@ class Control(Section):
         if self.decision_steps is not None and self.decision_times is not None:
             raise expected("either decision_steps or decision_times", got="both")
         return self
+
+    def build(self) -> PlanningSettings:
+        """Horizon, samples and caps of a decision."""
+        from vedette.control import PlanningSettings, planning_limits
+
+        return PlanningSettings(
+            horizon_steps=self.horizon_steps,
+            horizon_period=self.horizon_period,
+            num_samples=self.num_samples,
+            ideal_measurements=self.ideal_measurements,
+            detection_threshold=self.detection_threshold,
+            max_prior_hypotheses=self.limits.max_prior_hypotheses,
+            limits=replace(
+                planning_limits(),
+                max_hypotheses=self.limits.max_hypotheses,
+                min_relative_weight=self.limits.min_relative_weight,
+            ),
+        )
+
+    def build_platform(self, sensor: Sensor) -> Courses:
+        """What carries one sensor, with its own actions or those of all."""
+        from vedette.platforms import Courses
+
+        headings = sensor.headings or self.headings
+        return Courses(sensor.speed, sensor.actions_deg or self.actions_deg, relative=headings == "relative")

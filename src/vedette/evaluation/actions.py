@@ -1,0 +1,76 @@
+"""Actions for readers: in words, and as an axis of a figure."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+
+from vedette.kernels.base.types import Floats
+from vedette.platforms import Actions
+
+# What one sensor was sent to do, rounded for counting: name and number of each column.
+Row: TypeAlias = tuple[tuple[str, float], ...]
+
+_UNITS = {"_deg": ("deg", "°"), "_rad": ("rad", " rad"), "_m": ("m", " m")}
+_MINUS = "\N{MINUS SIGN}"
+
+
+class ActionAxis(NamedTuple):
+    """The actions of a sensor along an axis.
+
+    name: what is on it, `heading`; unit: `deg`, or nothing. places: (num_actions,) where each action is. labels: in
+    words. is_numeric: whether places are the numbers of a column; otherwise they count actions from 1.
+    """
+
+    name: str
+    unit: str
+    places: Floats
+    labels: tuple[str, ...]
+    is_numeric: bool
+
+    def title(self, sensor: int | None = None) -> str:
+        """`Heading (deg)`, `Heading of sensor 1 (deg)`."""
+        of = "" if sensor is None else f" of sensor {sensor + 1}"
+        return self.name.capitalize() + of + (f" ({self.unit})" if self.unit else "")
+
+
+def action_axis(actions: Actions) -> ActionAxis:
+    """The axis of a lone column in its numbers; of several columns the actions one after the other."""
+    labels = tuple(row_words(rounded(actions.columns, row)) for row in actions.values)
+    if len(actions.columns) == 1:
+        name, unit, _ = _parts(actions.columns[0])
+        return ActionAxis(name, unit, actions.values[:, 0], labels, True)
+    return ActionAxis("action", "", np.arange(1.0, len(actions) + 1), labels, False)
+
+
+def rounded(columns: Sequence[str], row: Floats) -> Row:
+    """A row to whole degrees and four digits of all else."""
+    numbers = zip(columns, row.tolist(), strict=True)
+    return tuple((name, (round(x) if name.endswith("_deg") else float(f"{x:.4g}")) + 0.0) for name, x in numbers)
+
+
+def row_words(row: Row) -> str:
+    """`-30°` of a heading, `heading -30°, speed 5` of more columns, `still` of none."""
+    if len(row) == 1 and row[0][0] == "heading_deg":
+        return f"{row[0][1]:g}°"
+    words = (f"{name} {value:g}{sign}" for (name, _, sign), value in ((_parts(name), x) for name, x in row))
+    return ", ".join(words) or "still"
+
+
+def choice_words(rows: Sequence[Row]) -> str:
+    """What all sensors do: `-30°, 60°`."""
+    return ("; " if any(len(row) > 1 for row in rows) else ", ").join(map(row_words, rows))
+
+
+def with_minus(text: str) -> str:
+    """Text with the minus sign of print."""
+    return text.replace("-", _MINUS)
+
+
+def _parts(column: str) -> tuple[str, str, str]:
+    """Name in words, unit, and sign after a number: `heading_deg` is `heading`, `deg`, `°`."""
+    end = next((end for end in _UNITS if column.endswith(end)), "")
+    name = column.removesuffix(end).replace("_", " ")
+    return (name, *_UNITS[end]) if end else (name, "", "")

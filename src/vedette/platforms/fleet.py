@@ -1,0 +1,54 @@
+"""The platforms of a run on their ways."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from vedette.errors import InputError
+from vedette.kernels.base.types import Floats
+from vedette.models.arguments import float_array
+from vedette.platforms.base import Platform, course_of
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Fleet:
+    """Platforms, the action that each is under, and since when.
+
+    Attributes:
+        platforms: one a sensor.
+        starts: (num_sensors, pose_dim) where each was when it began its action.
+        actions: the row of its action, one a sensor; None: it lies still.
+        since: s, when they began.
+
+    Raises:
+        InputError: another number of poses or actions than of platforms, or actions of other columns.
+    """
+
+    platforms: tuple[Platform, ...]
+    starts: Floats
+    actions: tuple[Floats | None, ...]
+    since: float
+
+    def __post_init__(self) -> None:
+        num = len(self.platforms)
+        if len(self.starts) != num or len(self.actions) != num:
+            raise InputError(f"fleet: expected {num} poses and actions; got {len(self.starts)}, {len(self.actions)}")
+        for s, (platform, action) in enumerate(zip(self.platforms, self.actions, strict=True)):
+            if action is not None:
+                float_array(f"sensors[{s}] action", action, (len(platform.columns),))
+
+    def poses(self, time: float) -> Floats:
+        """(num_sensors, pose_dim) where all are at `time`, s, which is no earlier than `since`."""
+        seconds = np.array([time - self.since])
+        at = self.starts.copy()
+        for s, (platform, action) in enumerate(zip(self.platforms, self.actions, strict=True)):
+            if action is not None:
+                at[s] = course_of(f"sensors[{s}].platform", platform, self.starts[s], action, seconds)[0]
+        return at
+
+    def follow(self, actions: Sequence[Floats | None], time: float) -> Fleet:
+        """All on their ways from where they are at `time`, each under its new action."""
+        return replace(self, starts=self.poses(time), actions=tuple(actions), since=time)

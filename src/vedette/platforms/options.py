@@ -1,0 +1,54 @@
+"""The options of a sensor at a decision: its actions, where they lead, and which of them lead the same way."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from vedette.kernels.base.types import Floats, Ints
+from vedette.platforms.actions import Actions
+from vedette.platforms.base import Platform, actions_at, course_of
+
+# Poses nearer than this, relative to their size, are one: rounding of degrees to radians and back stays below.
+_SAME_POSE = 1e-9
+
+
+class Options(NamedTuple):
+    """What one sensor may do at a decision.
+
+    actions: all of them, in the order of tables. courses: (num_courses, num_times, pose_dim) the different courses that
+    they lead to, each in the place of its first action. which: (num_actions,) which course each action takes.
+    """
+
+    actions: Actions
+    courses: Floats
+    which: Ints
+
+    def first_action(self, course: int) -> int:
+        """The first action that takes a course."""
+        return int(np.flatnonzero(self.which == course)[0])
+
+
+def options_at(field: str, platform: Platform, pose: Floats, times: Floats) -> Options:
+    """The options of a platform at a pose, told apart by where it is at `times`, in seconds from now.
+
+    Raises `InputError`, with the name of the platform, for actions or courses that are none.
+    """
+    actions = actions_at(field, platform, pose)
+    courses: list[Floats] = []
+    which = np.empty(len(actions), np.int64)
+    for i, row in enumerate(actions.values):
+        course = course_of(field, platform, pose, row, times)
+        which[i] = next((k for k, other in enumerate(courses) if _same(course, other)), len(courses))
+        if which[i] == len(courses):
+            courses.append(course)
+    return Options(actions, np.array(courses), which)
+
+
+def _same(first: Floats, second: Floats) -> bool:
+    """Whether poses are equal up to rounding, headings up to whole turns."""
+    off = np.abs(first - second)
+    off[:, 2] = np.abs(np.remainder(off[:, 2] + math.pi, 2.0 * math.pi) - math.pi)
+    return bool((off <= _SAME_POSE * np.maximum(1.0, np.abs(first))).all())

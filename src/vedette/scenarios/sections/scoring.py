@@ -1,0 +1,63 @@
+"""Sections about the results: how estimates are read off a density, and their score."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Annotated, Literal
+
+from pydantic import Field
+
+from vedette.scenarios.sections.base import Chance, Count, Positive, Section
+
+if TYPE_CHECKING:  # with the densities comes the compiler, which a check does without
+    from vedette.densities import Estimate
+    from vedette.filters import Belief
+
+
+class MapEstimator(Section):
+    """Most probable number of targets, then the best hypothesis with that number (as in the paper). Of a filter without
+    labels, the heaviest components or Bernoullis instead, newly labelled at each scan; a phd's number is the mean."""
+
+    kind: Literal["map"] = Field(default="map", description="Kind of estimate [-].")
+
+    def build(self) -> Callable[[Belief, int], Estimate]:
+        """How estimates are read off a density after a scan, given its number, by which unlabelled ones are named."""
+        from vedette.densities import GLMB, LMB, map_estimate, unlabelled_estimate
+
+        def estimate(density: Belief, step: int) -> Estimate:
+            return map_estimate(density) if isinstance(density, GLMB | LMB) else unlabelled_estimate(density, step)
+
+        return estimate
+
+
+class MarginalEstimator(Section):
+    """Every label whose existence is probable enough; for filters that have labels."""
+
+    kind: Literal["marginal"] = Field(default="marginal", description="Kind of estimate [-].")
+    threshold: Chance = Field(default=0.5, description="Least probability of existence [-].")
+
+    def build(self) -> Callable[[Belief, int], Estimate]:
+        """How estimates are read off a density after a scan, given its number."""
+        from vedette.densities import GLMB, LMB, marginal_estimate, unlabelled_estimate
+
+        def estimate(density: Belief, step: int) -> Estimate:
+            if not isinstance(density, GLMB | LMB):
+                return unlabelled_estimate(density, step)
+            return marginal_estimate(density, self.threshold)
+
+        return estimate
+
+
+Estimator = Annotated[MapEstimator | MarginalEstimator, Field(discriminator="kind")]
+
+
+class Ospa(Section):
+    """The score: optimal subpattern assignment distance between estimates and truth, in position."""
+
+    cutoff: Positive = Field(default=100.0, description="Cost of a missed or false target, c [m].")
+    order: float = Field(default=1.0, ge=1.0, description="Order p [-].")
+    window: Count = Field(default=10, description="Scans of the window of OSPA(2) [-].")
+    from_step: Count | None = Field(
+        default=None, description="First scan of the reported mean; none: the one after the first decision, or 1 [-]."
+    )
+    to_step: Count | None = Field(default=None, description="Last scan of the reported mean; none: the last scan [-].")

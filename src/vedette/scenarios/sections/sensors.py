@@ -1,0 +1,83 @@
+"""Sections about the sensors: where they are, how they move, and what they see."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+from pydantic import Field
+
+from vedette.scenarios.sections.base import GaussianMethod, Name, Point, Section
+from vedette.scenarios.sections.sensing import (
+    BearingRange,
+    Clutter,
+    Detection,
+    GaussianDetection,
+    Measurement,
+    Noise,
+    RangeDependentNoise,
+    RegionClutter,
+)
+
+if TYPE_CHECKING:  # with the models comes the compiler, which a check does without
+    from vedette.models import Region, SensorModel
+
+Headings = Literal["absolute", "relative"]
+Actions = Annotated[tuple[float, ...], Field(strict=False, min_length=1)]
+
+
+class Sensor(Section):
+    """One sensor and the platform that carries it."""
+
+    name: Name | None = Field(default=None, description="What to call it; none: `sensor 1`, `sensor 2`, ... [-].")
+    position: Point = Field(description="Where it starts [m].")
+    heading_deg: float = Field(default=0.0, description="Heading at the start, counter-clockwise from east [deg].")
+    speed: float = Field(default=0.0, ge=0.0, description="Speed when under way; 0: a fixed sensor [m/s].")
+    moves_from: Literal["first_decision", "start"] = Field(
+        default="first_decision", description="Whether it lies still until its first decision, as in the paper [-]."
+    )
+    actions_deg: Actions | None = Field(default=None, description="Its own actions; none: those of control [deg].")
+    headings: Headings | None = Field(default=None, description="What its own actions mean; none: as control says [-].")
+    measurement: Measurement = Field(default=BearingRange(), description="What it measures [-].")
+    noise: Noise = Field(default=RangeDependentNoise(), description="Measurement noise [-].")
+    detection: Detection = Field(default=GaussianDetection(), description="Probability of detection [-].")
+    clutter: Clutter = Field(default=RegionClutter(), description="False measurements [-].")
+
+    @property
+    def pose(self) -> tuple[float, float, float]:
+        """Where it starts: [px, py, heading_rad]."""
+        return (*self.position, math.radians(self.heading_deg))
+
+    def build(self, region: Region, method: GaussianMethod, folder: Path) -> SensorModel:
+        """What it sees; `folder` is what a custom model's file is relative to.
+
+        Raises:
+            InputError: a custom model that cannot be had, or parts that do not fit together.
+        """
+        from vedette.models import SensorModel
+
+        measurement = self.measurement.build(folder)
+        return SensorModel(
+            measurement,
+            self.noise.build(self.measurement, folder),
+            self.detection.build(folder),
+            self.clutter.build(measurement, self.measurement.kind, region, folder),
+            method,
+        )
+
+
+class SensorDefaults(Section):
+    """What every sensor has unless it says otherwise; key by key, a sensor's own value replaces the whole default."""
+
+    heading_deg: float | None = Field(default=None, description="Heading at the start [deg].")
+    speed: Annotated[float, Field(ge=0.0)] | None = Field(default=None, description="Speed when under way [m/s].")
+    moves_from: Literal["first_decision", "start"] | None = Field(
+        default=None, description="Whether they lie still until the first decision [-]."
+    )
+    actions_deg: Actions | None = Field(default=None, description="Their actions [deg].")
+    headings: Headings | None = Field(default=None, description="What these actions mean [-].")
+    measurement: Measurement | None = Field(default=None, description="What they measure [-].")
+    noise: Noise | None = Field(default=None, description="Measurement noise [-].")
+    detection: Detection | None = Field(default=None, description="Probability of detection [-].")
+    clutter: Clutter | None = Field(default=None, description="False measurements [-].")

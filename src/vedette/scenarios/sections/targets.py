@@ -1,0 +1,116 @@
+"""Sections about the true targets: written out, or recorded."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal, Protocol
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from vedette.scenarios.sections.base import Point, Positive, Section, SomeNumbers, Step, expected
+from vedette.scenarios.sections.world import Motion, RegionSection, Time, grouped_order
+
+if TYPE_CHECKING:  # with the models comes the compiler, which a check does without
+    from vedette.models import MotionModel
+    from vedette.recorded import RecordedTargets as RecordedSource
+    from vedette.simulation import ScriptedTargets as ScriptedSource
+
+
+class World(Protocol):
+    """What of a scenario targets are made with."""
+
+    @property
+    def time(self) -> Time: ...
+    @property
+    def region(self) -> RegionSection: ...
+    @property
+    def motion(self) -> Motion: ...
+
+
+class ScriptedTarget(Section):
+    """One true target that follows the motion model."""
+
+    state: SomeNumbers = Field(description="State at its first scan [m, m/s, ...].")
+    start_step: Step = Field(default=1, description="First scan at which it is there [-].")
+    end_step: Step | None = Field(default=None, description="Last scan at which it is there; none: to the end [-].")
+    process_noise: bool = Field(default=False, description="Whether its motion is disturbed by the process noise [-].")
+
+
+class ScriptedTargets(Section):
+    """Targets written out here."""
+
+    kind: Literal["scripted"] = Field(default="scripted", description="Kind of targets [-].")
+    tracks: Annotated[tuple[ScriptedTarget, ...], Field(strict=False)] = Field(description="The targets [-].")
+
+    def build(self, world: World, motion: MotionModel, folder: Path) -> ScriptedSource:
+        """The targets, as `motion` moves them."""
+        from vedette.simulation import ScriptedTargets
+
+        times, tracks = world.time.build(), self.tracks
+        states = np.array([track.state for track in tracks]).reshape(len(tracks), motion.state_dim)
+        return ScriptedTargets(
+            motion,
+            states[:, grouped_order(world.motion)],
+            np.array([times[track.start_step - 1] for track in tracks]),
+            np.array([times[(track.end_step or len(times)) - 1] for track in tracks]),
+            [track.process_noise for track in tracks] or False,
+        )
+
+
+class Columns(Section):
+    """Names of the columns, where they differ from the names of these keys. Places are x, y or longitude, latitude."""
+
+    time: str | None = Field(default=None, description="Time: a number of seconds, or ISO 8601 [s].")
+    id: str | None = Field(default=None, description="Which target [-].")
+    x: str | None = Field(default=None, description="East [m].")
+    y: str | None = Field(default=None, description="North [m].")
+    longitude: str | None = Field(default=None, description="Longitude, WGS84 [deg].")
+    latitude: str | None = Field(default=None, description="Latitude, WGS84 [deg].")
+    vx: str | None = Field(default=None, description="Velocity to the east, if it is recorded [m/s].")
+    vy: str | None = Field(default=None, description="Velocity to the north, if it is recorded [m/s].")
+
+    @model_validator(mode="after")
+    def _one_pair(self) -> Columns:
+        given = self.given()
+        for first, second in (("x", "y"), ("longitude", "latitude"), ("vx", "vy")):
+            if (first in given) != (second in given):
+                raise expected(f"{first} and {second} together", got=f"only {first if first in given else second}")
+        if "x" in given and "longitude" in given:
+            raise expected("either x and y, or longitude and latitude", got="both")
+        return self
+
+    def given(self) -> dict[str, str]:
+        """The names that are given: key -> name in the file."""
+        return {key: name for key in type(self).model_fields if (name := getattr(self, key)) is not None}
+
+
+class RecordedTargets(Section):
+    """Targets from a CSV or Parquet file of reports: time, which target, where. Interpolated at the scans."""
+
+    kind: Literal["recorded"] = Field(default="recorded", description="Kind of targets [-].")
+    path: str = Field(min_length=1, description="CSV or Parquet file, relative to the scenario file [-].")
+    columns: Columns = Field(default=Columns(), description="Names of its columns [-].")
+    time_origin: float | str | None = Field(
+        default=None, description="Recorded time of the first scan, a number or ISO 8601; none: the earliest [s]."
+    )
+    origin_deg: Point | None = Field(
+        default=None, description="Longitude and latitude of x = y = 0; none: the middle of the reports [deg]."
+    )
+    max_gap: Positive = Field(default=60.0, description="A longer silence ends the track [s].")
+    min_speed: float = Field(
+        default=0.0, ge=0.0, description="A track slower than this on average is left out (moored) [m/s]."
+    )
+    max_speed: Positive | None = Field(
+        default=None, description="Reports that would need more are dropped (jumps); none: no limit [m/s]."
+    )
+    crop: bool = Field(default=True, description="Whether tracks end at the edges of the region [-].")
+
+    def build(self, world: World, motion: MotionModel, folder: Path) -> RecordedSource:
+        """The targets, as they were recorded. Raises `InputError` for a file that cannot be read, or gives none."""
+        from vedette.scenarios.records import recorded_source
+
+        return recorded_source(self, world.region, folder)
+
+
+Targets = Annotated[ScriptedTargets | RecordedTargets, Field(discriminator="kind")]
