@@ -9,6 +9,7 @@ from vedette.filters.glmb import DeltaGlmbFilter
 from vedette.filters.info import FilterInfo
 from vedette.filters.limits import Limits
 from vedette.filters.lmb import LmbFilter
+from vedette.filters.multi_sensor import MultiSensorGlmbFilter, MultiSensorLmbFilter
 from vedette.filters.phd import PhdFilter
 
 LabelledFilter: TypeAlias = DeltaGlmbFilter | LmbFilter
@@ -25,5 +26,7 @@ __all__ = [
     "Limits",
     "LmbFilter",
     "LocalFilter",
+    "MultiSensorGlmbFilter",
+    "MultiSensorLmbFilter",
     "PhdFilter",
 ]
