@@ -18,7 +18,7 @@ import numpy as np
 
 from vedette.densities import GLMB, LMB, map_estimate, unlabelled_estimate
 from vedette.evaluation import ospa_of_run
-from vedette.filters import CbMemberFilter, CphdFilter, DeltaGlmbFilter, LmbFilter, LocalFilter, PhdFilter
+from vedette.filters import CbMemberFilter, CphdFilter, DeltaGlmbFilter, Filter, LmbFilter, PhdFilter
 from vedette.scenarios import load_scenario
 from vedette.scenarios.build import build_experiment
 from vedette.simulation import Truth, simulate_scan
@@ -41,8 +41,8 @@ def simulated(name: str, num_runs: int) -> tuple[DeltaGlmbFilter, np.ndarray, np
     return tracker, pose, experiment.times, runs
 
 
-def variants(tracker: DeltaGlmbFilter) -> dict[str, LocalFilter]:
-    parts = (tracker.motion, tracker.survival, tracker.birth, tracker.sensor, tracker.limits)
+def variants(tracker: DeltaGlmbFilter) -> dict[str, Filter]:
+    parts = (tracker.targets, tracker.sensor, tracker.limits)
     return {
         "delta-GLMB, ranked": replace(tracker, assignment="ranked", marginalised=False),
         "delta-GLMB, Gibbs": replace(tracker, assignment="gibbs", marginalised=False),

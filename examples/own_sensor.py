@@ -106,7 +106,8 @@ def make_filter(sensor: models.SensorModel) -> DeltaGlmbFilter:
     means = np.hstack([TARGETS[:, :2], np.zeros((3, 2))])
     covs = np.tile(np.diag([50.0, 50.0, 25.0, 25.0]) ** 2, (3, 1, 1))
     birth = models.BirthModel(np.full(3, 0.02), means, covs, frozenset({1}))
-    return DeltaGlmbFilter(models.constant_velocity(5.0), models.constant_survival(0.98), birth, sensor)
+    targets = models.TargetModel(models.constant_velocity(5.0), models.constant_survival(0.98), birth)
+    return DeltaGlmbFilter(targets, sensor)
 
 
 def track(sensor: models.SensorModel, truth: Truth, report: Callable[[str], None] = print) -> np.ndarray:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -50,12 +51,18 @@ def sensor_model(**parts: Any) -> models.SensorModel:
     return models.SensorModel(**(standard | parts))
 
 
+@cache
+def target_model(dim: int) -> models.TargetModel:
+    """Of 4 state components, or 5 with a turn rate; the same one for all sensors."""
+    motion = models.constant_velocity(2.0) if dim == 4 else models.coordinated_turn(2.0, 0.02)
+    birth = models.BirthModel(np.full(1, 0.05), np.zeros((1, dim)), 2.0 * np.diag(STD[:dim] ** 2)[np.newaxis])
+    return models.TargetModel(motion, models.constant_survival(0.9), birth)
+
+
 def mobile_sensor(kind: str, platform: Any = None, dim: int = 4, **parts: Any) -> MobileSensor:
     """A sensor with a filter of a `kind`: lmb, or else delta-GLMB. dim: 4, or 5 with a turn rate."""
     build = LmbFilter if kind == "lmb" else DeltaGlmbFilter
-    motion = models.constant_velocity(2.0) if dim == 4 else models.coordinated_turn(2.0, 0.02)
-    birth = models.BirthModel(np.full(1, 0.05), np.zeros((1, dim)), 2.0 * np.diag(STD[:dim] ** 2)[np.newaxis])
-    local = build(motion, models.constant_survival(0.9), birth, sensor_model(**parts))
+    local = build(target_model(dim), sensor_model(**parts))
     return MobileSensor(local, Courses(30.0, HEADINGS) if platform is None else platform)
 
 

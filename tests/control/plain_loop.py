@@ -22,7 +22,7 @@ def plain_rewards(situation: Situation, unit_volume: Any, seed: int) -> tuple[An
     """Joint rewards (num_joint, num_samples), the last sensor's action fastest, and (num_actions, num_samples) of each
     sensor alone."""
     settings, num_samples = situation.settings, situation.settings.num_samples
-    motion = situation.sensors[0].filter.motion
+    motion = situation.sensors[0].filter.targets.motion
     futures = _draw(situation, np.random.default_rng(seed))
     updated = [
         [
@@ -57,7 +57,7 @@ def _draw(situation: Situation, rng: np.random.Generator) -> list[tuple[Any, Any
     samples = draw(fused, settings.num_samples, rng=rng)
     states, at = [], samples.states
     for _ in range(settings.horizon_steps):
-        at = situation.sensors[0].filter.motion.propagate(at, settings.horizon_period)
+        at = situation.sensors[0].filter.targets.motion.propagate(at, settings.horizon_period)
         states.append([at[samples.offsets[m] : samples.offsets[m + 1]] for m in range(settings.num_samples)])
     drawn = []
     for sensor in situation.sensors:
@@ -99,12 +99,15 @@ def _updated(
     if isinstance(belief, GLMB):
         belief = _cut(belief, settings.max_prior_hypotheses)
     belief = replace(belief, tracks=TrackTable.from_gaussians(belief.tracks.labels, *track_moments(belief.tracks)))
-    immortal = models.constant_survival(1.0), models.BirthModel.none(belief.state_dim)
-    local = kind(own.motion, *immortal, own.sensor, settings.limits)
+    local = kind(_immortal(own.targets.motion), own.sensor, settings.limits)
     for h, pose in enumerate(path):
         scan = _scan(own.sensor, pose, states[h][m], uniforms[m][h], normals[m][h], settings)
         belief, _ = local.step(belief, scan, pose, settings.horizon_period, h + 1, rng=np.random.default_rng(0))
     return marginalise(belief, max_components=1) if isinstance(belief, GLMB) else belief
+
+
+def _immortal(motion: models.MotionModel) -> models.TargetModel:
+    return models.TargetModel(motion, models.constant_survival(1.0), models.BirthModel.none(motion.state_dim))
 
 
 def _cut(belief: GLMB, most: int) -> GLMB:
@@ -128,8 +131,7 @@ def _predicted(fused: Any, motion: models.MotionModel, settings: PlanningSetting
         models.constant_detection(0.0),
         models.measurement_space_clutter(0.0, [-1.0, -1.0], [1.0, 1.0]),
     )
-    immortal = models.constant_survival(1.0), models.BirthModel.none(fused.state_dim)
-    local = kind(motion, *immortal, blind, settings.limits)
+    local = kind(_immortal(motion), blind, settings.limits)
     for h in range(settings.horizon_steps):
         belief, _ = local.step(belief, [], np.zeros(3), settings.horizon_period, h + 1, rng=np.random.default_rng(0))
     return belief

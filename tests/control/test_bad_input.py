@@ -153,7 +153,7 @@ def test_state_dimensions(planner: Any) -> None:
     assert refused(replace(example, beliefs=(example.beliefs[0], wide)), planner) == f"beliefs[1]: {expected}"
     assert refused(replace(example, fused=wide), planner) == f"fused: {expected}"
     sensors = (example.sensors[0], mobile_sensor("marginal", dim=5))
-    message = "sensors: expected filters of one state dimension; got [4, 5]"
+    message = "filters[1].targets: expected the target model of filters[0]; got another"
     assert refused(replace(example, sensors=sensors), planner) == message
 
 
@@ -273,7 +273,7 @@ def test_settings(changes: dict[str, Any], message: str) -> None:
 
 def test_sensors() -> None:
     local = mobile_sensor("lmb").filter
-    with pytest.raises(InputError, match=r"filter: expected a filter of vedette\.filters"):
+    with pytest.raises(InputError, match="filter: expected a Filter, with targets, sensor"):
         MobileSensor("filter", Courses(1.0))  # type: ignore[arg-type]
     with pytest.raises(InputError, match="platform: expected a platform, with columns"):
         MobileSensor(local, (0.0, 90.0))  # type: ignore[arg-type]
@@ -283,7 +283,7 @@ def test_sensors() -> None:
 @pytest.mark.parametrize("planner", [JointPlanner, IndependentPlanner])
 def test_filters_without_labels_cannot_be_planned_with(planner: Any, kind: Any) -> None:
     known = mobile_sensor("lmb").filter
-    local = kind(known.motion, known.survival, known.birth, known.sensor)
+    local = kind(known.targets, known.sensor)
     sensors = (MobileSensor(local, Courses(1.0)),)
     belief = local.initial()
     with pytest.raises(InputError, match=rf"sensors\[0\].filter: expected one that labels its .*; got {kind.__name__}"):

@@ -53,7 +53,8 @@ def _alone(
 ) -> tuple[float, GLMB]:
     """Log weight and end of one label set's hypotheses, followed by a filter of their own."""
     own = sensor.filter
-    local = DeltaGlmbFilter(own.motion, models.constant_survival(1.0), models.BirthModel.none(4), own.sensor, limits)
+    immortal = models.TargetModel(own.targets.motion, models.constant_survival(1.0), models.BirthModel.none(4))
+    local = DeltaGlmbFilter(immortal, own.sensor, limits)
     chosen = [belief.hyp_tracks[belief.hyp_offsets[h] : belief.hyp_offsets[h + 1]].tolist() for h in hyps]
     total = float(np.logaddexp.reduce(belief.hyp_log_weights[hyps]))
     at = GLMB.from_hypotheses(belief.tracks, chosen, np.exp(belief.hyp_log_weights[hyps] - total))

@@ -102,7 +102,10 @@ sensor = models.SensorModel(
     models.bearing_range(), models.constant_noise([0.02, 10.0]), models.constant_detection(0.9),
     models.region_clutter(25.0, region, "bearing_range"),
 )
-tracker = LmbFilter(models.constant_velocity(5.0), models.constant_survival(0.98), models.BirthModel.none(4), sensor)
+targets = models.TargetModel(
+    models.constant_velocity(5.0), models.constant_survival(0.98), models.BirthModel.none(4)
+)
+tracker = LmbFilter(targets, sensor)
 num = 4
 belief = LMB.from_bernoullis(
     [(1, i) for i in range(num)], [0.9] * num,

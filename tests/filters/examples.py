@@ -43,13 +43,17 @@ class Scene:
         sites = zip(self.births.existence, self.births.means, self.births.covs, strict=True)
         return {(step, i): (float(r), [(1.0, mean, cov)]) for i, (r, mean, cov) in enumerate(sites)}
 
+    @property
+    def targets(self) -> models.TargetModel:
+        return models.TargetModel(self.motion, self.survival, self.births)
+
     def glmb_filter(self, **options: Any) -> DeltaGlmbFilter:
         options.setdefault("limits", Limits.none())
-        return DeltaGlmbFilter(self.motion, self.survival, self.births, self.sensor, **options)
+        return DeltaGlmbFilter(self.targets, self.sensor, **options)
 
     def lmb_filter(self, **options: Any) -> LmbFilter:
         options.setdefault("limits", Limits.none())
-        return LmbFilter(self.motion, self.survival, self.births, self.sensor, **options)
+        return LmbFilter(self.targets, self.sensor, **options)
 
 
 def cv_matrices(sigma: float) -> tuple[Floats, Floats]:

@@ -20,7 +20,7 @@ import numpy as np
 from vedette import models
 from vedette.densities import GLMB, LMB, Estimate, map_estimate
 from vedette.evaluation.metrics import ospa
-from vedette.filters import LabelledFilter
+from vedette.filters import Filter
 from vedette.fusion import Fusion
 
 POSE = np.zeros(3)
@@ -168,20 +168,20 @@ def motion_model(parameters: dict[str, Any], method: str) -> models.MotionModel:
     return models.constant_velocity(math.sqrt(float(parameters["Q"][1, 1])))
 
 
-def make_filter(kind: type, recording: Recording, method: str = "ekf", **options: Any) -> LabelledFilter:
+def make_filter(kind: type, recording: Recording, method: str = "ekf", **options: Any) -> Filter:
     """A filter of this kind with the recording's models; `method` for the motion and the measurement."""
     return make_filters(kind, recording, method, **options)[0]
 
 
-def make_filters(kind: type, recording: Recording, method: str = "ekf", **options: Any) -> list[LabelledFilter]:
+def make_filters(kind: type, recording: Recording, method: str = "ekf", **options: Any) -> list[Filter]:
     """The same, one for each sensor of the recording."""
     parameters = recording.parameters
     survival = models.constant_survival(float(parameters["P_S"]))
-    motion, birth = motion_model(parameters, method), birth_model(parameters)
-    return [kind(motion, survival, birth, sensor, **options) for sensor in sensor_models(parameters, method)]
+    targets = models.TargetModel(motion_model(parameters, method), survival, birth_model(parameters))
+    return [kind(targets, sensor, **options) for sensor in sensor_models(parameters, method)]
 
 
-def run(tracker: LabelledFilter, recording: Recording, *, seed: int = 0) -> tuple[list[Estimate], list[float]]:
+def run(tracker: Filter, recording: Recording, *, seed: int = 0) -> tuple[list[Estimate], list[float]]:
     """Estimates at every scan (most probable number of targets, then the most probable of that number), and the CPU
     seconds of each step.
     """
@@ -197,7 +197,7 @@ def run(tracker: LabelledFilter, recording: Recording, *, seed: int = 0) -> tupl
 
 
 def run_fused(
-    trackers: list[LabelledFilter], fusion: Fusion[Any, Any], recording: Recording, *, seed: int = 0
+    trackers: list[Filter], fusion: Fusion[Any, Any], recording: Recording, *, seed: int = 0
 ) -> list[Estimate]:
     """Estimates at every scan from the fusion of all sensors' beliefs, which is fed back: with births at every scan
     sensors would else give one target different labels.

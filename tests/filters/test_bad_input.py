@@ -85,7 +85,7 @@ def make(kind: Any, limits: Limits | None = None, **parts: Any) -> Any:
     motion = parts.pop("motion", models.constant_velocity(1.0))
     survival = parts.pop("survival", models.constant_survival(0.95))
     births = parts.pop("birth", birth())
-    return kind(motion, survival, births, sensor(**parts), limits or Limits())
+    return kind(models.TargetModel(motion, survival, births), sensor(**parts), limits or Limits())
 
 
 def step(tracker: Any, scan: Any = NEAR, belief: Any = None, pose: Any = POSE, dt: Any = 1.0, number: int = 1) -> Any:
@@ -419,7 +419,9 @@ def test_parts_that_do_not_fit(kind: Any) -> None:
     with pytest.raises(InputError, match="survival: expected a SurvivalModel; got float"):
         make(kind, survival=0.9)
     with pytest.raises(InputError, match="sensor: expected a SensorModel"):
-        kind(models.constant_velocity(1.0), models.constant_survival(0.9), birth(), None)
+        kind(make(kind).targets, None)
+    with pytest.raises(InputError, match="targets: expected a TargetModel; got MotionModel"):
+        kind(models.constant_velocity(1.0), sensor())
     with pytest.raises(InputError, match="limits: expected a Limits; got int"):
         dataclasses.replace(make(kind), limits=300)
 

@@ -31,11 +31,11 @@ SENSOR = models.SensorModel(
 def make(kind: str, limits: Limits = LIMITS) -> Any:
     means = np.column_stack([SITES, np.zeros((4, 2))])
     birth = models.BirthModel(np.full(4, 0.03), means, np.tile(100.0 * np.eye(4), (4, 1, 1)))
-    survival = models.constant_survival(0.99)
+    targets = models.TargetModel(MOTION, models.constant_survival(0.99), birth)
     if kind == "lmb":
-        return LmbFilter(MOTION, survival, birth, SENSOR, limits)
+        return LmbFilter(targets, SENSOR, limits)
     assignment: Literal["gibbs", "ranked"] = "gibbs" if kind == "gibbs" else "ranked"
-    return DeltaGlmbFilter(MOTION, survival, birth, SENSOR, limits, assignment, 300, kind == "marginalised")
+    return DeltaGlmbFilter(targets, SENSOR, limits, assignment, 300, kind == "marginalised")
 
 
 class Scene:

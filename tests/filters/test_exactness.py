@@ -71,12 +71,15 @@ class Example:
     model: oracle.Model
     scans: tuple[Any, ...]
 
+    @property
+    def targets(self) -> models.TargetModel:
+        return models.TargetModel(self.motion, models.constant_survival(SURVIVAL), BIRTHS)
+
     def filter(self, limits: Limits, **options: Any) -> DeltaGlmbFilter:
-        survival = models.constant_survival(SURVIVAL)
-        return DeltaGlmbFilter(self.motion, survival, BIRTHS, self.sensor, limits, **options)
+        return DeltaGlmbFilter(self.targets, self.sensor, limits, **options)
 
     def lmb_filter(self, limits: Limits) -> LmbFilter:
-        return LmbFilter(self.motion, models.constant_survival(SURVIVAL), BIRTHS, self.sensor, limits)
+        return LmbFilter(self.targets, self.sensor, limits)
 
 
 def _oracle_model(method: str, **parts: Any) -> oracle.Model:

@@ -40,7 +40,8 @@ def make(
     }
     sensor = models.SensorModel(**(standard | parts), method=method)
     motion, birth = models.constant_velocity(sigma_v, method=method), models.BirthModel.none(4)
-    return kind(motion, models.constant_survival(0.99), birth, sensor, limits or Limits())
+    targets = models.TargetModel(motion, models.constant_survival(0.99), birth)
+    return kind(targets, sensor, limits or Limits())
 
 
 def target(kind: Any, means: Any, cov: Any) -> Any:

@@ -86,13 +86,10 @@ def test_no_target_of_a_crowd_becomes_certain(most: int) -> None:
         models.constant_detection(0.9),
         models.region_clutter(5.0, models.Region(-500.0, 500.0, -500.0, 500.0), "position"),
     )
-    tracker = LmbFilter(
-        models.constant_velocity(1.0),
-        models.constant_survival(0.99),
-        models.BirthModel.none(4),
-        sensor,
-        Limits(max_hypotheses=most),
+    targets = models.TargetModel(
+        models.constant_velocity(1.0), models.constant_survival(0.99), models.BirthModel.none(4)
     )
+    tracker = LmbFilter(targets, sensor, Limits(max_hypotheses=most))
     labels = np.column_stack([np.zeros(16), np.arange(16)]).astype(np.int64)
     means = np.column_stack([places, np.zeros((16, 2))])
     belief = LMB.from_bernoullis(labels, np.full(16, 0.9), means, np.tile(25.0 * np.eye(4), (16, 1, 1)))

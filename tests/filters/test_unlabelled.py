@@ -173,7 +173,7 @@ def test_a_certain_bernoulli_is_bounded_so_that_the_scan_counts() -> None:
 def test_hundreds_of_scans_stay_valid_and_bounded(kind: Any) -> None:
     local = build_sensors(load_scenario("linear-10"))[0].filter
     limits = Limits(max_intensity_components=40, max_labels=50)
-    tracker = kind(local.motion, local.survival, local.birth, local.sensor, limits)
+    tracker = kind(local.targets, local.sensor, limits)
     scene, belief, rng = Scene(4), tracker.initial(), np.random.default_rng(0)
     for number in range(300 if JIT_ENABLED else 5):
         belief, info = tracker.step(belief, scene.scan(number), np.array([900.0, 900.0, 0.0]), 1.0, number + 1, rng=rng)
@@ -205,13 +205,13 @@ def test_the_expected_number_is_unbiased_on_a_clean_scene(kind: Any) -> None:
         detection=models.constant_detection(0.95),
         clutter=models.region_clutter(2.0, models.Region(-1000.0, 1000.0, -1000.0, 1000.0), "position"),
     )
-    errors, numbers = [], []
+    motion, errors, numbers = tracker.targets.motion, [], []
     for run in range(120):
         rng, belief, states = np.random.default_rng(run), tracker.initial(), np.empty((0, 4))
         error = 0.0
         for number in range(20):
-            states = tracker.motion.propagate(states, 1.0)[rng.random(len(states)) < 0.95] if len(states) else states
-            states = states + rng.multivariate_normal(np.zeros(4), tracker.motion.noise_cov(means[0], 1.0), len(states))
+            states = motion.propagate(states, 1.0)[rng.random(len(states)) < 0.95] if len(states) else states
+            states = states + rng.multivariate_normal(np.zeros(4), motion.noise_cov(means[0], 1.0), len(states))
             born = [
                 rng.multivariate_normal(m, c) for m, c in zip(means, births.covs, strict=True) if rng.random() < 0.1
             ]

@@ -18,7 +18,7 @@ every_scene = pytest.mark.parametrize("name", SCENES)
 
 
 def make(kind, scene: Scene, limits: Limits | None = None):
-    return kind(scene.motion, scene.survival, scene.births, scene.sensor, limits or Limits.none())
+    return kind(scene.targets, scene.sensor, limits or Limits.none())
 
 
 def mixture_of(density: Poisson | IidCluster, total: float = 1.0) -> Mixture:

@@ -112,7 +112,7 @@ def _birth(rng: Rng, dim: int) -> models.BirthModel:
     return models.BirthModel(np.array(existence), states(rng, num, dim), covs, steps)
 
 
-def world(rng: Rng) -> tuple[models.MotionModel, models.SurvivalModel, models.BirthModel]:
+def world(rng: Rng) -> models.TargetModel:
     """What all sensors of an episode share."""
     sigma, method = one_of(rng, 0.0, some(rng, 5.0, 1e-12, 1e6)), one_of(rng, *METHODS)
     if rng.random() < 0.7:
@@ -120,12 +120,12 @@ def world(rng: Rng) -> tuple[models.MotionModel, models.SurvivalModel, models.Bi
     else:
         motion = models.coordinated_turn(sigma, one_of(rng, 0.0, some(rng, 0.01, 1e-12, 10.0)), method=method)
     survival = models.constant_survival(one_of(rng, 0.0, 1e-9, 0.5, 0.99, 0.99, 1.0))
-    return motion, survival, _birth(rng, motion.state_dim)
+    return models.TargetModel(motion, survival, _birth(rng, motion.state_dim))
 
 
-def make_filter(rng: Rng, kind: str, parts: tuple[Any, Any, Any]) -> Any:
+def make_filter(rng: Rng, kind: str, targets: models.TargetModel) -> Any:
     """A filter of the kind, with a sensor and limits of its own."""
-    args = (*parts, _sensor(rng), Limits() if rng.random() < 0.3 else _limits(rng))
+    args = (targets, _sensor(rng), Limits() if rng.random() < 0.3 else _limits(rng))
     if kind in ("ranked", "gibbs", "marginalised"):
         assignment: Any = "gibbs" if kind == "gibbs" else one_of(rng, "ranked", "ranked", "gibbs")
         return DeltaGlmbFilter(*args, assignment, int(rng.integers(1, 40)), kind == "marginalised")
@@ -134,7 +134,7 @@ def make_filter(rng: Rng, kind: str, parts: tuple[Any, Any, Any]) -> Any:
 
 def first_belief(rng: Rng, kind: str, local: Any) -> Any:
     """No target; or some that were there before step 1, certain ones among them."""
-    dim = local.motion.state_dim
+    dim = local.targets.state_dim
     if rng.random() < 0.6:
         return local.initial()
     num = int(rng.integers(1, 4))
@@ -160,16 +160,18 @@ def pose(rng: Rng) -> Any:
 
 def scan(rng: Rng, local: Any, at: Any) -> Any:
     """Measurements on the targets that births promise, beside them, anywhere, and repeats."""
-    sensor, dim = local.sensor, local.motion.state_dim
+    sensor, targets = local.sensor, local.targets
     rows = [np.empty((0, sensor.meas_dim))]
     if rng.random() < 0.8:
-        seen = sensor.measurement.measure(local.birth.means, at)
+        seen = sensor.measurement.measure(targets.birth.means, at)
         off = one_of(rng, 0.0, 1.0, 1.0, 6.0) * rng.standard_normal(seen.shape)
         rows.append(
-            seen + off * np.sqrt(np.diagonal(sensor.noise.covs(local.birth.means, at, sensor.meas_dim), 0, 1, 2))
+            seen + off * np.sqrt(np.diagonal(sensor.noise.covs(targets.birth.means, at, sensor.meas_dim), 0, 1, 2))
         )
     if rng.random() < 0.5:
-        rows.append(sensor.clutter.sample(at, sensor.measurement, state_dim=dim, rng=rng)[: rng.integers(1, 15)])
+        rows.append(
+            sensor.clutter.sample(at, sensor.measurement, state_dim=targets.state_dim, rng=rng)[: rng.integers(1, 15)]
+        )
     if rng.random() < 0.1:
         rows.append(rng.standard_normal((2, sensor.meas_dim)) * one_of(rng, 1e-300, 1e9, 1e300))
     table = np.concatenate(rows)

@@ -102,7 +102,7 @@ def _check_scans(rng: np.random.Generator, kind: str, local: Any, steps: int, co
     """Beliefs of one sensor after each scan."""
     belief, beliefs = scenes.first_belief(rng, kind, local), []
     # Who cannot survive is surely gone.
-    certain_allowed = _is_certain(belief) or local.survival.params[0] == 0.0
+    certain_allowed = _is_certain(belief) or local.targets.survival.params[0] == 0.0
     for step in range(1, steps + 1):
         at, dt = scenes.pose(rng), scenes.time_step(rng)
         if rng.random() < 0.01:

@@ -78,7 +78,7 @@ def beliefs(make_filter, motion, sensor):
     motion.check(STARTS)
     covs = np.tile(np.diag([50.0, 50.0, 25.0, 25.0]) ** 2, (2, 1, 1))
     birth = models.BirthModel(np.full(2, 0.02), STARTS * [1, 1, 0, 0], covs, frozenset({1}))
-    tracker = make_filter(motion, models.constant_survival(0.98), birth, sensor)
+    tracker = make_filter(models.TargetModel(motion, models.constant_survival(0.98), birth), sensor)
     times, rng = np.arange(1.0, 7.0), np.random.default_rng(3)
     truth = ScriptedTargets(models.constant_velocity(5.0), STARTS).truth(times, rng=rng)
     belief = tracker.initial()

@@ -135,9 +135,9 @@ def test_models_of_the_users_own_from_a_file_beside_the_scenario() -> None:
         ("speed: 4.0", sensor),
     )
     north, south = filters_of(loaded)
-    assert north.motion.state_dim == 3
-    np.testing.assert_allclose(north.motion.propagate([1.0, 2.0, 3.0], 2.0), [[6.0, 2.0, 3.0]])
-    assert north.survival.prob([[0.0, 0.0, 0.0]], 1.0) == 0.75
+    assert north.targets.motion.state_dim == 3
+    np.testing.assert_allclose(north.targets.motion.propagate([1.0, 2.0, 3.0], 2.0), [[6.0, 2.0, 3.0]])
+    assert north.targets.survival.prob([[0.0, 0.0, 0.0]], 1.0) == 0.75
     assert (north.sensor.clutter.rate, south.sensor.clutter.rate) == (3.0, 25.0)
     np.testing.assert_allclose(north.sensor.noise.covs([0.0, 0.0, 0.0], [0.0, 0.0, 0.0], 1), [[[4.0]]])
     step: Any = north.step
@@ -178,7 +178,7 @@ def test_filters_of_each_kind() -> None:
     gibbs, _ = filters_of(scenario(("kind: m_delta_glmb", text)))
     assert isinstance(gibbs, DeltaGlmbFilter)
     assert (gibbs.marginalised, gibbs.assignment, gibbs.num_gibbs_samples) == (False, "gibbs", 77)
-    assert (gibbs.motion.method, gibbs.sensor.method, gibbs.limits.max_hypotheses) == ("ckf", "ckf", 9)
+    assert (gibbs.targets.motion.method, gibbs.sensor.method, gibbs.limits.max_hypotheses) == ("ckf", "ckf", 9)
     lmb, _ = filters_of(scenario(("kind: m_delta_glmb", "kind: lmb"), ("kind: cm_delta_glmb", "kind: clmb")))
     assert isinstance(lmb, LmbFilter)
 
@@ -197,7 +197,8 @@ def test_a_filter_without_labels_runs_alone_and_names_its_estimates_by_the_scan(
     loaded = scenario(*ALONE, ("kind: m_delta_glmb", text))
     (local,) = filters_of(loaded)
     assert isinstance(local, container)
-    assert (local.limits.max_intensity_components, local.limits.max_existence) == (7, 0.5)
+    own: Any = local
+    assert (own.limits.max_intensity_components, own.limits.max_existence) == (7, 0.5)
     experiment, beliefs, fused, _ = tracked(loaded, 8, np.random.default_rng(1))
     estimate = experiment.estimate(fused, 8)
     estimate.validate()

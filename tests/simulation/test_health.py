@@ -13,7 +13,7 @@ import pytest
 from vedette.control import FixedPlanner
 from vedette.errors import NumericalError
 from vedette.evaluation.health import health_findings, health_line, summarise_health
-from vedette.filters import FilterInfo, Limits
+from vedette.filters import FilterInfo
 from vedette.fusion import CmDeltaGlmb
 from vedette.fusion.base import FusionInfo
 from vedette.models import limited_range
@@ -74,11 +74,11 @@ def test_the_record_holds_what_filters_and_fusion_said(experiment: Experiment) -
         assert health.num_missing_sets[scan].sum() == info.num_missing_sets
         assert health.fusion_num_sets[scan] == info.num_sets
         assert health.fusion_log_normaliser[scan] == info.log_normaliser
-    sensor = experiment.sensors[0]
+    local: Any = experiment.sensors[0].filter
     record = run(experiment)
     assert np.isfinite(record.health.log_likelihood).all()
     assert (record.health.num_hypotheses[1:] > 1).all()
-    assert (record.health.num_hypotheses <= sensor.filter.limits.max_hypotheses).all()
+    assert (record.health.num_hypotheses <= local.limits.max_hypotheses).all()
 
 
 def test_a_cap_that_is_met_is_recorded(experiment: Experiment) -> None:
@@ -92,13 +92,10 @@ def test_a_cap_that_is_met_is_recorded(experiment: Experiment) -> None:
 
 def test_labels_that_a_sensor_lacks_are_counted_at_that_sensor(experiment: Experiment) -> None:
     first, second = experiment.sensors
-    birth = first.filter.birth
-    blind = replace(birth, existence=np.full(len(birth.existence), 1e-9))
-    lopsided = replace(
-        experiment,
-        sensors=(first, replace(second, filter=replace(second.filter, birth=blind, limits=Limits(max_hypotheses=1)))),
-    )
-    record = run(lopsided)
+    local: Any = second.filter
+    near = replace(local.sensor, detection=limited_range(0.98, 1.0))
+    blind = replace(local, sensor=near, limits=replace(local.limits, max_hypotheses=1))
+    record = run(replace(experiment, sensors=(first, replace(second, filter=blind))))
     assert record.health.num_missing_labels[-1].tolist() == [0, 4]
     summary = summarise_health([record, record])
     assert summary.num_scans == 16
@@ -108,7 +105,8 @@ def test_labels_that_a_sensor_lacks_are_counted_at_that_sensor(experiment: Exper
 
 def test_a_target_that_one_sensor_alone_sees_is_told_as_lost(experiment: Experiment) -> None:
     first, second = experiment.sensors
-    far = replace(second.filter, sensor=replace(second.filter.sensor, detection=limited_range(0.98, 1.0)))
+    local: Any = second.filter
+    far = replace(local, sensor=replace(local.sensor, detection=limited_range(0.98, 1.0)))
     record = run(replace(experiment, sensors=(first, replace(second, filter=far))))
     assert record.health.fusion_num_lost_labels[-1] >= 1
     assert "GCI lost a target that one sensor was sure of" in health_line(record)

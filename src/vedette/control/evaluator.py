@@ -8,7 +8,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from vedette.control.inputs import Belief, check_beliefs, options_of
+from vedette.control.inputs import Belief, check_beliefs, check_sensors, options_of
 from vedette.control.kinds import of_one_kind
 from vedette.control.plain import PlainRewards, can_be_laid_out
 from vedette.control.priors import predicted
@@ -63,11 +63,12 @@ class Evaluator:
     ) -> Evaluator:
         """Draw the samples, predict, and run the pseudo-updates of every sensor (paper section III-B, steps 1 to 4).
 
-        Targets move as the first sensor's filter has it. Raises as `JointPlanner.plan`.
+        Raises as `JointPlanner.plan`.
         """
+        targets = check_sensors(sensors)
         options = options_of(sensors, poses, settings)
         check_beliefs(sensors, beliefs, fused)
-        prediction = predicted(fused, sensors[0].filter, settings.horizon_steps, settings.horizon_period)
+        prediction = predicted(fused, targets.motion, settings.horizon_steps, settings.horizon_period)
         futures = draw_futures(fused, sensors, settings, rng=rng)
         posteriors = tuple(
             pseudo_posteriors(belief, sensor, own.courses, future, settings)

@@ -10,21 +10,20 @@ import numpy as np
 from vedette.control.settings import MobileSensor, PlanningSettings
 from vedette.densities import GLMB, LMB
 from vedette.errors import InputError
-from vedette.filters import DeltaGlmbFilter, LabelledFilter
+from vedette.filters import labels_targets, shared_targets
 from vedette.kernels.base.types import Floats
+from vedette.models import TargetModel
 from vedette.models.arguments import float_array, reject
 from vedette.platforms import Options, options_at
 
 Belief: TypeAlias = GLMB | LMB
 
 
-def check_sensors(sensors: Sequence[MobileSensor]) -> None:
-    """`InputError` unless there is at least one sensor, and all track states of one dimension."""
+def check_sensors(sensors: Sequence[MobileSensor]) -> TargetModel:
+    """The targets that the sensors track; `InputError` unless there is a sensor, and all track the same."""
     if len(sensors) == 0 or not all(isinstance(sensor, MobileSensor) for sensor in sensors):
         raise reject("sensors", "at least one MobileSensor", sensors)
-    dims = [sensor.filter.motion.state_dim for sensor in sensors]
-    if len(set(dims)) > 1:
-        raise InputError(f"sensors: expected filters of one state dimension; got {dims}")
+    return shared_targets([sensor.filter for sensor in sensors])
 
 
 def check_poses(poses: Any, num_sensors: int) -> Floats:
@@ -49,11 +48,11 @@ def check_beliefs(sensors: Sequence[MobileSensor], beliefs: Sequence[Any], fused
     """`InputError` unless there is a valid belief of the right kind for each sensor's filter, and a valid fused one."""
     if len(beliefs) != len(sensors):
         raise InputError(f"beliefs: expected {len(sensors)}, one a sensor; got {len(beliefs)}")
-    state_dim = sensors[0].filter.motion.state_dim
+    state_dim = shared_targets([sensor.filter for sensor in sensors]).state_dim
     for i, (belief, sensor) in enumerate(zip(beliefs, sensors, strict=True)):
-        if not isinstance(sensor.filter, LabelledFilter):
+        if not labels_targets(sensor.filter):
             raise reject(f"sensors[{i}].filter", "one that labels its targets", type(sensor.filter).__name__)
-        kind = GLMB if isinstance(sensor.filter, DeltaGlmbFilter) else LMB
+        kind = GLMB if isinstance(sensor.filter.initial(), GLMB) else LMB
         _check_density(f"beliefs[{i}]", belief, (kind,), state_dim)
     _check_density("fused", fused, (GLMB, LMB), state_dim)
 

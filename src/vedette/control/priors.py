@@ -9,14 +9,13 @@ import numpy as np
 from vedette.control.inputs import Belief
 from vedette.densities import GLMB, LMB, TrackTable, marginalise, track_moments
 from vedette.densities.checks import unchecked
-from vedette.filters import LocalFilter
 from vedette.filters.inputs import model_errors
 from vedette.fusion.tracks import take_tracks
 from vedette.kernels.base.types import Ints
 from vedette.kernels.gaussian.linalg import log_sum
 from vedette.kernels.labelled.labels import group_by_label_set
 from vedette.kernels.planning.rewards import predict_tracks
-from vedette.models import constant_survival, kernel_motion
+from vedette.models import MotionModel, constant_survival, kernel_motion
 
 Label: TypeAlias = tuple[int, int]
 LabelSet: TypeAlias = tuple[Label, ...]
@@ -81,7 +80,7 @@ def single_labels(belief: LMB) -> tuple[LabelSet, ...]:
     return tuple(((step, site),) for step, site in belief.tracks.labels.tolist())
 
 
-def predicted(fused: Belief, local: LocalFilter, num_steps: int, period: float) -> Belief:
+def predicted(fused: Belief, motion: MotionModel, num_steps: int, period: float) -> Belief:
     """The fused density at the end of the horizon, without birth or death (paper, "pseudo-prediction").
 
     Tracks are first collapsed to one Gaussian each (a GLMB is marginalised), as those of the pseudo-updates are. Label
@@ -94,7 +93,7 @@ def predicted(fused: Belief, local: LocalFilter, num_steps: int, period: float) 
     means, covs = track_moments(single.tracks)
     with model_errors():
         means, covs = predict_tracks(
-            kernel_motion(local.motion, constant_survival(1.0)), float(period), int(num_steps), means, covs
+            kernel_motion(motion, constant_survival(1.0)), float(period), int(num_steps), means, covs
         )
     num = single.tracks.num_tracks
     tracks = unchecked(TrackTable, single.tracks.labels, np.arange(num + 1), np.zeros(num), means, covs)

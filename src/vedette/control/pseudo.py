@@ -21,6 +21,7 @@ from vedette.control.settings import IDEAL_MODES, MobileSensor, PlanningSettings
 from vedette.control.threads import run_chunks
 from vedette.densities import GLMB, LMB, TrackTable, sample_glmb, sample_lmb
 from vedette.densities.checks import unchecked
+from vedette.filters import shared_targets
 from vedette.filters.inputs import model_errors
 from vedette.kernels.base.types import Floats
 from vedette.kernels.planning.ideal import Decision, Futures, Horizon, propagate_samples
@@ -51,7 +52,8 @@ def draw_futures(
 
     The random numbers of detections and noise are each sensor's own, and the same for all its actions.
     """
-    motion = kernel_motion(sensors[0].filter.motion, sensors[0].filter.survival)
+    targets = shared_targets([sensor.filter for sensor in sensors])
+    motion = kernel_motion(targets.motion, targets.survival)
     num = settings.num_samples
     samples = sample_glmb(fused, num, rng=rng) if isinstance(fused, GLMB) else sample_lmb(fused, num, rng=rng)
     with model_errors():
@@ -80,7 +82,7 @@ def pseudo_posteriors(
         float(settings.detection_threshold),
     )
     decision = Decision(
-        kernel_motion(sensor.filter.motion, constant_survival(1.0)),
+        kernel_motion(sensor.filter.targets.motion, constant_survival(1.0)),
         sensor.filter.sensor.to_kernel(),
         horizon,
         futures,

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 
 from vedette.errors import InputError
-from vedette.filters import Limits, LocalFilter
+from vedette.filters import Filter, Limits
 from vedette.kernels.base.types import Floats
 from vedette.kernels.planning.ideal import EXPECTED, IDEAL, SAMPLED
 from vedette.models.arguments import dimension, positive, probability, reject
@@ -90,17 +90,17 @@ class MobileSensor:
 
     Attributes:
         filter: its local filter, with the models of the targets and of the sensor. The joint and the independent
-            planner need one that labels its targets: a `DeltaGlmbFilter` or an `LmbFilter`.
+            planner need one that labels its targets: that believes in a `GLMB` or an `LMB`.
         platform: what it may do, and where that takes it.
 
     Raises:
         InputError: something else than a filter or a platform.
     """
 
-    filter: LocalFilter
+    filter: Filter
     platform: Platform
 
     def __post_init__(self) -> None:
-        if not isinstance(self.filter, LocalFilter):
-            raise reject("filter", "a filter of vedette.filters", self.filter)
+        if not isinstance(self.filter, Filter):
+            raise reject("filter", "a Filter, with targets, sensor, initial() and step()", self.filter)
         check_platform("platform", self.platform)

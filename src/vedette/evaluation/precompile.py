@@ -11,7 +11,7 @@ import numpy as np
 from vedette.control import JointPlanner
 from vedette.densities import GLMB, LMB
 from vedette.evaluation.runs import children_ignore_interrupts, strategy
-from vedette.filters import LabelledFilter, LmbFilter
+from vedette.filters import labels_targets
 from vedette.scenarios import Scenario
 from vedette.scenarios.build import build_experiment
 from vedette.simulation.experiment import Experiment
@@ -25,7 +25,7 @@ def precompile(scenario: Scenario) -> None:
     forbidden, or fail) is compiled where it is first used; no result depends on it.
     """
     experiment = build_experiment(scenario)
-    if not isinstance(experiment.sensors[0].filter, LabelledFilter):
+    if not labels_targets(experiment.sensors[0].filter):
         _compile_filter(experiment)  # there is no fusion nor planning without labels
         return
     other = get_context("spawn").Process(target=_compile_planning, args=(scenario,), daemon=True)
@@ -47,7 +47,7 @@ def _compile_filter(experiment: Experiment) -> None:
 def _compile_planning(scenario: Scenario) -> None:
     """Fuse, estimate and plan as if every birth site held a target, one of which a single sensor knows."""
     experiment = build_experiment(scenario)
-    num_sites, num_sensors = experiment.sensors[0].filter.birth.num_sites, len(experiment.sensors)
+    num_sites, num_sensors = experiment.sensors[0].filter.targets.birth.num_sites, len(experiment.sensors)
     beliefs = [_belief(experiment, num_sites), *[_belief(experiment, max(num_sites - 1, 1))] * (num_sensors - 1)]
     fusion = experiment.fusion
     fused = beliefs[0] if fusion is None else fusion.fuse(beliefs)[0]
@@ -61,9 +61,9 @@ def _compile_planning(scenario: Scenario) -> None:
 def _belief(experiment: Experiment, num_targets: int) -> GLMB | LMB:
     """One target at each of the first birth sites, in the kind of density that the filter keeps."""
     local = experiment.sensors[0].filter
-    birth, labels = local.birth, [(1, site) for site in range(num_targets)]
+    birth, labels = local.targets.birth, [(1, site) for site in range(num_targets)]
     sites = slice(num_targets)
     belief = LMB.from_bernoullis(labels, birth.existence[sites], birth.means[sites], birth.covs[sites])
-    if isinstance(local, LmbFilter):
+    if isinstance(local.initial(), LMB):
         return belief
     return GLMB.from_hypotheses(belief.tracks, [list(range(num_targets))], [1.0])

@@ -3,6 +3,7 @@
 from typing import TypeAlias
 
 from vedette.densities import GLMB, LMB, IidCluster, MultiBernoulli, Poisson
+from vedette.filters.base import Filter, labels_targets, shared_targets
 from vedette.filters.cbmember import CbMemberFilter
 from vedette.filters.cphd import CphdFilter
 from vedette.filters.glmb import DeltaGlmbFilter
@@ -12,8 +13,6 @@ from vedette.filters.lmb import LmbFilter
 from vedette.filters.multi_sensor import MultiSensorGlmbFilter, MultiSensorLmbFilter
 from vedette.filters.phd import PhdFilter
 
-LabelledFilter: TypeAlias = DeltaGlmbFilter | LmbFilter
-LocalFilter: TypeAlias = LabelledFilter | PhdFilter | CphdFilter | CbMemberFilter
 Belief: TypeAlias = GLMB | LMB | Poisson | IidCluster | MultiBernoulli
 
 __all__ = [
@@ -21,12 +20,13 @@ __all__ = [
     "CbMemberFilter",
     "CphdFilter",
     "DeltaGlmbFilter",
+    "Filter",
     "FilterInfo",
-    "LabelledFilter",
     "Limits",
     "LmbFilter",
-    "LocalFilter",
     "MultiSensorGlmbFilter",
     "MultiSensorLmbFilter",
     "PhdFilter",
+    "labels_targets",
+    "shared_targets",
 ]

@@ -1,53 +1,104 @@
-"""What filters of one step a scan share: their models, and what they hand to their kernels."""
+"""What every filter is, and what the filters of one sensor share: models, checks, what they hand to their kernels."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
-from vedette.densities import LMB
-from vedette.filters.inputs import births_at, check_parts, check_scan, check_step
+import numpy as np
+
+from vedette.densities import GLMB, LMB
+from vedette.errors import InputError
+from vedette.filters.info import FilterInfo
+from vedette.filters.inputs import births_at, check_scan, check_step
 from vedette.filters.limits import Limits
 from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.types import Floats, Lmb, Motion, Sensor
-from vedette.models import BirthModel, MotionModel, SensorModel, SurvivalModel, kernel_motion
+from vedette.models import SensorModel, TargetModel, kernel_motion
 from vedette.models.arguments import generator, pose_vector, positive
 
 StepArguments = tuple[Lmb, Floats, Floats, float, Motion, Sensor, Truncation]
 
 
+@runtime_checkable
+class Filter(Protocol):
+    """How one sensor's belief meets time and a scan; one of your own is as good as those that are here.
+
+    What it believes may be anything that the fusion and the estimator after it take. A filter labels its targets if
+    that is a `GLMB` or an `LMB`; decisions need one that does.
+    """
+
+    @property
+    def targets(self) -> TargetModel:
+        """The targets, the same object for all sensors."""
+        ...
+
+    @property
+    def sensor(self) -> SensorModel:
+        """What the sensor sees."""
+        ...
+
+    def initial(self) -> Any:
+        """The belief before the first scan."""
+        ...
+
+    def step(
+        self, belief: Any, scan: Any, pose: Any, dt: float, step: int, *, rng: np.random.Generator
+    ) -> tuple[Any, FilterInfo]:
+        """Predict over `dt` seconds and update with a scan; see `DeltaGlmbFilter.step`."""
+        ...
+
+
+def labels_targets(tracker: Filter) -> bool:
+    """Whether the filter's belief is a `GLMB` or an `LMB`."""
+    return isinstance(tracker.initial(), GLMB | LMB)
+
+
+def shared_targets(filters: Sequence[Filter]) -> TargetModel:
+    """The one model of the targets that all these filters hold; `InputError` if they do not."""
+    targets = filters[0].targets
+    for i, other in enumerate(filters):
+        if other.targets != targets:
+            raise InputError(f"filters[{i}].targets: expected the target model of filters[0]; got another")
+    return targets
+
+
 @dataclass(frozen=True, slots=True, eq=False)
-class ModelledFilter:
-    """The models of a filter.
+class SingleSensorFilter:
+    """The parts of a filter of one sensor.
 
     Attributes:
-        motion, survival, birth, sensor: the models.
+        targets: how targets move, live on and appear.
+        sensor: what the sensor sees of them.
         limits: caps and thresholds.
 
     Raises:
-        InputError: models of different state dimensions.
+        InputError: a part of another kind.
     """
 
-    motion: MotionModel
-    survival: SurvivalModel
-    birth: BirthModel
+    targets: TargetModel
     sensor: SensorModel
     limits: Limits = field(default_factory=Limits)
 
     def __post_init__(self) -> None:
-        check_parts(self.motion, self.survival, self.birth, self.sensor, self.limits)
+        for name, kind in (("targets", TargetModel), ("sensor", SensorModel), ("limits", Limits)):
+            value = getattr(self, name)
+            if not isinstance(value, kind):
+                raise InputError(f"{name}: expected a {kind.__name__}; got {type(value).__name__}")
 
-    def _arguments(self, scan: Floats, pose: Any, dt: Any, step: Any, prior: LMB | None = None) -> StepArguments:
+    def _arguments(self, scan: Floats, pose: Any, dt: Any, step: Any, prior: GLMB | LMB | None = None) -> StepArguments:
         """Births, scan, pose, time step, models and truncation as the kernels take them, in their order.
 
         prior: whose labels those of the births must not repeat; None where there are none.
         """
+        targets = self.targets
         return (
-            births_at(self.birth, check_step(step, self.birth, prior)).to_kernel(),
+            births_at(targets.birth, check_step(step, targets.birth, prior)).to_kernel(),
             scan,
             pose_vector("pose", pose),
             positive("dt", dt),
-            kernel_motion(self.motion, self.survival),
+            kernel_motion(targets.motion, targets.survival),
             self.sensor.to_kernel(),
             self.limits.truncation(self.sensor.meas_dim),
         )

@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 
 from vedette.densities import MultiBernoulli
-from vedette.filters.base import ModelledFilter
+from vedette.filters.base import SingleSensorFilter
 from vedette.filters.info import FilterInfo
 from vedette.filters.inputs import check_belief, model_errors
 from vedette.kernels.steps.cbmember import step_cb_member
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class CbMemberFilter(ModelledFilter):
+class CbMemberFilter(SingleSensorFilter):
     """Gaussian-mixture cardinality-balanced multi-target multi-Bernoulli filter (Vo, Vo and Cantoni 2009).
 
     Believes in a multi-Bernoulli density, to which the births are added as they are; prediction is exact. The update
@@ -29,7 +29,7 @@ class CbMemberFilter(ModelledFilter):
 
     def initial(self) -> MultiBernoulli:
         """The belief before the first scan: no target."""
-        return MultiBernoulli.empty(self.motion.state_dim)
+        return MultiBernoulli.empty(self.targets.state_dim)
 
     def step(
         self, belief: MultiBernoulli, scan: Any, pose: Any, dt: float, step: int, *, rng: np.random.Generator
@@ -39,7 +39,7 @@ class CbMemberFilter(ModelledFilter):
         Nothing is drawn from `rng`; it is taken so that filters are interchangeable.
         """
         measurements, num_duplicates = self._check_scan(scan, rng)
-        prior = check_belief(belief, MultiBernoulli, self.motion.state_dim)
+        prior = check_belief(belief, MultiBernoulli, self.targets.state_dim)
         arguments = self._arguments(measurements, pose, dt, step)
         limits = self.limits
         with model_errors():

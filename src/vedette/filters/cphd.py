@@ -10,14 +10,14 @@ import numpy as np
 
 from vedette.densities import IidCluster
 from vedette.errors import NumericalError
-from vedette.filters.base import ModelledFilter
+from vedette.filters.base import SingleSensorFilter
 from vedette.filters.info import FilterInfo
 from vedette.filters.inputs import check_belief, model_errors
 from vedette.kernels.steps.cphd import step_cphd
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class CphdFilter(ModelledFilter):
+class CphdFilter(SingleSensorFilter):
     """Gaussian-mixture CPHD filter of one sensor (Vo, Vo and Cantoni 2007).
 
     Believes in an iid cluster; its cardinality distribution and intensity after a scan are those of the exact posterior
@@ -29,7 +29,7 @@ class CphdFilter(ModelledFilter):
 
     def initial(self) -> IidCluster:
         """The belief before the first scan: no target."""
-        return IidCluster.empty(self.motion.state_dim)
+        return IidCluster.empty(self.targets.state_dim)
 
     def step(
         self, belief: IidCluster, scan: Any, pose: Any, dt: float, step: int, *, rng: np.random.Generator
@@ -39,7 +39,7 @@ class CphdFilter(ModelledFilter):
         Nothing is drawn from `rng`; it is taken so that filters are interchangeable.
         """
         measurements, num_duplicates = self._check_scan(scan, rng)
-        prior = check_belief(belief, IidCluster, self.motion.state_dim)
+        prior = check_belief(belief, IidCluster, self.targets.state_dim)
         log_cardinality, mixture = prior.to_kernel()
         arguments = self._arguments(measurements, pose, dt, step)
         with model_errors():

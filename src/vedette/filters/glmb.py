@@ -3,37 +3,30 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
 
 from vedette.densities import GLMB, LMB
 from vedette.errors import InputError, NumericalError
+from vedette.filters.base import SingleSensorFilter
 from vedette.filters.info import FilterInfo
-from vedette.filters.inputs import (
-    births_at,
-    check_belief,
-    check_parts,
-    check_scan,
-    check_step,
-    model_errors,
-)
-from vedette.filters.limits import Limits
+from vedette.filters.inputs import check_belief, model_errors
 from vedette.kernels.labelled.conversions import marginalise
 from vedette.kernels.steps.glmb import step_gibbs, step_ranked
-from vedette.models import BirthModel, MotionModel, SensorModel, SurvivalModel, kernel_motion
-from vedette.models.arguments import dimension, generator, pose_vector, positive
+from vedette.models.arguments import dimension
 
 _NO_GROUPS = np.empty(0, np.int64)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class DeltaGlmbFilter:
+class DeltaGlmbFilter(SingleSensorFilter):
     """delta-GLMB filter of one sensor (Vo, Vo, Hoang 2017; paper, Algorithm 1, local prediction and update).
 
     Attributes:
-        motion, survival, birth, sensor: the models.
+        targets: how targets move, live on and appear.
+        sensor: what the sensor sees of them.
         limits: caps and thresholds.
         assignment: "ranked" finds the heaviest hypotheses in exact order, "gibbs" samples them.
         num_gibbs_samples: sweeps in all, shared out over the prior hypotheses.
@@ -41,27 +34,22 @@ class DeltaGlmbFilter:
             Fantacci and Vo 2015); track mixtures are then reduced to `limits.max_components`.
 
     Raises:
-        InputError: models of different state dimensions, or a field out of range.
+        InputError: a part of another kind, or a field out of range.
     """
 
-    motion: MotionModel
-    survival: SurvivalModel
-    birth: BirthModel
-    sensor: SensorModel
-    limits: Limits = field(default_factory=Limits)
     assignment: Literal["ranked", "gibbs"] = "ranked"
     num_gibbs_samples: int = 1000
     marginalised: bool = False
 
     def __post_init__(self) -> None:
-        check_parts(self.motion, self.survival, self.birth, self.sensor, self.limits)
+        SingleSensorFilter.__post_init__(self)  # slots replace the class that super() looks for
         if self.assignment not in ("ranked", "gibbs"):
             raise InputError(f"assignment: expected 'ranked' or 'gibbs'; got {self.assignment!r}")
         dimension("num_gibbs_samples", self.num_gibbs_samples)
 
     def initial(self) -> GLMB:
         """The belief before the first scan: no target."""
-        return GLMB.empty(self.motion.state_dim)
+        return GLMB.empty(self.targets.state_dim)
 
     def step(
         self, belief: GLMB | LMB, scan: Any, pose: Any, dt: float, step: int, *, rng: np.random.Generator
@@ -84,19 +72,9 @@ class DeltaGlmbFilter:
             ModelError: a model function raised or gave a value that is none of its kind.
             NumericalError: no hypothesis has positive weight.
         """
-        generator(rng)
-        measurements, num_duplicates = check_scan(scan, self.sensor.measurement)
-        prior = check_belief(belief, GLMB, self.motion.state_dim)
-        arguments = (
-            prior.to_kernel(),
-            births_at(self.birth, check_step(step, self.birth, prior)).to_kernel(),
-            measurements,
-            pose_vector("pose", pose),
-            positive("dt", dt),
-            kernel_motion(self.motion, self.survival),
-            self.sensor.to_kernel(),
-            self.limits.truncation(self.sensor.meas_dim),
-        )
+        measurements, num_duplicates = self._check_scan(scan, rng)
+        prior = check_belief(belief, GLMB, self.targets.state_dim)
+        arguments = (prior.to_kernel(), *self._arguments(measurements, pose, dt, step, prior))
         with model_errors():
             if self.assignment == "gibbs":
                 posterior, _, report = step_gibbs(*arguments, int(self.num_gibbs_samples), rng)

@@ -12,9 +12,8 @@ import numpy as np
 from vedette.densities import GLMB, LMB, IidCluster, MultiBernoulli, Poisson, TrackTable
 from vedette.densities.checks import unchecked
 from vedette.errors import InputError, ModelError, VedetteError
-from vedette.filters.limits import Limits
 from vedette.kernels.base.types import Bools, Floats
-from vedette.models import BirthModel, MotionModel, SensorModel, SurvivalModel
+from vedette.models import BirthModel
 from vedette.models.arguments import as_array, reject, step_number
 from vedette.models.measurement import MeasurementModel, wrap_angular
 
@@ -63,28 +62,6 @@ def _in_one_turn(scan: Floats, angular: Bools) -> Floats:
             f"{int(np.flatnonzero(angular)[np.argmax(sizes[row])])} is an angle (is it in degrees?)"
         )
     return wrap_angular(scan, angular)
-
-
-_PARTS: dict[str, type] = {
-    "motion": MotionModel,
-    "survival": SurvivalModel,
-    "birth": BirthModel,
-    "sensor": SensorModel,
-    "limits": Limits,
-}
-
-
-def check_parts(
-    motion: MotionModel, survival: SurvivalModel, birth: BirthModel, sensor: SensorModel, limits: Limits
-) -> None:
-    """`InputError` unless each part of a filter is of its kind, and states are of the same dimension in all."""
-    for (name, kind), value in zip(_PARTS.items(), (motion, survival, birth, sensor, limits), strict=True):
-        if not isinstance(value, kind):
-            raise InputError(f"{name}: expected a {kind.__name__}; got {type(value).__name__}")
-    if birth.state_dim != motion.state_dim:
-        raise InputError(
-            f"birth.means: expected states of dimension {motion.state_dim}, as the motion model; got {birth.state_dim}"
-        )
 
 
 def check_belief(belief: object, kind: type[_Density], state_dim: int) -> _Density:

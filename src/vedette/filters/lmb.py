@@ -10,27 +10,28 @@ import numpy as np
 
 from vedette.densities import GLMB, LMB
 from vedette.errors import NumericalError
-from vedette.filters.base import ModelledFilter
+from vedette.filters.base import SingleSensorFilter
 from vedette.filters.info import FilterInfo
 from vedette.filters.inputs import check_belief, model_errors
 from vedette.kernels.steps.lmb import step_lmb
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class LmbFilter(ModelledFilter):
+class LmbFilter(SingleSensorFilter):
     """LMB filter of one sensor (Reuter, Vo, Vo, Dietmayer 2014), cheaper than the delta-GLMB filter.
 
     Attributes:
-        motion, survival, birth, sensor: the models.
+        targets: how targets move, live on and appear.
+        sensor: what the sensor sees of them.
         limits: caps and thresholds.
 
     Raises:
-        InputError: models of different state dimensions.
+        InputError: a part of another kind.
     """
 
     def initial(self) -> LMB:
         """The belief before the first scan: no target."""
-        return LMB.empty(self.motion.state_dim)
+        return LMB.empty(self.targets.state_dim)
 
     def step(
         self, belief: GLMB | LMB, scan: Any, pose: Any, dt: float, step: int, *, rng: np.random.Generator
@@ -40,7 +41,7 @@ class LmbFilter(ModelledFilter):
         Nothing is drawn from `rng`; it is taken so that filters are interchangeable.
         """
         measurements, num_duplicates = self._check_scan(scan, rng)
-        prior = check_belief(belief, LMB, self.motion.state_dim)
+        prior = check_belief(belief, LMB, self.targets.state_dim)
         arguments = self._arguments(measurements, pose, dt, step, prior)
         with model_errors():
             posterior, report = step_lmb(prior.to_kernel(), *arguments, self.limits.reduction())

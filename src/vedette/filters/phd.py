@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 
 from vedette.densities import Poisson
-from vedette.filters.base import ModelledFilter
+from vedette.filters.base import SingleSensorFilter
 from vedette.filters.info import FilterInfo
 from vedette.filters.inputs import check_belief, model_errors
 from vedette.kernels.steps.phd import step_phd
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class PhdFilter(ModelledFilter):
+class PhdFilter(SingleSensorFilter):
     """Gaussian-mixture PHD filter of one sensor (Vo and Ma 2006).
 
     Believes in a Poisson density; its intensity after a scan is that of the exact posterior of such a prior. Births
@@ -26,7 +26,7 @@ class PhdFilter(ModelledFilter):
 
     def initial(self) -> Poisson:
         """The belief before the first scan: no target."""
-        return Poisson.empty(self.motion.state_dim)
+        return Poisson.empty(self.targets.state_dim)
 
     def step(
         self, belief: Poisson, scan: Any, pose: Any, dt: float, step: int, *, rng: np.random.Generator
@@ -36,7 +36,7 @@ class PhdFilter(ModelledFilter):
         Nothing is drawn from `rng`; it is taken so that filters are interchangeable.
         """
         measurements, num_duplicates = self._check_scan(scan, rng)
-        prior = check_belief(belief, Poisson, self.motion.state_dim)
+        prior = check_belief(belief, Poisson, self.targets.state_dim)
         arguments = self._arguments(measurements, pose, dt, step)
         with model_errors():
             posterior, report = step_phd(prior.to_kernel(), *arguments, self.limits.intensity_reduction())

@@ -20,6 +20,7 @@ from vedette.models.polar import bearing_only, bearing_range, range_only
 from vedette.models.region import Region
 from vedette.models.region_clutter import region_clutter
 from vedette.models.sensor import SensorModel
+from vedette.models.targets import TargetModel
 
 __all__ = [
     "MAX_PROB_DETECTION",
@@ -34,6 +35,7 @@ __all__ = [
     "Region",
     "SensorModel",
     "SurvivalModel",
+    "TargetModel",
     "bearing_only",
     "bearing_range",
     "constant_detection",

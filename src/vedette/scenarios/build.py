@@ -8,9 +8,11 @@ from __future__ import annotations
 import numpy as np
 
 from vedette.control import FixedPlanner, IndependentPlanner, JointPlanner, MobileSensor, Planner, RandomPlanner
+from vedette.densities import LMB
 from vedette.errors import InputError
-from vedette.filters import DeltaGlmbFilter, LabelledFilter, LocalFilter
+from vedette.filters import Filter, labels_targets, shared_targets
 from vedette.fusion import Clmb, CmDeltaGlmb
+from vedette.models import TargetModel
 from vedette.platforms import Actions
 from vedette.scenarios.checks import decision_steps
 from vedette.scenarios.loading import Scenario
@@ -28,10 +30,11 @@ def build_experiment(scenario: Scenario) -> Experiment:
     """
     model = scenario.model
     sensors = build_sensors(scenario)
+    motion = shared_targets([sensor.filter for sensor in sensors]).motion
     return Experiment(
         name=model.name,
         times=model.time.build(),
-        targets=model.targets.build(model, sensors[0].filter.motion, scenario.folder),
+        targets=model.targets.build(model, motion, scenario.folder),
         sensors=sensors,
         poses=np.array([sensor.pose for sensor in model.sensors]),
         first_actions=tuple(
@@ -52,11 +55,12 @@ def build_sensors(scenario: Scenario) -> tuple[MobileSensor, ...]:
     """
     model, folder = scenario.model, scenario.folder
     method, region = model.filter.gaussian_method, model.region.build()
-    motion, survival = model.motion.build(method, folder), model.survival.build(folder)
-    birth = model.birth.build(model.motion)
+    targets = TargetModel(
+        model.motion.build(method, folder), model.survival.build(folder), model.birth.build(model.motion)
+    )
     return tuple(
         MobileSensor(
-            model.filter.build(motion, survival, birth, sensor.build(region, method, folder)),
+            model.filter.build(targets, sensor.build(region, method, folder)),
             model.control.build_platform(sensor),
         )
         for sensor in model.sensors
@@ -83,13 +87,13 @@ def build_planner(scenario: Scenario, name: str) -> Planner:
     if name not in PLANNERS:
         raise InputError(f"planner: expected one of {', '.join(PLANNERS)}; got {name!r}")
     planner = JointPlanner if name == "jdm" else IndependentPlanner
-    if not isinstance(sensors[0].filter, LabelledFilter):
+    if not labels_targets(sensors[0].filter):
         kinds = "delta_glmb, m_delta_glmb or lmb"
         raise InputError(f"filter.kind: expected {kinds}, as planner {name} needs labels; got {model.filter.kind}")
     fusion = model.fusion.build(len(sensors)) or _of_one(sensors[0].filter)
     return planner(sensors, fusion, model.control.build(), model.control.reward.build())
 
 
-def _of_one(local: LocalFilter) -> CmDeltaGlmb | Clmb:
+def _of_one(local: Filter) -> CmDeltaGlmb | Clmb:
     """A single sensor is fused with nobody."""
-    return CmDeltaGlmb((1.0,)) if isinstance(local, DeltaGlmbFilter) else Clmb((1.0,))
+    return Clmb((1.0,)) if isinstance(local.initial(), LMB) else CmDeltaGlmb((1.0,))

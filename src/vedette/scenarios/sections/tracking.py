@@ -10,9 +10,10 @@ from pydantic import Field
 from vedette.scenarios.sections.base import Chance, Count, GaussianMethod, Probability, Section, Share
 
 if TYPE_CHECKING:  # with the filters comes the compiler, which a check does without
-    from vedette.filters import Limits, LocalFilter
+    from vedette.filters import Filter as LocalFilter
+    from vedette.filters import Limits
     from vedette.fusion import Clmb, CmDeltaGlmb
-    from vedette.models import BirthModel, MotionModel, SensorModel, SurvivalModel
+    from vedette.models import SensorModel, TargetModel
 
 
 class RankedAssignment(Section):
@@ -95,27 +96,23 @@ class Filter(Section):
     assignment: Assignment = Field(default=RankedAssignment(), description="How associations are truncated [-].")
     limits: FilterLimits = Field(default=FilterLimits(), description="What is thrown away [-].")
 
-    def build(
-        self, motion: MotionModel, survival: SurvivalModel, birth: BirthModel, sensor: SensorModel
-    ) -> LocalFilter:
+    def build(self, targets: TargetModel, sensor: SensorModel) -> LocalFilter:
         """The filter of one sensor."""
         from vedette.filters import CbMemberFilter, CphdFilter, DeltaGlmbFilter, LmbFilter, PhdFilter
 
         limits = self.limits.build()
         match self.kind:
             case "lmb":
-                return LmbFilter(motion, survival, birth, sensor, limits)
+                return LmbFilter(targets, sensor, limits)
             case "phd":
-                return PhdFilter(motion, survival, birth, sensor, limits)
+                return PhdFilter(targets, sensor, limits)
             case "cphd":
-                return CphdFilter(motion, survival, birth, sensor, limits)
+                return CphdFilter(targets, sensor, limits)
             case "cb_member":
-                return CbMemberFilter(motion, survival, birth, sensor, limits)
+                return CbMemberFilter(targets, sensor, limits)
         gibbs = self.assignment if isinstance(self.assignment, GibbsAssignment) else GibbsAssignment()
         return DeltaGlmbFilter(
-            motion,
-            survival,
-            birth,
+            targets,
             sensor,
             limits,
             assignment=self.assignment.kind,
