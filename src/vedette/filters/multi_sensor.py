@@ -92,15 +92,16 @@ class MultiSensorLmbFilter(MultiSensorFilter):
 
     Every track is weighed under each combination of a miss or a gated measurement at every sensor, and the combinations
     of all tracks are summed jointly, no measurement twice; the posterior is projected to an LMB once, not after each
-    sensor. The order of the sensors does not matter where models are linear and detection does not depend on the state;
-    else a later sensor's model is linearised, and its detection and noise are taken, at what the earlier ones have left.
+    sensor. The order of the sensors does not matter where models are linear and neither noise nor detection depends on
+    the state; else a later sensor's model is linearised, and its noise and detection are taken, at what the earlier
+    ones have left.
 
-    What is cut, by `limits`, and counted: combinations of a track that are surely less probable than `min_existence`, or
-    beyond the `max_hypotheses` heaviest at a sensor (`search_cut`; counted as they weigh there, before later sensors
+    What is cut, by `limits`, and counted: combinations of a track that are surely less probable than `min_existence`,
+    or beyond the `max_hypotheses` heaviest at a sensor (`search_cut`; counted as they weigh there, before later sensors
     speak); and in a cluster of tracks that contend for many measurements, sets of taken measurements beyond the
     `max_hypotheses` heaviest, or lighter than `min_relative_weight` times the heaviest (`num_inexact_clusters`). All of
-    it is in `discarded_weight_bound`. The number of combinations grows exponentially with the number of sensors that see
-    a track, up to `max_hypotheses`.
+    it is in `discarded_weight_bound`. The number of combinations grows exponentially with the number of sensors that
+    see a track, up to `max_hypotheses`.
 
     Attributes and errors: as `MultiSensorGlmbFilter`.
     """
@@ -158,12 +159,12 @@ class MultiSensorLmbFilter(MultiSensorFilter):
 class MultiSensorGlmbFilter(MultiSensorFilter):
     """delta-GLMB filter of several sensors: one prediction, then an update by each sensor's scan in turn.
 
-    Without caps the posterior is exact (Vo, Vo and Beard 2019, eq. 13, found factor by factor), whatever the order of the
-    sensors, where models are linear and detection does not depend on the state; else a later sensor's model is
-    linearised, and its detection and noise are taken, at what the earlier ones have left.
+    Without caps the posterior is the multi-sensor delta-GLMB (Vo, Vo and Beard 2019), whatever the order of the
+    sensors, where models are linear and neither noise nor detection depends on the state; else a later sensor's model
+    is linearised, and its noise and detection are taken, at what the earlier ones have left.
 
-    With caps, hypotheses are cut after every sensor as they weigh then. One that the first sensors make unlikely is gone
-    even where a later one would have raised it, so the order of the sensors then matters a little.
+    With caps, hypotheses are cut after every sensor as they weigh then. One that the first sensors make unlikely is
+    gone even where a later one would have raised it, so that the order of the sensors matters a little.
     `discarded_weight_bound` counts what is left out at each sensor by its weight there.
 
     Attributes:

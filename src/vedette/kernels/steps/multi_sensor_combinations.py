@@ -1,8 +1,8 @@
 """What may have happened to each track at several sensors at once: a miss or a gated measurement at every one of them.
 
-A combination of a track is grown sensor by sensor: its components are updated by the measurement that it takes at this
-sensor, and every gated measurement, and the miss, makes a combination of its own. With linear Gaussian models the order of
-the sensors does not matter: weights and moments are those of all measurements together.
+Combinations of a track grow sensor by sensor: each gated measurement, and the miss, makes one of its own, in which the
+components are updated by it. With linear Gaussian models the order of the sensors does not matter: weights and moments
+are those of all measurements together.
 """
 
 from __future__ import annotations
@@ -38,8 +38,8 @@ class Combinations(NamedTuple):
 
     rows: one a combination: the label of its track, and its updated components, whose log weights are those of the
         track's presence, of its mixture, and of the likelihoods of what it took relative to clutter. None is absent.
-    tracks: (num,) number of the track that each is of, increasing. columns: (num, num_sensors) measurement of each sensor
-        or MISSED; measurements are counted through all sensors.
+    tracks: (num,) number of the track that each is of, increasing.
+    columns: (num, num_sensors) measurement of each sensor, or MISSED; they are counted through all sensors.
     log_absent: (num_tracks,) log probability that a track is not there.
     """
 
@@ -68,7 +68,11 @@ def predict_combinations(prior: Lmb, birth: Lmb, num_sensors: int, dt: float, mo
     fill_survivors(prior.tracks, motion, dt, rows, make_scratch(dim, 0))
     fill_births(birth, num_tracks, rows)
     weigh_by_existence(prior.existence_logit, rows)
-    log_absent, tracks, columns = rows.log_absent.copy(), np.empty(num, np.int64), np.empty((num, num_sensors), np.int64)
+    log_absent, tracks, columns = (
+        rows.log_absent.copy(),
+        np.empty(num, np.int64),
+        np.empty((num, num_sensors), np.int64),
+    )
     for i in range(num):
         rows.log_absent[i], tracks[i] = -math.inf, i
     return Combinations(rows, tracks, columns, log_absent)
@@ -98,7 +102,7 @@ def _options_to_keep(combinations: Combinations, options: Options, most: int) ->
 
 @kernel
 def _taken(combinations: Combinations, rows: Rows, options: Options, kept: Ints, at: int, shift: int) -> Combinations:
-    """The combinations that follow from the kept options at sensor `at`, whose measurements are counted from `shift`."""
+    """The combinations that follow from the kept options at sensor `at`, its measurements counted from `shift`."""
     num, num_components = 0, 0
     for i in range(len(combinations.tracks)):
         for option in range(options.offsets[i], options.offsets[i + 1]):

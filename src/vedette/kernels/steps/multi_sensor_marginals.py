@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vedette.kernels.base.arrays import filled_ints, hashed
-from vedette.kernels.base.compile import borrowing, inlined, kernel
+from vedette.kernels.base.compile import inlined, kernel
 from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.gaussian.linalg import log_add
 from vedette.kernels.gaussian.mixtures import descending_order
@@ -46,7 +46,8 @@ class StateCaps(NamedTuple):
 class Classes(NamedTuple):
     """Choices of the tracks of a cluster, those that take the same contested measurements together.
 
-    offsets: (num_members + 1,) classes of each member, the first of which takes nothing. masks: (num_classes, num_words).
+    offsets: (num_members + 1,) classes of each member, of which the first takes nothing.
+    masks: (num_classes, num_words).
     log_weights: (num_classes,). alive: (num_members, num_words) measurements for which a later member may ask.
     """
 
@@ -57,9 +58,10 @@ class Classes(NamedTuple):
 
 
 class States(NamedTuple):
-    """Sets of contested measurements that have been taken. masks: (num_states, num_words). log_weights: (num_states,) of
-    all that led there. log_lent: (num_states, 2) of that which led to sets that are not followed, but taken for this one:
-    for the sum, and for a bound on it.
+    """Sets of contested measurements that have been taken.
+
+    masks: (num_states, num_words). log_weights: (num_states,) of all that led there. log_lent: (num_states, 2) of that
+    which led to sets that are not followed but taken for this one: in the sum, and in the bound on what is amiss in it.
     """
 
     masks: Ints
@@ -80,7 +82,11 @@ def _find_clusters(choices: Choices, num_columns: int) -> tuple[Ints, Ints]:
     contested: (num_columns,) 1 where more than one track may take the measurement.
     """
     num_tracks = len(choices.log_absent)
-    leaders, owners, contested = np.empty(num_tracks, np.int64), filled_ints(num_columns, -1), filled_ints(num_columns, 0)
+    leaders, owners, contested = (
+        np.empty(num_tracks, np.int64),
+        filled_ints(num_columns, -1),
+        filled_ints(num_columns, 0),
+    )
     for track in range(num_tracks):
         leaders[track] = track
         for choice in range(choices.offsets[track], choices.offsets[track + 1]):
@@ -124,7 +130,11 @@ def _number_contested(choices: Choices, members: Ints, contested: Ints) -> tuple
 def _order_members(choices: Choices, members: Ints, bit_of: Ints, num_bits: int) -> None:
     """Put next, again and again, the member that leaves the fewest measurements open: asked for before and after it."""
     num = len(members)
-    wants, asked, is_open = np.zeros((num, num_bits), np.int64), np.zeros(num_bits, np.int64), np.zeros(num_bits, np.int64)
+    wants, asked, is_open = (
+        np.zeros((num, num_bits), np.int64),
+        np.zeros(num_bits, np.int64),
+        np.zeros(num_bits, np.int64),
+    )
     for i in range(num):
         for choice in range(choices.offsets[members[i]], choices.offsets[members[i] + 1]):
             for sensor in range(choices.columns.shape[1]):
@@ -166,10 +176,10 @@ def _write_mask(columns: Ints, choice: int, bit_of: Ints, mask: Ints) -> None:
 
 @inlined
 def _same(first: Ints, second: Ints) -> bool:
+    difference = 0
     for word in range(len(first)):
-        if first[word] != second[word]:
-            return False
-    return True
+        difference |= first[word] ^ second[word]
+    return difference == 0
 
 
 @kernel
@@ -226,8 +236,8 @@ def _slot(table: Ints, masks: Ints, mask: Ints) -> int:
 
 @kernel
 def _advance(classes: Classes, member: int, states: States) -> tuple[States, Ints]:
-    """The states after a member has chosen, and (2 columns, as `States.log_lent`) which follows from each state and class;
-    -1: none.
+    """The states after a member has chosen, and which of them follows from each state and class, -1 for none, in two
+    columns as `States.log_lent`.
     """
     first, num_classes = classes.offsets[member], classes.offsets[member + 1] - classes.offsets[member]
     most, num_words = len(states.masks) * num_classes, states.masks.shape[1]
@@ -243,7 +253,7 @@ def _advance(classes: Classes, member: int, states: States) -> tuple[States, Int
                 before, taken = states.masks[state, word], classes.masks[first + c, word]
                 free = free and before & taken == 0
                 masks[count, word] = (before | taken) & classes.alive[member, word]
-            if not free or log_weight == -math.inf:
+            if not free or classes.log_weights[first + c] == -math.inf:
                 continue
             slot = _slot(table, masks, masks[count])
             if table[slot] < 0:
@@ -277,6 +287,8 @@ def _keep_heaviest(states: States, targets: Ints, caps: StateCaps) -> States:
     """
     order, num_words = descending_order(states.log_weights), states.masks.shape[1]
     heaviest, most = states.log_weights[order[0]], 0
+    if heaviest == -math.inf:
+        return states
     while most < min(len(order), caps.max_states) and heaviest - states.log_weights[order[most]] <= caps.max_log_gap:
         most += 1
     if most == len(order):
@@ -344,9 +356,7 @@ def _append(forward: States, filled: int, states: States) -> States:
 
 @kernel
 def _sum_cluster(classes: Classes, caps: StateCaps, out: Floats) -> tuple[float, float]:
-    """Log of the sum of all joint choices that hold each class. Returns the log of the sum of all, and of the most that is
-    amiss in it.
-    """
+    """Log of the sum of all joint choices that hold each class; returns the log of all, and the most that is amiss."""
     num_members = len(classes.offsets) - 1
     starts, num_targets = np.zeros(num_members + 1, np.int64), 0
     states = States(np.zeros((1, classes.masks.shape[1]), np.int64), np.zeros(1), np.full((1, 2), -math.inf))
@@ -372,6 +382,8 @@ def _single_track(choices: Choices, track: int, out: Floats, out_absent: Floats)
     log_total = choices.log_absent[track]
     for choice in range(choices.offsets[track], choices.offsets[track + 1]):
         log_total = log_add(log_total, choices.log_weights[choice])
+    if log_total == -math.inf:
+        return log_total
     out_absent[track] = choices.log_absent[track] - log_total
     for choice in range(choices.offsets[track], choices.offsets[track + 1]):
         out[choice] = choices.log_weights[choice] - log_total
@@ -397,6 +409,8 @@ def choice_marginals(
         members = _members(leaders, leader)
         if len(members) == 1:
             log_total += _single_track(choices, leader, out, out_absent)
+            if log_total == -math.inf:
+                return log_total, num_inexact, log_kept
             continue
         classes = _make_classes(choices, members, contested, class_of)
         sums = np.empty(len(classes.log_weights))
