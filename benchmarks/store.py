@@ -19,28 +19,27 @@ import statistics
 import tempfile
 import time
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pyarrow as pa
 from pyarrow import parquet
 
 from vedette.campaigns.cells import resolve
-from vedette.campaigns.codec import decode, encode, encode_timings
+from vedette.campaigns.codec import decode, encode
 from vedette.campaigns.export import export_tables
 from vedette.campaigns.results import open_results
 from vedette.campaigns.spec import spec_from_data
 from vedette.campaigns.store import Store
-from vedette.evaluation.metrics import RunMetrics, measure
+from vedette.evaluation.metrics import RunMetrics, decode_metrics, encode_metrics, measure
 from vedette.evaluation.runs import run_scenario
 from vedette.files import sync_folder
 from vedette.scenarios import load_scenario
-from vedette.simulation.columns import flatten
-from vedette.simulation.decisions import read_decisions, write_decisions
+from vedette.simulation.arrow import read_table, to_arrow
+from vedette.simulation.kept import encode_timings
 from vedette.simulation.records import RunRecord
-from vedette.simulation.tabulation import TABLES, record_of, run_facts, tables_of
+from vedette.simulation.tables import LAYOUTS, record_of, run_facts, tables_of
 
 Way = tuple[Callable[[int], None], Callable[[], int]]
 
@@ -50,17 +49,25 @@ def sqlite_file(folder: Path, record: RunRecord, metrics: RunMetrics, journal: s
     database = sqlite3.connect(folder / "campaign.sqlite", isolation_level=None)
     database.execute(f"PRAGMA journal_mode = {journal}")
     database.execute(f"PRAGMA synchronous = {'EXTRA' if journal == 'delete' else 'FULL'}")
-    database.execute("CREATE TABLE runs (cell TEXT, run INTEGER, payload BLOB, PRIMARY KEY (cell, run)) STRICT")
+    database.execute(
+        "CREATE TABLE runs (cell TEXT, run INTEGER, payload BLOB, metrics BLOB, PRIMARY KEY (cell, run)) STRICT"
+    )
 
     def land(run: int) -> None:
-        payload = zlib.compress(encode(record, metrics), 1)
-        database.execute("INSERT INTO runs VALUES ('jdm', ?, ?)", (run, payload))
+        payload, measures = (zlib.compress(part, 1) for part in (encode(record), encode_metrics(metrics)))
+        database.execute("INSERT INTO runs VALUES ('jdm', ?, ?, ?)", (run, payload, measures))
 
     def read() -> int:
-        rows = database.execute("SELECT payload FROM runs ORDER BY cell, run")
-        return sum(decode(zlib.decompress(payload))[0].num_scans for (payload,) in rows)
+        rows = database.execute("SELECT payload, metrics FROM runs ORDER BY cell, run")
+        return sum(_read(zlib.decompress(payload), zlib.decompress(measures)) for payload, measures in rows)
 
     return land, read
+
+
+def _read(payload: bytes, measures: bytes) -> int:
+    num_scans = decode(payload).num_scans
+    decode_metrics(measures, num_scans)
+    return num_scans
 
 
 def parquet_folders(folder: Path, record: RunRecord, metrics: RunMetrics) -> Way:
@@ -69,11 +76,11 @@ def parquet_folders(folder: Path, record: RunRecord, metrics: RunMetrics) -> Way
     def land(run: int) -> None:
         scratch = folder / f".jdm-{run}"
         scratch.mkdir()
-        tables = {**tables_of(record), "metrics": metrics.columns()}
-        for name, columns in tables.items():
-            parquet.write_table(pa.table(flatten(columns)), scratch / f"{name}.parquet")
+        for name, columns in tables_of(record).items():
+            batch = to_arrow(columns, LAYOUTS[name])
+            parquet.write_table(pa.Table.from_batches([batch]), scratch / f"{name}.parquet")
+        parquet.write_table(pa.table(metrics.columns()), scratch / "metrics.parquet")
         (scratch / "run.json").write_text(json.dumps(run_facts(record)))
-        (scratch / "decisions.json").write_text(write_decisions(record.decisions))
         for file in scratch.iterdir():
             with file.open("rb") as opened:
                 os.fsync(opened.fileno())
@@ -89,32 +96,22 @@ def parquet_folders(folder: Path, record: RunRecord, metrics: RunMetrics) -> Way
 
 def _read_folder(folder: Path) -> RunRecord:
     tables = {}
-    for name, kinds in TABLES.items():
-        table = parquet.read_table(folder / f"{name}.parquet")
-        flat = {column: table.column(column).to_numpy() for column in table.column_names}
-        tables[name] = {column: flat[column] if column in flat else _stacked(flat, column) for column in kinds}
-    RunMetrics.from_columns(
-        {name: column.to_numpy() for name, column in _columns(parquet.read_table(folder / "metrics.parquet"))}
-    )
-    facts = json.loads((folder / "run.json").read_text())
-    return record_of(facts, tables, read_decisions((folder / "decisions.json").read_text()), {})
-
-
-def _columns(table: pa.Table) -> Iterator[tuple[str, pa.ChunkedArray]]:
-    return zip(table.column_names, table.columns, strict=True)
-
-
-def _stacked(flat: dict[str, object], name: str) -> object:
-    width = sum(column.startswith(f"{name}_") for column in flat)
-    return np.stack([flat[f"{name}_{index}"] for index in range(width)], axis=1)  # type: ignore[arg-type]
+    for name in LAYOUTS:
+        table = parquet.read_table(folder / f"{name}.parquet").combine_chunks()
+        out = pa.BufferOutputStream()
+        with pa.ipc.new_file(out, table.schema) as writer:
+            writer.write_table(table)
+        tables[name] = read_table(out.getvalue().to_pybytes(), LAYOUTS[name], name)
+    parquet.read_table(folder / "metrics.parquet")
+    return record_of(json.loads((folder / "run.json").read_text()), tables, {})
 
 
 def print_codec(record: RunRecord, metrics: RunMetrics, repeats: int = 200) -> None:
     """Median milliseconds to encode and to decode a run, with all checks."""
-    payload = encode(record, metrics)
+    payload, measures = encode(record), encode_metrics(metrics)
     calls: dict[str, Callable[[], object]] = {
-        "encode": lambda: encode(record, metrics),
-        "decode": lambda: decode(payload),
+        "encode": lambda: (encode(record), encode_metrics(metrics)),
+        "decode": lambda: _read(payload, measures),
     }
     for name, call in calls.items():
         seconds = []
@@ -122,7 +119,7 @@ def print_codec(record: RunRecord, metrics: RunMetrics, repeats: int = 200) -> N
             start = time.perf_counter()
             call()
             seconds.append(time.perf_counter() - start)
-        print(f"{name}: {1e3 * statistics.median(seconds):.2f} ms, {len(payload)} bytes")
+        print(f"{name}: {1e3 * statistics.median(seconds):.2f} ms, {len(payload) + len(measures)} bytes")
 
 
 def measured(way: Way, folder: Path, num_runs: int) -> str:
@@ -148,7 +145,7 @@ def whole_folder(folder: Path, record: RunRecord, metrics: RunMetrics, num_runs:
     with Store.open(folder / "results", campaign) as store:
         for cell, run in campaign.tasks:
             mine = replace(record, run=run)
-            store.add(cell.name, run, encode(mine, metrics), encode_timings(mine))
+            store.add(cell.name, run, encode(mine), encode_timings(mine), encode_metrics(metrics))
     start = time.perf_counter()
     results = open_results(folder / "results")
     results.comparisons()

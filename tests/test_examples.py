@@ -54,7 +54,7 @@ SHOWN = {
     "docs/filters.md": ["target at"],
     "docs/metrics.md": ["True"],
     "docs/report.md": [],
-    "docs/results.md": ["gospa_m", "margin", "jdm-rate-5.0", "chosen_heading_deg"],
+    "docs/results.md": ["gospa_m", "margin", "jdm-rate-5.0", "heading_deg", "farthest_m"],
     "docs/runs.md": ["m; [10.0, 20.0, 30.0]"],
     "examples/own_sensor.py": ["greatest difference between the two"],
 }

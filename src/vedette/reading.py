@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from vedette.errors import InputError
 from vedette.text import shown
 
 MOST_BYTES = 2**30  # of a file, or of what one unpacks to: a run of 10,000 scans of 100 targets has a fifth of it
@@ -37,6 +38,22 @@ def read_file(path: Path, most: int = MOST_BYTES) -> bytes:
     if len(content) > most:
         raise ValueError(f"it has more than {most} bytes")
     return content
+
+
+def read_text(path: Path, what: str, most: int) -> str:
+    """The text of a UTF-8 file of at most so many bytes; `what` it is called in messages.
+
+    Raises:
+        InputError: it cannot be read, is too large, or is no such text.
+    """
+    try:
+        return read_file(path, most).decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path}: expected UTF-8 text; byte {error.start} is not") from None
+    except OSError as error:
+        raise InputError(f"{path}: expected a readable {what}; got {error.strerror}") from None
+    except ValueError as error:
+        raise InputError(f"{path}: expected a {what} of at most {most} bytes; {error}") from None
 
 
 def parse_json(content: bytes | str) -> Any:

@@ -21,7 +21,7 @@ def entry_of(run: int) -> Entry:
     """A run of bytes that do not compress, others for every number."""
     seed = hashlib.sha256(str(run).encode()).digest()
     payload = hashlib.shake_256(seed).digest(SIZE)
-    return Entry(CELL, run, 1, payload, payload[:1000])
+    return Entry(CELL, run, 1, payload, b"", payload[:1000])
 
 
 def add_for_ever(folder: Path, pause: str = "0.0") -> None:
@@ -56,8 +56,8 @@ def add_half(folder: Path) -> None:
     database.execute("PRAGMA cache_size = 1")
     database.execute("BEGIN IMMEDIATE")
     for run in range(1000, 1100):
-        row = (CELL, run, 1, entry_of(run).payload, "", b"", "")
-        database.execute("INSERT INTO runs VALUES (?, ?, ?, ?, ?, ?, ?)", row)
+        row = (CELL, run, 1, entry_of(run).payload, "", b"", "", b"", "")
+        database.execute("INSERT INTO runs VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)", row)
     print("half", flush=True)
     sys.stdin.read()
 

@@ -7,10 +7,11 @@ from pathlib import Path
 
 from evaluation.synthetic import make_record
 from vedette.campaigns.cells import Campaign, resolve
-from vedette.campaigns.codec import encode, encode_timings
+from vedette.campaigns.codec import encode
 from vedette.campaigns.spec import spec_from_data
 from vedette.campaigns.store import Store
-from vedette.evaluation.metrics import RunMetrics, measure
+from vedette.evaluation.metrics import RunMetrics, encode_metrics, measure
+from vedette.simulation.kept import encode_timings
 from vedette.simulation.records import RunRecord
 
 NUM_RUNS = 3
@@ -37,8 +38,8 @@ def make_run(planner: str, run: int) -> tuple[RunRecord, RunMetrics]:
 def add(store: Store, cell: str, run: int) -> bytes:
     """Add a run of the planner that the cell's name begins with; returns its payload."""
     record, metrics = make_run(cell.split("-")[0], run)
-    payload = encode(record, metrics)
-    store.add(cell, run, payload, encode_timings(record))
+    payload = encode(record)
+    store.add(cell, run, payload, encode_timings(record), encode_metrics(metrics))
     return payload
 
 

@@ -12,12 +12,12 @@ from vedette.campaigns import tasks
 from vedette.campaigns.codec import decode
 from vedette.campaigns.tasks import MIN_TASK_SECONDS, Failed, Landed, TaskQueue, perform
 from vedette.errors import ModelError, VedetteError
-from vedette.evaluation.metrics import measure
+from vedette.evaluation.metrics import decode_metrics, measure
 from vedette.evaluation.runs import run_scenario
 
 
 def landed(cell: str, seconds: float) -> Landed:
-    return Landed(cell, 0, b"", b"", 1.0, seconds)
+    return Landed(cell, 0, b"", b"", b"", 1.0, seconds)
 
 
 def drain(queue: TaskQueue) -> list[tuple[str, tuple[int, ...]]]:
@@ -69,7 +69,10 @@ def test_a_task_gives_back_the_runs_it_was_given() -> None:
     assert isinstance(first, Landed)
     assert isinstance(second, Landed)
     assert (first.cell, first.run, second.run) == ("idm", 0, 2)
-    record, metrics = decode(second.payload)
+    record = decode(second.payload)
+    metrics, own = decode_metrics(second.metrics, record.num_scans)
+    assert metrics is not None
+    assert own == {}
     again = run_scenario(task.cell.scenario, "idm", seed=0, run=2)
     assert record.ospa.tobytes() == again.ospa.tobytes()
     assert second.ospa == again.ospa[:, 0].mean()

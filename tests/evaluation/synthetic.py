@@ -89,7 +89,7 @@ def _move(planner: str, times: Floats, rng: np.random.Generator) -> tuple[Floats
         poses[scan] = pose
         if scan in DECISION_STEPS and planner != "fixed":
             plan = make_plan(planner, rng)
-            decisions.append(Decision(scan, float(time), pose.copy(), plan))
+            decisions.append(Decision(scan + 1, float(time), pose.copy(), plan))
             pose = np.c_[pose[:, :2], np.deg2rad(plan.chosen_actions)]
             moving = True
     return poses, tuple(decisions)

@@ -8,6 +8,7 @@ import zipfile
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
 
 Generator = np.random.Generator
 
@@ -107,24 +108,6 @@ def edit_bytes(content: bytes, rng: Generator) -> bytes:
 def edit_array(array: np.ndarray[Any, Any], rng: Generator) -> np.ndarray[Any, Any]:
     """The array with other numbers, of another type or of another shape."""
     what = rng.integers(7)
-    if array.dtype.names:
-        names = list(array.dtype.names)
-        name = names[rng.integers(len(names))]
-        if what == 0:
-            names.remove(name)
-            return array[names].copy() if names else array
-        if what == 1:
-            return array[: len(array) // 2]
-        if what == 2:
-            return np.concatenate([array, array[:1]])
-        if what == 3:
-            kinds = [(each, rng.choice(["<f4", "<i8", "<f8", "<U3", "<c16"]), array[each].shape[1:]) for each in names]
-            return np.zeros(len(array), np.dtype([(each, str(kind), shape) for each, kind, shape in kinds]))
-        edited = array.copy()
-        if array[name].size:
-            with np.errstate(all="ignore"):
-                edited[name].reshape(-1)[rng.integers(array[name].size)] = _number(array[name].dtype, rng)
-        return edited
     if what == 0 and array.dtype.kind in "fiu":
         return array.astype(rng.choice(["<f4", "<i8", "<f8", "<U3", "<c16", "?"]))
     if what == 1:
@@ -163,6 +146,51 @@ def huge_npy(rng: Generator) -> bytes:
     return b"\x93NUMPY\x01\x00" + (len(header) + 1).to_bytes(2, "little") + header.encode() + b"\n" + b"\0" * 64
 
 
+def edit_arrow(content: bytes, rng: Generator) -> bytes:
+    """An Arrow file with other bytes, columns, types, rows or nulls; in several batches, or packed."""
+    what = rng.integers(8)
+    if what < 3:
+        return edit_bytes(content, rng)
+    table = pa.ipc.open_file(content).read_all()
+    if what == 3:
+        table = pa.table({name: np.zeros(2_000_000) for name in table.schema.names[:1]})
+    elif what > 4 and table.num_columns:
+        table = _edit_column(table, int(rng.integers(table.num_columns)), rng)
+    packing = [None, "zstd", "lz4"][rng.integers(3)] if what in (3, 4) else None
+    out = pa.BufferOutputStream()
+    with pa.ipc.new_file(out, table.schema, options=pa.ipc.IpcWriteOptions(compression=packing)) as writer:
+        writer.write_table(table, None if rng.integers(4) else 1)
+    return bytes(out.getvalue().to_pybytes())
+
+
+def _edit_column(table: pa.Table, place: int, rng: Generator) -> pa.Table:
+    """With one column gone, renamed, of another type, with nulls or other values; or with rows in another order."""
+    name, column, what = table.schema.names[place], table.column(place), rng.integers(6)
+    if what == 0:
+        return table.drop_columns([name])
+    if what == 1:
+        names = list(table.schema.names)
+        names[place] = str(rng.choice(["", "extra", "action_99", "state_7", *names]))
+        return table.rename_columns(names)
+    if what == 2:
+        types = (pa.string(), pa.float32(), pa.int32(), pa.binary(), pa.bool_(), pa.null(), pa.list_(pa.int64()))
+        kind = types[rng.integers(len(types))]
+        return table.set_column(place, name, pa.nulls(table.num_rows, kind))
+    if what == 3:
+        return table.take(
+            rng.integers(0, max(table.num_rows, 1), int(rng.integers(0, table.num_rows + 3)) * bool(table))
+        )
+    values = column.to_pylist()
+    for index in rng.integers(0, max(len(values), 1), min(len(values), int(rng.integers(1, 4)))):
+        if what == 4:
+            values[index] = None
+        elif pa.types.is_integer(column.type) or pa.types.is_floating(column.type):
+            values[index] = _number(np.dtype(column.type.to_pandas_dtype()), rng).item()
+        else:
+            values[index] = ["", "x" * 1000][rng.integers(2)] if pa.types.is_string(column.type) else not values[index]
+    return table.set_column(place, name, pa.array(values, column.type))
+
+
 def edit_npz(content: bytes, rng: Generator) -> bytes:
     """An archive of arrays and JSON with a member edited, replaced, gone, doubled or inflated."""
     if not rng.integers(5):
@@ -187,6 +215,8 @@ def edit_npz(content: bytes, rng: Generator) -> bytes:
         members[place] = (f"{name}x", old)
     elif name.endswith(".json"):
         members[place] = (name, edit_json(old, rng))
+    elif name.endswith(".arrow"):
+        members[place] = (name, edit_arrow(old, rng))
     else:
         array = np.lib.format.read_array(io.BytesIO(old), allow_pickle=False)
         members[place] = (name, npy(edit_array(array, rng)))

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from fuzz.edits import edit_bytes, edit_json, edit_npz, value_of
+from fuzz.edits import edit_arrow, edit_bytes, edit_json, edit_npz, value_of
 from vedette.campaigns.manifest import contents_checksum
 
 Generator = np.random.Generator
@@ -46,12 +46,13 @@ _STATEMENTS = [
 _VIEW = (
     "ALTER TABLE runs RENAME TO old",
     "CREATE VIEW runs AS WITH RECURSIVE r(n) AS (SELECT 1 UNION ALL SELECT n + 1 FROM r) "
-    "SELECT 'jdm' AS cell, n AS run, 1 AS session, x'' AS payload, '' AS payload_sha256, x'' AS timings, "
+    "SELECT 'jdm' AS cell, n AS run, 1 AS session, x'' AS payload, '' AS payload_sha256, x'' AS metrics, "
+    "'' AS metrics_sha256, x'' AS timings, "
     "'' AS timings_sha256 FROM r",
 )
 _UNTYPED = (
     "ALTER TABLE runs RENAME TO old",
-    "CREATE TABLE runs (cell, run, session, payload, payload_sha256, timings, timings_sha256)",
+    "CREATE TABLE runs (cell, run, session, payload, payload_sha256, metrics, metrics_sha256, timings, timings_sha256)",
     "INSERT INTO runs SELECT * FROM old",
     "DROP TABLE old",
 )
@@ -87,7 +88,9 @@ def edit_database(folder: Path, rng: Generator) -> None:
     elif what == 4:
         ask(folder, *((statement, ()) for statement in _VIEW))
     elif what == 5:
-        column = ["cell", "run", "session", "payload", "payload_sha256", "timings", "timings_sha256"][rng.integers(7)]
+        column = ["cell", "run", "session", "payload", "payload_sha256", "metrics", "timings", "timings_sha256"][
+            rng.integers(8)
+        ]
         value = _storable(value_of(rng))
         change = (f"UPDATE runs SET {column} = ? WHERE run = 0", (value,))
         ask(folder, *((statement, ()) for statement in _UNTYPED), change)
@@ -106,14 +109,12 @@ def _storable(value: Any) -> Any:
 def edit_run(folder: Path, rng: Generator, *, sign: bool) -> None:
     """Other bytes of one run; with `sign` their checksum fits."""
     with closing(sqlite3.connect(folder / "campaign.sqlite")) as database:
-        rows = database.execute("SELECT cell, run, payload, timings FROM runs ORDER BY cell, run").fetchall()
-    cell, run, payload, timings = rows[rng.integers(len(rows))]
-    edited = {"payload": zlib.decompress(payload), "timings": zlib.decompress(timings)}
-    column = "timings" if not rng.integers(6) else "payload"
-    edited[column] = edit_npz(edited[column], rng) if column == "payload" else edit_bytes(edited[column], rng)
+        rows = database.execute("SELECT cell, run, payload, metrics, timings FROM runs ORDER BY cell, run").fetchall()
+    cell, run, *blobs = rows[rng.integers(len(rows))]
+    column, old = list(zip(("payload", "metrics", "timings"), blobs, strict=True))[max(0, rng.integers(6) - 3)]
+    content = (edit_npz if column == "payload" else edit_arrow)(zlib.decompress(old), rng)
     if not rng.integers(20):
-        edited[column] = bytes(200_000_000)  # a fifth of a megabyte on the disk
-    content = edited[column]
+        content = bytes(200_000_000)  # a fifth of a megabyte on the disk
     packed = zlib.compress(content, 1)
     ask(folder, (f"UPDATE runs SET {column} = ? WHERE cell = ? AND run = ?", (packed, cell, run)))
     if sign:

@@ -23,14 +23,15 @@ from densities.examples import random_glmb, random_lmb, random_poisson
 from evaluation.synthetic import make_record
 from fuzz import edits, store_edits
 from vedette.campaigns.cells import Campaign
-from vedette.campaigns.codec import encode, encode_timings
+from vedette.campaigns.codec import encode
 from vedette.campaigns.results import CampaignResults, open_results
 from vedette.campaigns.store import Store
 from vedette.cli import app
 from vedette.densities.files import load_density, save_density
 from vedette.errors import VedetteError
-from vedette.evaluation.metrics import measure
+from vedette.evaluation.metrics import encode_metrics, measure
 from vedette.reports import write_figures, write_report
+from vedette.simulation.kept import encode_timings
 from vedette.simulation.storage import load_run, read_manifest, save_run
 
 pytestmark = pytest.mark.fuzz
@@ -65,8 +66,8 @@ def originals(tmp_path_factory: pytest.TempPathFactory) -> Originals:
     with Store.open(place / "results", campaign) as store:
         for cell, run in campaign.tasks:
             record = replace(make_record(cell.planner, run, num_scans=SCANS), scenario="paper-a")
-            metrics = measure(record, cutoff=100.0, order=1.0, window=10)
-            store.add(cell.name, run, encode(record, metrics), encode_timings(record))
+            metrics = encode_metrics(measure(record, cutoff=100.0, order=1.0, window=10))
+            store.add(cell.name, run, encode(record), encode_timings(record), metrics)
     save_run(make_record(num_scans=SCANS), place / "run", scenario_text="name: synthetic\n")
     rng = np.random.default_rng(0)
     save_density(place / "glmb.npz", random_glmb(rng, 3, 5, 2))
@@ -166,7 +167,7 @@ def _read_all(results: CampaignResults, originals: Originals | None) -> None:
         results.finished(cell.name)
         assert len(results.missing(cell.name)) <= results.campaign.num_runs
     for run in results.runs():
-        encoded = encode(run.record, run.metrics)
+        encoded = encode(run.record)
         checksum = hashlib.sha256(f"{run.cell}\n{run.record.run}\n".encode() + encoded).hexdigest()
         if originals is not None:
             assert checksum == originals.checksums[run.cell, run.record.run], "another run, and nothing says so"
@@ -215,8 +216,8 @@ def test_saved_runs(originals: Originals, copies: Callable[[Path], Path], try_ca
             again = save_run(record, folder.parent / "again")
             if not signed:
                 whole = save_run(same, folder.parent / "same")
-                assert {path.name: path.read_bytes() for path in again.glob("*.csv")} == {
-                    path.name: path.read_bytes() for path in whole.glob("*.csv")
+                assert {path.name: path.read_bytes() for path in again.glob("*.arrow")} == {
+                    path.name: path.read_bytes() for path in whole.glob("*.arrow")
                 }
         assert contents(folder) == before
 
@@ -235,12 +236,10 @@ def _edit_saved(folder: Path, rng: np.random.Generator) -> bool:
     old = path.read_bytes()
     if name.endswith(".json"):
         new = edits.edit_json(old, rng)
-    elif rng.integers(2):
-        new = edits.edit_bytes(old, rng)
+    elif name.endswith(".arrow"):
+        new = edits.edit_arrow(old, rng)
     else:
-        cells = old.decode().split(",")
-        cells[rng.integers(len(cells))] = str(edits.value_of(rng))[:1000]
-        new = ",".join(cells).encode(errors="replace")
+        new = edits.edit_bytes(old, rng)
     path.write_bytes(new)
     if name == "manifest.json":
         return True  # the facts of a run stand nowhere else

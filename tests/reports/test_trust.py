@@ -13,15 +13,15 @@ from typer.testing import CliRunner
 from evaluation.synthetic import make_record
 from fuzz.store_edits import sign_manifest
 from vedette.campaigns.cells import Campaign, resolve
-from vedette.campaigns.codec import encode, encode_timings
+from vedette.campaigns.codec import encode
 from vedette.campaigns.spec import spec_from_data
 from vedette.campaigns.store import Store
 from vedette.cli import app
-from vedette.evaluation.metrics import measure
 from vedette.scenarios import Scenario, load_scenario
 from vedette.scenarios.dumping import dump_scenario
 from vedette.scenarios.overrides import with_fields
 from vedette.scenarios.trust import code_of, not_own
+from vedette.simulation.kept import encode_timings
 
 MODELS = """
 from pathlib import Path
@@ -54,8 +54,7 @@ def results(scenario: Path, tmp_path: Path) -> Path:
     )
     with Store.open(tmp_path / "results", campaign) as store:
         record = replace(make_record("jdm"), scenario="paper-a")
-        metrics = measure(record, cutoff=100.0, order=1.0, window=10)
-        store.add("jdm", 0, encode(record, metrics), encode_timings(record))
+        store.add("jdm", 0, encode(record), encode_timings(record))
     scenario.with_name("mark").unlink()
     return tmp_path / "results"
 

@@ -43,7 +43,7 @@ def needed(kind: str | None = None, **fields: st.SearchStrategy[Any]) -> st.Sear
 
 
 def custom(**fields: st.SearchStrategy[Any]) -> st.SearchStrategy[Data]:
-    return needed("custom", python=references, arguments=arguments, **fields)
+    return needed("custom", function=references, arguments=arguments, **fields)
 
 
 order = st.sampled_from(["grouped", "interleaved"])

@@ -110,7 +110,7 @@ def test_loading_names_the_file(tmp_path: Path) -> None:
 def test_what_is_no_utf8_is_told(tmp_path: Path) -> None:
     file = tmp_path / "latin.yaml"
     file.write_bytes("name: Zürich\n".encode("latin-1"))
-    with pytest.raises(ScenarioError, match="expected UTF-8 text, got byte 7 that is not"):
+    with pytest.raises(InputError, match="expected UTF-8 text; byte 7 is not"):
         load_scenario(file)
 
 

@@ -19,7 +19,7 @@ from vedette.fusion.base import _MERGE_DISTANCE
 from vedette.recorded import Cleaning
 from vedette.recorded import RecordedTargets as RecordedSource
 from vedette.scenarios import json_schema
-from vedette.scenarios.diagnostics import kind_of, locate
+from vedette.scenarios.diagnostics import kind_of
 from vedette.scenarios.sections.base import Section
 from vedette.scenarios.sections.control import CauchySchwarzReward as CauchySchwarzSection
 from vedette.scenarios.sections.control import Control
@@ -43,12 +43,6 @@ def test_every_field_says_what_it_is_and_in_which_unit(section: type[BaseModel])
 def test_no_kind_is_also_a_key_of_its_section() -> None:
     for section in sections():
         assert kind_of(section) not in section.model_fields
-
-
-def test_locations_lose_the_kinds_of_unions() -> None:
-    assert locate(("sensors", 1, "noise", "constant", "std", 0))[0] == ("sensors", 1, "noise", "std", 0)
-    assert locate(("control", "reward", "unit_volume", "float"))[0] == ("control", "reward", "unit_volume")
-    assert locate(("motion", "custom", "arguments", "custom"))[0] == ("motion", "arguments", "custom")
 
 
 def test_json_schema_describes_fields_and_forbids_others() -> None:

@@ -6,16 +6,21 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
 import pytest
+from pyarrow import feather
 
 from evaluation.synthetic import make_record
 from vedette.densities.estimates import Estimate
 from vedette.errors import InputError
 from vedette.simulation import storage
+from vedette.simulation.arrow import Columns, read_table, write_table
+from vedette.simulation.kept import encode_run
 from vedette.simulation.records import RunRecord
 from vedette.simulation.storage import load_run, read_manifest, save_run
+from vedette.simulation.tables import LAYOUTS, TIMINGS
 
-FILES = ("decisions.json", "scans.csv", "sensors.csv", "timings.csv", "tracks.csv", "truth.csv")
+FILES = tuple(f"{name}.arrow" for name in (*LAYOUTS, "timings"))
 
 
 def assert_same(first: Any, second: Any) -> None:
@@ -72,7 +77,9 @@ def test_tables_with_gaps_read_back(tmp_path: Path) -> None:
     record = replace(record, decisions=(replace(decision, plan=plan),))
     save_run(record, tmp_path / "run")
     assert_same(load_run(tmp_path / "run"), record)
-    assert "null" in (tmp_path / "run" / "decisions.json").read_text()
+    rewards = feather.read_table(tmp_path / "run" / "rewards.arrow")
+    assert rewards.num_rows == np.isfinite(mean).sum()
+    assert set(rewards["action_0"].to_pylist()) == {decision.plan.chosen[0]}
 
 
 def test_runs_without_any_target_estimate_or_scan_read_back(tmp_path: Path) -> None:
@@ -89,14 +96,49 @@ def test_the_same_run_gives_the_same_bytes(tmp_path: Path) -> None:
         assert (first / file).read_bytes() == (again / file).read_bytes()
 
 
+def first_scan(record: RunRecord) -> RunRecord:
+    """The record of a run of a single scan."""
+    health = record.health.first(1)
+    timings = {stage: seconds[:1] for stage, seconds in record.timings.items()}
+    return replace(
+        record,
+        times=record.times[:1],
+        truth=record.truth.first(1),
+        poses=record.poses[:1],
+        estimates=record.estimates[:1],
+        decisions=(),
+        ospa=record.ospa[:1],
+        health=health,
+        timings=timings,
+    )
+
+
+def test_runs_of_one_scan_that_stopped_or_have_wider_poses_read_back(tmp_path: Path) -> None:
+    whole = make_record()
+    wide = np.concatenate([whole.poses, np.ones((40, 2, 2))], axis=2)
+    decisions = tuple(replace(each, poses=wide[each.step - 1]) for each in whole.decisions)
+    cases = {
+        "one scan": first_scan(whole),
+        "stopped": replace(first_scan(whole), stopped="synthetic: stopped at step 2: the filter: ²"),
+        "no times": replace(whole, timings={}),
+        "wide": replace(whole, poses=wide, decisions=decisions),
+    }
+    for name, record in cases.items():
+        assert_same(load_run(save_run(record, tmp_path / name)), record)
+
+
 def test_files_are_open_and_described(saved: Path) -> None:
     assert sorted(path.name for path in saved.iterdir()) == sorted([*FILES, "manifest.json", "scenario.yaml"])
-    assert (saved / "scans.csv").read_text().startswith("step,time_s,num_targets,num_estimates,ospa_m,localisation_m")
-    assert (
-        (saved / "sensors.csv").read_text().startswith("step,time_s,sensor,x_m,y_m,heading_rad,log_likelihood,num_hyp")
-    )
-    decision = json.loads((saved / "decisions.json").read_text())[0]
-    assert len(decision["chosen_actions"]) == 2
+    record = make_record()
+    scans, sensors = (feather.read_table(saved / f"{name}.arrow") for name in ("scans", "sensors"))
+    np.testing.assert_array_equal(scans["ospa_m"], record.ospa[:, 0])
+    assert scans.column_names[:5] == ["step", "time_s", "num_targets", "num_estimates", "ospa_m"]
+    assert sensors.column_names[:8] == [
+        *("step", "time_s", "sensor", "x_m", "y_m", "heading_rad", "log_likelihood", "num_hypotheses")
+    ]
+    actions = feather.read_table(saved / "actions.arrow").to_pylist()
+    chosen = [row["heading_deg"] for row in actions if row["chosen"] and row["decision"] == 0]
+    np.testing.assert_array_equal(chosen, np.ravel(record.decisions[0].plan.chosen_actions))
     manifest = read_manifest(saved)
     assert manifest["run"]["seed"] == 7
     assert set(manifest["versions"]) == {"python", "vedette", "numpy", "scipy", "numba"}
@@ -144,7 +186,7 @@ def test_a_crash_while_writing_leaves_nothing(tmp_path: Path, monkeypatch: pytes
 @pytest.mark.parametrize("file", FILES)
 def test_altered_and_truncated_files_are_named(saved: Path, file: str) -> None:
     content = (saved / file).read_bytes()
-    for broken in (content[: len(content) // 2], content.replace(b"1", b"2", 1), b""):
+    for broken in (content[: len(content) // 2], content[:-1] + bytes([content[-1] ^ 1]), b""):
         (saved / file).write_bytes(broken)
         with pytest.raises(InputError, match=rf"{file}: expected the file as it was written"):
             load_run(saved)
@@ -159,13 +201,15 @@ def test_altered_and_truncated_files_are_named(saved: Path, file: str) -> None:
         ("{", "cut short or altered"),
         ("[]", "got another file"),
         ('{"format": "photo album"}', "got another file"),
-        ('{"format": "vedette-run", "format_version": 99}', "format version 3; got 99"),
-        ('{"format": "vedette-run", "format_version": 3}', "fields files and run"),
-        ('{"format": "vedette-run", "format_version": 3, "run": {}, "files": {"../x": ""}}', "plain file names"),
+        ('{"format": "vedette-run", "format_version": 99}', "format 4; got 99, written by another version"),
         (
-            '{"format": "vedette-run", "format_version": 3, "run": {}, "files": {}}',
-            "expected a file decisions.json|scans",
+            '{"format": "vedette-run", "format_version": 3, "versions": {"vedette": "0.1"}}',
+            "expected format 4; got 3, written by an earlier version of this program: run it again, or read it with "
+            "vedette 0.1",
         ),
+        ('{"format": "vedette-run", "format_version": 4}', "fields files and run"),
+        ('{"format": "vedette-run", "format_version": 4, "run": {}, "files": {"../x": ""}}', "plain file names"),
+        ('{"format": "vedette-run", "format_version": 4, "run": {}, "files": {}}', "expected a file timings"),
     ],
 )
 def test_a_broken_manifest_is_named(saved: Path, manifest: str, message: str) -> None:
@@ -179,39 +223,115 @@ def test_what_is_no_run_is_named(tmp_path: Path) -> None:
         load_run(tmp_path / "nowhere")
 
 
-def rewrite(saved: Path, file: str, old: str, new: str) -> None:
+def rewrite(saved: Path, name: str, content: bytes) -> None:
     """Alter a file and make the manifest agree with it, as a careful hand would."""
-    text = (saved / file).read_text().replace(old, new, 1)
-    (saved / file).write_text(text)
+    (saved / f"{name}.arrow").write_bytes(content)
     manifest = json.loads((saved / "manifest.json").read_text())
-    manifest["files"][file] = storage.hashlib.sha256(text.encode()).hexdigest()
+    manifest["files"][f"{name}.arrow"] = storage.hashlib.sha256(content).hexdigest()
     (saved / "manifest.json").write_text(json.dumps(manifest))
 
 
+def table(saved: Path, name: str) -> Columns:
+    layout = LAYOUTS.get(name, TIMINGS)
+    return read_table((saved / f"{name}.arrow").read_bytes(), layout, name)
+
+
+def as_file(columns: Any, **options: Any) -> bytes:
+    out = pa.BufferOutputStream()
+    whole = pa.table(columns)
+    with pa.ipc.new_file(out, whole.schema, options=pa.ipc.IpcWriteOptions(**options)) as writer:
+        writer.write_table(whole)
+    return bytes(out.getvalue().to_pybytes())
+
+
 @pytest.mark.parametrize(
-    ("file", "old", "new", "message"),
+    ("name", "change", "message"),
     [
-        ("tracks.csv", "existence", "exists", "expected a column existence"),
-        ("truth.csv", "-55.0", "west", "column state_0: expected numbers"),
-        ("truth.csv", "\n1,", "\n1.5,", "column step: expected whole numbers"),
-        ("truth.csv", "\n1,", "\n40,", "expected rows in order"),
-        ("sensors.csv", "\n1,1.0,0,-745.0,830.0,0.0,nan", "", "rows as long as"),
-        ("scans.csv", "\n1,1.0,3", "\n1,1.0,3,3", "rows as long as"),
-        ("decisions.json", '"chosen"', '"choice"', "do not fit together"),
-        ("decisions.json", '"sensors": [', '"sensors": [7, ', "reward table"),
+        ("tracks", {"existence": None}, r"tracks\.arrow: expected a column existence; got "),
+        ("truth", {"state_1": None}, "expected columns state_0 to state_2; got "),
+        (
+            "truth",
+            {"state_0": ["west"]},
+            r"truth\.arrow, column 'state_0': expected numbers; got the type 'string'",
+        ),
+        ("truth", {"step": [1.5]}, r"column 'step': expected whole numbers; got the type 'double'"),
+        ("truth", {"step": [41]}, "step: expected rows in order, of steps 1 to 40"),
+        (
+            "truth",
+            {"colour": [40]},
+            r"truth\.arrow: expected no other column than step, time_s, target; got 'colour'",
+        ),
+        ("scans", {"ospa_m": pa.nulls(40, pa.float64())}, r"column 'ospa_m': expected numbers; got nothing"),
+        ("decisions", {"step": [-3]}, "record.decisions: expected a step of 1 to 40; got -3"),
+        ("decisions", {"step": [77]}, "do not fit together"),
+        ("decisions", {"decision": [1]}, "decisions, column decision: expected them numbered from 0"),
+        ("actions", {"chosen": [True]}, "do not fit together: too many values to unpack"),
+        ("actions", {"sensor": [2**62]}, "column sensor: expected rows"),
+        ("rewards", {"action_1": [13]}, "do not fit together: invalid entry in coordinates array"),
+        ("rewards", {"action_0": pa.nulls(507, pa.int64())}, "rewards: expected each combination of actions once"),
+        (
+            "timings",
+            {"filter_s": [0]},
+            r"timings\.arrow, column 'filter_s': expected numbers; got the type 'int64'",
+        ),
     ],
 )
-def test_files_that_do_not_fit_together_are_named(saved: Path, file: str, old: str, new: str, message: str) -> None:
-    rewrite(saved, file, old, new)
+def test_files_that_do_not_fit_together_are_named(saved: Path, name: str, change: dict[str, Any], message: str) -> None:
+    columns: dict[str, Any] = dict(table(saved, name))
+    num = len(next(iter(columns.values())))
+    for column, values in change.items():
+        full = values if isinstance(values, pa.Array) else [values[0]] * num if values else None
+        columns[column] = full
+    rewrite(saved, name, as_file({each: values for each, values in columns.items() if values is not None}))
     with pytest.raises(InputError, match=message):
         load_run(saved)
 
 
-def test_a_row_that_is_missing_is_named(saved: Path) -> None:
-    last = (saved / "sensors.csv").read_text().splitlines()[-1]
-    rewrite(saved, "sensors.csv", f"{last}\n", "")
-    with pytest.raises(InputError, match="do not fit together"):
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (b"", "it does not begin as one"),
+        (b"ARROW1\0\0\xff\xff", "it is cut short"),
+        (as_file({"step": np.zeros(10)}, compression="zstd"), "expected rows that are not compressed"),
+        (as_file({"step": np.zeros(10_000_000)}, compression="lz4"), "expected rows that are not compressed"),
+        (as_file({"step": pa.array(["a", "b"]).dictionary_encode()}), "expected a schema and one batch of rows"),
+        (as_file(pa.concat_tables([pa.table({"step": [1]})] * 2)), "expected a schema and one batch of rows"),
+    ],
+)
+def test_what_is_no_table_of_a_run_is_never_unpacked(saved: Path, content: bytes, message: str) -> None:
+    rewrite(saved, "truth", content)
+    with pytest.raises(InputError, match=rf"truth\.arrow: expected a table as an Arrow file; it is damaged: {message}"):
         load_run(saved)
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("sensors", "sensors: expected a row of every sensor for each of 40 scans; got 79"),
+        ("actions", "actions, column action: expected those of a sensor numbered from 0"),
+    ],
+)
+def test_a_row_that_is_missing_is_named(saved: Path, name: str, message: str) -> None:
+    rows: Any = table(saved, name)
+    rewrite(saved, name, write_table({each: values[1:] for each, values in rows.items()}, LAYOUTS[name]))
+    with pytest.raises(InputError, match=message):
+        load_run(saved)
+
+
+def test_bits_of_padding_are_no_part_of_a_file() -> None:
+    """Arrow pads columns of truths and of nulls to whole bytes and words: with zeros, whatever the memory held."""
+    record = make_record("idm")
+    first = encode_run(record)
+    junk = [np.full(100_000, 2**63 - 1) for _ in range(20)]
+    del junk
+    assert encode_run(make_record("idm")) == first
+    assert encode_run(load_again(record)) == first
+
+
+def load_again(record: RunRecord) -> RunRecord:
+    from vedette.campaigns.codec import decode, encode
+
+    return decode(encode(record))
 
 
 def contradictions() -> dict[str, RunRecord]:
@@ -225,8 +345,14 @@ def contradictions() -> dict[str, RunRecord]:
         "record.health.cap_met": replace(record, health=replace(record.health, cap_met=record.health.cap_met[1:])),
         "record.ospa": replace(record, ospa=record.ospa[:, :2]),
         "plan.chosen": replace(record, decisions=(replace(record.decisions[0], plan=plan),)),
-        "record.decisions: expected finite": replace(
+        "record.decisions: expected the time 10 s of step 10; got nan": replace(
             record, decisions=(replace(record.decisions[0], time=float("nan")),)
+        ),
+        "record.decisions: expected the poses of step 10": replace(
+            record, decisions=(replace(record.decisions[0], poses=record.poses[30]),)
+        ),
+        "record.times: expected one scan or more": replace(
+            record, times=record.times[:0], truth=record.truth.first(0), poses=record.poses[:0], estimates=()
         ),
     }
 

@@ -1,25 +1,24 @@
-"""Finished runs as one xarray dataset: every measure of every scan over cell, run and step."""
+"""The scans of finished runs as one xarray dataset: every measure over cell, run and step."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import pyarrow as pa
 
 from vedette.campaigns.cells import Campaign
-from vedette.campaigns.rows import scan_rows
 from vedette.campaigns.tables import setting_of, unit_of
 from vedette.errors import InputError
 
 if TYPE_CHECKING:
     import xarray
 
-    from vedette.campaigns.finished import FinishedRun
+_EMPTY = pa.table({"cell": pa.array([], pa.string()), **{name: np.empty(0) for name in ("run", "step", "time_s")}})
 
 
-def dataset_of_runs(campaign: Campaign, runs: Iterable[FinishedRun]) -> xarray.Dataset:
-    """Every column of the table `scans` as a float64 variable of dimensions (cell, run, step).
+def dataset_of_scans(campaign: Campaign, scans: pa.Table | None) -> xarray.Dataset:
+    """Every column of the table `scans` (None: no run is finished) as a float64 variable of (cell, run, step).
 
     NaN where a run is not finished, a cell has fewer scans than another, or a measure has no value. Coordinates: `cell`
     (name), `run`, `step` (from 1), the value of each axis of the campaign by cell, and `time_s` by cell and step.
@@ -31,20 +30,23 @@ def dataset_of_runs(campaign: Campaign, runs: Iterable[FinishedRun]) -> xarray.D
         import xarray
     except ImportError:
         raise InputError("dataset: expected xarray, which is not installed; pip install 'vedette[xarray]'") from None
-    rows = {(run.cell, run.record.run): scan_rows(run) for run in runs}
-    num_scans = max((len(columns["step"]) for columns in rows.values()), default=0)
-    names = list(dict.fromkeys(name for columns in rows.values() for name in columns if name != "step"))
-    values = {name: np.full((len(campaign.cells), campaign.num_runs, num_scans), np.nan) for name in names}
-    places = {cell.name: index for index, cell in enumerate(campaign.cells)}
-    for (cell, run), columns in rows.items():
-        for name in names:
-            column: Any = columns[name]
-            values[name][places[cell], run, : len(column)] = column
-    times = _times(values.pop("time_s", np.full((len(campaign.cells), 1, num_scans), np.nan)))
+    table = _EMPTY if scans is None else scans
+    cells = [cell.name for cell in campaign.cells]
+    of_cells = np.array([cells.index(name) for name in table["cell"].to_pylist()], np.int64)
+    of_runs, steps = (table[name].to_numpy().astype(np.int64) for name in ("run", "step"))
+    num_scans = int(steps.max(initial=0))
+    values = {}
+    for name in table.column_names:
+        if name not in ("cell", "run", "step", *campaign.axes):
+            values[name] = np.full((len(cells), campaign.num_runs, num_scans), np.nan)
+            values[name][of_cells, of_runs, steps - 1] = table[name].to_numpy()
+    times = np.full((len(cells), num_scans), np.nan)
+    times[of_cells, steps - 1] = table["time_s"].to_numpy()  # the same in every run of a cell
+    del values["time_s"]
     return xarray.Dataset(
         {name: (("cell", "run", "step"), array, _attributes(name)) for name, array in values.items()},
         coords={
-            "cell": [cell.name for cell in campaign.cells],
+            "cell": cells,
             "run": np.arange(campaign.num_runs),
             "step": np.arange(1, num_scans + 1),
             "time_s": (("cell", "step"), times, {"units": "s"}),
@@ -52,14 +54,6 @@ def dataset_of_runs(campaign: Campaign, runs: Iterable[FinishedRun]) -> xarray.D
         },
         attrs={"campaign": campaign.name, "seed": str(campaign.seed)},
     )
-
-
-def _times(of_runs: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
-    """(num_cells, num_scans) from the same for each run, NaN where it is not finished."""
-    times = np.full((of_runs.shape[0], of_runs.shape[2]), np.nan)
-    for run in range(of_runs.shape[1]):
-        times = np.where(np.isnan(times), of_runs[:, run], times)
-    return times
 
 
 def _values(campaign: Campaign, axis: str) -> list[Any]:

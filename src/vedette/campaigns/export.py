@@ -1,4 +1,4 @@
-"""The results of a campaign in the files of other tools: Parquet, CSV, NetCDF."""
+"""Results in the files of other tools, of a campaign or of a single run: Parquet, CSV, NetCDF."""
 
 from __future__ import annotations
 
@@ -10,15 +10,16 @@ from typing import Any, BinaryIO
 from pyarrow import csv, parquet
 
 from vedette.campaigns.results import CampaignResults
-from vedette.campaigns.tables import plain_lists
+from vedette.campaigns.tables import tables_of_record
 from vedette.errors import InputError
 from vedette.files import write_whole
+from vedette.simulation.records import RunRecord
 
 NETCDF = "scans.nc"
 
 
-def export_tables(results: CampaignResults, folder: Path | str) -> tuple[Path, ...]:
-    """Write each table of `CampaignResults.tables` as `<name>.parquet` into a folder; returns the files.
+def export_tables(results: CampaignResults | RunRecord, folder: Path | str) -> tuple[Path, ...]:
+    """Write each table as `<name>.parquet` into a folder; returns the files.
 
     Each file appears whole or not at all, in place of one of that name. Equal results give equal bytes under the same
     version of pyarrow, but for `timings.parquet`, which holds what the clock said. No file where no run is finished.
@@ -32,21 +33,23 @@ def export_tables(results: CampaignResults, folder: Path | str) -> tuple[Path, .
     return _write_tables(results, Path(folder), ".parquet", write)
 
 
-def export_csv(results: CampaignResults, folder: Path | str) -> tuple[Path, ...]:
-    """Write the same tables as `<name>.csv`, lists as JSON; as `export_tables`."""
-    return _write_tables(results, Path(folder), ".csv", lambda table, file: csv.write_csv(plain_lists(table), file))
+def export_csv(results: CampaignResults | RunRecord, folder: Path | str) -> tuple[Path, ...]:
+    """Write the same tables as `<name>.csv`; as `export_tables`."""
+    return _write_tables(results, Path(folder), ".csv", csv.write_csv)
 
 
-def export_netcdf(results: CampaignResults, folder: Path | str) -> tuple[Path, ...]:
+def export_netcdf(results: CampaignResults | RunRecord, folder: Path | str) -> tuple[Path, ...]:
     """Write `CampaignResults.dataset` as `scans.nc` (NetCDF 3) into a folder.
 
-    Raises `InputError` where xarray is not installed or the file cannot be written.
+    Raises `InputError` for a single run, where xarray is not installed or the file cannot be written.
     """
+    if isinstance(results, RunRecord):
+        raise InputError("netcdf: expected the results of a campaign, over cells and runs; got a single run")
     content = bytes(results.dataset().to_netcdf(engine="scipy"))
     return (_write(Path(folder) / NETCDF, content),)
 
 
-FORMATS: dict[str, Callable[[CampaignResults, Path], tuple[Path, ...]]] = {
+FORMATS: dict[str, Callable[[CampaignResults | RunRecord, Path], tuple[Path, ...]]] = {
     "parquet": export_tables,
     "csv": export_csv,
     "netcdf": export_netcdf,
@@ -54,10 +57,11 @@ FORMATS: dict[str, Callable[[CampaignResults, Path], tuple[Path, ...]]] = {
 
 
 def _write_tables(
-    results: CampaignResults, folder: Path, ending: str, write: Callable[[Any, BinaryIO], None]
+    results: CampaignResults | RunRecord, folder: Path, ending: str, write: Callable[[Any, BinaryIO], None]
 ) -> tuple[Path, ...]:
     files = []
-    for name, table in results.tables().items():
+    tables = tables_of_record(results) if isinstance(results, RunRecord) else results.tables()
+    for name, table in tables.items():
         content = io.BytesIO()
         write(table, content)
         files.append(_write(folder / f"{name}{ending}", content.getvalue()))

@@ -7,6 +7,7 @@ its cell and run number too, that are verified whenever it is read.
 from __future__ import annotations
 
 import hashlib
+import itertools
 import sqlite3
 import zlib
 from collections.abc import Iterator, Sequence
@@ -26,25 +27,27 @@ _LEVEL = 1  # of zlib: half the size in under a millisecond, and higher levels g
 _TABLES = (
     "CREATE TABLE campaign (contents TEXT NOT NULL)",
     "CREATE TABLE runs (cell TEXT NOT NULL, run INTEGER NOT NULL, session INTEGER NOT NULL, "
-    "payload BLOB NOT NULL, payload_sha256 TEXT NOT NULL, timings BLOB NOT NULL, timings_sha256 TEXT NOT NULL, "
-    "PRIMARY KEY (cell, run))",
-)
-# Not there in folders of before it was kept why a run could not be finished.
-_FAILURES = (
+    "payload BLOB NOT NULL, payload_sha256 TEXT NOT NULL, metrics BLOB NOT NULL, metrics_sha256 TEXT NOT NULL, "
+    "timings BLOB NOT NULL, timings_sha256 TEXT NOT NULL, PRIMARY KEY (cell, run))",
     "CREATE TABLE failures (cell TEXT NOT NULL, run INTEGER NOT NULL, session INTEGER NOT NULL, "
-    "message TEXT NOT NULL, PRIMARY KEY (cell, run))"
+    "message TEXT NOT NULL, PRIMARY KEY (cell, run))",
 )
-_COLUMNS = "cell, run, session, payload, payload_sha256, timings, timings_sha256"
+_COLUMNS = "cell, run, session, payload, payload_sha256, metrics, metrics_sha256, timings, timings_sha256"
 
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """One finished run as it was handed in, and the session (counted from 1) that it was handed in by."""
+    """One finished run as it was handed in, and the session (counted from 1) that it was handed in by.
+
+    Attributes:
+        metrics: what was measured of it; no bytes where nothing was, as it can be measured again.
+    """
 
     cell: str
     run: int
     session: int
     payload: bytes
+    metrics: bytes
     timings: bytes
 
     @property
@@ -83,25 +86,22 @@ class Writer:
                 for statement in _TABLES:
                     database.execute(statement)
                 database.execute("INSERT INTO campaign VALUES (?)", (contents,))
-            if not _check_tables(self._path, database):
-                database.execute(_FAILURES)
+            _check_tables(self._path, database)
             found = database.execute("SELECT contents FROM campaign").fetchall()
             database.execute("COMMIT")
         _check_contents(self._path, found, contents)
 
     def add(self, entry: Entry) -> None:
         """Put the run on the disk; when this returns it stays, whatever happens to this process or its machine."""
-        row = (
-            *(entry.cell, entry.run, entry.session),
-            *(zlib.compress(entry.payload, _LEVEL), entry.checksum),
-            *(zlib.compress(entry.timings, _LEVEL), _checksum(entry.cell, entry.run, entry.timings)),
-        )
+        parts = (entry.payload, entry.metrics, entry.timings)
+        packed = [(zlib.compress(part, _LEVEL), _checksum(entry.cell, entry.run, part)) for part in parts]
+        row = (entry.cell, entry.run, entry.session, *itertools.chain.from_iterable(packed))
         assert self._database is not None
         try:
             with _explained(self._path, f"cell {entry.cell}, run {entry.run}: "):
                 self._database.execute("BEGIN IMMEDIATE")
                 with self._database:  # both or neither
-                    self._database.execute(f"INSERT INTO runs ({_COLUMNS}) VALUES (?, ?, ?, ?, ?, ?, ?)", row)
+                    self._database.execute(f"INSERT INTO runs ({_COLUMNS}) VALUES ({', '.join('?' * len(row))})", row)
                     self._database.execute("DELETE FROM failures WHERE cell = ? AND run = ?", (entry.cell, entry.run))
         except sqlite3.IntegrityError:
             raise InputError(
@@ -128,6 +128,13 @@ class Writer:
         with _explained(self._path):
             rows = self._database.execute(f"SELECT {_COLUMNS} FROM runs ORDER BY cell, run")
             return tuple((row[0], row[1]) for row in rows if _verified(row) is None)
+
+    def put_metrics(self, cell: str, run: int, metrics: bytes) -> None:
+        """Keep other measures of a run that is there."""
+        row = (zlib.compress(metrics, _LEVEL), _checksum(cell, run, metrics), cell, run)
+        assert self._database is not None
+        with _explained(self._path, f"cell {cell}, run {run}: "):
+            self._database.execute("UPDATE runs SET metrics = ?, metrics_sha256 = ? WHERE cell = ? AND run = ?", row)
 
     def discard(self, cell: str, run: int) -> None:
         """Take a run out of the file."""
@@ -161,8 +168,6 @@ class Reader:
 
     def failures(self) -> list[Failure]:
         """The runs that were tried and could not be finished, sorted."""
-        if not self._ask("SELECT 1 FROM sqlite_master WHERE name = 'failures'"):
-            return []
         rows = self._ask("SELECT cell, run, session, message FROM failures ORDER BY cell, run")
         return [Failure(*row) for row in rows]
 
@@ -191,15 +196,15 @@ class Reader:
 
 def _verified(row: tuple[Any, ...]) -> Entry | None:
     """The run in a row; None where it is not as it was written."""
-    cell, run, session, payload, payload_checksum, timings, timings_checksum = row
+    cell, run, session, *packed = row
     if not isinstance(cell, str) or not isinstance(run, int) or not isinstance(session, int):
         return None
     try:
-        entry = Entry(cell, run, session, inflate(payload), inflate(timings))
-        intact = entry.checksum == payload_checksum and _checksum(cell, run, entry.timings) == timings_checksum
+        parts = [inflate(part) for part in packed[::2]]
     except (ValueError, TypeError):
         return None
-    return entry if intact else None
+    intact = [_checksum(cell, run, part) for part in parts] == packed[1::2]
+    return Entry(cell, run, session, *parts) if intact else None
 
 
 def _answer(path: Path, question: str, values: Sequence[Any], mode: str = "ro") -> list[Any]:
@@ -209,16 +214,11 @@ def _answer(path: Path, question: str, values: Sequence[Any], mode: str = "ro") 
         return database.execute(question, values).fetchall()
 
 
-def _check_tables(path: Path, database: sqlite3.Connection) -> bool:
-    """`InputError` unless the tables are those of a campaign, with nothing that acts or answers in their place.
-
-    Returns whether the table of failures is among them.
-    """
+def _check_tables(path: Path, database: sqlite3.Connection) -> None:
+    """`InputError` unless the tables are those of a campaign, with nothing that acts or answers in their place."""
     rows = database.execute("SELECT sql FROM sqlite_master WHERE name NOT LIKE 'sqlite~_%' ESCAPE '~'")
-    found = sorted(str(sql) for (sql,) in rows)
-    if found not in (sorted(_TABLES), sorted((*_TABLES, _FAILURES))):
+    if sorted(str(sql) for (sql,) in rows) != sorted(_TABLES):
         raise InputError(f"{path}: expected the tables of a campaign; the file is cut short or altered")
-    return _FAILURES in found
 
 
 def _checked_keys(path: Path, rows: Sequence[tuple[Any, Any]]) -> list[tuple[str, int]]:

@@ -22,12 +22,12 @@ from vedette.reading import parse_json, read_file, said
 from vedette.scenarios import Scenario
 from vedette.scenarios.sections import ScenarioModel
 from vedette.scenarios.yaml_reader import read_yaml
+from vedette.simulation.kept import FORMAT_VERSION, check_version
 from vedette.simulation.storage import versions
 from vedette.text import shown
 
 MANIFEST = "manifest.json"
 FORMAT = "vedette-campaign"
-FORMAT_VERSION = 2
 _MOST_BYTES = 2**27  # of a manifest: ten thousand cells have a fifth of it
 # What of the manifest can never change. The number of runs is not part of it: a campaign may be made longer.
 _FIXED = ("name", "seed", "axes", "compare", "spec", "cells", "digest")
@@ -113,11 +113,7 @@ def read_manifest(folder: Path) -> dict[str, Any]:
         raise InputError(f"{path}: expected the manifest of a campaign; it is cut short or altered: {error}") from None
     if not isinstance(manifest, dict) or manifest.get("format") != FORMAT:
         raise InputError(f"{path}: expected the manifest of a campaign; got another file")
-    if manifest.get("format_version") != FORMAT_VERSION:
-        raise InputError(
-            f"{path}: expected format version {FORMAT_VERSION}; got {shown(manifest.get('format_version'))}, "
-            "written by another version of this program"
-        )
+    check_version(manifest, _written_by(manifest), path)
     missing = [field for field in (*_FIXED, "num_runs", "sessions") if field not in manifest]
     if missing:
         raise InputError(f"{path}: expected a field {missing[0]}; it is cut short or altered")
@@ -130,6 +126,14 @@ def read_manifest(folder: Path) -> dict[str, Any]:
             f"{path}: expected a campaign; it is cut short or altered: {place}: {said(fault['msg'])}"
         ) from None
     return manifest
+
+
+def _written_by(manifest: Mapping[str, Any]) -> Any:
+    """The version of the program in the last session, if it says so."""
+    try:
+        return manifest["sessions"][-1]["versions"]["vedette"]
+    except (LookupError, TypeError):
+        return None
 
 
 def write_manifest(folder: Path, manifest: Mapping[str, Any]) -> None:

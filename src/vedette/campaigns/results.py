@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import operator
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, SupportsIndex
 
 from vedette.campaigns.cells import Campaign, Cell
-from vedette.campaigns.codec import decode, decode_timings
+from vedette.campaigns.codec import decode
 from vedette.campaigns.finished import FinishedRun
 from vedette.campaigns.journal import DATABASE, Entry, Failure, Reader
 from vedette.campaigns.manifest import campaign_of, contents_checksum, read_manifest
 from vedette.errors import InputError
 from vedette.evaluation.comparison import Comparison, scored
-from vedette.evaluation.metrics import RunMetrics
+from vedette.evaluation.metrics import Metric, RunMetrics, decode_metrics
+from vedette.evaluation.runs import measure_run
 from vedette.simulation.records import RunRecord
 from vedette.text import shown
 
@@ -58,6 +59,7 @@ class CampaignResults:
     campaign: Campaign
     manifest: dict[str, Any]
     _reader: Reader = field(repr=False)
+    _own: tuple[Metric, ...] = field(default=(), repr=False)
 
     def finished(self, cell: str) -> tuple[int, ...]:
         """Numbers of the finished runs of a cell, increasing. Raises `InputError` for a name of no cell."""
@@ -95,7 +97,7 @@ class CampaignResults:
         return self.run(cell, run).record
 
     def metrics(self, cell: str, run: SupportsIndex) -> RunMetrics:
-        """The measures of a finished run."""
+        """The measures of a finished run: as they were kept, or where this version has others, computed anew."""
         return self.run(cell, run).metrics
 
     def comparisons(self) -> tuple[GroupComparison, ...]:
@@ -103,7 +105,7 @@ class CampaignResults:
         return tuple(filter(None, map(self._comparison, self.campaign.groups())))
 
     def tables(self) -> dict[str, pyarrow.Table]:
-        """Runs, scans, decisions, rewards, tracks, truth, sensors and timings as Arrow tables.
+        """Runs, scans, decisions, actions, rewards, tracks, truth, sensors and timings as Arrow tables.
 
         For pandas `.to_pandas()`, for polars `polars.from_arrow`; DuckDB queries them as they are. See
         `vedette.campaigns.tables`. None where no run is finished.
@@ -117,9 +119,9 @@ class CampaignResults:
 
         Raises `InputError` where xarray is not installed.
         """
-        from vedette.campaigns.dataset import dataset_of_runs
+        from vedette.campaigns.dataset import dataset_of_scans
 
-        return dataset_of_runs(self.campaign, self.runs())
+        return dataset_of_scans(self.campaign, self.tables().get("scans"))
 
     def _finished(self) -> list[tuple[str, int]]:
         """Cell and number of every finished run, sorted; `InputError` for one that the campaign does not have."""
@@ -146,21 +148,29 @@ class CampaignResults:
 
     def _decoded(self, entry: Entry) -> FinishedRun:
         try:
-            record, metrics = decode(entry.payload)
-            record = replace(record, timings=decode_timings(entry.timings))
+            record = decode(entry.payload, entry.timings)
             if record.run != entry.run:
                 raise InputError(f"run: expected the number {entry.run}; got {record.run}")
-            num_sensors = len(self.campaign.cell(entry.cell).scenario.model.sensors)
+            scenario = self.campaign.cell(entry.cell).scenario
+            num_sensors = len(scenario.model.sensors)
             if record.num_sensors != num_sensors:
                 raise InputError(f"run: expected the {num_sensors} sensors of its scenario; got {record.num_sensors}")
+            metrics, own = decode_metrics(entry.metrics, record.num_scans) if entry.metrics else (None, {})
+            if metrics is None:
+                metrics = replace(measure_run(record, scenario), own=own)
+            metrics.own.update({metric.name: metric.of(record) for metric in self._own})
         except InputError as error:
             place = f"{self.folder / DATABASE}: cell {entry.cell}, run {entry.run}"
             raise InputError(f"{place}: {error}") from error
         return FinishedRun(entry.cell, record, metrics, entry.session, entry.checksum)
 
 
-def open_results(folder: Path | str) -> CampaignResults:
+def open_results(folder: Path | str, metrics: Sequence[Metric] = ()) -> CampaignResults:
     """Open the results folder of a campaign to read.
+
+    Args:
+        folder: finished, unfinished, or while it is written.
+        metrics: measures of one's own, computed of every run that is read, beside those that were kept.
 
     Raises `InputError`, naming the file, for a folder that holds no campaign, or one whose manifest or runs are
     missing, cut short or altered.
@@ -172,4 +182,4 @@ def open_results(folder: Path | str) -> CampaignResults:
     manifest = read_manifest(target)
     reader = Reader(target)
     reader.check(contents_checksum(manifest))
-    return CampaignResults(target, campaign_of(target, manifest), manifest, reader)
+    return CampaignResults(target, campaign_of(target, manifest), manifest, reader, tuple(metrics))

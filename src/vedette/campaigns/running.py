@@ -126,7 +126,7 @@ def run_campaign(
                     store.note_failure(result.cell, result.run, result.message)
                     watch.failed(result)
                     continue
-                store.add(result.cell, result.run, result.payload, result.timings)
+                store.add(result.cell, result.run, result.payload, result.timings, result.metrics)
                 num_landed += 1
                 watch.landed(result)
     # Each time: what was left of them by another end of this call, or altered since, is put right.

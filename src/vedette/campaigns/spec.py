@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import math
 import tomllib
-from datetime import date, time
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import BaseModel, Field, JsonValue, ValidationError, field_validator
+from pydantic import Field, JsonValue
 
 from vedette.errors import InputError
 from vedette.evaluation.runs import STRATEGIES
-from vedette.scenarios.diagnostics import suggestion
-from vedette.scenarios.faults import describe, named
-from vedette.scenarios.sections.base import Name, Section, Whole, expected
-from vedette.text import elided, listed, plain, printable
+from vedette.reading import read_text
+from vedette.scenarios.diagnostics import read_section
+from vedette.scenarios.faults import Finding, describe, named
+from vedette.scenarios.sections.base import Name, Section, Whole, check
+from vedette.text import elided, listed, printable
 
 _MOST_BYTES = 2_000_000
 # A cell is a scenario with its filters built: this many take minutes before the first run.
@@ -24,25 +25,6 @@ _MOST_CELLS, _MOST_VALUES = 10_000, 1000
 ShortName = Annotated[Name, Field(max_length=60)]
 Names = Annotated[tuple[Name, ...], Field(strict=False, min_length=1)]
 Fields = dict[str, JsonValue]
-
-_WHAT = {
-    "missing": "a value, as it is required",
-    "extra_forbidden": "one of {known}",
-    "int_type": "a whole number",
-    "int_from_float": "a whole number",
-    "string_type": "text in quotes",
-    "tuple_type": "a list",
-    "dict_type": "a table",
-    "list_type": "a list",
-    "too_short": "at least one entry",
-    "greater_than_equal": "a number of at least {ge}",
-    "less_than_equal": "a number of at most {le}",
-    "expected": "{expected}",
-    "finite_number": "a finite number",
-    "invalid-json-value": "text, a number, true or false, a list or a table",
-    "too_long": "at most {max_length} characters",
-}
-_UNIONS = ("float", "int", "str", "bool", "list", "dict")
 
 
 class Variant(Section):
@@ -80,13 +62,32 @@ class CampaignSpec(Section):
         description="Axis whose values are compared; none: planner, or the one that has several values [-].",
     )
 
-    @field_validator("planners")
-    @classmethod
-    def _known(cls, names: tuple[str, ...]) -> tuple[str, ...]:
-        for index, name in enumerate(names):
-            if name not in STRATEGIES:
-                raise expected(f"one of {', '.join(STRATEGIES)}", at=(index,), got=f"'{named(name)}'")
-        return names
+    @check
+    def _fields_alone(self) -> Iterator[Finding]:
+        for name in sorted({"scenario", "planner", "filter", "fusion", "variant"} & self.grid.keys()):
+            yield ("grid",), "paths of scenario fields", describe(name)
+
+    @check
+    def _each_value_once(self) -> Iterator[Finding]:
+        for axis, values in self.axes().items():
+            if len(values) > _MOST_VALUES:
+                yield (axis,), f"at most {_MOST_VALUES} values", str(len(values))
+                return
+            twice = [value for i, value in enumerate(values) if value in values[:i]]
+            if twice:
+                yield (axis,), "each value once", f"{describe(twice[0])} again"
+
+    @check
+    def _not_too_many(self) -> Iterator[Finding]:
+        if (cells := math.prod(map(len, self.axes().values()))) > _MOST_CELLS:
+            yield (), f"at most {_MOST_CELLS} combinations of settings", str(cells)
+
+    @check
+    def _comparable(self) -> Iterator[Finding]:
+        comparable = [axis for axis in self.axes() if axis != "scenario"]  # runs of two scenarios are no pairs
+        if self.compare is not None and self.compare not in comparable:
+            why = ", as runs of two scenarios are no pairs" if self.compare == "scenario" else ""
+            yield ("compare",), f"one of {', '.join(map(named, comparable))}{why}", describe(self.compare)
 
     def axes(self) -> dict[str, tuple[Any, ...]]:
         """Every axis and its values, in the order in which cells are made; scenario and planner are always there."""
@@ -118,69 +119,14 @@ def parse_spec(text: str, file: str = "<text>") -> CampaignSpec:
 
 def spec_from_data(data: Any, place: str = "campaign") -> CampaignSpec:
     """The specification in plain data. Raises `InputError` as `parse_spec`."""
-    try:
-        spec = CampaignSpec.model_validate(data)
-    except ValidationError as error:
-        details = error.errors(include_url=False)
-        raise InputError(listed(list(dict.fromkeys(f"{place}: {_fault(detail)}" for detail in details)))) from None
-    _check_axes(spec, place)
+    if not isinstance(data, Mapping):
+        raise InputError(f"{place}: expected a mapping, got {describe(data)}")
+    spec, faults = read_section(CampaignSpec, data)
+    if faults:
+        raise InputError(listed(list(dict.fromkeys(f"{place}: {fault.message}" for fault in faults))))
     return spec
 
 
 def load_spec(path: Path | str) -> CampaignSpec:
     """Read a specification from its TOML file. Raises `InputError` as `parse_spec`, and where there is no such file."""
-    file = Path(path)
-    try:
-        if (size := file.stat().st_size) > _MOST_BYTES:
-            raise InputError(f"{file}: expected a campaign file of at most {_MOST_BYTES} bytes; got {size}")
-        return parse_spec(file.read_bytes().decode("utf-8-sig"), str(file))
-    except UnicodeDecodeError as error:
-        raise InputError(f"{file}: expected UTF-8 text; byte {error.start} is not") from None
-    except OSError as error:
-        raise InputError(f"{file}: expected a readable campaign file; got {error.strerror}") from None
-
-
-def _fault(detail: Any) -> str:
-    loc, context = detail["loc"], detail.get("ctx", {})
-    loc += tuple(context.get("at", ()))
-    if detail["type"] == "finite_number":  # the member of a union that was tried
-        loc = tuple(part for part in loc if part not in _UNIONS)
-    field = ".".join(named(str(part)) for part in loc) or "the specification"
-    model: type[BaseModel] = Variant if loc[:1] == ("variants",) else CampaignSpec
-    known = [name for name in model.model_fields if name != "kind"]
-    template = _WHAT.get(detail["type"], detail["msg"])
-    what = template.format(known=", ".join(known), **context)
-    if detail["type"] == "missing":
-        return f"{field}: expected {what}; got nothing"
-    if detail["type"] == "extra_forbidden":
-        hint = suggestion(str(loc[-1]), known)
-        return f"{field}: expected {what}; got an unknown key" + (f" ({hint})" if hint else "")
-    return f"{field}: expected {what}; got {context.get('got') or _shown(detail['input'])}"
-
-
-def _shown(value: Any) -> str:
-    """A value of the file in a few words."""
-    if isinstance(value, date | time):
-        return f"the date or time {value}"
-    return describe(value) if isinstance(value, list | dict) and value else named(plain(value))
-
-
-def _check_axes(spec: CampaignSpec, place: str) -> None:
-    reserved = {"scenario", "planner", "filter", "fusion", "variant"} & spec.grid.keys()
-    if reserved:
-        raise InputError(f"{place}: grid: expected paths of scenario fields; got {sorted(reserved)[0]!r}")
-    for axis, values in spec.axes().items():
-        seen: list[Any] = []
-        if len(values) > _MOST_VALUES:
-            raise InputError(f"{place}: {named(axis)}: expected at most {_MOST_VALUES} values; got {len(values)}")
-        for value in values:
-            if value in seen:
-                raise InputError(f"{place}: {named(axis)}: expected each value once; got {_shown(value)} again")
-            seen.append(value)
-    if (cells := math.prod(map(len, spec.axes().values()))) > _MOST_CELLS:
-        raise InputError(f"{place}: expected at most {_MOST_CELLS} combinations of settings; got {cells}")
-    comparable = [axis for axis in spec.axes() if axis != "scenario"]  # runs of two scenarios are no pairs
-    if spec.compare is not None and spec.compare not in comparable:
-        why = ", as runs of two scenarios are no pairs" if spec.compare == "scenario" else ""
-        known = ", ".join(map(named, comparable))
-        raise InputError(f"{place}: compare: expected one of {known}{why}; got '{named(spec.compare)}'")
+    return parse_spec(read_text(Path(path), "campaign file", _MOST_BYTES), str(path))

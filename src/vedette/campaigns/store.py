@@ -88,8 +88,10 @@ class Store:
         """Take a finished run out, so that it can be added anew."""
         self._writer.discard(cell, run)
 
-    def add(self, cell: str, run: int, payload: bytes, timings: bytes) -> None:
-        """Keep a finished run (`vedette.campaigns.codec`). When this returns, the run is on the disk.
+    def add(self, cell: str, run: int, payload: bytes, timings: bytes, metrics: bytes = b"") -> None:
+        """Keep a finished run (`vedette.campaigns.codec`), and its measures if there are any yet.
+
+        When this returns, the run is on the disk.
 
         Raises `InputError` for a run that is not the campaign's or is there already, and for a disk that is full or
         fails: then the run is not kept, the earlier ones are, and adding may be tried again.
@@ -98,7 +100,7 @@ class Store:
             raise InputError(f"cell: expected one of {', '.join(self._num_runs)}; got {cell!r}")
         if not 0 <= run < self._num_runs[cell]:
             raise InputError(f"run: expected a number from 0 to {self._num_runs[cell] - 1}; got {run}")
-        self._writer.add(journal.Entry(cell, int(run), self.session, payload, timings))
+        self._writer.add(journal.Entry(cell, int(run), self.session, payload, metrics, timings))
 
     def note_failure(self, cell: str, run: int, message: str) -> None:
         """Keep why a run could not be finished, until it is."""

@@ -1,70 +1,89 @@
-"""Finished runs as Arrow tables for other tools: one row a run, a scan, a decision, a reward, a track point.
+"""Finished runs as Arrow tables for other tools: those of a single run, one below another.
 
-Every table begins with the columns `cell`, one for each axis of the campaign, and `run`; rows are in the order of the
-campaign's cells, then by run, then by time. The unit of a column is the end of its name (`_m`, `_s`, `_rad`) and in the
-metadata of its field; null stands where a measure has no value. A `step` is the number of a scan, from 1; that of a
-decision is the scan that it followed.
+Every table of many runs begins with the columns `cell`, one for each axis of the campaign, and `run`; rows are in the
+order of the campaign's cells, then by run, then by time. The unit of a column is the end of its name (`_m`, `_s`,
+`_rad`) and in the metadata of its field; null stands where a measure has no value. A `step` is the number of a scan,
+from 1; that of a decision is the scan that it followed.
 """
 
 from __future__ import annotations
 
 import json
 from collections.abc import Iterable
-from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyarrow as pa
 
 from vedette.campaigns.cells import Campaign, Cell
-from vedette.campaigns.rows import PER_RUN, Lists
+from vedette.simulation.arrow import Columns, Kind, Layout, to_arrow
+from vedette.simulation.records import RunRecord
+from vedette.simulation.tables import LAYOUTS, OSPA_COLUMNS, TIMINGS, tables_of, timing_table
 
 if TYPE_CHECKING:
     from vedette.campaigns.finished import FinishedRun
 
-NAMES = tuple(PER_RUN)
 _UNITS = {"_m": "m", "_s": "s", "_rad": "rad"}
+_ANY = Layout({"sha256": Kind.TEXT}, {"": Kind.NUMBER})
+
+
+def tables_of_record(record: RunRecord) -> dict[str, pa.Table]:
+    """The tables of a single run, null for what is not a number."""
+    return {name: _with_units(pa.Table.from_batches([table])) for name, table in _batches(record).items()}
 
 
 def tables_of_runs(campaign: Campaign, runs: Iterable[FinishedRun]) -> dict[str, pa.Table]:
-    """The tables `NAMES`, of runs in the order of `CampaignResults.runs`.
+    """The tables of all runs, which come in the order of `CampaignResults.runs`.
 
     Takes about as much memory as the tables: some 150 MB for 1,000 runs of 40 scans with joint decisions.
     """
-    parts: dict[str, list[Any]] = {name: [] for name in NAMES}
-    for name, group in groupby(runs, key=lambda run: run.cell):
-        finished = list(group)
-        for table, rows in PER_RUN.items():
-            parts[table].append(_of_cell(campaign, campaign.cell(name), finished, [rows(run) for run in finished]))
+    parts: dict[str, list[pa.Table]] = {}
+    places: list[tuple[Cell, int]] = []
+    for run in runs:
+        places.append((campaign.cell(run.cell), run.record.run))
+        measures, session = run.metrics.columns(), np.full(run.record.num_scans, run.session)
+        of_run = {"runs": to_arrow(_summary(run), _ANY), **_batches(run.record, measures, {"session": session})}
+        for name, table in of_run.items():
+            parts.setdefault(name, []).append(pa.Table.from_batches([table]))
     metadata = {"vedette": json.dumps({"campaign": campaign.name, "seed": campaign.seed})}
     return {
-        name: _with_units(pa.concat_tables(of, promote_options="permissive")).replace_schema_metadata(metadata)
-        for name, of in parts.items()
-        if of
+        name: _with_units(_joined(campaign, places, of)).replace_schema_metadata(metadata) for name, of in parts.items()
     }
 
 
-def _of_cell(campaign: Campaign, cell: Cell, runs: list[FinishedRun], rows: list[dict[str, Any]]) -> pa.Table:
-    """The rows of all finished runs of one cell, its name and settings before them."""
-    lengths = [len(next(iter(columns.values()))) for columns in rows]
-    num_rows = sum(lengths)
-    settings = {axis: setting_of(campaign, cell, axis) for axis in campaign.axes}
-    columns = {name: pa.repeat(pa.scalar(value), num_rows) for name, value in {"cell": cell.name, **settings}.items()}
-    columns["run"] = pa.array(np.repeat([run.record.run for run in runs], lengths))
-    for name in dict.fromkeys(name for each in rows for name in each):
-        parts = [each[name] if name in each else [None] * length for each, length in zip(rows, lengths, strict=True)]
-        columns[name] = _column(parts)
-    return pa.table(columns)
+def _batches(record: RunRecord, measures: Any = None, timed: Any = None) -> dict[str, pa.RecordBatch]:
+    """The tables of one run; `measures` are more columns of the scans, `timed` of the timings."""
+    tables = tables_of(record)
+    timings = {"step": np.arange(1, record.num_scans + 1), "time_s": record.times, **timing_table(record)}
+    scans = to_arrow({**tables.pop("scans"), **(measures or {})}, _ANY, nan_is_null=True)
+    others = {name: to_arrow(table, LAYOUTS[name], nan_is_null=True) for name, table in tables.items()}
+    return {"scans": scans, **others, "timings": to_arrow({**timings, **(timed or {})}, TIMINGS, nan_is_null=True)}
 
 
-def _column(parts: list[Any]) -> Any:
-    parts = [part for part in parts if len(part)] or parts[:1]
-    if all(isinstance(part, np.ndarray) for part in parts):
-        return pa.array(np.concatenate(parts), from_pandas=True)  # null for NaN, which SQL takes for a number
-    if all(isinstance(part, Lists) for part in parts):
-        lists = Lists.joined(parts)
-        return pa.ListArray.from_arrays(pa.array(np.cumsum([0, *lists.lengths]), pa.int32()), pa.array(lists.values))
-    return pa.array([value for part in parts for value in part])
+def _summary(run: FinishedRun) -> Columns:
+    """One row: numbers of scans and decisions, means over all scans, and the checksum of the run."""
+    record = run.record
+    means = zip(OSPA_COLUMNS, record.ospa.mean(axis=0), strict=True)
+    return {
+        "num_scans": np.array([record.num_scans]),
+        "num_decisions": np.array([len(record.decisions)]),
+        **{f"mean_{name}": np.array([value]) for name, value in means},
+        "sha256": [run.checksum],
+    }
+
+
+def _joined(campaign: Campaign, places: list[tuple[Cell, int]], tables: list[pa.Table]) -> pa.Table:
+    """The tables of one name of all runs, cell, settings and number before each row; null for what a run lacks."""
+    rows = np.repeat(np.arange(len(tables)), [table.num_rows for table in tables])
+    settings = {axis: [setting_of(campaign, cell, axis) for cell, _ in places] for axis in campaign.axes}
+    keys = {"cell": [cell.name for cell, _ in places], **settings, "run": [run for _, run in places]}
+    table = pa.concat_tables(tables, promote_options="default")
+    return pa.table(
+        {
+            **{name: pa.array(of).take(pa.array(rows)) for name, of in keys.items()},
+            **dict(zip(table.column_names, table.columns, strict=True)),
+        }
+    ).combine_chunks()
 
 
 def setting_of(campaign: Campaign, cell: Cell, axis: str) -> Any:
@@ -89,12 +108,3 @@ def _with_units(table: pa.Table) -> pa.Table:
 def unit_of(column: str) -> str | None:
     """Unit of a column by the end of its name; None for numbers and names."""
     return next((unit for end, unit in _UNITS.items() if column.endswith(end)), None)
-
-
-def plain_lists(table: pa.Table) -> pa.Table:
-    """The table with its lists as JSON text, for formats without lists."""
-    for index, schema_field in enumerate(table.schema):
-        if pa.types.is_list(schema_field.type):
-            texts = [None if value is None else json.dumps(value) for value in table.column(index).to_pylist()]
-            table = table.set_column(index, schema_field.name, pa.array(texts, pa.string()))
-    return table

@@ -8,10 +8,11 @@ from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
 
 from vedette.campaigns.cells import Campaign, Cell
-from vedette.campaigns.codec import encode, encode_timings
+from vedette.campaigns.codec import encode
 from vedette.errors import VedetteError
-from vedette.evaluation.metrics import measure
-from vedette.evaluation.runs import run_scenario
+from vedette.evaluation.metrics import encode_metrics
+from vedette.evaluation.runs import measure_run, run_scenario
+from vedette.simulation.kept import encode_timings
 from vedette.simulation.storage import versions
 
 # Below this a task costs more to hand out than it is worth.
@@ -43,7 +44,8 @@ class Landed:
 
     Attributes:
         cell, run: which.
-        payload, timings: as `vedette.campaigns.codec` encodes them.
+        payload: as `vedette.campaigns.codec` encodes it.
+        metrics, timings: as Arrow files.
         ospa: mean over the scans, m.
         seconds: it took, s of wall time.
     """
@@ -51,6 +53,7 @@ class Landed:
     cell: str
     run: int
     payload: bytes
+    metrics: bytes
     timings: bytes
     ospa: float
     seconds: float
@@ -81,17 +84,16 @@ def perform(task: Task) -> tuple[Landed | Failed, ...]:
 
 
 def _one(cell: Cell, seed: int, run: int) -> Landed | Failed:
-    score, start = cell.scenario.model.ospa, time.perf_counter()
+    start = time.perf_counter()
     try:
         record = run_scenario(cell.scenario, cell.planner, seed=seed, run=run, num_threads=1)
-        metrics = measure(record, cutoff=score.cutoff, order=score.order, window=score.window)
-        payload, timings = encode(record, metrics), encode_timings(record)
+        kept = encode(record), encode_metrics(measure_run(record, cell.scenario)), encode_timings(record)
     except VedetteError as error:
         return Failed(cell.name, run, str(error))
     except Exception as error:  # in what surrounds a run: one bad one must not end a night's work
         return Failed(cell.name, run, f"{type(error).__name__}: {error}")
     mean = float(record.ospa[:, 0].mean())
-    return Landed(cell.name, run, payload, timings, mean, time.perf_counter() - start)
+    return Landed(cell.name, run, *kept, mean, time.perf_counter() - start)
 
 
 class TaskQueue:

@@ -1,4 +1,4 @@
-"""The command that reads a campaign's results: results."""
+"""The command that reads results, of a campaign or of a single run: results."""
 
 from __future__ import annotations
 
@@ -10,19 +10,23 @@ import typer
 
 from vedette.cli.comparisons import print_comparison
 from vedette.cli.errors import usage_error
+from vedette.cli.running import print_run
 from vedette.text import counted
 
 if TYPE_CHECKING:
     from vedette.campaigns import Failed
     from vedette.campaigns.journal import Failure
     from vedette.campaigns.results import CampaignResults
+    from vedette.simulation.records import RunRecord
 
 _SHOWN_FAILURES = 10
 _FORMATS = ("parquet", "csv", "netcdf")
 
 
 def results(
-    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Results folder of a campaign, finished or not.")],
+    folder: Annotated[
+        Path, typer.Argument(metavar="DIR", help="Results folder of a campaign, finished or not; or of a single run.")
+    ],
     export: Annotated[
         Path | None, typer.Option("--export", metavar="DIR", help="Folder for the results as files of other tools.")
     ] = None,
@@ -31,16 +35,22 @@ def results(
         typer.Option("--format", metavar="NAME", help="Of the files: parquet (default), csv, netcdf; may be repeated."),
     ] = None,
 ) -> None:
-    """Print the comparison of a campaign's strategies, and what is still to be run; export the results."""
+    """Print the comparison of a campaign's strategies, and what is still to be run, or a single run; export either."""
     for name in formats or ():
         if name not in _FORMATS:
             raise usage_error(f"expected one of {', '.join(_FORMATS)}; got {name}", "--format")
     if formats and export is None:
         raise usage_error("expected with --export, which names the folder", "--format")
     from vedette.campaigns.results import open_results
+    from vedette.simulation.storage import holds_run, load_run
 
-    opened = open_results(folder)
-    print_results(opened)
+    opened: CampaignResults | RunRecord
+    if holds_run(folder):
+        opened = load_run(folder)
+        print_run(opened)
+    else:
+        opened = open_results(folder)
+        print_results(opened)
     if export is not None:
         from vedette.campaigns.export import FORMATS
 

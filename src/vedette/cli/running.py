@@ -120,7 +120,7 @@ def run(
             if error.record is None:
                 _end(error, "nothing was written")
             record, stop = error.record, error
-        _print_run(record)
+        print_run(record)
         if stop is not None and out is None:
             _end(stop, "nothing was written")
         if stop is not None and _holds_whole_run(out):
@@ -148,7 +148,8 @@ def _end(stop: RunStopped | RunInterrupted, left: str) -> NoReturn:
     raise typer.Exit(INTERRUPTED if isinstance(stop, KeyboardInterrupt) else 1) from None
 
 
-def _print_run(record: RunRecord) -> None:
+def print_run(record: RunRecord) -> None:
+    """What was decided in a run, how good it was, what it cost, and what was cut off."""
     from rich.table import Table
 
     from vedette.evaluation.actions import choice_words

@@ -10,6 +10,7 @@ from vedette.evaluation.metrics import (
     GospaResult,
     GospaSeries,
     Matching,
+    Metric,
     OspaResult,
     RunMetrics,
     TrackSet,
@@ -28,7 +29,7 @@ from vedette.evaluation.metrics import (
     ospa2_of_run,
     ospa_of_run,
 )
-from vedette.evaluation.runs import STRATEGIES, run_scenario, strategy
+from vedette.evaluation.runs import STRATEGIES, measure_run, run_scenario, strategy
 from vedette.evaluation.statistics import PairedDifference, Summary, paired_difference, summarise
 from vedette.evaluation.tables import decision_rows, strategy_csv, strategy_markdown, strategy_rows
 
@@ -40,6 +41,7 @@ __all__ = [
     "GospaResult",
     "GospaSeries",
     "Matching",
+    "Metric",
     "OspaResult",
     "PairedDifference",
     "RunMetrics",
@@ -56,6 +58,7 @@ __all__ = [
     "gospa_of_run",
     "match_run",
     "measure",
+    "measure_run",
     "nees",
     "nees_interval",
     "ospa",

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import signal
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
 
 from vedette.control import IndependentPlanner, JointPlanner, Planner
-from vedette.evaluation.metrics import ospa_of_run
+from vedette.evaluation.metrics import Metric, RunMetrics, measure, ospa_of_run
 from vedette.scenarios import Scenario
 from vedette.scenarios.build import build_experiment, build_planner
 from vedette.simulation.loop import simulate
@@ -49,6 +49,12 @@ def run_scenario(scenario: Scenario, planner: str, *, seed: int, run: int = 0, n
     return simulate(
         build_experiment(scenario), strategy(scenario, planner, num_threads), seed=seed, run=run, score=score
     )
+
+
+def measure_run(record: RunRecord, scenario: Scenario, own: Sequence[Metric] = ()) -> RunMetrics:
+    """All measures of a run under the cutoff, order and window of its scenario; raises as `measure`."""
+    ospa = scenario.model.ospa
+    return measure(record, cutoff=ospa.cutoff, order=ospa.order, window=ospa.window, own=own)
 
 
 @contextmanager

@@ -14,7 +14,6 @@ from vedette.filters import Filter, labels_targets, shared_targets
 from vedette.fusion import Clmb, CmDeltaGlmb
 from vedette.models import TargetModel
 from vedette.platforms import Actions
-from vedette.scenarios.checks import decision_steps
 from vedette.scenarios.loading import Scenario
 from vedette.simulation.experiment import Experiment
 from vedette.simulation.truth import TargetSource
@@ -43,7 +42,7 @@ def build_experiment(scenario: Scenario) -> Experiment:
         fusion=model.fusion.build(len(sensors)),
         feedback=model.fusion.feedback,
         estimate=model.estimator.build(),
-        decision_steps=decision_steps(model),
+        decision_steps=model.decision_steps,
     )
 
 

@@ -9,10 +9,8 @@ import numpy as np
 
 from vedette.errors import VedetteError
 from vedette.kernels.base.types import Floats
-from vedette.scenarios.checks import decision_steps
-from vedette.scenarios.diagnostics import place_fault
-from vedette.scenarios.faults import Path
-from vedette.scenarios.loading import Scenario
+from vedette.scenarios.faults import Path, Told
+from vedette.scenarios.loading import Scenario, place_fault
 from vedette.scenarios.names import sensor_names
 from vedette.scenarios.sections import ScenarioModel
 from vedette.scenarios.sections.sensing import ConstantDetection, GaussianDetection, LimitedRange, LimitedSector
@@ -38,7 +36,7 @@ def cautions(scenario: Scenario) -> tuple[str, ...]:
             document = None
     lines = []
     for path, text in found:
-        place = None if document is None else place_fault(document, path, "", "").place
+        place = None if document is None else place_fault(document, Told(path, "", "")).place
         where = scenario.name if place is None else f"{scenario.path}:{place[0]}:{place[1]}"
         lines.append(f"{where}: warning: {text}")
     return tuple(lines)
@@ -87,7 +85,7 @@ def _views(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
     worst = int(spread.argmax())
     if spread[worst] > MAX_DIFFERENCE:
         yield ("sensors", list(chances)[int(table[:, worst].argmin())], "detection"), _unlike(names, table, grid)
-    elif decision_steps(model):
+    elif model.decision_steps:
         yield from _limited_and_moving(model)
 
 

@@ -1,4 +1,4 @@
-"""Faults of a scenario's data: what the schema objects to, in the words and at the places of the file."""
+"""Faults of a configuration's data: what its sections object to, in the words and at the paths of the file."""
 
 from __future__ import annotations
 
@@ -6,14 +6,16 @@ import difflib
 import re
 import types
 from collections.abc import Iterator, Mapping
-from typing import Annotated, Any, Literal, Union, get_args, get_origin
+from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from vedette.scenarios.faults import Fault, Path, describe
-from vedette.scenarios.sections import ScenarioModel
-from vedette.scenarios.yaml_reader import Document
+from vedette.scenarios.faults import Path, Told, describe
+from vedette.scenarios.sections.base import IN_PART, Section
+from vedette.scenarios.sections.unread import Unread
+
+S = TypeVar("S", bound=Section)
 
 # pydantic's error types and what was expected; `{}` takes a value of the error's context.
 _EXPECTED = {
@@ -23,21 +25,54 @@ _EXPECTED = {
     "finite_number": "a finite number",
     "string_type": "a word or text in quotes",
     "bool_type": "true or false",
-    "greater_than": "a number above {gt:g}",
-    "greater_than_equal": "a number of at least {ge:g}",
-    "less_than": "a number below {lt:g}",
-    "less_than_equal": "a number of at most {le:g}",
+    "greater_than": "a number above {gt}",
+    "greater_than_equal": "a number of at least {ge}",
+    "less_than": "a number below {lt}",
+    "less_than_equal": "a number of at most {le}",
     "tuple_type": "a list",
     "list_type": "a list",
     "dict_type": "a mapping",
     "model_type": "a mapping",
     "model_attributes_type": "a mapping",
     "string_too_short": "text of at least {min_length} character",
+    "invalid-json-value": "text, a number, true or false, a list or a mapping",
     "expected": "{expected}",
 }
 
-_UNKNOWN = "an unknown key"
+UNKNOWN = "an unknown key"
 _LONGEST_WORD = 100  # comparing words takes the product of their lengths
+
+
+def read_section(section: type[S], data: Mapping[str, Any]) -> tuple[S, list[Told]]:
+    """The section in the data and what is wrong with it; where that is anything, the section is one in part."""
+    try:
+        return section.model_validate(data), []
+    except ValidationError:
+        found = section.model_validate(data, context=IN_PART)
+        return found, list(_faults(found, section, data, ()))
+
+
+def _faults(value: Any, annotation: Any, data: Any, path: Path) -> Iterator[Told]:
+    """All that is wrong with a value of a section in part, section by section."""
+    if isinstance(value, Unread):
+        errors = (error for error in value.errors if not _is_echo(error))
+        yield from _merge_alternatives([_translate(error, annotation, path) for error in errors])
+    elif isinstance(value, Section):
+        fields = type(value).model_fields
+        for name, field in fields.items():
+            inner = data.get(name) if isinstance(data, Mapping) else None
+            yield from _faults(getattr(value, name), field.annotation, inner, (*path, name))
+        if isinstance(data, Mapping):
+            yield from (_unknown_key(path, str(key), sorted(fields)) for key in data if key not in fields)
+        yield from (Told((*path, *at), wanted, got) for at, wanted, got in value.findings())
+    elif isinstance(value, tuple):
+        items = data if isinstance(data, list) and len(data) == len(value) else [None] * len(value)
+        for i, (item, inner) in enumerate(zip(value, items, strict=True)):
+            yield from _faults(item, _item(annotation, i), inner, (*path, i))
+    elif isinstance(value, dict):
+        for key, item in value.items():
+            inner = data.get(key) if isinstance(data, Mapping) else None
+            yield from _faults(item, _entry(annotation), inner, (*path, key))
 
 
 def options(annotation: Any) -> Iterator[Any]:
@@ -50,10 +85,6 @@ def options(annotation: Any) -> Iterator[Any]:
             yield from options(option)
     else:
         yield annotation
-
-
-def _models(annotation: Any) -> list[type[BaseModel]]:
-    return [option for option in options(annotation) if isinstance(option, type) and issubclass(option, BaseModel)]
 
 
 def kind_of(model: type[BaseModel]) -> str | None:
@@ -70,28 +101,8 @@ def _item(annotation: Any, index: int) -> Any:
     return None
 
 
-def locate(loc: tuple[str | int, ...]) -> tuple[Path, Any]:
-    """Path in the data of a pydantic error location, and the annotation of what stands there.
-
-    The location also names the member of a union that was tried; the data does not.
-    """
-    path: list[str | int] = []
-    annotation: Any = ScenarioModel
-    for position, part in enumerate(loc):
-        models = _models(annotation)
-        tagged = [model for model in models if kind_of(model) == part]
-        if len(models) > 1 and tagged:
-            annotation = tagged[0]
-        elif isinstance(part, int):
-            path.append(part)
-            annotation = _item(annotation, part)
-        elif models:
-            path.append(part)
-            field = models[0].model_fields.get(part)
-            annotation = None if field is None else field.annotation
-        elif any(get_origin(option) is dict for option in options(annotation)):
-            return (*path, *loc[position:]), None
-    return tuple(path), annotation
+def _entry(annotation: Any) -> Any:
+    return next((get_args(option)[1] for option in options(annotation) if get_origin(option) is dict), None)
 
 
 def suggestion(word: str, known: list[str]) -> str:
@@ -106,22 +117,21 @@ def _one_of(words: list[str]) -> str:
     return words[0] if len(words) == 1 else "one of " + ", ".join(words)
 
 
-def _unknown_key(path: Path, loc: tuple[str | int, ...]) -> tuple[str, str, str]:
-    models = _models(locate(loc[:-1])[1])
-    known = sorted(models[0].model_fields) if models else []
-    hint = suggestion(str(path[-1]), known)
-    if path[-1] == "<<":
+def _unknown_key(path: Path, key: str, known: list[str]) -> Told:
+    hint = suggestion(key, known)
+    if key == "<<":
         hint = "YAML 1.2 has no merge keys; sensor_defaults holds what sensors share"
-    return _one_of(known), _UNKNOWN, hint
+    return Told((*path, key), _one_of(known), UNKNOWN, hint)
 
 
-def _kind_fault(error: ErrorDetails, path: Path, annotation: Any) -> tuple[Path, str, str, str]:
-    kinds = [kind for model in _models(annotation) if (kind := kind_of(model))]
+def _kind_fault(error: ErrorDetails, path: Path, annotation: Any) -> Told:
+    sections = (option for option in options(annotation) if isinstance(option, type) and issubclass(option, BaseModel))
+    kinds = [kind for section in sections if (kind := kind_of(section))]
     if error["type"] == "union_tag_not_found":
-        return path, f"a mapping with kind: {_one_of(kinds)}", "no kind", ""
+        return Told(path, f"a mapping with kind: {_one_of(kinds)}", "no kind")
     tag = error["input"].get("kind")
     hint = suggestion(tag, kinds) if isinstance(tag, str) else ""
-    return (*path, "kind"), _one_of(kinds), describe(tag), hint
+    return Told((*path, "kind"), _one_of(kinds), describe(tag), hint)
 
 
 def _literals(annotation: Any) -> list[str]:
@@ -135,10 +145,13 @@ def _expected(error: ErrorDetails, annotation: Any) -> str:
     template = _EXPECTED.get(error["type"])
     if template is None:
         return re.sub(r"^Input should be ", "", error["msg"])
-    return template.format(**error.get("ctx", {}))
+    context = error.get("ctx", {})
+    return template.format(**{name: f"{x:g}" if isinstance(x, float) else x for name, x in context.items()})
 
 
 def _length_fault(error: ErrorDetails, annotation: Any) -> tuple[str, str]:
+    if isinstance(error["input"], str):
+        return f"text of at most {error['ctx']['max_length']} characters", describe(error["input"])
     fixed = [get_args(option) for option in options(annotation) if get_origin(option) is tuple]
     context = error.get("ctx", {})
     if fixed and fixed[0][-1] is not Ellipsis:
@@ -148,47 +161,38 @@ def _length_fault(error: ErrorDetails, annotation: Any) -> tuple[str, str]:
     return f"a list of {wanted}", describe(error["input"])
 
 
-def _translate(error: ErrorDetails) -> tuple[Path, str, str, str]:
-    """Path, expected, got and hint of one error of pydantic's."""
-    path, annotation = locate(error["loc"])
+def _inside(loc: tuple[str | int, ...], annotation: Any) -> tuple[Path, Any]:
+    """Path in a field of one of pydantic's locations, which also name the members of unions, and what stands there."""
+    path: Path = ()
+    for part in loc:
+        if isinstance(part, int):
+            path, annotation = (*path, part), _item(annotation, part)
+        elif any(get_origin(option) is dict for option in options(annotation)):
+            path, annotation = (*path, part), _entry(annotation)
+    return path, annotation
+
+
+def _translate(error: ErrorDetails, annotation: Any, path: Path) -> Told:
+    """One error of pydantic's with the field at `path`."""
+    inside, inner = _inside(error["loc"], annotation)
+    path = (*path, *inside)
     match error["type"]:
-        case "extra_forbidden":
-            return (path, *_unknown_key(path, error["loc"]))
         case "union_tag_invalid" | "union_tag_not_found":
-            return _kind_fault(error, path, annotation)
+            return _kind_fault(error, path, inner)
         case "too_short" | "too_long":
-            return (path, *_length_fault(error, annotation), "")
-        case "missing" if isinstance(path[-1], int):
-            return (path[:-1], *_length_fault(error, locate(error["loc"][:-1])[1]), "")
+            return Told(path, *_length_fault(error, inner))
+        case "missing" if inside:
+            return Told(path[:-1], *_length_fault(error, annotation))
         case "missing":
-            return path, "a value, as it is required", "nothing", ""
+            return Told(path, "a value, as it is required", "nothing")
         case "literal_error" if isinstance(error["input"], str):
-            hint = suggestion(error["input"], _literals(annotation))
-            return path, _expected(error, annotation), describe(error["input"]), hint
-    context = error.get("ctx", {})
-    at, value = context.get("at", ()), error["input"]
-    for part in at:
-        value = value[part]
-    return (*path, *at), _expected(error, annotation), context.get("got") or describe(value), ""
-
-
-def _written_path(path: Path, data: Any) -> Path:
-    """Where the file says what stands at `path`: a sensor's value may come from `sensor_defaults`."""
-    if len(path) < 3 or path[0] != "sensors" or not isinstance(data, Mapping):
-        return path
-    sensors, defaults = data.get("sensors"), data.get("sensor_defaults")
-    own = sensors[path[1]] if isinstance(sensors, list) and isinstance(path[1], int) else None
-    if isinstance(own, Mapping) and path[2] not in own and isinstance(defaults, Mapping) and path[2] in defaults:
-        return ("sensor_defaults", *path[2:])
-    return path
-
-
-def place_fault(document: Document, path: Path, expected: str, got: str, hint: str = "") -> Fault:
-    """A fault at the place in the file of the data's `path`."""
-    written = _written_path(path, document.data)
-    at_key = got == _UNKNOWN or written not in document.value_places
-    place = document.place(written) if at_key else document.value_place(written)
-    return Fault(place, written, expected, got, hint)
+            return Told(
+                path,
+                _expected(error, inner),
+                describe(error["input"]),
+                suggestion(error["input"], _literals(inner)),
+            )
+    return Told(path, _expected(error, inner), describe(error["input"]))
 
 
 def _is_echo(error: ErrorDetails) -> bool:
@@ -196,20 +200,13 @@ def _is_echo(error: ErrorDetails) -> bool:
     return error["type"] == "too_short" and len(error["input"]) >= error["ctx"]["min_length"]
 
 
-def _merge_alternatives(found: list[tuple[Path, str, str, str]]) -> list[tuple[Path, str, str, str]]:
+def _merge_alternatives(found: list[Told]) -> list[Told]:
     """One entry for each path: the members of a union each say what they expected, unless one got further inside."""
     around = {path[:length] for path, *_ in found for length in range(len(path))}
     merged: dict[tuple[Path, str], tuple[list[str], str]] = {}
-    for path, expected, got, hint in found:
+    for path, wanted, got, hint in found:
         if path in around:
             continue
         expectations, hints = merged.get((path, got), ([], ""))
-        merged[(path, got)] = ([*expectations, *([] if expected in expectations else [expected])], hints or hint)
-    return [(path, " or ".join(wanted), got, hint) for (path, got), (wanted, hint) in merged.items()]
-
-
-def validation_faults(document: Document, error: ValidationError) -> list[Fault]:
-    """The faults behind an error of pydantic's, each at its place in the file."""
-    errors = [detail for detail in error.errors(include_url=False) if not _is_echo(detail)]
-    found = [entry for entry in map(_translate, errors) if _written_path(entry[0], document.data) == entry[0]]
-    return [place_fault(document, *entry) for entry in _merge_alternatives(found)]
+        merged[(path, got)] = ([*expectations, *([] if wanted in expectations else [wanted])], hints or hint)
+    return [Told(path, " or ".join(wanted), got, hint) for (path, got), (wanted, hint) in merged.items()]

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
-from typing import Any
+from datetime import date, time
+from typing import Any, NamedTuple
 
 from vedette.text import elided, plain, printable
 
@@ -15,29 +15,30 @@ Finding = tuple[Path, str, str]  # path, expected, got
 _LONGEST = 60
 
 
-@dataclass(frozen=True, slots=True)
-class Fault:
-    """What is wrong, where.
+class Told(NamedTuple):
+    """What is wrong with the data: the path in them, what was expected, what came, and how to mend it, or empty."""
 
-    Attributes:
-        place: line and column, from 1.
-        path: keys and indices that lead to the field; empty for the file as a whole.
-        expected, got: what should stand there, and what does.
-        hint: how to mend it, or empty.
-    """
-
-    place: Place
     path: Path
     expected: str
     got: str
     hint: str = ""
 
+    @property
+    def message(self) -> str:
+        """`field: expected ..., got ... (hint)`."""
+        field = f"{format_path(self.path)}: " if self.path else ""
+        return printable(f"{field}expected {self.expected}, got {self.got}" + (f" ({self.hint})" if self.hint else ""))
+
+
+class Fault(NamedTuple):
+    """What is wrong with a file, and where: line and column, from 1."""
+
+    place: Place
+    told: Told
+
     def message(self, file: str) -> str:
         """`file:line:column: field: expected ..., got ...`."""
-        field = f" {format_path(self.path)}:" if self.path else ""
-        hint = f" ({self.hint})" if self.hint else ""
-        text = f"{file}:{self.place[0]}:{self.place[1]}:{field} expected {self.expected}, got {self.got}{hint}"
-        return printable(text)
+        return f"{printable(file)}:{self.place[0]}:{self.place[1]}: {self.told.message}"
 
 
 def format_path(path: Path) -> str:
@@ -57,6 +58,8 @@ def describe(value: Any) -> str:
     """A value of the file in a few words."""
     if value is None:
         return "nothing"
+    if isinstance(value, date | time):
+        return f"the date or time {value}"
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, list | tuple):

@@ -14,8 +14,8 @@ from pathlib import Path as FilePath
 from typing import Any
 
 from vedette.scenarios.faults import Finding, Path, describe, named
-from vedette.scenarios.parts import Parts
-from vedette.scenarios.sections.base import Section
+from vedette.scenarios.sections import ScenarioModel
+from vedette.scenarios.sections.base import Section, attempt, is_whole
 from vedette.scenarios.sections.custom import Custom
 from vedette.scenarios.sections.targets import RecordedTargets
 
@@ -24,34 +24,32 @@ def _absent(file: str) -> str:
     return f"{describe(file)}, which is not there"
 
 
-def recorded_findings(parts: Parts) -> Iterator[Finding]:
+def recorded_findings(model: ScenarioModel, folder: FilePath) -> Iterator[Finding]:
     """What is wrong with the file of recorded targets: all that a run would refuse."""
-    recorded = parts.recorded
-    if recorded is None:
+    recorded = model.targets
+    if not isinstance(recorded, RecordedTargets):
         return
-    file = (parts.folder or FilePath()) / recorded.path
+    file = folder / recorded.path
     if file.suffix.lower() not in (".csv", ".parquet"):
         yield ("targets", "path"), "a .csv or .parquet file", describe(recorded.path)
     elif not os.path.isfile(file):  # a name can be too long, or hold what no name can: for pathlib, an error
         yield ("targets", "path"), "a file, relative to the scenario file", _absent(recorded.path)
     else:
-        faults = list(_columns(recorded, file)) if recorded.columns is not None else []
+        if any(recorded.columns.findings()):
+            return
+        faults = list(_columns(recorded, file))
         yield from faults
         if not faults:
-            yield from _content(recorded, parts)
+            yield from _content(recorded, model, folder)
 
 
-def _content(recorded: RecordedTargets, parts: Parts) -> Iterator[Finding]:
+def _content(recorded: RecordedTargets, model: ScenarioModel, folder: FilePath) -> Iterator[Finding]:
     """What is wrong with the rows, or with the scans or the region for them; where these are faulty, nothing."""
-    region, time = parts.region, parts.time
-    if region is None or time is None:
+    if not all(map(is_whole, (recorded, model.region, model.time))):
         return
-    for section in (recorded, region, time):
-        if any(getattr(section, name) is None for name, field in type(section).model_fields.items() if field.default):
-            return
     from vedette.scenarios.records import record_fault  # with it comes the compiler, which most checks do without
 
-    fault = record_fault(recorded, region, time, parts.folder or FilePath())
+    fault = record_fault(recorded, model.region, model.time, folder)
     if fault is not None:
         yield ("targets", "path"), "a file of recorded targets that a run can use", fault
 
@@ -86,6 +84,9 @@ def _customs(value: Any, path: Path) -> Iterator[tuple[Path, Custom]]:
     elif isinstance(value, Section):
         for name in type(value).model_fields:
             yield from _customs(getattr(value, name), (*path, name))
+    elif isinstance(value, tuple):
+        for i, item in enumerate(value):
+            yield from _customs(item, (*path, i))
 
 
 def _is_findable(package: str) -> bool:
@@ -112,17 +113,18 @@ def _unnamed(file: FilePath, name: str) -> tuple[str, str] | None:
     return f"a name that {describe(file.name)} defines", describe(name)
 
 
-def reference_findings(parts: Parts) -> Iterator[Finding]:
-    """Which models of the user's own are not there. Nothing is imported."""
-    sections: list[tuple[Path, Any]] = [(("motion",), parts.motion), (("survival",), parts.survival)]
-    sections += [(("sensors", i), sensor) for i, sensor in enumerate(parts.sensors)]
-    for path, custom in (found for start, section in sections for found in _customs(section, start)):
-        module = custom.function.rpartition(":")[0]
-        if module.endswith(".py"):
-            file = (parts.folder or FilePath()) / module
-            if not os.path.isfile(file):
-                yield (*path, "function"), "a file, relative to the scenario file", _absent(module)
-            elif fault := _unnamed(file, custom.function.rpartition(":")[2].partition(".")[0]):
-                yield (*path, "function"), *fault
-        elif not _is_findable(module.partition(".")[0]):
-            yield (*path, "function"), "a module that Python finds", describe(module)
+def reference_findings(model: ScenarioModel, folder: FilePath) -> Iterator[Finding]:
+    """Which code of the user's own is not there. Nothing is imported."""
+    for path, custom in _customs(model, ()):
+        yield from attempt(_reference(path, custom, folder))
+
+
+def _reference(path: Path, custom: Custom, folder: FilePath) -> Iterator[Finding]:
+    module, _, name = custom.function.rpartition(":")
+    if module.endswith(".py"):
+        if not os.path.isfile(folder / module):
+            yield (*path, "function"), "a file, relative to the scenario file", _absent(module)
+        elif fault := _unnamed(folder / module, name.partition(".")[0]):
+            yield (*path, "function"), *fault
+    elif not _is_findable(module.partition(".")[0]):
+        yield (*path, "function"), "a module that Python finds", describe(module)

@@ -8,15 +8,14 @@ from dataclasses import dataclass
 from pathlib import Path as FilePath
 from typing import Any
 
-from pydantic import ValidationError
-
 from vedette.errors import InputError, ScenarioError
-from vedette.scenarios.checks import findings
-from vedette.scenarios.diagnostics import locate, place_fault, suggestion, validation_faults
-from vedette.scenarios.faults import Fault, Path, describe, named
-from vedette.scenarios.parts import Parts, parts_of_data, parts_of_model
-from vedette.scenarios.sections import ScenarioModel, merge_sensor_defaults
-from vedette.scenarios.yaml_reader import Document, read_yaml
+from vedette.reading import read_text
+from vedette.scenarios.diagnostics import UNKNOWN, read_section, suggestion
+from vedette.scenarios.faults import Fault, Path, Told, describe, named
+from vedette.scenarios.file_checks import recorded_findings, reference_findings
+from vedette.scenarios.sections import ScenarioModel
+from vedette.scenarios.sections.base import attempt
+from vedette.scenarios.yaml_reader import MOST_BYTES, Document, read_yaml
 
 BUILTIN_FOLDER = FilePath(__file__).parent / "builtin"
 
@@ -49,22 +48,23 @@ def list_builtin() -> dict[str, FilePath]:
     return {file.stem: file for file in sorted(BUILTIN_FOLDER.glob("*.yaml"))}
 
 
-def _without(data: Any, paths: list[Path]) -> Any:
-    """A deep copy of plain data without the keys at `paths`."""
-    inner: dict[str | int, list[Path]] = {}
-    for first, *rest in paths:
-        inner.setdefault(first, []).append(tuple(rest))
-    if isinstance(data, Mapping):
-        kept = {key: inner.get(key, []) for key in data}
-        return {key: _without(value, kept[key]) for key, value in data.items() if () not in kept[key]}
-    if isinstance(data, list):
-        return [_without(item, inner.get(i, [])) for i, item in enumerate(data)]
-    return data
+def place_fault(document: Document, told: Told) -> Fault:
+    """The fault at the place in the file where it says what stands at the data's path."""
+    written = _written_path(told.path, document.data)
+    at_key = told.got == UNKNOWN or written not in document.value_places
+    place = document.place(written) if at_key else document.value_place(written)
+    return Fault(place, told._replace(path=written))
 
 
-def _partial(document: Document, error: ValidationError, folder: FilePath | None) -> Parts:
-    unknown = [locate(e["loc"])[0] for e in error.errors(include_url=False) if e["type"] == "extra_forbidden"]
-    return parts_of_data(_without(merge_sensor_defaults(document.data), unknown), folder)
+def _written_path(path: Path, data: Any) -> Path:
+    """Where the file says what stands at `path`: a sensor's value may come from `sensor_defaults`."""
+    if len(path) < 3 or path[0] != "sensors" or not isinstance(data, Mapping):
+        return path
+    sensors, defaults = data.get("sensors"), data.get("sensor_defaults")
+    own = sensors[path[1]] if isinstance(sensors, list) and isinstance(path[1], int) else None
+    if isinstance(own, Mapping) and path[2] not in own and isinstance(defaults, Mapping) and path[2] in defaults:
+        return ("sensor_defaults", *path[2:])
+    return path
 
 
 def _unique(faults: list[Fault]) -> list[Fault]:
@@ -78,16 +78,13 @@ def diagnose(document: Document, folder: FilePath | None) -> tuple[ScenarioModel
     if not isinstance(document.data, Mapping):
         if not faults:
             place = document.value_place(())
-            faults.append(Fault(place, (), "a mapping of the sections of a scenario", describe(document.data)))
+            faults.append(Fault(place, Told((), "a mapping of the sections of a scenario", describe(document.data))))
         return None, _unique(faults)
-    model: ScenarioModel | None = None
-    try:
-        model = ScenarioModel.model_validate(document.data)
-        parts = parts_of_model(model, folder)
-    except ValidationError as error:
-        faults += validation_faults(document, error)
-        parts = _partial(document, error, folder)
-    faults += [place_fault(document, *finding) for finding in findings(parts)]
+    model, told = read_section(ScenarioModel, document.data)
+    beside = folder or FilePath()
+    for findings in (recorded_findings(model, beside), reference_findings(model, beside)):
+        told += [Told(*finding) for finding in attempt(findings)]
+    faults += [place_fault(document, fault) for fault in told]
     return (None if faults else model), _unique(faults)
 
 
@@ -101,15 +98,6 @@ def parse_scenario(text: str, file: str = "<text>", folder: FilePath | None = No
     if model is None:
         raise ScenarioError([fault.message(file) for fault in faults])
     return model
-
-
-def _read_text(path: FilePath) -> str:
-    try:
-        return path.read_bytes().decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise ScenarioError([f"{path}:1:1: expected UTF-8 text, got byte {error.start} that is not"]) from None
-    except OSError as error:
-        raise InputError(f"scenario file {path}: expected a readable file; got {error.strerror}") from None
 
 
 def load_scenario(name_or_path: str | FilePath) -> Scenario:
@@ -127,7 +115,7 @@ def load_scenario(name_or_path: str | FilePath) -> Scenario:
         known = ", ".join(builtin)
         got = named(str(name_or_path))
         raise InputError(f"scenario: expected a YAML file or one of {known}; got '{got}'{hint}")
-    return Scenario(parse_scenario(_read_text(path), str(path), path.parent), path)
+    return Scenario(parse_scenario(read_text(path, "scenario file", MOST_BYTES), str(path), path.parent), path)
 
 
 def json_schema() -> dict[str, Any]:

@@ -36,13 +36,7 @@ def with_fields(scenario: Scenario, fields: Mapping[str, Any]) -> Scenario:
         raise ScenarioError(faults)
     model, found = diagnose(Document(scenario.name, data, {}, {}, []), scenario.folder)
     if model is None:
-        hints = [f" ({fault.hint})" if fault.hint else "" for fault in found]
-        raise ScenarioError(
-            [
-                f"{format_path(fault.path)}: expected {fault.expected}, got {fault.got}{hint}"
-                for fault, hint in zip(found, hints, strict=True)
-            ]
-        )
+        raise ScenarioError([fault.told.message for fault in found])
     return Scenario(model, scenario.path)
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Literal
 
-from vedette.scenarios.checks import decision_steps
 from vedette.scenarios.loading import Scenario
 from vedette.scenarios.sections import ScenarioModel
 from vedette.scenarios.sections.base import Section
@@ -20,7 +19,7 @@ def one_line(scenario: Scenario) -> str:
     model = scenario.model
     targets = model.targets
     what = "recorded targets" if isinstance(targets, RecordedTargets) else counted(len(targets.tracks), "target")
-    decisions = counted(len(decision_steps(model)), "decision")
+    decisions = counted(len(model.decision_steps), "decision")
     return (
         f"ok: {model.name}, {counted(model.time.num_steps, 'scan')}, {what}, {counted(len(model.sensors), 'sensor')}, "
         f"{model.filter.kind} filter, {model.fusion.kind} fusion, {decisions}"
@@ -64,7 +63,7 @@ def facts(model: ScenarioModel) -> list[tuple[str, str]]:
         ("filter", f"{settings(model.filter)}, {model.filter.assignment.kind} assignment"),
         ("fusion", _fusion(model.fusion)),
         ("estimate", settings(model.estimator)),
-        ("decisions", _decisions(decision_steps(model))),
+        ("decisions", _decisions(model.decision_steps)),
         ("actions", f"{control.headings} headings, {short(control.actions_deg)} deg"),
         ("horizon", f"{counted(control.horizon_steps, 'step')} of {control.horizon_period:g} s"),
         ("reward", f"{settings(control.reward)}, {counted(control.num_samples, 'sample')}"),

@@ -12,7 +12,7 @@ from vedette.errors import InputError
 from vedette.filters import FilterInfo
 from vedette.fusion.base import FusionInfo
 from vedette.kernels.base.types import Floats, Ints
-from vedette.simulation.columns import Columns, Kind
+from vedette.simulation.arrow import Columns, Kind
 
 _FUSION = "fusion_"  # in front of the names that are of the fusion as a whole
 

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from vedette.control.plan import Plan
 from vedette.densities.estimates import Estimate
+from vedette.errors import InputError
 from vedette.kernels.base.types import Floats
 from vedette.simulation.health import Health
 from vedette.simulation.truth import Truth
@@ -17,8 +20,8 @@ class Decision:
 
     Attributes:
         step: number of the scan, from 1, after which the plan was made.
-        time: s.
-        poses: (num_sensors, 3 or more) poses [px, py, heading_rad, ...] of the sensors at that moment.
+        time: of that scan, s.
+        poses: (num_sensors, 3 or more) poses [px, py, heading_rad, ...] of the sensors at that scan.
         plan: the choice and its evidence.
     """
 
@@ -26,6 +29,20 @@ class Decision:
     time: float
     poses: Floats
     plan: Plan
+
+    def check(self, times: Floats, poses: Floats) -> None:
+        """Raise `InputError` unless the plan is valid, and time and poses are those of its scan of the run."""
+        if not 1 <= self.step <= len(times):
+            raise InputError(f"record.decisions: expected a step of 1 to {len(times)}; got {self.step}")
+        if self.time != times[self.step - 1]:
+            raise InputError(
+                f"record.decisions: expected the time {times[self.step - 1]:g} s of step {self.step}; got {self.time:g}"
+            )
+        if not np.array_equal(self.poses, poses[self.step - 1]):
+            raise InputError(f"record.decisions: expected the poses of step {self.step}; got others")
+        if self.plan.num_sensors != len(self.poses):
+            raise InputError(f"plan: expected {len(self.poses)} sensors; got {self.plan.num_sensors}")
+        self.plan.validate()
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,9 +1,8 @@
 """Runs on disk, in open formats.
 
-A run is a folder: `manifest.json` (what ran, on which versions, and a checksum of every other file), `scans.csv`
-(OSPA, reports of the fusion), `truth.csv`, `tracks.csv` (estimates), `sensors.csv` (poses, reports of the filters),
-`timings.csv`, `decisions.json` (choices with their reward tables) and, where it was given, `scenario.yaml`. A run that
-stopped early says so in the manifest (`stopped`). A folder appears whole or not at all.
+A run is a folder: `manifest.json` (what ran, on which versions, and a checksum of every other file), an Arrow file for
+each table of `vedette.simulation.tables`, `timings.arrow` and, where it was given, `scenario.yaml`. A run that stopped
+early says so in the manifest (`stopped`). A folder appears whole or not at all.
 """
 
 from __future__ import annotations
@@ -21,14 +20,13 @@ from typing import Any
 
 from vedette.errors import InputError
 from vedette.reading import parse_json, read_file
-from vedette.simulation.encoding import decode_run, encode_run
+from vedette.simulation.kept import FORMAT_VERSION, check_version, decode_run, encode_run, encode_timings
 from vedette.simulation.records import RunRecord
-from vedette.simulation.tabulation import run_facts
+from vedette.simulation.tables import run_facts
 from vedette.text import shown
 
 FORMAT = "vedette-run"
-FORMAT_VERSION = 3
-MANIFEST = "manifest.json"
+MANIFEST, TIMINGS = "manifest.json", "timings.arrow"
 SCENARIO = "scenario.yaml"
 _PACKAGES = ("vedette", "numpy", "scipy", "numba")
 
@@ -48,7 +46,7 @@ def save_run(
     """
     target = Path(directory)
     check_free(target, overwrite)
-    files = {name: text.encode() for name, text in encode_run(record).items()}
+    files = {**encode_run(record), TIMINGS: encode_timings(record)}
     if scenario_text is not None:
         files[SCENARIO] = scenario_text.encode()
     files[MANIFEST] = json.dumps(_manifest(record, files), indent=2, sort_keys=True).encode() + b"\n"
@@ -68,7 +66,7 @@ def save_run(
 def load_run(directory: Path | str) -> RunRecord:
     """Read a run back, bit for bit.
 
-    Raises `InputError`, naming the file, if the folder holds no run, one of a newer format, or one with a file that is
+    Raises `InputError`, naming the file, if the folder holds no run, one of another format, or one with a file that is
     missing, cut short or altered since it was written.
     """
     folder = Path(directory)
@@ -80,11 +78,12 @@ def load_run(directory: Path | str) -> RunRecord:
         content = _read(folder / name)
         if hashlib.sha256(content).hexdigest() != checksum:
             raise InputError(f"{folder / name}: expected the file as it was written; it is cut short or altered")
-        try:
-            files[name] = content.decode()
-        except UnicodeDecodeError as error:
-            raise InputError(f"{folder / name}: expected UTF-8 text; byte {error.start} is not") from None
-    return decode_run(manifest["run"], files, str(folder))
+        files[name] = content
+    if TIMINGS not in files:
+        raise InputError(
+            f"{folder / MANIFEST}: expected a file {TIMINGS}; it names {shown(', '.join(files)) or 'none'}"
+        )
+    return decode_run(manifest["run"], files, str(folder), files[TIMINGS])
 
 
 def read_manifest(directory: Path | str) -> dict[str, Any]:
@@ -98,14 +97,20 @@ def read_manifest(directory: Path | str) -> dict[str, Any]:
         raise InputError(f"{path}: expected the manifest of a run; it is cut short or altered: {error}") from error
     if not isinstance(manifest, dict) or manifest.get("format") != FORMAT:
         raise InputError(f"{path}: expected the manifest of a run; got another file")
-    if manifest.get("format_version") != FORMAT_VERSION:
-        raise InputError(
-            f"{path}: expected format version {FORMAT_VERSION}; got {shown(manifest.get('format_version'))}, "
-            "written by another version of this program"
-        )
+    written = manifest.get("versions")
+    check_version(manifest, written.get("vedette") if isinstance(written, dict) else None, path)
     if not isinstance(manifest.get("files"), dict) or not isinstance(manifest.get("run"), dict):
         raise InputError(f"{path}: expected the fields files and run; it is cut short or altered")
     return manifest
+
+
+def holds_run(directory: Path | str) -> bool:
+    """Whether a folder says of itself that it holds a saved run, of whatever format."""
+    try:
+        manifest = parse_json(read_file(Path(directory) / MANIFEST))
+    except (OSError, ValueError):
+        return False
+    return isinstance(manifest, dict) and manifest.get("format") == FORMAT
 
 
 def _manifest(record: RunRecord, files: Mapping[str, bytes]) -> dict[str, Any]:

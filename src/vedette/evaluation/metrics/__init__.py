@@ -1,7 +1,9 @@
 """How far estimates are from the truth: distances between sets of points and of tracks, breaks, consistency."""
 
 from vedette.evaluation.metrics.consistency import AverageNees, average_nees, nees, nees_interval
+from vedette.evaluation.metrics.kept import decode_metrics, encode_metrics
 from vedette.evaluation.metrics.matching import Matching, match_run
+from vedette.evaluation.metrics.own import Metric
 from vedette.evaluation.metrics.point_gospa import GospaResult, GospaSeries, gospa, gospa_distance, gospa_of_run
 from vedette.evaluation.metrics.point_ospa import OspaResult, ospa, ospa_of_run
 from vedette.evaluation.metrics.run import RunMetrics, measure
@@ -14,12 +16,15 @@ __all__ = [
     "GospaResult",
     "GospaSeries",
     "Matching",
+    "Metric",
     "OspaResult",
     "RunMetrics",
     "TrackSet",
     "average_nees",
     "continuity",
     "continuity_of_run",
+    "decode_metrics",
+    "encode_metrics",
     "gospa",
     "gospa_distance",
     "gospa_of_run",

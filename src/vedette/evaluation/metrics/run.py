@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,9 @@ from vedette.evaluation.metrics.trajectories import continuity
 from vedette.kernels.base.types import Floats, Ints
 from vedette.models.arguments import reject
 from vedette.simulation.records import RunRecord
+
+if TYPE_CHECKING:
+    from vedette.evaluation.metrics.own import Metric
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -40,6 +44,7 @@ class RunMetrics:
         position_nees_mean: mean NEES of the position over all pairs; NaN where there is none.
         label_switches: targets matched to another label than at their last match.
         fragmentations: targets matched again after a break.
+        own: measures of one's own, by name.
     """
 
     gospa_m: Floats
@@ -55,6 +60,7 @@ class RunMetrics:
     position_nees_mean: Floats
     label_switches: Ints
     fragmentations: Ints
+    own: dict[str, Floats] = field(default_factory=dict)
 
     @property
     def num_scans(self) -> int:
@@ -62,29 +68,35 @@ class RunMetrics:
         return len(self.gospa_m)
 
     def columns(self) -> dict[str, NDArray[np.float64] | NDArray[np.int64]]:
-        """Each array under its name, in the order above: float64, or int64 for numbers of things."""
-        return {name: getattr(self, name) for name in COLUMNS}
+        """Each array under its name, in the order above: float64, or int64 for numbers of things; one's own last."""
+        return {**{name: getattr(self, name) for name in COLUMNS}, **self.own}
 
     @classmethod
     def from_columns(cls, columns: Mapping[str, NDArray[np.float64] | NDArray[np.int64]]) -> RunMetrics:
         """Of what `columns` gives, in any order.
 
-        Raises `InputError` for a name missing or unknown, a type that is not the column's, or unequal lengths.
+        Raises `InputError` for a name missing, a type that is not the column's, or unequal lengths.
         """
-        if columns.keys() != COLUMNS.keys():
+        if not columns.keys() >= COLUMNS.keys():
             raise reject("columns", ", ".join(COLUMNS), ", ".join(columns))
         num_scans = len(columns["gospa_m"])
-        for name, dtype in COLUMNS.items():
-            if columns[name].dtype != dtype or columns[name].shape != (num_scans,):
-                got = f"{columns[name].dtype} in shape {columns[name].shape}"
+        for name, column in columns.items():
+            dtype = COLUMNS.get(name, np.dtype(np.float64))
+            if column.dtype != dtype or column.shape != (num_scans,):
+                got = f"{column.dtype} in shape {column.shape}"
                 raise reject(f"columns.{name}", f"{dtype} in shape {(num_scans,)}", got)
-        return cls(**columns)  # type: ignore[arg-type] # types are checked above
+        own = {name: column for name, column in columns.items() if name not in COLUMNS}
+        return cls(**{name: columns[name] for name in COLUMNS}, own=own)  # type: ignore[arg-type] # checked above
 
 
-COLUMNS = {field.name: np.dtype(np.float64 if field.type == "Floats" else np.int64) for field in fields(RunMetrics)}
+COLUMNS = {
+    each.name: np.dtype(np.float64 if each.type == "Floats" else np.int64)
+    for each in fields(RunMetrics)
+    if each.name != "own"
+}
 
 
-def measure(record: RunRecord, *, cutoff: float, order: float, window: int) -> RunMetrics:
+def measure(record: RunRecord, *, cutoff: float, order: float, window: int, own: Sequence[Metric] = ()) -> RunMetrics:
     """All measures of a run, from one matching a scan; a matching of tracks besides for OSPA(2).
 
     Args:
@@ -92,9 +104,11 @@ def measure(record: RunRecord, *, cutoff: float, order: float, window: int) -> R
         cutoff: c > 0, m, finite.
         order: p >= 1, finite.
         window: scans of the window of OSPA(2), at least 1.
+        own: measures of one's own, each with a name of its own.
 
     Raises:
-        InputError: an argument out of range, not one estimate a scan, or a position that is not finite.
+        InputError: an argument out of range, not one estimate a scan, a position that is not finite, or a measure of
+            one's own that is not one number a scan.
         NumericalError: an estimate's covariance is not symmetric and positive definite.
     """
     truth = record.truth
@@ -118,4 +132,5 @@ def measure(record: RunRecord, *, cutoff: float, order: float, window: int) -> R
         position_nees_mean=matching.mean_by_scan(position),
         label_switches=breaks.label_switches,
         fragmentations=breaks.fragmentations,
+        own={metric.name: metric.of(record) for metric in own},
     )

@@ -5,10 +5,26 @@ Each field's description ends with its unit in brackets; [-] is a number without
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal, Self
+from collections.abc import Callable, Iterator, Mapping
+from functools import cache
+from typing import Annotated, Any, ClassVar, Literal, Self
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, model_validator
-from pydantic_core import PydanticCustomError
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    ModelWrapValidatorHandler,
+    ValidationError,
+    ValidationInfo,
+    create_model,
+    model_validator,
+)
+from pydantic_core import ErrorDetails, PydanticCustomError
+
+from vedette.scenarios.faults import Finding, describe
+from vedette.scenarios.sections.unread import NotRead, Unread
 
 # Squares and products of numbers in this range are numbers, too.
 _SMALLEST, _LARGEST = 1e-30, 1e15
@@ -62,15 +78,103 @@ Chance = Annotated[float, Field(gt=0.0, lt=1.0)]
 GaussianMethod = Literal["auto", "ekf", "ukf", "ckf"]
 
 
+IN_PART = {"in_part": True}  # validation context under which what cannot be read becomes an `Unread`
+
+Check = Callable[[Any], Iterator[Finding]]
+
+
+def check(findings: Check) -> Check:
+    """Mark a method that says what is wrong with a section: paths inside it, what was expected, what came."""
+    findings.is_check = True  # type: ignore[attr-defined] # a function takes attributes
+    return findings
+
+
+def attempt(findings: Iterator[Finding]) -> Iterator[Finding]:
+    """The findings up to the first that would need what could not be read."""
+    try:
+        yield from findings
+    except NotRead:
+        return
+
+
+def is_whole(value: Any) -> bool:
+    """Whether all of a section could be read."""
+    if isinstance(value, Section):
+        return all(is_whole(getattr(value, name)) for name in type(value).model_fields)
+    return all(map(is_whole, value)) if isinstance(value, tuple) else not isinstance(value, Unread)
+
+
 class Section(BaseModel):
-    """A mapping of the scenario file: no unknown keys, no silent conversion of types, nothing infinite."""
+    """A mapping of a configuration file: no unknown keys, no silent conversion of types, nothing infinite.
+
+    A valid section is one whose fields are valid and whose `findings` are none. Read with the context `IN_PART`, a
+    faulty mapping is a section too, with `Unread` in place of what is faulty, so that all other checks can go on.
+    """
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False, validate_default=True)
 
-    @model_validator(mode="after")
-    def _within_reason(self) -> Self:
+    _checks: ClassVar[tuple[Check, ...]] = ()
+
+    @classmethod
+    def __pydantic_init_subclass__(cls, **_: Any) -> None:
+        methods = (method for parent in reversed(cls.__mro__) for method in vars(parent).values())
+        cls._checks = tuple(method for method in methods if getattr(method, "is_check", False))
+
+    def findings(self) -> Iterator[Finding]:
+        """What is wrong with the section beyond its fields one by one."""
+        for method in self._checks:
+            yield from attempt(method(self))
+
+    @check
+    def _numbers_within_reason(self) -> Iterator[Finding]:
         for name in type(self).model_fields:
             path = _too_large(getattr(self, name), (name,))
             if path:
-                raise expected(f"a number from {-_LARGEST:g} to {_LARGEST:g}", at=path)
+                value = getattr(self, name)
+                for part in path[1:]:
+                    value = value[part]
+                yield path, f"a number from {-_LARGEST:g} to {_LARGEST:g}", describe(value)
+
+    @model_validator(mode="after")
+    def _checked(self, info: ValidationInfo) -> Self:
+        if info.context is not IN_PART:
+            for path, wanted, got in self.findings():
+                raise expected(wanted, at=path, got=got)
         return self
+
+    @classmethod
+    def prepared(cls, data: Mapping[str, Any]) -> Mapping[str, Any]:
+        """The mapping as its fields read it."""
+        return data
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _read(cls, data: Any, handler: ModelWrapValidatorHandler[Self], info: ValidationInfo) -> Any:
+        if isinstance(data, Mapping):
+            data = cls.prepared(data)
+            if info.context is IN_PART:
+                return cls.model_construct(**{name: _field_in_part(cls, name, data) for name in cls.model_fields})
+        elif info.context is IN_PART and not isinstance(data, cls):
+            try:
+                return handler(data)
+            except ValidationError as error:
+                return Unread(error.errors(include_url=False))
+        return handler(data)
+
+
+def _field_in_part(section: type[Section], name: str, data: Mapping[str, Any]) -> Any:
+    if name not in data:
+        field = section.model_fields[name]
+        missing = ErrorDetails(type="missing", loc=(), msg="", input=None)
+        return Unread([missing]) if field.is_required() else field.get_default()
+    try:
+        return getattr(_alone(section, name).model_validate({name: data[name]}, context=IN_PART), name)
+    except ValidationError as error:
+        return Unread([{**detail, "loc": detail["loc"][1:]} for detail in error.errors(include_url=False)])
+
+
+@cache
+def _alone(section: type[Section], name: str) -> type[BaseModel]:
+    """A model of one field of a section."""
+    field = section.model_fields[name]
+    return create_model("Alone", __config__=section.model_config, **{name: (field.annotation, field)})  # type: ignore[call-overload, no-any-return]

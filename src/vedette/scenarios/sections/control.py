@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import pairwise
 from typing import TYPE_CHECKING, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
-from vedette.scenarios.sections.base import Count, Numbers, Positive, Probability, Section, Share, Steps, expected
+from vedette.scenarios.faults import Finding, describe
+from vedette.scenarios.sections.base import Count, Numbers, Positive, Probability, Section, Share, Steps, check
 from vedette.scenarios.sections.sensors import Actions, Headings, Sensor
 
 if TYPE_CHECKING:  # with the planners comes the compiler, which a check does without
@@ -41,6 +44,12 @@ class PlanningLimits(Section):
     min_relative_weight: Share = Field(
         default=1e-5, description="Hypotheses lighter than this times the heaviest are dropped [-]."
     )
+
+
+def _order(name: str, moments: Sequence[float]) -> Iterator[Finding]:
+    for i, (before, after) in enumerate(pairwise(moments)):
+        if after <= before:
+            yield (name, i + 1), f"more than the one before it, {before:g}", describe(after)
 
 
 class Control(Section):
@@ -77,11 +86,18 @@ class Control(Section):
     reward: CauchySchwarzReward = Field(default=CauchySchwarzReward(), description="Value of a density [-].")
     limits: PlanningLimits = Field(default=PlanningLimits(), description="How much it works with [-].")
 
-    @model_validator(mode="after")
-    def _one_schedule(self) -> Control:
+    @check
+    def _one_schedule(self) -> Iterator[Finding]:
         if self.decision_steps is not None and self.decision_times is not None:
-            raise expected("either decision_steps or decision_times", got="both")
-        return self
+            yield (), "either decision_steps or decision_times", "both"
+
+    @check
+    def _steps_in_order(self) -> Iterator[Finding]:
+        yield from _order("decision_steps", self.decision_steps or ())
+
+    @check
+    def _times_in_order(self) -> Iterator[Finding]:
+        yield from _order("decision_times", self.decision_times or ())
 
     def build(self) -> PlanningSettings:
         """Horizon, samples and caps of a decision."""

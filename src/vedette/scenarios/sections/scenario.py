@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, field_validator
 
-from vedette.scenarios.sections.base import Name, Section
+from vedette.scenarios.faults import Finding
+from vedette.scenarios.sections.base import Name, Section, attempt, check
+from vedette.scenarios.sections.checks import CHECKS, step_of_time
 from vedette.scenarios.sections.control import Control
 from vedette.scenarios.sections.scoring import Estimator, MapEstimator, Ospa
 from vedette.scenarios.sections.sensors import Sensor, SensorDefaults
@@ -56,12 +58,26 @@ class ScenarioModel(Section):
     control: Control = Field(default=Control(), description="When and how the sensors decide [-].")
     ospa: Ospa = Field(default=Ospa(), description="How the estimates are scored [-].")
 
-    @model_validator(mode="before")
     @classmethod
-    def _merge(cls, data: Any) -> Any:
-        return merge_sensor_defaults(data) if isinstance(data, Mapping) else data
+    def prepared(cls, data: Mapping[str, Any]) -> Mapping[str, Any]:
+        """With what `sensor_defaults` gives, in every sensor."""
+        return merge_sensor_defaults(data)
 
     @field_validator("sensor_defaults")
     @classmethod
     def _merged(cls, _: SensorDefaults | None) -> None:
         return None
+
+    @check
+    def _across_sections(self) -> Iterator[Finding]:
+        for across in CHECKS:
+            yield from attempt(across(self))
+
+    @property
+    def decision_steps(self) -> tuple[int, ...]:
+        """The scans after which the sensors decide, however the scenario says it."""
+        if self.control.decision_times is None:
+            return self.control.decision_steps or ()
+        time = self.time
+        steps = (step_of_time(moment, time.start, time.step_period) for moment in self.control.decision_times)
+        return tuple(step for step in steps if step is not None)

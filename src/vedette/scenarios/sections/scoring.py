@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field
 
-from vedette.scenarios.sections.base import Chance, Count, Positive, Section
+from vedette.scenarios.faults import Finding, describe
+from vedette.scenarios.sections.base import Chance, Count, Positive, Section, check
 
 if TYPE_CHECKING:  # with the densities comes the compiler, which a check does without
     from vedette.densities import Estimate
@@ -61,3 +62,8 @@ class Ospa(Section):
         default=None, description="First scan of the reported mean; none: the one after the first decision, or 1 [-]."
     )
     to_step: Count | None = Field(default=None, description="Last scan of the reported mean; none: the last scan [-].")
+
+    @check
+    def _in_order(self) -> Iterator[Finding]:
+        if self.from_step is not None and self.to_step is not None and self.to_step < self.from_step:
+            yield ("to_step",), f"a step from from_step, {self.from_step}, on", describe(self.to_step)

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field
 
-from vedette.scenarios.sections.base import GaussianMethod, Name, Point, Section
+from vedette.scenarios.faults import Finding, describe
+from vedette.scenarios.sections.base import GaussianMethod, Name, Point, Section, check
 from vedette.scenarios.sections.sensing import (
     BearingRange,
     Clutter,
@@ -43,6 +45,45 @@ class Sensor(Section):
     noise: Noise = Field(default=RangeDependentNoise(), description="Measurement noise [-].")
     detection: Detection = Field(default=GaussianDetection(), description="Probability of detection [-].")
     clutter: Clutter = Field(default=RegionClutter(), description="False measurements [-].")
+
+    @check
+    def _noise_fits(self) -> Iterator[Finding]:
+        noise, dim = self.noise, self.measurement.dim
+        if noise.kind == "range_dependent" and self.measurement.kind in ("position", "custom"):
+            kind = self.measurement.kind
+            yield ("noise",), f"constant or custom noise for a {kind} measurement", "range_dependent noise"
+        elif noise.kind == "constant" and dim is not None and len(noise.std) != dim:
+            yield ("noise", "std"), self._components(dim), describe(noise.std)
+
+    @check
+    def _clutter_is_for_a_known_measurement(self) -> Iterator[Finding]:
+        if self.clutter.kind == "region" and self.measurement.kind == "custom":
+            yield ("clutter",), "measurement_space or custom clutter for a custom measurement", "region clutter"
+
+    @check
+    def _clutter_has_the_components(self) -> Iterator[Finding]:
+        if self.clutter.kind != "measurement_space":
+            return
+        low, high, dim = self.clutter.low, self.clutter.high, self.measurement.dim
+        for name, values in (("low", low), ("high", high)):
+            if dim is not None and len(values) != dim:
+                yield ("clutter", name), self._components(dim), describe(values)
+        if dim is None and len(low) != len(high):
+            yield ("clutter", "high"), f"as many numbers as low, {len(low)}", describe(high)
+
+    @check
+    def _clutter_is_a_box(self) -> Iterator[Finding]:
+        if self.clutter.kind != "measurement_space":
+            return
+        for j, (low, high) in enumerate(zip(self.clutter.low, self.clutter.high, strict=False)):
+            if high <= low:
+                yield ("clutter", "high", j), f"a number above low, {low:g}", describe(high)
+            elif j in self.measurement.angular and high - low > 2.0 * math.pi * (1.0 + 1e-9):
+                yield ("clutter", "high", j), f"an angle of at most 2 pi above low, {low:g}", describe(high)
+
+    def _components(self, dim: int) -> str:
+        numbers = "1 number" if dim == 1 else f"{dim} numbers"
+        return f"{numbers}, as a {self.measurement.kind} measurement has"
 
     @property
     def pose(self) -> tuple[float, float, float]:

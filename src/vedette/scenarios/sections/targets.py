@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal, Protocol
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field
 
-from vedette.scenarios.sections.base import Point, Positive, Section, SomeNumbers, Step, expected
+from vedette.scenarios.faults import Finding, describe
+from vedette.scenarios.sections.base import Point, Positive, Section, SomeNumbers, Step, check
 from vedette.scenarios.sections.world import Motion, RegionSection, Time, grouped_order
 
 if TYPE_CHECKING:  # with the models comes the compiler, which a check does without
@@ -35,6 +37,11 @@ class ScriptedTarget(Section):
     start_step: Step = Field(default=1, description="First scan at which it is there [-].")
     end_step: Step | None = Field(default=None, description="Last scan at which it is there; none: to the end [-].")
     process_noise: bool = Field(default=False, description="Whether its motion is disturbed by the process noise [-].")
+
+    @check
+    def _lifetime(self) -> Iterator[Finding]:
+        if self.end_step is not None and self.end_step < self.start_step:
+            yield ("end_step",), f"a step from start_step, {self.start_step}, on", describe(self.end_step)
 
 
 class ScriptedTargets(Section):
@@ -70,15 +77,15 @@ class Columns(Section):
     vx: str | None = Field(default=None, description="Velocity to the east, if it is recorded [m/s].")
     vy: str | None = Field(default=None, description="Velocity to the north, if it is recorded [m/s].")
 
-    @model_validator(mode="after")
-    def _one_pair(self) -> Columns:
+    @check
+    def _pairs(self) -> Iterator[Finding]:
         given = self.given()
         for first, second in (("x", "y"), ("longitude", "latitude"), ("vx", "vy")):
             if (first in given) != (second in given):
-                raise expected(f"{first} and {second} together", got=f"only {first if first in given else second}")
+                yield (), f"{first} and {second} together", f"only {first if first in given else second}"
+                return
         if "x" in given and "longitude" in given:
-            raise expected("either x and y, or longitude and latitude", got="both")
-        return self
+            yield (), "either x and y, or longitude and latitude", "both"
 
     def given(self) -> dict[str, str]:
         """The names that are given: key -> name in the file."""

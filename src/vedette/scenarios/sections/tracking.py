@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field
 
-from vedette.scenarios.sections.base import Chance, Count, GaussianMethod, Probability, Section, Share
+from vedette.scenarios.faults import Finding
+from vedette.scenarios.sections.base import Chance, Count, GaussianMethod, Probability, Section, Share, check
 
 if TYPE_CHECKING:  # with the filters comes the compiler, which a check does without
     from vedette.filters import Filter as LocalFilter
     from vedette.filters import Limits
     from vedette.fusion import Clmb, CmDeltaGlmb
     from vedette.models import SensorModel, TargetModel
+
+
+_WEIGHT_TOLERANCE = 1e-6
 
 
 class RankedAssignment(Section):
@@ -96,6 +101,11 @@ class Filter(Section):
     assignment: Assignment = Field(default=RankedAssignment(), description="How associations are truncated [-].")
     limits: FilterLimits = Field(default=FilterLimits(), description="What is thrown away [-].")
 
+    @check
+    def _assignment_fits(self) -> Iterator[Finding]:
+        if self.kind in ("lmb", *UNLABELLED) and self.assignment.kind == "gibbs":
+            yield ("assignment", "kind"), f"ranked, as the filter is {self.kind}", '"gibbs"'
+
     def build(self, targets: TargetModel, sensor: SensorModel) -> LocalFilter:
         """The filter of one sensor."""
         from vedette.filters import CbMemberFilter, CphdFilter, DeltaGlmbFilter, LmbFilter, PhdFilter
@@ -168,6 +178,11 @@ class Fusion(Section):
         default=False, description="Whether the fused density replaces the sensors' own; the paper's does not [-]."
     )
     limits: FusionLimits = Field(default=FusionLimits(), description="What is thrown away [-].")
+
+    @check
+    def _sum_to_one(self) -> Iterator[Finding]:
+        if self.weights is not None and abs(math.fsum(self.weights) - 1.0) > _WEIGHT_TOLERANCE:
+            yield ("weights",), "weights with sum 1", f"a sum of {math.fsum(self.weights):g}"
 
     def scaled_weights(self, num_sensors: int) -> tuple[float, ...]:
         """Weight of each sensor: equal where none are given; scaled to sum to one beyond the rounding of the file."""

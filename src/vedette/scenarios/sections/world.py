@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field
 
+from vedette.covariances import SMALLEST_VARIANCE
 from vedette.errors import InputError
+from vedette.scenarios.faults import Finding, describe
 from vedette.scenarios.sections.base import (
     GaussianMethod,
     Positive,
@@ -19,7 +22,7 @@ from vedette.scenarios.sections.base import (
     SomeNumbers,
     Steps,
     Whole,
-    expected,
+    check,
 )
 from vedette.scenarios.sections.custom import Custom
 
@@ -35,6 +38,12 @@ class Time(Section):
     step_period: Positive = Field(default=1.0, description="Time between scans [s].")
     start: float = Field(default=1.0, description="Time of the first scan [s].")
 
+    @check
+    def _distinct(self) -> Iterator[Finding]:
+        latest = abs(self.start) + self.num_steps * self.step_period
+        if self.step_period < 1e6 * math.ulp(latest):
+            yield ("step_period",), f"a period that can be told apart at {latest:g} s", describe(self.step_period)
+
     def build(self) -> Floats:
         """(num_steps,) times of the scans in s; that of step k is entry k - 1."""
         return self.start + self.step_period * np.arange(self.num_steps, dtype=np.float64)
@@ -48,13 +57,15 @@ class RegionSection(Section):
     y_min: float = Field(description="Southern edge [m].")
     y_max: float = Field(description="Northern edge [m].")
 
-    @model_validator(mode="after")
-    def _positive(self) -> RegionSection:
+    @check
+    def _width(self) -> Iterator[Finding]:
         if self.x_max <= self.x_min:
-            raise expected(f"a number above x_min, {self.x_min:g}", at=("x_max",))
+            yield ("x_max",), f"a number above x_min, {self.x_min:g}", describe(self.x_max)
+
+    @check
+    def _height(self) -> Iterator[Finding]:
         if self.y_max <= self.y_min:
-            raise expected(f"a number above y_min, {self.y_min:g}", at=("y_max",))
-        return self
+            yield ("y_max",), f"a number above y_min, {self.y_min:g}", describe(self.y_max)
 
     def build(self) -> Region:
         """The surveillance region."""
@@ -187,11 +198,18 @@ class BirthSite(Section):
         default=None, description="Covariance of the state, row by row; else give std [m^2, m^2/s, ...]."
     )
 
-    @model_validator(mode="after")
-    def _one_spread(self) -> BirthSite:
+    @check
+    def _one_spread(self) -> Iterator[Finding]:
         if (self.std is None) == (self.cov is None):
-            raise expected("either std or cov", got="both" if self.std else "neither")
-        return self
+            yield (), "either std or cov", "both" if self.std else "neither"
+
+    @check
+    def _positive(self) -> Iterator[Finding]:
+        for j, std in enumerate(self.std or ()):
+            if std <= 0.0:
+                yield ("std", j), "a number above 0", describe(std)
+            elif std * std < SMALLEST_VARIANCE:
+                yield ("std", j), f"a number of at least {math.sqrt(SMALLEST_VARIANCE):g}", describe(std)
 
     def covariance(self) -> Floats:
         """Covariance of the state, in the order of the file."""
@@ -205,6 +223,13 @@ class Birth(Section):
         default="every", description='Scans at which targets may appear: a list, or "every" [-].'
     )
     sites: Annotated[tuple[BirthSite, ...], Field(strict=False, min_length=1)] = Field(description="The sites [-].")
+
+    @check
+    def _each_once(self) -> Iterator[Finding]:
+        steps = () if self.steps == "every" else self.steps
+        for i, step in enumerate(steps):
+            if step in steps[:i]:
+                yield ("steps", i), "each step once", f"{step} again"
 
     def build(self, motion: Motion) -> BirthModel:
         """The birth sites, shared by all sensors."""

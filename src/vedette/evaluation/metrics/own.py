@@ -1,0 +1,58 @@
+"""Measures of one's own: a name, and a function of a run's record."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from vedette.errors import VedetteError
+from vedette.evaluation.metrics.run import COLUMNS
+from vedette.kernels.base.types import Floats
+from vedette.models.arguments import float_array, reject
+from vedette.simulation.records import RunRecord
+from vedette.simulation.tables import LAYOUTS
+
+# Columns of the tables of many runs beside those of the scans of one.
+_TAKEN = {"cell", "run", "scenario", "planner", "variant", "filter", "fusion"}
+
+
+@dataclass(frozen=True, slots=True)
+class Metric:
+    """One measure more, with a column of its own wherever there are measures.
+
+    Attributes:
+        name: of its column, a Python identifier; its unit, if it has one, at the end (`_m` m, `_s` s, `_rad` rad).
+        function: of the record of a run, gives (num_scans,) numbers; NaN where it has no value.
+
+    Raises:
+        InputError: a name that is no identifier, or that another column has.
+    """
+
+    name: str
+    function: Callable[[RunRecord], Any]
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.name, str) or not self.name.isidentifier():
+            raise reject("metric.name", "a Python identifier", self.name)
+        if self.name in _TAKEN or self.name in COLUMNS or LAYOUTS["scans"].kind(self.name) is not None:
+            raise reject("metric.name", "a name that no column has", self.name)
+
+    def of(self, record: RunRecord) -> Floats:
+        """(num_scans,) the measure of a run.
+
+        Raises `InputError`, with the name, for anything but one number a scan, and `VedetteError` where the function
+        itself raises.
+        """
+        try:
+            answer = self.function(record)
+        except VedetteError:
+            raise
+        except Exception as error:
+            raise VedetteError(f"metric {self.name}: {type(error).__name__}: {error}") from error
+        values = float_array(f"metric {self.name}", answer, (record.num_scans,), finite=False)
+        if np.isinf(values).any():
+            raise reject(f"metric {self.name}", "finite numbers, or NaN", values)
+        return values

@@ -1,0 +1,176 @@
+"""Checks across the sections of a scenario: what each section alone cannot know.
+
+Each is written as for a valid scenario. In a faulty one, a check ends where it would need what could not be read.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from vedette.covariances import covariance_fault
+from vedette.scenarios.faults import Finding, Path, describe
+from vedette.scenarios.sections.base import attempt
+from vedette.scenarios.sections.tracking import UNLABELLED
+from vedette.scenarios.sections.world import BirthSite
+
+if TYPE_CHECKING:
+    from vedette.scenarios.sections.scenario import ScenarioModel
+    from vedette.scenarios.sections.sensors import Sensor
+
+# How far a decision time may be from the time of a scan, in scans: rounding of sums of decimal fractions.
+_TIME_TOLERANCE = 1e-6
+
+
+def step_of_time(time: float, start: float, step_period: float) -> int | None:
+    """The scan at `time`, or None where there is none."""
+    position = (time - start) / step_period + 1.0
+    return round(position) if abs(position - round(position)) <= _TIME_TOLERANCE else None
+
+
+def _up_to_last(path: Path, step: int | None, last: int) -> Iterator[Finding]:
+    if step is not None and step > last:
+        yield path, f"a step up to the last, {last}", describe(step)
+
+
+def _decision_steps(model: ScenarioModel) -> Iterator[Finding]:
+    for i, step in enumerate(model.control.decision_steps or ()):
+        yield from _up_to_last(("control", "decision_steps", i), step, model.time.num_steps)
+
+
+def _decision_times(model: ScenarioModel) -> Iterator[Finding]:
+    time = model.time
+    end = time.start + (time.num_steps - 1) * time.step_period
+    for i, moment in enumerate(model.control.decision_times or ()):
+        if not time.start <= moment <= end + _TIME_TOLERANCE:
+            yield ("control", "decision_times", i), f"a time from {time.start:g} to {end:g} s", describe(moment)
+        elif step_of_time(moment, time.start, time.step_period) is None:
+            wanted = f"the time of a scan: {time.start:g} s and every {time.step_period:g} s after it"
+            yield ("control", "decision_times", i), wanted, describe(moment)
+
+
+def _weights(model: ScenarioModel) -> Iterator[Finding]:
+    weights = model.fusion.weights
+    if weights is not None and len(weights) != len(model.sensors):
+        yield ("fusion", "weights"), f"as many weights as sensors, {len(model.sensors)}", describe(weights)
+
+
+def _fusion_of_labels(model: ScenarioModel) -> Iterator[Finding]:
+    kind, num_sensors = model.filter.kind, len(model.sensors)
+    if kind not in UNLABELLED:
+        return
+    if num_sensors > 1:
+        wanted = f"a filter with labels by which to fuse, as there are {num_sensors} sensors"
+        yield ("filter", "kind"), wanted, describe(kind)
+    elif model.fusion.kind != "none":
+        wanted = f"none, as {kind} filters have no labels by which to fuse"
+        yield ("fusion", "kind"), wanted, describe(model.fusion.kind)
+
+
+def _fusion_of_several(model: ScenarioModel) -> Iterator[Finding]:
+    if model.filter.kind not in UNLABELLED and model.fusion.kind == "none" and len(model.sensors) > 1:
+        yield ("fusion", "kind"), f"a fusion, as there are {len(model.sensors)} sensors", '"none"'
+
+
+def _fusion_of_kind(model: ScenarioModel) -> Iterator[Finding]:
+    if model.fusion.kind == "cm_delta_glmb" and model.filter.kind == "lmb":
+        yield ("fusion", "kind"), "clmb or none, as the filters are lmb", '"cm_delta_glmb"'
+    if model.fusion.kind == "clmb" and model.fusion.feedback and model.filter.kind not in ("lmb", *UNLABELLED):
+        wanted = f"false, as {model.filter.kind} filters cannot go on from an LMB"
+        yield ("fusion", "feedback"), wanted, "true"
+
+
+def _estimator(model: ScenarioModel) -> Iterator[Finding]:
+    if model.filter.kind in UNLABELLED and model.estimator.kind == "marginal":
+        yield ("estimator", "kind"), f"map, as {model.filter.kind} filters have no labels", '"marginal"'
+
+
+def _combinations(model: ScenarioModel) -> Iterator[Finding]:
+    limits, num_sensors = model.fusion.limits, len(model.sensors)
+    if model.fusion.mixture_power == "moment_matched":
+        return
+    if limits.max_components**num_sensors > limits.max_combinations:
+        wanted = f"a number whose power by {num_sensors} sensors is at most max_combinations, {limits.max_combinations}"
+        yield ("fusion", "limits", "max_components"), wanted, describe(limits.max_components)
+
+
+def _birth_steps(model: ScenarioModel) -> Iterator[Finding]:
+    for i, step in enumerate(() if model.birth.steps == "every" else model.birth.steps):
+        yield from _up_to_last(("birth", "steps", i), step, model.time.num_steps)
+
+
+def _birth_sites(model: ScenarioModel) -> Iterator[Finding]:
+    for i, site in enumerate(model.birth.sites):
+        path: Path = ("birth", "sites", i)
+        yield from attempt(_state_length((*path, "mean"), site, "mean", model))
+        yield from attempt(_state_length((*path, "std"), site, "std", model))
+        yield from attempt(_covariance((*path, "cov"), site, model))
+
+
+def _state_length(path: Path, holder: Any, field: str, model: ScenarioModel) -> Iterator[Finding]:
+    values, dim = getattr(holder, field), model.motion.state_dim
+    if values is not None and len(values) != dim:
+        yield path, f"{dim} numbers, as a state under motion has", describe(values)
+
+
+def _covariance(path: Path, site: BirthSite, model: ScenarioModel) -> Iterator[Finding]:
+    if site.cov is None:
+        return
+    rows: Sequence[Sequence[float]] = site.cov
+    dim = model.motion.state_dim
+    if len(rows) != dim or any(len(row) != dim for row in rows):
+        shape = f"rows of {', '.join(str(len(row)) for row in rows)}" if len(rows) == dim else describe(rows)
+        yield path, f"{dim} rows of {dim} numbers", shape
+    elif fault := covariance_fault(np.array(rows)):
+        yield path, *fault
+
+
+def _targets(model: ScenarioModel) -> Iterator[Finding]:
+    if model.targets.kind != "scripted":
+        return
+    for i, target in enumerate(model.targets.tracks):
+        path: Path = ("targets", "tracks", i)
+        yield from attempt(_state_length((*path, "state"), target, "state", model))
+        for name in ("start_step", "end_step"):
+            yield from attempt(_last_step((*path, name), target, name, model))
+
+
+def _last_step(path: Path, holder: Any, name: str, model: ScenarioModel) -> Iterator[Finding]:
+    yield from _up_to_last(path, getattr(holder, name), model.time.num_steps)
+
+
+def _sensor_names(model: ScenarioModel) -> Iterator[Finding]:
+    names: set[str] = set()
+    for i, sensor in enumerate(model.sensors):
+        yield from attempt(_name_once(("sensors", i, "name"), sensor, names))
+
+
+def _name_once(path: Path, sensor: Sensor, names: set[str]) -> Iterator[Finding]:
+    if sensor.name in names:
+        yield path, "each name once", f"{describe(sensor.name)} again"
+    elif sensor.name is not None:
+        names.add(sensor.name)
+
+
+def _score(model: ScenarioModel) -> Iterator[Finding]:
+    for name in ("from_step", "to_step"):
+        yield from attempt(_last_step(("ospa", name), model.ospa, name, model))
+
+
+CHECKS = (
+    _decision_steps,
+    _decision_times,
+    _weights,
+    _fusion_of_labels,
+    _fusion_of_several,
+    _fusion_of_kind,
+    _estimator,
+    _combinations,
+    _birth_steps,
+    _birth_sites,
+    _targets,
+    _sensor_names,
+    _score,
+)

@@ -1,0 +1,197 @@
+"""Tables of named columns as Arrow, and as the bytes of an Arrow file (Feather), both without loss.
+
+The bytes depend on the numbers alone: uncompressed, one batch, no metadata but what is given. Read back, they are of
+unknown origin: nothing unpacks, no type but those of `Kind` is made, and every offset is checked before it is followed.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+
+from vedette.errors import InputError
+from vedette.kernels.base.types import Bools, Floats, Ints
+from vedette.reading import said
+from vedette.text import shown
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+# Columns of equal length by name: arrays of (num_rows,), or lists of texts.
+Columns: TypeAlias = dict[str, "Ints | Floats | Bools | list[str]"]
+
+_MAGIC, _ALIGNMENT = b"ARROW1", 8
+
+
+class Kind(Enum):
+    """What a column holds."""
+
+    INTEGER = "whole numbers"  # (num_rows,) int64
+    NUMBER = "numbers"  # (num_rows,) float64, NaN where there is none
+    COUNT = "whole numbers or nothing"  # (num_rows,) int64 from 0, null in the file for -1
+    VALUE = "numbers or nothing"  # (num_rows,) float64, null in the file for NaN
+    TRUTH = "truths"  # (num_rows,) bool
+    TEXT = "texts"  # num_rows texts
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """The columns of a table.
+
+    Attributes:
+        fixed: those that are always there.
+        more: beginnings of the names of those of which there may be any number; the empty text: any name.
+    """
+
+    fixed: Mapping[str, Kind]
+    more: Mapping[str, Kind] = field(default_factory=dict)
+
+    def kind(self, name: str) -> Kind | None:
+        """What the column of that name holds; None where the table has no such column."""
+        if name in self.fixed:
+            return self.fixed[name]
+        return next((kind for start, kind in self.more.items() if name.startswith(start)), None)
+
+    def others(self, names: Mapping[str, Any]) -> list[str]:
+        """Those of the names that are not of a fixed column, in order."""
+        return [name for name in names if name not in self.fixed]
+
+
+def to_arrow(columns: Columns, layout: Layout, *, nan_is_null: bool = False) -> pa.RecordBatch:
+    """The table in Arrow; with `nan_is_null` for tools that would take NaN for a number.
+
+    Raises `InputError` for a column that the layout does not have, and for columns of unequal lengths.
+    """
+    import pyarrow as pa
+
+    arrays = {}
+    for name, column in columns.items():
+        kind = layout.kind(name)
+        if kind is None:
+            raise InputError(f"column {shown(name)}: expected one of {', '.join(layout.fixed)}")
+        if kind is Kind.COUNT:
+            gaps = np.asarray(column) < 0
+            arrays[name] = pa.array(np.where(gaps, 0, column), mask=gaps if gaps.any() else None)
+        elif kind is Kind.TEXT:
+            arrays[name] = pa.array(column, pa.string())
+        else:
+            arrays[name] = pa.array(column, from_pandas=kind is Kind.VALUE or (nan_is_null and kind is Kind.NUMBER))
+    if len({len(array) for array in arrays.values()}) > 1:
+        raise InputError(
+            f"columns: expected equal lengths; got {', '.join(str(len(each)) for each in arrays.values())}"
+        )
+    return pa.RecordBatch.from_arrays(list(arrays.values()), list(arrays))
+
+
+def write_table(columns: Columns, layout: Layout, metadata: Mapping[str, str] | None = None) -> bytes:
+    """The bytes of an Arrow file, which `pandas.read_feather` and the like read. Raises `InputError` as `to_arrow`."""
+    import pyarrow as pa
+
+    batch, out = to_arrow(columns, layout).replace_schema_metadata(metadata), pa.BufferOutputStream()
+    with pa.ipc.new_file(out, batch.schema) as writer:
+        writer.write_batch(batch)
+    content: bytes = out.getvalue().to_pybytes()
+    return content
+
+
+def read_table(content: bytes, layout: Layout, place: str) -> Columns:
+    """The columns back from their bytes.
+
+    Raises `InputError`, naming the place, for bytes that are no such file, and a column that is missing, unknown or
+    holds something else.
+    """
+    try:
+        schema, batch = _messages(content)
+        _check_names(schema.names, layout, place)
+        _check_types(schema, layout, place)
+        return _read_columns(schema, batch, layout, place)
+    except InputError:
+        raise
+    except Exception as error:  # damage can raise nearly anything in there
+        raise InputError(f"{place}: expected a table as an Arrow file; it is damaged: {said(error)}") from error
+
+
+def read_metadata(content: bytes) -> dict[str, str]:
+    """What was given to `write_table` beside the columns. Raises nearly anything for bytes that are no Arrow file."""
+    metadata = _messages(content)[0].metadata or {}
+    return {key.decode(): value.decode() for key, value in metadata.items()}
+
+
+def _messages(content: bytes) -> tuple[pa.Schema, pa.Message]:
+    """The schema and the one batch of a file. The index at its end, made for files of many batches, is not read."""
+    import pyarrow as pa
+
+    if content[: len(_MAGIC)] != _MAGIC:
+        raise ValueError("it does not begin as one")
+    if content[-len(_MAGIC) :] != _MAGIC:
+        raise ValueError("it is cut short")
+    messages = list(pa.ipc.MessageReader.open_stream(pa.py_buffer(content).slice(_ALIGNMENT)))
+    if [message.type for message in messages] != ["schema", "record batch"]:
+        raise ValueError("expected a schema and one batch of rows")
+    if _is_compressed(messages[1].metadata.to_pybytes()):
+        raise ValueError("expected rows that are not compressed")
+    return pa.ipc.read_schema(messages[0]), messages[1]
+
+
+def _is_compressed(metadata: bytes) -> bool:
+    """Whether a message of a batch has the field `compression` (format/Message.fbs of Arrow): it could unpack to any
+    size. pyarrow does not say so before it unpacks."""
+
+    def entry(table: int, index: int) -> int:
+        (back,) = struct.unpack_from("<i", metadata, table)
+        (size,) = struct.unpack_from("<H", metadata, table - back)
+        if 4 + 2 * index >= size:
+            return 0
+        (offset,) = struct.unpack_from("<H", metadata, table - back + 4 + 2 * index)
+        return table + offset if offset else 0
+
+    header = entry(struct.unpack_from("<I", metadata)[0], 2)
+    return bool(entry(header + struct.unpack_from("<I", metadata, header)[0], 3))
+
+
+def _check_names(names: list[str], layout: Layout, place: str) -> None:
+    missing = [name for name in layout.fixed if name not in names]
+    if missing:
+        raise InputError(f"{place}: expected a column {missing[0]}; got {shown(', '.join(names))}")
+    for name in names:
+        if layout.kind(name) is None:
+            raise InputError(f"{place}: expected no other column than {', '.join(layout.fixed)}; got {shown(name)}")
+        if names.count(name) > 1:
+            raise InputError(f"{place}: expected each column once; got {shown(name)} twice")
+
+
+def _check_types(schema: pa.Schema, layout: Layout, place: str) -> None:
+    import pyarrow as pa
+
+    numbers = {Kind.INTEGER: pa.int64(), Kind.COUNT: pa.int64(), Kind.NUMBER: pa.float64(), Kind.VALUE: pa.float64()}
+    types = {**numbers, Kind.TRUTH: pa.bool_(), Kind.TEXT: pa.string()}
+    for each in schema:
+        kind = layout.kind(each.name)
+        assert kind is not None  # of the names checked before
+        if each.type != types[kind]:
+            raise InputError(
+                f"{place}, column {shown(each.name)}: expected {kind.value}; got the type {shown(str(each.type))}"
+            )
+
+
+def _read_columns(schema: pa.Schema, message: pa.Message, layout: Layout, place: str) -> Columns:
+    import pyarrow as pa
+
+    batch = pa.ipc.read_record_batch(message, schema)
+    batch.validate(full=True)
+    columns: Columns = {}
+    for name, column in zip(schema.names, batch.columns, strict=True):
+        kind = layout.kind(name)
+        if column.null_count and kind not in (Kind.COUNT, Kind.VALUE):
+            raise InputError(f"{place}, column {shown(name)}: expected {kind.value if kind else ''}; got nothing")
+        if kind is Kind.TEXT:
+            columns[name] = column.to_pylist()
+        else:
+            whole = column.fill_null(-1) if kind is Kind.COUNT and column.null_count else column
+            columns[name] = np.array(whole.to_numpy(zero_copy_only=False))  # a copy: arrays that may be written to
+    return columns

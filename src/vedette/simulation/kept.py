@@ -1,0 +1,74 @@
+"""A run as files, an Arrow file a table: those of a saved run's folder, and what a campaign keeps of a run."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from vedette.errors import InputError
+from vedette.kernels.base.types import Floats
+from vedette.reading import said
+from vedette.simulation.arrow import read_table, write_table
+from vedette.simulation.records import RunRecord
+from vedette.simulation.tables import LAYOUTS, TIMINGS, check_record, record_of, tables_of, timing_table, timings_of
+from vedette.text import printable, shown
+
+FORMAT_VERSION = 4  # of saved runs and of campaigns; another wherever a table gains, loses or renames a column
+_ENDING = ".arrow"
+
+
+def encode_run(record: RunRecord) -> dict[str, bytes]:
+    """File names and contents: all of a run but `run_facts` and its timings. Equal runs give equal bytes.
+
+    Raises `InputError` for a record that contradicts itself or holds an invalid plan.
+    """
+    check_record(record)
+    return {f"{name}{_ENDING}": write_table(table, LAYOUTS[name]) for name, table in tables_of(record).items()}
+
+
+def decode_run(
+    facts: Mapping[str, Any], files: Mapping[str, bytes], place: str, timings: bytes | None = None
+) -> RunRecord:
+    """The record back from its files; without `timings`, as `encode_timings` gives them, it has none.
+
+    Raises `InputError`, naming `place` and the file, for files that are missing, damaged or do not fit together.
+    """
+    tables = {}
+    for name, layout in LAYOUTS.items():
+        file = f"{name}{_ENDING}"
+        if file not in files:
+            raise InputError(f"{place}: expected a file {file}; got {shown(', '.join(files)) if files else 'none'}")
+        tables[name] = read_table(files[file], layout, f"{place}/{file}")
+    spent = {} if timings is None else decode_timings(timings, f"{place}/timings{_ENDING}")
+    try:
+        record = record_of(facts, tables, spent)
+        check_record(record)
+    except InputError as error:
+        raise InputError(f"{place}: {error}") from error
+    except Exception as error:  # files of no run can raise nearly anything on the way to one
+        raise InputError(f"{place}: expected the files of a run; they do not fit together: {said(error)}") from error
+    return record
+
+
+def encode_timings(record: RunRecord) -> bytes:
+    """The seconds of every stage and scan: the one thing of a run that its seed does not fix."""
+    return write_table(timing_table(record), TIMINGS)
+
+
+def decode_timings(content: bytes, place: str) -> dict[str, Floats]:
+    """The timings back from their bytes. Raises `InputError`, naming the place, for other bytes."""
+    return timings_of(read_table(content, TIMINGS, place))
+
+
+def check_version(manifest: Mapping[str, Any], written_by: object, place: object) -> None:
+    """`InputError` unless a saved run or a campaign is of this format; it says what to do with another."""
+    version = manifest.get("format_version")
+    if version == FORMAT_VERSION:
+        return
+    earlier = isinstance(version, int) and 0 < version < FORMAT_VERSION
+    which = "an earlier version" if earlier else "another version"
+    named = f"vedette {printable(written_by)[:40]}" if isinstance(written_by, str) else "the version that wrote it"
+    raise InputError(
+        f"{place}: expected format {FORMAT_VERSION}; got {shown(version)}, written by {which} of this program: run it "
+        f"again, or read it with {named}"
+    )

@@ -1,0 +1,217 @@
+"""The decisions of a run as tables of columns, and back: what each sensor could do, what that was expected to bring."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from vedette.control.plan import Plan, RewardTable
+from vedette.errors import InputError
+from vedette.kernels.base.types import Floats, Ints
+from vedette.platforms import Actions
+from vedette.simulation.arrow import Columns, Kind, Layout
+from vedette.simulation.records import Decision
+from vedette.text import shown
+
+_DECISION = {"decision": Kind.INTEGER, "step": Kind.INTEGER, "time_s": Kind.NUMBER}
+
+PLANNED: dict[str, Layout] = {
+    "decisions": Layout({**_DECISION, "planner": Kind.TEXT, "notes": Kind.TEXT}, {"num_": Kind.COUNT}),
+    "actions": Layout(
+        {**_DECISION, "sensor": Kind.INTEGER, "action": Kind.INTEGER, "chosen": Kind.TRUTH}, {"": Kind.VALUE}
+    ),
+    "rewards": Layout(
+        {
+            **_DECISION,
+            "reward_table": Kind.INTEGER,
+            "reward": Kind.NUMBER,
+            "reward_se": Kind.NUMBER,
+            "chosen": Kind.TRUTH,
+        },
+        {"action_": Kind.COUNT},
+    ),
+}
+_MOST_REWARDS = 2**26  # of a run, those that were not evaluated included: what a file leaves out takes memory, too
+# Names that tables of many runs have beside these: a platform's own number of such a name gets `action_` in front.
+_TAKEN = {*PLANNED["actions"].fixed, "cell", "run", "scenario", "planner", "variant", "filter", "fusion"}
+
+
+def planned_tables(decisions: Sequence[Decision], num_sensors: int) -> dict[str, Columns]:
+    """The tables of `PLANNED`. Raises `InputError` for plans that no table can hold."""
+    counted = dict.fromkeys(name for decision in decisions for name in decision.plan.counts)
+    of_decisions = {
+        **_columns_of(enumerate(decisions)),
+        "planner": [decision.plan.planner for decision in decisions],
+        "notes": [_notes(decision.plan) for decision in decisions],
+        **{f"num_{name}": np.array([each.plan.counts.get(name, -1) for each in decisions]) for name in counted},
+    }
+    return {"decisions": of_decisions, "actions": _actions(decisions), "rewards": _rewards(decisions, num_sensors)}
+
+
+def decisions_of(tables: Mapping[str, Mapping[str, Any]], poses: Floats) -> tuple[Decision, ...]:
+    """The decisions back from their tables and the poses of the run.
+
+    Raises `InputError`, `KeyError`, `IndexError` or `ValueError` for tables that do not fit together.
+    """
+    table, actions, rewards = (tables[name] for name in PLANNED)
+    num = len(table["decision"])
+    if not np.array_equal(table["decision"], np.arange(num)):
+        raise InputError("decisions, column decision: expected them numbered from 0")
+    counted = PLANNED["decisions"].others(table)
+    of_actions, of_rewards = _rows_by("decision", actions, num), _rows_by("decision", rewards, num)
+    decisions, room = [], _MOST_REWARDS
+    for index, step in enumerate(table["step"].tolist()):
+        plan = _plan(
+            table["planner"][index],
+            {name: column[of_actions[index]] for name, column in actions.items()},
+            {name: column[of_rewards[index]] for name, column in rewards.items()},
+            table["notes"][index],
+            {name.removeprefix("num_"): int(table[name][index]) for name in counted if table[name][index] >= 0},
+            room,
+        )
+        room -= sum(rewards_of.mean.size for rewards_of in plan.tables)
+        decisions.append(Decision(step, float(table["time_s"][index]), poses[step - 1], plan))
+    return tuple(decisions)
+
+
+def _plan(
+    planner: str,
+    actions: Mapping[str, Any],
+    rewards: Mapping[str, Any],
+    notes: str,
+    counts: dict[str, int],
+    room: int,
+) -> Plan:
+    options, chosen = [], []
+    for rows in _rows_by("sensor", actions):
+        own = {name: column[rows] for name, column in actions.items()}
+        if not np.array_equal(own["action"], np.arange(len(own["action"]))):
+            raise InputError("actions, column action: expected those of a sensor numbered from 0")
+        (choice,) = np.flatnonzero(own["chosen"])
+        chosen.append(int(choice))
+        names = [name for name in PLANNED["actions"].others(own) if not np.isnan(own[name]).all()]
+        values = np.empty((len(own["action"]), len(names)))
+        for place, name in enumerate(names):
+            values[:, place] = own[name]
+        options.append(Actions(tuple(name.removeprefix("action_") for name in names), values))
+    shape = tuple(len(values) for values in options)
+    tables: list[RewardTable] = []
+    for rows in _rows_by("reward_table", rewards):
+        tables.append(_table(rewards, rows, shape, room))
+        room -= tables[-1].mean.size
+    return Plan(planner, tuple(options), tuple(chosen), tuple(tables), counts, tuple(notes.splitlines()))
+
+
+def _table(rewards: Mapping[str, Any], rows: slice, num_actions: tuple[int, ...], room: int) -> RewardTable:
+    index = np.stack([rewards[f"action_{sensor}"][rows] for sensor in range(len(num_actions))], axis=1)
+    sensors = np.flatnonzero(index[0] >= 0)
+    shape = tuple(num_actions[sensor] for sensor in sensors)
+    if math.prod(shape) > room:
+        raise InputError(f"rewards: expected tables of at most {_MOST_REWARDS} entries in all; got more")
+    place = np.ravel_multi_index(tuple(index[:, sensors].T), shape)  # raises for an action that there is not
+    if np.any(np.diff(place) <= 0):
+        raise InputError("rewards: expected each combination of actions once, in order")
+    mean, error = np.full(shape, np.nan), np.full(shape, np.nan)
+    mean.flat[place], error.flat[place] = rewards["reward"][rows], rewards["reward_se"][rows]
+    return RewardTable(tuple(sensors.tolist()), mean, error)
+
+
+def _notes(plan: Plan) -> str:
+    """A line each."""
+    text = "\n".join(plan.notes)
+    if text.splitlines() != list(plan.notes):
+        raise InputError(f"plan.notes: expected notes of one line each; got {shown(text)}")
+    return text
+
+
+def _actions(decisions: Sequence[Decision]) -> Columns:
+    """One row a decision, sensor and action; null where a number is none of the sensor's."""
+    parts = [
+        (number, decision, sensor, own.columns, own.values)
+        for number, decision in enumerate(decisions)
+        for sensor, own in enumerate(decision.plan.actions)
+    ]
+    lengths = [len(values) for *_, values in parts]
+    names = dict.fromkeys(name for *_, names, _ in parts for name in names)
+    numbers = {name: np.full(sum(lengths), np.nan) for name in names}
+    start = 0
+    for *_, own, values in parts:
+        if list(own) != [name for name in names if name in own]:
+            raise InputError(f"plan.actions: expected columns in the order {', '.join(names)}; got {', '.join(own)}")
+        for name, column in zip(own, values.T, strict=True):
+            numbers[name][start : start + len(values)] = column
+        start += len(values)
+    return {
+        **_columns_of(((number, decision) for number, decision, *_ in parts), lengths),
+        "sensor": np.repeat(np.array([sensor for _, _, sensor, *_ in parts], np.int64), lengths),
+        "action": _joined([np.arange(length) for length in lengths], np.int64),
+        "chosen": _joined(
+            [np.arange(len(values)) == decision.plan.chosen[sensor] for _, decision, sensor, _, values in parts], bool
+        ),
+        **{f"action_{name}" if _is_taken(name) else name: column for name, column in numbers.items()},
+    }
+
+
+def _is_taken(name: str) -> bool:
+    return name in _TAKEN or name.startswith("action_")
+
+
+def _rewards(decisions: Sequence[Decision], num_sensors: int) -> Columns:
+    """One row an action, or combination of actions, that was evaluated; null for a sensor that is not of the table."""
+    parts = [
+        (number, decision, place, table, np.argwhere(~np.isnan(table.mean)))
+        for number, decision in enumerate(decisions)
+        for place, table in enumerate(decision.plan.tables)
+    ]
+    if sum(table.mean.size for *_, table, _ in parts) > _MOST_REWARDS:
+        raise InputError(f"plan.tables: expected at most {_MOST_REWARDS} entries in all; got more")
+    lengths = [len(index) for *_, index in parts]
+    actions = np.full((sum(lengths), num_sensors), -1)
+    start = 0
+    for _, _, _, table, index in parts:
+        if list(table.sensors) != sorted(table.sensors):
+            raise InputError(f"plan.tables: expected sensors in increasing order; got {table.sensors}")
+        actions[start : start + len(index), list(table.sensors)] = index
+        start += len(index)
+    return {
+        **_columns_of(((number, decision) for number, decision, *_ in parts), lengths),
+        "reward_table": np.repeat(np.array([place for _, _, place, *_ in parts], np.int64), lengths),
+        **{f"action_{sensor}": actions[:, sensor] for sensor in range(num_sensors)},
+        "reward": _joined([table.mean[tuple(index.T)] for *_, table, index in parts], np.float64),
+        "reward_se": _joined([table.standard_error[tuple(index.T)] for *_, table, index in parts], np.float64),
+        "chosen": _joined(
+            [(index == [each.plan.chosen[s] for s in table.sensors]).all(axis=1) for _, each, _, table, index in parts],
+            bool,
+        ),
+    }
+
+
+def _columns_of(numbered: Iterator[tuple[int, Decision]] | enumerate[Decision], repeats: Any = 1) -> Columns:
+    """Number, step and time of decisions, each for as many rows as `repeats` says."""
+    rows = [(number, decision.step, decision.time) for number, decision in numbered]
+    numbers, steps, times = zip(*rows, strict=True) if rows else ((), (), ())
+    return {
+        "decision": np.repeat(np.array(numbers, np.int64), repeats),
+        "step": np.repeat(np.array(steps, np.int64), repeats),
+        "time_s": np.repeat(np.array(times, np.float64), repeats),
+    }
+
+
+def _joined(parts: Sequence[np.ndarray[Any, Any]], dtype: type) -> np.ndarray[Any, Any]:
+    return np.concatenate([np.empty(0, dtype), *parts]).astype(dtype, copy=False)
+
+
+def _rows_by(name: str, table: Mapping[str, Any], num: int | None = None) -> list[slice]:
+    """The rows of each number from 0 to `num` - 1, which stand in order; without it of every number up to the last."""
+    numbers: Ints = table[name]
+    if num is None and len(numbers) and (numbers[0] != 0 or np.any(np.diff(numbers) > 1)):
+        raise InputError(f"column {name}: expected rows of every number from 0")
+    num = int(numbers.max(initial=-1)) + 1 if num is None else num
+    if np.any(np.diff(numbers) < 0) or np.any(numbers < 0) or np.any(numbers >= num):
+        raise InputError(f"column {name}: expected rows in order, of 0 to {num - 1}")
+    bounds = np.searchsorted(numbers, np.arange(num + 1)).tolist()
+    return [slice(start, stop) for start, stop in pairwise(bounds)]

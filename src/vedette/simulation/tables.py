@@ -1,0 +1,205 @@
+"""A run as tables of columns, and back: the one mapping behind every form in which runs are kept.
+
+`step` counts scans from 1 in every table; a row of `tracks` is one estimate at one scan, a row of `actions` one action
+that a sensor could choose at a decision, and a row of `rewards` one that was evaluated, `action_0` that of the first
+sensor. Decisions stand in `planned`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from itertools import pairwise
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from vedette.densities.estimates import Estimate
+from vedette.errors import InputError
+from vedette.kernels.base.types import Floats, Ints
+from vedette.simulation.arrow import Columns, Kind, Layout
+from vedette.simulation.health import FUSION_COLUMNS, SENSOR_COLUMNS, Health
+from vedette.simulation.planned import PLANNED, decisions_of, planned_tables
+from vedette.simulation.records import RunRecord
+from vedette.simulation.truth import Truth
+
+Tables: TypeAlias = dict[str, Columns]
+
+OSPA_COLUMNS = ("ospa_m", "localisation_m", "cardinality_m")
+POSE_COLUMNS = ("x_m", "y_m", "heading_rad")
+
+_TIME = {"step": Kind.INTEGER, "time_s": Kind.NUMBER}
+_LABEL = {"birth_step": Kind.INTEGER, "birth_site": Kind.INTEGER}
+_COUNTS = {"num_targets": Kind.INTEGER, "num_estimates": Kind.INTEGER}
+
+# All of a run but what names it and how long it took.
+LAYOUTS: dict[str, Layout] = {
+    "scans": Layout({**_TIME, **_COUNTS, **dict.fromkeys(OSPA_COLUMNS, Kind.NUMBER), **FUSION_COLUMNS}),
+    "truth": Layout({**_TIME, "target": Kind.INTEGER}, {"state_": Kind.NUMBER}),
+    "tracks": Layout({**_TIME, **_LABEL, "existence": Kind.NUMBER}, {"mean_": Kind.NUMBER, "cov_": Kind.NUMBER}),
+    "sensors": Layout(
+        {**_TIME, "sensor": Kind.INTEGER, **dict.fromkeys(POSE_COLUMNS, Kind.NUMBER), **SENSOR_COLUMNS},
+        {"pose_": Kind.NUMBER},
+    ),
+    **PLANNED,
+}
+TIMINGS = Layout({"step": Kind.INTEGER}, {"": Kind.NUMBER})
+
+
+def check_record(record: RunRecord) -> None:
+    """Raise `InputError` for a record that contradicts itself or holds an invalid plan."""
+    num_scans = record.num_scans
+    if num_scans == 0:
+        raise InputError("record.times: expected one scan or more; got none")
+    if not np.array_equal(record.truth.times, record.times):
+        raise InputError("record.truth: expected the scan times of the record; got others")
+    record.truth.validate()
+    lengths = {"estimates": len(record.estimates), "poses": len(record.poses)}
+    lengths |= {f"timings[{stage!r}]": len(seconds) for stage, seconds in record.timings.items()}
+    for name, length in lengths.items():
+        if length != num_scans:
+            raise InputError(f"record.{name}: expected one entry for each of {num_scans} scans; got {length}")
+    if record.ospa.shape != (num_scans, 3):
+        raise InputError(f"record.ospa: expected shape {(num_scans, 3)}; got {record.ospa.shape}")
+    record.health.check(num_scans, record.num_sensors)
+    for decision in record.decisions:
+        decision.check(record.times, record.poses)
+
+
+def tables_of(record: RunRecord) -> Tables:
+    """The tables of `LAYOUTS`."""
+    of_scans = {
+        "scans": _scans(record),
+        "truth": _truth(record),
+        "tracks": _tracks(record),
+        "sensors": _sensors(record),
+    }
+    return {**of_scans, **planned_tables(record.decisions, record.num_sensors)}
+
+
+def timing_table(record: RunRecord) -> Columns:
+    """Step and seconds by stage, `<stage>_s`."""
+    seconds = {f"{stage}_s": spent for stage, spent in record.timings.items()}
+    return {"step": np.arange(1, record.num_scans + 1), **seconds}
+
+
+def timings_of(table: Mapping[str, Any]) -> dict[str, Floats]:
+    """The timings back from their table."""
+    return {name.removesuffix("_s"): seconds for name, seconds in table.items() if name != "step"}
+
+
+def run_facts(record: RunRecord) -> dict[str, Any]:
+    """What names a run: scenario, planner, seed and number; and why it stopped early, null where it did not."""
+    names = {"scenario": record.scenario, "planner": record.planner, "seed": record.seed, "run": record.run}
+    return {**names, "stopped": record.stopped}
+
+
+def record_of(
+    facts: Mapping[str, Any], tables: Mapping[str, Mapping[str, Any]], timings: dict[str, Floats]
+) -> RunRecord:
+    """The record back from `run_facts`, `tables_of` and its timings; not yet checked.
+
+    Raises `InputError`, `KeyError`, `TypeError` or `ValueError` for tables that do not fit together.
+    """
+    scans, sensors = tables["scans"], tables["sensors"]
+    times = scans["time_s"]
+    if len(times) == 0 or len(sensors["step"]) % len(times):
+        raise InputError(
+            f"sensors: expected a row of every sensor for each of {len(times)} scans; got {len(sensors['step'])}"
+        )
+    pose_columns = [*POSE_COLUMNS, *LAYOUTS["sensors"].others(sensors)]
+    poses = np.stack([sensors[name] for name in pose_columns], axis=1).reshape(len(times), -1, len(pose_columns))
+    return RunRecord(
+        scenario=str(facts["scenario"]),
+        planner=str(facts["planner"]),
+        seed=int(facts["seed"]),
+        run=int(facts["run"]),
+        times=times,
+        truth=Truth(
+            times, _offsets(tables["truth"], len(times)), tables["truth"]["target"], _matrix(tables["truth"], "state_")
+        ),
+        poses=poses,
+        estimates=_estimates_of(tables["tracks"], len(times)),
+        decisions=decisions_of(tables, poses),
+        ospa=np.stack([scans[name] for name in OSPA_COLUMNS], axis=1),
+        health=Health.from_columns(sensors, scans, len(times)),
+        timings=timings,
+        stopped=None if facts["stopped"] is None else str(facts["stopped"]),
+    )
+
+
+def _scans(record: RunRecord) -> Columns:
+    return {
+        "step": np.arange(1, record.num_scans + 1),
+        "time_s": record.times,
+        "num_targets": np.diff(record.truth.offsets),
+        "num_estimates": _counts(record),
+        **dict(zip(OSPA_COLUMNS, record.ospa.T, strict=True)),
+        **record.health.fusion_columns(),
+    }
+
+
+def _truth(record: RunRecord) -> Columns:
+    truth = record.truth
+    scans = np.repeat(np.arange(record.num_scans), np.diff(truth.offsets))
+    return {"step": scans + 1, "time_s": record.times[scans], "target": truth.ids, **_columns("state_", truth.states)}
+
+
+def _tracks(record: RunRecord) -> Columns:
+    scans = np.repeat(np.arange(record.num_scans), _counts(record))
+    labels = np.concatenate([estimate.labels for estimate in record.estimates])
+    covs = np.concatenate([estimate.covs for estimate in record.estimates])
+    return {
+        "step": scans + 1,
+        "time_s": record.times[scans],
+        "birth_step": labels[:, 0],
+        "birth_site": labels[:, 1],
+        "existence": np.concatenate([estimate.existence for estimate in record.estimates]),
+        **_columns("mean_", np.concatenate([estimate.means for estimate in record.estimates])),
+        **_columns("cov_", covs.reshape(len(covs), covs.shape[1] * covs.shape[2])),
+    }
+
+
+def _estimates_of(table: Mapping[str, Any], num_scans: int) -> tuple[Estimate, ...]:
+    labels = np.stack([table["birth_step"], table["birth_site"]], axis=1)
+    means, existence = _matrix(table, "mean_"), table["existence"]
+    covs = _matrix(table, "cov_").reshape(len(means), means.shape[1], means.shape[1])
+    rows = [slice(start, stop) for start, stop in pairwise(_offsets(table, num_scans).tolist())]
+    return tuple(Estimate(labels[row], means[row], covs[row], existence[row]) for row in rows)
+
+
+def _sensors(record: RunRecord) -> Columns:
+    num_scans, num_sensors, pose_dim = record.poses.shape
+    scans = np.repeat(np.arange(num_scans), num_sensors)
+    poses = record.poses.reshape(num_scans * num_sensors, pose_dim)
+    return {
+        "step": scans + 1,
+        "time_s": record.times[scans],
+        "sensor": np.tile(np.arange(num_sensors), num_scans),
+        **dict(zip(POSE_COLUMNS, poses.T, strict=False)),
+        **{f"pose_{index}": poses[:, index] for index in range(len(POSE_COLUMNS), pose_dim)},
+        **record.health.sensor_columns(),
+    }
+
+
+def _counts(record: RunRecord) -> Ints:
+    return np.array([len(estimate.labels) for estimate in record.estimates], np.int64)
+
+
+def _columns(start: str, matrix: Floats) -> Columns:
+    return {f"{start}{index}": column for index, column in enumerate(matrix.T)}
+
+
+def _matrix(table: Mapping[str, Any], start: str) -> Floats:
+    """(num_rows, n) from `_columns`."""
+    width = sum(name.startswith(start) for name in table)
+    if not all(f"{start}{index}" in table for index in range(max(width, 1))):
+        raise InputError(f"expected columns {start}0 to {start}{max(width, 1) - 1}; got {', '.join(table)}")
+    return np.stack([table[f"{start}{index}"] for index in range(width)], axis=1)
+
+
+def _offsets(table: Mapping[str, Any], num_scans: int) -> Ints:
+    """CSR offsets of rows that are in order of step."""
+    steps = table["step"]
+    if len(steps) and (np.any(np.diff(steps) < 0) or steps[0] < 1 or steps[-1] > num_scans):
+        raise InputError(f"step: expected rows in order, of steps 1 to {num_scans}")
+    return np.searchsorted(steps, np.arange(1, num_scans + 2)).astype(np.int64)
