@@ -33,7 +33,7 @@ def test_every_combination_of_all_axes_is_a_cell() -> None:
         fusions = ["cm_delta_glmb", "clmb"]
         set."ospa.cutoff" = 50.0
         [grid]
-        "sensors.*.speed" = [30.0, 50.0, 70.0]
+        "sensors.*.platform.speed" = [30.0, 50.0, 70.0]
         "control.num_samples" = [5]
         """.replace("        ", ""),
         'name = "full"\nscenarios = ["paper-a", "paper-e"]\nruns = 2\n',
@@ -46,11 +46,11 @@ def test_every_combination_of_all_axes_is_a_cell() -> None:
         "scenario": "paper-e",
         "planner": "still",
         "fusion": "clmb",
-        "sensors.*.speed": 70.0,
+        "sensors.*.platform.speed": 70.0,
         "control.num_samples": 5,
     }
     assert last.scenario.model.fusion.kind == "clmb"
-    assert [sensor.speed for sensor in last.scenario.model.sensors] == [70.0, 70.0]
+    assert [sensor.platform.speed for sensor in last.scenario.model.sensors] == [70.0, 70.0]
     assert last.scenario.model.control.num_samples == 5
     assert last.scenario.model.ospa.cutoff == 50.0
     assert len(full.groups()) == 12

@@ -29,7 +29,7 @@ def test_the_page_and_the_figures_are_written_where_they_should_be(folder: Path,
     names = sorted(path.name for path in figures.iterdir())
     assert f"wrote {page}" in result.stdout
     assert f"wrote {len(names)} files to {figures}" in result.stdout
-    for stem in ("ospa", "distributions", "headings", "cost", "consistency", "tracks-fixed"):
+    for stem in ("ospa", "distributions", "decisions", "cost", "consistency", "tracks-fixed"):
         assert {f"{stem}.pdf", f"{stem}.png", f"{stem}.svg"} <= set(names)
     assert "Fixed, run" in page.read_text("utf-8")
 

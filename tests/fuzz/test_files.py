@@ -132,7 +132,6 @@ def small(rng: np.random.Generator) -> dict[str, Any]:
     labelled = name != "linear-10" or rng.random() < 0.5
     data["control"] = {
         "decision_steps": [1] if labelled else [],
-        "actions_deg": [0.0, 90.0],
         "horizon_steps": 1,
         "num_samples": 1,
         "ideal_measurements": pick(rng, ["ideal", "expected", "sampled"]),
@@ -205,7 +204,7 @@ def test_what_is_accepted_can_be_run(try_cases: TryCases, folder: Path) -> None:
 
 PATHS = [
     "control.num_samples",
-    "sensors.*.speed",
+    "sensors.*.platform.speed",
     "sensors.0.speed",
     "sensors.\u00b2.speed",
     "sensors.\u0663.speed",
@@ -259,7 +258,7 @@ def test_fields_set_by_path(try_cases: TryCases, folder: Path) -> None:
 CAMPAIGNS = [path.read_text() for path in sorted(Path(__file__).parents[2].glob("examples/campaigns/*.toml"))]
 CAMPAIGNS += [
     'name = "own"\nscenarios = ["small.yaml"]\nplanners = ["random", "still"]\nruns = 2\nset = {"ospa.cutoff" = 20}\n'
-    '[grid]\n"sensors.*.speed" = [1.0, 2.0]\n[[variants]]\nname = "a"\nset = {"control.num_samples" = 3}\n'
+    '[grid]\n"sensors.*.platform.speed" = [1.0, 2.0]\n[[variants]]\nname = "a"\nset = {"control.num_samples" = 3}\n'
     '[[variants]]\nname = "b"\n',
     'name = "times"\nscenarios = ["small.yaml"]\nruns = 2\n[grid]\n"time.start" = [1e400, inf, nan, 2024-01-01]\n',
 ]

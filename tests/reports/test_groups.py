@@ -15,7 +15,7 @@ from vedette.reports.saving import run_errors
     [
         ("sensors.*.clutter.rate", "clutter rate", ""),
         ("sensors.0.noise.sigma_range", "noise sigma range", "m"),
-        ("sensors.*.speed", "sensors speed", "m/s"),
+        ("sensors.*.platform.speed", "platform speed", "m/s"),
         ("control.horizon_period", "control horizon period", "s"),
         ("planner", "planner", ""),
         ("nothing.of.this", "of this", ""),

@@ -19,7 +19,7 @@ targets:
 sensor_defaults:
   noise: {kind: constant, std: [0.02, 3.0]}
 sensors:
-  - {name: north, position: [0.0, 40.0], speed: 4.0}
+  - {name: north, position: [0.0, 40.0], heading_deg: 4.0}
   - {name: south, position: [0.0, -40.0]}
 filter: {kind: m_delta_glmb}
 fusion: {kind: cm_delta_glmb, weights: [0.5, 0.5]}

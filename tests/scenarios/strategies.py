@@ -53,7 +53,6 @@ motions = {
     3: custom(state_dim=st.just(3)),
 }
 angles = st.lists(finite, min_size=1, max_size=5)
-headings = st.sampled_from(["absolute", "relative"])
 detections = st.one_of(
     section("gaussian", sigma=positive),
     needed("constant", probability=probability),
@@ -62,6 +61,18 @@ detections = st.one_of(
     custom(),
 )
 MEASUREMENT_DIM = {"bearing_range": 2, "bearing_only": 1, "range_only": 1, "position": 2}
+
+
+def platforms() -> st.SearchStrategy[Data]:
+    moving = st.one_of(
+        needed("still"),
+        needed("courses", speed=zero_or_more, headings_deg=angles, relative=st.booleans()),
+        needed("courses", speeds=st.lists(zero_or_more, min_size=1, max_size=3)),
+        needed("steps", length=positive, speed=positive, stay=st.booleans()),
+        needed("waypoints", points=st.lists(vector(2), min_size=1, max_size=3), speed=positive),
+        custom(),
+    )
+    return moving | needed("camera", half_width_deg=st.floats(0.1, 180.0), pointings_deg=angles, carrier=moving)
 
 
 @st.composite
@@ -76,10 +87,8 @@ def sensors(draw: st.DrawFn) -> Data:
     fixed = {"position": draw(vector(2)), "measurement": {"kind": kind}, "noise": draw(st.one_of(noises))}
     optional = section(
         heading_deg=finite,
-        speed=zero_or_more,
+        platform=platforms(),
         moves_from=st.sampled_from(["first_decision", "start"]),
-        actions_deg=angles,
-        headings=headings,
         detection=detections,
         clutter=clutters,
     )
@@ -144,11 +153,9 @@ def scenarios(draw: st.DrawFn) -> Data:
     """The data of a valid scenario file."""
     last, dim = draw(st.integers(1, 500)), draw(st.sampled_from(list(motions)))
     x, y = draw(vector(2)), draw(vector(2, st.floats(1.0, 1e6)))
-    platforms = draw(st.lists(sensors(), min_size=1, max_size=4))
+    carried = draw(st.lists(sensors(), min_size=1, max_size=4))
     control = section(
         decision_steps=steps(last),
-        actions_deg=angles,
-        headings=headings,
         horizon_steps=counts,
         horizon_period=positive,
         num_samples=counts,
@@ -166,8 +173,8 @@ def scenarios(draw: st.DrawFn) -> Data:
         "survival": draw(section("constant", probability=probability) | custom()),
         "birth": {"sites": draw(sites(dim)), **draw(section(steps=st.just("every") | steps(last)))},
         "targets": draw(targets(dim, last)),
-        "sensors": [{**item, "name": f"{draw(names)}{number}"} for number, item in enumerate(platforms)],
-        **draw(tracking(len(platforms))),
+        "sensors": [{**item, "name": f"{draw(names)}{number}"} for number, item in enumerate(carried)],
+        **draw(tracking(len(carried))),
         "control": draw(control),
         "ospa": draw(
             section(

@@ -23,7 +23,7 @@ def test_faults_of_schema_and_of_sense_come_together_in_file_order() -> None:
         ("existence: 0.1", "existence: 2"),
         ("end_step: 18", "end_step: 1"),
         ("std: [0.02, 3.0]", "std: [0.02]"),
-        ("speed: 4.0", "speed: fast"),
+        ("heading_deg: 4.0", "heading_deg: fast"),
         ("weights: [0.5, 0.5]", "weights: [0.5, 0.6], mixture_power: cubic"),
         ("decision_steps: [4, 8]", "decision_steps: [4, 50], num_samples: 0"),
     )
@@ -33,7 +33,7 @@ def test_faults_of_schema_and_of_sense_come_together_in_file_order() -> None:
         "f:9:19: birth.sites[0].existence:",
         "f:13:63: targets.tracks[0].end_step:",
         "f:15:32: sensor_defaults.noise.std:",
-        "f:17:49: sensors[0].speed:",
+        "f:17:55: sensors[0].heading_deg:",
         "f:20:40: fusion.weights:",
         "f:20:67: fusion.mixture_power:",
         "f:22:31: control.decision_steps[1]:",
@@ -49,7 +49,7 @@ def test_a_fault_in_the_defaults_is_named_once_and_where_it_stands() -> None:
 
 
 def test_a_sensor_with_its_own_value_has_its_own_faults() -> None:
-    text = changed(("speed: 4.0", "noise: {kind: constant, std: [1.0]}"))
+    text = changed(("heading_deg: 4.0", "noise: {kind: constant, std: [1.0]}"))
     assert faults(text) == [
         "f:17:71: sensors[0].noise.std: expected 2 numbers, as a bearing_range measurement has, got a list of 1"
     ]
@@ -73,19 +73,21 @@ def test_a_key_twice_and_a_wrong_value_are_both_told() -> None:
 
 
 def test_merge_keys_get_a_hint() -> None:
-    (fault,) = faults(changed(("speed: 4.0", "<<: {speed: 4.0}")))
+    (fault,) = faults(changed(("heading_deg: 4.0", "<<: {heading_deg: 4.0}")))
     assert fault.endswith("(YAML 1.2 has no merge keys; sensor_defaults holds what sensors share)")
 
 
 def test_numbers_as_people_write_them() -> None:
-    text = changed(("num_steps: 20,", "num_steps: 2e1,"), ("name: small", "name: no"), ("speed: 4.0", "speed: 4"))
+    text = changed(
+        ("num_steps: 20,", "num_steps: 2e1,"), ("name: small", "name: no"), ("heading_deg: 4.0", "heading_deg: 4")
+    )
     model = parse_scenario(text)
-    assert (model.time.num_steps, model.name, model.sensors[0].speed) == (20, "no", 4.0)
+    assert (model.time.num_steps, model.name, model.sensors[0].heading_deg) == (20, "no", 4.0)
 
 
 def test_anchors_and_aliases_can_repeat_a_section() -> None:
     text = changed(
-        ("speed: 4.0", "detection: &limited {kind: limited_range, probability: 0.9, max_range: 80.0}"),
+        ("heading_deg: 4.0", "detection: &limited {kind: limited_range, probability: 0.9, max_range: 80.0}"),
         ("position: [0.0, -40.0]", "position: [0.0, -40.0], detection: *limited"),
     )
     first, second = parse_scenario(text).sensors
@@ -94,7 +96,7 @@ def test_anchors_and_aliases_can_repeat_a_section() -> None:
 
 def test_a_fault_behind_an_alias_is_told_where_it_is_written() -> None:
     text = changed(
-        ("speed: 4.0", "detection: &limited {kind: limited_range, probability: 2, max_range: 80.0}"),
+        ("heading_deg: 4.0", "detection: &limited {kind: limited_range, probability: 2, max_range: 80.0}"),
         ("position: [0.0, -40.0]", "position: [0.0, -40.0], detection: *limited"),
     )
     assert [fault.split(":")[1:3] for fault in faults(text)] == [["17", "97"], ["17", "97"]]

@@ -18,7 +18,7 @@ from vedette.fusion import Clmb, CmDeltaGlmb
 from vedette.scenarios import Scenario, build, list_builtin, load_scenario, parse_scenario
 from vedette.scenarios.sections.scoring import MarginalEstimator
 from vedette.scenarios.sections.tracking import Fusion
-from vedette.simulation import Truth, simulate_scan
+from vedette.simulation import Truth, simulate_scans
 
 OWN_MODELS = Path(__file__).with_name("own_models.py")
 
@@ -36,7 +36,7 @@ def filters_of(loaded: Scenario) -> Any:
 
 
 def test_times_and_poses() -> None:
-    experiment = build.build_experiment(scenario(("speed: 4.0", "heading_deg: 90")))
+    experiment = build.build_experiment(scenario(("heading_deg: 4.0", "heading_deg: 90")))
     np.testing.assert_allclose(experiment.times, 2.0 + 0.5 * np.arange(20))
     np.testing.assert_allclose(experiment.poses, [[0.0, 40.0, math.pi / 2], [0.0, -40.0, 0.0]])
 
@@ -88,7 +88,7 @@ def test_no_target_is_a_scenario_too() -> None:
     ],
 )
 def test_measurements_and_their_noise(text: str, dim: int, angular: list[bool]) -> None:
-    sensor = filters_of(scenario(("speed: 4.0", text)))[0].sensor
+    sensor = filters_of(scenario(("heading_deg: 4.0", text)))[0].sensor
     assert sensor.meas_dim == dim
     assert list(sensor.measurement.angular) == angular
     sensor.check([[10.0, 20.0, 1.0, 1.0]], [0.0, 40.0, 0.0])
@@ -96,21 +96,21 @@ def test_measurements_and_their_noise(text: str, dim: int, angular: list[bool]) 
 
 def test_degrees_become_radians() -> None:
     text = "noise: {kind: range_dependent, sigma_range: 3.0, eta_range: 0.0, sigma_bearing_deg: 2.0, eta_bearing: 0.0}"
-    sensor = filters_of(scenario(("speed: 4.0", text)))[0].sensor
+    sensor = filters_of(scenario(("heading_deg: 4.0", text)))[0].sensor
     cov = sensor.noise.covs([10.0, 20.0, 0.0, 0.0], [0.0, 0.0, 0.0], 2)
     np.testing.assert_allclose(cov[0], np.diag([math.radians(2.0) ** 2, 9.0]))
 
 
 def test_a_sector_is_around_the_heading() -> None:
     text = "detection: {kind: limited_sector, probability: 0.9, max_range: 50.0, half_width_deg: 30.0}"
-    detection = filters_of(scenario(("speed: 4.0", text)))[0].sensor.detection
+    detection = filters_of(scenario(("heading_deg: 4.0", text)))[0].sensor.detection
     states = [[10.0, 5.0, 0.0, 0.0], [10.0, 8.0, 0.0, 0.0], [60.0, 0.0, 0.0, 0.0]]
     np.testing.assert_allclose(detection.prob(states, [0.0, 0.0, 0.0]), [0.9, 0.0, 0.0])
 
 
 def test_clutter_of_the_region_and_of_measurement_space() -> None:
     text = "clutter: {kind: measurement_space, rate: 7, low: [0.0, 0.0], high: [6.283185307179586, 100.0]}"
-    north, south = (local.sensor.clutter for local in filters_of(scenario(("speed: 4.0", text))))
+    north, south = (local.sensor.clutter for local in filters_of(scenario(("heading_deg: 4.0", text))))
     assert (north.rate, south.rate) == (7.0, 25.0)
 
 
@@ -132,7 +132,7 @@ def test_models_of_the_users_own_from_a_file_beside_the_scenario() -> None:
             "  noise: {kind: constant, std: [0.02, 3.0]}",
             "  measurement: {kind: custom, function: 'own_models.py:measurement'}\n  noise: {kind: constant, std: [3.0]}\n  clutter: {kind: measurement_space, low: [0], high: [100]}",
         ),
-        ("speed: 4.0", sensor),
+        ("heading_deg: 4.0", sensor),
     )
     north, south = filters_of(loaded)
     assert north.targets.motion.state_dim == 3
@@ -199,13 +199,13 @@ def test_a_filter_without_labels_runs_alone_and_names_its_estimates_by_the_scan(
     assert isinstance(local, container)
     own: Any = local
     assert (own.limits.max_intensity_components, own.limits.max_existence) == (7, 0.5)
-    experiment, beliefs, fused, _ = tracked(loaded, 8, np.random.default_rng(1))
-    estimate = experiment.estimate(fused, 8)
+    experiment, state, _ = tracked(loaded, 8, np.random.default_rng(1))
+    estimate = experiment.estimate(state.fused, 8)
     estimate.validate()
     assert estimate.labels.tolist() == [[8, i] for i in range(estimate.num_targets)]
     for planner in ("random", "fixed"):
         made = build.build_planner(loaded, planner)
-        made.plan(beliefs, fused, experiment.poses, rng=np.random.default_rng(0))
+        made.plan(state, experiment.poses, rng=np.random.default_rng(0))
     for planner in ("jdm", "idm"):
         with pytest.raises(
             InputError, match=rf"^filter\.kind: expected .*, as planner {planner} needs labels; got {kind}"
@@ -231,8 +231,10 @@ def test_the_marginal_estimator_has_its_threshold() -> None:
 
 
 def test_actions_of_one_sensor_and_of_all() -> None:
-    model = scenario(("speed: 4.0", "actions_deg: [-10, 10], headings: relative")).model
-    own, common = (model.control.build_platform(sensor) for sensor in model.sensors)
+    text = "platform: {kind: courses, speed: 5.0, headings_deg: [-10, 10], relative: true}"
+    shared = "sensor_defaults:\n  platform: {kind: courses, speed: 5.0}"
+    loaded = scenario(("heading_deg: 4.0", text), ("sensor_defaults:", shared))
+    own, common = (sensor.platform for sensor in build.build_sensors(loaded))
     pose = np.array([0.0, 0.0, math.pi / 2])
     np.testing.assert_allclose(own.actions(pose)[:, 0], [80.0, 100.0])
     np.testing.assert_allclose(common.actions(pose)[:, 0], np.arange(-180, 181, 30))
@@ -244,32 +246,30 @@ def test_an_unknown_planner() -> None:
         build.build_planner(loaded, "greedy")
 
 
-def tracked(loaded: Scenario, num_steps: int, rng: np.random.Generator) -> tuple[Any, Any, Any, Any]:
-    """The experiment, its beliefs after some scans with the sensors at rest, the fused belief, and the truth."""
+def tracked(loaded: Scenario, num_steps: int, rng: np.random.Generator) -> tuple[Any, Any, Any]:
+    """The experiment, what is believed after some scans with the sensors at rest, and the truth."""
     experiment: Any = build.build_experiment(loaded)
-    poses, filters = experiment.poses, [sensor.filter for sensor in experiment.sensors]
-    truth = experiment.targets.truth(experiment.times, rng=rng)
-    beliefs = [local.initial() for local in filters]
-    for step in range(1, num_steps + 1):
-        for i, local in enumerate(filters):
-            scan = simulate_scan(truth.at(step - 1)[1], poses[i], local.sensor, rng=rng).measurements
-            beliefs[i], _ = local.step(beliefs[i], scan, poses[i], loaded.model.time.step_period, step, rng=rng)
-    return experiment, beliefs, experiment.fusion.fuse(beliefs)[0] if experiment.fusion else beliefs[0], truth
+    tracker, poses, rngs = experiment.tracker, experiment.poses, [rng] * experiment.num_sensors
+    truth, state = experiment.targets.truth(experiment.times, rng=rng), tracker.initial()
+    for step in range(num_steps):
+        scans = simulate_scans(truth.at(step)[1], poses, tracker.sensors, rngs=rngs)
+        state, _ = tracker.step(state, [scan.measurements for scan in scans], poses, experiment.times[step], rngs=rngs)
+    return experiment, state, truth
 
 
 @pytest.mark.parametrize("name", list_builtin())
 def test_built_in_scenarios_run(name: str) -> None:
     loaded, rng = load_scenario(name), np.random.default_rng(1)
-    experiment, beliefs, fused, truth = tracked(loaded, 12, rng)
-    assert abs(len(experiment.estimate(fused, 12).labels) - len(truth.at(11)[0])) <= 1
+    experiment, state, truth = tracked(loaded, 12, rng)
+    assert abs(len(experiment.estimate(state.fused, 12).labels) - len(truth.at(11)[0])) <= 1
     for planner in ("random", "fixed"):
-        plan = build.build_planner(loaded, planner).plan(beliefs, fused, experiment.poses, rng=rng)
-        assert plan.num_sensors == len(experiment.sensors)
+        plan = build.build_planner(loaded, planner).plan(state, experiment.poses, rng=rng)
+        assert plan.num_sensors == experiment.num_sensors
 
 
 def test_decisions_of_the_papers_scenario_are_the_printed_ones() -> None:
     loaded, rng = load_scenario("paper-e"), np.random.default_rng(3)
-    experiment, beliefs, fused, _ = tracked(loaded, 10, rng)
+    experiment, state, _ = tracked(loaded, 10, rng)
     for planner in ("jdm", "idm"):
-        plan = build.build_planner(loaded, planner).plan(beliefs, fused, experiment.poses, rng=rng)
+        plan = build.build_planner(loaded, planner).plan(state, experiment.poses, rng=rng)
         np.testing.assert_allclose(np.ravel(plan.chosen_actions), [-30.0, 30.0])

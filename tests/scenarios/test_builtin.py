@@ -13,6 +13,7 @@ from vedette.scenarios import list_builtin, load_scenario
 from vedette.scenarios.build import build_targets
 from vedette.scenarios.loading import Scenario
 from vedette.scenarios.sections import ScenarioModel
+from vedette.scenarios.sections.platforms import Courses
 from vedette.scenarios.sections.sensing import BearingRange, GaussianDetection, RangeDependentNoise, RegionClutter
 from vedette.scenarios.sections.targets import RecordedTargets, ScriptedTargets
 from vedette.scenarios.sections.world import ConstantVelocity
@@ -43,7 +44,7 @@ NOTE_ROWS = {
     9: ("fusion.feedback", False),
     10: ("control.horizon_period", 2.0),
     12: ("control.ideal_measurements", "ideal"),
-    14: ("control.headings", "absolute"),
+    14: ("sensors.0.platform.relative", False),
     15: ("control.reward.unit_volume", 1.0),
     17: ("ospa.cutoff", 100.0),
 }
@@ -66,7 +67,7 @@ def test_the_papers_scenario_has_the_numbers_of_the_notes(name: str) -> None:
     assert [track.state for track in model.targets.tracks] == layout["targets"]
     assert not any(track.process_noise for track in model.targets.tracks)
     assert [sensor.position for sensor in model.sensors] == layout["sensors"]
-    assert {sensor.speed for sensor in model.sensors} == {layout["speed"]}
+    assert {sensor.platform for sensor in model.sensors} == {Courses(speed=layout["speed"])}
     assert {sensor.moves_from for sensor in model.sensors} == {"first_decision"}
     assert [site.mean for site in model.birth.sites] == [(x, y, 0.0, 0.0) for x, y, *_ in layout["targets"]]
     assert {(site.existence, site.std) for site in model.birth.sites} == {(0.02, (50.0, 50.0, 25.0, 25.0))}
@@ -89,7 +90,7 @@ def test_the_papers_scenario_has_the_papers_numbers(name: str) -> None:
     assert model.fusion.weights == (0.5, 0.5)
     control = model.control
     assert control.decision_steps == (10, 20, 30)
-    assert control.actions_deg == tuple(range(-180, 181, 30))
+    assert {sensor.platform.headings_deg for sensor in model.sensors} == {tuple(range(-180, 181, 30))}
     assert (control.horizon_steps, control.horizon_period, control.num_samples) == (5, 2.0, 40)
     assert (control.limits.max_prior_hypotheses, control.limits.max_hypotheses) == (10, 40)
     assert model.ospa.model_dump() == {"cutoff": 100.0, "order": 1.0, "window": 10, "from_step": 11, "to_step": 40}
@@ -110,7 +111,7 @@ def test_every_choice_that_the_paper_leaves_open_is_a_field_with_its_default(row
         "region": {"x_min": 0.0, "x_max": 1.0, "y_min": 0.0, "y_max": 1.0},
         "birth": {"sites": [{"existence": 0.1, "mean": [0.0] * 4, "std": [1.0] * 4}]},
         "targets": {"kind": "scripted", "tracks": []},
-        "sensors": [{"position": [0.0, 0.0]}],
+        "sensors": [{"position": [0.0, 0.0], "platform": {"kind": "courses", "speed": 1.0}}],
     }
     assert field_at(ScenarioModel.model_validate(least), path) == default
 
@@ -124,7 +125,7 @@ def test_ten_targets_inside_the_region_and_as_many_at_once(name: str, measures: 
     assert (truth.states[:, :2] > [region.x_min, region.y_min]).all()
     assert (truth.states[:, :2] < [region.x_max, region.y_max]).all()
     sensor = scenario.model.sensors[0]
-    assert (sensor.measurement.kind, sensor.speed) == (measures, 0.0)
+    assert (sensor.measurement.kind, sensor.platform.kind) == (measures, "still")
     assert len(scenario.model.birth.sites) == 4
 
 

@@ -72,9 +72,10 @@ def test_sensors_of_one_limited_view_warn_if_they_will_move(tmp_path: Path, deci
         STEPS,
         ("decision_steps: [4, 8]", f"decision_steps: {decisions}"),
         (same, f"{same}\n  detection: {{kind: limited_range, probability: 0.9, max_range: 160.0}}"),
+        ("heading_deg: 4.0", "platform: {kind: courses, speed: 4.0}"),
     )
     assert len(found) == number
-    assert all("sensors that move and see only so far" in line for line in found)
+    assert all("sensors that move or turn and see only so far" in line for line in found)
 
 
 @pytest.mark.parametrize(

@@ -71,9 +71,9 @@ def test_check_and_birth_model_refuse_the_same() -> None:
         ("position: [0.0, 40.0]", "position: [0.0, 1e150]", "a number from -1e+15 to 1e+15"),
         ("std: [0.02, 3.0]", "std: [0.02, 1e-200]", "a number of at least 1e-30"),
         ("start: 2.0", "start: 1e15", "a period that can be told apart"),
-        ("speed: 4.0", "clutter: {kind: region, rate: 1e9}", "a number of at most 1e"),
+        ("heading_deg: 4.0", "clutter: {kind: region, rate: 1e9}", "a number of at most 1e"),
         (
-            "speed: 4.0",
+            "heading_deg: 4.0",
             "clutter: {kind: measurement_space, low: [0, 0], high: [7, 9]}",
             "an angle of at most 2 pi above low",
         ),

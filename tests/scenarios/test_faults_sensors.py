@@ -41,7 +41,7 @@ CASES = [
         "  noise: {",
         "  nose: {",
         [
-            "f.yaml:15:3: sensor_defaults.nose: expected one of actions_deg, clutter, detection, heading_deg, headings, measurement, moves_from, noise, speed, got an unknown key (did you mean noise?)"
+            "f.yaml:15:3: sensor_defaults.nose: expected one of clutter, detection, heading_deg, measurement, moves_from, noise, platform, got an unknown key (did you mean noise?)"
         ],
     ),
     (
@@ -55,40 +55,69 @@ CASES = [
         ["f.yaml:17:5: sensors[0].position: expected a value, as it is required, got nothing"],
     ),
     ("name: south", "name: north", ['f.yaml:18:12: sensors[1].name: expected each name once, got "north" again']),
-    ("speed: 4.0", "speed: -4.0", ["f.yaml:17:49: sensors[0].speed: expected a number of at least 0, got -4.0"]),
     (
-        "speed: 4.0",
-        "actions_deg: []",
-        ["f.yaml:17:55: sensors[0].actions_deg: expected a list of at least 1, got an empty list"],
+        "heading_deg: 4.0",
+        "platform: {kind: courses, speed: -4.0}",
+        ["f.yaml:17:75: sensors[0].platform.speed: expected a number of at least 0, got -4.0"],
     ),
     (
-        "speed: 4.0",
-        "headings: relativ",
+        "heading_deg: 4.0",
+        "platform: {kind: courses, speed: 4.0, headings_deg: []}",
+        ["f.yaml:17:94: sensors[0].platform.headings_deg: expected a list of at least 1, got an empty list"],
+    ),
+    (
+        "heading_deg: 4.0",
+        "platform: {kind: courses}",
+        ["f.yaml:17:52: sensors[0].platform: expected either speed or speeds, got neither"],
+    ),
+    (
+        "heading_deg: 4.0",
+        "platform: {kind: curses, speed: 4.0}",
         [
-            'f.yaml:17:52: sensors[0].headings: expected one of absolute, relative, got "relativ" (did you mean relative?)'
+            'f.yaml:17:59: sensors[0].platform.kind: expected one of still, courses, steps, waypoints, camera, custom, got "curses" (did you mean courses?)'
         ],
     ),
     (
+        "heading_deg: 4.0",
         "speed: 4.0",
+        [
+            "f.yaml:17:42: sensors[0].speed: expected one of clutter, detection, heading_deg, measurement, moves_from, name, noise, platform, position, got an unknown key (the platform of a sensor has it: `platform: {kind: courses, speed: 50.0, headings_deg: [0, 90]}`)"
+        ],
+    ),
+    (
+        "heading_deg: 4.0",
+        "platform: {kind: camera, half_width_deg: 200.0, pointings_deg: [0.0], carrier: {kind: camera}}",
+        [
+            "f.yaml:17:83: sensors[0].platform.half_width_deg: expected a number of at most 180, got 200.0",
+            'f.yaml:17:128: sensors[0].platform.carrier.kind: expected one of still, courses, steps, waypoints, custom, got "camera"',
+        ],
+    ),
+    (
+        "heading_deg: 4.0",
+        "detection: {kind: camera, probability: 0.9, max_range: 50.0}",
+        ["f.yaml:17:5: sensors[0].platform: expected a camera, as its detection is a camera's, got still"],
+    ),
+    (
+        "heading_deg: 4.0",
         "measurement: {kind: position}, noise: {kind: range_dependent}",
         [
             "f.yaml:17:80: sensors[0].noise: expected constant or custom noise for a position measurement, got range_dependent noise"
         ],
     ),
     (
-        "speed: 4.0",
+        "heading_deg: 4.0",
         "measurement: {kind: range_only}",
         [
             "f.yaml:15:32: sensor_defaults.noise.std: expected 1 number, as a range_only measurement has, got a list of 2"
         ],
     ),
     (
-        "speed: 4.0",
+        "heading_deg: 4.0",
         "detection: {kind: limited_sector, probability: 0.9, max_range: 50.0, half_width_deg: 0}",
         ["f.yaml:17:127: sensors[0].detection.half_width_deg: expected a number above 0, got 0"],
     ),
     (
-        "speed: 4.0",
+        "heading_deg: 4.0",
         "detection: {kind: limited_range, probability: 1.1, max_range: -1}",
         [
             "f.yaml:17:88: sensors[0].detection.probability: expected a number of at most 1, got 1.1",
@@ -96,12 +125,12 @@ CASES = [
         ],
     ),
     (
-        "speed: 4.0",
+        "heading_deg: 4.0",
         "clutter: {kind: measurement_space, rate: 5, low: [-3.0, 0.0], high: [3.0, -1.0]}",
         ["f.yaml:17:116: sensors[0].clutter.high[1]: expected a number above low, 0, got -1.0"],
     ),
     (
-        "speed: 4.0",
+        "heading_deg: 4.0",
         "clutter: {kind: region, rate: lots}",
         ['f.yaml:17:72: sensors[0].clutter.rate: expected a number, got "lots"'],
     ),

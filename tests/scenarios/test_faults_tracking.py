@@ -11,7 +11,7 @@ from vedette.scenarios import parse_scenario
 
 CASES = [
     (
-        "sensors:\n  - {name: north, position: [0.0, 40.0], speed: 4.0}\n  - {name: south, position: [0.0, -40.0]}",
+        "sensors:\n  - {name: north, position: [0.0, 40.0], heading_deg: 4.0}\n  - {name: south, position: [0.0, -40.0]}",
         "sensors: []",
         ["f.yaml:16:10: sensors: expected a list of at least 1, got an empty list"],
     ),
@@ -128,10 +128,9 @@ CASES = [
     ),
     (
         "decision_steps: [4, 8]",
-        "actions_deg: [], headings: compass",
+        "actions_deg: [0, 90]",
         [
-            "f.yaml:22:24: control.actions_deg: expected a list of at least 1, got an empty list",
-            'f.yaml:22:38: control.headings: expected one of absolute, relative, got "compass"',
+            "f.yaml:22:11: control.actions_deg: expected one of decision_steps, decision_times, detection_threshold, horizon_period, horizon_steps, ideal_measurements, limits, num_samples, reward, got an unknown key (the platform of a sensor has it: `platform: {kind: courses, speed: 50.0, headings_deg: [0, 90]}`)"
         ],
     ),
     (

@@ -24,10 +24,11 @@ def test_nothing_set_is_the_same_scenario(paper: Scenario) -> None:
 
 def test_a_field_of_a_section_of_every_sensor_and_of_one(paper: Scenario) -> None:
     changed = with_fields(
-        paper, {"control.num_samples": 7, "sensors.*.speed": 30.0, "sensors.1.speed": 20.0, "ospa.order": 2}
+        paper,
+        {"control.num_samples": 7, "sensors.*.platform.speed": 30.0, "sensors.1.platform.speed": 20.0, "ospa.order": 2},
     )
     assert changed.model.control.num_samples == 7
-    assert [sensor.speed for sensor in changed.model.sensors] == [30.0, 20.0]
+    assert [sensor.platform.speed for sensor in changed.model.sensors] == [30.0, 20.0]
     assert changed.model.ospa.order == 2.0
     assert changed.path == paper.path
     assert paper.model.control.num_samples != 7

@@ -31,7 +31,7 @@ def test_built_in_scenarios_round_trip(name: str) -> None:
 
 
 def test_what_sensors_share_is_written_out() -> None:
-    model = parse_scenario(changed(("speed: 4.0", "noise: {kind: range_dependent}")))
+    model = parse_scenario(changed(("heading_deg: 4.0", "noise: {kind: range_dependent}")))
     assert [sensor.noise.kind for sensor in model.sensors] == ["range_dependent", "constant"]
     text = dump_scenario(model)
     assert "sensor_defaults" not in text

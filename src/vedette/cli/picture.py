@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Ellipse, Rectangle
+from matplotlib.patches import Ellipse, Rectangle, Wedge
 from matplotlib.ticker import MaxNLocator
 
 from vedette.evaluation.figures.labels import drawn_text
@@ -16,6 +16,7 @@ from vedette.evaluation.figures.style import COLUMN_WIDTH, GREY, VERMILION, colo
 from vedette.kernels.base.types import Floats
 from vedette.scenarios import Scenario
 from vedette.scenarios.names import sensor_names
+from vedette.scenarios.views import FieldOfView, field_of_view
 from vedette.simulation import Truth
 
 _INK = "#222222"
@@ -93,12 +94,20 @@ def _draw_sensors(axes: Axes, scenario: Scenario, scale: float) -> None:
     model = scenario.model
     for name, sensor in zip(sensor_names(model), model.sensors, strict=True):
         place = (sensor.position[0] * scale, sensor.position[1] * scale)
-        if sensor.speed > 0.0:
+        if sensor.platform.top_speed > 0.0:
             _draw_heading(axes, place, np.radians(sensor.heading_deg))
+        field = field_of_view(sensor)
+        if field is not None and np.isfinite(field.reach):
+            _draw_field(axes, place, field, scale)
         axes.plot(*place, marker="s", markersize=6, color=_INK, zorder=5)
         paper = {"boxstyle": "square,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.75}
         style: dict[str, Any] = {"textcoords": "offset points", "fontsize": 7, "zorder": 4.5, "bbox": paper}
         axes.annotate(drawn_text(name), place, xytext=(0, 7), ha="center", **style)
+
+
+def _draw_field(axes: Axes, place: tuple[float, float], field: FieldOfView, scale: float) -> None:
+    sides = np.degrees([field.middle - field.half_width, field.middle + field.half_width])
+    axes.add_patch(Wedge(place, field.reach * scale, *sides, facecolor=GREY, alpha=0.15, linewidth=0, zorder=1))
 
 
 def _draw_heading(axes: Axes, place: tuple[float, float], heading: float) -> None:

@@ -98,11 +98,11 @@ def _sensors(scenario: Scenario) -> Table:
 
     from vedette.scenarios.names import sensor_names
 
-    table = _numbers_table("sensors", "name", "x\n(m)", "y\n(m)", "heading\n(deg)", "speed\n(m/s)", "moves from")
+    table = _numbers_table("sensors", "name", "x\n(m)", "y\n(m)", "heading\n(deg)", "platform", "moves from")
     for name, sensor in zip(sensor_names(scenario.model), scenario.model.sensors, strict=True):
         place = (f"{sensor.position[0]:g}", f"{sensor.position[1]:g}")
-        start = "-" if sensor.speed == 0.0 else sensor.moves_from.replace("_", " ")
-        table.add_row(Text(name), *place, f"{sensor.heading_deg:g}", f"{sensor.speed:g}", start)
+        start = "-" if sensor.platform.kind == "still" else sensor.moves_from.replace("_", " ")
+        table.add_row(Text(name), *place, f"{sensor.heading_deg:g}", sensor.platform.kind, start)
     return table
 
 

@@ -6,6 +6,7 @@ from vedette.models.clutter import ClutterModel, ClutterSampler, measurement_spa
 from vedette.models.detection import (
     MAX_PROB_DETECTION,
     DetectionModel,
+    camera,
     constant_detection,
     gaussian_detection,
     limited_range,
@@ -38,6 +39,7 @@ __all__ = [
     "TargetModel",
     "bearing_only",
     "bearing_range",
+    "camera",
     "constant_detection",
     "constant_noise",
     "constant_survival",

@@ -75,6 +75,21 @@ def _limited_sector(state: Floats, pose: Floats, params: Floats) -> float:
     return params[0]  # type: ignore[no-any-return]
 
 
+@model_function("prob_detection")
+def _camera(state: Floats, pose: Floats, params: Floats) -> float:
+    if len(pose) < 5:
+        raise ValueError("camera: expected a pose with pointing_rad and half_width_rad")
+    dx, dy = state[0] - pose[0], state[1] - pose[1]
+    # The same pixels over a narrower field see farther.
+    reach = params[1] * params[2] / pose[4] if params[2] > 0.0 and pose[4] > 0.0 else params[1]
+    square = dx * dx + dy * dy
+    if square > reach * reach:
+        return 0.0
+    if square > 0.0 and abs(wrap_angle(math.atan2(dy, dx) - pose[3])) > pose[4]:
+        return 0.0
+    return params[0]  # type: ignore[no-any-return]
+
+
 def _guarded(prob_detection: float) -> float:
     return min(probability("prob_detection", prob_detection), MAX_PROB_DETECTION)
 
@@ -100,3 +115,21 @@ def limited_sector(prob_detection: float, max_range: float, half_width_rad: floa
         raise reject("half_width_rad", "an angle in (0, pi]", half_width_rad)
     params = np.array([_guarded(prob_detection), positive("max_range", max_range), half_width_rad])
     return DetectionModel(_limited_sector, params)
+
+
+def camera(prob_detection: float, max_range: float, reference_half_width_rad: float | None = None) -> DetectionModel:
+    """Constant up to a range and within the pose's half width of its pointing; 0 elsewhere.
+
+    The pose is [px, py, heading_rad, pointing_rad, half_width_rad], see `vedette.platforms.Pointing`.
+
+    Args:
+        prob_detection: within the field of view; 1 is taken as `MAX_PROB_DETECTION`.
+        max_range: m.
+        reference_half_width_rad: where the camera zooms, the half width at which it sees as far as `max_range`; it sees
+            as many times farther as its field is narrower. None: as far at every width.
+    """
+    reference = (
+        0.0 if reference_half_width_rad is None else positive("reference_half_width_rad", reference_half_width_rad)
+    )
+    params = np.array([_guarded(prob_detection), positive("max_range", max_range), reference])
+    return DetectionModel(_camera, params)

@@ -2,8 +2,23 @@
 
 from vedette.platforms.actions import Actions
 from vedette.platforms.base import Platform
+from vedette.platforms.camera import Carried, Pointing
 from vedette.platforms.courses import PAPER_HEADINGS_DEG, Courses
 from vedette.platforms.fleet import Fleet
 from vedette.platforms.options import Options, options_at
+from vedette.platforms.steps import Steps, Still, Waypoints
 
-__all__ = ["PAPER_HEADINGS_DEG", "Actions", "Courses", "Fleet", "Options", "Platform", "options_at"]
+__all__ = [
+    "PAPER_HEADINGS_DEG",
+    "Actions",
+    "Carried",
+    "Courses",
+    "Fleet",
+    "Options",
+    "Platform",
+    "Pointing",
+    "Steps",
+    "Still",
+    "Waypoints",
+    "options_at",
+]

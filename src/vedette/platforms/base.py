@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from vedette.models.arguments import as_array, float_array, reject
 from vedette.platforms.actions import Actions
 
 
+@runtime_checkable
 class Platform(Protocol):
     """What carries a sensor: what it may do, and where that takes it.
 
@@ -37,8 +38,7 @@ class Platform(Protocol):
 
 def check_platform(field: str, platform: Any) -> None:
     """`InputError` for what lacks a member of `Platform`."""
-    missing = [name for name in ("columns", "actions", "course") if not hasattr(platform, name)]
-    if missing:
+    if isinstance(platform, type) or not isinstance(platform, Platform):
         raise reject(field, "a platform, with columns, actions(pose) and course(pose, action, times)", platform)
 
 

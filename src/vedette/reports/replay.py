@@ -21,6 +21,7 @@ from vedette.scenarios.names import sensor_names
 from vedette.scenarios.sections.sensing import (
     BearingOnly,
     BearingRange,
+    CameraDetection,
     LimitedRange,
     LimitedSector,
     Position,
@@ -28,6 +29,7 @@ from vedette.scenarios.sections.sensing import (
 )
 from vedette.scenarios.sections.sensors import Sensor as SensorSection
 from vedette.scenarios.trust import code_of
+from vedette.scenarios.views import field_of_view
 from vedette.simulation.records import Decision, RunRecord
 from vedette.simulation.replay import scans_of_sensors
 from vedette.simulation.scans import Scan
@@ -63,7 +65,8 @@ def replay_data(strategy: Strategy, record: RunRecord, group: str, *, trust: boo
         "truth": [_targets(record, scan, places, has_velocity) for scan in range(record.num_scans)],
         "estimates": _estimates(record, scenario, places),
         "poses": [
-            [[*_rounded(pose[:2], places), round(float(pose[2]), 4)] for pose in poses] for poses in record.poses
+            [_pose(pose, section, places) for pose, section in zip(poses, sections, strict=True)]
+            for poses in record.poses
         ],
         "scans": _scans(record, scenario, [sensor["kind"] for sensor in sensors], places, trust),
         "ospa": [_rounded(parts, 2) for parts in record.ospa],
@@ -92,6 +95,15 @@ def _sensor(name: str, section: SensorSection) -> dict[str, Any]:
         found["range"] = section.detection.max_range
     if isinstance(section.detection, LimitedSector) and "range" in found:
         found["half_width"] = round(math.radians(section.detection.half_width_deg), 4)
+    return found
+
+
+def _pose(pose: Floats, section: SensorSection, places: int) -> list[float]:
+    """Place and heading; of a camera its field of view, too: middle and half width in rad, reach in m."""
+    found = [*_rounded(pose[:2], places), round(float(pose[2]), 4)]
+    if isinstance(section.detection, CameraDetection):
+        field = field_of_view(section, pose.tolist())
+        found += [] if field is None else [*_rounded(field[:2], 4), round(field.reach, places)]
     return found
 
 
@@ -143,7 +155,14 @@ def _ellipse(cov: Floats, places: int) -> list[float]:
 
 def code_of_sensors(scenario: Scenario) -> tuple[str, ...]:
     """Code that drawing the measurements of a scenario would run."""
-    return tuple(dict.fromkeys(name for sensor in scenario.model.sensors for name in code_of(sensor)))
+    return tuple(
+        dict.fromkeys(
+            name
+            for sensor in scenario.model.sensors
+            for section in (sensor.measurement, sensor.noise, sensor.detection, sensor.clutter)
+            for name in code_of(section)
+        )
+    )
 
 
 def _scans(

@@ -10,13 +10,16 @@ import numpy as np
 from vedette.control import FixedPlanner, IndependentPlanner, JointPlanner, MobileSensor, Planner, RandomPlanner
 from vedette.densities import LMB
 from vedette.errors import InputError
-from vedette.filters import Filter, labels_targets, shared_targets
+from vedette.filters import Filter, labels_targets
 from vedette.fusion import Clmb, CmDeltaGlmb
+from vedette.kernels.base.types import Floats
 from vedette.models import TargetModel
 from vedette.platforms import Actions
+from vedette.platforms.base import actions_at
 from vedette.scenarios.loading import Scenario
 from vedette.simulation.experiment import Experiment
 from vedette.simulation.truth import TargetSource
+from vedette.tracking import Distributed
 
 PLANNERS = ("jdm", "idm", "random", "fixed")
 
@@ -29,18 +32,19 @@ def build_experiment(scenario: Scenario) -> Experiment:
     """
     model = scenario.model
     sensors = build_sensors(scenario)
-    motion = shared_targets([sensor.filter for sensor in sensors]).motion
+    fusion = model.fusion.build(len(sensors))
+    tracker = Distributed(tuple(sensor.filter for sensor in sensors), fusion, model.fusion.feedback)
     return Experiment(
         name=model.name,
         times=model.time.build(),
-        targets=model.targets.build(model, motion, scenario.folder),
-        sensors=sensors,
-        poses=np.array([sensor.pose for sensor in model.sensors]),
+        targets=model.targets.build(model, tracker.targets.motion, scenario.folder),
+        tracker=tracker,
+        platforms=tuple(sensor.platform for sensor in sensors),
+        poses=build_poses(scenario),
         first_actions=tuple(
-            np.array([sensor.heading_deg]) if sensor.moves_from == "start" else None for sensor in model.sensors
+            own.values[0] if section.moves_from == "start" else None
+            for own, section in zip(_first_actions(scenario, sensors), model.sensors, strict=True)
         ),
-        fusion=model.fusion.build(len(sensors)),
-        feedback=model.fusion.feedback,
         estimate=model.estimator.build(),
         decision_steps=model.decision_steps,
     )
@@ -60,10 +64,28 @@ def build_sensors(scenario: Scenario) -> tuple[MobileSensor, ...]:
     return tuple(
         MobileSensor(
             model.filter.build(targets, sensor.build(region, method, folder)),
-            model.control.build_platform(sensor),
+            sensor.platform.build(folder),
         )
         for sensor in model.sensors
     )
+
+
+def build_poses(scenario: Scenario) -> Floats:
+    """(num_sensors, pose_dim) where they start, all as long as the longest; what is not a sensor's own is 0."""
+    poses = [sensor.pose for sensor in scenario.model.sensors]
+    longest = max(map(len, poses))
+    return np.array([(*pose, *(0.0,) * (longest - len(pose))) for pose in poses])
+
+
+def _first_actions(scenario: Scenario, sensors: tuple[MobileSensor, ...]) -> tuple[Actions, ...]:
+    """What each sensor does where nothing decides: its course at the start, or the first of its actions."""
+    found = []
+    places = zip(scenario.model.sensors, sensors, build_poses(scenario), strict=True)
+    for s, (section, sensor, pose) in enumerate(places):
+        row = section.platform.first_action(section.heading_deg)
+        own = actions_at(f"sensors[{s}].platform", sensor.platform, pose)
+        found.append(Actions(own.columns, own.values[:1] if row is None else np.array([row])))
+    return tuple(found)
 
 
 def build_targets(scenario: Scenario) -> TargetSource:
@@ -73,7 +95,7 @@ def build_targets(scenario: Scenario) -> TargetSource:
 
 
 def build_planner(scenario: Scenario, name: str) -> Planner:
-    """The planner called `jdm` (joint), `idm` (independent), `random`, or `fixed` (sensors keep their first heading).
+    """The planner called `jdm` (joint), `idm` (independent), `random`, or `fixed` (sensors keep their first course).
 
     Raises:
         InputError: another name, or `jdm` or `idm` with filters that have no labels.
@@ -82,7 +104,7 @@ def build_planner(scenario: Scenario, name: str) -> Planner:
     if name == "random":
         return RandomPlanner(sensors, model.control.build())
     if name == "fixed":
-        return FixedPlanner(tuple(Actions.of(heading_deg=sensor.heading_deg) for sensor in model.sensors))
+        return FixedPlanner(_first_actions(scenario, sensors))
     if name not in PLANNERS:
         raise InputError(f"planner: expected one of {', '.join(PLANNERS)}; got {name!r}")
     planner = JointPlanner if name == "jdm" else IndependentPlanner

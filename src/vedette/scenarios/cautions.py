@@ -13,9 +13,16 @@ from vedette.scenarios.faults import Path, Told
 from vedette.scenarios.loading import Scenario, place_fault
 from vedette.scenarios.names import sensor_names
 from vedette.scenarios.sections import ScenarioModel
-from vedette.scenarios.sections.sensing import ConstantDetection, GaussianDetection, LimitedRange, LimitedSector
+from vedette.scenarios.sections.sensing import (
+    CameraDetection,
+    ConstantDetection,
+    GaussianDetection,
+    LimitedRange,
+    LimitedSector,
+)
 from vedette.scenarios.sections.sensors import Sensor
 from vedette.scenarios.sections.targets import RecordedTargets
+from vedette.scenarios.views import field_of_view
 from vedette.scenarios.yaml_reader import read_yaml
 
 # Sensors whose probabilities of detection of one place differ by more than this do not see the same.
@@ -108,11 +115,11 @@ def _limited_and_moving(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
     across = math.hypot(region.x_max - region.x_min, region.y_max - region.y_min)
     for i, sensor in enumerate(model.sensors):
         limited = isinstance(sensor.detection, LimitedRange | LimitedSector) and sensor.detection.max_range < across
-        if limited and sensor.speed > 0.0:
+        if (limited and sensor.platform.top_speed > 0.0) or isinstance(sensor.detection, CameraDetection):
             yield (
                 ("sensors", i, "detection"),
-                "sensors that move and see only so far will differ in what they see; GCI loses what one sensor sees "
-                "and another does not",
+                "sensors that move or turn and see only so far will differ in what they see; GCI loses what one sensor "
+                "sees and another does not",
             )
             return
 
@@ -129,11 +136,10 @@ def prob_detection(sensor: Sensor, points: Floats) -> Floats | None:
         return np.full(len(points), section.probability)
     if isinstance(section, GaussianDetection):
         return np.asarray(np.exp(-0.5 * (distances / section.sigma) ** 2))
-    if isinstance(section, LimitedRange | LimitedSector):
-        seen = distances <= section.max_range
-        if isinstance(section, LimitedSector):
-            off = np.arctan2(ahead[:, 1], ahead[:, 0]) - math.radians(sensor.heading_deg)
-            off = np.abs((off + math.pi) % (2.0 * math.pi) - math.pi)
-            seen &= (distances == 0.0) | (off <= math.radians(section.half_width_deg))
-        return np.where(seen, section.probability, 0.0)
+    field = field_of_view(sensor)
+    if field is not None:
+        off = np.arctan2(ahead[:, 1], ahead[:, 0]) - field.middle
+        off = np.abs((off + math.pi) % (2.0 * math.pi) - math.pi)
+        seen = (distances <= field.reach) & ((distances == 0.0) | (off <= field.half_width))
+        return np.where(seen, field.probability, 0.0)
     return None

@@ -121,6 +121,8 @@ def _unknown_key(path: Path, key: str, known: list[str]) -> Told:
     hint = suggestion(key, known)
     if key == "<<":
         hint = "YAML 1.2 has no merge keys; sensor_defaults holds what sensors share"
+    if key in ("speed", "actions_deg", "headings") and "platform" not in path:
+        hint = "the platform of a sensor has it: `platform: {kind: courses, speed: 50.0, headings_deg: [0, 90]}`"
     return Told((*path, key), _one_of(known), UNKNOWN, hint)
 
 

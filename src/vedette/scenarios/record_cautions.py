@@ -60,6 +60,6 @@ def _distance(sensor: Sensor, source: RecordedSource, time: Time) -> float | Non
     """m to the nearest position of a track, where that is beyond the extent of all and what the sensor can travel."""
     positions = np.concatenate([track.positions for track in source.tracks])
     extent = float(np.hypot(*np.ptp(positions, axis=0)))
-    reach = max(extent, _NEAR) + sensor.speed * time.step_period * time.num_steps
+    reach = max(extent, _NEAR) + sensor.platform.top_speed * time.step_period * time.num_steps
     nearest = float(np.hypot(*(positions - sensor.position).T).min())
     return nearest if nearest > reach else None

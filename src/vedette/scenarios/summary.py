@@ -64,7 +64,6 @@ def facts(model: ScenarioModel) -> list[tuple[str, str]]:
         ("fusion", _fusion(model.fusion)),
         ("estimate", settings(model.estimator)),
         ("decisions", _decisions(model.decision_steps)),
-        ("actions", f"{control.headings} headings, {short(control.actions_deg)} deg"),
         ("horizon", f"{counted(control.horizon_steps, 'step')} of {control.horizon_period:g} s"),
         ("reward", f"{settings(control.reward)}, {counted(control.num_samples, 'sample')}"),
         ("pseudo-scans", f"{control.ideal_measurements} measurements"),
@@ -91,8 +90,10 @@ def _steps(steps: Literal["every"] | Sequence[int]) -> str:
 
 
 def sensing(sensor: Sensor) -> list[tuple[str, str]]:
-    """What a sensor measures, and how well."""
+    """What carries a sensor, what it measures, and how well."""
+    carrier = getattr(sensor.platform, "carrier", None)
     return [
+        ("platform", settings(sensor.platform) + (f", on: {settings(carrier)}" if carrier is not None else "")),
         ("measures", sensor.measurement.kind),
         ("noise", settings(sensor.noise)),
         ("detection", settings(sensor.detection)),

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.patches import Wedge
 from matplotlib.ticker import MaxNLocator
 
 from vedette.errors import InputError
@@ -150,8 +151,19 @@ def _draw_sensor(axes: Axes, record: RunRecord, sensor: int, scale: float) -> No
         ahead = 13.0 * _direction(decision, sensor)
         if ahead.any():
             axes.annotate("", place, xytext=_point(ahead), textcoords="offset points", arrowprops=arrow, zorder=7)
+        _draw_field(axes, decision, sensor, 0.12 * _reach([record]), scale)
         axes.plot(*place, marker="o", markersize=6.0, color=INK, markerfacecolor="white", markeredgewidth=0.7, zorder=8)
         axes.annotate(str(number), place, ha="center", va="center_baseline", fontsize=5, zorder=9)
+
+
+def _draw_field(axes: Axes, decision: Decision, sensor: int, size: float, scale: float) -> None:
+    """A sector of a given size, where the sensor was told to point."""
+    plan, pose = decision.plan, decision.poses[sensor]
+    row = dict(zip(plan.actions[sensor].columns, plan.chosen_actions[sensor].tolist(), strict=True))
+    if "pointing_deg" in row:
+        half = row.get("half_width_deg", float(np.rad2deg(pose[4])) if len(pose) > 4 else 0.0)
+        sides = row["pointing_deg"] - half, row["pointing_deg"] + half
+        axes.add_patch(Wedge(_point(pose[:2] * scale), size * scale, *sides, color=INK, alpha=0.2, lw=0, zorder=5))
 
 
 def _direction(decision: Decision, sensor: int) -> Floats:

@@ -11,7 +11,7 @@ import numpy as np
 from vedette.errors import VedetteError
 from vedette.evaluation.metrics.run import COLUMNS
 from vedette.kernels.base.types import Floats
-from vedette.models.arguments import float_array, reject
+from vedette.models.arguments import as_array, reject
 from vedette.simulation.records import RunRecord
 from vedette.simulation.tables import LAYOUTS
 
@@ -52,7 +52,11 @@ class Metric:
             raise
         except Exception as error:
             raise VedetteError(f"metric {self.name}: {type(error).__name__}: {error}") from error
-        values = float_array(f"metric {self.name}", answer, (record.num_scans,), finite=False)
+        values = as_array(f"metric {self.name}", answer, "fiu", "numbers").astype(np.float64)
+        if values.shape != (record.num_scans,):
+            raise reject(
+                f"metric {self.name}", f"a number for each of {record.num_scans} scans", f"shape {values.shape}"
+            )
         if np.isinf(values).any():
             raise reject(f"metric {self.name}", "finite numbers, or NaN", values)
         return values

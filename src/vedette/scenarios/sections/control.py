@@ -1,4 +1,4 @@
-"""Section about control: when to decide, between which actions, and how an action is valued."""
+"""Section about control: when to decide, and how an action is valued."""
 
 from __future__ import annotations
 
@@ -11,12 +11,10 @@ from pydantic import Field
 
 from vedette.scenarios.faults import Finding, describe
 from vedette.scenarios.sections.base import Count, Numbers, Positive, Probability, Section, Share, Steps, check
-from vedette.scenarios.sections.sensors import Actions, Headings, Sensor
 
 if TYPE_CHECKING:  # with the planners comes the compiler, which a check does without
     from vedette.control import CauchySchwarzReward as Reward
     from vedette.control import PlanningSettings
-    from vedette.platforms import Courses
 
 
 class CauchySchwarzReward(Section):
@@ -61,15 +59,6 @@ class Control(Section):
     decision_steps: Steps | None = Field(default=None, description="Scans after which they decide [-].")
     decision_times: Numbers | None = Field(
         default=None, description="The same as times, instead of decision_steps; each the time of a scan [s]."
-    )
-    actions_deg: Actions = Field(
-        default=tuple(range(-180, 181, 30)),
-        description="Actions of every sensor, in the order of tables and figures. Those that are one heading (-180 and "
-        "180) are evaluated once and shown each; of equal rewards the first action wins [deg].",
-    )
-    headings: Headings = Field(
-        default="absolute",
-        description="Whether an action is a heading, counter-clockwise from east, or a change of heading [-].",
     )
     horizon_steps: Count = Field(default=5, description="Pseudo-updates over the horizon, H [-].")
     horizon_period: Positive = Field(default=2.0, description="Time between pseudo-updates, T [s].")
@@ -116,10 +105,3 @@ class Control(Section):
                 min_relative_weight=self.limits.min_relative_weight,
             ),
         )
-
-    def build_platform(self, sensor: Sensor) -> Courses:
-        """What carries one sensor, with its own actions or those of all."""
-        from vedette.platforms import Courses
-
-        headings = sensor.headings or self.headings
-        return Courses(sensor.speed, sensor.actions_deg or self.actions_deg, relative=headings == "relative")

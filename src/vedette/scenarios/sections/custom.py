@@ -54,7 +54,7 @@ class Custom(Section):
             found: Any = _module(name, folder)
             for part in attribute.split("."):
                 found = getattr(found, part)
-            if not isinstance(found, wanted) and callable(found):
+            if isinstance(found, type) or (not isinstance(found, wanted) and callable(found)):
                 found = found(**self.arguments)
             elif self.arguments:
                 raise InputError(f"{field}.arguments: expected none, as {self.function} is no function")

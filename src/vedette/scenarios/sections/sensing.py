@@ -202,6 +202,26 @@ class LimitedSector(Section):
         return limited_sector(self.probability, self.max_range, math.radians(self.half_width_deg))
 
 
+class CameraDetection(Section):
+    """Detection within the field of view of a camera: along its pointing, as far to either side as its half width."""
+
+    kind: Literal["camera"] = Field(default="camera", description="Kind of detection [-].")
+    probability: Probability = Field(description="Probability of detection within the field of view [-].")
+    max_range: Positive = Field(description="Greatest distance [m].")
+    reference_half_width_deg: Annotated[float, Field(gt=0.0, le=180.0)] | None = Field(
+        default=None,
+        description="Where it zooms, the half width at which it sees so far; it sees as many times farther as its "
+        "field is narrower. None: as far at every width [deg].",
+    )
+
+    def build(self, folder: Path) -> DetectionModel:
+        """Probability of detection."""
+        from vedette.models import camera
+
+        reference = self.reference_half_width_deg
+        return camera(self.probability, self.max_range, None if reference is None else math.radians(reference))
+
+
 class CustomDetection(Custom):
     """A user's `DetectionModel`."""
 
@@ -215,7 +235,7 @@ class CustomDetection(Custom):
 
 
 Detection = Annotated[
-    GaussianDetection | ConstantDetection | LimitedRange | LimitedSector | CustomDetection,
+    GaussianDetection | ConstantDetection | LimitedRange | LimitedSector | CameraDetection | CustomDetection,
     Field(discriminator="kind"),
 ]
 

@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Literal
 
 from pydantic import Field
 
 from vedette.scenarios.faults import Finding, describe
 from vedette.scenarios.sections.base import GaussianMethod, Name, Point, Section, check
+from vedette.scenarios.sections.platforms import AnyPlatform, Still
 from vedette.scenarios.sections.sensing import (
     BearingRange,
     Clutter,
@@ -25,9 +26,6 @@ from vedette.scenarios.sections.sensing import (
 if TYPE_CHECKING:  # with the models comes the compiler, which a check does without
     from vedette.models import Region, SensorModel
 
-Headings = Literal["absolute", "relative"]
-Actions = Annotated[tuple[float, ...], Field(strict=False, min_length=1)]
-
 
 class Sensor(Section):
     """One sensor and the platform that carries it."""
@@ -35,16 +33,21 @@ class Sensor(Section):
     name: Name | None = Field(default=None, description="What to call it; none: `sensor 1`, `sensor 2`, ... [-].")
     position: Point = Field(description="Where it starts [m].")
     heading_deg: float = Field(default=0.0, description="Heading at the start, counter-clockwise from east [deg].")
-    speed: float = Field(default=0.0, ge=0.0, description="Speed when under way; 0: a fixed sensor [m/s].")
+    platform: AnyPlatform = Field(default=Still(), description="What carries it: what it may do [-].")
     moves_from: Literal["first_decision", "start"] = Field(
-        default="first_decision", description="Whether it lies still until its first decision, as in the paper [-]."
+        default="first_decision",
+        description="Whether it lies still until its first decision, as in the paper, or is under way on its course, "
+        "or under the first of its actions [-].",
     )
-    actions_deg: Actions | None = Field(default=None, description="Its own actions; none: those of control [deg].")
-    headings: Headings | None = Field(default=None, description="What its own actions mean; none: as control says [-].")
     measurement: Measurement = Field(default=BearingRange(), description="What it measures [-].")
     noise: Noise = Field(default=RangeDependentNoise(), description="Measurement noise [-].")
     detection: Detection = Field(default=GaussianDetection(), description="Probability of detection [-].")
     clutter: Clutter = Field(default=RegionClutter(), description="False measurements [-].")
+
+    @check
+    def _a_camera_carries_a_camera(self) -> Iterator[Finding]:
+        if self.detection.kind == "camera" and len(self.pose) < 5:
+            yield ("platform",), "a camera, as its detection is a camera's", self.platform.kind
 
     @check
     def _noise_fits(self) -> Iterator[Finding]:
@@ -86,9 +89,9 @@ class Sensor(Section):
         return f"{numbers}, as a {self.measurement.kind} measurement has"
 
     @property
-    def pose(self) -> tuple[float, float, float]:
-        """Where it starts: [px, py, heading_rad]."""
-        return (*self.position, math.radians(self.heading_deg))
+    def pose(self) -> tuple[float, ...]:
+        """Where it starts: [px, py, heading_rad], and what else its platform has."""
+        return (*self.position, math.radians(self.heading_deg), *self.platform.components())
 
     def build(self, region: Region, method: GaussianMethod, folder: Path) -> SensorModel:
         """What it sees; `folder` is what a custom model's file is relative to.
@@ -112,12 +115,10 @@ class SensorDefaults(Section):
     """What every sensor has unless it says otherwise; key by key, a sensor's own value replaces the whole default."""
 
     heading_deg: float | None = Field(default=None, description="Heading at the start [deg].")
-    speed: Annotated[float, Field(ge=0.0)] | None = Field(default=None, description="Speed when under way [m/s].")
+    platform: AnyPlatform | None = Field(default=None, description="What carries them: what they may do [-].")
     moves_from: Literal["first_decision", "start"] | None = Field(
         default=None, description="Whether they lie still until the first decision [-]."
     )
-    actions_deg: Actions | None = Field(default=None, description="Their actions [deg].")
-    headings: Headings | None = Field(default=None, description="What these actions mean [-].")
     measurement: Measurement | None = Field(default=None, description="What they measure [-].")
     noise: Noise | None = Field(default=None, description="Measurement noise [-].")
     detection: Detection | None = Field(default=None, description="Probability of detection [-].")

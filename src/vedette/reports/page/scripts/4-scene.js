@@ -88,8 +88,9 @@ function drawMeasurements(context, run, view, step, s) {
 }
 
 function drawSensor(context, run, view, step, s) {
-  const [x, y, heading] = run.poses[step][s];
-  const { range, half_width: halfWidth, name } = run.sensors[s];
+  const { name, ...seen } = run.sensors[s];
+  // A camera's field of view goes with its pose.
+  const [x, y, heading, middle = heading, halfWidth = seen.half_width, range = seen.range] = run.poses[step][s];
   const [px, py] = [view.x(x), view.y(y)];
   if (range !== undefined) {
     context.fillStyle = seriesColour(s);
@@ -97,7 +98,7 @@ function drawSensor(context, run, view, step, s) {
     context.beginPath();
     if (halfWidth !== undefined && halfWidth < Math.PI) context.moveTo(px, py);
     const spread = halfWidth ?? Math.PI;
-    context.arc(px, py, range * view.scale, -heading - spread, -heading + spread);
+    context.arc(px, py, range * view.scale, -middle - spread, -middle + spread);
     context.fill();
     context.globalAlpha = 1;
   }

@@ -10,10 +10,10 @@ function describeAt(run, step, view, x, y, show) {
   for (const estimate of run.estimates[step]) {
     if (near(estimate[1], estimate[2])) found.push(describeEstimate(run, estimate));
   }
-  run.poses[step].forEach(([east, north, heading], s) => {
+  run.poses[step].forEach(([east, north, heading, pointing], s) => {
     if (near(east, north)) {
       const at = `${metres(east, run)}, ${metres(north, run)}`;
-      found.push(`${run.sensors[s].name}: at ${at}, heading ${degrees(heading)}\u00b0`);
+      found.push(`${run.sensors[s].name}: at ${at}, heading ${degrees(heading)}\u00b0${pointing === undefined ? "" : `, pointing ${degrees(pointing)}\u00b0`}`);
     }
   });
   if (show.measurements && found.length < 3) found.push(...measurementsAt(run, step, view, x, y).slice(0, 3));

@@ -1,0 +1,124 @@
+"""Cameras that turn and zoom, on the spot or carried; pose [px, py, heading_rad, pointing_rad, half_width_rad]."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from vedette.errors import InputError
+from vedette.kernels.base.types import Floats
+from vedette.models.arguments import float_array, positive, reject
+from vedette.models.measurement import wrap_angles
+from vedette.platforms.base import Platform, check_platform
+
+POSE_DIM = 5
+
+
+@dataclass(frozen=True, slots=True)
+class Pointing:
+    """A camera on the spot that is pointed, and may zoom. Where it points does not depend on its heading.
+
+    `vedette.models.camera` looks along the pointing, as far to either side as the half width.
+
+    Attributes:
+        pointings_deg: degrees, counter-clockwise from +x.
+        relative: whether they are added to the present pointing; actions are absolute all the same.
+        half_widths_deg: of the field of view, of which an action chooses one at once; none: it does not zoom.
+        turn_rate_deg: degrees a second, the shorter way, counter-clockwise where both are as long; None: at once.
+
+    Raises:
+        InputError: no pointing, or one that is not finite; half widths outside (0, 180]; a rate that is not above 0.
+    """
+
+    pointings_deg: Sequence[float]
+    relative: bool = False
+    half_widths_deg: Sequence[float] = ()
+    turn_rate_deg: float | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("pointings_deg", "half_widths_deg"):
+            object.__setattr__(self, name, tuple(float_array(name, getattr(self, name), (None,)).tolist()))
+        if not self.pointings_deg:
+            raise reject("pointings_deg", "at least one angle in degrees", "none")
+        if not all(0.0 < width <= 180.0 for width in self.half_widths_deg):
+            raise reject("half_widths_deg", "angles in (0, 180] degrees", self.half_widths_deg)
+        if self.turn_rate_deg is not None:
+            positive("turn_rate_deg", self.turn_rate_deg)
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """`pointing_deg`, and `half_width_deg` where it zooms."""
+        return ("pointing_deg", "half_width_deg") if self.half_widths_deg else ("pointing_deg",)
+
+    def actions(self, pose: Floats) -> Floats:
+        """(num_actions, num_columns) absolute pointings, each at every width; 180 and -180 stay apart as printed."""
+        _check(pose)
+        degrees = np.array(self.pointings_deg)
+        if self.relative:
+            degrees = np.degrees(wrap_angles(pose[3] + np.radians(degrees)))
+        if not self.half_widths_deg:
+            return degrees[:, np.newaxis]
+        num = len(self.half_widths_deg)
+        return np.column_stack([np.repeat(degrees, num), np.tile(self.half_widths_deg, len(degrees))])
+
+    def course(self, pose: Floats, action: Floats, times: Floats) -> Floats:
+        """Position and heading stay."""
+        _check(pose)
+        poses = np.tile(pose, (len(times), 1))
+        turn = float(wrap_angles(np.radians(action[0]) - pose[3]))
+        if self.turn_rate_deg is None:
+            poses[:, 3] = wrap_angles(np.radians(action[0]))
+        else:
+            most = np.radians(self.turn_rate_deg) * times
+            poses[:, 3] = wrap_angles(pose[3] + math.copysign(1.0, turn) * np.minimum(abs(turn), most))
+        if self.half_widths_deg:
+            poses[:, 4] = math.radians(action[1])
+        return poses
+
+
+def _check(pose: Floats) -> None:
+    if len(pose) < POSE_DIM:
+        raise InputError(f"pose: expected {POSE_DIM} components, with pointing_rad and half_width_rad; got {len(pose)}")
+
+
+@dataclass(frozen=True, slots=True)
+class Carried:
+    """What points, on what moves: every action of the one with every action of the other, columns side by side.
+
+    Attributes:
+        carrier: moves position and heading, and gets a pose of these three.
+        pointing: moves all other components of the pose.
+
+    Raises:
+        InputError: one of them is no platform, or a column of both has the same name.
+    """
+
+    carrier: Platform
+    pointing: Platform
+
+    def __post_init__(self) -> None:
+        for name in ("carrier", "pointing"):
+            check_platform(name, getattr(self, name))
+        if len(set(self.columns)) < len(self.columns):
+            raise reject("pointing", f"columns other than {', '.join(self.carrier.columns)}", self.pointing.columns)
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Those of the carrier, then those of the pointing."""
+        return (*self.carrier.columns, *self.pointing.columns)
+
+    def actions(self, pose: Floats) -> Floats:
+        """(num_actions, num_columns), the pointing's fastest."""
+        moves = np.asarray(self.carrier.actions(pose[:3].copy()), np.float64)
+        turns = np.asarray(self.pointing.actions(pose), np.float64)
+        return np.hstack([np.repeat(moves, len(turns), axis=0), np.tile(turns, (len(moves), 1))])
+
+    def course(self, pose: Floats, action: Floats, times: Floats) -> Floats:
+        """Each its own components."""
+        num = len(self.carrier.columns)
+        poses = np.array(self.pointing.course(pose.copy(), action[num:], times), np.float64)
+        poses[:, :3] = np.asarray(self.carrier.course(pose[:3].copy(), action[:num], times))[:, :3]
+        return poses

@@ -1,0 +1,135 @@
+"""Platforms that move by the step, along a path, or not at all."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from vedette.kernels.base.types import Floats
+from vedette.models.arguments import float_array, non_negative, positive, reject
+
+
+@dataclass(frozen=True, slots=True)
+class Still:
+    """Stays where it is, as it is."""
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """None."""
+        return ()
+
+    def actions(self, pose: Floats) -> Floats:
+        """(1, 0): the one thing it can do."""
+        return np.empty((1, 0))
+
+    def course(self, pose: Floats, action: Floats, times: Floats) -> Floats:
+        """The pose, at every time."""
+        return np.tile(pose, (len(times), 1))
+
+
+@dataclass(frozen=True, slots=True)
+class Steps:
+    """Steps of one length, each made at a speed and followed by waiting.
+
+    Attributes:
+        length: m.
+        speed: m/s.
+        directions_deg: degrees, counter-clockwise from +x.
+        stay: whether staying is an action, too, the last one.
+
+    Raises:
+        InputError: no direction, or one that is not finite; a length or speed that is not above 0.
+    """
+
+    length: float
+    speed: float
+    directions_deg: Sequence[float] = (0.0, 45.0, 90.0, 135.0, 180.0, -135.0, -90.0, -45.0)
+    stay: bool = True
+
+    def __post_init__(self) -> None:
+        positive("length", self.length)
+        positive("speed", self.speed)
+        directions = float_array("directions_deg", self.directions_deg, (None,))
+        if len(directions) == 0:
+            raise reject("directions_deg", "at least one angle in degrees", "none")
+        object.__setattr__(self, "directions_deg", tuple(directions.tolist()))
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """`dx` and `dy`, m."""
+        return ("dx", "dy")
+
+    def actions(self, pose: Floats) -> Floats:
+        """(num_actions, 2) the step in each direction."""
+        angles = np.radians(self.directions_deg)
+        steps = self.length * np.column_stack([np.cos(angles), np.sin(angles)])
+        steps[np.abs(steps) < 1e-12 * self.length] = 0.0  # due north is not a hair east
+        return np.concatenate([steps, np.zeros((1, 2))]) if self.stay else steps
+
+    def course(self, pose: Floats, action: Floats, times: Floats) -> Floats:
+        """On the way, then at its end; the heading is that of the step, and stays while it stays."""
+        poses = np.tile(pose, (len(times), 1))
+        length = math.hypot(action[0], action[1])
+        if length > 0.0:
+            shares = np.minimum(times * self.speed / length, 1.0)
+            poses[:, :2] += shares[:, np.newaxis] * action
+            poses[:, 2] = math.atan2(action[1], action[0])
+        return poses
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Waypoints:
+    """A path through waypoints: an action chooses the one to head for, and the path is followed from there on.
+
+    Attributes:
+        points: (num_points, 2) m.
+        speed: m/s.
+        closed: whether the first follows the last, round and round; otherwise it waits at the last.
+
+    Raises:
+        InputError: no point, or one that is not finite; a speed below 0.
+    """
+
+    points: Sequence[Sequence[float]] | Floats
+    speed: float
+    closed: bool = False
+
+    def __post_init__(self) -> None:
+        points = float_array("points", self.points, (None, 2))
+        if len(points) == 0:
+            raise reject("points", "at least one point", "none")
+        non_negative("speed", self.speed)
+        object.__setattr__(self, "points", points)
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """`waypoint`, counted from 1."""
+        return ("waypoint",)
+
+    def actions(self, pose: Floats) -> Floats:
+        """(num_points, 1) every waypoint."""
+        return np.arange(1.0, len(self.points) + 1)[:, np.newaxis]
+
+    def course(self, pose: Floats, action: Floats, times: Floats) -> Floats:
+        """Straight to the waypoint, then from one to the next; the heading is that of the leg."""
+        first = int(action[0]) - 1
+        points = np.asarray(self.points)
+        ahead = np.concatenate([points[first:], points[: first + 1]]) if self.closed else points[first:]
+        corners = np.concatenate([pose[np.newaxis, :2], ahead])
+        legs = np.hypot(*np.diff(corners, axis=0).T)
+        ends = np.concatenate([np.zeros(1), np.cumsum(legs)])
+        gone = self.speed * times
+        if self.closed and ends[-1] > ends[1]:
+            beyond = gone > ends[1]
+            gone = np.where(beyond, ends[1] + np.remainder(gone - ends[1], ends[-1] - ends[1]), gone)
+        poses = np.tile(pose, (len(times), 1))
+        poses[:, 0], poses[:, 1] = (np.interp(gone, ends, corners[:, axis]) for axis in (0, 1))
+        long = np.flatnonzero(legs > 0.0)
+        if len(long):
+            leg = long[np.minimum(np.searchsorted(ends[long + 1], gone, side="right"), len(long) - 1)]
+            away = corners[leg + 1] - corners[leg]
+            poses[:, 2] = np.arctan2(away[:, 1], away[:, 0])
+        return poses

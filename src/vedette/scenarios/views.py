@@ -1,0 +1,33 @@
+"""What a sensor sees where its view ends: for checks, which compile nothing, and for drawings."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from vedette.scenarios.sections.sensing import CameraDetection, LimitedRange, LimitedSector
+from vedette.scenarios.sections.sensors import Sensor
+
+
+class FieldOfView(NamedTuple):
+    """A sector of a disc around a sensor: middle and half width in rad, reach in m, probability within it."""
+
+    middle: float
+    half_width: float
+    reach: float
+    probability: float
+
+
+def field_of_view(sensor: Sensor, pose: Sequence[float] | None = None) -> FieldOfView | None:
+    """Of a sensor at a pose, or where it starts; None where its view has no edge, or is of the user's own."""
+    section, at = sensor.detection, sensor.pose if pose is None else pose
+    if isinstance(section, LimitedRange):
+        return FieldOfView(at[2], math.pi, section.max_range, section.probability)
+    if isinstance(section, LimitedSector):
+        return FieldOfView(at[2], math.radians(section.half_width_deg), section.max_range, section.probability)
+    if isinstance(section, CameraDetection) and len(at) >= 5:
+        reference, width = section.reference_half_width_deg, at[4]
+        reach = section.max_range * (math.radians(reference) / width if reference is not None and width > 0.0 else 1.0)
+        return FieldOfView(at[3], width, reach, section.probability)
+    return None
