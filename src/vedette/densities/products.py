@@ -42,8 +42,10 @@ class PowerProducts:
         log_weights, log_dets: (num_sets,), (num_members,) log weights of the prediction and of the determinants of its
             covariances.
         rows: (num_members, row_size) its information rows.
-        sensors: columns of a joint action whose sensors take part; first_cases: the first case of each.
+        sensors: columns of a joint action whose sensors take part.
+        first_cases: the first case of each of these sensors.
         num_samples, num_threads: as the cases have them.
+        state_dim: length of a target's state.
     """
 
     laid: Laid

@@ -45,7 +45,7 @@ def power_integral(
         unit_volume: K, as of `cauchy_schwarz`.
         support: "full", or "common": only the label sets (two LMBs: the labels) that both densities have.
 
-    Returns: a number; -inf where nothing is shared, inf where a negative power makes the integral infinite.
+    It is -inf where nothing is shared, and inf where a negative power makes the integral infinite.
 
     Raises `InputError` for exponents or densities that do not fit (unlabelled ones, other state dimensions, support
     "common" with nothing in common), and for mixtures, of which only the exponents (1, 1), (2, 0), (0, 2), (1, 0) and
