@@ -106,7 +106,9 @@ class Store:
 
     def unmeasured(self, own: Mapping[str, Collection[str]]) -> tuple[tuple[str, int], ...]:
         """Cell name and number of every finished run that lacks measures: this version's, or its cell's `own`."""
-        return tuple((cell, run) for cell, run, kept in self._writer.metrics() if not has_metrics(kept, own.get(cell, ())))
+        return tuple(
+            (cell, run) for cell, run, kept in self._writer.metrics() if not has_metrics(kept, own.get(cell, ()))
+        )
 
     def put_metrics(self, cell: str, run: int, metrics: bytes) -> None:
         """Keep measures of a finished run in place of those that are there."""
