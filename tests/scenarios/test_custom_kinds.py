@@ -15,7 +15,7 @@ from vedette.campaigns import open_results, parse_spec, resolve, run_campaign
 from vedette.cli import app
 from vedette.errors import InputError
 from vedette.evaluation import run_scenario
-from vedette.scenarios import Scenario, load_scenario
+from vedette.scenarios import Scenario, load_scenario, with_fields
 from vedette.simulation.stopping import RunStopped
 
 OWN = Path(__file__).with_name("own_parts.py")
@@ -65,10 +65,19 @@ def test_all_kinds_in_one_run(scenario: Scenario) -> None:
     np.testing.assert_array_equal(third[0], [7.0, 0.0])
 
 
+@pytest.mark.filterwarnings("ignore::vedette.errors.SlowRewardWarning")
 def test_a_joint_decision_with_reward_search_and_fusion_of_ones_own(scenario: Scenario) -> None:
     plan = run_scenario(scenario, "jdm", seed=1).decisions[0].plan
     assert plan.chosen == (0, 0)
     assert np.isfinite(plan.expected_rewards[0][0])
+
+
+def test_a_reward_of_power_integrals(scenario: Scenario) -> None:
+    powers = {"kind": "custom", "function": "own_parts.py:Powers", "arguments": {"order": 0.25}}
+    twin = {"kind": "renyi", "order": 0.25}
+    for reward in (powers, twin):
+        plan = run_scenario(with_fields(scenario, {"control.reward": reward}), "idm", seed=1).decisions[0].plan
+        assert np.isfinite(plan.expected_rewards[0][0])
 
 
 def test_a_campaign_with_workers_gives_the_same_bytes(folder: Path) -> None:

@@ -141,7 +141,7 @@ CASES = [
     (
         "decision_steps: [4, 8]",
         "reward: {kind: entropy}",
-        ['f.yaml:22:26: control.reward.kind: expected one of cauchy_schwarz, custom, got "entropy"'],
+        ['f.yaml:22:26: control.reward.kind: expected one of cauchy_schwarz, renyi, custom, got "entropy"'],
     ),
     (
         "decision_steps: [4, 8]",

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field
 
@@ -15,7 +15,7 @@ from vedette.scenarios.sections.base import Count, Numbers, Positive, Probabilit
 from vedette.scenarios.sections.custom import Custom
 
 if TYPE_CHECKING:  # with the planners comes the compiler, which a check does without
-    from vedette.control import JointSearch, PlanningSettings, Reward
+    from vedette.control import JointSearch, PlanningSettings, PowerReward, Reward
 
 
 class CauchySchwarzReward(Section):
@@ -28,15 +28,33 @@ class CauchySchwarzReward(Section):
         "density, under which localisation counts as much as cardinality [-].",
     )
 
-    def build(self, folder: Path) -> Reward:
+    def build(self, folder: Path) -> Reward | PowerReward:
         """The value of an updated density."""
         from vedette.control import CauchySchwarzReward
 
         return CauchySchwarzReward(self.unit_volume)
 
 
+class RenyiReward(Section):
+    """Renyi divergence of the predicted from the updated density; it needs no unit of hyper-volume."""
+
+    kind: Literal["renyi"] = Field(default="renyi", description="Kind of reward [-].")
+    order: Positive = Field(default=0.5, description="Above 0 and not 1; 0.5: twice the Bhattacharyya distance [-].")
+
+    @check
+    def _not_one(self) -> Iterator[Finding]:
+        if self.order == 1.0:
+            yield ("order",), "a number other than 1", describe(self.order)
+
+    def build(self, folder: Path) -> Reward | PowerReward:
+        """The value of an updated density."""
+        from vedette.control import RenyiReward
+
+        return RenyiReward(self.order)
+
+
 class CustomReward(Custom):
-    """A user's own `vedette.control.Reward`: a function of the predicted and the updated density."""
+    """A user's own `vedette.control.Reward`, a function of the predicted and the updated density, or `PowerReward`."""
 
     kind: Literal["custom"] = Field(default="custom", description="Kind of reward [-].")
 
@@ -47,13 +65,19 @@ class CustomReward(Custom):
 
         return Reward
 
-    def build(self, folder: Path) -> Reward:
+    def lacks(self, found: Any) -> str:
+        """Nothing, too, where it is a reward of power integrals."""
+        from vedette.control import PowerReward
+
+        return "" if isinstance(found, PowerReward) else super().lacks(found)
+
+    def build(self, folder: Path) -> Reward | PowerReward:
         """The user's own."""
         made: Reward = self.made(folder)
         return made
 
 
-AnyReward = Annotated[CauchySchwarzReward | CustomReward, Field(discriminator="kind")]
+AnyReward = Annotated[CauchySchwarzReward | RenyiReward | CustomReward, Field(discriminator="kind")]
 
 
 class Exhaustive(Section):
