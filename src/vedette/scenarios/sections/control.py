@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field
 
@@ -36,15 +36,17 @@ class CauchySchwarzReward(Section):
 
 
 class RenyiReward(Section):
-    """Renyi divergence of the predicted from the updated density; it needs no unit of hyper-volume."""
+    """Renyi divergence of the predicted from the updated density."""
 
     kind: Literal["renyi"] = Field(default="renyi", description="Kind of reward [-].")
-    order: Positive = Field(default=0.5, description="Above 0 and not 1; 0.5: twice the Bhattacharyya distance [-].")
+    order: Positive = Field(
+        default=0.5, description="Exponent of the predicted density; not 1. 0.5: twice the Bhattacharyya distance [-]."
+    )
 
     @check
     def _not_one(self) -> Iterator[Finding]:
         if self.order == 1.0:
-            yield ("order",), "a number other than 1", describe(self.order)
+            yield ("order",), "a number other than 1", "1"
 
     def build(self, folder: Path) -> Reward | PowerReward:
         """The value of an updated density."""
@@ -65,15 +67,15 @@ class CustomReward(Custom):
 
         return Reward
 
-    def lacks(self, found: Any) -> str:
-        """Nothing, too, where it is a reward of power integrals."""
+    def lacking(self, found: object) -> str:
+        """As of other kinds; a reward of power integrals is no function."""
         from vedette.control import PowerReward
 
-        return "" if isinstance(found, PowerReward) else super().lacks(found)
+        return "" if isinstance(found, PowerReward) else super().lacking(found)
 
     def build(self, folder: Path) -> Reward | PowerReward:
         """The user's own."""
-        made: Reward = self.made(folder)
+        made: Reward | PowerReward = self.made(folder)
         return made
 
 
