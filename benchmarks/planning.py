@@ -15,9 +15,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from vedette.evaluation.runs import strategy
 from vedette.scenarios import Scenario, load_scenario
-from vedette.scenarios.build import build_experiment
+from vedette.scenarios.build import build_experiment, build_planner
 from vedette.simulation.loop import run_stream
 from vedette.simulation.scans import simulate_scans
 
@@ -63,7 +62,7 @@ def main() -> None:
         scenario = variant(kind)
         state, poses = after_ten_scans(scenario)
         for name in ("jdm", "idm"):
-            planner = strategy(scenario, name, num_threads=1)
+            planner = build_planner(scenario, name, num_threads=1)
             assert planner is not None
             seconds = []
             for repeat in range(repeats + 1):

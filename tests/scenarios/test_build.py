@@ -214,18 +214,18 @@ def test_a_filter_without_labels_runs_alone_and_names_its_estimates_by_the_scan(
 
 
 def test_fusions_of_each_kind_have_weights_that_sum_to_one() -> None:
-    cm = Fusion(weights=(0.3333333, 0.3333333, 0.3333333), missing_weight=1e-3).build(3)
+    cm = Fusion(weights=(0.3333333, 0.3333333, 0.3333333), missing_weight=1e-3).build(3, Path())
     assert isinstance(cm, CmDeltaGlmb)
     assert math.fsum(cm.weights) == pytest.approx(1.0, abs=1e-12)
     assert cm.missing_log_weight == math.log(1e-3)
-    clmb = Fusion(kind="clmb", missing_existence=0.01).build(4)
+    clmb = Fusion(kind="clmb", missing_existence=0.01).build(4, Path())
     assert isinstance(clmb, Clmb)
     assert (clmb.weights, clmb.missing_existence) == ((0.25,) * 4, 0.01)
-    assert Fusion(kind="none").build(1) is None
+    assert Fusion(kind="none").build(1, Path()) is None
 
 
 def test_the_marginal_estimator_has_its_threshold() -> None:
-    estimate = MarginalEstimator(threshold=0.9).build()
+    estimate = MarginalEstimator(threshold=0.9).build(Path())
     for empty in (GLMB.empty(4), LMB.empty(4)):
         assert len(estimate(empty, 1).labels) == 0
 
@@ -242,7 +242,7 @@ def test_actions_of_one_sensor_and_of_all() -> None:
 
 def test_an_unknown_planner() -> None:
     loaded = scenario()
-    with pytest.raises(InputError, match="planner: expected one of jdm, idm, random, fixed; got 'greedy'"):
+    with pytest.raises(InputError, match="planner: expected one of jdm, idm, random, fixed, still; got 'greedy'"):
         build.build_planner(loaded, "greedy")
 
 

@@ -9,9 +9,9 @@ import numpy as np
 
 from vedette.control import JointPlanner
 from vedette.densities import GLMB, LMB
-from vedette.evaluation.runs import children_ignore_interrupts, strategy
+from vedette.evaluation.runs import children_ignore_interrupts
 from vedette.scenarios import Scenario
-from vedette.scenarios.build import build_experiment
+from vedette.scenarios.build import build_experiment, build_planner
 from vedette.simulation.experiment import Experiment
 from vedette.simulation.loop import run_stream
 from vedette.tracking import State
@@ -46,7 +46,7 @@ def _compile_tracker(experiment: Experiment) -> None:
 def _compile_planning(scenario: Scenario) -> None:
     """Fuse, estimate and plan as if every birth site held a target, one of which a single sensor knows."""
     experiment = build_experiment(scenario)
-    planner = strategy(scenario, "jdm")
+    planner = build_planner(scenario, "jdm")
     assert isinstance(planner, JointPlanner)
     num_sites, num_others = experiment.tracker.targets.birth.num_sites, experiment.num_sensors - 1
     beliefs = (_belief(experiment, num_sites), *(_belief(experiment, max(num_sites - 1, 1)),) * num_others)

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
-from vedette.densities import Estimate
+from vedette.densities import Estimator
 from vedette.errors import InputError
-from vedette.filters import Belief
 from vedette.kernels.base.types import Floats
 from vedette.models.arguments import reject
 from vedette.platforms import Fleet, Platform
@@ -45,7 +43,7 @@ class Experiment:
     platforms: tuple[Platform, ...]
     poses: Floats
     first_actions: tuple[Floats | None, ...]
-    estimate: Callable[[Belief, int], Estimate]
+    estimate: Estimator
     decision_steps: tuple[int, ...]
 
     def __post_init__(self) -> None:

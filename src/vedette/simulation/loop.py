@@ -5,12 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from vedette.control import Planner, RandomPlanner
-from vedette.errors import VedetteError
 from vedette.simulation.experiment import Experiment
 from vedette.simulation.journal import Journal, Score
 from vedette.simulation.records import RunRecord
 from vedette.simulation.scans import simulate_scans
-from vedette.simulation.stopping import RunInterrupted, RunStopped
+from vedette.simulation.stopping import RunInterrupted, RunStopped, cause_of
 
 # Streams of one run: strategies meet the same truth and the same luck in the scans, whatever else they draw.
 TRUTH, SCANS, FILTER, PLANNER, RANDOM_CONTROL = range(5)
@@ -51,8 +50,7 @@ def simulate(experiment: Experiment, planner: Planner | None, *, seed: int, run:
         message = f"{journal.place(interrupt)}: interrupted"
         raise RunInterrupted(message, journal.partial(score, message)) from interrupt
     except Exception as error:
-        cause = str(error) if isinstance(error, VedetteError) else f"{type(error).__name__}: {error}"
-        message = f"{journal.place(error)}: {cause}"
+        message = f"{journal.place(error)}: {cause_of(error)}"
         record = journal.partial(score, message)
         raise RunStopped(message, journal.step, journal.time, journal.stage(error), record) from error
 

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -12,7 +10,7 @@ from vedette.errors import VedetteError
 from vedette.evaluation.metrics.run import COLUMNS
 from vedette.kernels.base.types import Floats
 from vedette.models.arguments import as_array, reject
-from vedette.simulation.records import RunRecord
+from vedette.simulation.records import Measure, RunRecord
 from vedette.simulation.tables import LAYOUTS
 
 # Columns of the tables of many runs beside those of the scans of one.
@@ -32,7 +30,7 @@ class Metric:
     """
 
     name: str
-    function: Callable[[RunRecord], Any]
+    function: Measure
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name.isidentifier():
