@@ -86,6 +86,17 @@ def _fusion_of_kind(model: ScenarioModel) -> Iterator[Finding]:
         yield ("fusion", "feedback"), wanted, "true"
 
 
+def _central(model: ScenarioModel) -> Iterator[Finding]:
+    if model.fusion.kind != "central":
+        return
+    if model.fusion.feedback:
+        yield ("fusion", "feedback"), "false, as nothing is fused while tracking", "true"
+    if model.filter.kind == "custom":
+        yield ("fusion", "kind"), "a fusion, as each sensor has a filter of your own", '"central"'
+    elif model.filter.assignment.kind == "gibbs":
+        yield ("filter", "assignment", "kind"), "ranked, as one filter takes the scans of all sensors", '"gibbs"'
+
+
 def _estimator(model: ScenarioModel) -> Iterator[Finding]:
     if model.filter.kind in UNLABELLED and model.estimator.kind == "marginal":
         yield ("estimator", "kind"), f"map, as {model.filter.kind} filters have no labels", '"marginal"'
@@ -170,6 +181,7 @@ CHECKS = (
     _fusion_of_labels,
     _fusion_of_several,
     _fusion_of_kind,
+    _central,
     _estimator,
     _combinations,
     _birth_steps,
