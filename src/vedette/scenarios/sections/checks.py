@@ -76,7 +76,7 @@ def _fusion_of_several(model: ScenarioModel) -> Iterator[Finding]:
 
 def _fusion_of_kind(model: ScenarioModel) -> Iterator[Finding]:
     if model.fusion.kind == "cm_delta_glmb" and model.filter.kind == "lmb":
-        yield ("fusion", "kind"), "clmb or none, as the filters are lmb", '"cm_delta_glmb"'
+        yield ("fusion", "kind"), "clmb, central or none, as the filters are lmb", '"cm_delta_glmb"'
     if (
         model.fusion.kind == "clmb"
         and model.fusion.feedback

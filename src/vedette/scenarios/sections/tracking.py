@@ -196,8 +196,8 @@ class Fusion(Section):
     kind: Literal["cm_delta_glmb", "clmb", "central", "none"] = Field(
         default="cm_delta_glmb",
         description="Of marginalised delta-GLMB densities, of LMB densities, or none (a single sensor). central: one "
-        "filter takes the scans of all sensors, and nothing is fused while tracking; what is set here then serves joint "
-        "decisions alone [-].",
+        "filter takes the scans of all sensors, and nothing is fused while tracking; what is set here then serves the "
+        "joint decisions alone [-].",
     )
     weights: Weights | None = Field(
         default=None, description="Weight of each sensor, with sum 1; none: equal weights [-]."
