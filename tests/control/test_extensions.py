@@ -10,10 +10,12 @@ import pytest
 
 from control.examples import SETTINGS, evaluator_of, situation
 from vedette.control import CauchySchwarzReward, IndependentPlanner, JointPlanner
-from vedette.control.pseudo import case_density
 from vedette.densities import cardinality_distribution
 from vedette.divergence import cauchy_schwarz
 from vedette.errors import InputError, NumericalError
+
+# Own rewards and fusions are mostly computed one by one, which is said once.
+pytestmark = pytest.mark.filterwarnings("ignore::vedette.errors.SlowRewardWarning")
 
 
 def minus_cardinality_variance(predicted: Any, updated: Any) -> float:
@@ -31,11 +33,7 @@ def test_a_reward_of_the_users_own(kind: str) -> None:
     alone = IndependentPlanner(*given).plan(*example.arguments, rng=np.random.default_rng(5))
     evaluator = evaluator_of(example)
     densities = [
-        [
-            case_density(own, action * SETTINGS.num_samples + m)
-            for action in range(3)
-            for m in range(SETTINGS.num_samples)
-        ]
+        [own.density(action * SETTINGS.num_samples + m) for action in range(3) for m in range(SETTINGS.num_samples)]
         for own in evaluator.posteriors
     ]
     for s, table in enumerate(alone.tables):
