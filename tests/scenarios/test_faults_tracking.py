@@ -148,8 +148,13 @@ CASES = [
     ),
     (
         "decision_steps: [4, 8]",
+        "reward: {kind: renyi, order: 1}",
+        ["f.yaml:22:40: control.reward.order: expected a number other than 1, got 1"],
+    ),
+    (
+        "decision_steps: [4, 8]",
         "reward: {kind: entropy}",
-        ['f.yaml:22:26: control.reward.kind: expected one of cauchy_schwarz, custom, got "entropy"'],
+        ['f.yaml:22:26: control.reward.kind: expected one of cauchy_schwarz, renyi, custom, got "entropy"'],
     ),
     (
         "decision_steps: [4, 8]",
