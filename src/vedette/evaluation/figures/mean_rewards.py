@@ -96,7 +96,10 @@ def _draw_curve(axes: Axes, rewards: MeanRewards, sensor: int, curve: tuple[Floa
     places = along.places[order]
     mean, error, share = curve[0][order], curve[1][order], share[order]
     shade = colour(sensor)
-    axes.fill_between(places, mean - error, mean + error, color=shade, alpha=0.2, linewidth=0)
+    if along.is_numeric:
+        axes.fill_between(places, mean - error, mean + error, color=shade, alpha=0.2, linewidth=0)
+    else:
+        axes.errorbar(places, mean, error, color=shade, linestyle="", linewidth=0.8)
     axes.plot(
         places,
         mean,
