@@ -37,6 +37,10 @@ class ActionAxis(NamedTuple):
         of = "" if sensor is None else f" of sensor {sensor + 1}"
         return self.name[:1].upper() + self.name[1:] + of + (f" ({self.unit})" if self.unit else "")
 
+    def counted(self) -> ActionAxis:
+        """The actions one after the other, whatever their numbers."""
+        return self._replace(places=np.arange(1.0, len(self.places) + 1), is_numeric=False)
+
 
 def action_axis(actions: Actions) -> ActionAxis:
     """The axis of a lone column in its numbers; of several columns the actions one after the other."""
