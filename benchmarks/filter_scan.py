@@ -20,7 +20,7 @@ from vedette.densities import GLMB, LMB, map_estimate, unlabelled_estimate
 from vedette.evaluation import ospa_of_run
 from vedette.filters import CbMemberFilter, CphdFilter, DeltaGlmbFilter, Filter, LmbFilter, PhdFilter
 from vedette.scenarios import load_scenario
-from vedette.scenarios.build import build_experiment
+from vedette.scenarios.build import build_experiment, build_sensors
 from vedette.simulation import Truth, simulate_scan
 
 Run = tuple[Truth, list[np.ndarray]]
@@ -29,7 +29,7 @@ Run = tuple[Truth, list[np.ndarray]]
 def simulated(name: str, num_runs: int) -> tuple[DeltaGlmbFilter, np.ndarray, np.ndarray, list[Run]]:
     """Filter, pose and times of the scenario's first sensor, and truth and scans of each run."""
     experiment = build_experiment(load_scenario(name))
-    tracker, pose = experiment.sensors[0].filter, experiment.poses[0]
+    tracker, pose = build_sensors(load_scenario(name))[0].filter, experiment.poses[0]
     if not isinstance(tracker, DeltaGlmbFilter):
         raise SystemExit(f"{name}: expected a scenario with a delta-GLMB filter")
     runs = []

@@ -15,11 +15,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from vedette.evaluation.runs import strategy
 from vedette.scenarios import Scenario, load_scenario
-from vedette.scenarios.build import build_experiment
+from vedette.scenarios.build import build_experiment, build_planner
 from vedette.simulation.loop import run_stream
-from vedette.simulation.scans import simulate_scan
+from vedette.simulation.scans import simulate_scans
 
 KINDS = {
     "delta-GLMB": ("delta_glmb", "cm_delta_glmb"),
@@ -43,17 +42,16 @@ def variant(kind: str) -> Scenario:
 
 
 def after_ten_scans(scenario: Scenario):  # type: ignore[no-untyped-def]
-    """Local beliefs, their fusion and the poses when the first decision is due."""
+    """What is believed, and the poses, when the first decision is due."""
     experiment = build_experiment(scenario)
     truth = experiment.targets.truth(experiment.times, rng=run_stream(1, 0))
-    beliefs = [sensor.filter.initial() for sensor in experiment.sensors]
-    rng = run_stream(1, 1)
-    for step in range(1, 11):
-        for s, sensor in enumerate(experiment.sensors):
-            scan = simulate_scan(truth.at(step - 1)[1], experiment.poses[s], sensor.filter.sensor, rng=rng)
-            beliefs[s], _ = sensor.filter.step(beliefs[s], scan.measurements, experiment.poses[s], 1.0, step, rng=rng)
-    assert experiment.fusion is not None
-    return beliefs, experiment.fusion.fuse(beliefs)[0], experiment.poses
+    tracker, poses = experiment.tracker, experiment.poses
+    state, rngs = tracker.initial(), [run_stream(1, 1)] * experiment.num_sensors
+    for step in range(10):
+        scans = simulate_scans(truth.at(step)[1], poses, tracker.sensors, rngs=rngs)
+        measurements = [scan.measurements for scan in scans]
+        state, _ = tracker.step(state, measurements, poses, float(experiment.times[step]), rngs=rngs)
+    return state, poses
 
 
 def main() -> None:
@@ -62,14 +60,14 @@ def main() -> None:
     repeats = parser.parse_args().repeats
     for kind in KINDS:
         scenario = variant(kind)
-        beliefs, fused, poses = after_ten_scans(scenario)
+        state, poses = after_ten_scans(scenario)
         for name in ("jdm", "idm"):
-            planner = strategy(scenario, name, num_threads=1)
+            planner = build_planner(scenario, name, num_threads=1)
             assert planner is not None
             seconds = []
             for repeat in range(repeats + 1):
                 start = time.process_time()
-                planner.plan(beliefs, fused, poses, rng=np.random.default_rng(repeat))
+                planner.plan(state, poses, rng=np.random.default_rng(repeat))
                 seconds.append(time.process_time() - start)
             median, least = statistics.median(seconds[1:]), min(seconds[1:])
             print(f"{kind:12s} {name}: median {1e3 * median:6.1f} ms of CPU, least {1e3 * least:6.1f} ms")

@@ -21,6 +21,7 @@ from vedette.densities import GLMB, LMB, TrackTable
 from vedette.filters import DeltaGlmbFilter, LmbFilter
 from vedette.fusion import Clmb, CmDeltaGlmb
 from vedette.platforms import Courses
+from vedette.tracking import State
 
 Label = tuple[int, int]
 LabelSet = tuple[Label, ...]
@@ -105,9 +106,14 @@ class Situation:
     poses: Any
 
     @property
-    def arguments(self) -> tuple[Any, Any, Any]:
+    def state(self) -> State:
+        """After the first scan."""
+        return State(self.beliefs, self.fused, 1, 1.0)
+
+    @property
+    def arguments(self) -> tuple[State, Any]:
         """Of `Planner.plan`."""
-        return self.beliefs, self.fused, self.poses
+        return self.state, self.poses
 
 
 # Sensor by sensor: sets and labels that all have, that one lacks, and a label that only one knows.

@@ -28,6 +28,7 @@ from vedette.errors import InputError, ModelError, NumericalError
 from vedette.filters import CbMemberFilter, CphdFilter, Limits, PhdFilter
 from vedette.fusion import Clmb, CmDeltaGlmb
 from vedette.platforms import Actions, Courses
+from vedette.tracking import State
 
 PLANNERS = [JointPlanner, IndependentPlanner]
 
@@ -122,7 +123,11 @@ def test_a_platform_cannot_move_its_sensor() -> None:
 @pytest.mark.parametrize("planner", PLANNERS)
 def test_numbers_of_beliefs_and_poses(planner: Any) -> None:
     example = situation("marginal")
-    assert "beliefs: expected 2, one a sensor; got 1" in refused(replace(example, beliefs=example.beliefs[:1]), planner)
+    with pytest.raises(InputError, match="state: expected a State; got tuple"):
+        planner(example.sensors, example.fusion, SETTINGS).plan((), example.poses, rng=np.random.default_rng(0))
+    assert "state.local: expected 2 beliefs, one a sensor; got 1" in refused(
+        replace(example, beliefs=example.beliefs[:1]), planner
+    )
     for poses in (example.poses[:1], example.poses[:, :2], example.poses[0], None, "here"):
         assert refused(replace(example, poses=poses), planner).startswith("poses: expected")
     for bad in (np.nan, np.inf):
@@ -138,11 +143,11 @@ def test_numbers_of_beliefs_and_poses(planner: Any) -> None:
 def test_kinds_of_beliefs(planner: Any) -> None:
     example, other = situation("marginal"), situation("lmb")
     mixed = replace(example, beliefs=(example.beliefs[0], other.beliefs[0]))
-    assert refused(mixed, planner) == "beliefs[1]: expected GLMB; got LMB"
-    assert refused(replace(other, beliefs=example.beliefs), planner) == "beliefs[0]: expected LMB; got GLMB"
+    assert refused(mixed, planner) == "state.local[1]: expected GLMB; got LMB"
+    assert refused(replace(other, beliefs=example.beliefs), planner) == "state.local[0]: expected LMB; got GLMB"
     unlabelled = Poisson.from_gaussians([1.0], np.zeros((1, 4)), np.eye(4)[np.newaxis])
-    assert refused(replace(example, fused=unlabelled), planner) == "fused: expected GLMB or LMB; got Poisson"
-    assert refused(replace(example, fused=None), planner) == "fused: expected GLMB or LMB; got NoneType"
+    assert refused(replace(example, fused=unlabelled), planner) == "state.fused: expected GLMB or LMB; got Poisson"
+    assert refused(replace(example, fused=None), planner) == "state.fused: expected GLMB or LMB; got NoneType"
 
 
 @pytest.mark.parametrize("planner", PLANNERS)
@@ -150,8 +155,8 @@ def test_state_dimensions(planner: Any) -> None:
     example, rng = situation("marginal"), np.random.default_rng(0)
     wide = glmb([(A, B), (A,)], rng, 1, 5)
     expected = "expected states of dimension 4, as its filter; got 5"
-    assert refused(replace(example, beliefs=(example.beliefs[0], wide)), planner) == f"beliefs[1]: {expected}"
-    assert refused(replace(example, fused=wide), planner) == f"fused: {expected}"
+    assert refused(replace(example, beliefs=(example.beliefs[0], wide)), planner) == f"state.local[1]: {expected}"
+    assert refused(replace(example, fused=wide), planner) == f"state.fused: {expected}"
     sensors = (example.sensors[0], mobile_sensor("marginal", dim=5))
     message = "filters[1].targets: expected the target model of filters[0]; got another"
     assert refused(replace(example, sensors=sensors), planner) == message
@@ -172,15 +177,15 @@ def test_densities_that_are_none(planner: Any, kind: str) -> None:
     covs[0] = -covs[0]
     indefinite = spoilt(belief, tracks=spoilt(belief.tracks, covs=covs))
     message = refused(replace(example, beliefs=(example.beliefs[0], indefinite)), planner)
-    assert message.startswith("beliefs[1]: tracks.covs[0]: expected")
+    assert message.startswith("state.local[1]: tracks.covs[0]: expected")
     means = example.fused.tracks.means.copy()
     means[0, 1] = np.nan
     nowhere = spoilt(example.fused, tracks=spoilt(example.fused.tracks, means=means))
-    assert refused(replace(example, fused=nowhere), planner).startswith("fused: tracks.means")
+    assert refused(replace(example, fused=nowhere), planner).startswith("state.fused: tracks.means")
     if kind == "marginal":
         heavy = spoilt(belief, hyp_log_weights=belief.hyp_log_weights + 0.1)
         message = refused(replace(example, beliefs=(heavy, belief)), planner)
-        assert message.startswith("beliefs[0]: hyp_log_weights")
+        assert message.startswith("state.local[0]: hyp_log_weights")
 
 
 def test_label_spaces_that_share_nothing() -> None:
@@ -214,7 +219,7 @@ def test_a_fusion_of_other_densities() -> None:
     example = replace(situation("marginal"), fusion=Clmb((0.5, 0.5)))
     for fused in (example.fused, Clmb((0.5, 0.5)).fuse(example.beliefs)[0]):
         plan = JointPlanner(example.sensors, example.fusion, SETTINGS).plan(
-            example.beliefs, fused, example.poses, rng=np.random.default_rng(0)
+            *replace(example, fused=fused).arguments, rng=np.random.default_rng(0)
         )
         plan.validate()
 
@@ -287,7 +292,7 @@ def test_filters_without_labels_cannot_be_planned_with(planner: Any, kind: Any) 
     sensors = (MobileSensor(local, Courses(1.0)),)
     belief = local.initial()
     with pytest.raises(InputError, match=rf"sensors\[0\].filter: expected one that labels its .*; got {kind.__name__}"):
-        planner(sensors, Clmb((1.0,))).plan([belief], belief, np.zeros((1, 3)), rng=np.random.default_rng(0))
+        planner(sensors, Clmb((1.0,))).plan(State((belief,), belief), np.zeros((1, 3)), rng=np.random.default_rng(0))
 
 
 @pytest.mark.parametrize("value", [0.0, -1.0, np.nan, np.inf, "unit", True])
@@ -306,9 +311,9 @@ def test_fixed_and_random_courses() -> None:
     for planner in (FixedPlanner((east, east)), RandomPlanner((mobile_sensor("lmb"),) * 2)):
         for poses in (np.zeros((1, 3)), np.full((2, 3), np.nan)):
             with pytest.raises(InputError, match="poses: expected"):
-                planner.plan(nothing, nothing, poses, rng=rng)
+                planner.plan(nothing, poses, rng=rng)
     with pytest.raises(InputError, match="sensors: expected at least one MobileSensor"):
-        RandomPlanner(()).plan(nothing, nothing, np.zeros((0, 3)), rng=rng)
+        RandomPlanner(()).plan(nothing, np.zeros((0, 3)), rng=rng)
 
 
 def test_a_scan_that_clutter_cannot_explain_is_no_trouble() -> None:

@@ -302,7 +302,7 @@ def test_the_default_settings_take_the_papers_number_of_steps() -> None:
 def test_random_control_takes_each_direction_equally_often() -> None:
     sensors = (mobile_sensor("lmb", PAPER), mobile_sensor("lmb", Courses(30.0, (10.0,))))
     planner, rng = RandomPlanner(sensors), np.random.default_rng(0)
-    chosen = [planner.plan((), None, np.zeros((2, 3)), rng=rng) for _ in range(1200)]  # type: ignore[arg-type]
+    chosen = [planner.plan(None, np.zeros((2, 3)), rng=rng) for _ in range(1200)]  # type: ignore[arg-type]
     counts = np.bincount([plan.chosen[0] for plan in chosen], minlength=13)
     assert counts[12] == 0
     assert (abs(counts[:12] - 100) < 5 * np.sqrt(100)).all()
@@ -312,6 +312,6 @@ def test_random_control_takes_each_direction_equally_often() -> None:
 
 def test_a_fixed_action_is_kept() -> None:
     planner = FixedPlanner((Actions.of(heading_deg=30.0), Actions.of(dx=-45.0, dy=1.0)))
-    plan = planner.plan((), None, np.zeros((2, 3)), rng=np.random.default_rng(0))  # type: ignore[arg-type]
+    plan = planner.plan(None, np.zeros((2, 3)), rng=np.random.default_rng(0))  # type: ignore[arg-type]
     assert [row.tolist() for row in plan.chosen_actions] == [[30.0], [-45.0, 1.0]]
     plan.validate()

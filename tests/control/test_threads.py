@@ -95,6 +95,7 @@ from vedette.control import IndependentPlanner, MobileSensor, PlanningSettings, 
 from vedette.densities import LMB
 from vedette.filters import LmbFilter
 from vedette.fusion import Clmb
+from vedette.tracking import State
 from vedette.platforms import Courses
 
 region = models.Region(-1000.0, 1000.0, -1000.0, 1000.0)
@@ -122,7 +123,7 @@ def counted(prior, decision, first, last, results):
 pseudo.pseudo_update_lmb = counted
 planner = IndependentPlanner((MobileSensor(tracker, Courses(50.0)),), Clmb((1.0,)), settings)
 try:
-    planner.plan([belief], belief, [[-700.0, 0.0, 0.0]], rng=np.random.default_rng(1))
+    planner.plan(State((belief,), belief), [[-700.0, 0.0, 0.0]], rng=np.random.default_rng(1))
 except KeyboardInterrupt:
     print("interrupted", sum(done), 13 * settings.num_samples)
 """

@@ -7,8 +7,9 @@ import pytest
 
 from vedette.errors import InputError
 from vedette.evaluation.comparison import scored, typical_run
-from vedette.evaluation.runs import run_scenario, strategy
+from vedette.evaluation.runs import run_scenario
 from vedette.scenarios import Scenario, list_builtin
+from vedette.scenarios.build import build_planner
 from vedette.scenarios.loading import parse_scenario
 
 
@@ -67,4 +68,4 @@ def test_the_typical_run_is_in_the_middle(scenario, runs):
 
 def test_unknown_strategy(scenario):
     with pytest.raises(InputError, match="planner"):
-        strategy(scenario, "clever")
+        build_planner(scenario, "clever")

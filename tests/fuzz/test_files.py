@@ -23,12 +23,12 @@ from scenarios.minimal import MINIMAL
 from vedette.campaigns.cells import resolve
 from vedette.campaigns.spec import load_spec
 from vedette.errors import NumericalError, VedetteError
-from vedette.evaluation.runs import run_scenario, strategy
+from vedette.evaluation.runs import run_scenario
 from vedette.models import Region
 from vedette.recorded.cleaning import Cleaning
 from vedette.recorded.targets import RecordedTargets
 from vedette.scenarios import Scenario, list_builtin, load_scenario, parse_scenario
-from vedette.scenarios.build import build_experiment
+from vedette.scenarios.build import build_experiment, build_planner
 from vedette.scenarios.dumping import dump_scenario, files_of
 from vedette.scenarios.overrides import with_fields
 from vedette.scenarios.summary import facts, one_line
@@ -102,7 +102,7 @@ def check_accepted(scenario: Scenario) -> None:
         return
     build_experiment(scenario)
     for planner in planners(scenario):
-        strategy(scenario, planner)
+        build_planner(scenario, planner)
 
 
 def planners(scenario: Scenario) -> list[str]:

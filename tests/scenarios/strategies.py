@@ -167,7 +167,7 @@ def scenarios(draw: st.DrawFn) -> Data:
     return {
         "name": draw(names),
         "description": draw(st.text(st.characters(exclude_categories=["Cs", "Cc"]), max_size=30)),
-        "time": {"num_steps": last, **draw(section(step_period=st.floats(1e-3, 1e3), start=finite))},
+        "time": {"num_steps": last, **draw(section(step_period=st.floats(1e-3, 1e3), start=st.floats(-1e5, 1e5)))},
         "region": {"x_min": x[0], "x_max": x[0] + y[0], "y_min": x[1], "y_max": x[1] + y[1]},
         "motion": draw(motions[dim]),
         "survival": draw(section("constant", probability=probability) | custom()),

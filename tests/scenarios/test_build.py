@@ -18,7 +18,7 @@ from vedette.fusion import Clmb, CmDeltaGlmb
 from vedette.scenarios import Scenario, build, list_builtin, load_scenario, parse_scenario
 from vedette.scenarios.sections.scoring import MarginalEstimator
 from vedette.scenarios.sections.tracking import Fusion
-from vedette.simulation import Truth, simulate_scan
+from vedette.simulation import Truth, simulate_scans
 
 OWN_MODELS = Path(__file__).with_name("own_models.py")
 
@@ -199,13 +199,13 @@ def test_a_filter_without_labels_runs_alone_and_names_its_estimates_by_the_scan(
     assert isinstance(local, container)
     own: Any = local
     assert (own.limits.max_intensity_components, own.limits.max_existence) == (7, 0.5)
-    experiment, beliefs, fused, _ = tracked(loaded, 8, np.random.default_rng(1))
-    estimate = experiment.estimate(fused, 8)
+    experiment, state, _ = tracked(loaded, 8, np.random.default_rng(1))
+    estimate = experiment.estimate(state.fused, 8)
     estimate.validate()
     assert estimate.labels.tolist() == [[8, i] for i in range(estimate.num_targets)]
     for planner in ("random", "fixed"):
         made = build.build_planner(loaded, planner)
-        made.plan(beliefs, fused, experiment.poses, rng=np.random.default_rng(0))
+        made.plan(state, experiment.poses, rng=np.random.default_rng(0))
     for planner in ("jdm", "idm"):
         with pytest.raises(
             InputError, match=rf"^filter\.kind: expected .*, as planner {planner} needs labels; got {kind}"
@@ -214,18 +214,18 @@ def test_a_filter_without_labels_runs_alone_and_names_its_estimates_by_the_scan(
 
 
 def test_fusions_of_each_kind_have_weights_that_sum_to_one() -> None:
-    cm = Fusion(weights=(0.3333333, 0.3333333, 0.3333333), missing_weight=1e-3).build(3)
+    cm = Fusion(weights=(0.3333333, 0.3333333, 0.3333333), missing_weight=1e-3).build(3, Path())
     assert isinstance(cm, CmDeltaGlmb)
     assert math.fsum(cm.weights) == pytest.approx(1.0, abs=1e-12)
     assert cm.missing_log_weight == math.log(1e-3)
-    clmb = Fusion(kind="clmb", missing_existence=0.01).build(4)
+    clmb = Fusion(kind="clmb", missing_existence=0.01).build(4, Path())
     assert isinstance(clmb, Clmb)
     assert (clmb.weights, clmb.missing_existence) == ((0.25,) * 4, 0.01)
-    assert Fusion(kind="none").build(1) is None
+    assert Fusion(kind="none").build(1, Path()) is None
 
 
 def test_the_marginal_estimator_has_its_threshold() -> None:
-    estimate = MarginalEstimator(threshold=0.9).build()
+    estimate = MarginalEstimator(threshold=0.9).build(Path())
     for empty in (GLMB.empty(4), LMB.empty(4)):
         assert len(estimate(empty, 1).labels) == 0
 
@@ -242,36 +242,34 @@ def test_actions_of_one_sensor_and_of_all() -> None:
 
 def test_an_unknown_planner() -> None:
     loaded = scenario()
-    with pytest.raises(InputError, match="planner: expected one of jdm, idm, random, fixed; got 'greedy'"):
+    with pytest.raises(InputError, match="planner: expected one of jdm, idm, random, fixed, still; got 'greedy'"):
         build.build_planner(loaded, "greedy")
 
 
-def tracked(loaded: Scenario, num_steps: int, rng: np.random.Generator) -> tuple[Any, Any, Any, Any]:
-    """The experiment, its beliefs after some scans with the sensors at rest, the fused belief, and the truth."""
+def tracked(loaded: Scenario, num_steps: int, rng: np.random.Generator) -> tuple[Any, Any, Any]:
+    """The experiment, what is believed after some scans with the sensors at rest, and the truth."""
     experiment: Any = build.build_experiment(loaded)
-    poses, filters = experiment.poses, [sensor.filter for sensor in experiment.sensors]
-    truth = experiment.targets.truth(experiment.times, rng=rng)
-    beliefs = [local.initial() for local in filters]
-    for step in range(1, num_steps + 1):
-        for i, local in enumerate(filters):
-            scan = simulate_scan(truth.at(step - 1)[1], poses[i], local.sensor, rng=rng).measurements
-            beliefs[i], _ = local.step(beliefs[i], scan, poses[i], loaded.model.time.step_period, step, rng=rng)
-    return experiment, beliefs, experiment.fusion.fuse(beliefs)[0] if experiment.fusion else beliefs[0], truth
+    tracker, poses, rngs = experiment.tracker, experiment.poses, [rng] * experiment.num_sensors
+    truth, state = experiment.targets.truth(experiment.times, rng=rng), tracker.initial()
+    for step in range(num_steps):
+        scans = simulate_scans(truth.at(step)[1], poses, tracker.sensors, rngs=rngs)
+        state, _ = tracker.step(state, [scan.measurements for scan in scans], poses, experiment.times[step], rngs=rngs)
+    return experiment, state, truth
 
 
 @pytest.mark.parametrize("name", list_builtin())
 def test_built_in_scenarios_run(name: str) -> None:
     loaded, rng = load_scenario(name), np.random.default_rng(1)
-    experiment, beliefs, fused, truth = tracked(loaded, 12, rng)
-    assert abs(len(experiment.estimate(fused, 12).labels) - len(truth.at(11)[0])) <= 1
+    experiment, state, truth = tracked(loaded, 12, rng)
+    assert abs(len(experiment.estimate(state.fused, 12).labels) - len(truth.at(11)[0])) <= 1
     for planner in ("random", "fixed"):
-        plan = build.build_planner(loaded, planner).plan(beliefs, fused, experiment.poses, rng=rng)
-        assert plan.num_sensors == len(experiment.sensors)
+        plan = build.build_planner(loaded, planner).plan(state, experiment.poses, rng=rng)
+        assert plan.num_sensors == experiment.num_sensors
 
 
 def test_decisions_of_the_papers_scenario_are_the_printed_ones() -> None:
     loaded, rng = load_scenario("paper-e"), np.random.default_rng(3)
-    experiment, beliefs, fused, _ = tracked(loaded, 10, rng)
+    experiment, state, _ = tracked(loaded, 10, rng)
     for planner in ("jdm", "idm"):
-        plan = build.build_planner(loaded, planner).plan(beliefs, fused, experiment.poses, rng=rng)
+        plan = build.build_planner(loaded, planner).plan(state, experiment.poses, rng=rng)
         np.testing.assert_allclose(np.ravel(plan.chosen_actions), [-30.0, 30.0])

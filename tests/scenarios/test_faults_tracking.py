@@ -19,7 +19,7 @@ CASES = [
         "kind: m_delta_glmb",
         "kind: m-delta-glmb",
         [
-            'f.yaml:19:16: filter.kind: expected one of delta_glmb, m_delta_glmb, lmb, phd, cphd, cb_member, got "m-delta-glmb" (did you mean m_delta_glmb?)'
+            'f.yaml:19:16: filter.kind: expected one of delta_glmb, m_delta_glmb, lmb, phd, cphd, cb_member, custom, got "m-delta-glmb" (did you mean m_delta_glmb?)'
         ],
     ),
     (
@@ -130,7 +130,7 @@ CASES = [
         "decision_steps: [4, 8]",
         "actions_deg: [0, 90]",
         [
-            "f.yaml:22:11: control.actions_deg: expected one of decision_steps, decision_times, detection_threshold, horizon_period, horizon_steps, ideal_measurements, limits, num_samples, reward, got an unknown key (the platform of a sensor has it: `platform: {kind: courses, speed: 50.0, headings_deg: [0, 90]}`)"
+            "f.yaml:22:11: control.actions_deg: expected one of decision_steps, decision_times, detection_threshold, horizon_period, horizon_steps, ideal_measurements, limits, num_samples, reward, search, got an unknown key (the platform of a sensor has it: `platform: {kind: courses, speed: 50.0, headings_deg: [0, 90]}`)"
         ],
     ),
     (
@@ -141,7 +141,7 @@ CASES = [
     (
         "decision_steps: [4, 8]",
         "reward: {kind: entropy}",
-        ['f.yaml:22:26: control.reward.kind: expected cauchy_schwarz, got "entropy"'],
+        ['f.yaml:22:26: control.reward.kind: expected one of cauchy_schwarz, custom, got "entropy"'],
     ),
     (
         "decision_steps: [4, 8]",

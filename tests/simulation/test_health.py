@@ -44,7 +44,19 @@ def run(experiment: Experiment, planner: Any = None) -> RunRecord:
 
 
 def with_filters(experiment: Experiment, change: Any) -> Experiment:
-    return replace(experiment, sensors=tuple(replace(each, filter=change(each.filter)) for each in experiment.sensors))
+    tracker: Any = experiment.tracker
+    return replace(experiment, tracker=replace(tracker, filters=tuple(change(each) for each in tracker.filters)))
+
+
+def with_fusion(experiment: Experiment, change: Any) -> Experiment:
+    tracker: Any = experiment.tracker
+    return replace(experiment, tracker=replace(tracker, fusion=change(tracker.fusion)))
+
+
+def with_second(experiment: Experiment, change: Any) -> Experiment:
+    """Another filter at the second sensor."""
+    tracker: Any = experiment.tracker
+    return with_filters(experiment, lambda one: one if one is tracker.filters[0] else change(one))
 
 
 @dataclass(frozen=True)
@@ -68,17 +80,17 @@ def test_every_field_of_both_reports_is_recorded() -> None:
 
 def test_the_record_holds_what_filters_and_fusion_said(experiment: Experiment) -> None:
     said: list[Any] = []
-    health = run(replace(experiment, fusion=_Recording(experiment.fusion, said))).health
+    health = run(with_fusion(experiment, lambda inner: _Recording(inner, said))).health
     health.check(8, 2)
     for scan, info in enumerate(said):
         assert health.num_missing_sets[scan].sum() == info.num_missing_sets
         assert health.fusion_num_sets[scan] == info.num_sets
         assert health.fusion_log_normaliser[scan] == info.log_normaliser
-    local: Any = experiment.sensors[0].filter
+    tracker: Any = experiment.tracker
     record = run(experiment)
     assert np.isfinite(record.health.log_likelihood).all()
     assert (record.health.num_hypotheses[1:] > 1).all()
-    assert (record.health.num_hypotheses <= local.limits.max_hypotheses).all()
+    assert (record.health.num_hypotheses <= tracker.filters[0].limits.max_hypotheses).all()
 
 
 def test_a_cap_that_is_met_is_recorded(experiment: Experiment) -> None:
@@ -91,11 +103,11 @@ def test_a_cap_that_is_met_is_recorded(experiment: Experiment) -> None:
 
 
 def test_labels_that_a_sensor_lacks_are_counted_at_that_sensor(experiment: Experiment) -> None:
-    first, second = experiment.sensors
-    local: Any = second.filter
-    near = replace(local.sensor, detection=limited_range(0.98, 1.0))
-    blind = replace(local, sensor=near, limits=replace(local.limits, max_hypotheses=1))
-    record = run(replace(experiment, sensors=(first, replace(second, filter=blind))))
+    def blind(local: Any) -> Any:
+        near = replace(local.sensor, detection=limited_range(0.98, 1.0))
+        return replace(local, sensor=near, limits=replace(local.limits, max_hypotheses=1))
+
+    record = run(with_second(experiment, blind))
     assert record.health.num_missing_labels[-1].tolist() == [0, 4]
     summary = summarise_health([record, record])
     assert summary.num_scans == 16
@@ -104,10 +116,10 @@ def test_labels_that_a_sensor_lacks_are_counted_at_that_sensor(experiment: Exper
 
 
 def test_a_target_that_one_sensor_alone_sees_is_told_as_lost(experiment: Experiment) -> None:
-    first, second = experiment.sensors
-    local: Any = second.filter
-    far = replace(local, sensor=replace(local.sensor, detection=limited_range(0.98, 1.0)))
-    record = run(replace(experiment, sensors=(first, replace(second, filter=far))))
+    def near(local: Any) -> Any:
+        return replace(local, sensor=replace(local.sensor, detection=limited_range(0.98, 1.0)))
+
+    record = run(with_second(experiment, near))
     assert record.health.fusion_num_lost_labels[-1] >= 1
     assert "GCI lost a target that one sensor was sure of" in health_line(record)
     assert "of the scans GCI lost a target" in health_findings([record])[0]
@@ -149,8 +161,16 @@ class _Failing:
     error: BaseException
     at: int
 
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self.inner, name)
+    @property
+    def targets(self) -> Any:
+        return self.inner.targets
+
+    @property
+    def sensor(self) -> Any:
+        return self.inner.sensor
+
+    def initial(self) -> Any:
+        return self.inner.initial()
 
     def step(self, belief: Any, scan: Any, pose: Any, dt: float, step: int, *, rng: np.random.Generator) -> Any:
         if step == self.at:
@@ -178,10 +198,7 @@ class _FailingPlanner:
 
 def failing(experiment: Experiment, error: BaseException, at: int) -> Experiment:
     """The filter of the second sensor raises."""
-    first, second = experiment.sensors
-    broken = replace(second)
-    object.__setattr__(broken, "filter", _Failing(second.filter, error, at))
-    return replace(experiment, sensors=(first, broken))
+    return with_second(experiment, lambda local: _Failing(local, error, at))
 
 
 def assert_first_scans(record: RunRecord, whole: RunRecord, num: int) -> None:
@@ -217,9 +234,8 @@ def test_a_filter_that_raises_is_named_and_what_was_before_is_kept(experiment: E
 
 
 def test_a_fusion_that_raises_is_named(experiment: Experiment) -> None:
-    assert isinstance(experiment.fusion, CmDeltaGlmb)
     with pytest.raises(RunStopped, match=r"step 6 of 8 \(6 s\), in the fusion: fusion of tracks") as caught:
-        run(replace(experiment, fusion=_FailingFusion(experiment.fusion, 6)))
+        run(with_fusion(experiment, lambda inner: _FailingFusion(inner, 6)))
     assert caught.value.record is not None
     assert caught.value.record.num_scans == 5
 

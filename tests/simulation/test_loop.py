@@ -11,8 +11,9 @@ from vedette.control import FixedPlanner, RandomPlanner
 from vedette.errors import InputError
 from vedette.platforms import Actions
 from vedette.scenarios import load_scenario
-from vedette.scenarios.build import build_experiment
-from vedette.simulation.loop import STAGES, simulate
+from vedette.scenarios.build import build_experiment, build_sensors
+from vedette.simulation.journal import STAGES
+from vedette.simulation.loop import simulate
 
 
 def no_score(truth, estimates):
@@ -45,8 +46,8 @@ def test_sensors_lie_still_until_the_first_decision_and_then_keep_its_course(sho
     np.testing.assert_array_equal(record.poses[9], shortened.poses)
     for later in range(10, 14):
         expected = shortened.poses.copy()
-        for pose, angle, sensor in zip(expected, np.radians([-30.0, 45.0]), shortened.sensors, strict=True):
-            pose += (later - 9.0) * sensor.platform.speed * np.array([np.cos(angle), np.sin(angle), 0.0])
+        for pose, angle, platform in zip(expected, np.radians([-30.0, 45.0]), shortened.platforms, strict=True):
+            pose += (later - 9.0) * platform.speed * np.array([np.cos(angle), np.sin(angle), 0.0])
             pose[2] = angle
         np.testing.assert_allclose(record.poses[later], expected, atol=1e-9)
 
@@ -55,7 +56,7 @@ def test_a_sensor_may_be_under_way_from_the_start(shortened):
     record = run(
         replace(shortened, first_actions=(np.zeros(1), None)), FixedPlanner((Actions.of(heading_deg=0.0),) * 2)
     )
-    assert record.poses[1, 0, 0] == pytest.approx(shortened.poses[0, 0] + shortened.sensors[0].platform.speed)
+    assert record.poses[1, 0, 0] == pytest.approx(shortened.poses[0, 0] + shortened.platforms[0].speed)
     np.testing.assert_array_equal(record.poses[1, 1], shortened.poses[1])
 
 
@@ -71,14 +72,14 @@ def test_equal_seeds_give_equal_runs_and_other_run_numbers_other_ones(shortened)
 
 
 def test_strategies_are_alike_until_they_decide(shortened):
-    still, random = run(shortened, None), run(shortened, RandomPlanner(shortened.sensors))
+    still, random = run(shortened, None), run(shortened, RandomPlanner(build_sensors(load_scenario("paper-e"))))
     for k in range(10):
         np.testing.assert_array_equal(still.estimates[k].means, random.estimates[k].means)
     np.testing.assert_array_equal(still.truth.states, random.truth.states)
 
 
 def test_feedback_gives_every_sensor_the_fused_belief(shortened):
-    plain, fed = run(shortened, None), run(replace(shortened, feedback=True), None)
+    plain, fed = run(shortened, None), run(replace(shortened, tracker=replace(shortened.tracker, feedback=True)), None)
     assert any(
         len(mine.means) != len(other.means) or not np.array_equal(mine.means, other.means)
         for mine, other in zip(plain.estimates[3:], fed.estimates[3:], strict=True)
@@ -89,11 +90,11 @@ def test_unequal_scan_times_move_sensors_by_the_time_between(shortened):
     times = np.array([1.0, 2.0, 4.0, 4.5])
     uneven = replace(shortened, times=times, decision_steps=(1,))
     record = run(uneven, FixedPlanner((Actions.of(heading_deg=0.0),) * 2))
-    np.testing.assert_allclose(np.diff(record.poses[:, 0, 0]), np.diff(times) * uneven.sensors[0].platform.speed)
+    np.testing.assert_allclose(np.diff(record.poses[:, 0, 0]), np.diff(times) * uneven.platforms[0].speed)
 
 
 def test_time_is_taken_by_stage_and_scan(shortened):
-    record = run(shortened, RandomPlanner(shortened.sensors))
+    record = run(shortened, RandomPlanner(build_sensors(load_scenario("paper-e"))))
     assert tuple(record.timings) == STAGES
     assert all(seconds.shape == (14,) and (seconds >= 0.0).all() for seconds in record.timings.values())
     assert (record.timings["filter"] > 0.0).all()
@@ -103,7 +104,8 @@ def test_time_is_taken_by_stage_and_scan(shortened):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"fusion": None}, "fusion: expected one for 2 sensors"),
+        ({"tracker": None}, "tracker: expected a Tracker, with targets, sensors"),
+        ({"platforms": ()}, "platforms: expected 2, one for each sensor of the tracker; got 0"),
         ({"decision_steps": (99,)}, "decision_steps: expected scans from 1 to 14; got 99"),
         ({"poses": np.zeros((3, 3))}, "poses: expected finite numbers"),
         ({"first_actions": (None,)}, "first_actions: expected 2, one a sensor; got 1"),

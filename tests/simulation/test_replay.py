@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -9,18 +10,19 @@ from vedette.errors import InputError
 from vedette.evaluation.runs import run_scenario
 from vedette.scenarios import load_scenario
 from vedette.scenarios.build import build_experiment
-from vedette.simulation import CLUTTER, Scan, loop, simulate_scan
+from vedette.simulation import CLUTTER, Scan, loop, simulate_scans
 from vedette.simulation.replay import scans_of
 
 
 def test_the_scans_drawn_again_are_those_that_the_loop_simulated(monkeypatch: pytest.MonkeyPatch) -> None:
     simulated: list[Scan] = []
 
-    def recording(*args: object, **kwargs: object) -> Scan:
-        simulated.append(simulate_scan(*args, **kwargs))  # type: ignore[arg-type]
-        return simulated[-1]
+    def recording(*args: Any, **kwargs: Any) -> tuple[Scan, ...]:
+        scans = simulate_scans(*args, **kwargs)
+        simulated.extend(scans)
+        return scans
 
-    monkeypatch.setattr(loop, "simulate_scan", recording)
+    monkeypatch.setattr(loop, "simulate_scans", recording)
     scenario = load_scenario("paper-a")
     record = run_scenario(scenario, "random", seed=3, run=2)
     again = scans_of(record, build_experiment(scenario))

@@ -13,8 +13,8 @@ from typing import Any
 
 from vedette.campaigns.spec import CampaignSpec, spec_from_data
 from vedette.errors import InputError, ScenarioError
-from vedette.evaluation.runs import strategy
 from vedette.scenarios import Scenario, list_builtin, load_scenario
+from vedette.scenarios.build import build_planner
 from vedette.scenarios.dumping import dump_scenario, files_of
 from vedette.scenarios.overrides import with_fields
 from vedette.text import listed
@@ -162,7 +162,7 @@ def _cell(
     try:
         changed = with_fields(scenario, fields)
         approve(changed)
-        strategy(changed, planner)
+        build_planner(changed, planner)
     except ScenarioError as error:
         raise InputError(listed(list(dict.fromkeys(f"cell {name}: {fault}" for fault in error.faults)))) from None
     except InputError as error:

@@ -140,11 +140,11 @@ class CampaignResults:
             return None
         axis = self.campaign.compare
         labels = tuple(str(cell.settings[axis]) for cell in cells)
-        records = {
-            label: [self.record(cell.name, run) for run in common] for label, cell in zip(labels, cells, strict=True)
-        }
+        runs = {label: [self.run(cell.name, run) for run in common] for label, cell in zip(labels, cells, strict=True)}
+        records = {label: [run.record for run in of] for label, of in runs.items()}
+        metrics = {label: [run.metrics for run in of] for label, of in runs.items()}
         settings = {name: value for name, value in cells[0].settings.items() if name != axis}
-        return GroupComparison(settings, cells, labels, scored(cells[0].scenario, records))
+        return GroupComparison(settings, cells, labels, scored(cells[0].scenario, records, metrics))
 
     def _decoded(self, entry: Entry) -> FinishedRun:
         try:

@@ -11,11 +11,11 @@ from typing import Annotated, Any
 from pydantic import Field, JsonValue
 
 from vedette.errors import InputError
-from vedette.evaluation.runs import STRATEGIES
 from vedette.reading import read_text
 from vedette.scenarios.diagnostics import read_section
 from vedette.scenarios.faults import Finding, describe, named
 from vedette.scenarios.sections.base import Name, Section, Whole, check
+from vedette.scenarios.sections.planners import STRATEGIES
 from vedette.text import elided, listed, printable
 
 _MOST_BYTES = 2_000_000
@@ -44,7 +44,8 @@ class CampaignSpec(Section):
     name: ShortName = Field(description="What the campaign is called [-].")
     scenarios: Names = Field(description="Built-in scenarios by name, or files relative to the specification [-].")
     planners: Names = Field(
-        default=("jdm", "idm", "random"), description="Strategies: " + ", ".join(STRATEGIES) + " [-]."
+        default=("jdm", "idm", "random"),
+        description=f"Strategies: {', '.join(STRATEGIES)}, or those of the scenarios' own [-].",
     )
     runs: Annotated[Whole, Field(ge=1, le=1_000_000)] = Field(description="Paired runs of each [-].")
     seed: Annotated[Whole, Field(ge=0)] = Field(default=0, description="With the run number it fixes every draw [-].")

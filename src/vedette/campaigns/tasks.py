@@ -11,7 +11,7 @@ from vedette.campaigns.cells import Campaign, Cell
 from vedette.campaigns.codec import encode
 from vedette.errors import VedetteError
 from vedette.evaluation.metrics import encode_metrics
-from vedette.evaluation.runs import measure_run, run_scenario
+from vedette.evaluation.runs import measure_run, own_metrics, run_scenario
 from vedette.simulation.kept import encode_timings
 from vedette.simulation.storage import versions
 
@@ -87,7 +87,11 @@ def _one(cell: Cell, seed: int, run: int) -> Landed | Failed:
     start = time.perf_counter()
     try:
         record = run_scenario(cell.scenario, cell.planner, seed=seed, run=run, num_threads=1)
-        kept = encode(record), encode_metrics(measure_run(record, cell.scenario)), encode_timings(record)
+        kept = (
+            encode(record),
+            encode_metrics(measure_run(record, cell.scenario, own_metrics(cell.scenario))),
+            encode_timings(record),
+        )
     except VedetteError as error:
         return Failed(cell.name, run, str(error))
     except Exception as error:  # in what surrounds a run: one bad one must not end a night's work
@@ -135,7 +139,7 @@ class TaskQueue:
         for cell in self._campaign.cells:
             model = cell.scenario.model
             kinds = {sensor.measurement.kind for sensor in model.sensors}
-            plans = cell.planner if cell.planner in ("jdm", "idm") else ""
+            plans = cell.planner if cell.planner not in ("random", "fixed", "still") else ""
             kernels = (plans, model.filter.kind, model.fusion.kind, model.motion.kind, frozenset(kinds))
             if kernels not in seen and self._todo[cell.name]:
                 seen.add(kernels)

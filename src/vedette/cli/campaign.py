@@ -73,8 +73,11 @@ def reproduce(
 ) -> None:
     """Compare strategies over paired runs, as the paper does: a campaign with its report, tables and figures."""
     names = [name.strip() for name in planners.split(",")]
+    from vedette.scenarios import load_scenario
+
+    loaded = load_scenario(scenario)
     for name in names:
-        check_planner(name, "--planners")
+        check_planner(loaded, name, "--planners")
     if len(set(names)) != len(names):
         raise usage_error(f"expected each strategy once; got {planners}", "--planners")
     from vedette.campaigns import CampaignSpec, open_results, resolve

@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from vedette.simulation.records import RunRecord
     from vedette.simulation.stopping import RunInterrupted, RunStopped
 
-STRATEGY_NAMES = ("jdm", "idm", "random", "fixed", "still")
-
 
 def compile_if_cold(scenario: Scenario) -> None:
     """The first start in an environment compiles for minutes of processor time; say so before it happens."""
@@ -78,16 +76,23 @@ class Approval:
             self._said.update(new)
 
 
-def check_planner(name: str, option: str) -> None:
-    """Wrong use of an option unless it names a strategy."""
-    if name not in STRATEGY_NAMES:
-        raise usage_error(f"expected one of {', '.join(STRATEGY_NAMES)}; got {name!r}", option)
+def check_planner(scenario: Scenario, name: str, option: str) -> None:
+    """Wrong use of an option unless it names a strategy of the scenario."""
+    from vedette.scenarios.sections.planners import STRATEGIES
+
+    known = (*STRATEGIES, *scenario.model.planners)
+    if name not in known:
+        raise usage_error(f"expected one of {', '.join(known)}; got {name!r}", option)
 
 
 def run(
     scenario: Annotated[str, typer.Argument(help="Name of a built-in scenario, or a scenario file.")],
     planner: Annotated[
-        str, typer.Option("--planner", help="jdm (joint), idm (independent), random, fixed (first heading), still.")
+        str,
+        typer.Option(
+            "--planner",
+            help="jdm (joint), idm (independent), random, fixed (first course), still, or the scenario's own.",
+        ),
     ] = "jdm",
     seed: Annotated[int, typer.Option("--seed", min=0, help="Seed; with --run it fixes every random number.")] = 0,
     run_number: Annotated[int, typer.Option("--run", min=0, help="Number of the run.")] = 0,
@@ -99,7 +104,6 @@ def run(
     trust: Annotated[bool, typer.Option("--trust", help=TRUST_HELP)] = False,
 ) -> None:
     """Run a scenario once: tracks, decisions with their rewards, errors, figures."""
-    check_planner(planner, "--planner")
     from vedette.evaluation.runs import run_scenario
     from vedette.scenarios import load_scenario
     from vedette.scenarios.dumping import dump_scenario
@@ -107,6 +111,7 @@ def run(
     from vedette.simulation.storage import check_free, save_run
 
     loaded = load_scenario(scenario)
+    check_planner(loaded, planner, "--planner")
     Approval(trust)(loaded)
     warn(loaded)
     if out is not None:

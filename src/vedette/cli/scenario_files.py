@@ -73,7 +73,8 @@ def _starting_files(scenario: Scenario, target: Path) -> dict[Path, str]:
 def check(files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Scenario files.")]) -> None:
     """Name every fault of scenario files.
 
-    Each by file, line, column and field, with what was expected and what came. Warnings, of what is valid but costs
+    Each by file, line, column and field, with what was expected and what came. Code of your own is imported and made,
+    and what it lacks is said; code that others may have written is not. Warnings, of what is valid but costs
     accuracy or may not be meant, go to standard error and leave the exit status at 0.
     """
     from vedette.scenarios import load_scenario
@@ -83,6 +84,8 @@ def check(files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="S
     for file in files:
         try:
             scenario = load_scenario(file)
+            if faults := code_faults(scenario):
+                raise ScenarioError(faults)
             typer.echo(f"{file}: {one_line(scenario)}")
             warn(scenario)
         except (ScenarioError, InputError) as error:
@@ -90,6 +93,21 @@ def check(files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="S
             faulty = True
     if faulty:
         raise typer.Exit(1)
+
+
+def code_faults(scenario: Scenario) -> list[str]:
+    """What is wrong with the code that a scenario names; a warning where others may have written it."""
+    from vedette.scenarios.trust import code_of, not_own
+
+    code = code_of(scenario.model)
+    if not code:
+        return []
+    if reason := not_own(scenario):
+        typer.echo(f"{scenario.path}: warning: {', '.join(code)} is not imported, as {reason}", err=True)
+        return []
+    from vedette.scenarios import code_checks
+
+    return code_checks.code_faults(scenario)
 
 
 def warn(scenario: Scenario, before: str = "") -> None:

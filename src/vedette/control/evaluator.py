@@ -8,7 +8,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from vedette.control.inputs import Belief, check_beliefs, check_sensors, options_of
+from vedette.control.inputs import Belief, check_sensors, check_state, options_of
 from vedette.control.kinds import of_one_kind
 from vedette.control.plain import PlainRewards, can_be_laid_out
 from vedette.control.priors import predicted
@@ -22,6 +22,7 @@ from vedette.errors import NumericalError
 from vedette.fusion import Clmb, CmDeltaGlmb, Fusion
 from vedette.kernels.base.types import Floats, Ints
 from vedette.platforms import Options
+from vedette.tracking import State
 
 SampleRewards: TypeAlias = Callable[[Ints], Floats]
 
@@ -55,8 +56,7 @@ class Evaluator:
         fusion: Fusion[Any, Any],
         settings: PlanningSettings,
         reward: Reward,
-        beliefs: Sequence[Belief],
-        fused: Belief,
+        state: State,
         poses: Any,
         *,
         rng: np.random.Generator,
@@ -67,12 +67,12 @@ class Evaluator:
         """
         targets = check_sensors(sensors)
         options = options_of(sensors, poses, settings)
-        check_beliefs(sensors, beliefs, fused)
-        prediction = predicted(fused, targets.motion, settings.horizon_steps, settings.horizon_period)
-        futures = draw_futures(fused, sensors, settings, rng=rng)
+        check_state(sensors, state)
+        prediction = predicted(state.fused, targets.motion, settings.horizon_steps, settings.horizon_period)
+        futures = draw_futures(state.fused, sensors, settings, rng=rng)
         posteriors = tuple(
             pseudo_posteriors(belief, sensor, own.courses, future, settings)
-            for belief, sensor, own, future in zip(beliefs, sensors, options, futures, strict=True)
+            for belief, sensor, own, future in zip(state.local, sensors, options, futures, strict=True)
         )
         steps = sum(len(own.courses) for own in options) * settings.num_samples * settings.horizon_steps
         counts = {"filter_steps": steps, "fusions": 0, "divergences": 0}

@@ -15,6 +15,7 @@ from vedette.kernels.base.types import Floats
 from vedette.models import TargetModel
 from vedette.models.arguments import float_array, reject
 from vedette.platforms import Options, options_at
+from vedette.tracking import State
 
 Belief: TypeAlias = GLMB | LMB
 
@@ -44,17 +45,19 @@ def options_of(sensors: Sequence[MobileSensor], poses: Any, settings: PlanningSe
     )
 
 
-def check_beliefs(sensors: Sequence[MobileSensor], beliefs: Sequence[Any], fused: Any) -> None:
+def check_state(sensors: Sequence[MobileSensor], state: State) -> None:
     """`InputError` unless there is a valid belief of the right kind for each sensor's filter, and a valid fused one."""
-    if len(beliefs) != len(sensors):
-        raise InputError(f"beliefs: expected {len(sensors)}, one a sensor; got {len(beliefs)}")
+    if not isinstance(state, State):
+        raise InputError(f"state: expected a State; got {type(state).__name__}")
+    if len(state.local) != len(sensors):
+        raise InputError(f"state.local: expected {len(sensors)} beliefs, one a sensor; got {len(state.local)}")
     state_dim = shared_targets([sensor.filter for sensor in sensors]).state_dim
-    for i, (belief, sensor) in enumerate(zip(beliefs, sensors, strict=True)):
+    for i, (belief, sensor) in enumerate(zip(state.local, sensors, strict=True)):
         if not labels_targets(sensor.filter):
             raise reject(f"sensors[{i}].filter", "one that labels its targets", type(sensor.filter).__name__)
         kind = GLMB if isinstance(sensor.filter.initial(), GLMB) else LMB
-        _check_density(f"beliefs[{i}]", belief, (kind,), state_dim)
-    _check_density("fused", fused, (GLMB, LMB), state_dim)
+        _check_density(f"state.local[{i}]", belief, (kind,), state_dim)
+    _check_density("state.fused", state.fused, (GLMB, LMB), state_dim)
 
 
 def _check_density(name: str, density: Any, kinds: tuple[type[Belief], ...], state_dim: int) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
@@ -10,7 +9,7 @@ import numpy as np
 
 from vedette.control.evaluator import Evaluator
 from vedette.control.evidence import Evidence
-from vedette.control.inputs import Belief, check_choice, check_poses, options_of
+from vedette.control.inputs import check_choice, check_poses, options_of
 from vedette.control.plan import Plan, RewardTable
 from vedette.control.reward import CauchySchwarzReward, Reward
 from vedette.control.search import ExhaustiveSearch, JointProblem, JointSearch, all_joint_actions, first_best
@@ -19,6 +18,7 @@ from vedette.fusion import Fusion
 from vedette.kernels.base.types import Floats
 from vedette.models.arguments import generator, reject
 from vedette.platforms import Actions
+from vedette.tracking import State
 
 
 class Planner(Protocol):
@@ -29,8 +29,8 @@ class Planner(Protocol):
         """Name of the strategy, as in `Plan.planner`."""
         ...
 
-    def plan(self, beliefs: Sequence[Belief], fused: Belief, poses: Floats, *, rng: np.random.Generator) -> Plan:
-        """Decide from the local posteriors, the fused one and the poses (num_sensors, 3 or more)."""
+    def plan(self, state: State, poses: Floats, *, rng: np.random.Generator) -> Plan:
+        """Decide from what a tracker believes after a scan and the poses (num_sensors, 3 or more)."""
         ...
 
 
@@ -57,14 +57,14 @@ class JointPlanner:
         """The strategy "jdm"."""
         return "jdm"
 
-    def plan(self, beliefs: Sequence[Belief], fused: Belief, poses: Floats, *, rng: np.random.Generator) -> Plan:
+    def plan(self, state: State, poses: Floats, *, rng: np.random.Generator) -> Plan:
         """The joint action of largest mean reward that the search finds; of equal ones the first in printed order.
 
         Rewards are equal within 1e-9, relative to the best or to 1.
 
         Args:
-            beliefs: local posterior of each sensor, as its filter left it.
-            fused: their fusion, from which samples and prediction are taken.
+            state: the belief of each sensor, as its filter left it; and the fused one, from which samples and
+                prediction are taken. Under `vedette.tracking.Central` they are all the same.
             poses: (num_sensors, 3 or more) present poses.
             rng: draws the samples, then whatever the search draws.
 
@@ -73,9 +73,7 @@ class JointPlanner:
             ModelError, NumericalError: as the filters; a reward that is not finite.
         """
         generator(rng)
-        evaluator = Evaluator.prepare(
-            self.sensors, self.fusion, self.settings, self.reward, beliefs, fused, poses, rng=rng
-        )
+        evaluator = Evaluator.prepare(self.sensors, self.fusion, self.settings, self.reward, state, poses, rng=rng)
         everyone = tuple(range(len(self.sensors)))
         evidence = Evidence(evaluator, everyone, evaluator.rewards(everyone, self.fusion))
         problem = JointProblem(evidence.shape, evidence.evaluate, evaluator.independent_choice)
@@ -108,12 +106,10 @@ class IndependentPlanner:
         """The strategy "idm"."""
         return "idm"
 
-    def plan(self, beliefs: Sequence[Belief], fused: Belief, poses: Floats, *, rng: np.random.Generator) -> Plan:
+    def plan(self, state: State, poses: Floats, *, rng: np.random.Generator) -> Plan:
         """Each sensor's action of largest mean reward; arguments, ties and errors as `JointPlanner.plan`."""
         generator(rng)
-        evaluator = Evaluator.prepare(
-            self.sensors, self.fusion, self.settings, self.reward, beliefs, fused, poses, rng=rng
-        )
+        evaluator = Evaluator.prepare(self.sensors, self.fusion, self.settings, self.reward, state, poses, rng=rng)
         chosen: list[int] = []
         tables: list[RewardTable] = []
         for s, own in enumerate(evaluator.options):
@@ -142,7 +138,7 @@ class RandomPlanner:
         """The strategy "random"."""
         return "random"
 
-    def plan(self, beliefs: Sequence[Belief], fused: Belief, poses: Floats, *, rng: np.random.Generator) -> Plan:
+    def plan(self, state: State, poses: Floats, *, rng: np.random.Generator) -> Plan:
         """Drawn from `rng`; the beliefs are not looked at."""
         generator(rng)
         options = options_of(self.sensors, poses, self.settings)
@@ -172,7 +168,7 @@ class FixedPlanner:
         """The strategy "fixed"."""
         return "fixed"
 
-    def plan(self, beliefs: Sequence[Belief], fused: Belief, poses: Floats, *, rng: np.random.Generator) -> Plan:
+    def plan(self, state: State, poses: Floats, *, rng: np.random.Generator) -> Plan:
         """The set actions, whatever is believed."""
         generator(rng)
         check_poses(poses, len(self.actions))

@@ -3,6 +3,7 @@
 from vedette.densities.conversions import glmb_to_lmb, lmb_to_glmb, marginalise
 from vedette.densities.estimates import (
     Estimate,
+    Estimator,
     TrackHistory,
     map_estimate,
     marginal_estimate,
@@ -35,6 +36,7 @@ __all__ = [
     "GLMB",
     "LMB",
     "Estimate",
+    "Estimator",
     "IidCluster",
     "MultiBernoulli",
     "MultiTargetSamples",

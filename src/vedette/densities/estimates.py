@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -66,6 +67,14 @@ class Estimate:
         checks.check_covariances("covs", self.covs, error)
         if not np.all((self.existence >= 0.0) & (self.existence <= 1.0)):
             raise error(f"existence: expected probabilities; got {self.existence.tolist()}")
+
+
+class Estimator(Protocol):
+    """How the targets are read off a density after a scan."""
+
+    def __call__(self, density: Any, step: int) -> Estimate:
+        """The estimate of scan `step`, counted from 1, by which targets without labels are named."""
+        ...
 
 
 def map_estimate(density: GLMB | LMB) -> Estimate:

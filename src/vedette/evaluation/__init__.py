@@ -29,12 +29,11 @@ from vedette.evaluation.metrics import (
     ospa2_of_run,
     ospa_of_run,
 )
-from vedette.evaluation.runs import STRATEGIES, measure_run, run_scenario, strategy
+from vedette.evaluation.runs import measure_run, own_metrics, run_scenario
 from vedette.evaluation.statistics import PairedDifference, Summary, paired_difference, summarise
 from vedette.evaluation.tables import decision_rows, strategy_csv, strategy_markdown, strategy_rows
 
 __all__ = [
-    "STRATEGIES",
     "AverageNees",
     "Comparison",
     "Continuity",
@@ -65,9 +64,9 @@ __all__ = [
     "ospa2",
     "ospa2_of_run",
     "ospa_of_run",
+    "own_metrics",
     "paired_difference",
     "run_scenario",
-    "strategy",
     "strategy_csv",
     "strategy_markdown",
     "strategy_rows",

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TypeAlias
 
 import numpy as np
 
 from vedette.errors import InputError
 from vedette.evaluation.actions import Row, rounded
+from vedette.evaluation.metrics import RunMetrics
 from vedette.evaluation.statistics import PairedDifference, Summary, paired_difference, summarise
 from vedette.kernels.base.types import Bools, Floats
 from vedette.scenarios import Scenario
@@ -23,7 +24,9 @@ Choice: TypeAlias = tuple[Row, ...]
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """OSPA of several strategies on one scenario, paired run by run.
+    """OSPA and other measures of several strategies on one scenario, paired run by run.
+
+    A `part` is "total", "localisation" or "cardinality", of OSPA, or the name of a measure.
 
     Attributes:
         scenario: name of the scenario.
@@ -33,6 +36,7 @@ class Comparison:
         ospa: (num_strategies, num_runs, num_scans, 3) total, localisation and cardinality parts, m.
         since, until: scans after `since` (s) and up to `until` (s) count in the mean over time.
         choices: for each strategy, for each run, what each of its decisions chose.
+        measures: (num_strategies, num_runs, num_scans) of each measure that all runs have, by the name of its column.
     """
 
     scenario: str
@@ -43,6 +47,7 @@ class Comparison:
     since: float
     until: float
     choices: tuple[tuple[tuple[Choice, ...], ...], ...]
+    measures: Mapping[str, Floats] = field(default_factory=dict)
 
     @property
     def num_runs(self) -> int:
@@ -55,9 +60,13 @@ class Comparison:
         return np.asarray((self.times > self.since) & (self.times <= self.until))
 
     def run_means(self, strategy: str, part: str = "total") -> Floats:
-        """(num_runs,) OSPA averaged over the counted scans of each run, m."""
-        values: Floats = self.ospa[self._index(strategy), :, :, PARTS.index(part)]
-        return np.asarray(values[:, self.counted].mean(axis=1))
+        """(num_runs,) mean over the counted scans of each run that have a value; NaN where none has one."""
+        values = self._values(strategy, part)[:, self.counted]
+        known = ~np.isnan(values)
+        if known.all():
+            return np.asarray(values.mean(axis=1))
+        sums, counts = np.where(known, values, 0.0).sum(axis=1), known.sum(axis=1)
+        return np.where(counts > 0, sums / np.maximum(counts, 1), np.nan)
 
     def summary(self, strategy: str, part: str = "total") -> Summary:
         """Mean over runs of `run_means`."""
@@ -65,16 +74,24 @@ class Comparison:
 
     def curve(self, strategy: str, part: str = "total") -> Summary:
         """Mean over runs at each scan: arrays of shape (num_scans,)."""
-        return summarise(self.ospa[self._index(strategy), :, :, PARTS.index(part)])
+        return summarise(self._values(strategy, part))
 
-    def difference(self, strategy: str, reference: str | None = None) -> PairedDifference:
-        """How much more OSPA a strategy has than the reference (the first strategy unless named), run by run."""
-        return paired_difference(self.run_means(strategy), self.run_means(reference or self.strategies[0]))
+    def difference(self, strategy: str, reference: str | None = None, part: str = "total") -> PairedDifference:
+        """How much more a strategy has than the reference (the first strategy unless named), run by run."""
+        return paired_difference(self.run_means(strategy, part), self.run_means(reference or self.strategies[0], part))
 
     def decision_shares(self, strategy: str, decision: int) -> dict[Choice, float]:
         """Share of the runs in which each combination of actions was chosen; the most frequent first."""
         chosen = Counter(run[decision] for run in self.choices[self._index(strategy)] if decision < len(run))
         return {choice: count / self.num_runs for choice, count in chosen.most_common()}
+
+    def _values(self, strategy: str, part: str) -> Floats:
+        """(num_runs, num_scans)."""
+        if part in PARTS:
+            return np.asarray(self.ospa[self._index(strategy), :, :, PARTS.index(part)])
+        if part not in self.measures:
+            raise InputError(f"part: expected one of {', '.join((*PARTS, *self.measures))}; got {part!r}")
+        return np.asarray(self.measures[part][self._index(strategy)])
 
     def _index(self, strategy: str) -> int:
         if strategy not in self.strategies:
@@ -83,12 +100,17 @@ class Comparison:
 
 
 def compare(
-    runs: Mapping[str, Sequence[RunRecord]], *, since: float | None = None, until: float = np.inf
+    runs: Mapping[str, Sequence[RunRecord]],
+    metrics: Mapping[str, Sequence[RunMetrics]] | None = None,
+    *,
+    since: float | None = None,
+    until: float = np.inf,
 ) -> Comparison:
     """Put the runs of several strategies side by side.
 
     Args:
         runs: for each strategy its runs; the n-th runs of all must be of the same scenario, seed and run number.
+        metrics: measures of the same runs, to be compared, too.
         since: only scans after this time (s) count in the mean over time; by default the time of the first decision,
             before which all strategies are alike, and every scan if none was made before the last.
         until: only scans up to this time (s) count.
@@ -120,16 +142,27 @@ def compare(
         since=since,
         until=until,
         choices=tuple(tuple(choices_of(record) for record in runs[name]) for name in strategies),
+        measures=_measures([metrics[name] for name in strategies]) if metrics else {},
     )
 
 
-def scored(scenario: Scenario, runs: Mapping[str, Sequence[RunRecord]]) -> Comparison:
+def _measures(of_strategies: Sequence[Sequence[RunMetrics]]) -> dict[str, Floats]:
+    columns = [[metrics.columns() for metrics in of_runs] for of_runs in of_strategies]
+    common = [name for name in columns[0][0] if all(name in run for of_runs in columns for run in of_runs)]
+    return {name: np.array([[run[name] for run in of_runs] for of_runs in columns], np.float64) for name in common}
+
+
+def scored(
+    scenario: Scenario,
+    runs: Mapping[str, Sequence[RunRecord]],
+    metrics: Mapping[str, Sequence[RunMetrics]] | None = None,
+) -> Comparison:
     """The comparison over the scans that the scenario counts."""
     window = scenario.model.ospa
     times = next(iter(runs.values()))[0].times
     since = None if window.from_step is None else float(np.nextafter(times[window.from_step - 1], -np.inf))
     until = np.inf if window.to_step is None else float(times[window.to_step - 1])
-    return compare(runs, since=since, until=until)
+    return compare(runs, metrics, since=since, until=until)
 
 
 def typical_run(comparison: Comparison, strategy: str, records: Sequence[RunRecord]) -> RunRecord:

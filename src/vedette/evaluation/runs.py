@@ -6,39 +6,21 @@ import signal
 import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
 from functools import partial
 
-from vedette.control import IndependentPlanner, JointPlanner, Planner
 from vedette.evaluation.metrics import Metric, RunMetrics, measure, ospa_of_run
 from vedette.scenarios import Scenario
 from vedette.scenarios.build import build_experiment, build_planner
 from vedette.simulation.loop import simulate
 from vedette.simulation.records import RunRecord
 
-STRATEGIES = ("jdm", "idm", "random", "fixed", "still")
-
-
-def strategy(scenario: Scenario, name: str, num_threads: int = 0) -> Planner | None:
-    """The planner called `jdm`, `idm`, `random` or `fixed`; None for `still`, where the sensors never move.
-
-    Raises:
-        InputError: another name.
-    """
-    if name == "still":
-        return None
-    planner = build_planner(scenario, name)
-    if isinstance(planner, JointPlanner | IndependentPlanner):
-        return replace(planner, settings=replace(planner.settings, num_threads=num_threads))
-    return planner
-
 
 def run_scenario(scenario: Scenario, planner: str, *, seed: int, run: int = 0, num_threads: int = 0) -> RunRecord:
-    """One run of a scenario under one of the `STRATEGIES`.
+    """One run of a scenario under a strategy.
 
     Args:
         scenario: as `vedette.scenarios.load_scenario` reads it.
-        planner: "jdm" (joint), "idm" (independent), "random", "fixed" or "still".
+        planner: "jdm" (joint), "idm" (independent), "random", "fixed", "still", or one of the scenario's own.
         seed, run: fix every random number; runs with equal seed and number are paired across strategies.
         num_threads: share a decision (0: one a processor) and change no result.
 
@@ -46,9 +28,14 @@ def run_scenario(scenario: Scenario, planner: str, *, seed: int, run: int = 0, n
         VedetteError: the scenario's models, filters or planner cannot do what is asked.
     """
     score = partial(ospa_of_run, cutoff=scenario.model.ospa.cutoff, order=scenario.model.ospa.order)
-    return simulate(
-        build_experiment(scenario), strategy(scenario, planner, num_threads), seed=seed, run=run, score=score
-    )
+    decides = build_planner(scenario, planner, num_threads)
+    return simulate(build_experiment(scenario), decides, seed=seed, run=run, score=score)
+
+
+def own_metrics(scenario: Scenario) -> tuple[Metric, ...]:
+    """The measures of its own that a scenario names. Raises `InputError` for one that cannot be had."""
+    folder = scenario.folder
+    return tuple(Metric(name, section.made(folder)) for name, section in scenario.model.metrics.items())
 
 
 def measure_run(record: RunRecord, scenario: Scenario, own: Sequence[Metric] = ()) -> RunMetrics:

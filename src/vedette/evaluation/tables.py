@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import csv
 import io
+from collections.abc import Iterable
 
 import numpy as np
 
 from vedette.evaluation.actions import choice_words
-from vedette.evaluation.comparison import Comparison
-from vedette.evaluation.statistics import PairedDifference, Summary
+from vedette.evaluation.comparison import PARTS, Comparison
+from vedette.evaluation.statistics import PairedDifference, Summary, summarise
 
 HEADER = ("Strategy", "OSPA (m)", "Localisation (m)", "Cardinality (m)", "Difference (m)", "95 % interval", "Runs won")
 
@@ -53,16 +54,29 @@ def strategy_csv(comparison: Comparison) -> str:
     """The numbers behind the table, unrounded, one row a strategy."""
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
-    parts = [f"{part}_{field}_m" for part in ("total", "localisation", "cardinality") for field in ("mean", "se")]
-    writer.writerow(["strategy", "runs", *parts, "difference_m", "difference_se_m", "low_m", "high_m", "share_won"])
+    parts = [f"{part}_{field}_m" for part in PARTS for field in ("mean", "se")]
+    measures = [f"{name}_{field}" for name in comparison.measures for field in ("mean", "se")]
+    paired = ("difference_m", "difference_se_m", "low_m", "high_m", "share_won")
+    writer.writerow(["strategy", "runs", *parts, *paired, *measures])
     for strategy in comparison.strategies:
-        summaries = [comparison.summary(strategy, part) for part in ("total", "localisation", "cardinality")]
-        numbers = [float(value) for summary in summaries for value in (summary.mean, summary.standard_error)]
+        numbers = _means(comparison, strategy, PARTS)
         difference = comparison.difference(strategy)
-        paired = difference.summary
-        numbers += [float(value) for value in (paired.mean, paired.standard_error, paired.low, paired.high)]
-        writer.writerow([strategy, comparison.num_runs, *numbers, difference.share_won])
+        summary = difference.summary
+        numbers += [float(value) for value in (summary.mean, summary.standard_error, summary.low, summary.high)]
+        own = _means(comparison, strategy, comparison.measures)
+        writer.writerow([strategy, comparison.num_runs, *numbers, difference.share_won, *own])
     return out.getvalue()
+
+
+def _means(comparison: Comparison, strategy: str, parts: Iterable[str]) -> list[float]:
+    """Mean over the runs that have a value, and its standard error, of one part after the other."""
+    numbers = []
+    for part in parts:
+        means = comparison.run_means(strategy, part)
+        known = means[~np.isnan(means)]
+        summary = summarise(known) if len(known) else None
+        numbers += [float(summary.mean), float(summary.standard_error)] if summary else [np.nan, np.nan]
+    return numbers
 
 
 def caption(comparison: Comparison) -> str:

@@ -10,6 +10,7 @@ from vedette.filters.glmb import DeltaGlmbFilter
 from vedette.filters.info import FilterInfo
 from vedette.filters.limits import Limits
 from vedette.filters.lmb import LmbFilter
+from vedette.filters.multi_sensor import MultiSensorGlmbFilter, MultiSensorLmbFilter
 from vedette.filters.phd import PhdFilter
 
 Belief: TypeAlias = GLMB | LMB | Poisson | IidCluster | MultiBernoulli
@@ -23,6 +24,8 @@ __all__ = [
     "FilterInfo",
     "Limits",
     "LmbFilter",
+    "MultiSensorGlmbFilter",
+    "MultiSensorLmbFilter",
     "PhdFilter",
     "labels_targets",
     "shared_targets",

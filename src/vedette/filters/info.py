@@ -19,15 +19,18 @@ class FilterInfo:
             outside the gates is not in it. For an LMB the share of all joint choices that is left out of the inexact
             clusters, which bounds the error of every existence and association probability; 0 without them. For a CPHD
             filter the probability of the large numbers of targets that were left out, for a PHD filter 0. NaN for a
-            multi-Bernoulli, which is no sum of hypotheses.
+            multi-Bernoulli, which is no sum of hypotheses. For several sensors what is cut at one of them is counted as
+            it weighs there, though later ones may raise it; and combinations that an LMB drops are in it.
         dropped_existence: expected number of targets in labels that an LMB, or Bernoullis that a CB-MeMBer filter,
             dropped or bounded by `Limits.max_existence`; 0 for a PHD or CPHD filter, which keeps the weight of what it
             drops.
         num_clutter_raised: measurements whose clutter intensity was raised to `Limits.min_log_clutter`.
         num_duplicates: measurements that repeat another to the last digit and were left out.
-        num_inexact_clusters: LMB clusters summed over their heaviest joint choices only; 0 for other filters.
+        num_inexact_clusters: LMB clusters summed over their heaviest joint choices only (of several sensors: of which
+            not all sets of taken measurements were followed); 0 for other filters.
         search_cut: whether ranking stopped at `Limits.max_search_nodes` before it had found all it was asked for; false
-            where nothing is ranked.
+            where nothing is ranked. For an LMB of several sensors whether a track had more than
+            `Limits.max_hypotheses` combinations.
         cap_met: whether the posterior was as large as `Limits` allows, so that more may have been cut off: hypotheses
             of a GLMB, labels of an LMB, Bernoullis of a CB-MeMBer filter, components of a PHD or CPHD filter.
     """

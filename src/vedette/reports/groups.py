@@ -103,10 +103,11 @@ def _group(results: CampaignResults, cells: tuple[Cell, ...], name: str, title: 
             strategies.append(Strategy(cell, labels[cell.name], len(finished[cell.name]), records, metrics))
     missing = tuple(strategy_label(label) for cell, label in labels.items() if not finished[cell])
     paired = {each.label: each.records for each in strategies}
+    measured = {each.label: each.metrics for each in strategies}
     comparison, reason = None, "no run number is finished for every one of them yet"
     if common:
         try:
-            comparison, reason = scored(cells[0].scenario, paired), ""
+            comparison, reason = scored(cells[0].scenario, paired, measured), ""
         except InputError as error:  # such as scans of other times
             reason = str(error)
     return Group(name, title, tuple(strategies), missing, comparison, reason)

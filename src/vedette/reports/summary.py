@@ -41,13 +41,13 @@ def _markdown(group: Group) -> str:
 
 
 def _csv(groups: list[Group]) -> str:
-    """The tables of all groups under one header, the group's name in front."""
-    out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
-    for number, group in enumerate(groups):
+    """The tables of all groups under one header, the group's name in front; groups may have other measures."""
+    out, rows = io.StringIO(), []
+    for group in groups:
         assert group.comparison is not None
-        header, *rows = csv.reader(io.StringIO(strategy_csv(group.comparison)))
-        if number == 0:
-            writer.writerow(["group", *header])
-        writer.writerows([group.name, *row] for row in rows)
+        rows += [{"group": group.name, **row} for row in csv.DictReader(io.StringIO(strategy_csv(group.comparison)))]
+    writer = csv.DictWriter(out, list(dict.fromkeys(name for row in rows for name in row)), lineterminator="\n")
+    if rows:
+        writer.writeheader()
+    writer.writerows(rows)
     return out.getvalue()

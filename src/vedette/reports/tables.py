@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -95,6 +95,23 @@ def _kinds(order: float) -> tuple[_Kind, ...]:
     )
 
 
+def _own_kinds(strategies: Sequence[Strategy]) -> Iterator[_Kind]:
+    """The user's own measures that every run has."""
+
+    def mean(name: str) -> Measure:
+        def over(metrics: RunMetrics, counted: Bools) -> float:
+            values = metrics.own[name][counted]
+            known = values[~np.isnan(values)]
+            return float(known.mean()) if len(known) else np.nan
+
+        return over
+
+    runs = [metrics for each in strategies for metrics in each.metrics]
+    for name in runs[0].own:
+        if all(name in metrics.own for metrics in runs):
+            yield _Kind(name, "a measure of one's own, mean over the scans", mean(name))
+
+
 def error_table(group: Group) -> Table | None:
     """OSPA and its parts, and the paired differences; None without runs in common."""
     if group.comparison is None:
@@ -124,7 +141,7 @@ def measure_table(group: Group) -> Table | None:
     if not strategies:
         return None
     score = strategies[0].cell.scenario.model.ospa
-    kinds = _kinds(score.order)
+    kinds = (*_kinds(score.order), *_own_kinds(strategies))
     rows = [(kind.name, *(_over_runs(kind, each, group.counted) for each in strategies)) for kind in kinds]
     notes = [kind.note for kind in kinds]
     for name, note, dim in _consistency_kinds(strategies):
@@ -176,7 +193,9 @@ def _consistency(strategy: Strategy, counted: Bools, dim: int) -> str:
 def _over_runs(kind: _Kind, strategy: Strategy, counted: Bools) -> str:
     if kind.needs_labels and not strategy.has_labels:
         return "\N{EN DASH}"
-    return _with_error([kind.value(metrics, counted) for metrics in strategy.metrics])
+    values = [kind.value(metrics, counted) for metrics in strategy.metrics]
+    known = [value for value in values if not np.isnan(value)]
+    return _with_error(known) if known else "\N{EN DASH}"
 
 
 def _with_error(values: Sequence[float]) -> str:

@@ -7,20 +7,20 @@ from __future__ import annotations
 
 import numpy as np
 
-from vedette.control import FixedPlanner, IndependentPlanner, JointPlanner, MobileSensor, Planner, RandomPlanner
+from vedette.control import MobileSensor, Planner
 from vedette.densities import LMB
 from vedette.errors import InputError
-from vedette.filters import Filter, labels_targets, shared_targets
+from vedette.filters import Filter, labels_targets
 from vedette.fusion import Clmb, CmDeltaGlmb
 from vedette.kernels.base.types import Floats
 from vedette.models import TargetModel
 from vedette.platforms import Actions
 from vedette.platforms.base import actions_at
 from vedette.scenarios.loading import Scenario
+from vedette.scenarios.sections.planners import STRATEGIES, Parts
 from vedette.simulation.experiment import Experiment
 from vedette.simulation.truth import TargetSource
-
-PLANNERS = ("jdm", "idm", "random", "fixed")
+from vedette.tracking import Distributed
 
 
 def build_experiment(scenario: Scenario) -> Experiment:
@@ -31,20 +31,20 @@ def build_experiment(scenario: Scenario) -> Experiment:
     """
     model = scenario.model
     sensors = build_sensors(scenario)
-    motion = shared_targets([sensor.filter for sensor in sensors]).motion
+    fusion = model.fusion.build(len(sensors), scenario.folder)
+    tracker = Distributed(tuple(sensor.filter for sensor in sensors), fusion, model.fusion.feedback)
     return Experiment(
         name=model.name,
         times=model.time.build(),
-        targets=model.targets.build(model, motion, scenario.folder),
-        sensors=sensors,
+        targets=model.targets.build(model, tracker.targets.motion, scenario.folder),
+        tracker=tracker,
+        platforms=tuple(sensor.platform for sensor in sensors),
         poses=build_poses(scenario),
         first_actions=tuple(
             own.values[0] if section.moves_from == "start" else None
             for own, section in zip(_first_actions(scenario, sensors), model.sensors, strict=True)
         ),
-        fusion=model.fusion.build(len(sensors)),
-        feedback=model.fusion.feedback,
-        estimate=model.estimator.build(),
+        estimate=model.estimator.build(scenario.folder),
         decision_steps=model.decision_steps,
     )
 
@@ -62,7 +62,7 @@ def build_sensors(scenario: Scenario) -> tuple[MobileSensor, ...]:
     )
     return tuple(
         MobileSensor(
-            model.filter.build(targets, sensor.build(region, method, folder)),
+            model.filter.build(targets, sensor.build(region, method, folder), folder),
             sensor.platform.build(folder),
         )
         for sensor in model.sensors
@@ -93,25 +93,37 @@ def build_targets(scenario: Scenario) -> TargetSource:
     return model.targets.build(model, model.motion.build("auto", folder), folder)
 
 
-def build_planner(scenario: Scenario, name: str) -> Planner:
-    """The planner called `jdm` (joint), `idm` (independent), `random`, or `fixed` (sensors keep their first course).
+def build_planner(scenario: Scenario, name: str, num_threads: int = 0) -> Planner | None:
+    """The planner of a strategy: `jdm` (joint), `idm` (independent), `random`, `fixed` (sensors keep their first
+    course), or one of the scenario's own; None for `still`, where the sensors are never under way.
+
+    Args:
+        scenario: with the sensors that it steers.
+        name: of the strategy.
+        num_threads: share a decision; 0: one a processor.
 
     Raises:
-        InputError: another name, or `jdm` or `idm` with filters that have no labels.
+        InputError: another name, `jdm` or `idm` with filters that have no labels, or a custom part that cannot be had.
     """
-    model, sensors = scenario.model, build_sensors(scenario)
-    if name == "random":
-        return RandomPlanner(sensors, model.control.build())
-    if name == "fixed":
-        return FixedPlanner(_first_actions(scenario, sensors))
-    if name not in PLANNERS:
-        raise InputError(f"planner: expected one of {', '.join(PLANNERS)}; got {name!r}")
-    planner = JointPlanner if name == "jdm" else IndependentPlanner
-    if not labels_targets(sensors[0].filter):
+    model, folder = scenario.model, scenario.folder
+    if name not in (*STRATEGIES, *model.planners):
+        raise InputError(f"planner: expected one of {', '.join((*STRATEGIES, *model.planners))}; got {name!r}")
+    sensors = build_sensors(scenario)
+    if name in STRATEGIES and STRATEGIES[name].needs_labels and not labels_targets(sensors[0].filter):
         kinds = "delta_glmb, m_delta_glmb or lmb"
         raise InputError(f"filter.kind: expected {kinds}, as planner {name} needs labels; got {model.filter.kind}")
-    fusion = model.fusion.build(len(sensors)) or _of_one(sensors[0].filter)
-    return planner(sensors, fusion, model.control.build(), model.control.reward.build())
+    control = model.control
+    parts = Parts(
+        sensors,
+        model.fusion.build(len(sensors), folder) or _of_one(sensors[0].filter),
+        control.build(num_threads),
+        control.reward.build(folder),
+        control.search.build(folder),
+        _first_actions(scenario, sensors),
+    )
+    if name in model.planners:
+        return model.planners[name].build(name, parts, folder)
+    return STRATEGIES[name].planner(parts)
 
 
 def _of_one(local: Filter) -> CmDeltaGlmb | Clmb:

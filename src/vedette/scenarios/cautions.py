@@ -7,10 +7,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from vedette.errors import VedetteError
 from vedette.kernels.base.types import Floats
 from vedette.scenarios.faults import Path, Told
-from vedette.scenarios.loading import Scenario, place_fault
+from vedette.scenarios.loading import Scenario, document_of, place_fault
 from vedette.scenarios.names import sensor_names
 from vedette.scenarios.sections import ScenarioModel
 from vedette.scenarios.sections.sensing import (
@@ -23,7 +22,6 @@ from vedette.scenarios.sections.sensing import (
 from vedette.scenarios.sections.sensors import Sensor
 from vedette.scenarios.sections.targets import RecordedTargets
 from vedette.scenarios.views import field_of_view
-from vedette.scenarios.yaml_reader import read_yaml
 
 # Sensors whose probabilities of detection of one place differ by more than this do not see the same.
 MAX_DIFFERENCE = 0.5
@@ -35,12 +33,7 @@ def cautions(scenario: Scenario) -> tuple[str, ...]:
     found = [*_records(scenario), *_views(scenario.model), *_births(scenario.model)]
     if not found:
         return ()
-    document = None
-    if scenario.path is not None:
-        try:
-            document = read_yaml(scenario.path.read_bytes().decode("utf-8-sig"), str(scenario.path))
-        except (OSError, ValueError, VedetteError):  # gone or changed since it was read: no line to name
-            document = None
+    document = document_of(scenario)
     lines = []
     for path, text in found:
         place = None if document is None else place_fault(document, Told(path, "", "")).place
@@ -57,7 +50,7 @@ def _records(scenario: Scenario) -> Iterator[tuple[Path, str]]:
 
 
 def _fuses(model: ScenarioModel) -> bool:
-    return len(model.sensors) > 1 and model.fusion.kind != "none"
+    return len(model.sensors) > 1 and model.fusion.kind not in ("none", "custom")
 
 
 def _births(model: ScenarioModel) -> Iterator[tuple[Path, str]]:

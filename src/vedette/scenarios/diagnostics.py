@@ -87,10 +87,10 @@ def options(annotation: Any) -> Iterator[Any]:
         yield annotation
 
 
-def kind_of(model: type[BaseModel]) -> str | None:
-    """The value of `kind` that selects a model, or None where it is not one of several."""
+def kinds_of(model: type[BaseModel]) -> list[str]:
+    """The values of `kind` that select a model; none where it is not one of several."""
     field = model.model_fields.get("kind")
-    return None if field is None else str(field.default)
+    return [] if field is None else _literals(field.annotation)
 
 
 def _item(annotation: Any, index: int) -> Any:
@@ -128,7 +128,7 @@ def _unknown_key(path: Path, key: str, known: list[str]) -> Told:
 
 def _kind_fault(error: ErrorDetails, path: Path, annotation: Any) -> Told:
     sections = (option for option in options(annotation) if isinstance(option, type) and issubclass(option, BaseModel))
-    kinds = [kind for section in sections if (kind := kind_of(section))]
+    kinds = [kind for section in sections for kind in kinds_of(section)]
     if error["type"] == "union_tag_not_found":
         return Told(path, f"a mapping with kind: {_one_of(kinds)}", "no kind")
     tag = error["input"].get("kind")

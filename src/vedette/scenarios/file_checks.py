@@ -9,7 +9,7 @@ import os
 import symtable
 import tokenize
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path as FilePath
 from typing import Any
 
@@ -78,15 +78,17 @@ def _columns(recorded: RecordedTargets, file: FilePath) -> Iterator[Finding]:
         yield ("targets", "columns"), wanted, "nothing"
 
 
-def _customs(value: Any, path: Path) -> Iterator[tuple[Path, Custom]]:
+def customs(value: Any, path: Path) -> Iterator[tuple[Path, Custom]]:
+    """Everything of the user's own in a section, with its path."""
     if isinstance(value, Custom):
         yield path, value
-    elif isinstance(value, Section):
-        for name in type(value).model_fields:
-            yield from _customs(getattr(value, name), (*path, name))
-    elif isinstance(value, tuple):
-        for i, item in enumerate(value):
-            yield from _customs(item, (*path, i))
+    inner: Iterable[tuple[str | int, Any]] = ()
+    if isinstance(value, Section):
+        inner = ((name, getattr(value, name)) for name in type(value).model_fields)
+    elif isinstance(value, tuple | dict):
+        inner = enumerate(value) if isinstance(value, tuple) else value.items()
+    for name, item in inner:
+        yield from customs(item, (*path, name))
 
 
 def _is_findable(package: str) -> bool:
@@ -115,7 +117,7 @@ def _unnamed(file: FilePath, name: str) -> tuple[str, str] | None:
 
 def reference_findings(model: ScenarioModel, folder: FilePath) -> Iterator[Finding]:
     """Which code of the user's own is not there. Nothing is imported."""
-    for path, custom in _customs(model, ()):
+    for path, custom in customs(model, ()):
         yield from attempt(_reference(path, custom, folder))
 
 

@@ -118,6 +118,15 @@ def load_scenario(name_or_path: str | FilePath) -> Scenario:
     return Scenario(parse_scenario(read_text(path, "scenario file", MOST_BYTES), str(path), path.parent), path)
 
 
+def document_of(scenario: Scenario) -> Document | None:
+    """The file that a scenario was read from, for places in it; None where there is none any more."""
+    try:
+        text = None if scenario.path is None else read_text(scenario.path, "scenario file", MOST_BYTES)
+    except InputError:
+        return None
+    return None if text is None else read_yaml(text, str(scenario.path))
+
+
 def json_schema() -> dict[str, Any]:
     """JSON schema of scenario files, for editors."""
     schema = ScenarioModel.model_json_schema()

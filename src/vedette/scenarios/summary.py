@@ -10,7 +10,7 @@ from vedette.scenarios.sections import ScenarioModel
 from vedette.scenarios.sections.base import Section
 from vedette.scenarios.sections.sensors import Sensor
 from vedette.scenarios.sections.targets import RecordedTargets
-from vedette.scenarios.sections.tracking import Fusion
+from vedette.scenarios.sections.tracking import AnyFilter, AnyFusion, CustomFusion, Filter
 from vedette.text import counted
 
 
@@ -60,7 +60,7 @@ def facts(model: ScenarioModel) -> list[tuple[str, str]]:
         ("motion", settings(model.motion)),
         ("survival", settings(model.survival)),
         ("births", f"{counted(len(model.birth.sites), 'site')}, {_steps(model.birth.steps)}"),
-        ("filter", f"{settings(model.filter)}, {model.filter.assignment.kind} assignment"),
+        ("filter", _filter(model.filter)),
         ("fusion", _fusion(model.fusion)),
         ("estimate", settings(model.estimator)),
         ("decisions", _decisions(model.decision_steps)),
@@ -68,10 +68,19 @@ def facts(model: ScenarioModel) -> list[tuple[str, str]]:
         ("reward", f"{settings(control.reward)}, {counted(control.num_samples, 'sample')}"),
         ("pseudo-scans", f"{control.ideal_measurements} measurements"),
         ("OSPA", settings(model.ospa)),
+        *((f"planner {name}", settings(section)) for name, section in model.planners.items()),
+        *((f"metric {name}", settings(section)) for name, section in model.metrics.items()),
     ]
 
 
-def _fusion(section: Fusion) -> str:
+def _filter(section: AnyFilter) -> str:
+    assignment = f", {section.assignment.kind} assignment" if isinstance(section, Filter) else ""
+    return settings(section) + assignment
+
+
+def _fusion(section: AnyFusion) -> str:
+    if isinstance(section, CustomFusion):
+        return settings(section)
     if section.kind == "none":
         return "none"
     weights = "equal weights" if section.weights is None else f"weights {short(section.weights)}"

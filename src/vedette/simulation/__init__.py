@@ -3,7 +3,7 @@
 from vedette.simulation.experiment import Experiment
 from vedette.simulation.loop import simulate
 from vedette.simulation.records import Decision, RunRecord
-from vedette.simulation.scans import CLUTTER, Scan, simulate_scan
+from vedette.simulation.scans import CLUTTER, Scan, simulate_scan, simulate_scans
 from vedette.simulation.storage import load_run, save_run
 from vedette.simulation.truth import ScriptedTargets, TargetSource, Truth
 
@@ -20,4 +20,5 @@ __all__ = [
     "save_run",
     "simulate",
     "simulate_scan",
+    "simulate_scans",
 ]

@@ -1,20 +1,18 @@
-"""A simulated world with the trackers in it: everything a run needs but a planner and a seed."""
+"""A simulated world with a tracker in it: everything a run needs but a planner and a seed."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-from vedette.control import MobileSensor
-from vedette.densities import Estimate
+from vedette.densities import Estimator
 from vedette.errors import InputError
-from vedette.filters import Belief
-from vedette.fusion import Fusion
 from vedette.kernels.base.types import Floats
+from vedette.models.arguments import reject
+from vedette.platforms import Fleet, Platform
 from vedette.simulation.truth import TargetSource
+from vedette.tracking import Tracker
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -25,13 +23,12 @@ class Experiment:
         name: of the scenario, for records.
         times: (num_scans,) s of the scans.
         targets: where the true targets come from.
-        sensors: the sensors with their local filters.
+        tracker: follows them; its sensors are the ones that scan.
+        platforms: what carries each of its sensors.
         poses: (num_sensors, 3 or more) poses at the first scan, all as long as the longest; components that are not a
             sensor's own are 0.
         first_actions: for each sensor, the row of the action that it is under from the start; None: it lies still until
             the first decision.
-        fusion: of the local beliefs; None for a single sensor.
-        feedback: whether the fused belief replaces the local ones (paper-notes 9).
         estimate: reads the targets off the fused belief, given the number of the scan (from 1).
         decision_steps: scans (counted from 1) after which the planner is asked.
 
@@ -42,18 +39,21 @@ class Experiment:
     name: str
     times: Floats
     targets: TargetSource
-    sensors: tuple[MobileSensor, ...]
+    tracker: Tracker
+    platforms: tuple[Platform, ...]
     poses: Floats
     first_actions: tuple[Floats | None, ...]
-    fusion: Fusion[Any, Any] | None
-    feedback: bool
-    estimate: Callable[[Belief, int], Estimate]
+    estimate: Estimator
     decision_steps: tuple[int, ...]
 
     def __post_init__(self) -> None:
-        num = len(self.sensors)
-        if num == 0 or (self.fusion is None and num > 1):
-            raise InputError(f"fusion: expected one for {num} sensors; got none")
+        if not isinstance(self.tracker, Tracker):
+            raise reject("tracker", "a Tracker, with targets, sensors, initial() and step()", self.tracker)
+        num = self.num_sensors
+        if len(self.platforms) != num:
+            raise InputError(
+                f"platforms: expected {num}, one for each sensor of the tracker; got {len(self.platforms)}"
+            )
         shape = self.poses.shape
         if len(shape) != 2 or len(self.poses) != num or shape[1] < 3 or not np.isfinite(self.poses).all():
             raise InputError(f"poses: expected finite numbers of shape ({num}, 3 or more); got {self.poses.tolist()}")
@@ -62,3 +62,13 @@ class Experiment:
         bad = [step for step in self.decision_steps if not 1 <= step <= len(self.times)]
         if bad:
             raise InputError(f"decision_steps: expected scans from 1 to {len(self.times)}; got {bad[0]}")
+
+    @property
+    def num_sensors(self) -> int:
+        """Number of sensors."""
+        return len(self.tracker.sensors)
+
+    def fleet(self, *, moving: bool = True) -> Fleet:
+        """The platforms at the first scan; those that are not under way, or not `moving` at all, lie still."""
+        actions = self.first_actions if moving else (None,) * self.num_sensors
+        return Fleet(self.platforms, self.poses, actions, float(self.times[0]))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -22,7 +22,8 @@ class Health:
     """The reports of all filters and fusions of a run; names and meaning as in `FilterInfo` and `FusionInfo`.
 
     Arrays are (num_scans, num_sensors), those of the fusion as a whole (`fusion_...`) (num_scans,). Truths are 0 or 1.
-    Where there is no fusion, or one of your own that reports no `FusionInfo`, its numbers are 0.
+    Where there is no fusion, or one of your own that reports no `FusionInfo`, its numbers are 0. What one filter of all
+    sensors reports stands at every sensor, its numbers of measurements at the first alone.
 
     Attributes:
         log_likelihood: of the scan, given the prior.
@@ -72,10 +73,13 @@ class Health:
         """Of the first scans alone."""
         return Health(**{name: getattr(self, name)[:num_scans] for name in _DTYPES})
 
-    def note_filter(self, scan: int, sensor: int, info: FilterInfo) -> None:
-        """Write down what a filter reported; scans are counted from 0."""
+    def note_filters(self, scan: int, infos: Sequence[FilterInfo]) -> None:
+        """Write down what the filters reported, one a sensor or one for all; scans are counted from 0."""
         for name in _OF_FILTER:
-            getattr(self, name)[scan, sensor] = getattr(info, name)
+            array = getattr(self, name)
+            array[scan] = [getattr(info, name) for info in infos]
+            if len(infos) == 1 and name in _OF_SCANS:
+                array[scan, 1:] = 0
 
     def note_fusion(self, scan: int, info: Any) -> None:
         """Write down what a fusion reported, if it is a `FusionInfo`."""
@@ -110,6 +114,7 @@ class Health:
 
 _DTYPES = {field.name: np.dtype(np.float64 if field.type == "Floats" else np.int64) for field in fields(Health)}
 _KINDS = {name: Kind.NUMBER if dtype == np.float64 else Kind.INTEGER for name, dtype in _DTYPES.items()}
+_OF_SCANS = ("num_clutter_raised", "num_duplicates")  # which are added up over the sensors
 _OF_FILTER = tuple(field.name for field in fields(FilterInfo) if field.name in _DTYPES)
 
 # The columns of the tables of sensors and of scans.

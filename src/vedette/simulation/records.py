@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -89,3 +90,11 @@ class RunRecord:
     def num_sensors(self) -> int:
         """Number of sensors."""
         return int(self.poses.shape[1])
+
+
+class Measure(Protocol):
+    """A measure of a run."""
+
+    def __call__(self, record: RunRecord) -> Any:
+        """(num_scans,) numbers; NaN where it has no value."""
+        ...

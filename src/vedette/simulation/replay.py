@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from vedette.errors import InputError
 from vedette.models import SensorModel
 from vedette.simulation.experiment import Experiment
-from vedette.simulation.loop import SCANS, run_stream
+from vedette.simulation.loop import SCANS, sensor_streams
 from vedette.simulation.records import RunRecord
-from vedette.simulation.scans import Scan, simulate_scan
+from vedette.simulation.scans import Scan, simulate_scans
 
 
 def scans_of(record: RunRecord, experiment: Experiment) -> tuple[tuple[Scan, ...], ...]:
@@ -29,18 +29,15 @@ def scans_of(record: RunRecord, experiment: Experiment) -> tuple[tuple[Scan, ...
         InputError: another number of sensors in the record than in the experiment.
         VedetteError: what the models raise.
     """
-    return scans_of_sensors(record, [sensor.filter.sensor for sensor in experiment.sensors])
+    return scans_of_sensors(record, experiment.tracker.sensors)
 
 
 def scans_of_sensors(record: RunRecord, sensors: Sequence[SensorModel]) -> tuple[tuple[Scan, ...], ...]:
     """As `scans_of`, by the sensors' models alone."""
     if record.num_sensors != len(sensors):
         raise InputError(f"record: expected {len(sensors)} sensors; got {record.num_sensors}")
-    streams = [run_stream(record.seed, record.run, SCANS, sensor) for sensor in range(record.num_sensors)]
+    streams = sensor_streams(record.seed, record.run, SCANS, record.num_sensors)
     return tuple(
-        tuple(
-            simulate_scan(states, pose, sensor, ids=ids, rng=stream)
-            for sensor, pose, stream in zip(sensors, record.poses[step], streams, strict=True)
-        )
+        simulate_scans(states, record.poses[step], sensors, ids=ids, rngs=streams)
         for step, (ids, states) in enumerate(record.truth.at(scan) for scan in range(record.num_scans))
     )

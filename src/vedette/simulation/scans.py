@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,6 +13,7 @@ from vedette.kernels.base.types import Floats, Ints
 from vedette.models import SensorModel
 from vedette.models.arguments import float_array, generator, pose_vector, reject
 from vedette.models.measurement import wrap_angular
+from vedette.tracking import Stages
 
 CLUTTER = -1
 
@@ -67,6 +69,22 @@ def simulate_scan(
     order = np.argsort(rng.uniform(size=len(measurements)))
     kept = order[np.concatenate([seen, np.ones(len(clutter), np.bool_)])[order]]
     return Scan(np.ascontiguousarray(measurements[kept]), origins[kept])
+
+
+def simulate_scans(
+    truth_states: ArrayLike,
+    poses: Floats,
+    sensors: Sequence[SensorModel],
+    *,
+    ids: ArrayLike | None = None,
+    rngs: Sequence[np.random.Generator],
+) -> tuple[Scan, ...]:
+    """One scan a sensor, each with its own pose and random numbers; see `simulate_scan`."""
+    stages, scans = Stages(), []
+    for s, (pose, sensor, rng) in enumerate(zip(poses, sensors, rngs, strict=True)):
+        with stages.timing("scans", s):
+            scans.append(simulate_scan(truth_states, pose, sensor, ids=ids, rng=rng))
+    return tuple(scans)
 
 
 def _probabilities(sensor: SensorModel, states: Floats, pose: Floats) -> Floats:

@@ -2,10 +2,24 @@
 
 from __future__ import annotations
 
+import sysconfig
+import traceback
+from pathlib import Path
 from typing import Any
 
 from vedette.errors import VedetteError
 from vedette.simulation.records import RunRecord
+
+_LIBRARIES = (str(Path(__file__).parents[1]), *(sysconfig.get_path(name) for name in ("stdlib", "purelib", "platlib")))
+
+
+def cause_of(error: Exception) -> str:
+    """What was raised, in words; where it is not this library's word, with the place in the user's own code."""
+    if isinstance(error, VedetteError):
+        return str(error)
+    frames = [frame for frame in traceback.extract_tb(error.__traceback__) if not frame.filename.startswith(_LIBRARIES)]
+    place = f" ({Path(frames[-1].filename).name}, line {frames[-1].lineno}, {frames[-1].name})" if frames else ""
+    return f"{type(error).__name__}: {error}{place}"
 
 
 class RunStopped(VedetteError):

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from vedette.errors import VedetteError
 from vedette.evaluation.metrics.run import COLUMNS
 from vedette.kernels.base.types import Floats
-from vedette.models.arguments import float_array, reject
-from vedette.simulation.records import RunRecord
+from vedette.models.arguments import as_array, reject
+from vedette.simulation.records import Measure, RunRecord
 from vedette.simulation.tables import LAYOUTS
 
 # Columns of the tables of many runs beside those of the scans of one.
@@ -32,7 +30,7 @@ class Metric:
     """
 
     name: str
-    function: Callable[[RunRecord], Any]
+    function: Measure
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name.isidentifier():
@@ -52,7 +50,11 @@ class Metric:
             raise
         except Exception as error:
             raise VedetteError(f"metric {self.name}: {type(error).__name__}: {error}") from error
-        values = float_array(f"metric {self.name}", answer, (record.num_scans,), finite=False)
+        values = as_array(f"metric {self.name}", answer, "fiu", "numbers").astype(np.float64)
+        if values.shape != (record.num_scans,):
+            raise reject(
+                f"metric {self.name}", f"a number for each of {record.num_scans} scans", f"shape {values.shape}"
+            )
         if np.isinf(values).any():
             raise reject(f"metric {self.name}", "finite numbers, or NaN", values)
         return values

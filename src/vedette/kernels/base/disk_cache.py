@@ -26,7 +26,7 @@ from numba.core.serialize import dumps
 
 from vedette.kernels.base.private_files import fault_of_folder, make_private_folder, read_private, write_private
 
-_PACKAGE_ROOT = Path(__file__).resolve().parents[1]
+_PACKAGE_ROOT = Path(__file__).resolve().parents[2]
 _MARK_LENGTH = hashlib.sha256().digest_size
 
 

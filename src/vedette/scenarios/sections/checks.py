@@ -52,7 +52,7 @@ def _decision_times(model: ScenarioModel) -> Iterator[Finding]:
 
 
 def _weights(model: ScenarioModel) -> Iterator[Finding]:
-    weights = model.fusion.weights
+    weights = None if model.fusion.kind == "custom" else model.fusion.weights
     if weights is not None and len(weights) != len(model.sensors):
         yield ("fusion", "weights"), f"as many weights as sensors, {len(model.sensors)}", describe(weights)
 
@@ -77,7 +77,11 @@ def _fusion_of_several(model: ScenarioModel) -> Iterator[Finding]:
 def _fusion_of_kind(model: ScenarioModel) -> Iterator[Finding]:
     if model.fusion.kind == "cm_delta_glmb" and model.filter.kind == "lmb":
         yield ("fusion", "kind"), "clmb or none, as the filters are lmb", '"cm_delta_glmb"'
-    if model.fusion.kind == "clmb" and model.fusion.feedback and model.filter.kind not in ("lmb", *UNLABELLED):
+    if (
+        model.fusion.kind == "clmb"
+        and model.fusion.feedback
+        and model.filter.kind not in ("lmb", "custom", *UNLABELLED)
+    ):
         wanted = f"false, as {model.filter.kind} filters cannot go on from an LMB"
         yield ("fusion", "feedback"), wanted, "true"
 
@@ -88,9 +92,9 @@ def _estimator(model: ScenarioModel) -> Iterator[Finding]:
 
 
 def _combinations(model: ScenarioModel) -> Iterator[Finding]:
-    limits, num_sensors = model.fusion.limits, len(model.sensors)
-    if model.fusion.mixture_power == "moment_matched":
+    if model.fusion.kind == "custom" or model.fusion.mixture_power == "moment_matched":
         return
+    limits, num_sensors = model.fusion.limits, len(model.sensors)
     if limits.max_components**num_sensors > limits.max_combinations:
         wanted = f"a number whose power by {num_sensors} sensors is at most max_combinations, {limits.max_combinations}"
         yield ("fusion", "limits", "max_components"), wanted, describe(limits.max_components)

@@ -5,16 +5,17 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
-from typing import TYPE_CHECKING, Literal
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field
 
 from vedette.scenarios.faults import Finding, describe
-from vedette.scenarios.sections.base import Count, Numbers, Positive, Probability, Section, Share, Steps, check
+from vedette.scenarios.sections.base import Count, Numbers, Positive, Probability, Section, Share, Steps, Whole, check
+from vedette.scenarios.sections.custom import Custom
 
 if TYPE_CHECKING:  # with the planners comes the compiler, which a check does without
-    from vedette.control import CauchySchwarzReward as Reward
-    from vedette.control import PlanningSettings
+    from vedette.control import JointSearch, PlanningSettings, Reward
 
 
 class CauchySchwarzReward(Section):
@@ -27,11 +28,81 @@ class CauchySchwarzReward(Section):
         "density, under which localisation counts as much as cardinality [-].",
     )
 
-    def build(self) -> Reward:
+    def build(self, folder: Path) -> Reward:
         """The value of an updated density."""
         from vedette.control import CauchySchwarzReward
 
         return CauchySchwarzReward(self.unit_volume)
+
+
+class CustomReward(Custom):
+    """A user's own `vedette.control.Reward`: a function of the predicted and the updated density."""
+
+    kind: Literal["custom"] = Field(default="custom", description="Kind of reward [-].")
+
+    @classmethod
+    def protocol(cls) -> type:
+        """What it gives."""
+        from vedette.control import Reward
+
+        return Reward
+
+    def build(self, folder: Path) -> Reward:
+        """The user's own."""
+        made: Reward = self.made(folder)
+        return made
+
+
+AnyReward = Annotated[CauchySchwarzReward | CustomReward, Field(discriminator="kind")]
+
+
+class Exhaustive(Section):
+    """Every joint action, as in the paper."""
+
+    kind: Literal["exhaustive"] = Field(default="exhaustive", description="Kind of search [-].")
+    max_joint_actions: Count = Field(default=1_000_000, description="Bound on their number [-].")
+
+    def build(self, folder: Path) -> JointSearch:
+        """The search."""
+        from vedette.control import ExhaustiveSearch
+
+        return ExhaustiveSearch(self.max_joint_actions)
+
+
+class Ascent(Section):
+    """One sensor at a time, the others held, until no sensor alone can do better; for many sensors."""
+
+    kind: Literal["coordinate_ascent"] = Field(default="coordinate_ascent", description="Kind of search [-].")
+    num_restarts: Annotated[Whole, Field(ge=0, le=1_000_000)] = Field(
+        default=0, description="Ascents from random joint actions, after that from the independent decision [-]."
+    )
+
+    def build(self, folder: Path) -> JointSearch:
+        """The search."""
+        from vedette.control import CoordinateAscent
+
+        return CoordinateAscent(self.num_restarts)
+
+
+class CustomSearch(Custom):
+    """A user's own `vedette.control.JointSearch`."""
+
+    kind: Literal["custom"] = Field(default="custom", description="Kind of search [-].")
+
+    @classmethod
+    def protocol(cls) -> type:
+        """What it gives."""
+        from vedette.control import JointSearch
+
+        return JointSearch
+
+    def build(self, folder: Path) -> JointSearch:
+        """The user's own."""
+        made: JointSearch = self.made(folder)
+        return made
+
+
+AnySearch = Annotated[Exhaustive | Ascent | CustomSearch, Field(discriminator="kind")]
 
 
 class PlanningLimits(Section):
@@ -72,7 +143,8 @@ class Control(Section):
     detection_threshold: Probability = Field(
         default=0.5, description="Ideal measurements see a target when its detection is at least so probable [-]."
     )
-    reward: CauchySchwarzReward = Field(default=CauchySchwarzReward(), description="Value of a density [-].")
+    reward: AnyReward = Field(default=CauchySchwarzReward(), description="Value of a density [-].")
+    search: AnySearch = Field(default=Exhaustive(), description="Which joint actions a joint decision evaluates [-].")
     limits: PlanningLimits = Field(default=PlanningLimits(), description="How much it works with [-].")
 
     @check
@@ -88,7 +160,7 @@ class Control(Section):
     def _times_in_order(self) -> Iterator[Finding]:
         yield from _order("decision_times", self.decision_times or ())
 
-    def build(self) -> PlanningSettings:
+    def build(self, num_threads: int = 0) -> PlanningSettings:
         """Horizon, samples and caps of a decision."""
         from vedette.control import PlanningSettings, planning_limits
 
@@ -104,4 +176,5 @@ class Control(Section):
                 max_hypotheses=self.limits.max_hypotheses,
                 min_relative_weight=self.limits.min_relative_weight,
             ),
+            num_threads=num_threads,
         )

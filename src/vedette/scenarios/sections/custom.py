@@ -1,22 +1,24 @@
-"""Things of the user's own that a scenario names: imported, and called where they are functions."""
+"""Things of the user's own that a scenario names: imported, made, and held against the protocol they are to meet."""
 
 from __future__ import annotations
 
 import hashlib
 import importlib
 import importlib.util
+import inspect
 import re
 import sys
+from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from types import ModuleType
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any, ClassVar
 
 from pydantic import AfterValidator, Field, JsonValue
 
 from vedette.errors import InputError, VedetteError
 from vedette.scenarios.sections.base import Section, expected
 
-_T = TypeVar("_T")
 _REFERENCE = re.compile(r"([A-Za-z_]\w*(\.[A-Za-z_]\w*)*|[^:]+\.py):[A-Za-z_]\w*(\.[A-Za-z_]\w*)*")
 
 
@@ -26,48 +28,148 @@ def _reference(value: str) -> str:
     return value
 
 
+class NotGiven(InputError):
+    """Code of the user's own that does not give what it is to give.
+
+    Attributes:
+        section: that names it.
+        key: of the section at which the fault is.
+        wanted, got: what was expected there, and what came.
+    """
+
+    def __init__(self, section: Custom, key: str, wanted: str, got: str) -> None:
+        super().__init__(f"{section.field}.{key}: expected {wanted}; got {got}")
+        self.section, self.key, self.wanted, self.got = section, key, wanted, got
+
+
 class Custom(Section):
-    """Something of the user's own, written in Python. Imported when a scenario is built, not when checked."""
+    """Something of the user's own, written in Python: an object, or a class or function that makes it.
+
+    What `function` names is taken as it is where it meets the protocol; a class or another function is called with
+    `arguments` and, of the parts that there are for its kind, those that it has parameters for.
+    """
 
     function: Annotated[str, AfterValidator(_reference)] = Field(
         description="Where it is: `package.module:attribute`, or `file.py:attribute` relative to the scenario file [-]."
     )
+    spared: ClassVar[tuple[str, ...]] = ()  # members of the protocol that it need not have
     arguments: dict[str, JsonValue] = Field(
-        default={}, description="Keyword arguments, where the attribute is a function that returns the object [-]."
+        default={}, description="Keyword arguments, where the attribute is a class or function that is called [-]."
     )
 
-    def imported(self, wanted: type[_T], folder: Path, field: str) -> _T:
-        """The object that `function` names, or that the function of that name returns.
+    @property
+    def field(self) -> str:
+        """What it is to be, in a word, for messages."""
+        return type(self).__name__.removeprefix("Custom").lower()
 
-        This runs the user's code; checking a scenario does not.
+    @classmethod
+    def protocol(cls) -> type:
+        """The class or protocol of what it gives."""
+        raise NotImplementedError
 
-        Args:
-            wanted: class of the object.
-            folder: what a `file.py` is relative to.
-            field: name of the section, for messages.
-
-        Raises:
-            InputError: it cannot be imported or called, or is of another class.
-        """
+    def named(self, folder: Path) -> Any:
+        """What `function` names; importing it runs the user's code. Raises `NotGiven` where it cannot be had."""
         name, _, attribute = self.function.rpartition(":")
         try:
             found: Any = _module(name, folder)
             for part in attribute.split("."):
                 found = getattr(found, part)
-            if isinstance(found, type) or (not isinstance(found, wanted) and callable(found)):
-                found = found(**self.arguments)
-            elif self.arguments:
-                raise InputError(f"{field}.arguments: expected none, as {self.function} is no function")
         except VedetteError:
             raise
         except Exception as error:
-            raise self._not_given(wanted, field, f"{type(error).__name__}: {error}") from error
-        if not isinstance(found, wanted):
-            raise self._not_given(wanted, field, f"a {type(found).__name__}")
+            raise self._not_given(f"{type(error).__name__}: {error}") from error
         return found
 
-    def _not_given(self, wanted: type, field: str, got: str) -> InputError:
-        return InputError(f"{field}.function: expected {self.function} to give a {wanted.__name__}; got {got}")
+    def made(self, folder: Path, **parts: Any) -> Any:
+        """The object, of `parts` where it has to be made. Raises `NotGiven` for anything but what is wanted."""
+        found, wanted = self.named(folder), self.protocol()
+        as_it_is = not isinstance(found, type) and (_is_function(wanted) or not lacks(found, wanted, self.spared))
+        try:
+            if as_it_is and _is_function(wanted) and self.arguments:
+                found = partial(found, **self.arguments)
+            elif as_it_is and self.arguments:
+                got = ", ".join(self.arguments)
+                raise NotGiven(self, "arguments", f"none, as {self.function} is no class and no function", got)
+            elif not as_it_is and callable(found):
+                found = found(**_asked_for(found, parts), **self.arguments)
+        except VedetteError:
+            raise
+        except Exception as error:
+            raise self._not_given(f"{type(error).__name__}: {error}") from error
+        if fault := lacks(found, wanted, self.spared):
+            raise self._not_given(fault)
+        return found
+
+    def _not_given(self, got: str) -> NotGiven:
+        return NotGiven(self, "function", f"{self.function} to give a {self.protocol().__name__}", got)
+
+
+def _is_function(wanted: type) -> bool:
+    return "__call__" in vars(wanted)
+
+
+def _asked_for(made: Any, parts: dict[str, Any]) -> dict[str, Any]:
+    """Of the parts, those that a class or function has parameters for."""
+    try:
+        parameters = inspect.signature(made).parameters
+    except (ValueError, TypeError):  # some that are written in C have none
+        return {}
+    if any(parameter.kind is parameter.VAR_KEYWORD for parameter in parameters.values()):
+        return parts
+    return {name: part for name, part in parts.items() if name in parameters}
+
+
+def lacks(found: Any, wanted: type, spared: Sequence[str] = ()) -> str:
+    """What an object lacks of a class or protocol but for what is spared, in words; empty where it lacks nothing."""
+    if not getattr(wanted, "_is_protocol", False):
+        return "" if isinstance(found, wanted) else f"a {type(found).__name__}"
+    what = f"a {type(found).__name__}"
+    for name, member in _members(wanted).items():
+        if name in spared:
+            continue
+        if not hasattr(found, name):
+            return f"{what} without {_shown(name, member)}"
+        own = found if name == "__call__" else getattr(found, name)
+        if inspect.isfunction(member) and not _takes(own, member):
+            return f"{what} that cannot be called as {_shown(name, member)}"
+    return ""
+
+
+def _members(wanted: type) -> dict[str, Any]:
+    members = {name: member for parent in reversed(wanted.__mro__) for name, member in vars(parent).items()}
+    return {
+        name: member
+        for name, member in members.items()
+        if (inspect.isfunction(member) or isinstance(member, property))
+        and (name == "__call__" or not name.startswith("_"))
+    }
+
+
+def _parameters(member: Any) -> list[inspect.Parameter]:
+    return list(inspect.signature(member).parameters.values())[1:]
+
+
+def _shown(name: str, member: Any) -> str:
+    if not inspect.isfunction(member):
+        return name
+    plain = [each.replace(annotation=inspect.Parameter.empty) for each in _parameters(member)]
+    return f"{name.replace('__call__', '')}{inspect.Signature(plain)}"
+
+
+def _takes(own: Any, member: Any) -> bool:
+    """Whether a method can be called as that of a protocol is: keyword-only arguments by name, the others in order."""
+    if not callable(own):
+        return False
+    parameters = _parameters(member)
+    by_name = {each.name: None for each in parameters if each.kind is each.KEYWORD_ONLY}
+    in_order = [None] * (len(parameters) - len(by_name))
+    try:
+        inspect.signature(own).bind(*in_order, **by_name)
+    except TypeError:
+        return False
+    except ValueError:  # written in C, or bound to arguments that it does not take
+        return not isinstance(own, partial)
+    return True
 
 
 def _module(name: str, folder: Path) -> ModuleType:

@@ -147,11 +147,17 @@ class CustomPlatform(_PlatformSection, Custom):
     kind: Literal["custom"] = Field(default="custom", description="Kind of platform [-].")
     pose: Numbers = Field(default=(), description="Its pose at the start beyond place and heading [-].")
 
-    def build(self, folder: Path) -> Platform:
-        """The user's own."""
+    @classmethod
+    def protocol(cls) -> type:
+        """What it gives."""
         from vedette.platforms import Platform
 
-        return self.imported(Platform, folder, "platform")  # type: ignore[type-abstract]
+        return Platform
+
+    def build(self, folder: Path) -> Platform:
+        """The user's own."""
+        made: Platform = self.made(folder)
+        return made
 
     def components(self) -> Row:
         """What its pose has at the start beyond place and heading."""

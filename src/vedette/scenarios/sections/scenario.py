@@ -7,14 +7,15 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, field_validator
 
-from vedette.scenarios.faults import Finding
+from vedette.scenarios.faults import Finding, describe
 from vedette.scenarios.sections.base import Name, Section, attempt, check
 from vedette.scenarios.sections.checks import CHECKS, step_of_time
 from vedette.scenarios.sections.control import Control
-from vedette.scenarios.sections.scoring import Estimator, MapEstimator, Ospa
+from vedette.scenarios.sections.planners import STRATEGIES, CustomPlanner
+from vedette.scenarios.sections.scoring import AnyEstimator, CustomMetric, MapEstimator, Ospa
 from vedette.scenarios.sections.sensors import Sensor, SensorDefaults
 from vedette.scenarios.sections.targets import Targets
-from vedette.scenarios.sections.tracking import Filter, Fusion
+from vedette.scenarios.sections.tracking import AnyFilter, AnyFusion, Filter, Fusion
 from vedette.scenarios.sections.world import (
     Birth,
     ConstantSurvival,
@@ -52,11 +53,29 @@ class ScenarioModel(Section):
         default=None, exclude=True, description="What the sensors share; merged into them when read [-]."
     )
     sensors: Annotated[tuple[Sensor, ...], Field(strict=False, min_length=1)] = Field(description="The sensors [-].")
-    filter: Filter = Field(default=Filter(), description="The local filters [-].")
-    fusion: Fusion = Field(default=Fusion(), description="How their densities become one [-].")
-    estimator: Estimator = Field(default=MapEstimator(), description="How estimates are read off [-].")
+    filter: AnyFilter = Field(default=Filter(), description="The local filters [-].")
+    fusion: AnyFusion = Field(default=Fusion(), description="How their densities become one [-].")
+    estimator: AnyEstimator = Field(default=MapEstimator(), description="How estimates are read off [-].")
     control: Control = Field(default=Control(), description="When and how the sensors decide [-].")
+    planners: dict[Name, CustomPlanner] = Field(
+        default={}, description="Strategies of your own by name, beside jdm, idm, random, fixed and still [-]."
+    )
     ospa: Ospa = Field(default=Ospa(), description="How the estimates are scored [-].")
+    metrics: dict[Name, CustomMetric] = Field(
+        default={}, description="Measures of your own by name, each a column of the scans [-]."
+    )
+
+    @check
+    def _names_of_strategies(self) -> Iterator[Finding]:
+        for name in self.planners:
+            if name in STRATEGIES:
+                yield ("planners", name), f"another name than {', '.join(STRATEGIES)}", describe(name)
+
+    @check
+    def _names_of_measures(self) -> Iterator[Finding]:
+        for name in self.metrics:
+            if not name.isidentifier():
+                yield ("metrics", name), "a name of letters, digits and underscores", describe(name)
 
     @classmethod
     def prepared(cls, data: Mapping[str, Any]) -> Mapping[str, Any]:

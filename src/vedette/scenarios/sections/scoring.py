@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field
 
 from vedette.scenarios.faults import Finding, describe
 from vedette.scenarios.sections.base import Chance, Count, Positive, Section, check
+from vedette.scenarios.sections.custom import Custom
 
 if TYPE_CHECKING:  # with the densities comes the compiler, which a check does without
-    from vedette.densities import Estimate
+    from vedette.densities import Estimate, Estimator
     from vedette.filters import Belief
 
 
@@ -21,7 +23,7 @@ class MapEstimator(Section):
 
     kind: Literal["map"] = Field(default="map", description="Kind of estimate [-].")
 
-    def build(self) -> Callable[[Belief, int], Estimate]:
+    def build(self, folder: Path) -> Estimator:
         """How estimates are read off a density after a scan, given its number, by which unlabelled ones are named."""
         from vedette.densities import GLMB, LMB, map_estimate, unlabelled_estimate
 
@@ -37,7 +39,7 @@ class MarginalEstimator(Section):
     kind: Literal["marginal"] = Field(default="marginal", description="Kind of estimate [-].")
     threshold: Chance = Field(default=0.5, description="Least probability of existence [-].")
 
-    def build(self) -> Callable[[Belief, int], Estimate]:
+    def build(self, folder: Path) -> Estimator:
         """How estimates are read off a density after a scan, given its number."""
         from vedette.densities import GLMB, LMB, marginal_estimate, unlabelled_estimate
 
@@ -49,7 +51,38 @@ class MarginalEstimator(Section):
         return estimate
 
 
-Estimator = Annotated[MapEstimator | MarginalEstimator, Field(discriminator="kind")]
+class CustomEstimator(Custom):
+    """A user's own way to read the targets off a density: a function of the density and the number of the scan."""
+
+    kind: Literal["custom"] = Field(default="custom", description="Kind of estimate [-].")
+
+    @classmethod
+    def protocol(cls) -> type:
+        """What it gives."""
+        from vedette.densities import Estimator
+
+        return Estimator
+
+    def build(self, folder: Path) -> Estimator:
+        """The user's own."""
+        made: Estimator = self.made(folder)
+        return made
+
+
+AnyEstimator = Annotated[MapEstimator | MarginalEstimator | CustomEstimator, Field(discriminator="kind")]
+
+
+class CustomMetric(Custom):
+    """A measure of the user's own: a function of a run's record that gives one number a scan."""
+
+    kind: Literal["custom"] = Field(default="custom", description="Kind of measure [-].")
+
+    @classmethod
+    def protocol(cls) -> type:
+        """What it gives."""
+        from vedette.simulation.records import Measure
+
+        return Measure
 
 
 class Ospa(Section):

@@ -78,11 +78,17 @@ class CustomMeasurement(Custom):
     dim: ClassVar[int | None] = None
     angular: ClassVar[tuple[int, ...]] = ()
 
-    def build(self, folder: Path) -> MeasurementModel:
-        """What a sensor measures."""
+    @classmethod
+    def protocol(cls) -> type:
+        """The class of what it gives."""
         from vedette.models import MeasurementModel
 
-        return self.imported(MeasurementModel, folder, "measurement")
+        return MeasurementModel
+
+    def build(self, folder: Path) -> MeasurementModel:
+        """What a sensor measures."""
+        made: MeasurementModel = self.made(folder)
+        return made
 
 
 Measurement = Annotated[
@@ -137,11 +143,17 @@ class CustomNoise(Custom):
 
     kind: Literal["custom"] = Field(default="custom", description="Kind of noise [-].")
 
-    def build(self, measurement: Measurement, folder: Path) -> NoiseModel:
-        """Measurement noise."""
+    @classmethod
+    def protocol(cls) -> type:
+        """The class of what it gives."""
         from vedette.models import NoiseModel
 
-        return self.imported(NoiseModel, folder, "noise")
+        return NoiseModel
+
+    def build(self, measurement: Measurement, folder: Path) -> NoiseModel:
+        """Measurement noise."""
+        made: NoiseModel = self.made(folder)
+        return made
 
 
 Noise = Annotated[RangeDependentNoise | ConstantNoise | CustomNoise, Field(discriminator="kind")]
@@ -227,11 +239,17 @@ class CustomDetection(Custom):
 
     kind: Literal["custom"] = Field(default="custom", description="Kind of detection [-].")
 
-    def build(self, folder: Path) -> DetectionModel:
-        """Probability of detection."""
+    @classmethod
+    def protocol(cls) -> type:
+        """The class of what it gives."""
         from vedette.models import DetectionModel
 
-        return self.imported(DetectionModel, folder, "detection")
+        return DetectionModel
+
+    def build(self, folder: Path) -> DetectionModel:
+        """Probability of detection."""
+        made: DetectionModel = self.made(folder)
+        return made
 
 
 Detection = Annotated[
@@ -273,11 +291,17 @@ class CustomClutter(Custom):
 
     kind: Literal["custom"] = Field(default="custom", description="Kind of clutter [-].")
 
-    def build(self, measurement: MeasurementModel, kind: str, region: Region, folder: Path) -> ClutterModel:
-        """False measurements; `kind` is that of the measurement."""
+    @classmethod
+    def protocol(cls) -> type:
+        """The class of what it gives."""
         from vedette.models import ClutterModel
 
-        return self.imported(ClutterModel, folder, "clutter")
+        return ClutterModel
+
+    def build(self, measurement: MeasurementModel, kind: str, region: Region, folder: Path) -> ClutterModel:
+        """False measurements; `kind` is that of the measurement."""
+        made: ClutterModel = self.made(folder)
+        return made
 
 
 Clutter = Annotated[RegionClutter | MeasurementSpaceClutter | CustomClutter, Field(discriminator="kind")]

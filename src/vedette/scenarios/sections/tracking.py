@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Annotated, Literal
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field
 
 from vedette.scenarios.faults import Finding
 from vedette.scenarios.sections.base import Chance, Count, GaussianMethod, Probability, Section, Share, check
+from vedette.scenarios.sections.custom import Custom
 
 if TYPE_CHECKING:  # with the filters comes the compiler, which a check does without
     from vedette.filters import Filter as LocalFilter
     from vedette.filters import Limits
     from vedette.fusion import Clmb, CmDeltaGlmb
+    from vedette.fusion import Fusion as FusionRule
     from vedette.models import SensorModel, TargetModel
 
 
@@ -106,7 +109,7 @@ class Filter(Section):
         if self.kind in ("lmb", *UNLABELLED) and self.assignment.kind == "gibbs":
             yield ("assignment", "kind"), f"ranked, as the filter is {self.kind}", '"gibbs"'
 
-    def build(self, targets: TargetModel, sensor: SensorModel) -> LocalFilter:
+    def build(self, targets: TargetModel, sensor: SensorModel, folder: Path) -> LocalFilter:
         """The filter of one sensor."""
         from vedette.filters import CbMemberFilter, CphdFilter, DeltaGlmbFilter, LmbFilter, PhdFilter
 
@@ -129,6 +132,30 @@ class Filter(Section):
             num_gibbs_samples=gibbs.num_samples,
             marginalised=self.kind == "m_delta_glmb",
         )
+
+
+class CustomFilter(Custom):
+    """A user's own `vedette.filters.Filter`, made for each sensor; called with `targets` and `sensor`."""
+
+    kind: Literal["custom"] = Field(default="custom", description="Kind of filter [-].")
+    gaussian_method: GaussianMethod = Field(
+        default="auto", description="Extended, unscented or cubature Kalman; auto: extended where Jacobians exist [-]."
+    )
+
+    @classmethod
+    def protocol(cls) -> type:
+        """What it gives."""
+        from vedette.filters import Filter
+
+        return Filter
+
+    def build(self, targets: TargetModel, sensor: SensorModel, folder: Path) -> LocalFilter:
+        """The filter of one sensor."""
+        made: LocalFilter = self.made(folder, targets=targets, sensor=sensor)
+        return made
+
+
+AnyFilter = Annotated[Filter | CustomFilter, Field(discriminator="kind")]
 
 
 Weights = Annotated[tuple[Probability, ...], Field(strict=False, min_length=1)]
@@ -189,7 +216,7 @@ class Fusion(Section):
         given = self.weights or (1.0,) * num_sensors
         return tuple(weight / math.fsum(given) for weight in given)
 
-    def build(self, num_sensors: int) -> CmDeltaGlmb | Clmb | None:
+    def build(self, num_sensors: int, folder: Path) -> CmDeltaGlmb | Clmb | None:
         """The fusion of the sensors' densities; None where there is none."""
         from vedette.fusion import Clmb, CmDeltaGlmb, FusionLimits
 
@@ -206,3 +233,25 @@ class Fusion(Section):
         if self.kind == "clmb":
             return Clmb(weights, self.mixture_power, self.missing_existence, limits)
         return CmDeltaGlmb(weights, self.mixture_power, math.log(self.missing_weight), limits)
+
+
+class CustomFusion(Custom):
+    """A user's own `vedette.fusion.Fusion`; called with `num_sensors`."""
+
+    kind: Literal["custom"] = Field(default="custom", description="Kind of fusion [-].")
+    feedback: bool = Field(default=False, description="Whether the fused density replaces the sensors' own [-].")
+
+    @classmethod
+    def protocol(cls) -> type:
+        """What it gives."""
+        from vedette.fusion import Fusion
+
+        return Fusion
+
+    def build(self, num_sensors: int, folder: Path) -> FusionRule[Any, Any]:
+        """The fusion of the sensors' densities."""
+        made: FusionRule[Any, Any] = self.made(folder, num_sensors=num_sensors)
+        return made
+
+
+AnyFusion = Annotated[Fusion | CustomFusion, Field(discriminator="kind")]

@@ -12,7 +12,6 @@ import numpy as np
 from pydantic import Field
 
 from vedette.covariances import SMALLEST_VARIANCE
-from vedette.errors import InputError
 from vedette.scenarios.faults import Finding, describe
 from vedette.scenarios.sections.base import (
     GaussianMethod,
@@ -24,7 +23,7 @@ from vedette.scenarios.sections.base import (
     Whole,
     check,
 )
-from vedette.scenarios.sections.custom import Custom
+from vedette.scenarios.sections.custom import Custom, NotGiven
 
 if TYPE_CHECKING:  # with the models comes the compiler, which a check does without
     from vedette.kernels.base.types import Floats
@@ -131,6 +130,13 @@ class CustomMotion(Custom):
     kind: Literal["custom"] = Field(default="custom", description="Kind of motion [-].")
     state_dim: Annotated[Whole, Field(ge=2, le=100, description="Number of components of its state [-].")]
 
+    @classmethod
+    def protocol(cls) -> type:
+        """The class of what it gives."""
+        from vedette.models import MotionModel
+
+        return MotionModel
+
     @property
     def state_order(self) -> Literal["grouped"]:
         """States are written as the model has them."""
@@ -138,12 +144,9 @@ class CustomMotion(Custom):
 
     def build(self, method: GaussianMethod, folder: Path) -> MotionModel:
         """The motion model. Raises `InputError` where it has another state dimension than it says."""
-        from vedette.models import MotionModel
-
-        motion = self.imported(MotionModel, folder, "motion")
+        motion: MotionModel = self.made(folder)
         if motion.state_dim != self.state_dim:
-            wanted = f"that of {self.function}, {motion.state_dim}"
-            raise InputError(f"motion.state_dim: expected {wanted}; got {self.state_dim}")
+            raise NotGiven(self, "state_dim", f"that of {self.function}, {motion.state_dim}", str(self.state_dim))
         return motion if method == "auto" else replace(motion, method=method)
 
 
@@ -175,11 +178,17 @@ class CustomSurvival(Custom):
 
     kind: Literal["custom"] = Field(default="custom", description="Kind of survival [-].")
 
-    def build(self, folder: Path) -> SurvivalModel:
-        """The survival model."""
+    @classmethod
+    def protocol(cls) -> type:
+        """The class of what it gives."""
         from vedette.models import SurvivalModel
 
-        return self.imported(SurvivalModel, folder, "survival")
+        return SurvivalModel
+
+    def build(self, folder: Path) -> SurvivalModel:
+        """The survival model."""
+        made: SurvivalModel = self.made(folder)
+        return made
 
 
 Survival = Annotated[ConstantSurvival | CustomSurvival, Field(discriminator="kind")]

@@ -1,0 +1,124 @@
+"""From the combinations of all tracks at all sensors to the LMB of the exact posterior's existences and densities."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from vedette.kernels.association.options import Rows
+from vedette.kernels.association.truncation import Truncation
+from vedette.kernels.base.compile import kernel
+from vedette.kernels.base.types import Floats, Ints, Lmb, Tracks
+from vedette.kernels.gaussian.linalg import log_add, log_sum
+from vedette.kernels.gaussian.mixtures import copy_component, require_gaussians
+from vedette.kernels.steps.lmb import LmbReport, Reduction, append_reduced, labels_to_keep
+from vedette.kernels.steps.multi_sensor_combinations import Combinations
+from vedette.kernels.steps.multi_sensor_marginals import Choices, StateCaps, choice_marginals
+
+
+@kernel
+def _likely_choices(combinations: Combinations, log_least_odds: float) -> tuple[Choices, Ints, float]:
+    """The choices of every track, without those that take measurements and are surely less probable than that.
+
+    A joint choice that holds a combination of weight w exists for every one in which the track takes no measurement, of
+    weight v, instead; so its probability is at most w / (v + w). Also returns which combination each choice is, and the
+    log of the share of weight that is left at least.
+    """
+    rows, num_tracks, num = combinations.rows, len(combinations.log_absent), len(combinations.tracks)
+    log_weights, log_free, log_kept = np.empty(num), combinations.log_absent.copy(), 0.0
+    for i in range(num):
+        log_weights[i] = log_sum(rows.log_weights[rows.offsets[i] : rows.offsets[i + 1]])
+        if combinations.columns[i].max() < 0:
+            log_free[combinations.tracks[i]] = log_add(log_free[combinations.tracks[i]], log_weights[i])
+    offsets, kept, count = np.zeros(num_tracks + 1, np.int64), np.empty(num, np.int64), 0
+    for i in range(num):
+        odds = log_weights[i] - log_free[combinations.tracks[i]]
+        if combinations.columns[i].max() >= 0 and odds < log_least_odds:
+            log_kept -= log_add(0.0, odds)
+            continue
+        kept[count], log_weights[count] = i, log_weights[i]
+        offsets[combinations.tracks[i] + 1] += 1
+        count += 1
+    columns = np.empty((count, combinations.columns.shape[1]), np.int64)
+    for choice in range(count):
+        columns[choice] = combinations.columns[kept[choice]]
+    for track in range(num_tracks):
+        offsets[track + 1] += offsets[track]
+    return Choices(offsets, columns, log_weights[:count], combinations.log_absent), kept[:count], log_kept
+
+
+@kernel
+def _logits(choices: Choices, marginals: Floats, absent: Floats) -> Floats:
+    """Log odds of each track's existence; -inf where it cannot be there."""
+    logits = np.empty(len(absent))
+    for track in range(len(absent)):
+        present = -math.inf
+        for choice in range(choices.offsets[track], choices.offsets[track + 1]):
+            present = log_add(present, marginals[choice])
+        logits[track] = present - absent[track] if present > -math.inf else -math.inf
+    return logits
+
+
+@kernel
+def _widths(chosen: Ints, rows: Rows, choices: Choices, sources: Ints) -> tuple[int, int]:
+    """Components of the chosen track that has most, and of all chosen tracks."""
+    widest, total = 0, 0
+    for track in chosen:
+        width = 0
+        for source in sources[choices.offsets[track] : choices.offsets[track + 1]]:
+            width += rows.offsets[source + 1] - rows.offsets[source]
+        widest, total = max(widest, width), total + width
+    return widest, total
+
+
+@kernel
+def _reduced_tracks(
+    chosen: Ints, rows: Rows, choices: Choices, sources: Ints, marginals: Floats, reduction: Reduction
+) -> Tracks:
+    """Each chosen track's mixture over its combinations, reduced."""
+    dim = rows.means.shape[1]
+    widest, total = _widths(chosen, rows, choices, sources)
+    labels, offsets = np.empty((len(chosen), 2), np.int64), np.zeros(len(chosen) + 1, np.int64)
+    log_weights, means, covs = np.empty(total), np.empty((total, dim)), np.empty((total, dim, dim))
+    wide_weights, wide_means, wide_covs = np.empty(widest), np.empty((widest, dim)), np.empty((widest, dim, dim))
+    filled = 0
+    for i in range(len(chosen)):
+        width = 0
+        for choice in range(choices.offsets[chosen[i]], choices.offsets[chosen[i] + 1]):
+            source = sources[choice]
+            labels[i, 0], labels[i, 1] = rows.labels[source, 0], rows.labels[source, 1]
+            for c in range(rows.offsets[source], rows.offsets[source + 1]):
+                weight = rows.log_weights[c] + marginals[choice] - choices.log_weights[choice]
+                if weight > -math.inf:
+                    copy_component(rows.means, rows.covs, c, wide_means, wide_covs, width)
+                    wide_weights[width] = weight
+                    width += 1
+        filled = append_reduced(
+            wide_weights[:width], wide_means[:width], wide_covs[:width], reduction, filled, log_weights, means, covs
+        )
+        offsets[i + 1] = filled
+    return Tracks(labels, offsets, log_weights[:filled], means[:filled], covs[:filled])
+
+
+@kernel
+def update_lmb(
+    combinations: Combinations, num_columns: int, truncation: Truncation, reduction: Reduction
+) -> tuple[Lmb, LmbReport]:
+    """Associate, marginalise and reduce once the combinations are there; clutter is left to those who made them.
+
+    num_columns: measurements of all sensors. The least existence logit must be above -inf: a track that cannot be there
+    has no density.
+    """
+    choices, sources, log_kept = _likely_choices(combinations, reduction.min_existence_logit)
+    marginals, absent = np.empty(len(sources)), np.empty(len(choices.log_absent))
+    caps = StateCaps(truncation.max_hypotheses, truncation.max_log_gap)
+    log_total, num_inexact, log_summed = choice_marginals(choices, num_columns, caps, marginals, absent)
+    logits = _logits(choices, marginals, absent)
+    chosen, dropped = labels_to_keep(logits, reduction)
+    tracks = _reduced_tracks(chosen, combinations.rows, choices, sources, marginals, reduction)
+    require_gaussians(tracks.means, tracks.covs)
+    chosen_logits = np.empty(len(chosen))
+    for i in range(len(chosen)):
+        chosen_logits[i] = logits[chosen[i]]
+    return Lmb(tracks, chosen_logits), LmbReport(log_total, 0.0, 0, num_inexact, log_kept + log_summed, dropped)

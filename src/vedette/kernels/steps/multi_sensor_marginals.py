@@ -1,0 +1,433 @@
+"""Marginal probability of every combination of every track, where tracks contend for the measurements of all sensors.
+
+Within a cluster of tracks that share a measurement of any sensor, directly or not, the sum over all joint choices runs
+forward and backward over the tracks; its state is the set of contested measurements that earlier tracks have taken and
+later ones may still ask for. Only sets that occur are held, and the tracks come in an order that keeps few measurements
+open at a time. All is in logs, so that nothing vanishes.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from vedette.kernels.base.arrays import filled_ints, hashed
+from vedette.kernels.base.compile import inlined, kernel
+from vedette.kernels.base.types import Floats, Ints
+from vedette.kernels.gaussian.linalg import log_add
+from vedette.kernels.gaussian.mixtures import descending_order
+
+_BITS = 31  # bits of a mask in one word, so that words hash without overflow
+_NUM_PARTS = 32  # kept states that are tried in the place of one that is not
+
+
+class Choices(NamedTuple):
+    """What each track may choose. Choices of track `t` are `offsets[t]:offsets[t + 1]`, and being absent.
+
+    columns: (num_choices, num_sensors) measurements taken, counted through all sensors; negative: none.
+    log_weights: (num_choices,). log_absent: (num_tracks,).
+    """
+
+    offsets: Ints
+    columns: Ints
+    log_weights: Floats
+    log_absent: Floats
+
+
+class StateCaps(NamedTuple):
+    """How many sets of taken measurements are followed at a time, and to which log weight under the heaviest."""
+
+    max_states: int
+    max_log_gap: float
+
+
+class Classes(NamedTuple):
+    """Choices of the tracks of a cluster, those that take the same contested measurements together.
+
+    offsets: (num_members + 1,) classes of each member, of which the first takes nothing.
+    masks: (num_classes, num_words).
+    log_weights: (num_classes,). alive: (num_members, num_words) measurements for which a later member may ask.
+    """
+
+    offsets: Ints
+    masks: Ints
+    log_weights: Floats
+    alive: Ints
+
+
+class States(NamedTuple):
+    """Sets of contested measurements that have been taken.
+
+    masks: (num_states, num_words). log_weights: (num_states,) of all that led there. log_lent: (num_states, 2) of that
+    which led to sets that are not followed but taken for this one: in the sum, and in the bound on what is amiss in it.
+    """
+
+    masks: Ints
+    log_weights: Floats
+    log_lent: Floats
+
+
+@inlined
+def _root(leaders: Ints, track: int) -> int:
+    while leaders[track] != track:
+        track = leaders[track]
+    return track
+
+
+@kernel
+def _find_clusters(choices: Choices, num_columns: int) -> tuple[Ints, Ints]:
+    """leaders: (num_tracks,) a track of the same cluster, not after the track itself; the first leads itself.
+    contested: (num_columns,) 1 where more than one track may take the measurement.
+    """
+    num_tracks = len(choices.log_absent)
+    leaders, owners, contested = (
+        np.empty(num_tracks, np.int64),
+        filled_ints(num_columns, -1),
+        filled_ints(num_columns, 0),
+    )
+    for track in range(num_tracks):
+        leaders[track] = track
+        for choice in range(choices.offsets[track], choices.offsets[track + 1]):
+            for sensor in range(choices.columns.shape[1]):
+                column = choices.columns[choice, sensor]
+                if column < 0 or owners[column] == track:
+                    continue
+                if owners[column] >= 0:
+                    contested[column] = 1
+                    a, b = _root(leaders, owners[column]), _root(leaders, track)
+                    leaders[max(a, b)] = min(a, b)
+                owners[column] = track
+    return leaders, contested
+
+
+@kernel
+def _members(leaders: Ints, leader: int) -> Ints:
+    members, count = np.empty(len(leaders) - leader, np.int64), 0
+    for track in range(leader, len(leaders)):
+        if _root(leaders, track) == leader:
+            members[count] = track
+            count += 1
+    return members[:count]
+
+
+@kernel
+def _number_contested(choices: Choices, members: Ints, contested: Ints) -> tuple[Ints, int]:
+    """(num_columns,) number of each contested measurement of the cluster, else -1, and how many there are."""
+    bit_of, num_bits = filled_ints(len(contested), -1), 0
+    for track in members:
+        for choice in range(choices.offsets[track], choices.offsets[track + 1]):
+            for sensor in range(choices.columns.shape[1]):
+                column = choices.columns[choice, sensor]
+                if column >= 0 and contested[column] == 1 and bit_of[column] < 0:
+                    bit_of[column] = num_bits
+                    num_bits += 1
+    return bit_of, num_bits
+
+
+@kernel
+def _order_members(choices: Choices, members: Ints, bit_of: Ints, num_bits: int) -> None:
+    """Put next, again and again, the member that leaves the fewest measurements open: asked for before and after it."""
+    num = len(members)
+    wants, asked, is_open = (
+        np.zeros((num, num_bits), np.int64),
+        np.zeros(num_bits, np.int64),
+        np.zeros(num_bits, np.int64),
+    )
+    for i in range(num):
+        for choice in range(choices.offsets[members[i]], choices.offsets[members[i] + 1]):
+            for sensor in range(choices.columns.shape[1]):
+                column = choices.columns[choice, sensor]
+                if column >= 0 and bit_of[column] >= 0 and wants[i, bit_of[column]] == 0:
+                    wants[i, bit_of[column]] = 1
+                    asked[bit_of[column]] += 1
+    for place in range(num):
+        best, fewest = place, num_bits + 1
+        for i in range(place, num):
+            count = 0
+            for bit in range(num_bits):
+                if is_open[bit] + wants[i, bit] > 0 and asked[bit] > wants[i, bit]:
+                    count += 1
+            if count < fewest:
+                best, fewest = i, count
+        chosen = members[best]
+        for i in range(best, place, -1):
+            members[i] = members[i - 1]
+        members[place] = chosen
+        for bit in range(num_bits):
+            wanted = wants[best, bit]
+            for i in range(best, place, -1):
+                wants[i, bit] = wants[i - 1, bit]
+            wants[place, bit] = wanted
+            asked[bit] -= wanted
+            is_open[bit] = max(is_open[bit], wanted)
+
+
+@inlined
+def _write_mask(columns: Ints, choice: int, bit_of: Ints, mask: Ints) -> None:
+    for word in range(len(mask)):
+        mask[word] = 0
+    for sensor in range(columns.shape[1]):
+        column = columns[choice, sensor]
+        if column >= 0 and bit_of[column] >= 0:
+            mask[bit_of[column] // _BITS] |= 1 << (bit_of[column] % _BITS)
+
+
+@inlined
+def _same(first: Ints, second: Ints) -> bool:
+    difference = 0
+    for word in range(len(first)):
+        difference |= first[word] ^ second[word]
+    return difference == 0
+
+
+@kernel
+def _make_classes(choices: Choices, members: Ints, contested: Ints, class_of: Ints) -> Classes:
+    """Classes of the members, which are put in order. class_of: (num_choices,) to be written for their choices."""
+    bit_of, num_bits = _number_contested(choices, members, contested)
+    _order_members(choices, members, bit_of, num_bits)
+    num_words, most = max(1, (num_bits + _BITS - 1) // _BITS), len(members)
+    for track in members:
+        most += choices.offsets[track + 1] - choices.offsets[track]
+    offsets, masks, log_weights = (
+        np.zeros(len(members) + 1, np.int64),
+        np.empty((most, num_words), np.int64),
+        np.empty(most),
+    )
+    filled = 0
+    for i in range(len(members)):
+        first = filled
+        log_weights[filled] = choices.log_absent[members[i]]
+        for word in range(num_words):
+            masks[filled, word] = 0
+        filled += 1
+        for choice in range(choices.offsets[members[i]], choices.offsets[members[i] + 1]):
+            _write_mask(choices.columns, choice, bit_of, masks[filled])
+            found = first
+            while not _same(masks[found], masks[filled]):
+                found += 1
+            if found == filled:
+                log_weights[filled] = -math.inf
+                filled += 1
+            log_weights[found] = log_add(log_weights[found], choices.log_weights[choice])
+            class_of[choice] = found
+        offsets[i + 1] = filled
+    alive = np.zeros((len(members), num_words), np.int64)
+    for i in range(len(members) - 2, -1, -1):
+        for word in range(num_words):
+            alive[i, word] = alive[i + 1, word]
+            for later in range(offsets[i + 1], offsets[i + 2]):
+                alive[i, word] |= masks[later, word]
+    return Classes(offsets, masks[:filled], log_weights[:filled], alive)
+
+
+@inlined
+def _slot(table: Ints, masks: Ints, mask: Ints) -> int:
+    """Where in the hash table `mask` stands, or the free place for it."""
+    key = 0
+    for word in range(len(mask)):
+        key = hashed(key, mask[word])
+    slot = key & (len(table) - 1)
+    while table[slot] >= 0 and not _same(masks[table[slot]], mask):
+        slot = (slot + 1) & (len(table) - 1)
+    return slot
+
+
+@kernel
+def _advance(classes: Classes, member: int, states: States) -> tuple[States, Ints]:
+    """The states after a member has chosen, and which of them follows from each state and class, -1 for none, in two
+    columns as `States.log_lent`.
+    """
+    first, num_classes = classes.offsets[member], classes.offsets[member + 1] - classes.offsets[member]
+    most, num_words = len(states.masks) * num_classes, states.masks.shape[1]
+    size = 4
+    while size < 2 * most:
+        size *= 2
+    table, targets = filled_ints(size, -1), np.full((most, 2), -1)
+    masks, log_weights, count = np.empty((most + 1, num_words), np.int64), np.empty(most), 0
+    for state in range(len(states.masks)):
+        for c in range(num_classes):
+            log_weight, free = states.log_weights[state] + classes.log_weights[first + c], True
+            for word in range(num_words):
+                before, taken = states.masks[state, word], classes.masks[first + c, word]
+                free = free and before & taken == 0
+                masks[count, word] = (before | taken) & classes.alive[member, word]
+            if not free or classes.log_weights[first + c] == -math.inf:
+                continue
+            slot = _slot(table, masks, masks[count])
+            if table[slot] < 0:
+                table[slot], log_weights[count] = count, log_weight
+                count += 1
+            else:
+                log_weights[table[slot]] = log_add(log_weights[table[slot]], log_weight)
+            targets[state * num_classes + c, 0] = targets[state * num_classes + c, 1] = table[slot]
+    return States(masks[:count], log_weights[:count], np.full((count, 2), -math.inf)), targets
+
+
+@inlined
+def _part_of(masks: Ints, num: int, mask: Ints) -> int:
+    """The first of `num` sets that is part of `mask`; -1: none."""
+    for place in range(num):
+        is_part = True
+        for word in range(len(mask)):
+            is_part = is_part and masks[place, word] & ~mask[word] == 0
+        if is_part:
+            return place
+    return -1
+
+
+@kernel
+def _keep_heaviest(states: States, targets: Ints, caps: StateCaps) -> States:
+    """The heaviest states, to which `targets` are led.
+
+    Another is taken for the heaviest of the first few that is part of it. Where there is none, it is taken for the
+    heaviest of all in the sum, so that no choice is ruled out for want of a state; and for the empty set in the bound,
+    since the less is taken, the more choices are left to the later members.
+    """
+    order, num_words = descending_order(states.log_weights), states.masks.shape[1]
+    heaviest, most = states.log_weights[order[0]], 0
+    if heaviest == -math.inf:
+        return states
+    while most < min(len(order), caps.max_states) and heaviest - states.log_weights[order[most]] <= caps.max_log_gap:
+        most += 1
+    if most == len(order):
+        return states
+    places, masks = np.empty((len(order), 2), np.int64), np.zeros((most + 1, num_words), np.int64)
+    log_weights, log_lent = np.full(most + 1, -math.inf), np.full((most + 1, 2), -math.inf)
+    for place in range(len(order)):
+        state, follower, bound = order[place], place, place
+        if place < most:
+            for word in range(num_words):
+                masks[place, word] = states.masks[state, word]
+        else:
+            part = _part_of(masks, min(most, _NUM_PARTS), states.masks[state])
+            follower, bound = (part, part) if part >= 0 else (0, most)
+            log_lent[follower, 0] = log_add(log_lent[follower, 0], states.log_weights[state])
+            log_lent[bound, 1] = log_add(log_lent[bound, 1], states.log_weights[state])
+        places[state, 0], places[state, 1] = follower, bound
+        log_weights[follower] = log_add(log_weights[follower], states.log_weights[state])
+    for i in range(len(targets)):
+        if targets[i, 0] >= 0:
+            targets[i, 1] = places[targets[i, 0], 1]
+            targets[i, 0] = places[targets[i, 0], 0]
+    return States(masks, log_weights, log_lent)
+
+
+@kernel
+def _backward(classes: Classes, starts: Ints, forward: States, targets: Ints, out: Floats) -> float:
+    """Log of the sum of all joint choices that hold each class; returns the log of the most that is amiss in them."""
+    amiss, amiss_at_most, last = -math.inf, -math.inf, len(targets)
+    after = np.zeros((1, 2))
+    for member in range(len(starts) - 2, -1, -1):
+        first, num_classes = classes.offsets[member], classes.offsets[member + 1] - classes.offsets[member]
+        num_states = starts[member + 1] - starts[member]
+        before = np.full((num_states, 2), -math.inf)
+        last -= num_states * num_classes
+        for c in range(num_classes):
+            out[first + c] = -math.inf
+        for i in range(num_states):
+            state = starts[member] + i
+            for c in range(num_classes):
+                target, bound = targets[last + i * num_classes + c, 0], targets[last + i * num_classes + c, 1]
+                if target >= 0:
+                    rest = classes.log_weights[first + c] + after[target, 0]
+                    before[i, 0] = log_add(before[i, 0], rest)
+                    before[i, 1] = log_add(before[i, 1], classes.log_weights[first + c] + after[bound, 1])
+                    out[first + c] = log_add(out[first + c], forward.log_weights[state] + rest)
+            amiss = log_add(amiss, forward.log_lent[state, 0] + before[i, 0])
+            amiss_at_most = log_add(amiss_at_most, forward.log_lent[state, 1] + before[i, 1])
+        after = before
+    return max(amiss, amiss_at_most)
+
+
+@kernel
+def _append(forward: States, filled: int, states: States) -> States:
+    """`forward` with the states of one more member from `filled` on; their masks are not needed any more."""
+    num = len(states.log_weights)
+    log_weights, log_lent = forward.log_weights, forward.log_lent
+    if filled + num > len(log_weights):
+        room = 2 * (filled + num)
+        log_weights, log_lent = np.empty(room), np.empty((room, 2))
+        log_weights[:filled], log_lent[:filled] = forward.log_weights[:filled], forward.log_lent[:filled]
+    log_weights[filled : filled + num], log_lent[filled : filled + num] = states.log_weights, states.log_lent
+    return States(forward.masks, log_weights, log_lent)
+
+
+@kernel
+def _sum_cluster(classes: Classes, caps: StateCaps, out: Floats) -> tuple[float, float]:
+    """Log of the sum of all joint choices that hold each class; returns the log of all, and the most that is amiss."""
+    num_members = len(classes.offsets) - 1
+    starts, num_targets = np.zeros(num_members + 1, np.int64), 0
+    states = States(np.zeros((1, classes.masks.shape[1]), np.int64), np.zeros(1), np.full((1, 2), -math.inf))
+    forward, targets = states, np.empty((256, 2), np.int64)
+    for member in range(num_members):
+        starts[member + 1] = starts[member] + len(states.log_weights)
+        forward = _append(forward, starts[member], states)
+        states, followers = _advance(classes, member, states)
+        if len(states.log_weights) == 0:
+            return -math.inf, -math.inf
+        states = _keep_heaviest(states, followers, caps)
+        filled, num_targets = num_targets, num_targets + len(followers)
+        if num_targets > len(targets):
+            longer = np.empty((2 * num_targets, 2), np.int64)
+            longer[:filled] = targets[:filled]
+            targets = longer
+        targets[filled:num_targets] = followers
+    return states.log_weights[0], _backward(classes, starts, forward, targets[:num_targets], out)
+
+
+@inlined
+def _single_track(choices: Choices, track: int, out: Floats, out_absent: Floats) -> float:
+    log_total = choices.log_absent[track]
+    for choice in range(choices.offsets[track], choices.offsets[track + 1]):
+        log_total = log_add(log_total, choices.log_weights[choice])
+    if log_total == -math.inf:
+        return log_total
+    out_absent[track] = choices.log_absent[track] - log_total
+    for choice in range(choices.offsets[track], choices.offsets[track + 1]):
+        out[choice] = choices.log_weights[choice] - log_total
+    return log_total
+
+
+@kernel
+def choice_marginals(
+    choices: Choices, num_columns: int, caps: StateCaps, out: Floats, out_absent: Floats
+) -> tuple[float, int, float]:
+    """Log marginal probability of each choice in `out`, and of each track's absence in `out_absent`.
+
+    Returns the log total weight of all joint choices (-inf: none is possible), the number of clusters in which not all
+    sets of taken measurements were followed, and the log of the least share of all weight that is where it should be (0
+    without such clusters): 1 less that share bounds the error of each marginal.
+    """
+    log_total, num_inexact, log_kept = 0.0, 0, 0.0
+    leaders, contested = _find_clusters(choices, num_columns)
+    class_of = np.empty(len(choices.log_weights), np.int64)
+    for leader in range(len(leaders)):
+        if leaders[leader] != leader:
+            continue
+        members = _members(leaders, leader)
+        if len(members) == 1:
+            log_total += _single_track(choices, leader, out, out_absent)
+            if log_total == -math.inf:
+                return log_total, num_inexact, log_kept
+            continue
+        classes = _make_classes(choices, members, contested, class_of)
+        sums = np.empty(len(classes.log_weights))
+        log_joint, log_amiss = _sum_cluster(classes, caps, sums)
+        if log_joint == -math.inf:
+            return -math.inf, num_inexact, log_kept
+        log_total += log_joint
+        if log_amiss > -math.inf:
+            num_inexact += 1
+            log_kept += math.log1p(-math.exp(log_amiss - log_joint)) if log_amiss < log_joint else -math.inf
+        for i in range(len(members)):
+            none, track = classes.offsets[i], members[i]
+            # A class's share among all choices, times a choice's among those of its class.
+            out_absent[track] = choices.log_absent[track]
+            if out_absent[track] > -math.inf:
+                out_absent[track] += sums[none] - log_joint - classes.log_weights[none]
+            for choice in range(choices.offsets[track], choices.offsets[track + 1]):
+                c = class_of[choice]
+                out[choice] = sums[c] - log_joint + choices.log_weights[choice] - classes.log_weights[c]
+    return log_total, num_inexact, log_kept

@@ -1,0 +1,105 @@
+"""The strategies by name: the one place where they are declared, and those of the user's own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple
+
+import numpy as np
+from pydantic import Field
+
+from vedette.scenarios.sections.custom import Custom
+
+if TYPE_CHECKING:  # with the planners comes the compiler, which a check does without
+    from vedette.control import JointSearch, MobileSensor, Plan, Planner, PlanningSettings, Reward
+    from vedette.fusion import Fusion
+    from vedette.platforms import Actions
+
+
+class Parts(NamedTuple):
+    """What planners are made of.
+
+    sensors: the sensors that are steered. fusion: how their densities become one; of one sensor, of it alone. settings:
+    horizon, samples, caps, threads. reward: the value of a density. search: which joint actions are evaluated.
+    first_actions: what each sensor does where nothing decides.
+    """
+
+    sensors: tuple[MobileSensor, ...]
+    fusion: Fusion[Any, Any]
+    settings: PlanningSettings
+    reward: Reward
+    search: JointSearch
+    first_actions: tuple[Actions, ...]
+
+
+class Strategy(NamedTuple):
+    """A strategy that every scenario has: in a word, whether it needs labels, and how its planner is made."""
+
+    words: str
+    needs_labels: bool
+    planner: Callable[[Parts], Planner | None]
+
+
+def _joint(parts: Parts) -> Planner:
+    from vedette.control import JointPlanner
+
+    return JointPlanner(parts.sensors, parts.fusion, parts.settings, parts.reward, parts.search)
+
+
+def _independent(parts: Parts) -> Planner:
+    from vedette.control import IndependentPlanner
+
+    return IndependentPlanner(parts.sensors, parts.fusion, parts.settings, parts.reward)
+
+
+def _random(parts: Parts) -> Planner:
+    from vedette.control import RandomPlanner
+
+    return RandomPlanner(parts.sensors, parts.settings)
+
+
+def _fixed(parts: Parts) -> Planner:
+    from vedette.control import FixedPlanner
+
+    return FixedPlanner(parts.first_actions)
+
+
+STRATEGIES = {
+    "jdm": Strategy("joint", True, _joint),
+    "idm": Strategy("independent", True, _independent),
+    "random": Strategy("random", False, _random),
+    "fixed": Strategy("first course", False, _fixed),
+    "still": Strategy("never under way", False, lambda parts: None),
+}
+
+
+class CustomPlanner(Custom):
+    """A user's own planner; called with `sensors`, `fusion`, `settings`, `reward`, `search` and `first_actions`."""
+
+    kind: Literal["custom"] = Field(default="custom", description="Kind of planner [-].")
+    spared: ClassVar[tuple[str, ...]] = ("name",)  # which the scenario gives
+
+    @classmethod
+    def protocol(cls) -> type:
+        """What it gives."""
+        from vedette.control import Planner
+
+        return Planner
+
+    def build(self, name: str, parts: Parts, folder: Path) -> Planner:
+        """The user's own, under the name that the scenario gives it."""
+        return Named(name, self.made(folder, **parts._asdict()))
+
+
+@dataclass(frozen=True, slots=True)
+class Named:
+    """A planner of the user's own under the name that the scenario gives it."""
+
+    name: str
+    planner: Planner
+
+    def plan(self, *situation: Any, rng: np.random.Generator) -> Plan:
+        """What the planner decides."""
+        return replace(self.planner.plan(*situation, rng=rng), planner=self.name)

@@ -1,0 +1,111 @@
+"""What a run has brought so far, and where it is; so that a run that stops leaves what was finished."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
+from typing import TypeAlias
+
+import numpy as np
+
+from vedette.control import Plan
+from vedette.densities import Estimate
+from vedette.errors import VedetteError
+from vedette.kernels.base.types import Floats
+from vedette.simulation.experiment import Experiment
+from vedette.simulation.health import Health
+from vedette.simulation.records import Decision, RunRecord
+from vedette.simulation.truth import Truth
+from vedette.tracking import Stages, TrackerInfo, stage_of
+
+Score: TypeAlias = Callable[[Truth, Sequence[Estimate]], Floats]
+
+# What the time of a run is spent on. A tracker's own time is the filters', but for what it says was the fusion's.
+STAGES = ("scans", "filter", "fusion", "estimate", "planning")
+
+
+class Journal:
+    """The scans of a run that have an estimate; `step` is the scan at hand, counted from 1."""
+
+    def __init__(self, experiment: Experiment, planner: str, seed: int, run: int, truth: Truth) -> None:
+        self.experiment, self.planner, self.seed, self.run, self.truth = experiment, planner, seed, run, truth
+        self.step = 1
+        self.estimates: list[Estimate] = []
+        self._poses: list[Floats] = []
+        self._decisions: list[Decision] = []
+        self._health = Health.unreported(len(experiment.times), experiment.num_sensors)
+        self._clocks: list[Stages] = [Stages()]
+        self._fusion: list[float] = []
+
+    @property
+    def time(self) -> float:
+        """Of the scan at hand, s."""
+        return float(self.experiment.times[self.step - 1])
+
+    def begin(self, step: int) -> None:
+        """Turn to a scan."""
+        self.step = step
+        if step > 1:
+            self._clocks.append(Stages())
+
+    def timing(self, stage: str) -> AbstractContextManager[None]:
+        """Take the time of a stage of the scan at hand."""
+        return self._clocks[-1].timing(stage)
+
+    def note(self, poses: Floats, info: TrackerInfo, estimate: Estimate) -> None:
+        """Write down the scan at hand."""
+        self._health.note_filters(self.step - 1, info.filters)
+        self._health.note_fusion(self.step - 1, info.fusion)
+        self._fusion.append(float(info.seconds.get("fusion", 0.0)))
+        self._poses.append(poses)
+        self.estimates.append(estimate)
+
+    def decide(self, plan: Plan) -> None:
+        """Write down the decision after the scan at hand."""
+        self._decisions.append(Decision(self.step, self.time, self._poses[-1], plan))
+
+    def stage(self, error: BaseException) -> str:
+        """What was under way, in words."""
+        return stage_of(error) or "the movement of the sensors"
+
+    def place(self, error: BaseException) -> str:
+        """Which run, where in it."""
+        return (
+            f"{self.experiment.name}, {self.planner}, seed {self.seed}, run {self.run}: stopped at step "
+            f"{self.step} of {len(self.experiment.times)} ({self.time:g} s), in {self.stage(error)}"
+        )
+
+    def record(self, ospa: Floats, stopped: str | None = None) -> RunRecord:
+        """Of the scans that have an estimate."""
+        num = len(self.estimates)
+        return RunRecord(
+            scenario=self.experiment.name,
+            planner=self.planner,
+            seed=self.seed,
+            run=self.run,
+            times=self.experiment.times[:num],
+            truth=self.truth.first(num),
+            poses=np.array(self._poses[:num]),
+            estimates=tuple(self.estimates),
+            decisions=tuple(self._decisions),
+            ospa=ospa,
+            health=self._health.first(num),
+            timings=self._timings(num),
+            stopped=stopped,
+        )
+
+    def _timings(self, num_scans: int) -> dict[str, Floats]:
+        clocks, fusion = self._clocks[:num_scans], np.array(self._fusion[:num_scans])
+        spent = {stage: np.array([clock.seconds.get(stage, 0.0) for clock in clocks]) for stage in STAGES}
+        return spent | {"filter": np.maximum(spent["filter"] - fusion, 0.0), "fusion": fusion}
+
+    def partial(self, score: Score, stopped: str) -> RunRecord | None:
+        """The record of a run that stopped; None where no scan was finished. OSPA is NaN where it cannot be had."""
+        num = len(self.estimates)
+        if num == 0:
+            return None
+        try:
+            ospa = score(self.truth.first(num), self.estimates)
+        except VedetteError:
+            ospa = np.full((num, 3), np.nan)
+        return self.record(ospa, stopped)

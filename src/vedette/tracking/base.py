@@ -1,0 +1,114 @@
+"""What every tracker is: its state between scans, what it reports, and the checks of what it is given."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol, runtime_checkable
+
+import numpy as np
+
+from vedette.errors import InputError
+from vedette.filters import FilterInfo
+from vedette.kernels.base.types import Floats
+from vedette.models import SensorModel, TargetModel
+from vedette.models.arguments import real
+
+# s. The belief before the first scan holds no target, so that the time before it changes nothing.
+FIRST_PERIOD = 1.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class State:
+    """What is believed after a scan.
+
+    Attributes:
+        local: the belief of each sensor.
+        fused: that of all together.
+        step: number of the scan, from 1; 0 before the first.
+        time: s, of that scan; None before the first.
+    """
+
+    local: tuple[Any, ...]
+    fused: Any
+    step: int = 0
+    time: float | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TrackerInfo:
+    """Report of one step of a tracker.
+
+    Attributes:
+        filters: what the filters reported: one a sensor, or a single one for all sensors together.
+        fusion: what the fusion reported; None where nothing was fused.
+        seconds: wall time by stage, of which "filter" and "fusion" are kept in the record of a run.
+    """
+
+    filters: tuple[FilterInfo, ...]
+    fusion: Any
+    seconds: Mapping[str, float]
+
+
+@runtime_checkable
+class Tracker(Protocol):
+    """Carries the beliefs of all sensors from scan to scan; one of your own is as good as those that are here."""
+
+    @property
+    def targets(self) -> TargetModel:
+        """The targets as all sensors know them."""
+        ...
+
+    @property
+    def sensors(self) -> tuple[SensorModel, ...]:
+        """What each sensor sees, in the order of scans and poses."""
+        ...
+
+    def initial(self) -> State:
+        """The state before the first scan."""
+        ...
+
+    def step(
+        self, state: State, scans: Sequence[Any], poses: Any, time: float, *, rngs: Sequence[np.random.Generator]
+    ) -> tuple[State, TrackerInfo]:
+        """Predict to `time` and take in the scans of that time.
+
+        Args:
+            state: as the step before left it.
+            scans: one a sensor: (num, meas_dim) measurements, in any order; angles in radians.
+            poses: (num_sensors, 3 or more) [px, py, heading_rad, ...] of each sensor at `time`.
+            time: s, after `state.time`.
+            rngs: one a sensor, for filters that draw.
+
+        Returns:
+            The state after these scans, and a report.
+
+        Raises:
+            InputError: another number of scans, poses or generators than of sensors; a scan that is missing; a time
+                that is not after the last.
+            ModelError, NumericalError: as the filters and the fusion. Any exception has a note that says in which
+                stage it was raised (`vedette.tracking.stage_of`).
+        """
+        ...
+
+
+def check_step(
+    state: State, scans: Sequence[Any], poses: Any, time: float, rngs: Sequence[Any], num_sensors: int
+) -> tuple[Floats, float]:
+    """The poses as an array, and the seconds since the last scan; `InputError` as `Tracker.step` says."""
+    if not isinstance(state, State):
+        raise InputError(f"state: expected a State; got {type(state).__name__}")
+    for name, given in (("scans", scans), ("poses", poses), ("rngs", rngs)):
+        came = None if given is None else len(given)
+        if came != num_sensors:
+            raise InputError(f"{name}: expected {num_sensors}, one a sensor; got {came}")
+    missing = [s for s, scan in enumerate(scans) if scan is None]
+    if missing:
+        raise InputError(
+            f"scans[{missing[0]}]: expected measurements, an empty array for a scan without any; got None (a sensor "
+            "that does not scan is not yet provided for)"
+        )
+    now = real("time", time)
+    if state.time is not None and now <= state.time:
+        raise InputError(f"time: expected one after that of the last scan, {state.time:g} s; got {now:g}")
+    return poses, FIRST_PERIOD if state.time is None else now - state.time

@@ -1,0 +1,85 @@
+"""One filter takes the scans of all sensors: what any fusion of their beliefs is measured against."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol, runtime_checkable
+
+import numpy as np
+
+from vedette.filters import FilterInfo
+from vedette.models import SensorModel, TargetModel
+from vedette.models.arguments import reject
+from vedette.tracking.base import State, TrackerInfo, check_step
+from vedette.tracking.stages import Stages
+
+
+@runtime_checkable
+class CentralFilter(Protocol):
+    """A filter of several sensors: `MultiSensorGlmbFilter`, `MultiSensorLmbFilter`, or one of your own."""
+
+    @property
+    def targets(self) -> TargetModel:
+        """The targets."""
+        ...
+
+    @property
+    def sensors(self) -> tuple[SensorModel, ...]:
+        """What each sensor sees."""
+        ...
+
+    def initial(self) -> Any:
+        """The belief before the first scans."""
+        ...
+
+    def step(
+        self, belief: Any, scans: Any, poses: Any, dt: float, step: int, *, rng: np.random.Generator
+    ) -> tuple[Any, FilterInfo]:
+        """Predict over `dt` seconds and update with one scan a sensor."""
+        ...
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Central:
+    """A single belief, which is every sensor's and the fused one at once.
+
+    Attributes:
+        filter: of all sensors' scans.
+
+    Raises:
+        InputError: something else than such a filter.
+    """
+
+    filter: CentralFilter
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.filter, CentralFilter):
+            raise reject("filter", "one of several sensors, with targets, sensors, initial() and step()", self.filter)
+
+    @property
+    def targets(self) -> TargetModel:
+        """The targets."""
+        return self.filter.targets
+
+    @property
+    def sensors(self) -> tuple[SensorModel, ...]:
+        """What each sensor sees."""
+        return tuple(self.filter.sensors)
+
+    def initial(self) -> State:
+        """No target."""
+        return self._state(self.filter.initial(), 0, None)
+
+    def step(
+        self, state: State, scans: Sequence[Any], poses: Any, time: float, *, rngs: Sequence[np.random.Generator]
+    ) -> tuple[State, TrackerInfo]:
+        """Update the one belief with all scans; see `Tracker.step`. Only the first of `rngs` is drawn from."""
+        at, dt = check_step(state, scans, poses, time, rngs, len(self.sensors))
+        stages, step = Stages(), state.step + 1
+        with stages.timing("filter"):
+            belief, info = self.filter.step(state.fused, scans, at, dt, step, rng=rngs[0])
+        return self._state(belief, step, float(time)), TrackerInfo((info,), None, stages.seconds)
+
+    def _state(self, belief: Any, step: int, time: float | None) -> State:
+        return State((belief,) * len(self.sensors), belief, step, time)

@@ -1,0 +1,120 @@
+"""Measures of one's own: a column wherever there are measures, kept, computed later, compared and reported."""
+
+from __future__ import annotations
+
+import csv
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from campaigns.filled import fill, make_campaign, make_run
+from evaluation.synthetic import make_record
+from simulation.test_storage import assert_same
+from vedette.campaigns.results import open_results
+from vedette.campaigns.store import Store
+from vedette.errors import InputError, VedetteError
+from vedette.evaluation.metrics import Metric, decode_metrics, encode_metrics, kept, measure
+from vedette.reports import write_report
+from vedette.reports.groups import gather
+from vedette.reports.summary import write_summary
+from vedette.reports.tables import measure_table
+from vedette.simulation.records import RunRecord
+
+LIMITS: dict[str, Any] = {"cutoff": 100.0, "order": 1.0, "window": 10}
+
+
+def farthest(record: RunRecord) -> Any:
+    return np.hypot(record.poses[..., 0], record.poses[..., 1]).max(axis=1)
+
+
+def since_third(record: RunRecord) -> Any:
+    return np.where(record.times > 3.0, np.array([len(each.labels) for each in record.estimates]), np.nan)
+
+
+OWN = (Metric("farthest_m", farthest), Metric("estimates", since_third))
+
+
+def test_a_measure_of_ones_own_is_a_column_and_is_kept() -> None:
+    record = make_record()
+    metrics = measure(record, **LIMITS, own=OWN)
+    assert list(metrics.columns())[-2:] == ["farthest_m", "estimates"]
+    np.testing.assert_array_equal(metrics.columns()["farthest_m"], farthest(record))
+    again, own = decode_metrics(encode_metrics(metrics), 40)
+    assert_same(again, metrics)
+    assert_same(own, metrics.own)
+
+
+@pytest.mark.parametrize(
+    ("name", "got"), [("gospa_m", "no column has"), ("ospa_m", "no column has"), ("run", "no column"), ("a b", "ident")]
+)
+def test_names_that_no_column_can_have(name: str, got: str) -> None:
+    with pytest.raises(InputError, match=rf"metric\.name: expected a .*{got}"):
+        Metric(name, farthest)
+
+
+@pytest.mark.parametrize(
+    ("function", "message"),
+    [
+        (lambda record: 3.0, r"metric mine: expected .*40"),
+        (lambda record: record.times[1:], r"metric mine: expected .*40"),
+        (lambda record: ["x"] * 40, "metric mine: expected"),
+        (lambda record: np.full(40, np.inf), "metric mine: expected finite numbers, or NaN"),
+        (lambda record: record.nothing, "metric mine: AttributeError: 'RunRecord' object has no attribute 'nothing'"),
+    ],
+)
+def test_what_is_not_one_number_a_scan_is_named(function: Any, message: str) -> None:
+    with pytest.raises(VedetteError, match=message):
+        Metric("mine", function).of(make_record())
+
+
+def test_a_new_measure_is_computed_for_an_old_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of an earlier version, with fewer measures, and one that kept none: the same as this version keeps."""
+    campaign = make_campaign(grid={}, runs=2)
+    record, metrics = make_run("jdm", 0)
+    with monkeypatch.context() as earlier:
+        earlier.setattr(kept, "_SET", "0 gospa_m")
+        fill(tmp_path / "results", campaign, leave_out=2)
+    with Store.open(tmp_path / "results", campaign) as store:
+        other = make_run("jdm", 1)[0]
+        from vedette.campaigns.codec import encode
+        from vedette.simulation.kept import encode_timings
+
+        store.add("jdm", 1, encode(other), encode_timings(other))
+    results = open_results(tmp_path / "results")
+    assert_same(replace(results.metrics("jdm", 0), own={}), metrics)
+    assert_same(results.metrics("jdm", 1), make_run("jdm", 1)[1])
+    assert_same(results.record("jdm", 0), record)
+
+
+def test_tables_comparisons_and_reports_have_its_column(tmp_path: Path) -> None:
+    folder = fill(tmp_path / "results", make_campaign(grid={}))
+    results = open_results(folder, metrics=OWN)
+    scans = results.tables()["scans"].to_pandas()
+    chosen = scans[(scans["cell"] == "jdm") & (scans["run"] == 1)]
+    record = make_run("jdm", 1)[0]
+    np.testing.assert_array_equal(chosen["farthest_m"], farthest(record))
+    assert chosen["estimates"].isna().sum() == 3
+    np.testing.assert_array_equal(results.dataset()["farthest_m"].sel(cell="jdm", run=1), farthest(record))
+    (group,) = results.comparisons()
+    compared = group.comparison
+    assert compared.run_means("jdm", "farthest_m")[1] == pytest.approx(farthest(record)[compared.counted].mean())
+    assert compared.difference("random", part="gospa_m").summary.mean > 0.0
+    with pytest.raises(
+        InputError, match=r"part: expected one of total, localisation, cardinality, gospa_m, .*; got 'x'"
+    ):
+        compared.curve("jdm", "x")
+    (gathered,) = gather(results)
+    table = measure_table(gathered)
+    assert table is not None
+    assert [row[0] for row in table.rows if row[0] in ("farthest_m", "estimates")] == ["farthest_m", "estimates"]
+    write_summary(results, tmp_path / "summary")
+    with (tmp_path / "summary" / "summary.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert float(rows[0]["farthest_m_mean"]) == pytest.approx(compared.summary("jdm", "farthest_m").mean)
+    write_report(results, tmp_path / "report.html")
+    assert "farthest_m" in (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert json.loads((folder / "manifest.json").read_text())["format_version"] == 4
