@@ -16,12 +16,14 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from vedette.control import CauchySchwarzReward, RenyiReward
+from vedette.control.laid_rewards import lay_out_rewards
+from vedette.control.plain import PlainRewards
+from vedette.control.search import all_joint_actions
 from vedette.densities import GLMB, LMB, TrackTable, glmb_to_lmb
+from vedette.densities.cases import LabelledCases
 from vedette.divergence import cauchy_schwarz
 from vedette.fusion import Clmb, CmDeltaGlmb
-from vedette.kernels.base.compile import kernel
-from vedette.kernels.gaussian.information import row_size, to_information
-from vedette.kernels.planning.fused_divergence import Cases, Prediction, fused_glmb_divergence, fused_lmb_divergence
 
 Floats = NDArray[np.float64]
 DIM, NUM_LABELS, NUM_ACTIONS, NUM_SAMPLES = 4, 4, 12, 40
@@ -52,44 +54,22 @@ def belief(rng: np.random.Generator) -> GLMB:
     return GLMB.from_hypotheses(tracks, hyps, rng.dirichlet(np.ones(20)))
 
 
-def cases(rng: np.random.Generator, num_sets: int) -> tuple[Cases, Prediction]:
-    """Two sensors' cases on one label set of four labels (GLMB), or on four labels (LMB)."""
-    num_cases, size = 2 * NUM_ACTIONS * NUM_SAMPLES, row_size(DIM)
-    covs = [covariance(rng) for _ in range(20)]
-    rows, work = np.empty((num_cases + 1, NUM_LABELS, size)), np.empty((2, DIM, DIM))
-    for case in range(num_cases + 1):
-        for label in range(NUM_LABELS):
-            power, cov = (0.5, covs[rng.integers(20)]) if case < num_cases else (1.0, 4.0 * covs[label])
-            to_information(rng.normal(size=DIM), cov, np.zeros(DIM), power, rows[case, label], work[0], work[1])
-    offsets = np.arange(num_sets + 1) * (NUM_LABELS // num_sets)
-    log_present, log_absent = np.full((num_cases + 1, num_sets), -0.01), np.full((num_cases + 1, num_sets), -4.6)
-    held = np.ones((num_cases, num_sets), np.bool_)
-    all_cases = Cases(offsets, log_present[:-1], log_absent[:-1], held, rows[:-1])
-    return all_cases, Prediction(log_present[-1], log_absent[-1], rows[-1], 0.0, 0.0)
-
-
-@kernel
-def glmb_table(all_cases: Cases, prediction: Prediction, dim: int, out: Floats) -> None:
-    chosen, work = np.empty(2, np.int64), np.empty((2, all_cases.rows.shape[2]))
-    num_actions, num_samples = out.shape[0], out.shape[2]
-    for first in range(num_actions):
-        for second in range(num_actions):
-            for sample in range(num_samples):
-                chosen[0] = first * num_samples + sample
-                chosen[1] = (num_actions + second) * num_samples + sample
-                out[first, second, sample] = fused_glmb_divergence(all_cases, chosen, prediction, dim, 0.0, work)
-
-
-@kernel
-def lmb_table(all_cases: Cases, prediction: Prediction, dim: int, out: Floats) -> None:
-    chosen, work = np.empty(2, np.int64), np.empty((2, all_cases.rows.shape[2]))
-    num_actions, num_samples = out.shape[0], out.shape[2]
-    for first in range(num_actions):
-        for second in range(num_actions):
-            for sample in range(num_samples):
-                chosen[0] = first * num_samples + sample
-                chosen[1] = (num_actions + second) * num_samples + sample
-                out[first, second, sample] = fused_lmb_divergence(all_cases, chosen, prediction, dim, 0.0, work)
+def cases(rng: np.random.Generator, kind: str) -> tuple[list[LabelledCases], GLMB | LMB]:
+    """Two sensors' cases on one label set of four labels (GLMB), or on four labels (LMB), and the prediction."""
+    num_cases, labels = NUM_ACTIONS * NUM_SAMPLES, [(1, site) for site in range(NUM_LABELS)]
+    covs = np.array([covariance(rng) for _ in range(20)])
+    sensors = []
+    for _ in range(2):
+        shape = num_cases, NUM_LABELS
+        tracks = rng.normal(size=(*shape, DIM)), covs[rng.integers(20, size=shape)]
+        if kind == "GLMB":
+            own = LabelledCases.of_glmbs([tuple(labels)], np.zeros((num_cases, 1)), *tracks, num_samples=NUM_SAMPLES)
+        else:
+            own = LabelledCases.of_lmbs(labels, np.full(shape, 4.6), *tracks, num_samples=NUM_SAMPLES)
+        sensors.append(own)
+    means = rng.normal(size=(NUM_LABELS, DIM))
+    lmb = LMB.from_bernoullis(labels, np.full(NUM_LABELS, 0.99), means, 4.0 * covs[:NUM_LABELS])
+    return sensors, lmb if kind == "LMB" else GLMB.from_hypotheses(lmb.tracks, [list(range(NUM_LABELS))], [1.0])
 
 
 def main() -> None:
@@ -110,11 +90,19 @@ def main() -> None:
     }
     for name, work in public.items():
         print(f"{name:<34} {1e6 * median_seconds(work, repeats):8.0f} us")
-    out = np.empty((NUM_ACTIONS, NUM_ACTIONS, NUM_SAMPLES))
-    for name, num_sets, table in (("GLMB, one label set", 1, glmb_table), ("LMB", NUM_LABELS, lmb_table)):
-        all_cases, prediction = cases(rng, num_sets)
-        seconds = median_seconds(lambda t=table, c=all_cases, p=prediction: t(c, p, DIM, out), repeats)  # type: ignore[misc]
-        print(f"joint reward table, {name:<20} {1e3 * seconds:.2f} ms, {1e9 * seconds / out.size:.0f} ns an entry")
+    actions = all_joint_actions((NUM_ACTIONS, NUM_ACTIONS))
+    rewards = {"Cauchy-Schwarz": CauchySchwarzReward(), "Renyi of order 1/2": RenyiReward(0.5)}
+    for kind, fusion in (("GLMB", CmDeltaGlmb(halves)), ("LMB", Clmb(halves))):
+        sensors, prediction = cases(rng, kind)
+        for name, reward in rewards.items():
+            table = lay_out_rewards(sensors, prediction, fusion, reward)
+            assert not isinstance(table, str)
+            seconds = median_seconds(lambda t=table: t(actions), repeats)  # type: ignore[misc]
+            each = 1e9 * seconds / (len(actions) * NUM_SAMPLES)
+            print(f"joint rewards, {kind:<4} {name:<19} {1e3 * seconds:.2f} ms, {each:.0f} ns an entry")
+            plain = PlainRewards(sensors, prediction, fusion, reward, NUM_SAMPLES)
+            slow = median_seconds(lambda p=plain: p(actions[:2]), 5) / 2 * len(actions)  # type: ignore[misc]
+            print(f"  one by one {slow / seconds:.0f} times as long")
 
 
 if __name__ == "__main__":

@@ -21,6 +21,10 @@ class NumericalError(VedetteError, ArithmeticError):
     """A computation left the domain in which it is defined, e.g. a covariance that is not positive definite."""
 
 
+class SlowRewardWarning(UserWarning):
+    """A planner computes rewards one by one, because the reward or the fusion does not say how to lay them out."""
+
+
 class ScenarioError(VedetteError):
     """A scenario with one or more faults. The message lists the first fifty and counts the others.
 

@@ -211,6 +211,7 @@ def test_numbers_of_fusion_weights(kind: str) -> None:
         assert message == f"beliefs: expected {len(weights)}, one for each fusion weight; got 2"
 
 
+@pytest.mark.filterwarnings("ignore::vedette.errors.SlowRewardWarning")
 def test_a_fusion_of_other_densities() -> None:
     example = situation("lmb")
     message = refused(replace(example, fusion=CmDeltaGlmb((0.5, 0.5))), JointPlanner)

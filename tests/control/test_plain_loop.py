@@ -24,15 +24,16 @@ from control.examples import (
 )
 from control.plain_loop import plain_rewards
 from vedette import models
-from vedette.control import CauchySchwarzReward
-from vedette.control.kinds import of_one_kind
-from vedette.control.plain import PlainRewards, can_be_laid_out
+from vedette.control import CauchySchwarzReward, RenyiReward
+from vedette.control.plain import PlainRewards
 from vedette.control.search import all_joint_actions
 from vedette.densities import GLMB, LMB
 from vedette.fusion import Clmb, CmDeltaGlmb, FusionLimits
 from vedette.platforms import Courses
 
 SEED = 5
+
+pytestmark = pytest.mark.filterwarnings("ignore::vedette.errors.SlowRewardWarning")
 
 
 @models.model_function("prob_detection")
@@ -44,10 +45,9 @@ def assert_equals_plain_loop(example: Situation, unit_volume: Any = 1.0, *, laid
     """Joint and independent tables are those of the plain loop, by the path expected; returns the joint one."""
     joint, alone = plain_rewards(example, unit_volume, SEED)
     evaluator = evaluator_of(example, CauchySchwarzReward(unit_volume), SEED)
-    alike = of_one_kind(evaluator.posteriors, evaluator.prediction, example.fusion, 1)
-    assert can_be_laid_out(*alike, example.fusion, evaluator.reward) == laid_out
     everyone = range(len(example.sensors))
     np.testing.assert_allclose(evaluator.sample_rewards(everyone, example.fusion), joint, rtol=1e-9, atol=1e-9)
+    assert laid_out == (not evaluator.notes)
     for s, expected in enumerate(alone):
         np.testing.assert_allclose(evaluator.sample_rewards((s,), None), expected, rtol=1e-9, atol=1e-9)
     assert np.ptp(joint, axis=0).max() > 1e-5
@@ -124,7 +124,7 @@ def test_an_lmb_keeps_all_its_labels() -> None:
 @pytest.mark.parametrize("kind", ["delta", "marginal", "lmb"])
 def test_label_sets_that_certain_detection_rules_out(kind: str) -> None:
     example = situation(kind, seed=3, detection=models.DetectionModel(certain))
-    assert_equals_plain_loop(example, laid_out=False)
+    assert_equals_plain_loop(example)
 
 
 @pytest.mark.parametrize(
@@ -132,12 +132,12 @@ def test_label_sets_that_certain_detection_rules_out(kind: str) -> None:
     [
         ("delta", {"mixture_power": "component_wise"}, False),
         ("delta", {"mixture_power": "quadrature"}, False),
-        ("delta", {"weights": (0.0, 1.0)}, False),
+        ("delta", {"weights": (0.0, 1.0)}, True),
         ("delta", {"limits": FusionLimits(max_hypotheses=3)}, False),
         ("delta", {"limits": FusionLimits(max_hypotheses=8)}, True),
-        ("lmb", {"mixture_power": "component_wise"}, False),
-        ("lmb", {"mixture_power": "quadrature"}, False),
-        ("lmb", {"weights": (0.0, 1.0)}, False),
+        ("lmb", {"mixture_power": "component_wise"}, True),
+        ("lmb", {"mixture_power": "quadrature"}, True),
+        ("lmb", {"weights": (0.0, 1.0)}, True),
     ],
 )
 def test_fusions_of_all_sorts(kind: str, changed: dict[str, Any], laid_out: bool) -> None:
@@ -222,6 +222,39 @@ def test_the_general_path_gives_the_same_rewards(kind: str, num_sensors: int) ->
         np.testing.assert_allclose(laid_out(actions), general(actions), rtol=1e-9, atol=1e-9)
 
 
+class Combination:
+    """A reward of the user's own, of power integrals with a K, of normalised densities."""
+
+    exponents = ((0.4, 1.3), (0.0, 0.6), (2.0, 0.0), (0.0, 1.0), (1.0, 0.0), (1.0, 1.0))
+    unit_volume = 1e4
+
+    def combine(self, z: Any) -> Any:
+        crossed, alone, own, update, prediction, product = np.moveaxis(z, -1, 0)
+        crossed = crossed - 0.4 * prediction - 1.3 * update
+        return crossed + alone - 0.6 * update + own - 2.0 * prediction - 0.3 * (product - prediction - update)
+
+
+@pytest.mark.parametrize("reward", [RenyiReward(), RenyiReward(0.2), Combination()], ids=["half", "fifth", "own"])
+@pytest.mark.parametrize("kind", ["delta", "lmb", "glmbs to lmb", "certain"])
+@pytest.mark.parametrize("num_sensors", [1, 2, 3])
+def test_rewards_of_power_integrals(reward: Any, kind: str, num_sensors: int) -> None:
+    """Laid out and one by one; with certain detection label sets lose all their weight in some cases."""
+    detection = {"detection": models.DetectionModel(certain)} if kind == "certain" else {}
+    example = situation("lmb" if kind == "lmb" else "delta", num_sensors, seed=3, **detection)
+    if kind == "glmbs to lmb":
+        fusion = Clmb(example.fusion.weights)
+        example = replace(example, fusion=fusion, fused=fusion.fuse(example.beliefs)[0])
+    evaluator = evaluator_of(example, reward)
+    if kind == "certain":
+        assert any(np.isneginf(own.log_weights).any() for own in evaluator.posteriors)
+    for which, fusion in ((tuple(range(num_sensors)), example.fusion), ((0,), None)):
+        actions = all_joint_actions(tuple(evaluator.joint_shape()[s] for s in which))[-4:]
+        posteriors = [evaluator.posteriors[s] for s in which]
+        plain = PlainRewards(posteriors, evaluator.prediction, fusion, reward, SETTINGS.num_samples)
+        np.testing.assert_allclose(evaluator.rewards(which, fusion)(actions), plain(actions), rtol=1e-9, atol=1e-9)
+    assert not evaluator.notes
+
+
 @pytest.mark.parametrize("most", [1, 3, 300])
 def test_a_crowd_that_is_summed_in_part_is_still_laid_out(most: int) -> None:
     """A label that no kept choice has absent, or present, was certain: an infinite reward, or the long way round."""
@@ -229,16 +262,19 @@ def test_a_crowd_that_is_summed_in_part_is_still_laid_out(most: int) -> None:
     settings = replace(example.settings, limits=replace(example.settings.limits, max_hypotheses=most))
     evaluator = evaluator_of(replace(example, settings=settings))
     assert all(np.isfinite(own.log_weights).all() for own in evaluator.posteriors)
-    alike = of_one_kind(evaluator.posteriors, evaluator.prediction, example.fusion, 1)
-    assert can_be_laid_out(*alike, example.fusion, evaluator.reward)
     assert np.isfinite(evaluator.sample_rewards((0, 1), example.fusion)).all()
     assert np.isfinite(evaluator.sample_rewards((0,), None)).all()
+    assert not evaluator.notes
 
 
 def test_a_subclass_is_asked_itself() -> None:
     class Doubled(CauchySchwarzReward):
         def __call__(self, predicted: Any, updated: Any) -> float:
             return 2.0 * CauchySchwarzReward.__call__(self, predicted, updated)
+
+    class Tripled(CauchySchwarzReward):
+        def combine(self, z: Any) -> Any:
+            return 3.0 * CauchySchwarzReward.combine(self, z)
 
     class Fused(CmDeltaGlmb):
         def fuse(self, beliefs: Any) -> Any:
@@ -247,8 +283,15 @@ def test_a_subclass_is_asked_itself() -> None:
     example = situation("marginal")
     evaluator = evaluator_of(example)
     expected = evaluator.sample_rewards((0, 1), example.fusion)
-    doubled = evaluator_of(example, Doubled())
-    np.testing.assert_allclose(doubled.sample_rewards((0, 1), example.fusion), 2.0 * expected, rtol=1e-9, atol=1e-9)
+    assert not evaluator.notes
+    for reward, factor, laid_out in ((Doubled(), 2.0, False), (Tripled(), 3.0, True)):
+        other = evaluator_of(example, reward)
+        for fusion, rewards in ((example.fusion, expected), (Fused((0.5, 0.5)), None)):
+            found = other.sample_rewards((0, 1), fusion)
+            rewards = factor * (evaluator.sample_rewards((0, 1), fusion) if rewards is None else rewards)
+            np.testing.assert_allclose(found, rewards, rtol=1e-9, atol=1e-9)
+            if fusion is example.fusion:
+                assert laid_out == (not other.notes)
     fused = evaluator.sample_rewards((0, 1), Fused((0.5, 0.5)))
     first = evaluator.sample_rewards((0,), None)
     np.testing.assert_allclose(fused, np.repeat(first, 3, axis=0), rtol=1e-9, atol=1e-9)

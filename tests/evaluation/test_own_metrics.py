@@ -10,11 +10,16 @@ from typing import Any
 
 import numpy as np
 import pytest
+from pyarrow import parquet
 
 from campaigns.filled import fill, make_campaign, make_run
 from evaluation.synthetic import make_record
 from simulation.test_storage import assert_same
+from vedette.campaigns.cells import resolve
+from vedette.campaigns.codec import encode
 from vedette.campaigns.results import open_results
+from vedette.campaigns.running import run_campaign
+from vedette.campaigns.spec import spec_from_data
 from vedette.campaigns.store import Store
 from vedette.errors import InputError, VedetteError
 from vedette.evaluation.metrics import Metric, decode_metrics, encode_metrics, kept, measure
@@ -22,6 +27,9 @@ from vedette.reports import write_report
 from vedette.reports.groups import gather
 from vedette.reports.summary import write_summary
 from vedette.reports.tables import measure_table
+from vedette.scenarios import load_scenario
+from vedette.scenarios.dumping import dump_scenario
+from vedette.simulation.kept import encode_timings
 from vedette.simulation.records import RunRecord
 
 LIMITS: dict[str, Any] = {"cutoff": 100.0, "order": 1.0, "window": 10}
@@ -80,14 +88,38 @@ def test_a_new_measure_is_computed_for_an_old_folder(tmp_path: Path, monkeypatch
         fill(tmp_path / "results", campaign, leave_out=2)
     with Store.open(tmp_path / "results", campaign) as store:
         other = make_run("jdm", 1)[0]
-        from vedette.campaigns.codec import encode
-        from vedette.simulation.kept import encode_timings
-
         store.add("jdm", 1, encode(other), encode_timings(other))
     results = open_results(tmp_path / "results")
     assert_same(replace(results.metrics("jdm", 0), own={}), metrics)
     assert_same(results.metrics("jdm", 1), make_run("jdm", 1)[1])
     assert_same(results.record("jdm", 0), record)
+
+
+MINE = """
+import numpy as np
+
+def farthest(record):
+    return np.hypot(record.poses[..., 0], record.poses[..., 1]).max(axis=1)
+"""
+
+
+def test_a_measure_that_a_scenario_gains_is_of_the_same_campaign(tmp_path: Path) -> None:
+    """The finished runs are measured again when the campaign goes on, and nothing else of the folder changes."""
+    (tmp_path / "mine.py").write_text(MINE)
+    text = dump_scenario(load_scenario("paper-a").model)
+    (tmp_path / "scene.yaml").write_text(text)
+    spec = {"name": "x", "scenarios": ["scene.yaml"], "planners": ["jdm"], "runs": 2, "seed": 7}
+    folder = fill(tmp_path / "results", resolve(spec_from_data(spec), tmp_path))
+    before = {run.record.run: run.checksum for run in open_results(folder).runs()}
+    gains = "metrics: {farthest_m: {kind: custom, function: mine.py:farthest}}"
+    assert "metrics: {}" in text
+    (tmp_path / "scene.yaml").write_text(text.replace("metrics: {}", gains))
+    outcome = run_campaign(resolve(spec_from_data(spec), tmp_path), folder)
+    assert (outcome.num_found, outcome.num_landed) == (2, 0)
+    for run in open_results(folder).runs():
+        assert run.checksum == before[run.record.run]
+        np.testing.assert_array_equal(run.metrics.own["farthest_m"], farthest(run.record))
+    assert "farthest_m" in parquet.read_schema(folder / "tables" / "scans.parquet").names
 
 
 def test_tables_comparisons_and_reports_have_its_column(tmp_path: Path) -> None:

@@ -17,6 +17,7 @@ from vedette.scenarios import Scenario, list_builtin, load_scenario
 from vedette.scenarios.build import build_planner
 from vedette.scenarios.dumping import dump_scenario, files_of
 from vedette.scenarios.overrides import with_fields
+from vedette.scenarios.sections import ScenarioModel
 from vedette.text import listed
 
 _LONGEST_NAME = 120
@@ -107,8 +108,12 @@ class Campaign:
 
 
 def scenario_text(scenario: Scenario) -> str:
-    """The scenario as YAML that can be kept anywhere."""
-    return dump_scenario(scenario.model, folder=scenario.folder)
+    """The scenario as YAML that can be kept anywhere, without the user's own measures: they fix nothing of a run."""
+    return dump_scenario(_unmeasured(scenario), folder=scenario.folder)
+
+
+def _unmeasured(scenario: Scenario) -> ScenarioModel:
+    return scenario.model.model_copy(update={"metrics": {}})
 
 
 def resolve(
@@ -197,4 +202,4 @@ def _unused(name: str, cells: list[Cell]) -> str:
 
 
 def _contents(scenario: Scenario) -> list[str]:
-    return [hashlib.sha256(file.read_bytes()).hexdigest() for file in files_of(scenario.model, scenario.folder)]
+    return [hashlib.sha256(file.read_bytes()).hexdigest() for file in files_of(_unmeasured(scenario), scenario.folder)]

@@ -129,6 +129,13 @@ class Writer:
             rows = self._database.execute(f"SELECT {_COLUMNS} FROM runs ORDER BY cell, run")
             return tuple((row[0], row[1]) for row in rows if _verified(row) is None)
 
+    def metrics(self) -> Iterator[tuple[str, int, bytes]]:
+        """Cell and number of every run, with its measures."""
+        assert self._database is not None
+        with _explained(self._path):
+            rows = self._database.execute("SELECT cell, run, metrics FROM runs ORDER BY cell, run").fetchall()
+        return ((cell, run, inflate(packed)) for cell, run, packed in rows)
+
     def put_metrics(self, cell: str, run: int, metrics: bytes) -> None:
         """Keep other measures of a run that is there."""
         row = (zlib.compress(metrics, _LEVEL), _checksum(cell, run, metrics), cell, run)

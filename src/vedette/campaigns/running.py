@@ -19,6 +19,9 @@ from vedette.campaigns.results import open_results
 from vedette.campaigns.store import Store
 from vedette.campaigns.tasks import Failed, Landed, TaskQueue, perform
 from vedette.errors import InputError, VedetteError
+from vedette.evaluation.metrics import encode_metrics
+from vedette.evaluation.runs import own_metrics
+from vedette.text import counted
 
 TABLES = "tables"
 
@@ -114,6 +117,7 @@ def run_campaign(
         if lost:
             watch.note(f"{database} was not there, or empty: every run is done again")
         _check_undamaged(store, redo_damaged, watch)
+        _measure_anew(store, campaign, watch)
         queue = TaskQueue(campaign, store.finished())
         num_found = campaign.total - len(queue)
         watch.begin(num_found, campaign.total)
@@ -147,6 +151,19 @@ def _check_undamaged(store: Store, redo: bool, watch: Watch) -> None:
         store.discard(cell, run)
     if damaged:
         watch.note(f"damaged, and done again: {names}")
+
+
+def _measure_anew(store: Store, campaign: Campaign, watch: Watch) -> None:
+    """Measures that the program or the scenarios have gained since runs were kept, of their records."""
+    own = {cell.name: own_metrics(cell.scenario) for cell in campaign.cells}
+    lacking = store.unmeasured({cell: [metric.name for metric in of_cell] for cell, of_cell in own.items()})
+    results = open_results(store.folder)
+    for cell, run in lacking:
+        there = results.run(cell, run)
+        there.metrics.own.update({metric.name: metric.of(there.record) for metric in own[cell]})
+        store.put_metrics(cell, run, encode_metrics(there.metrics))
+    if lacking:
+        watch.note(f"measured anew: {counted(len(lacking), 'run')}")
 
 
 def _results(queue: TaskQueue, num_workers: int, scheduler: str | None, watch: Watch) -> Generator[Landed | Failed]:

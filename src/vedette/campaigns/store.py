@@ -6,6 +6,7 @@ The folder holds `manifest.json` (the campaign as data, who worked on it when, w
 
 from __future__ import annotations
 
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -22,6 +23,7 @@ from vedette.campaigns.manifest import (
     write_manifest,
 )
 from vedette.errors import InputError
+from vedette.evaluation.metrics import has_metrics
 
 
 class Store:
@@ -101,6 +103,16 @@ class Store:
         if not 0 <= run < self._num_runs[cell]:
             raise InputError(f"run: expected a number from 0 to {self._num_runs[cell] - 1}; got {run}")
         self._writer.add(journal.Entry(cell, int(run), self.session, payload, metrics, timings))
+
+    def unmeasured(self, own: Mapping[str, Collection[str]]) -> tuple[tuple[str, int], ...]:
+        """Cell name and number of every finished run that lacks measures: this version's, or its cell's `own`."""
+        return tuple(
+            (cell, run) for cell, run, kept in self._writer.metrics() if not has_metrics(kept, own.get(cell, ()))
+        )
+
+    def put_metrics(self, cell: str, run: int, metrics: bytes) -> None:
+        """Keep measures of a finished run in place of those that are there."""
+        self._writer.put_metrics(cell, run, metrics)
 
     def note_failure(self, cell: str, run: int, message: str) -> None:
         """Keep why a run could not be finished, until it is."""

@@ -3,7 +3,7 @@
 from vedette.control.evaluator import Evaluator
 from vedette.control.plan import Plan, RewardTable
 from vedette.control.planners import FixedPlanner, IndependentPlanner, JointPlanner, Planner, RandomPlanner
-from vedette.control.reward import CauchySchwarzReward, Reward
+from vedette.control.reward import CauchySchwarzReward, PowerReward, RenyiReward, Reward
 from vedette.control.search import CoordinateAscent, ExhaustiveSearch, JointProblem, JointSearch
 from vedette.control.settings import MobileSensor, PlanningSettings, planning_limits
 
@@ -21,7 +21,9 @@ __all__ = [
     "Plan",
     "Planner",
     "PlanningSettings",
+    "PowerReward",
     "RandomPlanner",
+    "RenyiReward",
     "Reward",
     "RewardTable",
     "planning_limits",

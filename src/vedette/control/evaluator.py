@@ -9,17 +9,16 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from vedette.control.inputs import Belief, check_sensors, check_state, options_of
-from vedette.control.kinds import of_one_kind
-from vedette.control.plain import PlainRewards, can_be_laid_out
+from vedette.control.laid_rewards import lay_out_rewards, warn_slow
+from vedette.control.plain import PlainRewards
 from vedette.control.priors import predicted
-from vedette.control.pseudo import PseudoPosteriors, draw_futures, pseudo_posteriors
-from vedette.control.reward import CauchySchwarzReward, Reward
+from vedette.control.pseudo import draw_futures, pseudo_posteriors
+from vedette.control.reward import PowerReward, Reward
 from vedette.control.search import all_joint_actions, first_best
 from vedette.control.settings import MobileSensor, PlanningSettings
-from vedette.control.tables import fused_rewards
-from vedette.densities import LMB
+from vedette.densities.cases import LabelledCases
 from vedette.errors import NumericalError
-from vedette.fusion import Clmb, CmDeltaGlmb, Fusion
+from vedette.fusion import Fusion
 from vedette.kernels.base.types import Floats, Ints
 from vedette.platforms import Options
 from vedette.tracking import State
@@ -38,16 +37,18 @@ class Evaluator:
         prediction: the fused density predicted to the horizon, one Gaussian a track.
         posteriors: the pseudo-posteriors of each sensor.
         counts: how many filter steps, fusions and divergences have been evaluated so far.
+        notes: what a reader of the decision must know, in the order in which it came up (keys; no values).
     """
 
     sensors: tuple[MobileSensor, ...]
     fusion: Fusion[Any, Any]
     settings: PlanningSettings
-    reward: Reward
+    reward: Reward | PowerReward
     options: tuple[Options, ...]
     prediction: Belief
-    posteriors: tuple[PseudoPosteriors, ...]
+    posteriors: tuple[LabelledCases, ...]
     counts: dict[str, int] = field(default_factory=dict)
+    notes: dict[str, None] = field(default_factory=dict)
 
     @classmethod
     def prepare(
@@ -55,7 +56,7 @@ class Evaluator:
         sensors: Sequence[MobileSensor],
         fusion: Fusion[Any, Any],
         settings: PlanningSettings,
-        reward: Reward,
+        reward: Reward | PowerReward,
         state: State,
         poses: Any,
         *,
@@ -100,20 +101,22 @@ class Evaluator:
 
         return evaluate
 
-    def _compute(self, posteriors: Sequence[PseudoPosteriors], fusion: Fusion[Any, Any] | None) -> SampleRewards:
-        num_samples, threads = self.settings.num_samples, self.settings.threads()
-        alike, prediction = of_one_kind(posteriors, self.prediction, fusion, threads)
-        if not can_be_laid_out(alike, prediction, fusion, self.reward):
-            return PlainRewards(posteriors, self.prediction, fusion, self.reward, num_samples)
-        assert isinstance(self.reward, CauchySchwarzReward)
-        alone = Clmb((1.0,)) if isinstance(prediction, LMB) else CmDeltaGlmb((1.0,))
-        rule = fusion if isinstance(fusion, CmDeltaGlmb | Clmb) else alone
-        return fused_rewards(alike, prediction, rule, num_samples, self.reward.volume(self.prediction), threads)
+    def _compute(self, posteriors: Sequence[LabelledCases], fusion: Fusion[Any, Any] | None) -> SampleRewards:
+        laid = lay_out_rewards(posteriors, self.prediction, fusion, self.reward)
+        if not isinstance(laid, str):
+            return laid
+        self.notes[f"rewards were computed one by one: {laid}"] = None
+        warn_slow(laid)
+        return PlainRewards(posteriors, self.prediction, fusion, self.reward, self.settings.num_samples)
 
     def sample_rewards(self, which: Sequence[int], fusion: Fusion[Any, Any] | None) -> Floats:
         """(num_joint, num_samples) rewards of all joint actions of the sensors `which`, the last one's fastest."""
         shape = self.joint_shape()
         return self.rewards(which, fusion)(all_joint_actions(tuple(shape[s] for s in which)))
+
+    def account(self) -> tuple[dict[str, int], tuple[str, ...]]:
+        """Counts and notes so far, as a plan holds them."""
+        return dict(self.counts), tuple(self.notes)
 
     def independent_choice(self) -> tuple[int, ...]:
         """The course that is best for each sensor alone (paper, Algorithm 3); of equal ones the first."""

@@ -9,17 +9,15 @@ from typing import Any
 import numpy as np
 
 from vedette.control.inputs import Belief
-from vedette.control.pseudo import PseudoPosteriors, case_density
-from vedette.control.reward import CauchySchwarzReward, Reward
-from vedette.densities import LMB
-from vedette.errors import InputError
-from vedette.fusion import Clmb, CmDeltaGlmb, Fusion
+from vedette.control.reward import PowerReward, Reward, reward_value
+from vedette.densities.cases import LabelledCases
+from vedette.fusion import Fusion
 from vedette.kernels.base.types import Floats, Ints
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlainRewards:
-    """What `FusedRewards` computes, and every other reward, by `fusion.fuse` and the reward itself.
+    """What `LaidRewards` computes, and every other reward, by `fusion.fuse` and the reward itself.
 
     Attributes:
         posteriors: one a sensor.
@@ -28,10 +26,10 @@ class PlainRewards:
         reward, num_samples: as in the planners.
     """
 
-    posteriors: Sequence[PseudoPosteriors]
+    posteriors: Sequence[LabelledCases]
     prediction: Belief
     fusion: Fusion[Any, Any] | None
-    reward: Reward
+    reward: Reward | PowerReward
     num_samples: int
     _densities: dict[tuple[int, int], Belief] = field(default_factory=dict)
 
@@ -42,42 +40,11 @@ class PlainRewards:
             for sample in range(self.num_samples):
                 densities = [self._density(s, action, sample) for s, action in enumerate(chosen)]
                 updated = densities[0] if self.fusion is None else self.fusion.fuse(densities)[0]
-                rewards[joint, sample] = self._reward(updated)
+                rewards[joint, sample] = reward_value(self.reward, self.prediction, updated)
         return rewards
 
     def _density(self, sensor: int, action: int, sample: int) -> Belief:
         key = sensor, action * self.num_samples + sample
         if key not in self._densities:
-            self._densities[key] = case_density(self.posteriors[sensor], key[1])
+            self._densities[key] = self.posteriors[sensor].density(key[1])
         return self._densities[key]
-
-    def _reward(self, updated: Any) -> float:
-        value = self.reward(self.prediction, updated)
-        try:
-            return float(value)
-        except (TypeError, ValueError):
-            raise InputError(f"reward: expected a number; got {type(value).__name__} {value!r}") from None
-
-
-def can_be_laid_out(
-    posteriors: Sequence[PseudoPosteriors], prediction: Belief, fusion: Fusion[Any, Any] | None, reward: Reward
-) -> bool:
-    """Whether `FusedRewards` computes exactly what `PlainRewards` does, and the inputs fit each other."""
-    is_lmb = isinstance(prediction, LMB)
-    # A subclass may do anything: only the very classes are known to be sums of rows.
-    if type(reward) is not CauchySchwarzReward or any(own.is_lmb != is_lmb for own in posteriors):
-        return False
-    # A set that lost all its weight in one case counts as missing there, and not in others.
-    if any((own.log_weights == -np.inf).any() for own in posteriors):
-        return False
-    if fusion is None:
-        return True
-    if type(fusion) is not (Clmb if is_lmb else CmDeltaGlmb):
-        return False
-    assert isinstance(fusion, Clmb | CmDeltaGlmb)
-    if len(fusion.weights) != len(posteriors) or min(fusion.weights) <= 0.0:
-        return False
-    sets = [set(own.sets) for own in posteriors]
-    # Stand-ins for missing sets are the only mixtures, and powers of single Gaussians are exact.
-    exact = fusion.mixture_power == "moment_matched" or all(own == sets[0] for own in sets)
-    return exact and fusion.mixture_power != "quadrature" and len(set().union(*sets)) <= fusion.limits.max_hypotheses

@@ -11,7 +11,7 @@ from vedette.control.evaluator import Evaluator
 from vedette.control.evidence import Evidence
 from vedette.control.inputs import check_choice, check_poses, options_of
 from vedette.control.plan import Plan, RewardTable
-from vedette.control.reward import CauchySchwarzReward, Reward
+from vedette.control.reward import CauchySchwarzReward, PowerReward, Reward
 from vedette.control.search import ExhaustiveSearch, JointProblem, JointSearch, all_joint_actions, first_best
 from vedette.control.settings import MobileSensor, PlanningSettings
 from vedette.fusion import Fusion
@@ -42,14 +42,14 @@ class JointPlanner:
         sensors: the sensors, in the order of the beliefs and of the fusion weights.
         fusion: how their pseudo-updated densities become one.
         settings: horizon, samples, caps.
-        reward: Cauchy-Schwarz divergence, or a reward of the user's own.
+        reward: Cauchy-Schwarz or Renyi divergence, or a reward of the user's own.
         search: which joint actions are evaluated: all of them, as in the paper, or fewer.
     """
 
     sensors: tuple[MobileSensor, ...]
     fusion: Fusion[Any, Any]
     settings: PlanningSettings = field(default_factory=PlanningSettings)
-    reward: Reward = field(default_factory=CauchySchwarzReward)
+    reward: Reward | PowerReward = field(default_factory=CauchySchwarzReward)
     search: JointSearch = field(default_factory=ExhaustiveSearch)
 
     @property
@@ -82,7 +82,7 @@ class JointPlanner:
             evidence.evaluate(np.array([best]))
         chosen = tuple(own.first_action(course) for own, course in zip(evaluator.options, best, strict=True))
         actions = tuple(own.actions for own in evaluator.options)
-        return Plan(self.name, actions, chosen, evidence.tables(best), dict(evaluator.counts))
+        return Plan(self.name, actions, chosen, evidence.tables(best), *evaluator.account())
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -93,13 +93,13 @@ class IndependentPlanner:
         sensors: the sensors, in the order of the beliefs.
         fusion: how the beliefs became one; the decision itself does not use it.
         settings: horizon, samples, caps.
-        reward: Cauchy-Schwarz divergence, or a reward of the user's own.
+        reward: Cauchy-Schwarz or Renyi divergence, or a reward of the user's own.
     """
 
     sensors: tuple[MobileSensor, ...]
     fusion: Fusion[Any, Any]
     settings: PlanningSettings = field(default_factory=PlanningSettings)
-    reward: Reward = field(default_factory=CauchySchwarzReward)
+    reward: Reward | PowerReward = field(default_factory=CauchySchwarzReward)
 
     @property
     def name(self) -> str:
@@ -118,7 +118,7 @@ class IndependentPlanner:
             chosen.append(own.first_action(best))
             tables.extend(evidence.tables((best,)))
         actions = tuple(own.actions for own in evaluator.options)
-        return Plan(self.name, actions, tuple(chosen), tuple(tables), dict(evaluator.counts))
+        return Plan(self.name, actions, tuple(chosen), tuple(tables), *evaluator.account())
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -3,24 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 
 from vedette.control.inputs import Belief
-from vedette.control.priors import (
-    LabelSet,
-    heaviest_hypotheses,
-    label_sets,
-    offsets_of,
-    single_gaussians,
-    single_labels,
-    take_hypotheses,
-)
+from vedette.control.priors import heaviest_hypotheses
 from vedette.control.settings import IDEAL_MODES, MobileSensor, PlanningSettings
-from vedette.control.threads import run_chunks
-from vedette.densities import GLMB, LMB, TrackTable, sample_glmb, sample_lmb
+from vedette.densities import GLMB, LMB, sample_glmb, sample_lmb
+from vedette.densities.cases import LabelledCases
 from vedette.densities.checks import unchecked
+from vedette.densities.label_sets import label_sets, offsets_of, single_gaussians
 from vedette.filters import shared_targets
 from vedette.filters.inputs import model_errors
 from vedette.kernels.base.types import Floats
@@ -28,21 +20,7 @@ from vedette.kernels.planning.ideal import Decision, Futures, Horizon, propagate
 from vedette.kernels.planning.pseudo_glmb import GlmbResults, pseudo_update_glmb
 from vedette.kernels.planning.pseudo_lmb import LmbResults, pseudo_update_lmb
 from vedette.models import constant_survival, kernel_motion
-
-
-class PseudoPosteriors(NamedTuple):
-    """Ideally updated densities of one sensor; case `action * num_samples + sample` is the first axis.
-
-    sets: label sets of the GLMB (of an LMB: one set a label). log_weights: (num_cases, num_sets) log weight of each
-    set; of an LMB the existence logit. means, covs: (num_cases, num_members, ...) one Gaussian for each label of each
-    set, in order; of a GLMB's set of log weight -inf without meaning.
-    """
-
-    sets: tuple[LabelSet, ...]
-    log_weights: Floats
-    means: Floats
-    covs: Floats
-    is_lmb: bool
+from vedette.threads import run_chunks
 
 
 def draw_futures(
@@ -69,7 +47,7 @@ def draw_futures(
 
 def pseudo_posteriors(
     belief: Belief, sensor: MobileSensor, courses: Floats, futures: Futures, settings: PlanningSettings
-) -> PseudoPosteriors:
+) -> LabelledCases:
     """Run the sensor's filter over the horizon for every course and sample, without births or deaths.
 
     courses: (num_courses, horizon_steps, pose_dim) poses at the pseudo-updates.
@@ -94,7 +72,7 @@ def pseudo_posteriors(
     return _run_lmb(belief, decision, settings, num_cases)
 
 
-def _run_glmb(belief: GLMB, decision: Decision, settings: PlanningSettings, num_cases: int) -> PseudoPosteriors:
+def _run_glmb(belief: GLMB, decision: Decision, settings: PlanningSettings, num_cases: int) -> LabelledCases:
     heaviest = heaviest_hypotheses(belief, settings.max_prior_hypotheses)
     prior = unchecked(GLMB, single_gaussians(heaviest.tracks), *heaviest.to_kernel()[1:])
     found, dim = label_sets(prior), prior.tracks.state_dim
@@ -112,10 +90,10 @@ def _run_glmb(belief: GLMB, decision: Decision, settings: PlanningSettings, num_
 
     with model_errors():
         run_chunks(work, num_cases, settings.threads())
-    return PseudoPosteriors(found.sets, results.log_weights, results.means, results.covs, False)
+    return LabelledCases.of_glmbs(found.sets, results.log_weights, results.means, results.covs, **_counts(settings))
 
 
-def _run_lmb(belief: LMB, decision: Decision, settings: PlanningSettings, num_cases: int) -> PseudoPosteriors:
+def _run_lmb(belief: LMB, decision: Decision, settings: PlanningSettings, num_cases: int) -> LabelledCases:
     num, dim = belief.tracks.num_tracks, belief.tracks.state_dim
     results = LmbResults(
         np.empty((num_cases, num)), np.empty((num_cases, num, dim)), np.empty((num_cases, num, dim, dim))
@@ -127,18 +105,9 @@ def _run_lmb(belief: LMB, decision: Decision, settings: PlanningSettings, num_ca
 
     with model_errors():
         run_chunks(work, num_cases, settings.threads())
-    return PseudoPosteriors(single_labels(belief), results.logits, results.means, results.covs, True)
+    labels = [tuple(label) for label in belief.tracks.labels.tolist()]
+    return LabelledCases.of_lmbs(labels, results.logits, results.means, results.covs, **_counts(settings))
 
 
-def case_density(posteriors: PseudoPosteriors, case: int) -> Belief:
-    """One ideally updated density as a container: an LMB, or a marginalised GLMB without sets of weight zero."""
-    labels = np.array([label for labels in posteriors.sets for label in labels], np.int64).reshape(-1, 2)
-    num = len(labels)
-    means, covs = posteriors.means[case].copy(), posteriors.covs[case].copy()
-    tracks = unchecked(TrackTable, labels, np.arange(num + 1), np.zeros(num), means, covs)
-    log_weights = posteriors.log_weights[case].copy()
-    if posteriors.is_lmb:
-        return unchecked(LMB, tracks, log_weights)
-    offsets = offsets_of([len(labels) for labels in posteriors.sets])
-    glmb = unchecked(GLMB, tracks, offsets, np.arange(num), log_weights)
-    return take_hypotheses(glmb, np.flatnonzero(log_weights > -np.inf))
+def _counts(settings: PlanningSettings) -> dict[str, int]:
+    return {"num_samples": settings.num_samples, "num_threads": settings.threads()}

@@ -84,9 +84,9 @@ def lmb_to_glmb(lmb: LMB, *, max_hypotheses: int) -> tuple[GLMB, float]:
 __all__ = ["DEFAULT_LOG_MIN_WEIGHT", "DEFAULT_MERGE_DISTANCE", "glmb_to_lmb", "lmb_to_glmb", "marginalise"]
 
 
-def lmb_on_label_sets(lmb: LMB, sets: Sequence[Sequence[tuple[int, int]]]) -> GLMB:
+def lmb_on_label_sets(lmb: LMB, sets: Sequence[Sequence[tuple[int, ...]]]) -> GLMB:
     """The LMB's hypotheses on those of the label sets that it has, in their order; their weights do not sum to one."""
-    place = {(step, site): i for i, (step, site) in enumerate(lmb.tracks.labels.tolist())}
+    place = {tuple(label): i for i, label in enumerate(lmb.tracks.labels.tolist())}
     hyps = [[place[label] for label in labels] for labels in sets if all(label in place for label in labels)]
     exists = np.zeros((len(hyps), len(place)), np.bool_)
     for h, hyp in enumerate(hyps):

@@ -9,10 +9,10 @@ import numpy as np
 
 from vedette.densities import GLMB, LMB, Poisson
 from vedette.densities.conversions import lmb_on_label_sets
+from vedette.densities.label_sets import label_sets
 from vedette.errors import InputError, NumericalError
 from vedette.kernels.base.types import Glmb, Tracks
 from vedette.kernels.labelled.inner_products import log_glmbs, log_lmbs, log_tracks
-from vedette.kernels.labelled.labels import group_by_label_set
 from vedette.kernels.labelled.stacking import stack_glmbs, stack_tracks
 
 Density: TypeAlias = GLMB | LMB | Poisson
@@ -41,19 +41,18 @@ def cauchy_schwarz(a: Density, b: Density, *, unit_volume: float = 1.0, support:
     dimensions, support "common" for Poisson or with nothing in common) or are not valid, and `NumericalError` where
     the inner products contradict the Cauchy-Schwarz inequality.
     """
-    log_unit_volume = _check(a, b, unit_volume)
-    if support not in ("full", "common"):
-        raise InputError(f"support: expected 'full' or 'common'; got {support!r}")
+    log_unit_volume = check_densities({"a": a, "b": b}, unit_volume)
+    check_support(support)
     if isinstance(a, Poisson) and isinstance(b, Poisson):
         if support == "common":
             raise InputError("support: 'common' is for densities with label sets; got two Poisson densities")
         return _poisson(a, b, log_unit_volume)
-    cross, own_a, own_b = _log_inner_products(a, b, log_unit_volume, support == "common", self_terms=True)
+    cross, own_a, own_b = log_inner_products(a, b, log_unit_volume, support == "common", self_terms=True)
     if support == "common" and -math.inf in (own_a, own_b):
         raise InputError("support: 'common' is for densities that share a label set; got two that share none")
     if cross == -math.inf:
         return math.inf
-    return _at_least_zero(0.5 * (own_a + own_b) - cross, max(abs(own_a), abs(own_b)))
+    return at_least_zero(0.5 * (own_a + own_b) - cross, max(abs(own_a), abs(own_b)))
 
 
 def log_inner_product(a: Density, b: Density, *, unit_volume: float = 1.0) -> float:
@@ -61,33 +60,40 @@ def log_inner_product(a: Density, b: Density, *, unit_volume: float = 1.0) -> fl
 
     Raises `InputError` for densities that cannot be compared or are not valid.
     """
-    log_unit_volume = _check(a, b, unit_volume)
+    log_unit_volume = check_densities({"a": a, "b": b}, unit_volume)
     if isinstance(a, Poisson) and isinstance(b, Poisson):
         shared = math.exp(log_unit_volume + log_tracks(_intensities(a, b), 0, 1))
         return shared - a.expected_number - b.expected_number
-    return _log_inner_products(a, b, log_unit_volume, False, self_terms=False)[0]
+    return log_inner_products(a, b, log_unit_volume, False, self_terms=False)[0]
 
 
-def _check(a: Density, b: Density, unit_volume: float) -> float:
-    """Raise `InputError` for what cannot be compared; returns the log of the unit volume."""
+def check_densities(densities: dict[str, Density], unit_volume: float) -> float:
+    """Raise `InputError` for two densities that cannot be compared; returns the log of the unit volume."""
     if not 0.0 < unit_volume < math.inf:
         raise InputError(f"unit_volume: expected a finite number above 0; got {unit_volume}")
-    for name, density in (("a", a), ("b", b)):
+    for name, density in densities.items():
         if not isinstance(density, GLMB | LMB | Poisson):
             raise InputError(f"{name}: expected a GLMB, an LMB or a Poisson; got {type(density).__name__}")
         try:
             density.validate(error=InputError)
         except InputError as fault:
             raise InputError(f"{name}: {fault}") from None
+    names, (a, b) = ", ".join(densities), densities.values()
     if isinstance(a, Poisson) != isinstance(b, Poisson):
         kinds = f"{type(a).__name__} and {type(b).__name__}"
-        raise InputError(f"a, b: expected two labelled or two unlabelled densities; got {kinds}")
+        raise InputError(f"{names}: expected two labelled or two unlabelled densities; got {kinds}")
     if a.state_dim != b.state_dim:
-        raise InputError(f"a, b: expected one state dimension; got {a.state_dim} and {b.state_dim}")
+        raise InputError(f"{names}: expected one state dimension; got {a.state_dim} and {b.state_dim}")
     return math.log(unit_volume)
 
 
-def _log_inner_products(
+def check_support(support: str) -> None:
+    """Raise `InputError` for another word."""
+    if support not in ("full", "common"):
+        raise InputError(f"support: expected 'full' or 'common'; got {support!r}")
+
+
+def log_inner_products(
     a: Density, b: Density, log_unit_volume: float, common: bool, *, self_terms: bool
 ) -> tuple[float, float, float]:
     """log zeta(a, b), zeta(a, a), zeta(b, b) of labelled densities; the last two may be -inf unless `self_terms`."""
@@ -96,7 +102,7 @@ def _log_inner_products(
     if isinstance(a, LMB) and isinstance(b, LMB):
         return _lmbs(a, b, log_unit_volume, common)
     if isinstance(a, LMB) and isinstance(b, GLMB):
-        cross, own_b, own_a = _log_inner_products(b, a, log_unit_volume, common, self_terms=self_terms)
+        cross, own_b, own_a = log_inner_products(b, a, log_unit_volume, common, self_terms=self_terms)
         return cross, own_a, own_b
     assert isinstance(a, GLMB)
     assert isinstance(b, LMB)
@@ -119,12 +125,7 @@ def _lmbs(a: LMB, b: LMB, log_unit_volume: float, common: bool) -> tuple[float, 
 
 def _on_label_sets(lmb: LMB, glmb: GLMB) -> Glmb:
     """The LMB's hypotheses on those label sets of `glmb` that it has; their weights do not sum to one."""
-    labels, bundle = glmb.tracks.labels.tolist(), glmb.to_kernel()
-    sets = [
-        [tuple(labels[track]) for track in glmb.hyp_tracks[glmb.hyp_offsets[first] : glmb.hyp_offsets[first + 1]]]
-        for first in group_by_label_set(bundle)[1].tolist()
-    ]
-    return lmb_on_label_sets(lmb, sets).to_kernel()
+    return lmb_on_label_sets(lmb, label_sets(glmb).sets).to_kernel()
 
 
 def _intensities(a: Poisson, b: Poisson) -> Tracks:
@@ -142,11 +143,11 @@ def _intensities(a: Poisson, b: Poisson) -> Tracks:
 def _poisson(a: Poisson, b: Poisson, log_unit_volume: float) -> float:
     tracks = _intensities(a, b)
     own_a, own_b, cross = (math.exp(log_unit_volume + log_tracks(tracks, i, j)) for i, j in ((0, 0), (1, 1), (0, 1)))
-    return _at_least_zero(0.5 * (own_a + own_b) - cross, max(own_a, own_b))
+    return at_least_zero(0.5 * (own_a + own_b) - cross, max(own_a, own_b))
 
 
-def _at_least_zero(divergence: float, magnitude: float) -> float:
+def at_least_zero(divergence: float, magnitude: float, name: str = "Cauchy-Schwarz") -> float:
     """`divergence`, or 0 where it is below by rounding. Raises `NumericalError` where it is further below or NaN."""
     if not divergence >= -_ROUNDING * max(1.0, magnitude):
-        raise NumericalError(f"Cauchy-Schwarz divergence: expected at least 0; got {divergence}")
-    return max(divergence, 0.0)
+        raise NumericalError(f"{name} divergence: expected at least 0; got {divergence}")
+    return max(divergence, 0.0) + 0.0  # no -0

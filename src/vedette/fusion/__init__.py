@@ -3,5 +3,17 @@
 from vedette.fusion.base import MIXTURE_POWERS, Fusion, FusionInfo, FusionLimits, MixturePower
 from vedette.fusion.clmb import Clmb
 from vedette.fusion.cm_delta_glmb import CmDeltaGlmb
+from vedette.fusion.laid_out import LaidOut, LaysOut, lay_out_alone
 
-__all__ = ["MIXTURE_POWERS", "Clmb", "CmDeltaGlmb", "Fusion", "FusionInfo", "FusionLimits", "MixturePower"]
+__all__ = [
+    "MIXTURE_POWERS",
+    "Clmb",
+    "CmDeltaGlmb",
+    "Fusion",
+    "FusionInfo",
+    "FusionLimits",
+    "LaidOut",
+    "LaysOut",
+    "MixturePower",
+    "lay_out_alone",
+]

@@ -145,14 +145,19 @@ def power_rule(mixture_power: str, limits: FusionLimits, state_dim: int) -> Powe
     return PowerRule((limits.log_min_component_weight, distance, limits.max_components), points, point_weights)
 
 
+def check_kinds(given: Sequence[type], kinds: tuple[type, ...], num_sensors: int) -> None:
+    """Raise `InputError` unless one belief a sensor is given, all of the kinds expected."""
+    if len(given) != num_sensors:
+        raise InputError(f"beliefs: expected {num_sensors}, one for each fusion weight; got {len(given)}")
+    expected = " or ".join(kind.__name__ for kind in kinds)
+    for i, kind in enumerate(given):
+        if not issubclass(kind, kinds):
+            raise InputError(f"beliefs[{i}]: expected {expected}; got {kind.__name__}")
+
+
 def check_beliefs(beliefs: Sequence[Any], kinds: tuple[type, ...], num_sensors: int) -> None:
     """Raise `InputError` unless there is one belief a sensor, all of the given kinds and of one state dimension."""
-    if len(beliefs) != num_sensors:
-        raise InputError(f"beliefs: expected {num_sensors}, one for each fusion weight; got {len(beliefs)}")
-    expected = " or ".join(kind.__name__ for kind in kinds)
-    for i, belief in enumerate(beliefs):
-        if not isinstance(belief, kinds):
-            raise InputError(f"beliefs[{i}]: expected {expected}; got {type(belief).__name__}")
+    check_kinds([type(belief) for belief in beliefs], kinds, num_sensors)
     dims = [belief.state_dim for belief in beliefs]
     if len(set(dims)) > 1:
         raise InputError(f"beliefs: expected one state dimension at all sensors; got {dims}")

@@ -8,10 +8,12 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import expit, log_expit
+from scipy.special import expit, log_expit, logit
 
 from vedette.densities import GLMB, LMB
+from vedette.densities.cases import LabelledCases, lmb_cases
 from vedette.densities.checks import unchecked
+from vedette.densities.products import PowerProducts, Share, lay_out_products
 from vedette.fusion.base import (
     FusionInfo,
     FusionLimits,
@@ -20,6 +22,7 @@ from vedette.fusion.base import (
     by_sensor,
     check_beliefs,
     check_floor,
+    check_kinds,
     check_power,
     check_weights,
     count_lost,
@@ -93,6 +96,27 @@ class Clmb:
             log_normaliser=float(np.logaddexp(log_present, log_absent).sum()),
             discarded_weight=0.0,
         )
+
+    def lay_out(self, cases: Sequence[LabelledCases], prediction: GLMB | LMB) -> PowerProducts | None:
+        """The fusions of any of the sensors' cases; None for a GLMB prediction, or where the powers are not exact.
+
+        cases: one a sensor; a GLMB is first converted, as by `fuse`. prediction: of one Gaussian a track. Raises
+        `InputError` for another number of cases.
+        """
+        check_kinds([own.kind for own in cases], (LMB, GLMB), len(self.weights))
+        active = [i for i, weight in enumerate(self.weights) if weight > 0.0]
+        # A GLMB's labels become mixtures; powers of the single Gaussians of an LMB are exact.
+        exact = self.mixture_power == "moment_matched" or all(own.kind is LMB for own in cases)
+        if not exact or not isinstance(prediction, LMB):
+            return None
+        shares = [self._share(cases[i], self.weights[i]) for i in active]
+        return lay_out_products(shares, LabelledCases.of(prediction), active)
+
+    def _share(self, own: LabelledCases, weight: float) -> Share:
+        lmbs = own if own.kind is LMB else lmb_cases(own)
+        held, logits = lmbs.possible, lmbs.existence_logits
+        least = logits.min(axis=1, where=held[:, 1::2], initial=float(logit(self.missing_existence)))
+        return Share(lmbs, weight, held, np.stack([log_expit(-least), log_expit(least)], axis=1))
 
 
 class _Aligned(NamedTuple):

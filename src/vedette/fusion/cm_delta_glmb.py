@@ -9,8 +9,11 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.special import expit
 
-from vedette.densities import GLMB, TrackTable
+from vedette.densities import GLMB, LMB, TrackTable
+from vedette.densities.cases import LabelledCases
 from vedette.densities.checks import unchecked
+from vedette.densities.label_sets import take_tracks
+from vedette.densities.products import PowerProducts, Share
 from vedette.errors import NumericalError
 from vedette.fusion.alignment import Aligned, align
 from vedette.fusion.base import (
@@ -21,12 +24,14 @@ from vedette.fusion.base import (
     by_sensor,
     check_beliefs,
     check_floor,
+    check_kinds,
     check_power,
     check_weights,
     count_lost,
     power_rule,
 )
-from vedette.fusion.tracks import fused_tracks, take_tracks
+from vedette.fusion.laid_out import lay_out_glmbs
+from vedette.fusion.tracks import fused_tracks
 from vedette.kernels.base.types import Floats, Glmb
 from vedette.kernels.gaussian.linalg import log_sum
 from vedette.kernels.labelled.conversions import marginalise
@@ -98,6 +103,32 @@ class CmDeltaGlmb:
             log_normaliser=log_normaliser,
             discarded_weight=discarded_weight,
         )
+
+    def lay_out(self, cases: Sequence[LabelledCases], prediction: GLMB | LMB) -> PowerProducts | None:
+        """The fusions of any of the sensors' cases; None for an LMB prediction, or where the powers are not exact.
+
+        cases: one a sensor. prediction: marginalised, of one Gaussian a track. Floors and stand-ins are as in
+        `fuse`.
+        Raises `InputError` for another number or kind of cases, and where they share no label set with the
+        prediction.
+        """
+        check_kinds([own.kind for own in cases], (GLMB,), len(self.weights))
+        active = [i for i, weight in enumerate(self.weights) if weight > 0.0]
+        if not isinstance(prediction, GLMB):
+            return None
+        shares = [self._share(cases[i], self.weights[i]) for i in active]
+        sets = {labels for share in shares for labels in share.cases.sets}
+        whole = all(set(share.cases.sets) == sets and share.held.all() for share in shares)
+        # Stand-ins for missing sets are the only mixtures, and powers of single Gaussians are exact.
+        exact = self.mixture_power == "moment_matched" or (whole and self.mixture_power != "quadrature")
+        if not exact or len(sets) > self.limits.max_hypotheses:
+            return None
+        return lay_out_glmbs(shares, LabelledCases.of(prediction), active)
+
+    def _share(self, own: LabelledCases, weight: float) -> Share:
+        held = own.possible
+        least = own.log_weights.min(axis=1, where=held, initial=self.missing_log_weight)
+        return Share(own, weight, held, least[:, None])
 
 
 def _marginalised(belief: GLMB, rule: PowerRule) -> Glmb:

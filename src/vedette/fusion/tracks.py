@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from vedette.densities import TrackTable
-from vedette.densities.checks import unchecked
 from vedette.errors import NumericalError
 from vedette.fusion.base import PowerRule
 from vedette.kernels.base.types import Floats, Ints, Tracks
@@ -42,18 +41,3 @@ def reduced_tracks(tracks: Tracks, rule: PowerRule) -> Tracks:
         return tracks
     each = np.arange(num + 1)
     return pooled_tracks(tracks, tracks.labels, each, each[:-1].copy(), np.ones(num), *rule.limits)
-
-
-def take_tracks(tracks: TrackTable, places: Ints) -> TrackTable:
-    """The tracks at `places`, in that order."""
-    sizes = np.diff(tracks.offsets)[places]
-    offsets = np.concatenate([np.zeros(1, np.int64), np.cumsum(sizes)])
-    components = np.repeat(tracks.offsets[places] - offsets[:-1], sizes) + np.arange(offsets[-1])
-    return unchecked(
-        TrackTable,
-        tracks.labels[places],
-        offsets,
-        tracks.log_weights[components],
-        tracks.means[components],
-        tracks.covs[components],
-    )

@@ -62,10 +62,12 @@ class Truth:
         float_array("Truth.states", self.states, (int(offsets[-1]), None))
         if self.ids.shape != (offsets[-1],) or (self.ids < 0).any():
             raise reject("Truth.ids", f"{offsets[-1]} ids of at least 0", self.ids)
-        for scan in range(self.num_scans):
-            ids, _ = self.at(scan)
-            if len(np.unique(ids)) != len(ids):
-                raise reject("Truth.ids", f"each id once in scan {scan}", ids)
+        scans = np.repeat(np.arange(self.num_scans), np.diff(offsets))
+        order = np.lexsort((self.ids, scans))
+        twice = (np.diff(self.ids[order]) == 0) & (np.diff(scans[order]) == 0)
+        if twice.any():
+            scan = int(scans[order][:-1][twice][0])
+            raise reject("Truth.ids", f"each id once in scan {scan}", self.at(scan)[0])
 
     @classmethod
     def from_arrays(cls, times: Floats, alive: Bools, states: Floats) -> Truth:

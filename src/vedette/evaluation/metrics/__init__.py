@@ -1,7 +1,7 @@
 """How far estimates are from the truth: distances between sets of points and of tracks, breaks, consistency."""
 
 from vedette.evaluation.metrics.consistency import AverageNees, average_nees, nees, nees_interval
-from vedette.evaluation.metrics.kept import decode_metrics, encode_metrics
+from vedette.evaluation.metrics.kept import decode_metrics, encode_metrics, has_metrics
 from vedette.evaluation.metrics.matching import Matching, match_run
 from vedette.evaluation.metrics.own import Metric
 from vedette.evaluation.metrics.point_gospa import GospaResult, GospaSeries, gospa, gospa_distance, gospa_of_run
@@ -28,6 +28,7 @@ __all__ = [
     "gospa",
     "gospa_distance",
     "gospa_of_run",
+    "has_metrics",
     "match_run",
     "measure",
     "nees",

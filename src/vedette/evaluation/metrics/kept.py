@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 
 from vedette.errors import InputError
@@ -18,7 +20,16 @@ _LAYOUT = Layout({}, {"": Kind.NUMBER})
 def encode_metrics(metrics: RunMetrics) -> bytes:
     """Equal measures give equal bytes."""
     columns = {name: column.astype(np.float64) for name, column in metrics.columns().items()}
-    return write_table(columns, _LAYOUT, {"built_in": _SET})  # type: ignore[arg-type] # arrays alone
+    return write_table(columns, _LAYOUT, {"built_in": _SET, "own": " ".join(metrics.own)})  # type: ignore[arg-type] # arrays alone
+
+
+def has_metrics(content: bytes, own: Iterable[str]) -> bool:
+    """Whether all that this version of the program measures is there, and one's own measures of these names."""
+    try:
+        there = read_metadata(content)
+        return there["built_in"] == _SET and set(own) <= set(there["own"].split())
+    except Exception:  # damage can raise nearly anything in there
+        return False
 
 
 def decode_metrics(content: bytes, num_scans: int) -> tuple[RunMetrics | None, dict[str, Floats]]:

@@ -1,1 +1,1 @@
-"""Ideal scans, pseudo-updates and reward tables of a decision."""
+"""Ideal scans, pseudo-updates and prediction of a decision."""

@@ -26,12 +26,10 @@ from vedette.kernels.association.options import (
     view_rows,
 )
 from vedette.kernels.base.compile import borrowing, inlined, kernel
-from vedette.kernels.base.types import Floats, Glmb, Ints, Lmb, Tracks
+from vedette.kernels.base.types import Floats, Ints, Lmb, Tracks
 from vedette.kernels.gaussian.kalman import Scratch, make_scratch
 from vedette.kernels.gaussian.mixtures import copy_component
-from vedette.kernels.labelled.conversions import glmb_to_lmb
 from vedette.kernels.planning.ideal import Decision, ideal_scan, most_targets
-from vedette.kernels.planning.pseudo_glmb import GlmbResults
 from vedette.kernels.steps.lmb import fill_existence, weigh_by_existence
 from vedette.kernels.steps.matching import Mixture, make_mixture, match_rows
 
@@ -171,21 +169,3 @@ def pseudo_update_lmb(prior: Lmb, decision: Decision, first: int, last: int, res
         first = _update_cases(prior, decision, first, last, results, work)
         if first < last:
             work = _grown_work(work)
-
-
-@kernel
-def glmb_cases_to_lmb(
-    labels: Ints, set_offsets: Ints, cases: GlmbResults, first: int, last: int, results: LmbResults
-) -> None:
-    """Cases `first:last` of one sensor's GLMB as LMBs by moments, into `results`, in increasing label order.
-
-    labels: (num_members, 2) label of each member of each label set.
-    """
-    num = len(labels)
-    offsets, no_weights, members = np.arange(num + 1), np.zeros(num), np.arange(num)
-    for case in range(first, last):
-        tracks = Tracks(labels, offsets, no_weights, cases.means[case], cases.covs[case])
-        lmb = glmb_to_lmb(Glmb(tracks, set_offsets, members, cases.log_weights[case]), -math.inf, 0.0, 1)
-        for i in range(len(lmb.existence_logit)):
-            results.logits[case, i] = lmb.existence_logit[i]
-            copy_component(lmb.tracks.means, lmb.tracks.covs, i, results.means[case], results.covs[case], i)

@@ -1,0 +1,149 @@
+"""One shape of labelled density, for many of them at once: what a sensor would believe, case by case."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+from scipy.special import log_expit
+
+from vedette.densities.checks import unchecked
+from vedette.densities.glmb import GLMB
+from vedette.densities.label_sets import Label, LabelSet, label_sets, offsets_of, single_gaussians, take_hypotheses
+from vedette.densities.lmb import LMB
+from vedette.densities.tracks import TrackTable
+from vedette.kernels.base.types import Bools, Floats, Ints
+from vedette.kernels.labelled.case_conversions import LmbCases, glmb_cases_to_lmb
+from vedette.kernels.labelled.power_integrals import SensorCases
+from vedette.threads import run_chunks
+
+# A label set, and the factor that it belongs to: of an LMB the label, of a GLMB nothing.
+Place: TypeAlias = tuple[LabelSet, LabelSet]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LabelledCases:
+    """Labelled densities of one kind on the same label sets, of one Gaussian a track.
+
+    Each is a product of factors, and a factor a weighted list of label sets with a Gaussian for each (set, label): a
+    marginalised GLMB has one factor, an LMB one a label, with the sets {} and {l}.
+
+    Attributes:
+        kind: the container that a case is taken out as.
+        factors: names of the factors: of an LMB each its label, of a GLMB the one `()`.
+        factor_offsets: (num_factors + 1,) into `sets`.
+        sets: label sets, factor after factor.
+        log_weights: (num_cases, num_sets) log weight of each set in its factor.
+        means, covs: (num_cases, num_members, ...) one Gaussian for each label of each set, in order; without meaning
+            where a GLMB's set has log weight -inf.
+        num_samples: of a planner: case `action * num_samples + sample` is of this action and this sample.
+        num_threads: threads that may share work on the cases; the result does not depend on it.
+    """
+
+    kind: type[GLMB] | type[LMB]
+    factors: tuple[LabelSet, ...]
+    factor_offsets: Ints
+    sets: tuple[LabelSet, ...]
+    log_weights: Floats
+    means: Floats
+    covs: Floats
+    num_samples: int = 1
+    num_threads: int = 1
+
+    @classmethod
+    def of_glmbs(
+        cls, sets: Sequence[LabelSet], log_weights: Floats, means: Floats, covs: Floats, **counts: int
+    ) -> LabelledCases:
+        """Marginalised GLMBs on distinct label sets, log_weights (num_cases, num_sets)."""
+        return cls(GLMB, ((),), np.array([0, len(sets)]), tuple(sets), log_weights, means, covs, **counts)
+
+    @classmethod
+    def of_lmbs(
+        cls, labels: Sequence[Label], existence_logits: Floats, means: Floats, covs: Floats, **counts: int
+    ) -> LabelledCases:
+        """LMBs of these labels, existence_logits (num_cases, num_labels)."""
+        log_weights = np.empty((len(existence_logits), 2 * len(labels)))
+        log_weights[:, 0::2], log_weights[:, 1::2] = log_expit(-existence_logits), log_expit(existence_logits)
+        factors = tuple((label,) for label in labels)
+        sets = tuple(labels for factor in factors for labels in ((), factor))
+        offsets = 2 * np.arange(len(factors) + 1)
+        return cls(LMB, factors, offsets, sets, log_weights, means, covs, **counts)
+
+    @classmethod
+    def of(cls, density: GLMB | LMB) -> LabelledCases:
+        """One density as the only case; a GLMB must be marginalised, a mixture is replaced by one of its moments."""
+        tracks = single_gaussians(density.tracks)
+        if isinstance(density, LMB):
+            labels = [tuple(label) for label in tracks.labels.tolist()]
+            return cls.of_lmbs(labels, density.existence_logit[None], tracks.means[None], tracks.covs[None])
+        means, covs = tracks.means[density.hyp_tracks], tracks.covs[density.hyp_tracks]
+        return cls.of_glmbs(label_sets(density).sets, density.hyp_log_weights[None], means[None], covs[None])
+
+    @property
+    def num_cases(self) -> int:
+        """Number of densities."""
+        return len(self.log_weights)
+
+    @property
+    def state_dim(self) -> int:
+        """Length of a target's state."""
+        return int(self.means.shape[2])
+
+    @property
+    def set_offsets(self) -> Ints:
+        """(num_sets + 1,) members of each label set."""
+        return offsets_of([len(labels) for labels in self.sets])
+
+    @property
+    def places(self) -> tuple[Place, ...]:
+        """Each label set with the name of its factor, by which the sets of several cases are matched."""
+        sizes = np.diff(self.factor_offsets).tolist()
+        names = (name for name, size in zip(self.factors, sizes, strict=True) for _ in range(size))
+        return tuple(zip(names, self.sets, strict=True))
+
+    @property
+    def existence_logits(self) -> Floats:
+        """(num_cases, num_labels) log-odds of existence, of LMBs."""
+        return np.asarray(self.log_weights[:, 1::2] - self.log_weights[:, 0::2])
+
+    @property
+    def possible(self) -> Bools:
+        """(num_cases, num_sets) false for the sets of weight zero of a GLMB, and for a label of an LMB that cannot
+        exist."""
+        if self.kind is GLMB:
+            return np.asarray(self.log_weights > -np.inf)
+        return np.repeat(self.log_weights[:, 1::2] > -np.inf, 2, axis=1)
+
+    def density(self, case: int) -> GLMB | LMB:
+        """One case as a container: an LMB, or a marginalised GLMB without sets of weight zero."""
+        labels = np.array([label for labels in self.sets for label in labels], np.int64).reshape(-1, 2)
+        num = len(labels)
+        tracks = unchecked(
+            TrackTable, labels, np.arange(num + 1), np.zeros(num), self.means[case].copy(), self.covs[case].copy()
+        )
+        if self.kind is LMB:
+            return unchecked(LMB, tracks, self.existence_logits[case].copy())
+        log_weights = self.log_weights[case].copy()
+        glmb = unchecked(GLMB, tracks, self.set_offsets, np.arange(num), log_weights)
+        return take_hypotheses(glmb, np.flatnonzero(log_weights > -np.inf))
+
+
+def lmb_cases(own: LabelledCases) -> LabelledCases:
+    """GLMBs as LMBs of the same existence probabilities and of one Gaussian a label, in increasing label order."""
+    members = np.array([label for labels in own.sets for label in labels], np.int64).reshape(-1, 2)
+    labels = np.unique(members, axis=0)
+    shape, dim = (own.num_cases, len(labels)), own.state_dim
+    logits, means, covs = np.empty(shape), np.empty((*shape, dim)), np.empty((*shape, dim, dim))
+    given, set_offsets = SensorCases(own.log_weights, own.possible, own.means, own.covs), own.set_offsets
+
+    def work(first: int, last: int) -> None:
+        glmb_cases_to_lmb(members, set_offsets, given, labels, first, last, LmbCases(logits, means, covs))
+
+    run_chunks(work, own.num_cases, own.num_threads)
+    known = [tuple(label) for label in labels.tolist()]
+    return LabelledCases.of_lmbs(known, logits, means, covs, num_samples=own.num_samples, num_threads=own.num_threads)
+
+
+__all__ = ["LabelledCases", "Place", "lmb_cases"]

@@ -1,0 +1,181 @@
+"""Power integrals of two labelled densities, and the Renyi divergence that is made of them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TypeAlias
+
+import numpy as np
+
+from vedette.densities import GLMB, LMB, marginalise
+from vedette.densities.cases import LabelledCases
+from vedette.densities.checks import unchecked
+from vedette.densities.conversions import lmb_on_label_sets
+from vedette.densities.label_sets import label_sets, single_gaussians
+from vedette.densities.products import Share, check_exponents, lay_out_products
+from vedette.divergence.closed_form import (
+    Support,
+    at_least_zero,
+    check_densities,
+    check_support,
+    log_inner_products,
+)
+from vedette.errors import InputError
+from vedette.kernels.base.types import Floats
+
+Labelled: TypeAlias = GLMB | LMB
+
+# Of mixtures, too: the inner products are in closed form, the other two are sums of weights.
+_INNER_PRODUCTS = {(1.0, 1.0): 0, (2.0, 0.0): 1, (0.0, 2.0): 2}
+_MASSES = ((1.0, 0.0), (0.0, 1.0))
+
+
+def power_integral(
+    p: Labelled, q: Labelled, a: float, b: float, *, unit_volume: float = 1.0, support: Support = "full"
+) -> float:
+    """Z(a, b): the log of the set integral of K^((a + b - 1) |X|) p(X)^a q(X)^b; dimensionless.
+
+    What divergences of the power family are made of: Cauchy-Schwarz is (Z(2, 0) + Z(0, 2)) / 2 - Z(1, 1), Renyi of an
+    order (Z(order, 1 - order) - order Z(1, 0) - (1 - order) Z(0, 1)) / (order - 1).
+
+    Args:
+        p, q: GLMBs or LMBs. With an LMB and a GLMB, the LMB is taken on the GLMB's label sets.
+        a, b: exponents; one of them may be negative, or 0 where the other is above 0. A density to the power of 0 is 1.
+        unit_volume: K, as of `cauchy_schwarz`.
+        support: "full", or "common": only the label sets (two LMBs: the labels) that both densities have.
+
+    It is -inf where nothing is shared, and inf where a negative power makes the integral infinite.
+
+    Raises `InputError` for exponents or densities that do not fit (unlabelled ones, other state dimensions, support
+    "common" with nothing in common), and for mixtures, of which only the exponents (1, 1), (2, 0), (0, 2), (1, 0) and
+    (0, 1) are in closed form: in a GLMB, a track of several components or a label set of several hypotheses
+    (`marginalise` makes one Gaussian of them).
+    """
+    return float(power_integrals(p, q, ((a, b),), unit_volume=unit_volume, support=support)[0])
+
+
+def power_integrals(
+    p: Labelled,
+    q: Labelled,
+    exponents: Sequence[tuple[float, float]],
+    *,
+    unit_volume: float = 1.0,
+    support: Support = "full",
+) -> Floats:
+    """(num_exponents,) `power_integral` of each pair (a, b)."""
+    log_unit_volume = check_densities({"p": p, "q": q}, unit_volume)
+    check_support(support)
+    if not isinstance(p, GLMB | LMB):
+        raise InputError("p, q: expected labelled densities, GLMB or LMB; got two Poisson densities")
+    pairs = [(float(a), float(b)) for a, b in check_exponents(exponents).tolist()]
+    mixed = not (_is_single(p) and _is_single(q))
+    if not mixed:
+        return _of_singles(p, q, pairs, unit_volume, support)
+    for pair in pairs:
+        if pair not in _INNER_PRODUCTS and pair not in _MASSES:
+            raise InputError(
+                f"p, q: expected one Gaussian a track and one hypothesis a label set for the exponents {pair}; got "
+                "mixtures"
+            )
+    products = log_inner_products(p, q, log_unit_volume, support == "common", self_terms=True)
+    masses = dict(zip(_MASSES, _of_singles(_single(p), _single(q), _MASSES, 1.0, support), strict=True))
+    return np.array([products[_INNER_PRODUCTS[pair]] if pair in _INNER_PRODUCTS else masses[pair] for pair in pairs])
+
+
+def renyi(p: Labelled, q: Labelled, order: float, *, support: Support = "full") -> float:
+    """Renyi divergence of p from q: log(integral of p^order q^(1 - order)) / (order - 1), of normalised densities.
+
+    At least 0, and 0 for equal ones. Order 1/2 is symmetric and twice the Bhattacharyya distance; in general it is
+    order / (1 - order) times that of q from p of order 1 - order. Towards 1 it becomes the Kullback-Leibler divergence.
+    Above 1 it is infinite where p is not small enough against q, as for a p much wider than q.
+
+    Args:
+        p, q: GLMBs or LMBs of single Gaussians, as of `power_integral`.
+        order: above 0 and not 1.
+        support: "full"; or "common", and then both are normalised on the label sets (labels) that both have.
+
+    Infinite where they share none. A result below 0 by rounding is 0. Raises `InputError` as `power_integral` and for
+    another order, and `NumericalError` where rounding leaves it further below.
+    """
+    if not 0.0 < order < math.inf or order == 1.0:
+        raise InputError(f"order: expected a finite number above 0 other than 1; got {order!r}")
+    z, log_p, log_q = power_integrals(p, q, ((order, 1.0 - order), *_MASSES), support=support).tolist()
+    if math.isinf(z):
+        return math.inf
+    divergence = (z - order * log_p - (1.0 - order) * log_q) / (order - 1.0)
+    return at_least_zero(divergence, max(abs(z), abs(log_p), abs(log_q)), "Renyi")
+
+
+def _is_single(density: Labelled) -> bool:
+    single = len(density.tracks.log_weights) == density.tracks.num_tracks
+    return single and (isinstance(density, LMB) or density.is_marginalised)
+
+
+def _single(density: Labelled) -> Labelled:
+    """The density with the same weights and one Gaussian for each mixture."""
+    if isinstance(density, GLMB):
+        return marginalise(density, max_components=1)
+    return unchecked(LMB, single_gaussians(density.tracks), density.existence_logit)
+
+
+def _of_singles(
+    p: Labelled, q: Labelled, pairs: Sequence[tuple[float, float]], unit_volume: float, support: Support
+) -> Floats:
+    if isinstance(p, GLMB) == isinstance(q, GLMB):
+        return _of_one_kind(LabelledCases.of(p), LabelledCases.of(q), pairs, unit_volume, support)
+    if isinstance(p, GLMB):
+        swapped = [(b, a) for a, b in pairs]
+        return _of_singles(q, p, swapped, unit_volume, support)
+    assert isinstance(p, LMB)
+    assert isinstance(q, GLMB)
+    found = np.empty(len(pairs))
+    on_sets = lmb_on_label_sets(p, label_sets(q).sets)
+    for i, (a, b) in enumerate(pairs):
+        if support == "full" and 0.0 in (a, b):
+            own = p if b == 0.0 else q
+            found[i] = _of_singles(own, own, ((a, b),), unit_volume, support)[0]
+        elif support == "full" and b < 0.0 and _has_more_sets(p, on_sets):
+            found[i] = math.inf
+        else:
+            views = LabelledCases.of(on_sets), LabelledCases.of(q)
+            found[i] = _of_one_kind(*views, ((a, b),), unit_volume, support)[0]
+    return found
+
+
+def _has_more_sets(lmb: LMB, on_sets: GLMB) -> bool:
+    """Whether the LMB has label sets of positive weight beyond these."""
+    num_sets = int(2 ** np.count_nonzero(np.isfinite(lmb.existence_logit)))
+    return bool(num_sets > np.count_nonzero(on_sets.hyp_log_weights > -math.inf))
+
+
+def _of_one_kind(
+    p: LabelledCases, q: LabelledCases, pairs: Sequence[tuple[float, float]], unit_volume: float, support: Support
+) -> Floats:
+    if support == "full":
+        p, q = _extended(p, q), _extended(q, p)
+    elif p.kind is GLMB and not set(p.sets) & set(q.sets):
+        raise InputError("support: 'common' is for densities that share a label set; got two that share none")
+    whole = Share.whole(q, np.ones_like(q.possible))
+    laid = lay_out_products([whole], p)
+    return np.asarray(laid.z(np.zeros((1, 1), np.int64), pairs, unit_volume)[0, 0])
+
+
+def _extended(own: LabelledCases, other: LabelledCases) -> LabelledCases:
+    """`own` with the label sets (labels) that only `other` has, at weight zero."""
+    known, starts = set(own.places), other.set_offsets
+    lacking = [i for i, place in enumerate(other.places) if place not in known]
+    members = np.array([m for i in lacking for m in range(starts[i], starts[i + 1])], np.int64)
+    means = np.concatenate([own.means, other.means[:, members]], axis=1)
+    covs = np.concatenate([own.covs, other.covs[:, members]], axis=1)
+    if own.kind is LMB:
+        labels = [labels[0] for labels in (*own.sets, *(other.sets[i] for i in lacking)) if labels]
+        logits = np.full((1, len(labels)), -math.inf)
+        logits[:, : len(own.factors)] = own.existence_logits
+        return LabelledCases.of_lmbs(labels, logits, means, covs)
+    log_weights = np.full((1, len(own.sets) + len(lacking)), -math.inf)
+    log_weights[:, : len(own.sets)] = own.log_weights
+    return LabelledCases.of_glmbs((*own.sets, *(other.sets[i] for i in lacking)), log_weights, means, covs)
+
+
+__all__ = ["Labelled", "power_integral", "power_integrals", "renyi"]

@@ -1,0 +1,69 @@
+"""Many GLMBs as LMBs at once."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from vedette.kernels.base.compile import kernel
+from vedette.kernels.base.types import Floats, Glmb, Ints, Tracks
+from vedette.kernels.gaussian.mixtures import copy_component
+from vedette.kernels.labelled.conversions import glmb_to_lmb
+from vedette.kernels.labelled.power_integrals import SensorCases
+
+
+class LmbCases(NamedTuple):
+    """LMBs on the same labels."""
+
+    logits: Floats  # (num_cases, num_labels)
+    means: Floats  # (num_cases, num_labels, state_dim)
+    covs: Floats  # (num_cases, num_labels, state_dim, state_dim)
+
+
+@kernel
+def _held_sets(set_offsets: Ints, cases: SensorCases, case: int) -> tuple[Ints, Ints, Floats]:
+    """Offsets, members and log weights of the label sets that a case has not lost."""
+    num = 0
+    for at in range(len(set_offsets) - 1):
+        num += cases.held[case, at]
+    offsets, members = np.zeros(num + 1, np.int64), np.empty(set_offsets[-1], np.int64)
+    log_weights, hyp, end = np.empty(num), 0, 0
+    for at in range(len(set_offsets) - 1):
+        if not cases.held[case, at]:
+            continue
+        for m in range(set_offsets[at], set_offsets[at + 1]):
+            members[end] = m
+            end += 1
+        log_weights[hyp] = cases.log_weights[case, at]
+        hyp += 1
+        offsets[hyp] = end
+    return offsets, members[:end].copy(), log_weights
+
+
+@kernel
+def glmb_cases_to_lmb(
+    members: Ints, set_offsets: Ints, cases: SensorCases, labels: Ints, first: int, last: int, out: LmbCases
+) -> None:
+    """Cases `first:last` of marginalised GLMBs as LMBs by moments, as `glmb_to_lmb` makes each.
+
+    members: (num_members, 2) label of each member of each label set. labels: (num_labels, 2) all of them in increasing
+    order; one that a case has lost with all its sets gets logit -inf there, and no Gaussian.
+    """
+    num = len(members)
+    offsets, no_weights = np.arange(num + 1), np.zeros(num)
+    for case in range(first, last):
+        tracks = Tracks(members, offsets, no_weights, cases.means[case], cases.covs[case])
+        hyp_offsets, hyp_members, log_weights = _held_sets(set_offsets, cases, case)
+        lmb, found = glmb_to_lmb(Glmb(tracks, hyp_offsets, hyp_members, log_weights), -math.inf, 0.0, 1), 0
+        known = lmb.tracks.labels
+        for i in range(len(labels)):
+            out.logits[case, i] = -math.inf
+            if found < len(known) and known[found, 0] == labels[i, 0] and known[found, 1] == labels[i, 1]:
+                out.logits[case, i] = lmb.existence_logit[found]
+                copy_component(lmb.tracks.means, lmb.tracks.covs, found, out.means[case], out.covs[case], i)
+                found += 1
+
+
+__all__ = ["LmbCases", "glmb_cases_to_lmb"]
