@@ -28,7 +28,7 @@ def test_a_field_of_a_section_of_every_sensor_and_of_one(paper: Scenario) -> Non
         {"control.num_samples": 7, "sensors.*.platform.speed": 30.0, "sensors.1.platform.speed": 20.0, "ospa.order": 2},
     )
     assert changed.model.control.num_samples == 7
-    assert [sensor.platform.speed for sensor in changed.model.sensors] == [30.0, 20.0]
+    assert [sensor.platform.model_dump()["speed"] for sensor in changed.model.sensors] == [30.0, 20.0]
     assert changed.model.ospa.order == 2.0
     assert changed.path == paper.path
     assert paper.model.control.num_samples != 7
@@ -70,7 +70,7 @@ def test_files_beside_the_scenario_stay_beside_it(tmp_path: Path) -> None:
         ({"control.num_samples": -3}, r"control\.num_samples: expected a number of at least 1, got -3"),
         ({"control.num_samples": "many"}, r"control\.num_samples: expected a whole number, got \"many\""),
         ({"filter.kind": "glmb"}, r"filter\.kind: expected one of .*, got \"glmb\""),
-        ({"filter.kind": "lmb"}, r"fusion\.kind: expected clmb or none, as the filters are lmb"),
+        ({"filter.kind": "lmb"}, r"fusion\.kind: expected clmb, central or none, as the filters are lmb"),
         ({"time.num_steps": 5}, r"expected a (step|time)"),
         ({"control.num_samples": -3, "ospa.cutoff": 0}, r"(?s)control\.num_samples.*ospa\.cutoff"),
     ],
