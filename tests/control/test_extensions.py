@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -9,10 +10,12 @@ import numpy as np
 import pytest
 
 from control.examples import SETTINGS, evaluator_of, situation
-from vedette.control import CauchySchwarzReward, IndependentPlanner, JointPlanner
+from vedette.control import CauchySchwarzReward, IndependentPlanner, JointPlanner, RenyiReward
+from vedette.control.laid_rewards import warn_slow
 from vedette.densities import cardinality_distribution
 from vedette.divergence import cauchy_schwarz
-from vedette.errors import InputError, NumericalError
+from vedette.errors import InputError, NumericalError, SlowRewardWarning
+from vedette.fusion import CmDeltaGlmb
 
 # Own rewards and fusions are mostly computed one by one, which is said once.
 pytestmark = pytest.mark.filterwarnings("ignore::vedette.errors.SlowRewardWarning")
@@ -96,6 +99,66 @@ def test_a_fusion_of_the_users_own(kind: str) -> None:
         *example.arguments, rng=np.random.default_rng(5)
     )
     assert plan.chosen == (int(alone.mean(axis=1).argmax()), 0)
+
+
+class LaidOutBefore:
+    """A fusion of the user's own that a planner need not call."""
+
+    def __init__(self, weights: Any) -> None:
+        self.rule, self.fused = CmDeltaGlmb(weights), 0
+
+    def fuse(self, beliefs: Any) -> Any:
+        self.fused += 1
+        return self.rule.fuse(beliefs)
+
+    def lay_out(self, cases: Any, prediction: Any) -> Any:
+        return self.rule.lay_out(cases, prediction)
+
+
+def test_a_fusion_of_the_users_own_that_lays_out() -> None:
+    example = situation("marginal")
+    expected = evaluator_of(example).sample_rewards((0, 1), example.fusion)
+    fusion = LaidOutBefore(example.fusion.weights)
+    evaluator = evaluator_of(replace(example, fusion=fusion))
+    np.testing.assert_array_equal(evaluator.sample_rewards((0, 1), fusion), expected)
+    assert (fusion.fused, evaluator.notes) == (0, {})
+
+
+def test_what_is_computed_one_by_one_is_said_in_the_plan_and_once_by_a_warning() -> None:
+    example = situation("marginal")
+    warn_slow.cache_clear()
+    planner = IndependentPlanner(example.sensors, example.fusion, SETTINGS, minus_cardinality_variance)
+    with pytest.warns(SlowRewardWarning, match="one by one, which takes some .* times as long.*: minus_card") as warned:
+        plans = [planner.plan(*example.arguments, rng=np.random.default_rng(5)) for _ in range(2)]
+    assert len(warned) == 1
+    for plan in plans:
+        assert plan.notes == (
+            "rewards were computed one by one: minus_cardinality_variance is a function of two densities",
+        )
+
+
+class Nonsense:
+    exponents = ((1.0, 1.0),)
+
+    def combine(self, z: Any) -> Any:
+        return z  # one number too many
+
+
+def test_a_combination_of_another_shape() -> None:
+    example = situation("marginal")
+    planner = IndependentPlanner(example.sensors, example.fusion, SETTINGS, Nonsense())
+    with pytest.raises(InputError, match=r"reward.combine: expected shape \(3, 3\) for z of shape \(3, 3, 1\)"):
+        planner.plan(*example.arguments, rng=np.random.default_rng(5))
+
+
+def test_an_order_without_a_finite_reward_is_named() -> None:
+    example = situation("marginal")
+    planner = IndependentPlanner(example.sensors, example.fusion, SETTINGS, RenyiReward(3.0))
+    with pytest.raises(NumericalError, match="expected a finite number; got inf"):
+        planner.plan(*example.arguments, rng=np.random.default_rng(5))
+    for order in (0.0, 1.0, math.inf, True, "half"):
+        with pytest.raises(InputError, match="order: expected a finite number above 0 other than 1"):
+            RenyiReward(order)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])

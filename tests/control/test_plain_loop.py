@@ -24,7 +24,7 @@ from control.examples import (
 )
 from control.plain_loop import plain_rewards
 from vedette import models
-from vedette.control import CauchySchwarzReward
+from vedette.control import CauchySchwarzReward, RenyiReward
 from vedette.control.plain import PlainRewards
 from vedette.control.search import all_joint_actions
 from vedette.densities import GLMB, LMB
@@ -220,6 +220,39 @@ def test_the_general_path_gives_the_same_rewards(kind: str, num_sensors: int) ->
         general = PlainRewards(posteriors, evaluator.prediction, fusion, evaluator.reward, SETTINGS.num_samples)
         laid_out = evaluator.rewards(which, fusion)
         np.testing.assert_allclose(laid_out(actions), general(actions), rtol=1e-9, atol=1e-9)
+
+
+class Combination:
+    """A reward of the user's own, of power integrals with a K, of normalised densities."""
+
+    exponents = ((0.4, 1.3), (0.0, 0.6), (2.0, 0.0), (0.0, 1.0), (1.0, 0.0), (1.0, 1.0))
+    unit_volume = 1e4
+
+    def combine(self, z: Any) -> Any:
+        crossed, alone, own, update, prediction, product = np.moveaxis(z, -1, 0)
+        crossed = crossed - 0.4 * prediction - 1.3 * update
+        return crossed + alone - 0.6 * update + own - 2.0 * prediction - 0.3 * (product - prediction - update)
+
+
+@pytest.mark.parametrize("reward", [RenyiReward(), RenyiReward(0.2), Combination()], ids=["half", "fifth", "own"])
+@pytest.mark.parametrize("kind", ["delta", "lmb", "glmbs to lmb", "certain"])
+@pytest.mark.parametrize("num_sensors", [1, 2, 3])
+def test_rewards_of_power_integrals(reward: Any, kind: str, num_sensors: int) -> None:
+    """Laid out and one by one; with certain detection label sets lose all their weight in some cases."""
+    detection = {"detection": models.DetectionModel(certain)} if kind == "certain" else {}
+    example = situation("lmb" if kind == "lmb" else "delta", num_sensors, seed=3, **detection)
+    if kind == "glmbs to lmb":
+        fusion = Clmb(example.fusion.weights)
+        example = replace(example, fusion=fusion, fused=fusion.fuse(example.beliefs)[0])
+    evaluator = evaluator_of(example, reward)
+    if kind == "certain":
+        assert any(np.isneginf(own.log_weights).any() for own in evaluator.posteriors)
+    for which, fusion in ((tuple(range(num_sensors)), example.fusion), ((0,), None)):
+        actions = all_joint_actions(tuple(evaluator.joint_shape()[s] for s in which))[-4:]
+        posteriors = [evaluator.posteriors[s] for s in which]
+        plain = PlainRewards(posteriors, evaluator.prediction, fusion, reward, SETTINGS.num_samples)
+        np.testing.assert_allclose(evaluator.rewards(which, fusion)(actions), plain(actions), rtol=1e-9, atol=1e-9)
+    assert not evaluator.notes
 
 
 @pytest.mark.parametrize("most", [1, 3, 300])

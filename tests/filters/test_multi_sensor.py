@@ -22,7 +22,7 @@ from filters.examples import (
 from reference import glmb as oracle
 from reference import multi_sensor
 from vedette import models
-from vedette.densities import LMB, TrackTable, lmb_to_glmb
+from vedette.densities import LMB, TrackTable, lmb_to_glmb, marginalise
 from vedette.errors import InputError, NumericalError
 from vedette.filters import DeltaGlmbFilter, Limits, LmbFilter, MultiSensorGlmbFilter, MultiSensorLmbFilter
 from vedette.kernels.base.compile import JIT_ENABLED
@@ -167,6 +167,17 @@ def test_one_sensor_is_the_filter_of_one_sensor(name):
                 assert_same_lmb(belief, plain_lmb(expected))
             else:
                 assert_same_glmb(plain_glmb(belief), plain_glmb(expected))
+
+
+def test_the_marginal_glmb_has_one_hypothesis_a_label_set():
+    whole, marginal = make(MultiSensorGlmbFilter), make(MultiSensorGlmbFilter)
+    marginal = dataclasses.replace(marginal, marginalised=True)
+    rng = np.random.default_rng(0)
+    expected, _ = whole.step(whole.initial(), SCANS[0], POSES, DT, 1, rng=rng)
+    collapsed = marginalise(expected, max_components=1000, log_min_weight=-math.inf, merge_distance=0.0)
+    belief, info = marginal.step(marginal.initial(), SCANS[0], POSES, DT, 1, rng=rng)
+    assert_same_glmb(plain_glmb(belief), plain_glmb(collapsed))
+    assert info.num_hypotheses == belief.num_hyps < expected.num_hyps
 
 
 @pytest.mark.parametrize("limits", [Limits(max_hypotheses=3), Limits(min_existence=0.02, min_relative_weight=0.03)])

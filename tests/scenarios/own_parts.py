@@ -50,6 +50,16 @@ def fusion(num_sensors: int, first: float = 0.5) -> Clmb:
     return Clmb((first, *((1.0 - first) / (num_sensors - 1),) * (num_sensors - 1)))
 
 
+class Overlap:
+    """A reward of power integrals."""
+
+    def __init__(self, power: float) -> None:
+        self.exponents = ((power, 1.0 - power),)
+
+    def combine(self, z: Any) -> Any:
+        return -z[..., 0]
+
+
 def reward(predicted: Any, updated: Any, scale: float = 1.0) -> float:
     """By how much the update is surer of the number of targets."""
     spread = [float(np.var(np.arange(len(p)) * p)) for p in map(cardinality, (predicted, updated))]

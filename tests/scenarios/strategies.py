@@ -161,7 +161,8 @@ def scenarios(draw: st.DrawFn) -> Data:
         num_samples=counts,
         ideal_measurements=st.sampled_from(["ideal", "expected", "sampled"]),
         detection_threshold=probability,
-        reward=section("cauchy_schwarz", unit_volume=st.just("reference") | positive),
+        reward=section("cauchy_schwarz", unit_volume=st.just("reference") | positive)
+        | section("renyi", order=positive.filter(lambda order: order != 1.0)),
         limits=section(max_prior_hypotheses=counts, max_hypotheses=counts),
     )
     return {

@@ -13,12 +13,23 @@ import pytest
 from scenarios.minimal import changed
 from vedette.densities import GLMB, LMB
 from vedette.errors import InputError
-from vedette.filters import CbMemberFilter, CphdFilter, DeltaGlmbFilter, LmbFilter, PhdFilter
+from vedette.filters import (
+    CbMemberFilter,
+    CphdFilter,
+    DeltaGlmbFilter,
+    LmbFilter,
+    MultiSensorGlmbFilter,
+    MultiSensorLmbFilter,
+    PhdFilter,
+)
 from vedette.fusion import Clmb, CmDeltaGlmb
 from vedette.scenarios import Scenario, build, list_builtin, load_scenario, parse_scenario
+from vedette.scenarios.cautions import cautions
 from vedette.scenarios.sections.scoring import MarginalEstimator
 from vedette.scenarios.sections.tracking import Fusion
+from vedette.scenarios.summary import facts, one_line
 from vedette.simulation import Truth, simulate_scans
+from vedette.tracking import Central
 
 OWN_MODELS = Path(__file__).with_name("own_models.py")
 
@@ -222,6 +233,33 @@ def test_fusions_of_each_kind_have_weights_that_sum_to_one() -> None:
     assert isinstance(clmb, Clmb)
     assert (clmb.weights, clmb.missing_existence) == ((0.25,) * 4, 0.01)
     assert Fusion(kind="none").build(1, Path()) is None
+
+
+CENTRAL = [
+    ("delta_glmb", MultiSensorGlmbFilter, CmDeltaGlmb),
+    ("m_delta_glmb", MultiSensorGlmbFilter, CmDeltaGlmb),
+    ("lmb", MultiSensorLmbFilter, Clmb),
+]
+
+
+@pytest.mark.parametrize(("kind", "container", "fusion"), CENTRAL)
+def test_one_filter_may_take_the_scans_of_all_sensors(kind: str, container: type, fusion: type) -> None:
+    loaded = scenario(
+        ("kind: m_delta_glmb", f"kind: {kind}, limits: {{max_hypotheses: 9}}"),
+        ("{kind: cm_delta_glmb, weights: [0.5, 0.5]}", "{kind: central}"),
+    )
+    tracker: Any = build.build_experiment(loaded).tracker
+    assert isinstance(tracker, Central)
+    assert isinstance(tracker.filter, container)
+    assert tracker.filter.limits.max_hypotheses == 9  # type: ignore[attr-defined]
+    assert getattr(tracker.filter, "marginalised", False) == (kind == "m_delta_glmb")
+    planner: Any = build.build_planner(loaded, "jdm")
+    assert isinstance(planner.fusion, fusion)
+    assert planner.fusion.weights == (0.5, 0.5)  # type: ignore[attr-defined]
+    assert {type(sensor.filter.initial()) for sensor in planner.sensors} == {type(tracker.initial().fused)}
+    assert f"2 sensors, central {kind} filter, " in one_line(loaded)
+    assert ("fusion", "central: one filter takes the scans of all sensors") in facts(loaded.model)
+    assert not any("GCI" in caution for caution in cautions(loaded))
 
 
 def test_the_marginal_estimator_has_its_threshold() -> None:

@@ -65,10 +65,12 @@ def test_all_kinds_in_one_run(scenario: Scenario) -> None:
     np.testing.assert_array_equal(third[0], [7.0, 0.0])
 
 
+@pytest.mark.filterwarnings("ignore::vedette.errors.SlowRewardWarning")
 def test_a_joint_decision_with_reward_search_and_fusion_of_ones_own(scenario: Scenario) -> None:
     plan = run_scenario(scenario, "jdm", seed=1).decisions[0].plan
     assert plan.chosen == (0, 0)
     assert np.isfinite(plan.expected_rewards[0][0])
+    assert plan.notes == ("rewards were computed one by one: reward is a function of two densities",)
 
 
 def test_a_campaign_with_workers_gives_the_same_bytes(folder: Path) -> None:
@@ -106,6 +108,14 @@ def check(file: Path) -> tuple[int, str]:
 def test_the_check_makes_everything(folder: Path) -> None:
     code, text = check(folder / "scene.yaml")
     assert (code, text.count("warning")) == (0, 0), text
+
+
+def test_a_reward_of_power_integrals_is_one_too(folder: Path) -> None:
+    file = folder / "scene.yaml"
+    file.write_text(file.read_text().replace(own("reward", "{scale: 2.0}"), own("Overlap", "{power: 0.25}")))
+    assert check(file)[0] == 0
+    reward = load_scenario(file).model.control.reward.build(folder)
+    assert (reward.exponents[0], reward.combine(np.array([-1.0]))) == ((0.25, 0.75), 1.0)  # type: ignore[union-attr]
 
 
 @pytest.mark.parametrize(

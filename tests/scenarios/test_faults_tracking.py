@@ -35,7 +35,7 @@ CASES = [
         "kind: lmb, assignment: {kind: gibbs, num_samples: 10}",
         [
             'f.yaml:19:40: filter.assignment.kind: expected ranked, as the filter is lmb, got "gibbs"',
-            'f.yaml:20:16: fusion.kind: expected clmb or none, as the filters are lmb, got "cm_delta_glmb"',
+            'f.yaml:20:16: fusion.kind: expected clmb, central or none, as the filters are lmb, got "cm_delta_glmb"',
         ],
     ),
     (
@@ -53,6 +53,14 @@ CASES = [
         "  - {name: south, position: [0.0, -40.0]}\nfilter: {kind: m_delta_glmb}\nfusion: {kind: cm_delta_glmb, weights: [0.5, 0.5]}\nestimator: {kind: marginal, threshold: 0.6}",
         "filter: {kind: phd}\nfusion: {kind: clmb}",
         ['f.yaml:19:16: fusion.kind: expected none, as phd filters have no labels by which to fuse, got "clmb"'],
+    ),
+    (
+        "filter: {kind: m_delta_glmb}\nfusion: {kind: cm_delta_glmb, weights: [0.5, 0.5]}",
+        "filter: {kind: delta_glmb, assignment: {kind: gibbs}}\nfusion: {kind: central, feedback: true}",
+        [
+            'f.yaml:19:47: filter.assignment.kind: expected ranked, as one filter takes the scans of all sensors, got "gibbs"',
+            "f.yaml:20:35: fusion.feedback: expected false, as nothing is fused while tracking, got true",
+        ],
     ),
     (
         "kind: m_delta_glmb",
@@ -140,8 +148,13 @@ CASES = [
     ),
     (
         "decision_steps: [4, 8]",
+        "reward: {kind: renyi, order: 1}",
+        ["f.yaml:22:40: control.reward.order: expected a number other than 1, got 1"],
+    ),
+    (
+        "decision_steps: [4, 8]",
         "reward: {kind: entropy}",
-        ['f.yaml:22:26: control.reward.kind: expected one of cauchy_schwarz, custom, got "entropy"'],
+        ['f.yaml:22:26: control.reward.kind: expected one of cauchy_schwarz, renyi, custom, got "entropy"'],
     ),
     (
         "decision_steps: [4, 8]",

@@ -11,7 +11,7 @@ from typing import Any, get_args
 import pytest
 from pydantic import BaseModel
 
-from vedette.control import CauchySchwarzReward, PlanningSettings
+from vedette.control import CauchySchwarzReward, PlanningSettings, RenyiReward
 from vedette.control.settings import IDEAL_MODES
 from vedette.densities import marginal_estimate
 from vedette.filters import DeltaGlmbFilter, Limits
@@ -24,6 +24,7 @@ from vedette.scenarios.diagnostics import kinds_of
 from vedette.scenarios.sections.base import Section
 from vedette.scenarios.sections.control import CauchySchwarzReward as CauchySchwarzSection
 from vedette.scenarios.sections.control import Control
+from vedette.scenarios.sections.control import RenyiReward as RenyiSection
 from vedette.scenarios.sections.scoring import MarginalEstimator
 from vedette.scenarios.sections.targets import RecordedTargets
 from vedette.scenarios.sections.tracking import FilterLimits, Fusion, FusionLimits, GibbsAssignment
@@ -95,6 +96,7 @@ DEFAULTS: list[tuple[type[BaseModel], Any, dict[str, str]]] = [
     (RecordedTargets, Cleaning, {"max_gap": "max_gap", "min_speed": "min_speed", "max_speed": "max_speed"}),
     (RecordedTargets, RecordedSource, {"time_origin": "time_origin"}),
     (CauchySchwarzSection, CauchySchwarzReward, {"unit_volume": "unit_volume"}),
+    (RenyiSection, RenyiReward, {"order": "order"}),
     (GibbsAssignment, DeltaGlmbFilter, {"num_samples": "num_gibbs_samples"}),
     (Fusion, Clmb, {"mixture_power": "mixture_power", "missing_existence": "missing_existence"}),
     (MarginalEstimator, marginal_estimate, {"threshold": "threshold"}),

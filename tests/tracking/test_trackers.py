@@ -260,6 +260,18 @@ def test_an_exception_says_in_which_stage_it_was_raised(experiment: Experiment) 
     assert stage_of(ValueError("elsewhere")) is None
 
 
+def test_a_filter_that_reports_nothing_is_told_so(experiment: Experiment) -> None:
+    class Silent(Own):
+        def step(self, *args: Any, **kwargs: Any) -> Any:
+            return super().step(*args, **kwargs)[0], None
+
+    tracker: Any = experiment.tracker
+    silent = replace(tracker, filters=(tracker.filters[0], Silent(tracker.filters[1])))
+    message = r"in the report of the tracker: TrackerInfo.filters: expected .*; got \['FilterInfo', 'NoneType'\]"
+    with pytest.raises(RunStopped, match=message):
+        run(replace(experiment, tracker=silent))
+
+
 def test_a_tracker_of_ones_own_needs_no_stages(experiment: Experiment) -> None:
     class OwnTracker:
         """Only the protocol; it gives up after three scans."""

@@ -55,7 +55,8 @@ def lay_out_rewards(
 
 
 def _name(thing: Any) -> str:
-    return str(getattr(thing, "__name__", type(thing).__name__))
+    named = getattr(thing, "func", thing)  # of a partial
+    return str(getattr(named, "__name__", type(named).__name__))
 
 
 @functools.cache

@@ -14,7 +14,8 @@ from vedette.filters.info import FilterInfo
 from vedette.filters.inputs import births_at, check_scan, check_step
 from vedette.filters.limits import Limits
 from vedette.kernels.association.truncation import Truncation
-from vedette.kernels.base.types import Floats, Lmb, Motion, Sensor
+from vedette.kernels.base.types import Floats, Glmb, Lmb, Motion, Sensor
+from vedette.kernels.labelled.conversions import marginalise
 from vedette.models import SensorModel, TargetModel, kernel_motion
 from vedette.models.arguments import generator, pose_vector, positive
 
@@ -62,6 +63,13 @@ def shared_targets(filters: Sequence[Filter]) -> TargetModel:
         if other.targets != targets:
             raise InputError(f"filters[{i}].targets: expected the target model of filters[0]; got another")
     return targets
+
+
+def marginalised(posterior: Glmb, limits: Limits) -> Glmb:
+    """One hypothesis a label set, its track mixtures reduced to `limits` (Fantacci and Vo 2015)."""
+    return marginalise(
+        posterior, limits.log_min_component_weight, float(limits.merge_distance), int(limits.max_components)
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)

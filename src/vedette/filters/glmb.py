@@ -10,10 +10,9 @@ import numpy as np
 
 from vedette.densities import GLMB, LMB
 from vedette.errors import InputError, NumericalError
-from vedette.filters.base import SingleSensorFilter
+from vedette.filters.base import SingleSensorFilter, marginalised
 from vedette.filters.info import FilterInfo
 from vedette.filters.inputs import check_belief, model_errors
-from vedette.kernels.labelled.conversions import marginalise
 from vedette.kernels.steps.glmb import step_gibbs, step_ranked
 from vedette.models.arguments import dimension
 
@@ -84,10 +83,7 @@ class DeltaGlmbFilter(SingleSensorFilter):
             raise NumericalError(f"step {step}: no hypothesis has positive weight; do the models forbid this scan?")
         cap_met = len(posterior.hyp_log_weights) >= self.limits.max_hypotheses
         if self.marginalised:
-            limits = self.limits
-            posterior = marginalise(
-                posterior, limits.log_min_component_weight, float(limits.merge_distance), int(limits.max_components)
-            )
+            posterior = marginalised(posterior, self.limits)
         info = FilterInfo(
             log_likelihood=report.log_total + report.log_clutter - self.sensor.clutter.rate,
             num_hypotheses=len(posterior.hyp_log_weights),

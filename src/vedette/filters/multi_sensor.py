@@ -11,6 +11,7 @@ import numpy as np
 
 from vedette.densities import GLMB, LMB
 from vedette.errors import InputError, NumericalError
+from vedette.filters.base import marginalised
 from vedette.filters.info import FilterInfo
 from vedette.filters.inputs import births_at, check_belief, check_scan, check_step, model_errors
 from vedette.filters.limits import Limits
@@ -171,10 +172,13 @@ class MultiSensorGlmbFilter(MultiSensorFilter):
         targets: how targets move, live on and appear.
         sensors: what each sensor sees of them; they may measure different things.
         limits: caps and thresholds.
+        marginalised: collapse the posterior to one hypothesis a label set after each step, as `DeltaGlmbFilter`.
 
     Raises:
         InputError: a part of another kind, or no sensor.
     """
+
+    marginalised: bool = False
 
     def initial(self) -> GLMB:
         """The belief before the first scans: no target."""
@@ -223,6 +227,8 @@ class MultiSensorGlmbFilter(MultiSensorFilter):
                 )
             reports.append(report)
             cap_met = cap_met or len(posterior.hyp_log_weights) >= limits.max_hypotheses
+        if self.marginalised:
+            posterior = marginalised(posterior, limits)
         log_kept = sum(min(0.0, report.log_total - report.log_bound) for report in reports)
         info = FilterInfo(
             log_likelihood=self._log_likelihood(sum(report.log_total for report in reports), reports),

@@ -5,22 +5,25 @@ Each section builds its own part (`vedette.scenarios.sections`); here they are p
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from vedette.control import MobileSensor, Planner
 from vedette.densities import LMB
 from vedette.errors import InputError
-from vedette.filters import Filter, labels_targets
-from vedette.fusion import Clmb, CmDeltaGlmb
+from vedette.filters import Filter, labels_targets, shared_targets
+from vedette.fusion import Fusion
 from vedette.kernels.base.types import Floats
 from vedette.models import TargetModel
 from vedette.platforms import Actions
 from vedette.platforms.base import actions_at
 from vedette.scenarios.loading import Scenario
 from vedette.scenarios.sections.planners import STRATEGIES, Parts
+from vedette.scenarios.sections.tracking import Filter as FilterSection
 from vedette.simulation.experiment import Experiment
 from vedette.simulation.truth import TargetSource
-from vedette.tracking import Distributed
+from vedette.tracking import Central, Distributed, Tracker
 
 
 def build_experiment(scenario: Scenario) -> Experiment:
@@ -31,8 +34,7 @@ def build_experiment(scenario: Scenario) -> Experiment:
     """
     model = scenario.model
     sensors = build_sensors(scenario)
-    fusion = model.fusion.build(len(sensors), scenario.folder)
-    tracker = Distributed(tuple(sensor.filter for sensor in sensors), fusion, model.fusion.feedback)
+    tracker = _tracker(scenario, tuple(sensor.filter for sensor in sensors))
     return Experiment(
         name=model.name,
         times=model.time.build(),
@@ -67,6 +69,14 @@ def build_sensors(scenario: Scenario) -> tuple[MobileSensor, ...]:
         )
         for sensor in model.sensors
     )
+
+
+def _tracker(scenario: Scenario, filters: tuple[Filter, ...]) -> Tracker:
+    """The filters and their fusion, or one filter for all sensors."""
+    model = scenario.model
+    if model.fusion.kind == "central" and isinstance(model.filter, FilterSection):
+        return Central(model.filter.build_central(shared_targets(filters), tuple(local.sensor for local in filters)))
+    return Distributed(filters, model.fusion.build(len(filters), scenario.folder), model.fusion.feedback)
 
 
 def build_poses(scenario: Scenario) -> Floats:
@@ -115,7 +125,7 @@ def build_planner(scenario: Scenario, name: str, num_threads: int = 0) -> Planne
     control = model.control
     parts = Parts(
         sensors,
-        model.fusion.build(len(sensors), folder) or _of_one(sensors[0].filter),
+        _fusion_of_decisions(scenario, sensors[0].filter),
         control.build(num_threads),
         control.reward.build(folder),
         control.search.build(folder),
@@ -126,6 +136,12 @@ def build_planner(scenario: Scenario, name: str, num_threads: int = 0) -> Planne
     return STRATEGIES[name].planner(parts)
 
 
-def _of_one(local: Filter) -> CmDeltaGlmb | Clmb:
-    """A single sensor is fused with nobody."""
-    return Clmb((1.0,)) if isinstance(local.initial(), LMB) else CmDeltaGlmb((1.0,))
+def _fusion_of_decisions(scenario: Scenario, local: Filter) -> Fusion[Any, Any]:
+    """That of the tracker; where it fuses nothing, GCI of the filters' kind of density."""
+    section, num_sensors = scenario.model.fusion, len(scenario.model.sensors)
+    if section.kind in ("none", "central"):
+        kind = "clmb" if isinstance(local.initial(), LMB) else "cm_delta_glmb"
+        section = section.model_copy(update={"kind": kind})
+    fusion = section.build(num_sensors, scenario.folder)
+    assert fusion is not None
+    return fusion

@@ -50,7 +50,7 @@ def _records(scenario: Scenario) -> Iterator[tuple[Path, str]]:
 
 
 def _fuses(model: ScenarioModel) -> bool:
-    return len(model.sensors) > 1 and model.fusion.kind not in ("none", "custom")
+    return len(model.sensors) > 1 and model.fusion.kind not in ("none", "central", "custom")
 
 
 def _births(model: ScenarioModel) -> Iterator[tuple[Path, str]]:

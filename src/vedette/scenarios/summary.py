@@ -22,8 +22,13 @@ def one_line(scenario: Scenario) -> str:
     decisions = counted(len(model.decision_steps), "decision")
     return (
         f"ok: {model.name}, {counted(model.time.num_steps, 'scan')}, {what}, {counted(len(model.sensors), 'sensor')}, "
-        f"{model.filter.kind} filter, {model.fusion.kind} fusion, {decisions}"
+        f"{_tracker(model)}, {decisions}"
     )
+
+
+def _tracker(model: ScenarioModel) -> str:
+    kinds = model.filter.kind, model.fusion.kind
+    return f"central {kinds[0]} filter" if kinds[1] == "central" else f"{kinds[0]} filter, {kinds[1]} fusion"
 
 
 def settings(section: Section) -> str:
@@ -81,8 +86,8 @@ def _filter(section: AnyFilter) -> str:
 def _fusion(section: AnyFusion) -> str:
     if isinstance(section, CustomFusion):
         return settings(section)
-    if section.kind == "none":
-        return "none"
+    if section.kind in ("none", "central"):
+        return "none" if section.kind == "none" else "central: one filter takes the scans of all sensors"
     weights = "equal weights" if section.weights is None else f"weights {short(section.weights)}"
     feedback = "feedback" if section.feedback else "no feedback"
     return f"{section.kind}, {weights}, {section.mixture_power} powers, {feedback}"

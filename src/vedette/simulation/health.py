@@ -74,7 +74,16 @@ class Health:
         return Health(**{name: getattr(self, name)[:num_scans] for name in _DTYPES})
 
     def note_filters(self, scan: int, infos: Sequence[FilterInfo]) -> None:
-        """Write down what the filters reported, one a sensor or one for all; scans are counted from 0."""
+        """Write down what the filters reported, one a sensor or one for all; scans are counted from 0.
+
+        Raises `InputError` for another number of reports, or what is none.
+        """
+        num = self.num_tracks.shape[1]
+        if len(infos) not in (1, num) or not all(isinstance(info, FilterInfo) for info in infos):
+            kinds = [type(info).__name__ for info in infos]
+            raise InputError(
+                f"TrackerInfo.filters: expected a FilterInfo of each of {num} sensors, or of all; got {kinds}"
+            )
         for name in _OF_FILTER:
             array = getattr(self, name)
             array[scan] = [getattr(info, name) for info in infos]

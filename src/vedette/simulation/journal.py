@@ -54,8 +54,9 @@ class Journal:
 
     def note(self, poses: Floats, info: TrackerInfo, estimate: Estimate) -> None:
         """Write down the scan at hand."""
-        self._health.note_filters(self.step - 1, info.filters)
-        self._health.note_fusion(self.step - 1, info.fusion)
+        with self.timing("report of the tracker"):
+            self._health.note_filters(self.step - 1, info.filters)
+            self._health.note_fusion(self.step - 1, info.fusion)
         self._fusion.append(float(info.seconds.get("fusion", 0.0)))
         self._poses.append(poses)
         self.estimates.append(estimate)

@@ -121,6 +121,7 @@ _LABELS = {
     "cb_member": "CB-MeMBer",
     "cm_delta_glmb": "CM-delta-GLMB",
     "clmb": "CLMB",
+    "central": "Central",
 }
 
 

@@ -76,7 +76,7 @@ def _fusion_of_several(model: ScenarioModel) -> Iterator[Finding]:
 
 def _fusion_of_kind(model: ScenarioModel) -> Iterator[Finding]:
     if model.fusion.kind == "cm_delta_glmb" and model.filter.kind == "lmb":
-        yield ("fusion", "kind"), "clmb or none, as the filters are lmb", '"cm_delta_glmb"'
+        yield ("fusion", "kind"), "clmb, central or none, as the filters are lmb", '"cm_delta_glmb"'
     if (
         model.fusion.kind == "clmb"
         and model.fusion.feedback
@@ -84,6 +84,17 @@ def _fusion_of_kind(model: ScenarioModel) -> Iterator[Finding]:
     ):
         wanted = f"false, as {model.filter.kind} filters cannot go on from an LMB"
         yield ("fusion", "feedback"), wanted, "true"
+
+
+def _central(model: ScenarioModel) -> Iterator[Finding]:
+    if model.fusion.kind != "central":
+        return
+    if model.fusion.feedback:
+        yield ("fusion", "feedback"), "false, as nothing is fused while tracking", "true"
+    if model.filter.kind == "custom":
+        yield ("fusion", "kind"), "a fusion, as each sensor has a filter of your own", '"central"'
+    elif model.filter.assignment.kind == "gibbs":
+        yield ("filter", "assignment", "kind"), "ranked, as one filter takes the scans of all sensors", '"gibbs"'
 
 
 def _estimator(model: ScenarioModel) -> Iterator[Finding]:
@@ -170,6 +181,7 @@ CHECKS = (
     _fusion_of_labels,
     _fusion_of_several,
     _fusion_of_kind,
+    _central,
     _estimator,
     _combinations,
     _birth_steps,

@@ -15,7 +15,7 @@ from vedette.scenarios.sections.base import Count, Numbers, Positive, Probabilit
 from vedette.scenarios.sections.custom import Custom
 
 if TYPE_CHECKING:  # with the planners comes the compiler, which a check does without
-    from vedette.control import JointSearch, PlanningSettings, Reward
+    from vedette.control import JointSearch, PlanningSettings, PowerReward, Reward
 
 
 class CauchySchwarzReward(Section):
@@ -28,15 +28,35 @@ class CauchySchwarzReward(Section):
         "density, under which localisation counts as much as cardinality [-].",
     )
 
-    def build(self, folder: Path) -> Reward:
+    def build(self, folder: Path) -> Reward | PowerReward:
         """The value of an updated density."""
         from vedette.control import CauchySchwarzReward
 
         return CauchySchwarzReward(self.unit_volume)
 
 
+class RenyiReward(Section):
+    """Renyi divergence of the predicted from the updated density."""
+
+    kind: Literal["renyi"] = Field(default="renyi", description="Kind of reward [-].")
+    order: Positive = Field(
+        default=0.5, description="Exponent of the predicted density; not 1. 0.5: twice the Bhattacharyya distance [-]."
+    )
+
+    @check
+    def _not_one(self) -> Iterator[Finding]:
+        if self.order == 1.0:
+            yield ("order",), "a number other than 1", "1"
+
+    def build(self, folder: Path) -> Reward | PowerReward:
+        """The value of an updated density."""
+        from vedette.control import RenyiReward
+
+        return RenyiReward(self.order)
+
+
 class CustomReward(Custom):
-    """A user's own `vedette.control.Reward`: a function of the predicted and the updated density."""
+    """A user's own `vedette.control.Reward`, a function of the predicted and the updated density, or `PowerReward`."""
 
     kind: Literal["custom"] = Field(default="custom", description="Kind of reward [-].")
 
@@ -47,13 +67,19 @@ class CustomReward(Custom):
 
         return Reward
 
-    def build(self, folder: Path) -> Reward:
+    def lacking(self, found: object) -> str:
+        """As of other kinds; a reward of power integrals is no function."""
+        from vedette.control import PowerReward
+
+        return "" if isinstance(found, PowerReward) else super().lacking(found)
+
+    def build(self, folder: Path) -> Reward | PowerReward:
         """The user's own."""
-        made: Reward = self.made(folder)
+        made: Reward | PowerReward = self.made(folder)
         return made
 
 
-AnyReward = Annotated[CauchySchwarzReward | CustomReward, Field(discriminator="kind")]
+AnyReward = Annotated[CauchySchwarzReward | RenyiReward | CustomReward, Field(discriminator="kind")]
 
 
 class Exhaustive(Section):

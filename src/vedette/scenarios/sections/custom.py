@@ -83,7 +83,7 @@ class Custom(Section):
     def made(self, folder: Path, **parts: Any) -> Any:
         """The object, of `parts` where it has to be made. Raises `NotGiven` for anything but what is wanted."""
         found, wanted = self.named(folder), self.protocol()
-        as_it_is = not isinstance(found, type) and (_is_function(wanted) or not lacks(found, wanted, self.spared))
+        as_it_is = not isinstance(found, type) and (_is_function(wanted) or not self.lacking(found))
         try:
             if as_it_is and _is_function(wanted) and self.arguments:
                 found = partial(found, **self.arguments)
@@ -96,9 +96,13 @@ class Custom(Section):
             raise
         except Exception as error:
             raise self._not_given(f"{type(error).__name__}: {error}") from error
-        if fault := lacks(found, wanted, self.spared):
+        if fault := self.lacking(found):
             raise self._not_given(fault)
         return found
+
+    def lacking(self, found: object) -> str:
+        """What an object lacks to be what is wanted, in words; empty where it lacks nothing."""
+        return lacks(found, self.protocol(), self.spared)
 
     def _not_given(self, got: str) -> NotGiven:
         return NotGiven(self, "function", f"{self.function} to give a {self.protocol().__name__}", got)

@@ -19,6 +19,7 @@ if TYPE_CHECKING:  # with the filters comes the compiler, which a check does wit
     from vedette.fusion import Clmb, CmDeltaGlmb
     from vedette.fusion import Fusion as FusionRule
     from vedette.models import SensorModel, TargetModel
+    from vedette.tracking import CentralFilter
 
 
 _WEIGHT_TOLERANCE = 1e-6
@@ -133,6 +134,15 @@ class Filter(Section):
             marginalised=self.kind == "m_delta_glmb",
         )
 
+    def build_central(self, targets: TargetModel, sensors: tuple[SensorModel, ...]) -> CentralFilter:
+        """The filter of all sensors' scans, for a fusion of kind central."""
+        from vedette.filters import MultiSensorGlmbFilter, MultiSensorLmbFilter
+
+        limits = self.limits.build()
+        if self.kind == "lmb":
+            return MultiSensorLmbFilter(targets, sensors, limits)
+        return MultiSensorGlmbFilter(targets, sensors, limits, marginalised=self.kind == "m_delta_glmb")
+
 
 class CustomFilter(Custom):
     """A user's own `vedette.filters.Filter`, made for each sensor; called with `targets` and `sensor`."""
@@ -183,9 +193,11 @@ class FusionLimits(Section):
 class Fusion(Section):
     """How the sensors' densities become one: generalised covariance intersection (paper section II-D)."""
 
-    kind: Literal["cm_delta_glmb", "clmb", "none"] = Field(
+    kind: Literal["cm_delta_glmb", "clmb", "central", "none"] = Field(
         default="cm_delta_glmb",
-        description="Of marginalised delta-GLMB densities, of LMB densities, or none (a single sensor) [-].",
+        description="Of marginalised delta-GLMB densities, of LMB densities, or none (a single sensor). central: one "
+        "filter takes the scans of all sensors, and nothing is fused while tracking; what is set here then serves the "
+        "joint decisions alone [-].",
     )
     weights: Weights | None = Field(
         default=None, description="Weight of each sensor, with sum 1; none: equal weights [-]."
@@ -217,10 +229,10 @@ class Fusion(Section):
         return tuple(weight / math.fsum(given) for weight in given)
 
     def build(self, num_sensors: int, folder: Path) -> CmDeltaGlmb | Clmb | None:
-        """The fusion of the sensors' densities; None where there is none."""
+        """The fusion of the sensors' densities after each scan; None where there is none."""
         from vedette.fusion import Clmb, CmDeltaGlmb, FusionLimits
 
-        if self.kind == "none":
+        if self.kind in ("none", "central"):
             return None
         weights, caps = self.scaled_weights(num_sensors), self.limits
         limits = FusionLimits(
