@@ -132,11 +132,13 @@ def check_version(manifest: Mapping[str, Any], session: Any, place: object) -> N
         return
     writer = session.get("versions") if isinstance(session, dict) else None
     writer = writer.get("vedette") if isinstance(writer, dict) else None
-    named = isinstance(writer, str) and writer != versions()["vedette"]
+    reader = "the version that wrote it"
+    if isinstance(writer, str) and writer != versions()["vedette"]:
+        reader = f"vedette {printable(writer)[:40]}"
     which = "an earlier" if isinstance(number, int) and 0 < number < FORMAT_VERSION else "another"
     raise InputError(
         f"{place}: expected format {FORMAT_VERSION}; got {shown(number)}, written by {which} version of this program: "
-        f"run it again, or read it with {f'vedette {printable(writer)[:40]}' if named else 'the version that wrote it'}"
+        f"run it again, or read it with {reader}"
     )
 
 
