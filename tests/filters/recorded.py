@@ -20,7 +20,7 @@ import numpy as np
 from vedette import models
 from vedette.densities import GLMB, LMB, Estimate, map_estimate
 from vedette.evaluation.metrics import ospa
-from vedette.filters import Filter
+from vedette.filters import Filter, LmbFilter
 from vedette.fusion import Fusion
 
 POSE = np.zeros(3)
@@ -191,6 +191,24 @@ def run(tracker: Filter, recording: Recording, *, seed: int = 0) -> tuple[list[E
     for step, scan in enumerate(recording.scans):
         start = time.process_time()
         belief, _ = tracker.step(belief, scan, POSE, PERIOD, step + 1, rng=rng)
+        seconds.append(time.process_time() - start)
+        estimates.append(map_estimate(belief))
+    return estimates, seconds
+
+
+def make_central(kind: type, recording: Recording, method: str = "auto", **options: Any) -> Any:
+    """A filter of all sensors of the recording."""
+    trackers = make_filters(LmbFilter, recording, method)
+    return kind(trackers[0].targets, [tracker.sensor for tracker in trackers], **options)
+
+
+def run_central(tracker: Any, recording: Recording, *, seed: int = 0) -> tuple[list[Estimate], list[float]]:
+    """As `run`, of a filter of all sensors of the recording."""
+    rng, num = np.random.default_rng(seed), len(tracker.sensors)
+    belief, estimates, seconds = tracker.initial(), [], []
+    for step, scans in enumerate(zip(*(scans_of(recording, s) for s in range(num)), strict=True), start=1):
+        start = time.process_time()
+        belief, _ = tracker.step(belief, scans, [POSE] * num, PERIOD, step, rng=rng)
         seconds.append(time.process_time() - start)
         estimates.append(map_estimate(belief))
     return estimates, seconds

@@ -20,29 +20,40 @@ _MINUS = "\N{MINUS SIGN}"
 class ActionAxis(NamedTuple):
     """The actions of a sensor along an axis.
 
-    name: what is on it, `heading`; unit: `deg`, or nothing. places: (num_actions,) where each action is. labels: in
-    words. is_numeric: whether places are the numbers of a column; otherwise they count actions from 1.
+    name: what is on it, `heading`, or the columns one after the other; unit: `deg`, or nothing. places: (num_actions,)
+    where each action is. ticks: the numbers alone. labels: in words. is_numeric: whether places are the numbers of a
+    column; otherwise they count actions from 1.
     """
 
     name: str
     unit: str
     places: Floats
+    ticks: tuple[str, ...]
     labels: tuple[str, ...]
     is_numeric: bool
 
     def title(self, sensor: int | None = None) -> str:
         """`Heading (deg)`, `Heading of sensor 1 (deg)`."""
         of = "" if sensor is None else f" of sensor {sensor + 1}"
-        return self.name.capitalize() + of + (f" ({self.unit})" if self.unit else "")
+        return self.name[:1].upper() + self.name[1:] + of + (f" ({self.unit})" if self.unit else "")
+
+    def counted(self) -> ActionAxis:
+        """The actions one after the other, whatever their numbers."""
+        return self._replace(places=np.arange(1.0, len(self.places) + 1), is_numeric=False)
 
 
 def action_axis(actions: Actions) -> ActionAxis:
     """The axis of a lone column in its numbers; of several columns the actions one after the other."""
-    labels = tuple(row_words(rounded(actions.columns, row)) for row in actions.values)
-    if len(actions.columns) == 1:
-        name, unit, _ = _parts(actions.columns[0])
-        return ActionAxis(name, unit, actions.values[:, 0], labels, True)
-    return ActionAxis("action", "", np.arange(1.0, len(actions) + 1), labels, False)
+    rows = [rounded(actions.columns, row) for row in actions.values]
+    ticks = tuple(with_minus(", ".join(f"{value:g}" for _, value in row)) for row in rows)
+    labels = tuple(map(row_words, rows))
+    names, units = [[_parts(column)[i] for column in actions.columns] for i in (0, 1)]
+    if len(names) == 1:
+        return ActionAxis(names[0], units[0], actions.values[:, 0], ticks, labels, True)
+    same = len(set(units)) == 1
+    each = names if same else [f"{name} ({unit})" if unit else name for name, unit in zip(names, units, strict=True)]
+    places = np.arange(1.0, len(actions) + 1)
+    return ActionAxis(", ".join(each) or "action", units[0] if same else "", places, ticks, labels, False)
 
 
 def rounded(columns: Sequence[str], row: Floats) -> Row:

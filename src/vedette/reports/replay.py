@@ -229,6 +229,7 @@ def _curves(plan: Plan) -> list[dict[str, Any]]:
                     "numeric": along.is_numeric,
                     "places": _rounded(along.places[order], 1),
                     "labels": [along.labels[i] for i in order],
+                    "ticks": [along.ticks[i] for i in order],
                     "mean": [_number(value) for value in mean[order]],
                     "error": [_number(value) for value in error[order]],
                     "chosen": int(np.flatnonzero(order == plan.chosen[sensor])[0]),
@@ -249,6 +250,7 @@ def _map(plan: Plan) -> dict[str, Any] | None:
     return {
         "sensors": pair,
         "labels": [[along.labels[i] for i in order] for along, order in zip(axes, orders, strict=True)],
+        "ticks": [[along.ticks[i] for i in order] for along, order in zip(axes, orders, strict=True)],
         "mean": [[_number(value) for value in row] for row in reward],
         "chosen": [
             int(np.flatnonzero(order == plan.chosen[sensor])[0]) for sensor, order in zip(pair, orders, strict=True)

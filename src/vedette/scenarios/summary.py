@@ -38,7 +38,7 @@ def settings(section: Section) -> str:
         value = getattr(section, name)
         if name == "kind":
             words.insert(0, str(value))
-        elif value is not None and not isinstance(value, Section | dict):
+        elif value not in (None, ()) and not isinstance(value, Section | dict):
             unit = (field.description or "").rpartition("[")[2].rstrip("].")
             words.append(f"{name} {short(value)}" + (f" {unit}" if unit not in ("-", "") else ""))
     return ", ".join(words)

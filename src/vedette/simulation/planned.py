@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from graphlib import CycleError, TopologicalSorter
 from itertools import pairwise
 from typing import Any
 
@@ -136,12 +137,10 @@ def _actions(decisions: Sequence[Decision]) -> Columns:
         for sensor, own in enumerate(decision.plan.actions)
     ]
     lengths = [len(values) for *_, values in parts]
-    names = dict.fromkeys(name for *_, names, _ in parts for name in names)
+    names = _in_one_order([own for *_, own, _ in parts])
     numbers = {name: np.full(sum(lengths), np.nan) for name in names}
     start = 0
     for *_, own, values in parts:
-        if list(own) != [name for name in names if name in own]:
-            raise InputError(f"plan.actions: expected columns in the order {', '.join(names)}; got {', '.join(own)}")
         for name, column in zip(own, values.T, strict=True):
             numbers[name][start : start + len(values)] = column
         start += len(values)
@@ -154,6 +153,19 @@ def _actions(decisions: Sequence[Decision]) -> Columns:
         ),
         **{f"action_{name}" if _is_taken(name) else name: column for name, column in numbers.items()},
     }
+
+
+def _in_one_order(orders: Sequence[Sequence[str]]) -> tuple[str, ...]:
+    """The columns of all sensors, so that those of each stand in its own order."""
+    sorter: TopologicalSorter[str] = TopologicalSorter()
+    for own in dict.fromkeys(map(tuple, orders)):
+        for place, name in enumerate(own):
+            sorter.add(name, *own[max(place - 1, 0) : place])
+    try:
+        return tuple(sorter.static_order())
+    except CycleError:
+        listed = " and ".join(", ".join(own) for own in dict.fromkeys(map(tuple, orders)))
+        raise InputError(f"plan.actions: expected columns in one order for all; got {listed}") from None
 
 
 def _is_taken(name: str) -> bool:

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from vedette.control.plan import RewardTable
 from vedette.errors import InputError
-from vedette.evaluation.actions import action_axis
+from vedette.evaluation.actions import ActionAxis, action_axis
 from vedette.evaluation.figures.rewards import best_over_others, best_over_pair, map_ticks, mark_actions
 from vedette.evaluation.figures.style import (
     HEAT_MAP,
@@ -80,28 +80,38 @@ def _label(figure: Figure, panels: Any, rewards: MeanRewards, joint: bool) -> No
 
 
 def _draw_curves(axes: Axes, rewards: MeanRewards) -> None:
+    along = {sensor: action_axis(rewards.actions[sensor]) for table in rewards.tables for sensor in table.sensors}
+    alike = len({each.title() if each.is_numeric else each.labels for each in along.values()}) == 1
     for table, share in zip(rewards.tables, rewards.shares, strict=True):
         for axis, sensor in enumerate(table.sensors):
             others = tuple(other for other in range(share.ndim) if other != axis)
-            _draw_curve(axes, rewards, sensor, best_over_others(table, axis), share.sum(axis=others))
-    along = [action_axis(rewards.actions[sensor]) for table in rewards.tables for sensor in table.sensors]
-    mark_actions(axes, along[0], 90)
-    if len({each.title() if each.is_numeric else each.labels for each in along}) > 1:
-        axes.set_xlabel("Action")
+            _draw_curve(
+                axes,
+                along[sensor] if alike else along[sensor].counted(),
+                sensor,
+                best_over_others(table, axis),
+                share.sum(axis=others),
+            )
+    if alike:
+        mark_actions(axes, next(iter(along.values())), 90)
+    else:
+        axes.set_xlabel("Number of the action")
 
 
-def _draw_curve(axes: Axes, rewards: MeanRewards, sensor: int, curve: tuple[Floats, Floats], share: Floats) -> None:
-    along = action_axis(rewards.actions[sensor])
+def _draw_curve(axes: Axes, along: ActionAxis, sensor: int, curve: tuple[Floats, Floats], share: Floats) -> None:
     order = np.argsort(along.places, kind="stable")
     places = along.places[order]
     mean, error, share = curve[0][order], curve[1][order], share[order]
     shade = colour(sensor)
-    axes.fill_between(places, mean - error, mean + error, color=shade, alpha=0.2, linewidth=0)
+    if along.is_numeric:
+        axes.fill_between(places, mean - error, mean + error, color=shade, alpha=0.2, linewidth=0)
+    else:
+        axes.errorbar(places, mean, error, color=shade, linestyle="", linewidth=0.8)
     axes.plot(
         places,
         mean,
         color=shade,
-        linestyle=line_style(sensor) if along.is_numeric else "",
+        linestyle=line_style(sensor) if along.is_numeric else ":",
         label=f"sensor {sensor + 1}",
     )
     axes.scatter(

@@ -86,7 +86,10 @@ def _draw_curve(axes: Axes, plan: Plan, sensor: int, mean: Floats, error: Floats
     places, mean, error = axis.places[order], mean[order], error[order]
     chosen = int(np.flatnonzero(order == plan.chosen[sensor])[0])
     shade = colour(sensor)
-    axes.fill_between(places, mean - error, mean + error, color=shade, alpha=0.2, linewidth=0)
+    if axis.is_numeric:
+        axes.fill_between(places, mean - error, mean + error, color=shade, alpha=0.2, linewidth=0)
+    else:
+        axes.errorbar(places, mean, error, color=shade, linestyle="", linewidth=0.8)
     axes.plot(
         places,
         mean,
@@ -106,7 +109,7 @@ def mark_actions(axes: Axes, along: ActionAxis, every: int = 60) -> None:
     axes.set_xlabel(along.title())
     low, high = axes.get_xlim()
     if not along.is_numeric:
-        axes.set_xticks(along.places, [with_minus(label) for label in along.labels], rotation=90, fontsize=5)
+        axes.set_xticks(along.places, along.ticks, rotation=90, fontsize=5)
     elif along.unit == "deg" and 180.0 < high - low < 420.0 and low > -220.0 and high < 220.0:
         axes.set_xticks(np.arange(-180, 181, every), [degrees_label(value) for value in range(-180, 181, every)])
 
@@ -114,8 +117,8 @@ def mark_actions(axes: Axes, along: ActionAxis, every: int = 60) -> None:
 def map_ticks(axis: Any, along: ActionAxis, most: int) -> None:
     """Ticks of one side of a map of joint actions, at most so many."""
     every = max(1, -(-len(along.places) // most))
-    words = [degrees_label(place) for place in along.places] if along.unit == "deg" else list(along.labels)
-    axis.set_ticks(range(0, len(words), every), [with_minus(word) for word in words[::every]])
+    style = {} if along.is_numeric or axis.axis_name == "y" else {"rotation": 90}
+    axis.set_ticks(range(0, len(along.ticks), every), along.ticks[::every], **style)
 
 
 def best_over_others(table: RewardTable, axis: int) -> tuple[Floats, Floats]:

@@ -90,7 +90,7 @@ def _draw_bars(axes: Any, chosen: list[Choice]) -> None:
     axes.set_yticks(range(place), ticks, fontsize=4)
     axes.invert_yaxis()
     axes.set_xlim(0.0, 1.0)
-    axes.set_xticks([0.0, 0.5, 1.0], ["0", "50 %", "100 %"], fontsize=6)
+    axes.set_xticks([0.0, 0.5, 1.0], ["0", "", "100 %"], fontsize=6)
 
 
 def _draw_rose(axes: Any, chosen: Ints, num_sensors: int) -> None:

@@ -48,18 +48,18 @@ function drawHeatScale(context, x, top, size, low, high) {
 }
 
 function labelMap(context, map, left, top, size) {
-  const [across, up] = map.labels;
+  const [across, up] = map.ticks;
   context.fillStyle = colours.grey;
   const place = (list, k) => ((k + 0.5) * size) / list.length;
   for (const k of [0, Math.floor(across.length / 2), across.length - 1]) {
     context.textAlign = "center";
     context.textBaseline = "top";
-    context.fillText(minus(across[k]), left + place(across, k), top + size + 3);
+    context.fillText(across[k], left + place(across, k), top + size + 3);
   }
   for (const k of [0, Math.floor(up.length / 2), up.length - 1]) {
     context.textAlign = "right";
     context.textBaseline = "middle";
-    context.fillText(minus(up[k]), left - 4, top + size - place(up, k));
+    context.fillText(up[k], left - 4, top + size - place(up, k));
   }
   context.textAlign = "center";
   context.textBaseline = "top";
@@ -101,7 +101,7 @@ function drawCurves(context, width, height, curves) {
     disc(context, x(places[curve.chosen]), y(curve.mean[curve.chosen]), 4.5);
     context.textAlign = "left";
     context.textBaseline = "middle";
-    const name = `sensor ${curve.sensor + 1}: ${minus(curve.labels[curve.chosen])}`;
+    const name = `sensor ${curve.sensor + 1}: ${minus((curve.numeric ? curve.labels : curve.ticks)[curve.chosen])}`;
     context.fillText(name, frame.left + (place % 3) * 100, 9);
   });
 }
