@@ -50,7 +50,7 @@ def test_every_combination_of_all_axes_is_a_cell() -> None:
         "control.num_samples": 5,
     }
     assert last.scenario.model.fusion.kind == "clmb"
-    assert [sensor.platform.speed for sensor in last.scenario.model.sensors] == [70.0, 70.0]
+    assert [sensor.platform.model_dump()["speed"] for sensor in last.scenario.model.sensors] == [70.0, 70.0]
     assert last.scenario.model.control.num_samples == 5
     assert last.scenario.model.ospa.cutoff == 50.0
     assert len(full.groups()) == 12

@@ -27,7 +27,7 @@ class Parts(NamedTuple):
     """
 
     sensors: tuple[MobileSensor, ...]
-    fusion: Fusion[Any, Any]
+    fusion: Fusion
     settings: PlanningSettings
     reward: Reward | PowerReward
     search: JointSearch
