@@ -73,6 +73,12 @@ def test_variants_hold_settings_that_belong_together() -> None:
     assert [cell.scenario.model.filter.kind for cell in variants.cells] == ["delta_glmb", "lmb"]
 
 
+def test_a_central_filter_is_compared_with_fusions() -> None:
+    both = campaign('planners = ["still"]\nfusions = ["cm_delta_glmb", "central"]\n')
+    assert [cell.name for cell in both.cells] == ["still-cm_delta_glmb", "still-central"]
+    assert both.compare == "fusion"
+
+
 def test_scenarios_are_named_or_lie_beside_the_file(tmp_path: Path) -> None:
     folder = tmp_path / "mine"
     folder.mkdir()
