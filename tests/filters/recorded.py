@@ -20,7 +20,7 @@ import numpy as np
 from vedette import models
 from vedette.densities import GLMB, LMB, Estimate, map_estimate
 from vedette.evaluation.metrics import ospa
-from vedette.filters import Filter
+from vedette.filters import Filter, LmbFilter
 from vedette.fusion import Fusion
 
 POSE = np.zeros(3)
@@ -196,9 +196,25 @@ def run(tracker: Filter, recording: Recording, *, seed: int = 0) -> tuple[list[E
     return estimates, seconds
 
 
-def run_fused(
-    trackers: list[Filter], fusion: Fusion[Any, Any], recording: Recording, *, seed: int = 0
-) -> list[Estimate]:
+def make_central(kind: type, recording: Recording, method: str = "auto", **options: Any) -> Any:
+    """A filter of all sensors of the recording."""
+    trackers = make_filters(LmbFilter, recording, method)
+    return kind(trackers[0].targets, [tracker.sensor for tracker in trackers], **options)
+
+
+def run_central(tracker: Any, recording: Recording, *, seed: int = 0) -> tuple[list[Estimate], list[float]]:
+    """As `run`, of a filter of all sensors of the recording."""
+    rng, num = np.random.default_rng(seed), len(tracker.sensors)
+    belief, estimates, seconds = tracker.initial(), [], []
+    for step, scans in enumerate(zip(*(scans_of(recording, s) for s in range(num)), strict=True), start=1):
+        start = time.process_time()
+        belief, _ = tracker.step(belief, scans, [POSE] * num, PERIOD, step, rng=rng)
+        seconds.append(time.process_time() - start)
+        estimates.append(map_estimate(belief))
+    return estimates, seconds
+
+
+def run_fused(trackers: list[Filter], fusion: Fusion, recording: Recording, *, seed: int = 0) -> list[Estimate]:
     """Estimates at every scan from the fusion of all sensors' beliefs, which is fed back: with births at every scan
     sensors would else give one target different labels.
     """
