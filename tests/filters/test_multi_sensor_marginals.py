@@ -10,7 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from vedette.kernels.steps.multi_sensor_marginals import Choices, StateCaps, choice_marginals
+from vedette.kernels.steps.multi_sensor_choices import Choices
+from vedette.kernels.steps.multi_sensor_marginals import StateCaps, choice_marginals
 
 pytestmark = pytest.mark.lanes
 
