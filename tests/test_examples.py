@@ -56,6 +56,7 @@ SHOWN = {
     "docs/report.md": [],
     "docs/results.md": ["gospa_m", "margin", "jdm-rate-5.0", "heading_deg", "farthest_m"],
     "docs/runs.md": ["m; [10.0, 20.0, 30.0]", "targets; hypotheses of each sensor"],
+    "docs/scenarios.md": ["array([-90.])"],
     "examples/own_sensor.py": ["greatest difference between the two"],
 }
 

@@ -2,8 +2,9 @@ from __future__ import annotations
 
 from hypothesis import given
 from hypothesis import strategies as st
+from rich.cells import cell_len
 
-from vedette.text import display_width, elided, elided_apart
+from vedette.text import elided, elided_apart
 
 
 def test_the_middle_is_left_out() -> None:
@@ -22,4 +23,4 @@ def test_names_that_would_look_alike_are_numbered() -> None:
 
 @given(st.text(max_size=60), st.integers(3, 30))
 def test_nothing_is_wider_than_allowed(text: str, most: int) -> None:
-    assert display_width(elided(text, most)) <= most
+    assert cell_len(elided(text, most)) <= most

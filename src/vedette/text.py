@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import unicodedata
 from collections.abc import Sequence
 from datetime import date, timedelta
 from typing import Any
+
+from rich.cells import cell_len, chop_cells
 
 ELLIPSIS = "\N{HORIZONTAL ELLIPSIS}"
 _MOST_LINES = 50
@@ -47,34 +48,19 @@ def shown(value: Any) -> str:
     return elided(printable(f"the time {value}" if isinstance(value, date | timedelta) else plain(value)), 80)
 
 
-def display_width(text: str) -> int:
-    """Columns that a text takes where letters are of equal width: wide letters (Chinese, emoji) take two."""
-    return sum(map(_width, text))
-
-
-def _width(letter: str) -> int:
-    if unicodedata.combining(letter):
-        return 0
-    return 2 if unicodedata.east_asian_width(letter) in "WF" else 1
-
-
 def elided(text: str, most: int = 24) -> str:
     """The text on one line; what is wider than `most` columns keeps its beginning and its end."""
     text = " ".join(text.split())
-    if display_width(text) <= most:
+    if cell_len(text) <= most:
         return text
     tail = (most - 1) // 2
     return _fitting(text, most - 1 - tail) + ELLIPSIS + _fitting(text[::-1], tail)[::-1]
 
 
 def _fitting(text: str, most: int) -> str:
-    """As much of the beginning as fits."""
-    taken = 0
-    for place, letter in enumerate(text):
-        taken += _width(letter)
-        if taken > most:
-            return text[:place]
-    return text
+    """As much of the beginning as fits into so many columns, where wide letters (Chinese, emoji) take two."""
+    first = chop_cells(text, max(most, 1))[0]
+    return first if cell_len(first) <= most else ""
 
 
 def elided_apart(names: Sequence[str], most: int = 24) -> tuple[str, ...]:

@@ -88,8 +88,11 @@ def test_strategies_are_compared_over_the_runs_that_all_have(whole, campaign):
     assert group.settings.keys() == {"scenario", "sensors.*.clutter.rate"}
     assert group.labels == group.comparison.strategies == ("jdm", "random")
     assert [cell.name for cell in group.cells] == ["jdm-rate-5.0", "random-rate-5.0"]
-    runs = {planner: [make_run(planner, run)[0] for run in range(2)] for planner in ("jdm", "random")}
-    assert_same(group.comparison, scored(campaign.cells[0].scenario, runs))
+    records, metrics = (
+        {planner: [make_run(planner, run)[part] for run in range(2)] for planner in ("jdm", "random")}
+        for part in (0, 1)
+    )
+    assert_same(group.comparison, scored(campaign.cells[0].scenario, records, metrics))
 
 
 def test_another_axis_than_the_planner_is_compared(tmp_path):

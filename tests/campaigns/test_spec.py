@@ -50,7 +50,7 @@ def test_every_combination_of_all_axes_is_a_cell() -> None:
         "control.num_samples": 5,
     }
     assert last.scenario.model.fusion.kind == "clmb"
-    assert [sensor.platform.speed for sensor in last.scenario.model.sensors] == [70.0, 70.0]
+    assert [sensor.platform.model_dump()["speed"] for sensor in last.scenario.model.sensors] == [70.0, 70.0]
     assert last.scenario.model.control.num_samples == 5
     assert last.scenario.model.ospa.cutoff == 50.0
     assert len(full.groups()) == 12
@@ -71,6 +71,12 @@ def test_variants_hold_settings_that_belong_together() -> None:
     assert [cell.name for cell in variants.cells] == ["still-GLMB", "still-LMB_CLMB"]
     assert variants.compare == "variant"
     assert [cell.scenario.model.filter.kind for cell in variants.cells] == ["delta_glmb", "lmb"]
+
+
+def test_a_central_filter_is_compared_with_fusions() -> None:
+    both = campaign('planners = ["still"]\nfusions = ["cm_delta_glmb", "central"]\n')
+    assert [cell.name for cell in both.cells] == ["still-cm_delta_glmb", "still-central"]
+    assert both.compare == "fusion"
 
 
 def test_scenarios_are_named_or_lie_beside_the_file(tmp_path: Path) -> None:

@@ -214,9 +214,7 @@ def run_central(tracker: Any, recording: Recording, *, seed: int = 0) -> tuple[l
     return estimates, seconds
 
 
-def run_fused(
-    trackers: list[Filter], fusion: Fusion[Any, Any], recording: Recording, *, seed: int = 0
-) -> list[Estimate]:
+def run_fused(trackers: list[Filter], fusion: Fusion, recording: Recording, *, seed: int = 0) -> list[Estimate]:
     """Estimates at every scan from the fusion of all sensors' beliefs, which is fed back: with births at every scan
     sensors would else give one target different labels.
     """

@@ -72,6 +72,20 @@ def cardinality(density: Any) -> Any:
     return cardinality_distribution(density)
 
 
+class Powers:
+    """A reward of power integrals alone: no function of two densities."""
+
+    def __init__(self, order: float = 0.5) -> None:
+        self.order = order
+
+    @property
+    def exponents(self) -> Any:
+        return (self.order, 1.0 - self.order), (0.0, 1.0)
+
+    def combine(self, z: Any) -> Any:
+        return (1.0 - self.order) * z[..., 1] - z[..., 0]
+
+
 class FirstOfAll:
     """Looks at one joint action."""
 

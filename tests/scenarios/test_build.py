@@ -215,7 +215,7 @@ def test_a_filter_without_labels_runs_alone_and_names_its_estimates_by_the_scan(
     estimate.validate()
     assert estimate.labels.tolist() == [[8, i] for i in range(estimate.num_targets)]
     for planner in ("random", "fixed"):
-        made = build.build_planner(loaded, planner)
+        made: Any = build.build_planner(loaded, planner)
         made.plan(state, experiment.poses, rng=np.random.default_rng(0))
     for planner in ("jdm", "idm"):
         with pytest.raises(
@@ -301,7 +301,8 @@ def test_built_in_scenarios_run(name: str) -> None:
     experiment, state, truth = tracked(loaded, 12, rng)
     assert abs(len(experiment.estimate(state.fused, 12).labels) - len(truth.at(11)[0])) <= 1
     for planner in ("random", "fixed"):
-        plan = build.build_planner(loaded, planner).plan(state, experiment.poses, rng=rng)
+        decides: Any = build.build_planner(loaded, planner)
+        plan = decides.plan(state, experiment.poses, rng=rng)
         assert plan.num_sensors == experiment.num_sensors
 
 
@@ -309,5 +310,6 @@ def test_decisions_of_the_papers_scenario_are_the_printed_ones() -> None:
     loaded, rng = load_scenario("paper-e"), np.random.default_rng(3)
     experiment, state, _ = tracked(loaded, 10, rng)
     for planner in ("jdm", "idm"):
-        plan = build.build_planner(loaded, planner).plan(state, experiment.poses, rng=rng)
+        decides: Any = build.build_planner(loaded, planner)
+        plan = decides.plan(state, experiment.poses, rng=rng)
         np.testing.assert_allclose(np.ravel(plan.chosen_actions), [-30.0, 30.0])

@@ -87,10 +87,10 @@ def test_the_papers_scenario_has_the_papers_numbers(name: str) -> None:
         assert sensor.detection == GaussianDetection(sigma=10000.0)
         assert sensor.clutter == RegionClutter(rate=25.0)
     assert model.region.model_dump() == {"x_min": -1000.0, "x_max": 1000.0, "y_min": -1000.0, "y_max": 1000.0}
-    assert model.fusion.weights == (0.5, 0.5)
+    assert model.fusion.model_dump()["weights"] == (0.5, 0.5)
     control = model.control
     assert control.decision_steps == (10, 20, 30)
-    assert {sensor.platform.headings_deg for sensor in model.sensors} == {tuple(range(-180, 181, 30))}
+    assert {sensor.platform.model_dump()["headings_deg"] for sensor in model.sensors} == {tuple(range(-180, 181, 30))}
     assert (control.horizon_steps, control.horizon_period, control.num_samples) == (5, 2.0, 40)
     assert (control.limits.max_prior_hypotheses, control.limits.max_hypotheses) == (10, 40)
     assert model.ospa.model_dump() == {"cutoff": 100.0, "order": 1.0, "window": 10, "from_step": 11, "to_step": 40}

@@ -15,7 +15,7 @@ from vedette.campaigns import open_results, parse_spec, resolve, run_campaign
 from vedette.cli import app
 from vedette.errors import InputError
 from vedette.evaluation import run_scenario
-from vedette.scenarios import Scenario, load_scenario
+from vedette.scenarios import Scenario, load_scenario, with_fields
 from vedette.simulation.stopping import RunStopped
 
 OWN = Path(__file__).with_name("own_parts.py")
@@ -71,6 +71,14 @@ def test_a_joint_decision_with_reward_search_and_fusion_of_ones_own(scenario: Sc
     assert plan.chosen == (0, 0)
     assert np.isfinite(plan.expected_rewards[0][0])
     assert plan.notes == ("rewards were computed one by one: reward is a function of two densities",)
+
+
+def test_a_reward_of_power_integrals(scenario: Scenario) -> None:
+    powers = {"kind": "custom", "function": "own_parts.py:Powers", "arguments": {"order": 0.25}}
+    twin = {"kind": "renyi", "order": 0.25}
+    for reward in (powers, twin):
+        plan = run_scenario(with_fields(scenario, {"control.reward": reward}), "idm", seed=1).decisions[0].plan
+        assert np.isfinite(plan.expected_rewards[0][0])
 
 
 def test_a_campaign_with_workers_gives_the_same_bytes(folder: Path) -> None:

@@ -28,7 +28,7 @@ def test_a_field_of_a_section_of_every_sensor_and_of_one(paper: Scenario) -> Non
         {"control.num_samples": 7, "sensors.*.platform.speed": 30.0, "sensors.1.platform.speed": 20.0, "ospa.order": 2},
     )
     assert changed.model.control.num_samples == 7
-    assert [sensor.platform.speed for sensor in changed.model.sensors] == [30.0, 20.0]
+    assert [sensor.platform.model_dump()["speed"] for sensor in changed.model.sensors] == [30.0, 20.0]
     assert changed.model.ospa.order == 2.0
     assert changed.path == paper.path
     assert paper.model.control.num_samples != 7

@@ -10,7 +10,7 @@ import pytest
 
 from vedette.control import IndependentPlanner, JointPlanner, MobileSensor, PlanningSettings
 from vedette.errors import InputError, NumericalError
-from vedette.filters import DeltaGlmbFilter, Filter, LmbFilter
+from vedette.filters import DeltaGlmbFilter, Filter, Limits, LmbFilter, MultiSensorGlmbFilter, MultiSensorLmbFilter
 from vedette.fusion import Clmb
 from vedette.models import TargetModel
 from vedette.scenarios import load_scenario
@@ -19,6 +19,7 @@ from vedette.simulation import RunRecord, simulate, simulate_scan
 from vedette.simulation.experiment import Experiment
 from vedette.simulation.journal import STAGES
 from vedette.simulation.loop import FILTER, PLANNER, SCANS, TRUTH, run_stream
+from vedette.simulation.replay import scans_of
 from vedette.simulation.stopping import RunStopped
 from vedette.tracking import Central, CentralFilter, Distributed, State, Tracker, stage_of
 
@@ -156,6 +157,19 @@ def test_a_central_filter_is_every_sensors_belief(experiment: Experiment) -> Non
     assert tuple(record.timings) == STAGES
     assert (record.timings["filter"] > 0.0).all()
     assert (record.timings["fusion"] == 0.0).all()
+
+
+@pytest.mark.parametrize("kind", [MultiSensorGlmbFilter, MultiSensorLmbFilter])
+def test_a_central_run_is_the_filter_on_the_scans_of_the_run(experiment: Experiment, kind: Any) -> None:
+    tracker = Central(kind(experiment.tracker.targets, experiment.tracker.sensors, Limits(max_hypotheses=50)))
+    shorter = replace(experiment, tracker=tracker, times=experiment.times[:4], decision_steps=())
+    record = run(shorter)
+    belief, rng = tracker.filter.initial(), np.random.default_rng(0)
+    for step, scans in enumerate(scans_of(record, shorter), start=1):
+        measurements = [scan.measurements for scan in scans]
+        belief, info = tracker.filter.step(belief, measurements, experiment.poses, 1.0, step, rng=rng)
+        assert (record.health.log_likelihood[step - 1] == info.log_likelihood).all()
+        assert record.estimates[step - 1].means.tobytes() == experiment.estimate(belief, step).means.tobytes()
 
 
 def test_measurements_that_one_filter_of_all_left_out_are_counted_once(experiment: Experiment) -> None:

@@ -22,8 +22,8 @@ from vedette.reading import parse_json, read_file, said
 from vedette.scenarios import Scenario
 from vedette.scenarios.sections import ScenarioModel
 from vedette.scenarios.yaml_reader import read_yaml
-from vedette.simulation.kept import FORMAT_VERSION, check_version
-from vedette.simulation.storage import versions
+from vedette.simulation.kept import FORMAT_VERSION
+from vedette.simulation.storage import check_version, versions
 from vedette.text import shown
 
 MANIFEST = "manifest.json"
@@ -113,7 +113,8 @@ def read_manifest(folder: Path) -> dict[str, Any]:
         raise InputError(f"{path}: expected the manifest of a campaign; it is cut short or altered: {error}") from None
     if not isinstance(manifest, dict) or manifest.get("format") != FORMAT:
         raise InputError(f"{path}: expected the manifest of a campaign; got another file")
-    check_version(manifest, _written_by(manifest), path)
+    sessions = manifest.get("sessions")
+    check_version(manifest, sessions[-1] if isinstance(sessions, list) and sessions else None, path)
     missing = [field for field in (*_FIXED, "num_runs", "sessions") if field not in manifest]
     if missing:
         raise InputError(f"{path}: expected a field {missing[0]}; it is cut short or altered")
@@ -126,14 +127,6 @@ def read_manifest(folder: Path) -> dict[str, Any]:
             f"{path}: expected a campaign; it is cut short or altered: {place}: {said(fault['msg'])}"
         ) from None
     return manifest
-
-
-def _written_by(manifest: Mapping[str, Any]) -> Any:
-    """The version of the program in the last session, if it says so."""
-    try:
-        return manifest["sessions"][-1]["versions"]["vedette"]
-    except (LookupError, TypeError):
-        return None
 
 
 def write_manifest(folder: Path, manifest: Mapping[str, Any]) -> None:

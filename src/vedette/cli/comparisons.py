@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from rich.cells import cell_len
+
 from vedette.cli.output import console as new_console
-from vedette.text import display_width, elided_apart
+from vedette.text import elided_apart
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -28,7 +30,7 @@ def print_comparison(comparison: Comparison) -> None:
     console = new_console()
     numbers = [row[1:] for row in strategy_rows(comparison)]
     labels = elided_apart(comparison.strategies, _LONGEST_LABEL)
-    longest = max(map(display_width, labels))
+    longest = max(map(cell_len, labels))
     gap = 2 if _width(numbers, 2) + longest <= console.width else 1
     room = console.width - _width(numbers, gap)
     if room < min(_SHORTEST_LABEL, longest):

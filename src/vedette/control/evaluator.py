@@ -41,7 +41,7 @@ class Evaluator:
     """
 
     sensors: tuple[MobileSensor, ...]
-    fusion: Fusion[Any, Any]
+    fusion: Fusion
     settings: PlanningSettings
     reward: Reward | PowerReward
     options: tuple[Options, ...]
@@ -54,7 +54,7 @@ class Evaluator:
     def prepare(
         cls,
         sensors: Sequence[MobileSensor],
-        fusion: Fusion[Any, Any],
+        fusion: Fusion,
         settings: PlanningSettings,
         reward: Reward | PowerReward,
         state: State,
@@ -83,7 +83,7 @@ class Evaluator:
         """Number of different courses of each sensor."""
         return tuple(len(own.courses) for own in self.options)
 
-    def rewards(self, which: Sequence[int], fusion: Fusion[Any, Any] | None) -> SampleRewards:
+    def rewards(self, which: Sequence[int], fusion: Fusion | None) -> SampleRewards:
         """The function that gives (num_joint, num_samples) rewards of joint actions (num_joint, num of `which`).
 
         which: the sensors that act. Their actions are numbers of different courses. fusion: None for a single sensor,
@@ -101,7 +101,7 @@ class Evaluator:
 
         return evaluate
 
-    def _compute(self, posteriors: Sequence[LabelledCases], fusion: Fusion[Any, Any] | None) -> SampleRewards:
+    def _compute(self, posteriors: Sequence[LabelledCases], fusion: Fusion | None) -> SampleRewards:
         laid = lay_out_rewards(posteriors, self.prediction, fusion, self.reward)
         if not isinstance(laid, str):
             return laid
@@ -109,7 +109,7 @@ class Evaluator:
         warn_slow(laid)
         return PlainRewards(posteriors, self.prediction, fusion, self.reward, self.settings.num_samples)
 
-    def sample_rewards(self, which: Sequence[int], fusion: Fusion[Any, Any] | None) -> Floats:
+    def sample_rewards(self, which: Sequence[int], fusion: Fusion | None) -> Floats:
         """(num_joint, num_samples) rewards of all joint actions of the sensors `which`, the last one's fastest."""
         shape = self.joint_shape()
         return self.rewards(which, fusion)(all_joint_actions(tuple(shape[s] for s in which)))

@@ -39,7 +39,7 @@ class LaidRewards:
 
 
 def lay_out_rewards(
-    cases: Sequence[LabelledCases], prediction: Belief, fusion: Fusion[Any, Any] | None, reward: Reward | PowerReward
+    cases: Sequence[LabelledCases], prediction: Belief, fusion: Fusion | None, reward: Reward | PowerReward
 ) -> LaidRewards | str:
     """The rewards laid out, or why they cannot be. fusion: None for a sensor alone."""
     if not isinstance(reward, PowerReward) or not speaks_for(reward, "combine", "__call__"):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
@@ -28,7 +27,7 @@ class PlainRewards:
 
     posteriors: Sequence[LabelledCases]
     prediction: Belief
-    fusion: Fusion[Any, Any] | None
+    fusion: Fusion | None
     reward: Reward | PowerReward
     num_samples: int
     _densities: dict[tuple[int, int], Belief] = field(default_factory=dict)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 
@@ -47,7 +47,7 @@ class JointPlanner:
     """
 
     sensors: tuple[MobileSensor, ...]
-    fusion: Fusion[Any, Any]
+    fusion: Fusion
     settings: PlanningSettings = field(default_factory=PlanningSettings)
     reward: Reward | PowerReward = field(default_factory=CauchySchwarzReward)
     search: JointSearch = field(default_factory=ExhaustiveSearch)
@@ -97,7 +97,7 @@ class IndependentPlanner:
     """
 
     sensors: tuple[MobileSensor, ...]
-    fusion: Fusion[Any, Any]
+    fusion: Fusion
     settings: PlanningSettings = field(default_factory=PlanningSettings)
     reward: Reward | PowerReward = field(default_factory=CauchySchwarzReward)
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterable
+import itertools
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -50,33 +51,50 @@ def decisions_markdown(comparison: Comparison) -> str:
     return "\n".join(lines) + "\n"
 
 
-def strategy_csv(comparison: Comparison) -> str:
-    """The numbers behind the table, unrounded, one row a strategy."""
+def strategy_csv(comparisons: Mapping[str, Comparison] | Comparison) -> str:
+    """The numbers behind the table, unrounded, one row a strategy; of several comparisons with their names in front."""
+    if isinstance(comparisons, Comparison):
+        rows = [_numbers(comparisons, strategy) for strategy in comparisons.strategies]
+    else:
+        rows = [
+            {"group": name, **_numbers(comparison, strategy)}
+            for name, comparison in comparisons.items()
+            for strategy in comparison.strategies
+        ]
     out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
-    parts = [f"{part}_{field}_m" for part in PARTS for field in ("mean", "se")]
-    measures = [f"{name}_{field}" for name in comparison.measures for field in ("mean", "se")]
-    paired = ("difference_m", "difference_se_m", "low_m", "high_m", "share_won")
-    writer.writerow(["strategy", "runs", *parts, *paired, *measures])
-    for strategy in comparison.strategies:
-        numbers = _means(comparison, strategy, PARTS)
-        difference = comparison.difference(strategy)
-        summary = difference.summary
-        numbers += [float(value) for value in (summary.mean, summary.standard_error, summary.low, summary.high)]
-        own = _means(comparison, strategy, comparison.measures)
-        writer.writerow([strategy, comparison.num_runs, *numbers, difference.share_won, *own])
+    columns = list(dict.fromkeys(name for row in rows for name in row))  # comparisons may have other measures
+    writer = csv.DictWriter(out, columns, lineterminator="\n")
+    if rows:
+        writer.writeheader()
+    writer.writerows(rows)
     return out.getvalue()
 
 
-def _means(comparison: Comparison, strategy: str, parts: Iterable[str]) -> list[float]:
-    """Mean over the runs that have a value, and its standard error, of one part after the other."""
-    numbers = []
-    for part in parts:
-        means = comparison.run_means(strategy, part)
-        known = means[~np.isnan(means)]
-        summary = summarise(known) if len(known) else None
-        numbers += [float(summary.mean), float(summary.standard_error)] if summary else [np.nan, np.nan]
-    return numbers
+def _numbers(comparison: Comparison, strategy: str) -> dict[str, str | float]:
+    difference = comparison.difference(strategy)
+    paired = difference.summary
+    parts = [_means(comparison, strategy, part, f"{part}_mean_m", f"{part}_se_m") for part in PARTS]
+    measures = [_means(comparison, strategy, name, f"{name}_mean", f"{name}_se") for name in comparison.measures]
+    return {
+        "strategy": strategy,
+        "runs": comparison.num_runs,
+        **dict(itertools.chain(*parts)),
+        "difference_m": float(paired.mean),
+        "difference_se_m": float(paired.standard_error),
+        "low_m": float(paired.low),
+        "high_m": float(paired.high),
+        "share_won": difference.share_won,
+        **dict(itertools.chain(*measures)),
+    }
+
+
+def _means(comparison: Comparison, strategy: str, part: str, *names: str) -> list[tuple[str, float]]:
+    """Mean over the runs that have a value, and its standard error, under these names."""
+    means = comparison.run_means(strategy, part)
+    known = means[~np.isnan(means)]
+    summary = summarise(known) if len(known) else None
+    values = (float(summary.mean), float(summary.standard_error)) if summary else (np.nan, np.nan)
+    return list(zip(names, values, strict=True))
 
 
 def caption(comparison: Comparison) -> str:

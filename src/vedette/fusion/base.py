@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple, Protocol, TypeVar
+from typing import Any, Literal, NamedTuple, Protocol
 
 import numpy as np
 
@@ -21,9 +21,6 @@ _MERGE_DISTANCE = {"moment_matched": 0.0, "component_wise": 2.0, "quadrature": 0
 
 # Existence from which a sensor is sure of a label, and below which the fusion has lost it.
 SURE, LOST = 0.9, 0.5
-
-_BeliefT_contra = TypeVar("_BeliefT_contra", contravariant=True)
-_FusedT_co = TypeVar("_FusedT_co", covariant=True)
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,10 +62,10 @@ class FusionInfo:
         return sum(self.missing_labels)
 
 
-class Fusion(Protocol[_BeliefT_contra, _FusedT_co]):
+class Fusion(Protocol):
     """One belief of all the sensors'. The order of `beliefs` is that of the fusion weights."""
 
-    def fuse(self, beliefs: Sequence[_BeliefT_contra]) -> tuple[_FusedT_co, FusionInfo]:
+    def fuse(self, beliefs: Sequence[Any]) -> tuple[Any, FusionInfo]:
         """The fused belief, and what had to be repaired or thrown away."""
         ...
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from pathlib import Path
 
 from vedette.campaigns.results import CampaignResults
@@ -22,7 +20,8 @@ def write_summary(results: CampaignResults, folder: Path) -> tuple[Path, ...]:
         InputError: the folder cannot be written.
     """
     groups = [group for group in gather(results) if group.comparison is not None]
-    contents = {MARKDOWN: "\n".join(map(_markdown, groups)), CSV: _csv(groups)}
+    compared = {group.name: group.comparison for group in groups if group.comparison is not None}
+    contents = {MARKDOWN: "\n".join(map(_markdown, groups)), CSV: strategy_csv(compared)}
     try:
         folder.mkdir(parents=True, exist_ok=True)
         for name, text in contents.items():
@@ -38,16 +37,3 @@ def _markdown(group: Group) -> str:
     if len(group.comparison.decision_times):
         parts.append(decisions_markdown(group.comparison))
     return "\n".join(part for part in parts if part)
-
-
-def _csv(groups: list[Group]) -> str:
-    """The tables of all groups under one header, the group's name in front; groups may have other measures."""
-    out, rows = io.StringIO(), []
-    for group in groups:
-        assert group.comparison is not None
-        rows += [{"group": group.name, **row} for row in csv.DictReader(io.StringIO(strategy_csv(group.comparison)))]
-    writer = csv.DictWriter(out, list(dict.fromkeys(name for row in rows for name in row)), lineterminator="\n")
-    if rows:
-        writer.writeheader()
-    writer.writerows(rows)
-    return out.getvalue()

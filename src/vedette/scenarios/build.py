@@ -5,8 +5,6 @@ Each section builds its own part (`vedette.scenarios.sections`); here they are p
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from vedette.control import MobileSensor, Planner
@@ -136,7 +134,7 @@ def build_planner(scenario: Scenario, name: str, num_threads: int = 0) -> Planne
     return STRATEGIES[name].planner(parts)
 
 
-def _fusion_of_decisions(scenario: Scenario, local: Filter) -> Fusion[Any, Any]:
+def _fusion_of_decisions(scenario: Scenario, local: Filter) -> Fusion:
     """That of the tracker; where it fuses nothing, GCI of the filters' kind of density."""
     section, num_sensors = scenario.model.fusion, len(scenario.model.sensors)
     if section.kind in ("none", "central"):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -12,7 +12,7 @@ from vedette.errors import InputError
 from vedette.filters import FilterInfo
 from vedette.fusion.base import FusionInfo
 from vedette.kernels.base.types import Floats, Ints
-from vedette.simulation.arrow import Columns, Kind
+from vedette.simulation.arrow import Kind
 
 _FUSION = "fusion_"  # in front of the names that are of the fusion as a whole
 
@@ -105,20 +105,6 @@ class Health:
             shape = (num_scans,) if name in FUSION_COLUMNS else (num_scans, num_sensors)
             if array.shape != shape or array.dtype != dtype:
                 raise InputError(f"record.health.{name}: expected {dtype} of {shape}; got {array.dtype} {array.shape}")
-
-    def sensor_columns(self) -> Columns:
-        """One row a scan and sensor, by scan."""
-        return {name: getattr(self, name).ravel() for name in SENSOR_COLUMNS}
-
-    def fusion_columns(self) -> Columns:
-        """One row a scan."""
-        return {name: getattr(self, name) for name in FUSION_COLUMNS}
-
-    @classmethod
-    def from_columns(cls, sensors: Mapping[str, Any], scans: Mapping[str, Any], num_scans: int) -> Health:
-        """Back from `sensor_columns` and `fusion_columns`."""
-        of_sensors = {name: sensors[name].reshape(num_scans, -1) for name in SENSOR_COLUMNS}
-        return cls(**of_sensors, **{name: scans[name] for name in FUSION_COLUMNS})
 
 
 _DTYPES = {field.name: np.dtype(np.float64 if field.type == "Floats" else np.int64) for field in fields(Health)}

@@ -11,7 +11,7 @@ from vedette.reading import said
 from vedette.simulation.arrow import read_table, write_table
 from vedette.simulation.records import RunRecord
 from vedette.simulation.tables import LAYOUTS, TIMINGS, check_record, record_of, tables_of, timing_table, timings_of
-from vedette.text import printable, shown
+from vedette.text import shown
 
 FORMAT_VERSION = 4  # of saved runs and of campaigns; another wherever a table gains, loses or renames a column
 _ENDING = ".arrow"
@@ -58,17 +58,3 @@ def encode_timings(record: RunRecord) -> bytes:
 def decode_timings(content: bytes, place: str) -> dict[str, Floats]:
     """The timings back from their bytes. Raises `InputError`, naming the place, for other bytes."""
     return timings_of(read_table(content, TIMINGS, place))
-
-
-def check_version(manifest: Mapping[str, Any], written_by: object, place: object) -> None:
-    """`InputError` unless a saved run or a campaign is of this format; it says what to do with another."""
-    version = manifest.get("format_version")
-    if version == FORMAT_VERSION:
-        return
-    earlier = isinstance(version, int) and 0 < version < FORMAT_VERSION
-    which = "an earlier version" if earlier else "another version"
-    named = f"vedette {printable(written_by)[:40]}" if isinstance(written_by, str) else "the version that wrote it"
-    raise InputError(
-        f"{place}: expected format {FORMAT_VERSION}; got {shown(version)}, written by {which} of this program: run it "
-        f"again, or read it with {named}"
-    )

@@ -20,10 +20,10 @@ from typing import Any
 
 from vedette.errors import InputError
 from vedette.reading import parse_json, read_file
-from vedette.simulation.kept import FORMAT_VERSION, check_version, decode_run, encode_run, encode_timings
+from vedette.simulation.kept import FORMAT_VERSION, decode_run, encode_run, encode_timings
 from vedette.simulation.records import RunRecord
 from vedette.simulation.tables import run_facts
-from vedette.text import shown
+from vedette.text import printable, shown
 
 FORMAT = "vedette-run"
 MANIFEST, TIMINGS = "manifest.json", "timings.arrow"
@@ -97,8 +97,7 @@ def read_manifest(directory: Path | str) -> dict[str, Any]:
         raise InputError(f"{path}: expected the manifest of a run; it is cut short or altered: {error}") from error
     if not isinstance(manifest, dict) or manifest.get("format") != FORMAT:
         raise InputError(f"{path}: expected the manifest of a run; got another file")
-    written = manifest.get("versions")
-    check_version(manifest, written.get("vedette") if isinstance(written, dict) else None, path)
+    check_version(manifest, manifest, path)
     if not isinstance(manifest.get("files"), dict) or not isinstance(manifest.get("run"), dict):
         raise InputError(f"{path}: expected the fields files and run; it is cut short or altered")
     return manifest
@@ -121,6 +120,26 @@ def _manifest(record: RunRecord, files: Mapping[str, bytes]) -> dict[str, Any]:
         "versions": versions(),
         "files": {name: hashlib.sha256(content).hexdigest() for name, content in files.items()},
     }
+
+
+def check_version(manifest: Mapping[str, Any], session: Any, place: object) -> None:
+    """`InputError` unless a saved run or a campaign is of this format; it says what to do with another.
+
+    session: what has the `versions` that wrote it, if it has.
+    """
+    number = manifest.get("format_version")
+    if number == FORMAT_VERSION:
+        return
+    writer = session.get("versions") if isinstance(session, dict) else None
+    writer = writer.get("vedette") if isinstance(writer, dict) else None
+    reader = "the version that wrote it"
+    if isinstance(writer, str) and writer != versions()["vedette"]:
+        reader = f"vedette {printable(writer)[:40]}"
+    which = "an earlier" if isinstance(number, int) and 0 < number < FORMAT_VERSION else "another"
+    raise InputError(
+        f"{place}: expected format {FORMAT_VERSION}; got {shown(number)}, written by {which} version of this program: "
+        f"run it again, or read it with {reader}"
+    )
 
 
 def versions(*more: str) -> dict[str, str]:

@@ -121,7 +121,10 @@ def record_of(
         estimates=_estimates_of(tables["tracks"], len(times)),
         decisions=decisions_of(tables, poses),
         ospa=np.stack([scans[name] for name in OSPA_COLUMNS], axis=1),
-        health=Health.from_columns(sensors, scans, len(times)),
+        health=Health(
+            **{name: sensors[name].reshape(len(times), -1) for name in SENSOR_COLUMNS},
+            **{name: scans[name] for name in FUSION_COLUMNS},
+        ),
         timings=timings,
         stopped=None if facts["stopped"] is None else str(facts["stopped"]),
     )
@@ -134,7 +137,7 @@ def _scans(record: RunRecord) -> Columns:
         "num_targets": np.diff(record.truth.offsets),
         "num_estimates": _counts(record),
         **dict(zip(OSPA_COLUMNS, record.ospa.T, strict=True)),
-        **record.health.fusion_columns(),
+        **{name: getattr(record.health, name) for name in FUSION_COLUMNS},
     }
 
 
@@ -177,7 +180,7 @@ def _sensors(record: RunRecord) -> Columns:
         "sensor": np.tile(np.arange(num_sensors), num_scans),
         **dict(zip(POSE_COLUMNS, poses.T, strict=False)),
         **{f"pose_{index}": poses[:, index] for index in range(len(POSE_COLUMNS), pose_dim)},
-        **record.health.sensor_columns(),
+        **{name: getattr(record.health, name).ravel() for name in SENSOR_COLUMNS},
     }
 
 

@@ -31,7 +31,7 @@ class Distributed:
     """
 
     filters: tuple[Filter, ...]
-    fusion: Fusion[Any, Any] | None = None
+    fusion: Fusion | None = None
     feedback: bool = False
 
     def __post_init__(self) -> None:

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from rich.cells import cell_len
 
 from vedette.evaluation.comparison import Comparison
 from vedette.evaluation.figures.labels import short_labels
 from vedette.evaluation.figures.style import GREY, INK, colour, new_figure, styled
 from vedette.evaluation.statistics import Summary, paired_difference
 from vedette.kernels.base.types import Floats
-from vedette.text import display_width
 
 _ROW = 0.36  # inches
 _SHORT, _ONE_LINE = 8, 20  # letters
@@ -52,14 +52,14 @@ def _draw_differences(axes: Axes, comparison: Comparison) -> None:
     name, *names = short_labels(comparison.strategies)
     _name_rows(axes, [_minus(other, name) for other in names])
     # The whole sentence where it fits; the names of the rows say the same.
-    are_short = display_width(name) <= _SHORT and max(map(display_width, names)) <= _ONE_LINE - _SHORT
+    are_short = cell_len(name) <= _SHORT and max(map(cell_len, names)) <= _ONE_LINE - _SHORT
     better = f", right of 0: {name} better" if are_short else ""
     axes.set_xlabel(f"Paired difference (m){better}")
 
 
 def _minus(name: str, reference: str) -> str:
     """A difference in words, on two lines where one would leave little room to draw."""
-    between = "\n" if display_width(name + reference) > _ONE_LINE else " "
+    between = "\n" if cell_len(name + reference) > _ONE_LINE else " "
     return f"{name}{between}\N{MINUS SIGN} {reference}"
 
 

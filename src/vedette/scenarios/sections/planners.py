@@ -13,7 +13,7 @@ from pydantic import Field
 from vedette.scenarios.sections.custom import Custom
 
 if TYPE_CHECKING:  # with the planners comes the compiler, which a check does without
-    from vedette.control import JointSearch, MobileSensor, Plan, Planner, PlanningSettings, Reward
+    from vedette.control import JointSearch, MobileSensor, Plan, Planner, PlanningSettings, PowerReward, Reward
     from vedette.fusion import Fusion
     from vedette.platforms import Actions
 
@@ -27,9 +27,9 @@ class Parts(NamedTuple):
     """
 
     sensors: tuple[MobileSensor, ...]
-    fusion: Fusion[Any, Any]
+    fusion: Fusion
     settings: PlanningSettings
-    reward: Reward
+    reward: Reward | PowerReward
     search: JointSearch
     first_actions: tuple[Actions, ...]
 

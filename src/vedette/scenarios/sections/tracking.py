@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field
 
@@ -260,9 +260,9 @@ class CustomFusion(Custom):
 
         return Fusion
 
-    def build(self, num_sensors: int, folder: Path) -> FusionRule[Any, Any]:
+    def build(self, num_sensors: int, folder: Path) -> FusionRule:
         """The fusion of the sensors' densities."""
-        made: FusionRule[Any, Any] = self.made(folder, num_sensors=num_sensors)
+        made: FusionRule = self.made(folder, num_sensors=num_sensors)
         return made
 
 
