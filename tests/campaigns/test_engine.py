@@ -27,7 +27,7 @@ def payloads(results: Any) -> dict[tuple[str, int], bytes]:
     landed = list(results)
     assert all(isinstance(result, Landed) for result in landed), [r for r in landed if isinstance(r, Failed)]
     assert len({(result.cell, result.run) for result in landed}) == len(landed)
-    return {(result.cell, result.run): result.payload for result in landed}
+    return {(result.cell, result.run): result.payload + result.metrics for result in landed}
 
 
 @pytest.fixture(scope="module")

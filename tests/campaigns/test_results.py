@@ -88,10 +88,8 @@ def test_strategies_are_compared_over_the_runs_that_all_have(whole, campaign):
     assert group.settings.keys() == {"scenario", "sensors.*.clutter.rate"}
     assert group.labels == group.comparison.strategies == ("jdm", "random")
     assert [cell.name for cell in group.cells] == ["jdm-rate-5.0", "random-rate-5.0"]
-    records, metrics = (
-        {planner: [make_run(planner, run)[part] for run in range(2)] for planner in ("jdm", "random")}
-        for part in (0, 1)
-    )
+    records = {planner: [make_run(planner, run)[0] for run in range(2)] for planner in ("jdm", "random")}
+    metrics = {planner: [make_run(planner, run)[1] for run in range(2)] for planner in ("jdm", "random")}
     assert_same(group.comparison, scored(campaign.cells[0].scenario, records, metrics))
 
 

@@ -9,10 +9,10 @@ import numpy as np
 from hypothesis import strategies as st
 
 from vedette.kernels.association.assignment import ABSENT, MISSED, Options
-from vedette.kernels.association.ranked import Parents
+from vedette.kernels.association.children import Parents
 
 
-def make_options(rows: list[list[tuple[int, float]]]) -> Options:
+def make_options(rows: list[list[tuple[int, float]]], num_measurements: int) -> Options:
     """Options from (column, log weight) pairs of each row, in any order."""
     flat = [sorted(row, key=lambda option: -option[1]) for row in rows]
     columns = [column for row in flat for column, _ in row]
@@ -24,21 +24,21 @@ def make_options(rows: list[list[tuple[int, float]]]) -> Options:
         np.zeros(len(columns), np.int64),
         np.zeros(1),
         np.zeros((1, 1)),
+        num_measurements,
     )
 
 
-def make_parents(members: list[list[int]], log_weights: Any, groups: Any = ()) -> Parents:
+def make_parents(members: list[list[int]], log_weights: Any) -> Parents:
     return Parents(
         np.cumsum([0, *(len(rows) for rows in members)]),
         np.array([row for rows in members for row in rows], np.int64),
         np.array(log_weights, np.float64),
-        np.array(groups, np.int64),
     )
 
 
 @st.composite
 def tables(draw: st.DrawFn, max_rows: int = 4, max_columns: int = 4, max_parents: int = 3) -> Any:
-    """(options, number of columns, parents): sparse or dense, with ties where weights are whole numbers."""
+    """(options, parents): sparse or dense, with ties where weights are whole numbers."""
     num_columns = draw(st.integers(0, max_columns))
     num_rows = draw(st.integers(0, max_rows))
     weights = draw(st.sampled_from([st.integers(-3, 1).map(float), st.floats(-30.0, 5.0)]))
@@ -52,8 +52,7 @@ def tables(draw: st.DrawFn, max_rows: int = 4, max_columns: int = 4, max_parents
         [row for row in range(num_rows) if draw(st.booleans())] for _ in range(draw(st.integers(1, max_parents)))
     ]
     prior = [draw(st.one_of(weights, st.just(-np.inf))) for _ in members]
-    groups = draw(st.one_of(st.just([]), st.lists(st.integers(0, 2), min_size=len(members), max_size=len(members))))
-    return make_options(rows), num_columns, make_parents(members, prior, groups)
+    return make_options(rows, num_columns), make_parents(members, prior)
 
 
 def choices_of(options: Options, rows: Any) -> list[tuple[float, tuple[int, ...]]]:

@@ -25,10 +25,11 @@ from vedette.densities import LMB, TrackTable
 from vedette.filters import Limits
 from vedette.kernels.association.assignment import ABSENT, MISSED
 from vedette.kernels.association.marginals import option_marginals
+from vedette.kernels.association.search import SearchCaps
 
 pytestmark = pytest.mark.lanes
 
-UNLIMITED = (2**62, math.inf, 2**62)
+UNLIMITED = SearchCaps(2**62, math.inf, 2**62)
 
 
 def marginals_of(options):
@@ -43,9 +44,8 @@ def marginals_of(options):
     return total, marginals - total
 
 
-def assert_marginals(options, num_columns, num_ranked=None):
-    got = np.empty(len(options.columns))
-    total, ranked, _ = option_marginals(options, num_columns, *UNLIMITED, got)
+def assert_marginals(options, num_ranked=None):
+    got, (total, ranked, _) = option_marginals(options, UNLIMITED)
     expected_total, expected = marginals_of(options)
     if expected_total == -math.inf:
         assert total == -math.inf
@@ -58,8 +58,8 @@ def assert_marginals(options, num_columns, num_ranked=None):
 
 @given(tables(max_rows=5))
 def test_marginals(table):
-    options, num_columns, _ = table
-    assert_marginals(options, num_columns)
+    options, _ = table
+    assert_marginals(options)
 
 
 @settings(max_examples=5)
@@ -68,27 +68,26 @@ def test_dense_clusters(seed):
     rng = np.random.default_rng(seed)
     rows = [[(column, rng.normal(scale=2.0)) for column in (ABSENT, MISSED, *range(4))] for _ in range(5)]
     rows += [[(column, rng.normal()) for column in (MISSED, 4, 5)] for _ in range(2)]
-    assert_marginals(make_options(rows), 6, num_ranked=0)
+    assert_marginals(make_options(rows, 6), num_ranked=0)
 
 
 def test_more_measurements_than_the_exact_sum_takes_are_ranked():
     rng = np.random.default_rng(2)
     spans = [range(0, 6), range(4, 11), range(9, 15)]
     rows = [[(column, rng.normal(scale=2.0)) for column in (ABSENT, MISSED, *span)] for span in spans]
-    assert_marginals(make_options(rows), 15, num_ranked=1)
+    assert_marginals(make_options(rows, 15), num_ranked=1)
 
 
 def test_weights_beyond_the_range_of_floats():
     rows = [[(0, 0.0), (1, -700.0), (MISSED, -800.0)], [(0, 0.0), (MISSED, -650.0)], [(1, -2.0), (0, -3.0)]]
-    assert_marginals(make_options(rows), 2, num_ranked=1)
+    assert_marginals(make_options(rows, 2), num_ranked=1)
 
 
 def test_a_row_without_options_forbids_all():
     tables_without_choice: list[list[list[tuple[int, float]]]] = [[[]], [[(0, 1.0)], []], [[(0, 0.0)], [(0, 0.0)]]]
     for rows in tables_without_choice:
-        options = make_options(rows)
-        total, _, _ = option_marginals(options, 1, *UNLIMITED, np.empty(len(options.columns)))
-        assert total == -math.inf
+        _, sums = option_marginals(make_options(rows, 1), UNLIMITED)
+        assert sums.log_total == -math.inf
 
 
 def assert_same_lmb(got, expected):

@@ -11,22 +11,24 @@ from hypothesis import strategies as st
 
 from filters.tables import children_of, choices_of, make_options, make_parents, tables
 from vedette.kernels.association.assignment import ABSENT, MISSED, make_dual_work, solve_assignment
-from vedette.kernels.association.coverage import add_uncovered, themes_of_options
+from vedette.kernels.association.children import grown_children, make_children
+from vedette.kernels.association.coverage import add_uncovered, associations_of_options
 from vedette.kernels.association.gibbs import sample_children
-from vedette.kernels.association.ranked import rank_children
+from vedette.kernels.association.openings import start_search
+from vedette.kernels.association.ranked import add_missing_groups, rank_children, run_search
+from vedette.kernels.association.search import WIDEST, SearchCaps, grown_search, make_search
 
 pytestmark = pytest.mark.lanes
 
-UNLIMITED = (2**62, math.inf, 2**62)
+UNLIMITED = SearchCaps(2**62, math.inf, 2**62)
 
 
 def listed(children):
     """Log weight, parent and options of each child."""
+    num, offsets = int(children.filled[0]), children.offsets
     return [
-        (float(w), int(p), tuple(children.options[low:high].tolist()))
-        for w, p, low, high in zip(
-            children.log_weights, children.parents, children.offsets[:-1], children.offsets[1:], strict=True
-        )
+        (float(children.log_weights[c]), int(children.parents[c]), tuple(children.options[offsets[c] : offsets[c + 1]]))
+        for c in range(num)
     ]
 
 
@@ -41,9 +43,9 @@ def assert_heaviest(got, expected):
 
 @given(tables(max_rows=5))
 def test_best_assignment_and_its_duals(table):
-    options, num_columns, parents = table
+    options, parents = table
     rows = parents.rows[: parents.offsets[1]]
-    work = make_dual_work(len(rows), num_columns)
+    work = make_dual_work(len(rows), options.num_measurements)
     cost = solve_assignment(options, rows, work)
     choices = choices_of(options, rows)
     if not choices:
@@ -65,19 +67,18 @@ def test_best_assignment_and_its_duals(table):
 
 @given(tables())
 def test_all_children_in_order(table):
-    options, num_columns, parents = table
-    children, cut = rank_children(options, parents, num_columns, *UNLIMITED)
+    options, parents = table
+    children, cut = rank_children(options, parents, UNLIMITED)
     expected = children_of(options, parents)
     assert not cut
-    assert len(children.parents) == len(expected)
+    assert children.filled[0] == len(expected)
     assert_heaviest(listed(children), expected)
 
 
 @given(tables(), st.integers(1, 12), st.sampled_from([0.0, 1.0, 2.5, 10.0, math.inf]))
 def test_number_and_gap(table, most, gap):
-    options, num_columns, parents = table
-    parents = parents._replace(groups=np.empty(0, np.int64))
-    children, _ = rank_children(options, parents, num_columns, most, gap, 2**62)
+    options, parents = table
+    children, _ = rank_children(options, parents, SearchCaps(most, gap, 2**62))
     expected = children_of(options, parents)
     near = [child for child in expected if child[0] >= expected[0][0] - gap - 1e-9][:most]
     got = listed(children)
@@ -87,45 +88,59 @@ def test_number_and_gap(table, most, gap):
     assert len(exact) <= len(got) <= len(near)
 
 
-@given(tables(max_parents=5), st.integers(1, 4))
-def test_every_group_keeps_its_heaviest(table, most):
-    options, num_columns, parents = table
-    children, _ = rank_children(options, parents, num_columns, most, 1.0, 2**62)
-    if len(parents.groups) == 0:
-        return
+@given(tables(max_parents=5), st.integers(1, 4), st.lists(st.integers(0, 2), min_size=5, max_size=5))
+def test_every_group_keeps_its_heaviest(table, most, numbers):
+    options, parents = table
+    groups, seen = np.array(numbers[: len(parents.log_weights)], np.int64), np.zeros(3, np.int64)
+    children, _ = rank_children(options, parents, SearchCaps(most, 1.0, 2**62))
+    widest = int(np.diff(parents.offsets).max())
+    work = make_dual_work(widest, options.num_measurements)
+    while not add_missing_groups(options, parents, groups, seen, work, children):
+        children = grown_children(children, widest)
     heaviest: dict[int, float] = {}
     for weight, parent, _ in children_of(options, parents):
-        heaviest.setdefault(int(parents.groups[parent]), weight)
+        heaviest.setdefault(int(groups[parent]), weight)
     got: dict[int, float] = {}
     for weight, parent, _ in listed(children):
-        group = int(parents.groups[parent])
+        group = int(groups[parent])
         got[group] = max(got.get(group, -math.inf), weight)
     assert got == pytest.approx(heaviest, abs=1e-9)
+
+
+@given(tables(max_rows=5), st.integers(1, 40))
+def test_a_search_whose_stores_are_grown_goes_on_where_it_stopped(table, most):
+    options, parents = table
+    caps, search, children = SearchCaps(most, math.inf, 2**62), make_search(0), make_children(0, 0)
+    while not start_search(options, parents, search, children):
+        search = grown_search(search)
+    while not run_search(options, parents, caps, search, children):
+        search, children = grown_search(search), grown_children(children, search.sizes[WIDEST])
+    assert listed(children) == listed(rank_children(options, parents, caps)[0])
 
 
 def test_larger_dense_tables():
     rng = np.random.default_rng(5)
     for _ in range(5):
         rows = [[(column, rng.normal()) for column in (ABSENT, MISSED, *range(5))] for _ in range(5)]
-        options = make_options(rows)
+        options = make_options(rows, 5)
         parents = make_parents([[0, 1, 2, 3, 4], [0, 2, 4], []], [-1.0, -0.5, -3.0])
-        children, _ = rank_children(options, parents, 5, 300, math.inf, 2**62)
-        assert len(children.parents) == 300
+        children, _ = rank_children(options, parents, SearchCaps(300, math.inf, 2**62))
+        assert children.filled[0] == 300
         assert_heaviest(listed(children), children_of(options, parents))
 
 
 def test_search_stops_at_the_node_bound_and_says_so():
     rows = [[(column, 0.0) for column in (MISSED, *range(6))] for _ in range(6)]
-    options, parents = make_options(rows), make_parents([list(range(6))], [0.0])
-    children, cut = rank_children(options, parents, 6, 1000, math.inf, 200)
+    options, parents = make_options(rows, 6), make_parents([list(range(6))], [0.0])
+    children, cut = rank_children(options, parents, SearchCaps(1000, math.inf, 200))
     assert cut
-    assert 0 < len(children.parents) < 1000
+    assert 0 < children.filled[0] < 1000
 
 
 @given(tables(), st.integers(0, 2**32 - 1))
 def test_samples_are_children_each_found_once_the_best_of_each_parent_among_them(table, seed):
-    options, num_columns, parents = table
-    children = sample_children(options, parents, num_columns, 20, np.random.default_rng(seed))
+    options, parents = table
+    children = sample_children(options, parents, 20, np.random.default_rng(seed))
     expected = children_of(options, parents)
     weights = {(parent, chosen): weight for weight, parent, chosen in expected}
     got = listed(children)
@@ -138,37 +153,36 @@ def test_samples_are_children_each_found_once_the_best_of_each_parent_among_them
 
 
 @given(tables(), st.integers(1, 3), st.sampled_from([3.0, 50.0, math.inf]))
-def test_every_theme_of_weight_gets_a_child(table, most, gap):
-    options, num_columns, parents = table
-    parents = parents._replace(groups=np.empty(0, np.int64))
+def test_every_association_of_weight_gets_a_child(table, most, gap):
+    options, parents = table
     num_rows = len(options.offsets) - 1
     labels = np.stack([np.zeros(num_rows, np.int64), np.arange(num_rows) // 2], axis=1)
-    themes, num_themes = themes_of_options(labels, options, num_columns)
-    ranked, _ = rank_children(options, parents, num_columns, most, math.inf, 2**62)
-    children = add_uncovered(options, themes, num_themes, parents, ranked, num_columns, gap)
-    got, expected = listed(children), children_of(options, parents)
-    assert got[: len(ranked.parents)] == listed(ranked)
+    associations = associations_of_options(labels, options)
+    ranked, _ = rank_children(options, parents, SearchCaps(most, math.inf, 2**62))
+    before = listed(ranked)
+    got, expected = listed(add_uncovered(options, associations, parents, ranked, gap)), children_of(options, parents)
+    assert got[: len(before)] == before
     weights = {(parent, chosen): weight for weight, parent, chosen in expected}
     for weight, parent, chosen in got:
         assert weight == pytest.approx(weights[parent, chosen], abs=1e-9)
-    for weight, _, _ in got[len(ranked.parents) :]:
+    for weight, _, _ in got[len(before) :]:
         assert weight >= expected[0][0] - gap - 1e-9
-    if num_columns == 0 and gap == math.inf:
-        # Nothing collides, so that the bound is met and the heaviest child of every theme is found.
-        held = {int(themes[option]) for _, _, chosen in got for option in chosen}
-        wanted = {int(themes[option]) for _, _, chosen in expected for option in chosen}
+    if options.num_measurements == 0 and gap == math.inf:
+        # Nothing collides, so that the bound is met and the heaviest child of every association is found.
+        held = {int(associations.of_option[option]) for _, _, chosen in got for option in chosen}
+        wanted = {int(associations.of_option[option]) for _, _, chosen in expected for option in chosen}
         assert held - {-1} == wanted - {-1}
 
 
-def test_a_theme_is_a_label_and_what_the_scan_did_to_it():
+def test_an_association_is_a_label_and_what_the_scan_did_to_it():
     rows = [[(ABSENT, -1.0), (MISSED, -2.0), (0, -0.5)], [(MISSED, 0.0), (0, -1.0)], [(MISSED, 0.0), (1, -1.0)]]
-    options = make_options(rows)
-    themes, num_themes = themes_of_options(np.array([[3, 1], [3, 1], [4, 0]]), options, 2)
-    assert num_themes == 6
-    assert themes[options.columns == ABSENT].tolist() == [-1]
+    options = make_options(rows, 2)
+    numbers, num = associations_of_options(np.array([[3, 1], [3, 1], [4, 0]]), options)
+    assert num == 6
+    assert numbers[options.columns == ABSENT].tolist() == [-1]
     first, second, third = (
-        themes[low:high] for low, high in zip(options.offsets[:-1], options.offsets[1:], strict=True)
+        numbers[low:high] for low, high in zip(options.offsets[:-1], options.offsets[1:], strict=True)
     )
     assert set(first[first >= 0]) == set(second)
     assert not set(second) & set(third)
-    assert len(set(themes[themes >= 0].tolist())) == 4
+    assert len(set(numbers[numbers >= 0].tolist())) == 4

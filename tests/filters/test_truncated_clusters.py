@@ -14,6 +14,7 @@ from vedette.densities import LMB
 from vedette.filters import Limits, LmbFilter
 from vedette.kernels.association.assignment import ABSENT, MISSED, Options
 from vedette.kernels.association.marginals import option_marginals
+from vedette.kernels.association.search import SearchCaps
 
 NUM_MEASUREMENTS = 14  # more than the exact sum takes
 
@@ -21,7 +22,7 @@ NUM_MEASUREMENTS = 14  # more than the exact sum takes
 def crowd(rng: np.random.Generator, scale: float) -> Options:
     """Three rows in one cluster, each of which may be absent, missed or detected as any measurement."""
     columns = (ABSENT, MISSED, *range(NUM_MEASUREMENTS))
-    return make_options([[(column, scale * rng.normal()) for column in columns] for _ in range(3)])
+    return make_options([[(column, scale * rng.normal()) for column in columns] for _ in range(3)], NUM_MEASUREMENTS)
 
 
 def enumerated(options: Options) -> tuple[float, np.ndarray]:
@@ -45,8 +46,7 @@ def test_marginals_are_within_the_share_left_out(scale: float, most: int, gap: f
         options = crowd(np.random.default_rng(seed), scale)
         log_all, expected = enumerated(options)
         weights_before = options.log_weights.copy()
-        got = np.empty(len(options.columns))
-        log_summed, num_ranked, log_kept = option_marginals(options, NUM_MEASUREMENTS, most, gap, 2**62, got)
+        got, (log_summed, num_ranked, log_kept) = option_marginals(options, SearchCaps(most, gap, 2**62))
         assert num_ranked == 1
         np.testing.assert_array_equal(options.log_weights, weights_before)
         left_out = -math.expm1(log_summed - log_all)
@@ -60,8 +60,7 @@ def test_marginals_are_within_the_share_left_out(scale: float, most: int, gap: f
 
 def test_a_sum_of_all_choices_leaves_nothing_out() -> None:
     options = crowd(np.random.default_rng(0), 1.0)
-    got = np.empty(len(options.columns))
-    log_summed, num_ranked, log_kept = option_marginals(options, NUM_MEASUREMENTS, 2**62, math.inf, 2**62, got)
+    got, (log_summed, num_ranked, log_kept) = option_marginals(options, SearchCaps(2**62, math.inf, 2**62))
     log_all, expected = enumerated(options)
     assert (num_ranked, log_kept) == (1, 0.0)
     assert log_summed == pytest.approx(log_all, abs=1e-10)
@@ -70,8 +69,7 @@ def test_a_sum_of_all_choices_leaves_nothing_out() -> None:
 
 def test_an_exact_sum_that_falls_below_the_smallest_number_leaves_both_sides_open() -> None:
     rows = [[(0, 0.0), (MISSED, -1.0), (ABSENT, -900.0)], [(0, 0.0), (MISSED, -2.0)]]
-    got = np.empty(5)
-    _, num_ranked, log_kept = option_marginals(make_options(rows), 1, 2**62, math.inf, 2**62, got)
+    got, (_, num_ranked, log_kept) = option_marginals(make_options(rows, 1), SearchCaps(2**62, math.inf, 2**62))
     assert (num_ranked, log_kept) == (0, 0.0)
     assert got[2] == pytest.approx(-900.0 - math.log(math.exp(-1.0) + math.exp(-2.0) + math.exp(-3.0)), abs=0.4)
 

@@ -111,7 +111,7 @@ def edit_run(folder: Path, rng: Generator, *, sign: bool) -> None:
     with closing(sqlite3.connect(folder / "campaign.sqlite")) as database:
         rows = database.execute("SELECT cell, run, payload, metrics, timings FROM runs ORDER BY cell, run").fetchall()
     cell, run, *blobs = rows[rng.integers(len(rows))]
-    column, old = list(zip(("payload", "metrics", "timings"), blobs, strict=True))[max(0, rng.integers(6) - 3)]
+    column, old = list(zip(("payload", "metrics", "timings"), blobs, strict=True))[max(0, int(rng.integers(6)) - 3)]
     content = (edit_npz if column == "payload" else edit_arrow)(zlib.decompress(old), rng)
     if not rng.integers(20):
         content = bytes(200_000_000)  # a fifth of a megabyte on the disk

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from vedette.kernels.base import disk_cache
 from vedette.kernels.base.compile import JIT_ENABLED
 from waiting import PATIENCE
 
@@ -30,6 +31,7 @@ for name in sys.argv[2:]:
 stats = log_sum.stats
 print(sum(stats.cache_hits.values()), sum(stats.cache_misses.values()))
 """
+KERNELS = Path(disk_cache.__file__).parents[1]
 TYPES = ["float64", "float32", "int64", "int32", "uint8", "int8"]
 
 
@@ -95,3 +97,9 @@ def test_a_file_may_be_a_script_and_a_module(tmp_path: Path) -> None:
         command = [sys.executable, "-W", "error", *arguments]
         result = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=600, check=False)
         assert result.returncode == 0, result.stderr
+
+
+def test_a_stamp_covers_every_kernel_file_that_is_reached() -> None:
+    reached = {path.relative_to(KERNELS).as_posix() for path in disk_cache._source_closure(KERNELS / "steps/lmb.py")}
+    assert {"steps/lmb.py", "association/search.py", "gaussian/linalg.py", "base/types.py"} <= reached
+    assert not any(name.startswith("planning/") for name in reached)

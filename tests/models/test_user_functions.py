@@ -13,7 +13,7 @@ from reference.user_models import my_bearing_range, my_bearing_range_jacobian, u
 from vedette import models
 from vedette.errors import InputError, ModelError
 from vedette.kernels.base.compile import JIT_ENABLED
-from vedette.kernels.gaussian.kalman import CUBATURE, LINEARISED, UNSCENTED
+from vedette.kernels.gaussian.sigma_points import CUBATURE, LINEARISED, UNSCENTED
 
 pytestmark = pytest.mark.lanes
 

@@ -37,9 +37,12 @@ _COLUMNS = "cell, run, session, payload, payload_sha256, metrics, metrics_sha256
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """One finished run as it was handed in, and the session (counted from 1) that it was handed in by.
+    """One finished run as it was handed in.
 
     Attributes:
+        cell, run: which.
+        session: that it was handed in by, counted from 1.
+        payload, timings: the run, and what the clock said of it.
         metrics: what was measured of it; no bytes where nothing was, as it can be measured again.
     """
 

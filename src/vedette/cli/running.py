@@ -173,6 +173,8 @@ def print_run(record: RunRecord) -> None:
             rewards = ", ".join(f"{mean:.3f} ± {error:.3f}" for mean, error in decision.plan.expected_rewards)
             table.add_row(f"{decision.time:g} s", choice_words(choice), rewards)
         console.print(table)
+        for note in dict.fromkeys(note for decision in record.decisions for note in decision.plan.notes):
+            console.print(f"note: {note}", soft_wrap=True)
     total, localisation, cardinality = record.ospa.mean(axis=0)
     console.print(f"mean OSPA {total:.2f} m (localisation {localisation:.2f}, cardinality {cardinality:.2f})")
     spent = ", ".join(f"{stage} {seconds.sum():.2f} s" for stage, seconds in record.timings.items())

@@ -60,6 +60,7 @@ def pseudo_posteriors(
         float(settings.detection_threshold),
     )
     decision = Decision(
+        LMB.empty(belief.state_dim).to_kernel(),
         kernel_motion(sensor.filter.targets.motion, constant_survival(1.0)),
         sensor.filter.sensor.to_kernel(),
         horizon,

@@ -12,19 +12,21 @@ from vedette.densities.checks import unchecked
 from vedette.densities.glmb import GLMB
 from vedette.densities.lmb import LMB
 from vedette.errors import InputError
+from vedette.kernels.gaussian.mixtures import MixtureCaps
 from vedette.kernels.labelled import conversions as kernels
 
 DEFAULT_LOG_MIN_WEIGHT = math.log(1e-5)
 DEFAULT_MERGE_DISTANCE = 2.0
 
 
-def _check_limits(max_components: int, log_min_weight: float, merge_distance: float) -> None:
+def _checked_caps(max_components: int, log_min_weight: float, merge_distance: float) -> MixtureCaps:
     if max_components < 1:
         raise InputError(f"max_components: expected at least 1; got {max_components}")
     if not log_min_weight <= 0.0:
         raise InputError(f"log_min_weight: expected the log of a weight of at most 1; got {log_min_weight}")
     if not merge_distance >= 0.0:
         raise InputError(f"merge_distance: expected at least 0; got {merge_distance}")
+    return MixtureCaps(float(log_min_weight), float(merge_distance), int(max_components))
 
 
 def marginalise(
@@ -45,10 +47,8 @@ def marginalise(
     Hypotheses come out by descending weight, equal weights in the order of their first occurrence.
     Raises `InputError` for a limit outside its range.
     """
-    _check_limits(max_components, log_min_weight, merge_distance)
-    return GLMB.from_kernel(
-        kernels.marginalise(glmb.to_kernel(), float(log_min_weight), float(merge_distance), int(max_components))
-    )
+    caps = _checked_caps(max_components, log_min_weight, merge_distance)
+    return GLMB.from_kernel(kernels.marginalise(glmb.to_kernel(), caps))
 
 
 def glmb_to_lmb(
@@ -63,10 +63,8 @@ def glmb_to_lmb(
     Keeps the existence probabilities and so the mean cardinality, not its whole distribution. Mixtures are reduced as
     by `marginalise`. Raises `InputError` for a limit outside its range.
     """
-    _check_limits(max_components, log_min_weight, merge_distance)
-    return LMB.from_kernel(
-        kernels.glmb_to_lmb(glmb.to_kernel(), float(log_min_weight), float(merge_distance), int(max_components))
-    )
+    caps = _checked_caps(max_components, log_min_weight, merge_distance)
+    return LMB.from_kernel(kernels.glmb_to_lmb(glmb.to_kernel(), caps))
 
 
 def lmb_to_glmb(lmb: LMB, *, max_hypotheses: int) -> tuple[GLMB, float]:

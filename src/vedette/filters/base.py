@@ -14,12 +14,11 @@ from vedette.filters.info import FilterInfo
 from vedette.filters.inputs import births_at, check_scan, check_step
 from vedette.filters.limits import Limits
 from vedette.kernels.association.truncation import Truncation
-from vedette.kernels.base.types import Floats, Glmb, Lmb, Motion, Sensor
-from vedette.kernels.labelled.conversions import marginalise
+from vedette.kernels.base.types import Floats, Motion, ScanInput, Sensor
 from vedette.models import SensorModel, TargetModel, kernel_motion
 from vedette.models.arguments import generator, pose_vector, positive
 
-StepArguments = tuple[Lmb, Floats, Floats, float, Motion, Sensor, Truncation]
+StepArguments = tuple[ScanInput, Motion, Sensor, Truncation]
 
 
 @runtime_checkable
@@ -65,13 +64,6 @@ def shared_targets(filters: Sequence[Filter]) -> TargetModel:
     return targets
 
 
-def marginalised(posterior: Glmb, limits: Limits) -> Glmb:
-    """One hypothesis a label set, its track mixtures reduced to `limits` (Fantacci and Vo 2015)."""
-    return marginalise(
-        posterior, limits.log_min_component_weight, float(limits.merge_distance), int(limits.max_components)
-    )
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class SingleSensorFilter:
     """The parts of a filter of one sensor.
@@ -96,16 +88,14 @@ class SingleSensorFilter:
                 raise InputError(f"{name}: expected a {kind.__name__}; got {type(value).__name__}")
 
     def _arguments(self, scan: Floats, pose: Any, dt: Any, step: Any, prior: GLMB | LMB | None = None) -> StepArguments:
-        """Births, scan, pose, time step, models and truncation as the kernels take them, in their order.
+        """Scan, models and truncation as the kernels take them, in their order.
 
         prior: whose labels those of the births must not repeat; None where there are none.
         """
         targets = self.targets
+        birth = births_at(targets.birth, check_step(step, targets.birth, prior)).to_kernel()
         return (
-            births_at(targets.birth, check_step(step, targets.birth, prior)).to_kernel(),
-            scan,
-            pose_vector("pose", pose),
-            positive("dt", dt),
+            ScanInput(birth, scan, pose_vector("pose", pose), positive("dt", dt)),
             kernel_motion(targets.motion, targets.survival),
             self.sensor.to_kernel(),
             self.limits.truncation(self.sensor.meas_dim),

@@ -44,7 +44,7 @@ class CphdFilter(SingleSensorFilter):
         arguments = self._arguments(measurements, pose, dt, step)
         with model_errors():
             cardinality, posterior, report = step_cphd(
-                log_cardinality, mixture, *arguments, self.limits.intensity_reduction()
+                log_cardinality, mixture, *arguments, self.limits.intensity_caps()
             )
         if report.log_total == -math.inf:
             raise NumericalError(

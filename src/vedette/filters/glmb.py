@@ -10,13 +10,12 @@ import numpy as np
 
 from vedette.densities import GLMB, LMB
 from vedette.errors import InputError, NumericalError
-from vedette.filters.base import SingleSensorFilter, marginalised
+from vedette.filters.base import SingleSensorFilter
 from vedette.filters.info import FilterInfo
 from vedette.filters.inputs import check_belief, model_errors
+from vedette.kernels.labelled.conversions import marginalise
 from vedette.kernels.steps.glmb import step_gibbs, step_ranked
 from vedette.models.arguments import dimension
-
-_NO_GROUPS = np.empty(0, np.int64)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -76,14 +75,14 @@ class DeltaGlmbFilter(SingleSensorFilter):
         arguments = (prior.to_kernel(), *self._arguments(measurements, pose, dt, step, prior))
         with model_errors():
             if self.assignment == "gibbs":
-                posterior, _, report = step_gibbs(*arguments, int(self.num_gibbs_samples), rng)
+                posterior, report = step_gibbs(*arguments, int(self.num_gibbs_samples), rng)
             else:
-                posterior, _, report = step_ranked(*arguments, _NO_GROUPS)
+                posterior, report = step_ranked(*arguments)
         if len(posterior.hyp_log_weights) == 0:
             raise NumericalError(f"step {step}: no hypothesis has positive weight; do the models forbid this scan?")
         cap_met = len(posterior.hyp_log_weights) >= self.limits.max_hypotheses
         if self.marginalised:
-            posterior = marginalised(posterior, self.limits)
+            posterior = marginalise(posterior, self.limits.track_caps())
         info = FilterInfo(
             log_likelihood=report.log_total + report.log_clutter - self.sensor.clutter.rate,
             num_hypotheses=len(posterior.hyp_log_weights),

@@ -7,7 +7,9 @@ from dataclasses import dataclass
 
 from scipy.special import gammaincinv, logit
 
+from vedette.kernels.association.search import SearchCaps
 from vedette.kernels.association.truncation import Truncation
+from vedette.kernels.gaussian.mixtures import MixtureCaps
 from vedette.kernels.steps.lmb import Reduction
 from vedette.models.arguments import dimension, non_negative, probability, real, reject
 
@@ -91,33 +93,26 @@ class Limits:
 
     def truncation(self, meas_dim: int) -> Truncation:
         """The fields that bound hypotheses, as kernels take them."""
+        log_gap = -math.log(self.min_relative_weight) if self.min_relative_weight > 0.0 else math.inf
         return Truncation(
-            int(self.max_hypotheses),
-            -math.log(self.min_relative_weight) if self.min_relative_weight > 0.0 else math.inf,
+            SearchCaps(int(self.max_hypotheses), log_gap, int(self.max_search_nodes)),
             2.0 * float(gammaincinv(0.5 * meas_dim, self.gate_probability)),  # the quantile of chi-squared
             float(self.min_log_clutter),
-            int(self.max_search_nodes),
             -math.log(self.min_track_weight) if self.min_track_weight > 0.0 else math.inf,
         )
 
-    @property
-    def log_min_component_weight(self) -> float:
-        """Logarithm of `min_component_weight`."""
-        return math.log(self.min_component_weight) if self.min_component_weight > 0.0 else -math.inf
+    def track_caps(self) -> MixtureCaps:
+        """The fields that bound the mixture of a track, as kernels take them."""
+        log_min_weight = math.log(self.min_component_weight) if self.min_component_weight > 0.0 else -math.inf
+        return MixtureCaps(log_min_weight, float(self.merge_distance), int(self.max_components))
+
+    def intensity_caps(self) -> MixtureCaps:
+        """As `track_caps`, with the cap of a whole intensity in the place of a track's."""
+        return self.track_caps()._replace(max_components=int(self.max_intensity_components))
 
     def reduction(self) -> Reduction:
         """The fields that bound tracks and labels, as kernels take them."""
-        return Reduction(
-            self.log_min_component_weight,
-            float(self.merge_distance),
-            int(self.max_components),
-            float(logit(self.min_existence)),
-            int(self.max_labels),
-        )
-
-    def intensity_reduction(self) -> Reduction:
-        """As `reduction`, with the cap of a whole intensity in the place of a track's."""
-        return self.reduction()._replace(max_components=int(self.max_intensity_components))
+        return Reduction(self.track_caps(), float(logit(self.min_existence)), int(self.max_labels))
 
     @property
     def max_existence_logit(self) -> float:

@@ -45,17 +45,17 @@ class LmbFilter(SingleSensorFilter):
         arguments = self._arguments(measurements, pose, dt, step, prior)
         with model_errors():
             posterior, report = step_lmb(prior.to_kernel(), *arguments, self.limits.reduction())
-        if not np.isfinite(report.log_total):
+        if not np.isfinite(report.sums.log_total):
             raise NumericalError(f"step {step}: no association has positive weight; do the models forbid this scan?")
         info = FilterInfo(
-            log_likelihood=report.log_total + report.log_clutter - self.sensor.clutter.rate,
+            log_likelihood=report.sums.log_total + report.log_clutter - self.sensor.clutter.rate,
             num_hypotheses=1,
             num_tracks=len(posterior.existence_logit),
-            discarded_weight_bound=max(0.0, -math.expm1(report.log_kept)),
+            discarded_weight_bound=max(0.0, -math.expm1(report.sums.log_kept)),
             dropped_existence=float(report.dropped_existence),
             num_clutter_raised=int(report.num_raised),
             num_duplicates=num_duplicates,
-            num_inexact_clusters=int(report.num_ranked),
+            num_inexact_clusters=int(report.sums.num_ranked),
             search_cut=False,
             cap_met=len(posterior.existence_logit) >= self.limits.max_labels,
         )

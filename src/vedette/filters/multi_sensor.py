@@ -11,19 +11,17 @@ import numpy as np
 
 from vedette.densities import GLMB, LMB
 from vedette.errors import InputError, NumericalError
-from vedette.filters.base import marginalised
 from vedette.filters.info import FilterInfo
 from vedette.filters.inputs import births_at, check_belief, check_scan, check_step, model_errors
 from vedette.filters.limits import Limits
-from vedette.kernels.base.types import Floats
+from vedette.kernels.base.types import Floats, ScanInput
+from vedette.kernels.labelled.conversions import marginalise
 from vedette.kernels.steps.glmb import StepReport, step_ranked
 from vedette.kernels.steps.multi_sensor_combinations import SensorReport, extend_combinations, predict_combinations
 from vedette.kernels.steps.multi_sensor_glmb import update_ranked
 from vedette.kernels.steps.multi_sensor_lmb import update_lmb
 from vedette.models import SensorModel, TargetModel, kernel_motion
 from vedette.models.arguments import generator, pose_vector, positive
-
-_NO_GROUPS = np.empty(0, np.int64)
 
 
 class _Look(NamedTuple):
@@ -127,29 +125,28 @@ class MultiSensorLmbFilter(MultiSensorFilter):
         # A label that cannot exist has no density to be kept with.
         reduction = reduction._replace(min_existence_logit=max(reduction.min_existence_logit, -1e300))
         with model_errors():
-            combinations = predict_combinations(
-                prior.to_kernel(), births.to_kernel(), len(looks), positive("dt", dt), motion
-            )
-            for s, (sensor, scan, pose) in enumerate(looks):
+            inputs = [ScanInput(births.to_kernel(), scan, pose, positive("dt", dt)) for _, scan, pose in looks]
+            combinations = predict_combinations(prior.to_kernel(), inputs[0], len(looks), motion)
+            for s, (sensor, scan, _) in enumerate(looks):
                 truncation = limits.truncation(sensor.meas_dim)
                 combinations, report = extend_combinations(
-                    combinations, s, num_columns, scan, pose, sensor.to_kernel(), truncation
+                    combinations, s, num_columns, inputs[s], sensor.to_kernel(), truncation
                 )
                 num_columns += len(scan)
                 reports.append(report)
             posterior, joint = update_lmb(combinations, num_columns, truncation, reduction)
-        if not math.isfinite(joint.log_total):
+        if not math.isfinite(joint.sums.log_total):
             raise NumericalError(f"step {step}: no association has positive weight; do the models forbid these scans?")
-        log_kept = joint.log_kept + sum(report.log_kept for report in reports)
+        log_kept = joint.sums.log_kept + sum(report.log_kept for report in reports)
         info = FilterInfo(
-            log_likelihood=self._log_likelihood(joint.log_total, reports),
+            log_likelihood=self._log_likelihood(joint.sums.log_total, reports),
             num_hypotheses=1,
             num_tracks=len(posterior.existence_logit),
             discarded_weight_bound=max(0.0, -math.expm1(log_kept)),
             dropped_existence=float(joint.dropped_existence),
             num_clutter_raised=sum(int(report.num_raised) for report in reports),
             num_duplicates=num_duplicates,
-            num_inexact_clusters=int(joint.num_ranked),
+            num_inexact_clusters=int(joint.sums.num_ranked),
             search_cut=any(report.log_kept < 0.0 for report in reports),
             cap_met=len(posterior.existence_logit) >= limits.max_labels,
         )
@@ -213,14 +210,14 @@ class MultiSensorGlmbFilter(MultiSensorFilter):
         births = births_at(targets.birth, check_step(step, targets.birth, prior))
         posterior, reports, cap_met = prior.to_kernel(), [], False
         for s, (sensor, scan, pose) in enumerate(looks):
-            look = (scan, pose, sensor.to_kernel(), limits.truncation(sensor.meas_dim))
+            given = ScanInput(births.to_kernel(), scan, pose, positive("dt", dt))
+            own = (sensor.to_kernel(), limits.truncation(sensor.meas_dim))
             with model_errors():
                 if s == 0:
                     motion = kernel_motion(targets.motion, targets.survival)
-                    times = (scan, pose, positive("dt", dt), motion, look[2], look[3])
-                    posterior, _, report = step_ranked(posterior, births.to_kernel(), *times, _NO_GROUPS)
+                    posterior, report = step_ranked(posterior, given, motion, *own)
                 else:
-                    posterior, report = update_ranked(posterior, *look)
+                    posterior, report = update_ranked(posterior, given, *own)
             if len(posterior.hyp_log_weights) == 0:
                 raise NumericalError(
                     f"step {step}, sensor {s}: no hypothesis has positive weight; do the models forbid this scan?"
@@ -228,7 +225,7 @@ class MultiSensorGlmbFilter(MultiSensorFilter):
             reports.append(report)
             cap_met = cap_met or len(posterior.hyp_log_weights) >= limits.max_hypotheses
         if self.marginalised:
-            posterior = marginalised(posterior, limits)
+            posterior = marginalise(posterior, limits.track_caps())
         log_kept = sum(min(0.0, report.log_total - report.log_bound) for report in reports)
         info = FilterInfo(
             log_likelihood=self._log_likelihood(sum(report.log_total for report in reports), reports),

@@ -39,7 +39,7 @@ class PhdFilter(SingleSensorFilter):
         prior = check_belief(belief, Poisson, self.targets.state_dim)
         arguments = self._arguments(measurements, pose, dt, step)
         with model_errors():
-            posterior, report = step_phd(prior.to_kernel(), *arguments, self.limits.intensity_reduction())
+            posterior, report = step_phd(prior.to_kernel(), *arguments, self.limits.intensity_caps())
         info = FilterInfo(
             log_likelihood=report.log_total + report.log_clutter - self.sensor.clutter.rate,
             num_hypotheses=1,

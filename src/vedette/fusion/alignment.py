@@ -44,7 +44,7 @@ def align(sensors: Sequence[Glmb], missing_log_weight: float, rule: PowerRule) -
     """Sensors' marginalised GLMBs, each of at least one hypothesis, on the union of their label sets.
 
     Where a sensor lacks a set, its weight is the least of `missing_log_weight` and the weights that it has, and the
-    density of each label its marginal density over the sets that it has, reduced by the rule's limits.
+    density of each label its marginal density over the sets that it has, reduced by the rule's caps.
     """
     stack = stack_glmbs(sensors)
     group_of, first = group_by_label_set(stack)
@@ -67,7 +67,7 @@ def align(sensors: Sequence[Glmb], missing_log_weight: float, rule: PowerRule) -
     num_missing_labels = np.zeros(len(sensors), np.int64)
     for s in np.flatnonzero(~held.all(axis=0)).tolist():
         lacking = np.flatnonzero(~held[set_of_member, s])
-        marginal = glmb_to_lmb(sensors[s], *rule.limits).tracks
+        marginal = glmb_to_lmb(sensors[s], rule.caps).tracks
         places, num_missing_labels[s] = _find_labels(marginal.labels, labels[lacking])
         chosen[lacking, s] = np.where(places >= 0, places + len(tracks.labels), -1)
         tracks = stack_tracks([tracks, marginal])

@@ -12,6 +12,7 @@ import numpy as np
 from vedette.errors import InputError
 from vedette.fusion.cubature import MAX_DIM, fifth_degree_rule
 from vedette.kernels.base.types import Floats, Ints
+from vedette.kernels.gaussian.mixtures import MixtureCaps
 
 MixturePower = Literal["moment_matched", "component_wise", "quadrature"]
 MIXTURE_POWERS: tuple[MixturePower, ...] = ("moment_matched", "component_wise", "quadrature")
@@ -88,15 +89,11 @@ class FusionLimits(NamedTuple):
 
 
 class PowerRule(NamedTuple):
-    """How powers of mixtures of one state dimension are taken.
+    """How powers of mixtures of one state dimension are taken."""
 
-    limits: log of the least weight, merge distance and most components, for `kernels.mixtures.reduce_mixture`.
-    points, point_weights: cubature rule, empty without quadrature.
-    """
-
-    limits: tuple[float, float, int]
-    points: Floats
-    point_weights: Floats
+    caps: MixtureCaps
+    points: Floats  # (num_points, state_dim) of a cubature rule for the standard normal, empty without quadrature
+    point_weights: Floats  # (num_points,)
 
 
 def check_weights(weights: Sequence[float] | Floats) -> tuple[float, ...]:
@@ -130,16 +127,17 @@ def check_floor(name: str, log_floor: float) -> None:
 
 
 def power_rule(mixture_power: str, limits: FusionLimits, state_dim: int) -> PowerRule:
-    """The limits and the cubature rule of a power of mixtures. Raises `InputError` where there is no rule."""
+    """The caps and the cubature rule of a power of mixtures. Raises `InputError` where there is no rule."""
     points, point_weights = np.empty((0, state_dim)), np.empty(0)
     if mixture_power == "moment_matched":
-        return PowerRule((-math.inf, 0.0, 1), points, point_weights)
+        return PowerRule(MixtureCaps(-math.inf, 0.0, 1), points, point_weights)
     if mixture_power == "quadrature":
         if state_dim > MAX_DIM:
             raise InputError(f"mixture_power: quadrature needs at most {MAX_DIM} state dimensions; got {state_dim}")
         points, point_weights = fifth_degree_rule(state_dim)
     distance = limits.merge_distance if limits.merge_distance is not None else _MERGE_DISTANCE[mixture_power]
-    return PowerRule((limits.log_min_component_weight, distance, limits.max_components), points, point_weights)
+    caps = MixtureCaps(float(limits.log_min_component_weight), float(distance), int(limits.max_components))
+    return PowerRule(caps, points, point_weights)
 
 
 def check_kinds(given: Sequence[type], kinds: tuple[type, ...], num_sensors: int) -> None:

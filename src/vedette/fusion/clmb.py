@@ -151,7 +151,7 @@ def _align(sensors: Sequence[Lmb], missing_existence: float) -> _Aligned:
 def _as_lmb(belief: LMB | GLMB, rule: PowerRule) -> Lmb:
     """An LMB with reduced mixtures."""
     if isinstance(belief, GLMB):
-        return glmb_to_lmb(belief.to_kernel(), *rule.limits)
+        return glmb_to_lmb(belief.to_kernel(), rule.caps)
     return Lmb(reduced_tracks(belief.tracks.to_kernel(), rule), belief.existence_logit)
 
 

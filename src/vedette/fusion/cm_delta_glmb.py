@@ -133,7 +133,7 @@ class CmDeltaGlmb:
 
 def _marginalised(belief: GLMB, rule: PowerRule) -> Glmb:
     """One hypothesis a label set, of positive weight, with reduced mixtures."""
-    glmb = marginalise(belief.to_kernel(), *rule.limits)
+    glmb = marginalise(belief.to_kernel(), rule.caps)
     held = int(np.count_nonzero(glmb.hyp_log_weights > -math.inf))
     # They come by descending weight, so those of weight zero are the last.
     return Glmb(

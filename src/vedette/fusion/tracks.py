@@ -19,7 +19,7 @@ def fused_tracks(
 
     labels: (num, 2). chosen: (num, S) each sensor's track in `tracks`, -1 where it does not know the label; of
     mixtures already reduced. weights: (S,) positive fusion weights. The fused mixtures are reduced by the rule's
-    limits. Raises `NumericalError` where a product of powers is no density.
+    caps. Raises `NumericalError` where a product of powers is no density.
     """
     try:
         offsets, log_weights, means, covs, log_overlaps = fuse_tracks(
@@ -35,9 +35,9 @@ def fused_tracks(
 
 
 def reduced_tracks(tracks: Tracks, rule: PowerRule) -> Tracks:
-    """The tracks with their mixtures reduced by the rule's limits."""
+    """The tracks with their mixtures reduced by the rule's caps."""
     num = len(tracks.labels)
     if len(tracks.log_weights) == num:
         return tracks
     each = np.arange(num + 1)
-    return pooled_tracks(tracks, tracks.labels, each, each[:-1].copy(), np.ones(num), *rule.limits)
+    return pooled_tracks(tracks, tracks.labels, each, each[:-1].copy(), np.ones(num), rule.caps)

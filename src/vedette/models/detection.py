@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vedette.kernels.base.types import Floats
-from vedette.kernels.gaussian.kalman import wrap_angle
+from vedette.kernels.gaussian.scratch import wrap_angle
 from vedette.models.arguments import params_vector, pose_vector, positive, probability, reject, state_table
 from vedette.models.functions import ModelFunction, call, model_function, require_kind
 from vedette.models.probe import probe_probability

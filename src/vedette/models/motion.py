@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vedette.kernels.base.types import Floats, Motion
-from vedette.kernels.gaussian.kalman import CUBATURE, LINEARISED, UNSCENTED
+from vedette.kernels.gaussian.sigma_points import CUBATURE, LINEARISED, UNSCENTED
 from vedette.models.arguments import dimension, params_vector, positive, probability, real, reject, state_table
 from vedette.models.functions import ModelFunction, call, model_function, require_kind
 from vedette.models.probe import probe_array, probe_covariance, probe_jacobian, probe_probability

@@ -1,7 +1,8 @@
-"""Assignment of the rows (tracks) of a hypothesis to columns (measurements): the optimum and its dual variables.
+"""Assignment of the rows (predicted tracks) of a hypothesis to columns (measurements): optimum and dual variables.
 
-Every row has a list of options sorted by descending log weight. An option's column is a measurement, which at most one
-row may take, or negative (absent, missed), which any row may take.
+Minimise the sum of the costs c[i, o(i)] = -log weight over a choice of one option o(i) a row, no column taken twice.
+Every row lists its options by descending log weight. An option's column is a measurement, which at most one row may
+take, or negative (absent, missed), which any row may take: as if each row had a column of its own for it.
 """
 
 from __future__ import annotations
@@ -19,32 +20,28 @@ MISSED = -1
 
 
 class Options(NamedTuple):
-    """What may happen to each row. Options of row `r` are `offsets[r]:offsets[r + 1]`, heaviest first.
+    """What may happen to each row of a scan, heaviest first."""
 
-    columns: (num_options,) ABSENT, MISSED or a measurement index. log_weights: (num_options,).
-    entries: (num_options,) start of the option's component log weights in `component_log_weights`, -1 if absent.
-    whitened: (num_entries, meas_dim) whitened residuals of the components of a detection.
-    """
-
-    offsets: Ints
-    columns: Ints
-    log_weights: Floats
-    entries: Ints
-    component_log_weights: Floats
-    whitened: Floats
+    offsets: Ints  # (num_rows + 1,) into the options
+    columns: Ints  # (num_options,) ABSENT, MISSED or a measurement
+    log_weights: Floats  # (num_options,) relative to clutter alone
+    entries: Ints  # (num_options,) where the option's components start in the next two, -1 if absent
+    component_log_weights: Floats  # (num_entries,) those of an option sum to its weight; -inf outside the gate
+    whitened: Floats  # (num_entries, meas_dim) whitened residuals of the components of a detection
+    num_measurements: int  # of the scan
 
 
 class DualWork(NamedTuple):
-    """Working arrays of the assignment solver, sized by rows and columns."""
+    """Working arrays of the assignment solver."""
 
-    row_dual: Floats
-    row_option: Ints
-    row_gap: Floats
-    column_dual: Floats
-    column_row: Ints
-    slack: Floats
-    slack_option: Ints
-    visited: Ints
+    row_dual: Floats  # (num_rows,) u
+    row_option: Ints  # (num_rows,) chosen option of each row
+    row_gap: Floats  # (num_rows,) reduced cost of the second best option, of the ranking search
+    column_dual: Floats  # (num_columns,) v <= 0
+    column_row: Ints  # (num_columns,) row that holds the column, -1 for none
+    slack: Floats  # (num_columns,) least reduced cost from the rows of the alternating tree
+    slack_option: Ints  # (num_columns,) option and row of that cost, packed as option * num_rows + row
+    visited: Ints  # (num_columns,) 1 where the column is in the tree
 
 
 @kernel
@@ -65,13 +62,15 @@ def make_dual_work(num_rows: int, num_columns: int) -> DualWork:
 def solve_assignment(options: Options, rows: Ints, work: DualWork) -> float:
     """Cost of the best joint choice, minus its log weight; +inf where none exists.
 
-    Leaves the chosen option of each row in `work.row_option` and optimal dual variables in `work.row_dual` and
-    `work.column_dual` (<= 0), so that cost(option) - row_dual - column_dual >= 0 with equality on the optimum.
-    Rows whose best options do not collide are settled at once; otherwise shortest augmenting paths (Jonker, Volgenant).
+    Leaves the chosen option of each row in `work.row_option` and optimal dual variables u, v <= 0 in `work.row_dual`
+    and `work.column_dual`: c - u - v >= 0 for every option, with equality on the optimum (complementary slackness),
+    and v = 0 for a column that the optimum leaves unused. Shortest augmenting paths (Jonker and Volgenant 1987).
     """
     total = 0.0
     collision = False
-    for column in range(len(work.column_dual)):
+    num_columns = options.num_measurements
+    # Where no two rows want the same measurement first, everyone gets its best option and all v are 0.
+    for column in range(num_columns):
         work.column_dual[column] = 0.0
         work.column_row[column] = -1
     for i in range(len(rows)):
@@ -87,7 +86,7 @@ def solve_assignment(options: Options, rows: Ints, work: DualWork) -> float:
             work.column_row[column] = i
     if not collision:
         return total
-    for column in range(len(work.column_dual)):
+    for column in range(num_columns):
         work.column_row[column] = -1
     for i in range(len(rows)):
         if not _augment(options, rows, i, work):
@@ -101,7 +100,7 @@ def solve_assignment(options: Options, rows: Ints, work: DualWork) -> float:
 @inlined
 def _augment(options: Options, rows: Ints, start: int, work: DualWork) -> bool:
     """Assign row `start` along a shortest alternating path, to a free column or a row's own negative column."""
-    num_columns = len(work.column_dual)
+    num_columns = options.num_measurements
     for column in range(num_columns):
         work.slack[column] = math.inf
         work.visited[column] = 0
@@ -109,6 +108,7 @@ def _augment(options: Options, rows: Ints, start: int, work: DualWork) -> bool:
     own_slack, own_option, own_row = math.inf, -1, -1
     row = start
     while True:
+        # Dijkstra's algorithm over columns, with reduced costs as lengths: relax the edges of the row reached last.
         for option in range(options.offsets[rows[row]], options.offsets[rows[row] + 1]):
             column = options.columns[option]
             reduced = -options.log_weights[option] - work.row_dual[row]
@@ -117,13 +117,16 @@ def _augment(options: Options, rows: Ints, start: int, work: DualWork) -> bool:
                     own_slack, own_option, own_row = reduced, option, row
             elif work.visited[column] == 0 and reduced - work.column_dual[column] < work.slack[column]:
                 work.slack[column] = reduced - work.column_dual[column]
+                # One number for both, so that the path back needs a single array.
                 work.slack_option[column] = option * len(rows) + row
+        # A row's own column (absent, missed) is always free, so that it ends the path as a free measurement does.
         best, best_column = own_slack, -1
         for column in range(num_columns):
             if work.visited[column] == 0 and work.slack[column] < best:
                 best, best_column = work.slack[column], column
         if best == math.inf:
             return False
+        # Duals move along the tree so that reduced costs stay non-negative and the edge just reached becomes tight.
         work.row_dual[start] += best
         for column in range(num_columns):
             if work.visited[column] == 1:

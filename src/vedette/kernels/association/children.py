@@ -12,67 +12,67 @@ from vedette.kernels.base.types import Floats, Ints
 
 
 class Parents(NamedTuple):
-    """Prior hypotheses. Rows of parent `p` are `rows[offsets[p]:offsets[p + 1]]`.
+    """Hypotheses over the rows of a scan."""
 
-    groups: (num,) label-set number, or empty. Of each group at least one child is kept whatever its weight.
-    """
-
-    offsets: Ints
-    rows: Ints
-    log_weights: Floats
-    groups: Ints
+    offsets: Ints  # (num_parents + 1,) into rows
+    rows: Ints  # those of one parent in label order
+    log_weights: Floats  # (num_parents,)
 
 
 class Children(NamedTuple):
-    """Joint choices. Options of child `c` are `options[offsets[c]:offsets[c + 1]]`, one a row of its parent."""
+    """Joint choices of one option for every row of a parent, as many as have been found so far."""
 
-    parents: Ints
-    offsets: Ints
-    options: Ints
-    log_weights: Floats
-
-
-@kernel
-def make_children() -> Children:
-    return Children(np.empty(64, np.int64), np.zeros(66, np.int64), np.empty(512, np.int64), np.empty(64))
+    filled: Ints  # (2,) number of children, and of all their options; the arrays have room for more
+    parents: Ints  # (num_children,)
+    offsets: Ints  # (num_children + 1,) into options
+    options: Ints  # in the order of the parent's rows
+    log_weights: Floats  # (num_children,)
 
 
 @kernel
-def grown_children(children: Children, used: Ints, num_rows: int) -> Children:
-    """Room for at least one more child of `num_rows` rows."""
+def make_children(num: int, num_options: int) -> Children:
+    """None yet, and room for `num` of so many options in all."""
     return Children(
-        grown_ints(children.parents, used[0] + 1),
-        grown_ints(children.offsets, 2 * (used[0] + 2)),
-        grown_ints(children.options, used[1] + num_rows),
-        grown_floats(children.log_weights, used[0] + 1),
+        np.zeros(2, np.int64),
+        np.empty(num, np.int64),
+        np.zeros(num + 1, np.int64),
+        np.empty(num_options, np.int64),
+        np.empty(num),
+    )
+
+
+@kernel
+def grown_children(children: Children, num_rows: int) -> Children:
+    """The same children with room for at least one more of `num_rows` rows."""
+    num, num_options = children.filled[0], children.filled[1]
+    parents = grown_ints(children.parents, num + 1)
+    return Children(
+        children.filled,
+        parents,
+        grown_ints(children.offsets, len(parents) + 1),
+        grown_ints(children.options, num_options + num_rows),
+        grown_floats(children.log_weights, num + 1),
     )
 
 
 @inlined
-def is_full(children: Children, used: Ints, num_rows: int) -> bool:
-    """Whether one more child of `num_rows` rows needs room. used: (2,) number of children and of their options."""
-    return used[0] == len(children.parents) or used[1] + num_rows > len(children.options)
+def is_full(children: Children, num_rows: int) -> bool:
+    """Whether one more child of `num_rows` rows needs room."""
+    filled = children.filled
+    return filled[0] == len(children.parents) or filled[1] + num_rows > len(children.options)
 
 
 @inlined
-def append_child(children: Children, used: Ints, parent: int, num_rows: int, log_weight: float) -> int:
+def append_child(children: Children, parent: int, num_rows: int, log_weight: float) -> int:
     """Enter one more child; returns where its options are to be written."""
-    num, start = used[0], used[1]
+    filled = children.filled
+    num, start = filled[0], filled[1]
     children.parents[num] = parent
     children.offsets[num + 1] = start + num_rows
     children.log_weights[num] = log_weight
-    used[0] += 1
-    used[1] += num_rows
+    filled[0] += 1
+    filled[1] += num_rows
     return start
-
-
-@borrowing
-def num_groups(groups: Ints) -> int:
-    """Number of label-set groups; 0 where groups are not in use."""
-    most = 0
-    for group in groups:
-        most = max(most, group + 1)
-    return most
 
 
 @borrowing
@@ -91,6 +91,5 @@ __all__ = [
     "grown_children",
     "is_full",
     "make_children",
-    "num_groups",
     "widest_parent",
 ]

@@ -15,45 +15,34 @@ from vedette.kernels.base.types import Floats, Ints
 
 
 class MarginalWork(NamedTuple):
-    """Arrays in which the clusters of a scan are found and summed; made once, grown when a cluster needs more.
+    """Arrays in which the clusters of a scan are found and summed; made once, grown when a cluster needs more."""
 
-    leaders: (num_rows,) a row of the same cluster, not after the row itself; the first of a cluster leads itself.
-    owners: (num_columns,) the first row that each measurement is gated by, or -1. members: (num_rows,) rows of the
-    cluster at hand. bits: (num_columns,) number of each measurement within its cluster, or -1.
-    tables: of the exact sum, for which a cluster has asked for `needed` (1,) numbers. search, children, used: of the
-    ranked sum, as in `run_search`, whose one parent has the offsets `single`, the weight `no_weight` and `no_groups`.
-    """
-
-    leaders: Ints
-    members: Ints
-    owners: Ints
-    bits: Ints
-    tables: Floats
-    needed: Ints
-    search: Search
-    children: Children
-    used: Ints
-    single: Ints
-    no_weight: Floats
-    no_groups: Ints
+    leaders: Ints  # (num_rows,) a row of the same cluster, not after this one; the first of a cluster leads itself
+    members: Ints  # (num_rows,) rows of the cluster at hand
+    owners: Ints  # (num_measurements,) the first row that each measurement is gated by, or -1
+    bits: Ints  # (num_measurements,) number of each measurement within its cluster, or -1
+    tables: Floats  # of the exact sum
+    needed: Ints  # (1,) how many numbers of `tables` a cluster has asked for
+    search: Search  # of the ranked sum
+    children: Children  # of the ranked sum
+    single: Ints  # (2,) offsets of the ranked sum's one parent, which holds the rows of the cluster
+    no_weight: Floats  # (1,) its log weight, 0
 
 
 @kernel
-def make_marginal_work(num_rows: int, num_columns: int) -> MarginalWork:
+def make_marginal_work(num_rows: int, num_measurements: int) -> MarginalWork:
     """Room for the clusters of so many rows and measurements, and for a small exact sum."""
     return MarginalWork(
         np.empty(num_rows, np.int64),
         np.empty(num_rows, np.int64),
-        np.empty(num_columns, np.int64),
-        np.empty(num_columns, np.int64),
-        np.empty(64),
+        np.empty(num_measurements, np.int64),
+        np.empty(num_measurements, np.int64),
+        np.empty(512),
         np.zeros(1, np.int64),
-        make_search(),
-        make_children(),
-        np.zeros(2, np.int64),
+        make_search(0),
+        make_children(0, 0),
         np.zeros(2, np.int64),
         np.zeros(1),
-        np.empty(0, np.int64),
     )
 
 
@@ -68,11 +57,9 @@ def grown_marginal_work(work: MarginalWork) -> MarginalWork:
         grown_floats(work.tables, work.needed[0]),
         work.needed,
         grown_search(work.search),
-        grown_children(work.children, work.used, work.search.sizes[WIDEST]),
-        work.used,
+        grown_children(work.children, work.search.sizes[WIDEST]),
         work.single,
         work.no_weight,
-        work.no_groups,
     )
 
 
@@ -80,10 +67,10 @@ def grown_marginal_work(work: MarginalWork) -> MarginalWork:
 def find_clusters(options: Options, leaders: Ints, owners: Ints) -> bool:
     """Lead the rows that share a gated measurement, directly or not, to the first of them; false where none does.
 
-    leaders, owners: as in `MarginalWork`, to be written.
+    leaders, owners: as in `MarginalWork`, to be written (union-find, the lesser root leads).
     """
     shared = False
-    for column in range(len(owners)):
+    for column in range(options.num_measurements):
         owners[column] = -1
     for row in range(len(options.offsets) - 1):
         leaders[row] = row
@@ -91,6 +78,7 @@ def find_clusters(options: Options, leaders: Ints, owners: Ints) -> bool:
             column = options.columns[option]
             if column < 0:
                 continue
+            # The first row that gates a measurement stands for all that do: one union a pair is enough.
             if owners[column] < 0:
                 owners[column] = row
             else:
@@ -112,6 +100,7 @@ def gather_cluster(options: Options, leader: int, work: MarginalWork) -> tuple[i
     """Write the rows of a cluster and number its measurements; how many there are of both."""
     count, num_bits = 0, 0
     for row in range(leader, len(options.offsets) - 1):
+        # Members come after their leader, so that rows before it need not be looked at.
         if _root(work.leaders, row) != leader:
             continue
         work.members[count] = row

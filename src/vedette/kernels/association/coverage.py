@@ -1,29 +1,44 @@
 """A hypothesis for every way in which a target may be seen, so that an unlikely track lives until evidence decides.
 
-The heaviest hypotheses are many variations on a few themes. A target whose first measurements fit its birth badly
-starts in a hypothesis far down the list; cut there, it is lost for good, since no later hypothesis holds its track. So
-the heaviest hypothesis of every theme is kept besides. A theme is a label together with what the scan did to it:
-missed, or detected as this measurement.
+The heaviest hypotheses are many variations on a few associations. A target whose first measurements fit its birth
+badly starts in a hypothesis far down the list; cut there, it is lost for good, since no later hypothesis holds its
+track. So the heaviest hypothesis of every association is kept besides. An association is a label together with what the
+scan did to it: missed, or detected as this measurement; theta(label) of Vo, Vo, Hoang 2017.
 """
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from vedette.kernels.association.assignment import ABSENT, Options, make_dual_work, solve_assignment
-from vedette.kernels.association.ranked import Children, Parents, append_child, grown_children, is_full
+from vedette.kernels.association.children import (
+    Children,
+    Parents,
+    append_child,
+    grown_children,
+    is_full,
+    widest_parent,
+)
 from vedette.kernels.base.arrays import filled_ints
 from vedette.kernels.base.compile import kernel
 from vedette.kernels.base.types import Floats, Ints
 
 
+class Associations(NamedTuple):
+    """The associations of a scan, numbered."""
+
+    of_option: Ints  # (num_options,) number of each option's association, -1 if absent
+    num: int  # how many there may be
+
+
 @kernel
-def themes_of_options(labels: Ints, options: Options, num_columns: int) -> tuple[Ints, int]:
-    """Number of each option's theme, -1 if absent, and how many themes there may be. labels: (num_rows, 2)."""
+def associations_of_options(labels: Ints, options: Options) -> Associations:
+    """Options of rows of one label as one measurement share an association. labels: (num_rows, 2)."""
     firsts, num_labels = np.empty(len(labels), np.int64), 0
-    themes = np.empty(options.offsets[len(labels)], np.int64)
+    numbers, places = np.empty(options.offsets[len(labels)], np.int64), options.num_measurements + 1
     for row in range(len(labels)):
         found = num_labels - 1
         while found >= 0:
@@ -37,8 +52,8 @@ def themes_of_options(labels: Ints, options: Options, num_columns: int) -> tuple
             num_labels += 1
         for option in range(options.offsets[row], options.offsets[row + 1]):
             column = options.columns[option]
-            themes[option] = -1 if column == ABSENT else found * (num_columns + 1) + column + 1
-    return themes, num_labels * (num_columns + 1)
+            numbers[option] = -1 if column == ABSENT else found * places + column + 1
+    return Associations(numbers, num_labels * places)
 
 
 @kernel
@@ -60,23 +75,26 @@ def _best_parents(options: Options, parents: Parents) -> tuple[Ints, Floats]:
 
 @kernel
 def _candidates(
-    options: Options, themes: Ints, best_parent: Ints, best_bound: Floats, is_covered: Ints, floor: float
+    options: Options, numbers: Ints, best_parent: Ints, best_bound: Floats, is_covered: Ints, floor: float
 ) -> tuple[Ints, Ints]:
-    """Row and option (-1: none) that may give each uncovered theme its heaviest choice, of those bounded by `floor`."""
-    theme_rows, theme_options = filled_ints(len(is_covered), -1), filled_ints(len(is_covered), -1)
+    """Row and option (-1: none) that may give each uncovered association its heaviest choice, of those bounded by
+    `floor`. numbers: association of each option.
+    """
+    its_row, its_option = filled_ints(len(is_covered), -1), filled_ints(len(is_covered), -1)
     bounds = np.empty(len(is_covered))
     for row in range(len(best_parent)):
         if best_parent[row] < 0:
             continue
         first = options.offsets[row]
         for option in range(first, options.offsets[row + 1]):
+            # The best parent's bound with this row's best option exchanged for this one.
             bound = best_bound[row] - options.log_weights[first] + options.log_weights[option]
-            theme = themes[option]
-            if theme < 0 or is_covered[theme] == 1 or bound < floor:
+            number = numbers[option]
+            if number < 0 or is_covered[number] == 1 or bound < floor:
                 continue
-            if theme_rows[theme] < 0 or bound > bounds[theme]:
-                theme_rows[theme], theme_options[theme], bounds[theme] = row, option, bound
-    return theme_rows, theme_options
+            if its_row[number] < 0 or bound > bounds[number]:
+                its_row[number], its_option[number], bounds[number] = row, option, bound
+    return its_row, its_option
 
 
 @kernel
@@ -91,80 +109,71 @@ def _with_spare_row(options: Options) -> Options:
     for option in range(num):
         columns[option] = options.columns[option]
         log_weights[option] = options.log_weights[option]
-    return Options(offsets, columns, log_weights, options.entries, options.component_log_weights, options.whitened)
+    entries, weights, whitened = options.entries, options.component_log_weights, options.whitened
+    return Options(offsets, columns, log_weights, entries, weights, whitened, options.num_measurements)
 
 
 @kernel
 def add_uncovered(
-    options: Options,
-    themes: Ints,
-    num_themes: int,
-    parents: Parents,
-    children: Children,
-    num_columns: int,
-    max_log_gap: float,
+    options: Options, associations: Associations, parents: Parents, children: Children, max_log_gap: float
 ) -> Children:
-    """The children and, for every theme that none of them holds, a heavy choice that holds it: the best one with the
-    track and the parent of the largest bound. Choices more than `max_log_gap` under the heaviest child are left out.
+    """The children and, for every association that none of them holds, a heavy choice that holds it.
+
+    That is the best one with the track and the parent of the largest bound; none more than `max_log_gap` under the
+    heaviest child.
     """
-    max_rows, best = 0, -math.inf
-    for parent in range(len(parents.log_weights)):
-        max_rows = max(max_rows, parents.offsets[parent + 1] - parents.offsets[parent])
-    for log_weight in children.log_weights:
-        best = max(best, log_weight)
-    is_covered = filled_ints(num_themes, 0)
-    for option in children.options:
-        if themes[option] >= 0:
-            is_covered[themes[option]] = 1
+    numbers, best = associations.of_option, -math.inf
+    for child in range(children.filled[0]):
+        best = max(best, children.log_weights[child])
+    is_covered = filled_ints(associations.num, 0)
+    for i in range(children.filled[1]):
+        if numbers[children.options[i]] >= 0:
+            is_covered[numbers[children.options[i]]] = 1
     best_parent, best_bound = _best_parents(options, parents)
-    theme_rows, theme_options = _candidates(options, themes, best_parent, best_bound, is_covered, best - max_log_gap)
+    its_row, its_option = _candidates(options, numbers, best_parent, best_bound, is_covered, best - max_log_gap)
+    # A row that must take one option is a row that has no other: the spare one stands in for it in the assignment.
     forced = _with_spare_row(options)
     spare_row, spare = len(options.offsets) - 1, options.offsets[len(options.offsets) - 1]
-    work = make_dual_work(max_rows, num_columns)
-    rows = np.empty(max_rows, np.int64)
-    used = np.empty(2, np.int64)
-    used[0], used[1] = len(children.parents), len(children.options)
-    for theme in range(num_themes):
-        option, parent, place = theme_options[theme], -1, -1
+    widest = widest_parent(parents)
+    work, rows = make_dual_work(widest, options.num_measurements), np.empty(widest, np.int64)
+    for number in range(associations.num):
+        option, parent, place = its_option[number], -1, -1
         if option < 0:
             continue
-        parent = best_parent[theme_rows[theme]]
+        parent = best_parent[its_row[number]]
         start, count = parents.offsets[parent], parents.offsets[parent + 1] - parents.offsets[parent]
         for i in range(count):
             rows[i] = parents.rows[start + i]
-            if rows[i] == theme_rows[theme]:
+            if rows[i] == its_row[number]:
                 rows[i] = spare_row
                 place = i
         forced.columns[spare], forced.log_weights[spare] = options.columns[option], options.log_weights[option]
         log_weight = parents.log_weights[parent] - solve_assignment(forced, rows[:count], work)
         if log_weight < best - max_log_gap or log_weight == -math.inf:
             continue
-        if is_full(children, used, count):
-            children = grown_children(children, used, count)
-        at = append_child(children, used, parent, count, log_weight)
+        if is_full(children, count):
+            children = grown_children(children, count)
+        at = append_child(children, parent, count, log_weight)
         for i in range(count):
             children.options[at + i] = option if i == place else work.row_option[i]
-    num = used[0]
-    return Children(
-        children.parents[:num], children.offsets[: num + 1], children.options[: used[1]], children.log_weights[:num]
-    )
+    return children
 
 
 @kernel
 def mark_heaviest(
     children: Children,
     order: Ints,
-    themes: Ints,
-    num_themes: int,
+    associations: Associations,
     num_safe: int,
     most: int,
     max_log_gap: float,
     marks: Ints,
 ) -> int:
-    """Mark with 1 the heaviest child of each theme that the `num_safe` heaviest do not hold, at most `most` children,
-    none more than `max_log_gap` under the first; their number. order: the children to look at, heaviest first.
+    """Mark with 1 the heaviest child of each association that the `num_safe` heaviest do not hold, at most `most`
+    children, none more than `max_log_gap` under the first; their number. order: the children in question, heaviest
+    first.
     """
-    seen = filled_ints(num_themes, 0)
+    seen = filled_ints(associations.num, 0)
     num_marked = 0
     for place in range(len(order)):
         child = order[place]
@@ -173,10 +182,11 @@ def mark_heaviest(
             break
         is_needed = 0
         for i in range(children.offsets[child], children.offsets[child + 1]):
-            theme = themes[children.options[i]]
-            if theme >= 0 and seen[theme] == 0:
-                seen[theme] = 1
+            number = associations.of_option[children.options[i]]
+            if number >= 0 and seen[number] == 0:
+                seen[number] = 1
                 is_needed = 1
+        # What is safe covers its associations already; marking starts with what would be cut.
         if place >= num_safe:
             marks[child] = is_needed
             num_marked += is_needed

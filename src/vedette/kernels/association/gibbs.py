@@ -11,7 +11,15 @@ import math
 import numpy as np
 
 from vedette.kernels.association.assignment import DualWork, Options, make_dual_work, solve_assignment
-from vedette.kernels.association.ranked import Children, Parents, append_child, grown_children, is_full
+from vedette.kernels.association.children import (
+    Children,
+    Parents,
+    append_child,
+    grown_children,
+    is_full,
+    make_children,
+    widest_parent,
+)
 from vedette.kernels.base.arrays import filled_ints, hashed
 from vedette.kernels.base.compile import kernel
 from vedette.kernels.base.types import Floats, Ints
@@ -22,6 +30,7 @@ def _sweep(options: Options, rows: Ints, weights: Floats, work: DualWork, rng: n
     """Redraw the option of each row given the columns of all others (`work.column_row` holds who has a column)."""
     for i in range(len(rows)):
         old = options.columns[work.row_option[i]]
+        # The row lets its measurement go before it draws: it may take it again.
         if old >= 0:
             work.column_row[old] = -1
         total = 0.0
@@ -77,28 +86,25 @@ def _relative_weights(options: Options) -> Floats:
 
 
 @kernel
-def sample_children(
-    options: Options, parents: Parents, num_columns: int, num_samples: int, rng: np.random.Generator
-) -> Children:
+def sample_children(options: Options, parents: Parents, num_samples: int, rng: np.random.Generator) -> Children:
     """Distinct joint choices of all parents from about `num_samples` sweeps in all, in order of discovery."""
-    max_rows, shares = 0, 0.0
-    for parent in range(len(parents.log_weights)):
-        max_rows = max(max_rows, parents.offsets[parent + 1] - parents.offsets[parent])
-        shares += math.exp(0.5 * parents.log_weights[parent])
-    work = make_dual_work(max_rows, num_columns)
-    weights = _relative_weights(options)
-    children = Children(np.empty(16, np.int64), np.zeros(18, np.int64), np.empty(128, np.int64), np.empty(16))
-    used = np.zeros(2, np.int64)
+    shares = 0.0
+    for log_weight in parents.log_weights:
+        shares += math.exp(0.5 * log_weight)
+    work, weights = make_dual_work(widest_parent(parents), options.num_measurements), _relative_weights(options)
+    children = make_children(64, 512)
     for parent in range(len(parents.log_weights)):
         rows = parents.rows[parents.offsets[parent] : parents.offsets[parent + 1]]
         if parents.log_weights[parent] == -math.inf or solve_assignment(options, rows, work) == math.inf:
             continue
-        for column in range(num_columns):
+        for column in range(options.num_measurements):
             work.column_row[column] = -1
         for i in range(len(rows)):
             if options.columns[work.row_option[i]] >= 0:
                 work.column_row[options.columns[work.row_option[i]]] = i
+        # By the square root, so that light parents are explored too: their children may be heavy.
         num_sweeps = math.ceil(num_samples * math.exp(0.5 * parents.log_weights[parent]) / shares)
+        # At most half full, so that probing stays short.
         size = 4
         while size < 2 * (num_sweeps + 1):
             size *= 2
@@ -107,16 +113,13 @@ def sample_children(
         for sweep in range(num_sweeps + 1):
             if sweep > 0:
                 _sweep(options, rows, weights, work, rng)
-            if _is_new(choice, used[0], children, table):
+            if _is_new(choice, children.filled[0], children, table):
                 log_weight = parents.log_weights[parent]
                 for option in choice:
                     log_weight += options.log_weights[option]
-                if is_full(children, used, len(rows)):
-                    children = grown_children(children, used, len(rows))
-                start = append_child(children, used, parent, len(rows), log_weight)
+                if is_full(children, len(rows)):
+                    children = grown_children(children, len(rows))
+                start = append_child(children, parent, len(rows), log_weight)
                 for i in range(len(rows)):
                     children.options[start + i] = choice[i]
-    num = used[0]
-    return Children(
-        children.parents[:num], children.offsets[: num + 1], children.options[: used[1]], children.log_weights[:num]
-    )
+    return children

@@ -27,6 +27,7 @@ def log_left_out_bound(options: Options, rows: Ints, log_summed: float, log_next
         log_count += math.log(stop - start)
     if log_all <= log_summed:
         return -math.inf
+    # log (exp(all) - exp(summed)), written so that it does not cancel.
     return min(log_all + math.log(-math.expm1(log_summed - log_all)), log_count + log_next)
 
 
@@ -57,6 +58,7 @@ def has_closed_side(options: Options, rows: Ints, marginals: Floats) -> bool:
 def _heaviest_absent(options: Options, rows: Ints, at: int, option_absent: int, work: DualWork) -> float:
     """Log weight of the heaviest joint choice in which row `rows[at]` is absent."""
     last = len(rows) - 1
+    # Order does not matter to an assignment: the row is moved to the end and left out.
     rows[at], rows[last] = rows[last], rows[at]
     cost = solve_assignment(options, rows[:last], work)
     rows[at], rows[last] = rows[last], rows[at]

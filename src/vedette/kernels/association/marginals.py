@@ -10,6 +10,8 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+import numpy as np
+
 from vedette.kernels.association.assignment import Options
 from vedette.kernels.association.children import Parents
 from vedette.kernels.association.clusters import (
@@ -22,7 +24,7 @@ from vedette.kernels.association.clusters import (
 from vedette.kernels.association.left_out import has_closed_side, log_left_out_bound, open_sides
 from vedette.kernels.association.openings import size_search, start_search
 from vedette.kernels.association.ranked import run_search
-from vedette.kernels.association.search import HEAP
+from vedette.kernels.association.search import HEAP, SearchCaps
 from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.gaussian.linalg import log_add
@@ -30,12 +32,12 @@ from vedette.kernels.gaussian.linalg import log_add
 MAX_EXACT_MEASUREMENTS = 12
 
 
-class MarginalCaps(NamedTuple):
-    """How a cluster too large for the exact sum is summed: see `ranked.rank_children`."""
+class MarginalSums(NamedTuple):
+    """What the marginals of a scan were taken of."""
 
-    max_choices: int
-    max_log_gap: float
-    max_nodes: int
+    log_total: float  # log total weight of all joint choices that were summed; -inf where none is possible
+    num_ranked: int  # clusters summed over their heaviest choices only
+    log_kept: float  # log of the least share of all weight that is in the sum; 0 without such clusters
 
 
 @inlined
@@ -85,10 +87,12 @@ def _exact_cluster(options: Options, rows: Ints, bit_of: Ints, num_bits: int, ta
         scale += options.log_weights[options.offsets[rows[i]]]
         at = i * size
         _transfer(options, rows[i], bit_of, tables[at : at + size], tables[at + size : at + 2 * size], True)
+    # Backwards: weight of all that later rows can do once a set of measurements is taken.
     for i in range(num - 1, -1, -1):
         at = backwards + i * size
         _transfer(options, rows[i], bit_of, tables[at + size : at + 2 * size], tables[at : at + size], False)
     total = tables[backwards]
+    # Relative weights have underflowed: the caller ranks the cluster's joint choices in logs instead.
     if not total > 1e-250:
         return -math.inf
     for i in range(num):
@@ -96,6 +100,7 @@ def _exact_cluster(options: Options, rows: Ints, bit_of: Ints, num_bits: int, ta
         for option in range(start, options.offsets[rows[i] + 1]):
             column = options.columns[option]
             bit = 1 << bit_of[column] if column >= 0 else 0
+            # P(option) is proportional to the sum over sets of forward(before) weight(option) backward(after).
             joint = 0.0
             for mask in range(size):
                 if mask & bit == 0:
@@ -107,28 +112,24 @@ def _exact_cluster(options: Options, rows: Ints, bit_of: Ints, num_bits: int, ta
 
 @borrowing
 def _ranked_cluster(
-    options: Options, rows: Ints, num_columns: int, caps: MarginalCaps, work: MarginalWork, out: Floats
+    options: Options, rows: Ints, caps: SearchCaps, work: MarginalWork, out: Floats
 ) -> tuple[float, float, bool]:
     """Marginals of a cluster over its heaviest joint choices; the log of their total weight, the log of the least share
     of all weight that this is, and whether there was room.
     """
     work.single[1] = len(rows)
-    parents, children, used = Parents(work.single, rows, work.no_weight, work.no_groups), work.children, work.used
-    used[0] = used[1] = 0
-    if not size_search(options, parents, num_columns, work.search):
+    parents, children = Parents(work.single, rows, work.no_weight), work.children
+    if not start_search(options, parents, work.search, children):
         return 0.0, 0.0, False
-    start_search(options, parents, work.search)
-    if not run_search(
-        options, parents, caps.max_choices, caps.max_log_gap, caps.max_nodes, work.search, children, used
-    ):
+    if not run_search(options, parents, caps, work.search, children):
         return 0.0, 0.0, False
     for row in rows:
         for option in range(options.offsets[row], options.offsets[row + 1]):
             out[option] = 0.0
-    if used[0] == 0:
+    if children.filled[0] == 0:
         return -math.inf, 0.0, True
     peak, total = children.log_weights[0], 0.0
-    for child in range(used[0]):
+    for child in range(children.filled[0]):
         weight = math.exp(children.log_weights[child] - peak)
         total += weight
         for i in range(children.offsets[child], children.offsets[child + 1]):
@@ -147,33 +148,30 @@ def _ranked_cluster(
 
 
 @borrowing
-def _open_exact(
-    options: Options, rows: Ints, num_columns: int, log_total: float, work: MarginalWork, out: Floats
-) -> bool:
+def _open_exact(options: Options, rows: Ints, log_total: float, work: MarginalWork, out: Floats) -> bool:
     """As `open_sides` where the exact sum has lost a side below the smallest number; false where there is no room."""
     if not has_closed_side(options, rows, out):
         return True
     work.single[1] = len(rows)
-    if not size_search(options, Parents(work.single, rows, work.no_weight, work.no_groups), num_columns, work.search):
+    if not size_search(options, Parents(work.single, rows, work.no_weight), work.search):
         return False
     open_sides(options, rows, log_total, work.search.work, out)
     return True
 
 
 @inlined
-def fill_marginals(
-    options: Options, num_columns: int, caps: MarginalCaps, work: MarginalWork, out: Floats
-) -> tuple[float, int, float, bool]:
-    """As `option_marginals`; the flag is false where `work` must be grown and all done anew.
+def fill_marginals(options: Options, caps: SearchCaps, work: MarginalWork, out: Floats) -> tuple[MarginalSums, bool]:
+    """Write the log marginal probability of each option into `out`; false where `work` must be grown for that.
 
+    Where clusters were ranked, 1 less the share of all weight that is in the sum bounds the error of each marginal.
     Inlined because `work` is a large bundle, of which the usual small clusters need little.
     """
     log_total, num_ranked, log_kept = 0.0, 0, 0.0
     if not find_clusters(options, work.leaders, work.owners):
         for row in range(len(options.offsets) - 1):
             log_total += _single_row(options, row, out)
-        return log_total, num_ranked, log_kept, True
-    for column in range(num_columns):
+        return MarginalSums(log_total, num_ranked, log_kept), True
+    for column in range(options.num_measurements):
         work.bits[column] = -1
     for leader in range(len(options.offsets) - 1):
         if work.leaders[leader] != leader:
@@ -183,36 +181,31 @@ def fill_marginals(
             log_total += _single_row(options, leader, out)
             continue
         total, rows = -math.inf, work.members[:count]
+        # 2^measurements states a row: beyond a dozen, ranking is cheaper.
         if num_bits <= MAX_EXACT_MEASUREMENTS:
             work.needed[0] = 2 * (count + 1) << num_bits
             if work.needed[0] > len(work.tables):
-                return 0.0, 0, 0.0, False
+                return MarginalSums(0.0, 0, 0.0), False
             total = _exact_cluster(options, rows, work.bits, num_bits, work.tables, out)
         if total > -math.inf:
-            has_room = _open_exact(options, rows, num_columns, total, work, out)
+            has_room = _open_exact(options, rows, total, work, out)
         else:
             num_ranked += 1
-            total, log_share, has_room = _ranked_cluster(options, rows, num_columns, caps, work, out)
+            total, log_share, has_room = _ranked_cluster(options, rows, caps, work, out)
             log_kept += log_share
         if not has_room:
-            return 0.0, 0, 0.0, False
+            return MarginalSums(0.0, 0, 0.0), False
         log_total += total
-    return log_total, num_ranked, log_kept, True
+    return MarginalSums(log_total, num_ranked, log_kept), True
 
 
 @kernel
-def option_marginals(
-    options: Options, num_columns: int, max_choices: int, max_log_gap: float, max_nodes: int, out: Floats
-) -> tuple[float, int, float]:
-    """Log marginal probability of each option in `out`. Returns the log total weight of all joint choices, the
-    number of clusters that were summed over their `max_choices` heaviest choices only, and the log of the least share
-    of all weight that is in the sum (0 without such clusters): 1 less that share bounds the error of each marginal.
-    The total is -inf if no joint choice is possible.
-    """
-    work = make_marginal_work(len(options.offsets) - 1, num_columns)
-    caps = MarginalCaps(max_choices, max_log_gap, max_nodes)
-    log_total, num_ranked, log_kept, done = fill_marginals(options, num_columns, caps, work, out)
-    while not done:
+def option_marginals(options: Options, caps: SearchCaps) -> tuple[Floats, MarginalSums]:
+    """As `fill_marginals`, into arrays made for it."""
+    marginals = np.empty(options.offsets[-1])
+    work = make_marginal_work(len(options.offsets) - 1, options.num_measurements)
+    while True:
+        sums, has_room = fill_marginals(options, caps, work, marginals)
+        if has_room:
+            return marginals, sums
         work = grown_marginal_work(work)
-        log_total, num_ranked, log_kept, done = fill_marginals(options, num_columns, caps, work, out)
-    return log_total, num_ranked, log_kept

@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 
 from vedette.kernels.association.assignment import DualWork, Options
-from vedette.kernels.association.children import Parents, widest_parent
+from vedette.kernels.association.children import Children, Parents, widest_parent
 from vedette.kernels.association.search import (
     CHOICES,
     COLUMNS,
+    MEMBERS,
     OPTIONS,
     PARENTS,
     PENALTIES,
@@ -25,16 +26,18 @@ from vedette.kernels.base.types import Floats, Ints
 
 
 @borrowing
-def size_search(options: Options, parents: Parents, num_columns: int, search: Search) -> bool:
+def size_search(options: Options, parents: Parents, search: Search) -> bool:
     """Note the size of the problem; false where the search must be grown to hold it."""
-    sizes = search.sizes
+    sizes, num_columns = search.sizes, options.num_measurements
     for k in range(len(sizes)):
         sizes[k] = 0
     sizes[PARENTS], sizes[ROWS], sizes[COLUMNS] = len(parents.log_weights), len(options.offsets) - 1, num_columns
-    sizes[OPTIONS], sizes[WIDEST] = options.offsets[sizes[ROWS]], widest_parent(parents)
+    sizes[MEMBERS], sizes[WIDEST] = parents.offsets[sizes[PARENTS]], widest_parent(parents)
+    sizes[OPTIONS] = options.offsets[sizes[ROWS]]
     sizes[CHOICES] = sizes[OPTIONS]
     return (
         sizes[PARENTS] <= len(search.starts)
+        and sizes[MEMBERS] + sizes[WIDEST] <= len(search.position_rows)
         and 2 * sizes[OPTIONS] <= len(search.options)
         and sizes[PARENTS] + 2 * sizes[WIDEST] + 4 <= len(search.bounds)
         and num_columns <= len(search.taken)
@@ -44,8 +47,14 @@ def size_search(options: Options, parents: Parents, num_columns: int, search: Se
 
 
 @borrowing
-def start_search(options: Options, parents: Parents, search: Search) -> None:
-    """Nothing opened; every parent waits with the bound that ignores collisions."""
+def start_search(options: Options, parents: Parents, search: Search, children: Children) -> bool:
+    """Nothing found and nothing opened; every parent waits with the bound that ignores collisions. False where the
+    search must be grown for the problem.
+    """
+    if not size_search(options, parents, search):
+        return False
+    children.filled[0] = children.filled[1] = 0
+    # The rows' own choices, shared by all parents whose best options do not collide.
     for row in range(search.sizes[ROWS]):
         first = options.offsets[row]
         for option in range(first, options.offsets[row + 1]):
@@ -61,6 +70,7 @@ def start_search(options: Options, parents: Parents, search: Search) -> None:
             bound += -options.log_weights[first] if first < options.offsets[parents.rows[i] + 1] else math.inf
         if bound < math.inf:
             push(search, new_node(search, bound, parent, -1, -1, -1))
+    return True
 
 
 @inlined
@@ -84,10 +94,12 @@ def open_free(parent: int, rows: Ints, options: Options, search: Search) -> bool
         first, last = options.offsets[rows[i]], options.offsets[rows[i] + 1]
         column = options.columns[first]
         if column >= 0:
+            # Nothing has been kept: positions are counted only once the parent is laid out.
             if search.taken[column] == stamp:
                 return False
             search.taken[column] = stamp
         gap = search.costs[first + 1] if first + 1 < last else math.inf
+        # Rows that hardly waver are settled first: near the root then nothing branches.
         _insert_position(search, first_position, i, i, gap, gaps)
     for position in range(first_position, first_position + len(rows)):
         row = rows[search.position_rows[position]]
@@ -107,7 +119,11 @@ def _reduced_cost(options: Options, option: int, row: int, work: DualWork) -> fl
 
 @inlined
 def open_solved(parent: int, rows: Ints, options: Options, search: Search) -> None:
-    """Lay out a parent whose assignment problem has just been solved: rows with the firmest best option first."""
+    """Lay out a parent whose assignment problem has just been solved: rows with the firmest best option first.
+
+    By the duals u, v of the optimum, any joint choice costs the optimum, plus the reduced costs c - u - v >= 0 of its
+    options, plus -v of every column that it leaves unused: the sum of the u and of all v is the optimum's own cost.
+    """
     work, first_position = search.work, search.sizes[POSITIONS]
     for i in range(len(rows)):
         gap = math.inf
@@ -134,6 +150,7 @@ def open_solved(parent: int, rows: Ints, options: Options, search: Search) -> No
     penalties = search.sizes[PENALTIES]
     search.starts[parent], search.penalty_starts[parent] = first_position, penalties
     for column in range(search.sizes[COLUMNS]):
+        # Only columns that rows contend for have a price.
         if work.column_dual[column] < 0.0:
             search.penalty_columns[penalties] = column
             search.penalty_costs[penalties] = -work.column_dual[column]

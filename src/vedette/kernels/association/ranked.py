@@ -3,14 +3,13 @@
 Truncating a delta-GLMB to its heaviest hypotheses minimises the L1 error (Vo, Vo, Phung 2014, Prop. 5). Instead of
 ranking inside each prior hypothesis with a number of children fixed beforehand (Murty), one best-first search runs over
 all of them: its bound is the optimal assignment's dual solution, so it is exact from the first node, and rows whose
-second choice is far off stay near the root, so that one more hypothesis costs a few nodes.
+second choice is far off stay near the root, so that one more hypothesis costs a few nodes. How it works, step by step:
+docs/devdocs/ranked-search.md.
 """
 
 from __future__ import annotations
 
 import math
-
-import numpy as np
 
 from vedette.kernels.association.assignment import DualWork, Options, solve_assignment
 from vedette.kernels.association.children import (
@@ -20,15 +19,16 @@ from vedette.kernels.association.children import (
     grown_children,
     is_full,
     make_children,
-    num_groups,
+    widest_parent,
 )
-from vedette.kernels.association.openings import open_free, open_solved, size_search, start_search
+from vedette.kernels.association.openings import open_free, open_solved, start_search
 from vedette.kernels.association.search import (
     HEAP,
     NODES,
     STAMP,
     WIDEST,
     Search,
+    SearchCaps,
     grown_search,
     has_room,
     make_search,
@@ -36,9 +36,13 @@ from vedette.kernels.association.search import (
     pop,
     push,
 )
-from vedette.kernels.base.arrays import filled_ints
 from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Ints
+
+# Nodes that a search visits for each child that it finds, with some to spare (12.8 were measured over 86 rows), and
+# how many children are thought of at most when room for them is made.
+_NODES_A_CHILD = 16
+_MOST_CHILDREN = 2048
 
 
 @inlined
@@ -61,6 +65,7 @@ def _take(search: Search, columns: Ints, choice: int, stamp: int) -> None:
 
 @inlined
 def _unused_penalty(search: Search, parent: int, stamp: int) -> float:
+    """The -v of the contended columns that no row of the full choice has taken."""
     total = 0.0
     for i in range(search.penalty_starts[parent], search.penalty_ends[parent]):
         if search.taken[search.penalty_columns[i]] != stamp:
@@ -70,11 +75,18 @@ def _unused_penalty(search: Search, parent: int, stamp: int) -> float:
 
 @inlined
 def _descend(search: Search, node: int, num_rows: int, columns: Ints, limit: float) -> int:
-    """Visit `node` and dive along first choices while nothing waiting is better. A full choice's node, or -1."""
+    """Visit `node` and dive along first choices while nothing waiting is better. A full choice's node, or -1.
+
+    A node's bound is its parent hypothesis's optimum plus the extra costs of the choices settled so far. It is a lower
+    bound of all that is below it, since extra costs and penalties are never negative; it is met by a full choice that
+    goes on with choices of cost 0 and leaves no contended column unused, and of the root by the optimum itself.
+    """
     parent = search.parents[node]
+    # A full choice comes off the heap: its bound is its cost, and nothing that waits is cheaper.
     if search.depths[node] == num_rows:
         return node
     first_position = search.starts[parent]
+    # The columns taken so far carry this visit's stamp: a new stamp frees all of them without a loop.
     search.sizes[STAMP] += 1
     stamp = search.sizes[STAMP]
     if search.depths[node] >= 0:
@@ -85,6 +97,8 @@ def _descend(search: Search, node: int, num_rows: int, columns: Ints, limit: flo
     while True:
         depth, bound = search.depths[node], search.bounds[node]
         if depth >= 0:
+            # A node stands for its choice and all dearer ones at its position. On its visit the next of them that is
+            # free is split off to wait: each joint choice is then under one node alone, and none is made before needed.
             choice, previous = search.choices[node], search.previous[node]
             sibling = _next_free(search, columns, choice + 1, search.lasts[first_position + depth], stamp)
             if sibling >= 0 and search.bounds[previous] + search.costs[sibling] <= limit:
@@ -103,6 +117,7 @@ def _descend(search: Search, node: int, num_rows: int, columns: Ints, limit: flo
         if bound > limit:
             return -1
         node = new_node(search, bound, parent, depth + 1, next_choice, node)
+        # Going on without the heap is the same as being pushed and popped at once.
         if search.sizes[HEAP] > 0 and search.heap_bounds[0] < bound:
             push(search, node)
             return -1
@@ -121,28 +136,25 @@ def _write_choice(search: Search, node: int, out: Ints, start: int) -> None:
 
 
 @borrowing
-def run_search(
-    options: Options,
-    parents: Parents,
-    max_children: int,
-    max_log_gap: float,
-    max_nodes: int,
-    search: Search,
-    children: Children,
-    used: Ints,
-) -> bool:
-    """Append children in descending order of weight. False where search or children must be grown to go on."""
-    sizes = search.sizes
-    while sizes[HEAP] > 0 and used[0] < max_children and sizes[NODES] < max_nodes:
-        limit = max_log_gap - children.log_weights[0] if used[0] > 0 else math.inf
+def run_search(options: Options, parents: Parents, caps: SearchCaps, search: Search, children: Children) -> bool:
+    """Append children in descending order of weight, at most `max_hypotheses` in all and none more than `max_log_gap`
+    under the first.
+
+    False where search or children must be grown; called again with the grown ones it goes on where it stopped.
+    """
+    sizes, filled = search.sizes, children.filled
+    while sizes[HEAP] > 0 and filled[0] < caps.max_hypotheses and sizes[NODES] < caps.max_nodes:
+        limit = caps.max_log_gap - children.log_weights[0] if filled[0] > 0 else math.inf
         if search.heap_bounds[0] > limit:
             sizes[HEAP] = 0
             return True
-        if not has_room(search) or is_full(children, used, sizes[WIDEST]):
+        if not has_room(search) or is_full(children, sizes[WIDEST]):
             return False
         node = pop(search)
         parent = search.parents[node]
         rows = parents.rows[parents.offsets[parent] : parents.offsets[parent + 1]]
+        # A parent's first bound lets rows share columns. Only when it comes to the top is its assignment solved, and
+        # not even then where the rows' best options do not collide, for then they are the optimum.
         if search.starts[parent] < 0 and not open_free(parent, rows, options, search):
             optimum = solve_assignment(options, rows, search.work) - parents.log_weights[parent]
             if optimum == math.inf:
@@ -154,29 +166,46 @@ def run_search(
                 continue
         full = _descend(search, node, len(rows), options.columns, limit)
         if full >= 0:
-            start = append_child(children, used, parent, len(rows), -search.bounds[full])
+            start = append_child(children, parent, len(rows), -search.bounds[full])
             _write_choice(search, full, children.options, start)
     return True
 
 
+@kernel
+def rank_children(options: Options, parents: Parents, caps: SearchCaps) -> tuple[Children, bool]:
+    """The heaviest joint choices of all parents in descending order, in arrays made for them; the flag tells that the
+    search stopped at `max_nodes` before it had found all within the other caps.
+    """
+    num, widest = min(caps.max_hypotheses, _MOST_CHILDREN), widest_parent(parents)
+    # Made as large as they are likely to become: growing them took a third of the search.
+    search = make_search(_NODES_A_CHILD * num + len(parents.log_weights) + 2 * widest + 4)
+    children = make_children(num, num * widest)
+    while not start_search(options, parents, search, children):
+        search = grown_search(search)
+    while not run_search(options, parents, caps, search, children):
+        search, children = grown_search(search), grown_children(children, search.sizes[WIDEST])
+    return children, search.sizes[HEAP] > 0 and children.filled[0] < caps.max_hypotheses
+
+
 @borrowing
 def add_missing_groups(
-    options: Options, parents: Parents, work: DualWork, seen: Ints, children: Children, used: Ints
+    options: Options, parents: Parents, groups: Ints, seen: Ints, work: DualWork, children: Children
 ) -> bool:
-    """Append the best child of each group that has none yet. seen: (num_groups,) to work in.
+    """Append the best child of each group of parents that has none yet, whatever its weight.
 
-    False where children must be grown to go on; what is already there is not appended again.
+    groups: (num_parents,) number of each one's group. seen: (num_groups,) to work in. False where children must be
+    grown to go on; what is already there is not appended again.
     """
     for group in range(len(seen)):
         seen[group] = 0
-    for child in range(used[0]):
-        seen[parents.groups[children.parents[child]]] = 1
+    for child in range(children.filled[0]):
+        seen[groups[children.parents[child]]] = 1
     for group in range(len(seen)):
         if seen[group]:
             continue
         best, best_parent = math.inf, -1
-        for parent in range(len(parents.groups)):
-            if parents.groups[parent] == group:
+        for parent in range(len(groups)):
+            if groups[parent] == group:
                 rows = parents.rows[parents.offsets[parent] : parents.offsets[parent + 1]]
                 cost = solve_assignment(options, rows, work) - parents.log_weights[parent]
                 if cost < best:
@@ -184,53 +213,14 @@ def add_missing_groups(
         if best_parent < 0:
             continue
         rows = parents.rows[parents.offsets[best_parent] : parents.offsets[best_parent + 1]]
-        if is_full(children, used, len(rows)):
+        if is_full(children, len(rows)):
             return False
+        # Solved again: the assignments in between have left others' options in the work.
         solve_assignment(options, rows, work)
-        start = append_child(children, used, best_parent, len(rows), -best)
+        start = append_child(children, best_parent, len(rows), -best)
         for i in range(len(rows)):
             children.options[start + i] = work.row_option[i]
     return True
 
 
-@kernel
-def rank_children(
-    options: Options, parents: Parents, num_columns: int, max_children: int, max_log_gap: float, max_nodes: int
-) -> tuple[Children, bool]:
-    """The heaviest joint choices of all parents in descending order: at most `max_children`, and none whose log weight
-    is more than `max_log_gap` under the first; besides them the best of every group.
-
-    The flag tells that the search was cut at `max_nodes` before it had found them all.
-    """
-    search, children, used = make_search(), make_children(), np.zeros(2, np.int64)
-    size_search(options, parents, num_columns, search)
-    search = grown_search(search)
-    start_search(options, parents, search)
-    widest = search.sizes[WIDEST]
-    while not run_search(options, parents, max_children, max_log_gap, max_nodes, search, children, used):
-        search = grown_search(search)
-        children = grown_children(children, used, widest)
-    cut = search.sizes[HEAP] > 0 and used[0] < max_children
-    seen = filled_ints(num_groups(parents.groups), 0)
-    while len(seen) and not add_missing_groups(options, parents, search.work, seen, children, used):
-        children = grown_children(children, used, widest)
-    num = used[0]
-    trimmed = Children(
-        children.parents[:num], children.offsets[: num + 1], children.options[: used[1]], children.log_weights[:num]
-    )
-    return trimmed, cut
-
-
-__all__ = [
-    "Children",
-    "Parents",
-    "add_missing_groups",
-    "append_child",
-    "grown_children",
-    "is_full",
-    "num_groups",
-    "rank_children",
-    "run_search",
-    "size_search",
-    "start_search",
-]
+__all__ = ["add_missing_groups", "rank_children", "run_search"]

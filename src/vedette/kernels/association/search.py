@@ -11,63 +11,87 @@ from vedette.kernels.base.arrays import grown_floats, grown_ints
 from vedette.kernels.base.compile import inlined, kernel
 from vedette.kernels.base.types import Floats, Ints
 
-# Places in `Search.sizes`: what the search must hold, then how much of each store is filled.
-PARENTS, ROWS, OPTIONS, COLUMNS, WIDEST = range(5)
-NODES, HEAP, POSITIONS, CHOICES, PENALTIES, STAMP = range(5, 11)
-_NUM_SIZES = 11
+# Places in `Search.sizes`: what the search must hold (MEMBERS: rows of all parents together, WIDEST: of the widest),
+# then how much of each store is filled.
+PARENTS, MEMBERS, ROWS, OPTIONS, COLUMNS, WIDEST = range(6)
+NODES, HEAP, POSITIONS, CHOICES, PENALTIES, STAMP = range(6, 12)
+_NUM_SIZES = 12
+
+
+class SearchCaps(NamedTuple):
+    """Where a search for the heaviest joint choices stops."""
+
+    max_hypotheses: int  # joint choices found
+    max_log_gap: float  # log weight below the best
+    max_nodes: int  # nodes visited, a guard against scenes of hopeless ambiguity
 
 
 class Search(NamedTuple):
-    """Stores of a search; `sizes` tells how far they are filled.
+    """Stores of a search.
 
-    An opened parent has one position a row, in search order, from `starts[parent]` on (-1: not opened). There
-    `position_rows` is the row's place in the parent and `firsts:lasts` are its choices, cheapest first: options and
-    what they cost more than the row's part in the optimum. Choices of the rows on their own stand at the places of
-    their options; a parent in whose optimum rows give way to each other has its own, and a penalty for each contended
-    column that is left unused.
+    An opened parent has one position a row, in the order in which the search settles them. Choices at a position are
+    options, cheapest first, and what they cost more than the row's part in the optimum. Where the rows' best options do
+    not collide they are the rows' own, the same for all parents; a parent in whose optimum rows give way to each other
+    has its own choices (reduced costs), and a penalty for each contended column that is left unused.
 
     A node settles the positions up to `depth` of a parent, this one by its choice, those before as in `previous`.
-    bounds: least cost of all joint choices under a node. heap_nodes: waiting nodes, least bound (heap_bounds) first.
-    taken: (num_columns,) stamp of the node at which a column was last seen taken.
     """
 
-    sizes: Ints
-    starts: Ints
-    penalty_starts: Ints
-    penalty_ends: Ints
-    position_rows: Ints
-    firsts: Ints
-    lasts: Ints
-    options: Ints
-    costs: Floats
-    penalty_columns: Ints
-    penalty_costs: Floats
-    bounds: Floats
-    parents: Ints
-    depths: Ints
-    choices: Ints
-    previous: Ints
-    heap_bounds: Floats
-    heap_nodes: Ints
-    taken: Ints
+    sizes: Ints  # (12,) what the search must hold, and how far the stores are filled
+    starts: Ints  # (num_parents,) first position of a parent, -1: not opened
+    penalty_starts: Ints  # (num_parents,)
+    penalty_ends: Ints  # (num_parents,)
+    position_rows: Ints  # place in the parent of the row at each position
+    firsts: Ints  # first choice at each position
+    lasts: Ints  # one past its last choice
+    options: Ints  # option of each choice
+    costs: Floats  # what it costs more than the optimum
+    penalty_columns: Ints  # contended columns of each opened parent
+    penalty_costs: Floats  # -v > 0 of each
+    bounds: Floats  # least cost of all joint choices under a node
+    parents: Ints  # whose joint choice a node begins
+    depths: Ints  # last position settled, -1: none
+    choices: Ints  # made at that position
+    previous: Ints  # node of the positions before
+    heap_bounds: Floats  # bounds of the waiting nodes, a binary heap, least first
+    heap_nodes: Ints  # the waiting nodes
+    taken: Ints  # (num_columns,) stamp of the visit in which a column was last seen taken
     work: DualWork
 
 
 @kernel
-def make_search() -> Search:
-    """Stores of next to no room."""
+def make_search(num_nodes: int) -> Search:
+    """Room for so many nodes; for the rest of a problem it is made by `grown_search` once the problem is known."""
     ints, floats = np.empty(0, np.int64), np.empty(0)
     return Search(
-        np.zeros(_NUM_SIZES, np.int64), ints, ints, ints, ints, ints, ints, ints, floats, ints, floats, floats,
-        ints, ints, ints, ints, floats, ints, ints, make_dual_work(0, 0),
-    )  # fmt: skip
+        np.zeros(_NUM_SIZES, np.int64),
+        ints,
+        ints,
+        ints,
+        ints,
+        ints,
+        ints,
+        ints,
+        floats,
+        ints,
+        floats,
+        np.empty(num_nodes),
+        np.empty(num_nodes, np.int64),
+        np.empty(num_nodes, np.int64),
+        np.empty(num_nodes, np.int64),
+        np.empty(num_nodes, np.int64),
+        np.empty(num_nodes),
+        np.empty(num_nodes, np.int64),
+        ints,
+        make_dual_work(0, 0),
+    )
 
 
 @kernel
 def grown_search(search: Search) -> Search:
     """The same search with room for its problem, and for at least one more visit of a node."""
     sizes = search.sizes
-    positions, choices = sizes[POSITIONS] + sizes[WIDEST], sizes[CHOICES] + sizes[OPTIONS]
+    positions, choices = sizes[MEMBERS] + sizes[WIDEST], sizes[CHOICES] + sizes[OPTIONS]
     penalties, nodes = sizes[PENALTIES] + sizes[COLUMNS], sizes[NODES] + sizes[PARENTS] + 2 * sizes[WIDEST] + 256
     work = search.work
     if len(work.row_dual) < sizes[WIDEST] or len(work.column_dual) < sizes[COLUMNS]:
@@ -102,7 +126,6 @@ def has_room(search: Search) -> bool:
     sizes = search.sizes
     return (
         sizes[NODES] + 2 * sizes[WIDEST] + 4 <= len(search.bounds)
-        and sizes[POSITIONS] + sizes[WIDEST] <= len(search.position_rows)
         and sizes[CHOICES] + sizes[OPTIONS] <= len(search.options)
         and sizes[PENALTIES] + sizes[COLUMNS] <= len(search.penalty_columns)
     )
@@ -126,6 +149,7 @@ def push(search: Search, node: int) -> None:
     bounds, nodes, bound = search.heap_bounds, search.heap_nodes, search.bounds[node]
     slot = search.sizes[HEAP]
     search.sizes[HEAP] = slot + 1
+    # An equal bound does not overtake.
     while slot > 0:
         above = (slot - 1) // 2
         if bounds[above] <= bound:

@@ -8,7 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from vedette.kernels.association.assignment import ABSENT
-from vedette.kernels.association.children import Children, num_groups
+from vedette.kernels.association.children import Children
+from vedette.kernels.association.search import SearchCaps
 from vedette.kernels.base.arrays import filled_ints, hashed
 from vedette.kernels.base.compile import borrowing, kernel
 from vedette.kernels.base.types import Ints
@@ -16,17 +17,12 @@ from vedette.kernels.gaussian.mixtures import descending_order
 
 
 class Truncation(NamedTuple):
-    """What is kept. max_hypotheses: how many. max_log_gap: log weight below the best. gate: squared Mahalanobis
-    distance. log_clutter_floor: least log clutter intensity. max_nodes: bound on the ranking search. max_track_gap: log
-    weight below the best to which a hypothesis is kept as the only one of a track; 0: none is.
-    """
+    """What of a scan is kept."""
 
-    max_hypotheses: int
-    max_log_gap: float
-    gate: float
-    log_clutter_floor: float
-    max_nodes: int
-    max_track_gap: float
+    search: SearchCaps  # how many hypotheses, and how light
+    gate: float  # squared Mahalanobis distance beyond which a track was not seen as a measurement
+    log_clutter_floor: float  # least log clutter intensity
+    max_track_gap: float  # log weight below the best to which a hypothesis is kept as a track's only one; 0: none is
 
 
 @borrowing
@@ -50,7 +46,7 @@ def _same_tracks(first: int, second: int, children: Children, columns: Ints) -> 
 @kernel
 def merge_equal(children: Children, columns: Ints) -> Ints:
     """Add the weight of each repeated hypothesis to its first occurrence; return the first occurrences."""
-    num = len(children.parents)
+    num = children.filled[0]
     size = 4
     while size < 2 * num:
         size *= 2
@@ -71,6 +67,7 @@ def merge_equal(children: Children, columns: Ints) -> Ints:
             num_firsts += 1
         else:
             first = table[slot]
+            # log (exp a + exp b); both are finite, as a child of weight zero is never found.
             a, b = children.log_weights[first], children.log_weights[child]
             children.log_weights[first] = max(a, b) + math.log1p(math.exp(min(a, b) - max(a, b)))
     return firsts[:num_firsts]
@@ -89,26 +86,20 @@ def heaviest_first(children: Children, firsts: Ints) -> Ints:
 
 
 @kernel
-def keep_heaviest(children: Children, order: Ints, needed: Ints, truncation: Truncation, groups: Ints) -> Ints:
-    """The children to keep of those in `order`, heaviest first: those needed; of the others, by number and gap; and the
-    heaviest of each group.
-    """
-    others = truncation.max_hypotheses
+def keep_heaviest(children: Children, order: Ints, needed: Ints, caps: SearchCaps) -> Ints:
+    """The children to keep of those in `order`, heaviest first: those needed; of the others, by number and gap."""
+    others = caps.max_hypotheses
     for child in order:
         others -= needed[child]
     kept = np.empty(len(order), np.int64)
     num_kept = 0
-    seen = filled_ints(num_groups(groups), 0)
     for child in order:
         wanted = needed[child] == 1
+        # The needed ones have their places already, taken from the same number.
         gap = children.log_weights[order[0]] - children.log_weights[child]
-        if not wanted and others > 0 and gap <= truncation.max_log_gap:
+        if not wanted and others > 0 and gap <= caps.max_log_gap:
             wanted = True
             others -= 1
-        if len(groups):
-            group = groups[children.parents[child]]
-            wanted = wanted or seen[group] == 0
-            seen[group] = 1
         if wanted:
             kept[num_kept] = child
             num_kept += 1

@@ -17,6 +17,15 @@ def filled_ints(num: int, value: int) -> Ints:
 
 
 @kernel
+def counted_ints(num: int) -> Ints:
+    """0, 1, 2, ..., num - 1."""
+    array = np.empty(num, np.int64)
+    for i in range(num):
+        array[i] = i
+    return array
+
+
+@kernel
 def grown_floats(array: Floats, needed: int) -> Floats:
     """`array` itself if it holds `needed` entries, else a longer one with the same beginning."""
     if needed <= len(array):

@@ -16,46 +16,41 @@ Bools = NDArray[np.bool_]
 
 
 class Tracks(NamedTuple):
-    """Labelled Gaussian-mixture track densities.
+    """Labelled Gaussian-mixture track densities."""
 
-    labels: (num_tracks, 2) birth step, birth index. offsets: (num_tracks + 1,) into the components.
-    log_weights: (num_components,), normalised within each track. means: (num_components, state_dim).
-    covs: (num_components, state_dim, state_dim).
-    """
-
-    labels: Ints
-    offsets: Ints
-    log_weights: Floats
-    means: Floats
-    covs: Floats
+    labels: Ints  # (num_tracks, 2) birth step, birth index
+    offsets: Ints  # (num_tracks + 1,) into the components
+    log_weights: Floats  # (num_components,) normalised within each track
+    means: Floats  # (num_components, state_dim)
+    covs: Floats  # (num_components, state_dim, state_dim)
 
 
 class Mixture(NamedTuple):
-    """One Gaussian mixture of any total weight: log_weights (num,), means (num, state_dim), covs."""
+    """One Gaussian mixture of any total weight."""
 
-    log_weights: Floats
-    means: Floats
-    covs: Floats
+    log_weights: Floats  # (num,)
+    means: Floats  # (num, state_dim)
+    covs: Floats  # (num, state_dim, state_dim)
 
 
 class Glmb(NamedTuple):
-    """GLMB density: hypotheses over one shared track table. hyp_tracks holds indices into `tracks`, in label order."""
+    """GLMB density: hypotheses over one shared track table (Vo, Vo, Hoang 2017, eq. 12; paper eq. 4)."""
 
     tracks: Tracks
-    hyp_offsets: Ints
-    hyp_tracks: Ints
-    hyp_log_weights: Floats
+    hyp_offsets: Ints  # (num_hyps + 1,) into hyp_tracks
+    hyp_tracks: Ints  # indices into `tracks`; those of one hypothesis in label order
+    hyp_log_weights: Floats  # (num_hyps,)
 
 
 class Lmb(NamedTuple):
-    """LMB density: one track a label, in label order. existence_logit: (num_tracks,) log r - log (1 - r)."""
+    """LMB density: one track a label, in label order."""
 
     tracks: Tracks
-    existence_logit: Floats
+    existence_logit: Floats  # (num_tracks,) log r - log (1 - r)
 
 
 class Motion(NamedTuple):
-    """Motion and survival functions with their parameter vectors. `method`: see `vedette.kernels.gaussian.kalman`."""
+    """Motion and survival functions with their parameter vectors."""
 
     transition: Any
     transition_jacobian: Any
@@ -64,14 +59,11 @@ class Motion(NamedTuple):
     transition_params: Floats
     noise_params: Floats
     survival_params: Floats
-    method: int
+    method: int  # LINEARISED, UNSCENTED or CUBATURE of `vedette.kernels.gaussian.sigma_points`
 
 
 class Sensor(NamedTuple):
-    """Measurement, noise, detection and clutter functions with their parameter vectors.
-
-    angular: (meas_dim,) true where a component is an angle in radians, whose residuals are wrapped to (-pi, pi].
-    """
+    """Measurement, noise, detection and clutter functions with their parameter vectors."""
 
     measurement: Any
     measurement_jacobian: Any
@@ -82,5 +74,14 @@ class Sensor(NamedTuple):
     noise_params: Floats
     detection_params: Floats
     clutter_params: Floats
-    angular: Bools
-    method: int
+    angular: Bools  # (meas_dim,) true of angles in radians, whose residuals are wrapped to (-pi, pi]
+    method: int  # as of `Motion`
+
+
+class ScanInput(NamedTuple):
+    """One scan of a sensor, and what may have come since the one before."""
+
+    birth: Lmb  # who may have been born since then
+    measurements: Floats  # (num_measurements, meas_dim)
+    pose: Floats  # (pose_dim,) of the sensor
+    dt: float  # seconds since the previous scan

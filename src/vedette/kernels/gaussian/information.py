@@ -46,6 +46,7 @@ def to_information(
     at, squared, last = 0, 0.0, n * (n + 1) // 2
     for i in range(n):
         row[last + i] = 0.0
+        # L^-1 row by row, and with it L^-1 d: Y d = L^-T (L^-1 d), and d'Yd = |L^-1 d|^2.
         scale, whitened = 1.0 / factor[i, i], 0.0
         for j in range(i):
             total = 0.0
@@ -78,6 +79,7 @@ def log_integral(row: Floats, dim: int) -> float:
     """
     det, diagonal = 1.0, 0
     for k in range(dim):
+        # Symmetric elimination of [[Y, y], [y', s]]: the last diagonal entry becomes s - y'Y^-1 y.
         pivot = row[diagonal]
         if not pivot > 0.0:
             return math.nan
@@ -92,6 +94,7 @@ def log_integral(row: Floats, dim: int) -> float:
                 above += j + 1
             start += i + 1
         diagonal += k + 2
+    # One logarithm instead of one a pivot, unless the product leaves the range of a double.
     if 1e-250 < det < 1e250:
         log_det = math.log(det)
     else:

@@ -43,6 +43,7 @@ def log_det_from_factor(factor: Floats) -> float:
     product = 1.0
     for i in range(factor.shape[0]):
         product *= factor[i, i]
+    # One logarithm instead of n, unless the product leaves the range of a double.
     if 1e-150 < product < 1e150:
         return 2.0 * math.log(product)
     total = 0.0
@@ -91,6 +92,24 @@ def inverse_from_factor(factor: Floats, out: Floats) -> None:
         for j in range(i):
             out[i, j] = 0.5 * (out[i, j] + out[j, i])
             out[j, i] = out[i, j]
+
+
+@inlined
+def sandwich(jacobian: Floats, cov: Floats, noise: Floats, product: Floats, out: Floats, n: int) -> None:
+    """out = jacobian cov jacobian' + noise."""
+    for i in range(n):
+        for j in range(n):
+            total = 0.0
+            for k in range(n):
+                total += jacobian[i, k] * cov[k, j]
+            product[i, j] = total
+    for i in range(n):
+        for j in range(i + 1):
+            total = 0.5 * (noise[i, j] + noise[j, i])
+            for k in range(n):
+                total += product[i, k] * jacobian[j, k]
+            out[i, j] = total
+            out[j, i] = total
 
 
 @inlined

@@ -3,13 +3,28 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from vedette.errors import NumericalError
 from vedette.kernels.base.compile import borrowing, inlined, kernel
-from vedette.kernels.base.types import Floats, Ints
+from vedette.kernels.base.types import Floats, Ints, Mixture
 from vedette.kernels.gaussian.linalg import cholesky, log_sum, solve_lower
+
+
+class MixtureCaps(NamedTuple):
+    """How a mixture is kept small."""
+
+    log_min_weight: float  # components below this, relative to the mixture's total weight, are dropped
+    merge_distance: float  # Mahalanobis distance within which components are merged; 0 merges none
+    max_components: int  # kept; 1 is one Gaussian of the moments of all components, the light ones too
+
+
+@kernel
+def make_components(num: int, state_dim: int) -> Mixture:
+    """Room for so many components."""
+    return Mixture(np.empty(num), np.empty((num, state_dim)), np.empty((num, state_dim, state_dim)))
 
 
 @inlined
@@ -116,6 +131,7 @@ def match_components(
     total = 0.0
     for c in range(count):
         total += weights[c]
+    # Without any weight the plain mean: any density will do, as long as it is one.
     equal = 0.0 if total > 0.0 else 1.0
     scale = 1.0 / (total + equal * count)
     for i in range(n):
@@ -159,6 +175,7 @@ def _near(heaviest: int, log_weights: Floats, means: Floats, covs: Floats, merge
     factor, difference = np.empty((n, n)), np.empty(n)
     out[0] = heaviest
     count = 1
+    # Distances are measured under the heaviest component's covariance, as its neighbours are to fit into it.
     if not merge_distance > 0.0 or not cholesky(covs[heaviest], factor):
         return count
     for c in range(len(log_weights)):
@@ -206,37 +223,31 @@ def _merge(
 
 @kernel
 def reduce_mixture(
-    log_weights: Floats,
-    means: Floats,
-    covs: Floats,
-    log_min_weight: float,
-    merge_distance: float,
-    max_components: int,
+    log_weights: Floats, means: Floats, covs: Floats, caps: MixtureCaps
 ) -> tuple[Floats, Floats, Floats]:
-    """A mixture of at most `max_components` Gaussians, heaviest first, of the same total weight.
+    """A mixture within the caps, heaviest component first, of the same total weight.
 
-    Components lighter than `log_min_weight` (log, relative to the total) are dropped; then, greedily from the heaviest,
-    all components within the Mahalanobis distance `merge_distance` of it (under its covariance; 0 merges nothing) are
-    merged by moment matching; then the heaviest `max_components` stay. With `max_components` 1 the result is the moment
-    match of all components, the light ones too.
+    Light components are dropped; then, greedily from the heaviest, all components within the merging distance of it
+    (under its covariance) are merged by moment matching; then the heaviest stay.
     """
     num, n = means.shape
     total = log_sum(log_weights)
-    if max_components == 1 or num <= 1 or total == -math.inf:
+    if caps.max_components == 1 or num <= 1 or total == -math.inf:
         kept = min(num, 1)
         one_mean, one_cov, one_log_weight = np.empty((kept, n)), np.empty((kept, n, n)), np.full(kept, total)
         if kept == 1:
             moment_match(log_weights, means, covs, one_mean[0], one_cov[0])
         return one_log_weight, one_mean, one_cov
     merged_log_weights, merged_means, merged_covs = _merge(
-        log_weights, means, covs, total + log_min_weight, merge_distance
+        log_weights, means, covs, total + caps.log_min_weight, caps.merge_distance
     )
     order = descending_order(merged_log_weights)
-    kept = min(len(order), max_components)
+    kept = min(len(order), caps.max_components)
     out_log_weights, out_means, out_covs = np.empty(kept), np.empty((kept, n)), np.empty((kept, n, n))
     for k in range(kept):
         out_log_weights[k] = merged_log_weights[order[k]]
         copy_component(merged_means, merged_covs, order[k], out_means, out_covs, k)
+    # What was dropped is shared out, so that reducing does not lose a target.
     shift = total - log_sum(out_log_weights)
     for k in range(kept):
         out_log_weights[k] += shift
@@ -244,6 +255,7 @@ def reduce_mixture(
 
 
 __all__ = [
+    "MixtureCaps",
     "copy_component",
     "descending_order",
     "match_components",

@@ -8,7 +8,13 @@ import numpy as np
 
 from vedette.kernels.base.compile import inlined, kernel
 from vedette.kernels.base.types import Floats, Ints, Tracks
-from vedette.kernels.gaussian.mixtures import copy_component, match_components, reduce_mixture, require_gaussians
+from vedette.kernels.gaussian.mixtures import (
+    MixtureCaps,
+    copy_component,
+    match_components,
+    reduce_mixture,
+    require_gaussians,
+)
 
 
 @inlined
@@ -34,6 +40,7 @@ def _gather(
         for source in range(tracks.offsets[pool[p]], tracks.offsets[pool[p] + 1]):
             components[count] = source
             log_weight = tracks.log_weights[source]
+            # A single Gaussian has log weight 0: the usual case needs no exponential.
             component_weights[count] = weights[p] if log_weight == 0.0 else weights[p] * math.exp(log_weight)
             count += 1
     return count
@@ -41,12 +48,7 @@ def _gather(
 
 @kernel
 def _reduced_components(
-    tracks: Tracks,
-    components: Ints,
-    weights: Floats,
-    log_min_weight: float,
-    merge_distance: float,
-    max_components: int,
+    tracks: Tracks, components: Ints, weights: Floats, caps: MixtureCaps
 ) -> tuple[Floats, Floats, Floats]:
     """The normalised, reduced mixture of `components` under linear weights."""
     num, n = len(components), tracks.means.shape[1]
@@ -57,19 +59,12 @@ def _reduced_components(
         share = weights[c] / total if total > 0.0 else 1.0 / num
         log_weights[c] = math.log(share) if share > 0.0 else -math.inf
         copy_component(tracks.means, tracks.covs, components[c], means, covs, c)
-    return reduce_mixture(log_weights, means, covs, log_min_weight, merge_distance, max_components)
+    return reduce_mixture(log_weights, means, covs, caps)
 
 
 @kernel
 def pooled_tracks(
-    tracks: Tracks,
-    labels: Ints,
-    pool_offsets: Ints,
-    pool: Ints,
-    weights: Floats,
-    log_min_weight: float,
-    merge_distance: float,
-    max_components: int,
+    tracks: Tracks, labels: Ints, pool_offsets: Ints, pool: Ints, weights: Floats, caps: MixtureCaps
 ) -> Tracks:
     """One track for each pool of tracks: the mixture of the pool under its linear weights, reduced."""
     num, n, used, largest, room = len(labels), tracks.means.shape[1], 0, 0, 0
@@ -78,7 +73,7 @@ def pooled_tracks(
         for p in range(pool_offsets[i], pool_offsets[i + 1]):
             size += tracks.offsets[pool[p] + 1] - tracks.offsets[pool[p]]
         largest = max(largest, size)
-        room += min(size, max_components)
+        room += min(size, caps.max_components)
     components, component_weights = np.empty(largest, np.int64), np.empty(largest)
     offsets, log_weights, means, covs = (
         np.zeros(num + 1, np.int64),
@@ -88,12 +83,12 @@ def pooled_tracks(
     )
     for i in range(num):
         count = _gather(tracks, pool, weights, pool_offsets[i], pool_offsets[i + 1], components, component_weights)
-        if max_components == 1 or count == 1:
+        if caps.max_components == 1 or count == 1:
             match_components(components, component_weights, count, tracks.means, tracks.covs, means[used], covs[used])
             used += 1
         else:
             reduced_log_weights, reduced_means, reduced_covs = _reduced_components(
-                tracks, components[:count], component_weights[:count], log_min_weight, merge_distance, max_components
+                tracks, components[:count], component_weights[:count], caps
             )
             for c in range(len(reduced_log_weights)):
                 log_weights[used] = reduced_log_weights[c]

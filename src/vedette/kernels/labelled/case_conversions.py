@@ -9,7 +9,7 @@ import numpy as np
 
 from vedette.kernels.base.compile import kernel
 from vedette.kernels.base.types import Floats, Glmb, Ints, Tracks
-from vedette.kernels.gaussian.mixtures import copy_component
+from vedette.kernels.gaussian.mixtures import MixtureCaps, copy_component
 from vedette.kernels.labelled.conversions import glmb_to_lmb
 from vedette.kernels.labelled.power_integrals import SensorCases
 
@@ -52,11 +52,11 @@ def glmb_cases_to_lmb(
     order; one that a case has lost with all its sets gets logit -inf there, and no Gaussian.
     """
     num = len(members)
-    offsets, no_weights = np.arange(num + 1), np.zeros(num)
+    offsets, no_weights, caps = np.arange(num + 1), np.zeros(num), MixtureCaps(-math.inf, 0.0, 1)
     for case in range(first, last):
         tracks = Tracks(members, offsets, no_weights, cases.means[case], cases.covs[case])
         hyp_offsets, hyp_members, log_weights = _held_sets(set_offsets, cases, case)
-        lmb, found = glmb_to_lmb(Glmb(tracks, hyp_offsets, hyp_members, log_weights), -math.inf, 0.0, 1), 0
+        lmb, found = glmb_to_lmb(Glmb(tracks, hyp_offsets, hyp_members, log_weights), caps), 0
         known = lmb.tracks.labels
         for i in range(len(labels)):
             out.logits[case, i] = -math.inf

@@ -9,7 +9,7 @@ import numpy as np
 from vedette.kernels.base.compile import kernel
 from vedette.kernels.base.types import Floats, Glmb, Ints, Lmb
 from vedette.kernels.gaussian.linalg import log_sum
-from vedette.kernels.gaussian.mixtures import descending_order
+from vedette.kernels.gaussian.mixtures import MixtureCaps, descending_order
 from vedette.kernels.gaussian.pooling import add_to_pool, pooled_tracks
 from vedette.kernels.labelled.labels import group_by_label_set, group_members, increasing_labels, label_place
 from vedette.kernels.labelled.subsets import smallest_sums
@@ -33,14 +33,13 @@ def _set_weights(glmb: Glmb, group_of: Ints, num_sets: int) -> tuple[Floats, Flo
 
 
 @kernel
-def marginalise(glmb: Glmb, log_min_weight: float, merge_distance: float, max_components: int) -> Glmb:
+def marginalise(glmb: Glmb, caps: MixtureCaps) -> Glmb:
     """Marginalised GLMB: one hypothesis a label set, over all association histories (paper eq. 10).
 
     Each track of a label set is the mixture of that label's tracks in the set's hypotheses, weighted by them, and
-    reduced by `kernels.mixtures.reduce_mixture` under the three limits; with `max_components` 1 it is one Gaussian of
-    the mixture's moments. Each (label set, label) has its own entry in the track table, in the order of the hypotheses.
-    Hypotheses come out by descending weight, equal weights in the order of their first occurrence; a label set of
-    weight zero is kept.
+    reduced under the caps; with `max_components` 1 it is one Gaussian of the mixture's moments. Each (label set, label)
+    has its own entry in the track table, in the order of the hypotheses. Hypotheses come out by descending weight,
+    equal weights in the order of their first occurrence; a label set of weight zero is kept.
     """
     group_of, first = group_by_label_set(glmb)
     num_sets, num_entries = len(first), len(glmb.hyp_tracks)
@@ -68,9 +67,7 @@ def marginalise(glmb: Glmb, log_min_weight: float, merge_distance: float, max_co
             labels[i, 1] = glmb.tracks.labels[pool[end - 1], 1]
             i += 1
             pool_offsets[i] = end
-    tracks = pooled_tracks(
-        glmb.tracks, labels, pool_offsets, pool, weights, log_min_weight, merge_distance, max_components
-    )
+    tracks = pooled_tracks(glmb.tracks, labels, pool_offsets, pool, weights, caps)
     return Glmb(tracks, hyp_offsets, np.arange(num_tracks), hyp_log_weights)
 
 
@@ -90,13 +87,12 @@ def _log_sum_where(log_weights: Floats, mark: Ints, value: int, equal: bool) -> 
 
 
 @kernel
-def glmb_to_lmb(glmb: Glmb, log_min_weight: float, merge_distance: float, max_components: int) -> Lmb:
+def glmb_to_lmb(glmb: Glmb, caps: MixtureCaps) -> Lmb:
     """LMB of the same existence probabilities and, up to the reduction of mixtures, the same track densities.
 
     Reuter, Vo, Vo and Dietmayer 2014, "The labeled multi-Bernoulli filter", eq. 43-45. The logit of existence is the
     difference of the log weights with and without the label, so that nothing is lost near existence 1. A label all of
-    whose hypotheses have weight zero keeps logit -inf and the plain mean of its tracks. The limits are those of
-    `kernels.mixtures.reduce_mixture`.
+    whose hypotheses have weight zero keeps logit -inf and the plain mean of its tracks.
     """
     labels, num_entries = increasing_labels(glmb), len(glmb.hyp_tracks)
     num_labels, log_weights = len(labels), glmb.hyp_log_weights
@@ -119,12 +115,11 @@ def glmb_to_lmb(glmb: Glmb, log_min_weight: float, merge_distance: float, max_co
         for m in range(low, high):
             relative = 0.0 if log_with == -math.inf else math.exp(log_weights[hyp_of[entries[m]]] - log_with)
             end = add_to_pool(glmb.hyp_tracks[entries[m]], relative, slot_of, pool, weights, end)
+        # Only what was touched is reset: a loop over all tracks a label would be quadratic.
         for p in range(pool_offsets[i], end):
             slot_of[pool[p]] = -1
         pool_offsets[i + 1] = end
-    tracks = pooled_tracks(
-        glmb.tracks, labels, pool_offsets, pool, weights, log_min_weight, merge_distance, max_components
-    )
+    tracks = pooled_tracks(glmb.tracks, labels, pool_offsets, pool, weights, caps)
     return Lmb(tracks, existence_logit)
 
 
@@ -155,6 +150,7 @@ def lmb_to_glmb(lmb: Lmb, max_hypotheses: int) -> tuple[Glmb, float]:
             hyp_log_weights[h] -= costs[flips[node]]
             node = previous[node]
         for i in range(num):
+            # The likeliest subset has every label that is likelier there than not; others flip some of them.
             if (lmb.existence_logit[i] > 0.0) != (flipped[i] == h + 1):
                 hyp_tracks[end] = i
                 end += 1

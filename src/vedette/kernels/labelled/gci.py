@@ -21,22 +21,17 @@ from vedette.kernels.gaussian.mixtures import require_gaussians
 
 
 class Powers(NamedTuple):
-    """Powers of the components of one label at all sensors, and working arrays.
+    """Powers of the components of one label at all sensors, and working arrays."""
 
-    rows: (S * max_components, row_size) information rows of N^w about `reference`. log_weights: w log a of each.
-    starts: (S + 1,) where the components of each sensor start. weights: (S,) the powers w; 0 where a label is
-    unknown.
-    """
-
-    rows: Floats
-    log_weights: Floats
-    starts: Ints
-    weights: Floats
-    reference: Floats
-    row: Floats
-    factor: Floats
-    matrix: Floats
-    offset: Floats
+    rows: Floats  # (num_components, row_size) information rows of N^w about `reference`
+    log_weights: Floats  # (num_components,) w log a of each
+    starts: Ints  # (num_sensors + 1,) where the components of each sensor start
+    weights: Floats  # (num_sensors,) the powers w; 0 where a label is unknown
+    reference: Floats  # (state_dim,) near the densities, so that little cancels
+    row: Floats  # (row_size,) of a product
+    factor: Floats  # (state_dim, state_dim)
+    matrix: Floats  # (state_dim, state_dim)
+    offset: Floats  # (state_dim,) from the reference
 
 
 @kernel
@@ -68,6 +63,7 @@ def _load(chosen: Ints, item: int, fusion_weights: Floats, tracks: Tracks, power
         powers.weights[s] = 0.0
         if track < 0:
             continue
+        # Sensors that do not know the label have no say in its density: the others' weights sum to one.
         weight = fusion_weights[s] / total
         powers.weights[s] = weight
         for c in range(tracks.offsets[track], tracks.offsets[track + 1]):
@@ -95,6 +91,7 @@ def _multiply(powers: Powers, low: int, high: int, log_weights: Floats, means: F
             if num == 0:
                 continue
             component = powers.starts[s] + rest % num
+            # The digits of the combination's number, in bases of the sensors' numbers of components.
             rest //= num
             total += powers.log_weights[component]
             for k in range(len(row)):
@@ -134,6 +131,7 @@ def _correct(powers: Powers, points: Floats, point_weights: Floats, mean: Floats
             for j in range(i + 1):
                 images[p, i] += powers.factor[i, j] * points[p, j]
             offset[i] = mean[i] - powers.reference[i] + images[p, i]
+        # f / q is at most 1, so that no point can dominate however far out it is.
         masses[p] = point_weights[p] * math.exp(_log_ratio(powers))
         total += masses[p]
     for i in range(dim):

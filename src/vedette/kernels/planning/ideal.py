@@ -9,9 +9,9 @@ import numpy as np
 from vedette.errors import ModelError
 from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.compile import borrowing, inlined, kernel
-from vedette.kernels.base.types import Floats, Ints, Motion, Sensor
-from vedette.kernels.gaussian.kalman import Scratch, wrap_angle
+from vedette.kernels.base.types import Floats, Ints, Lmb, Motion, Sensor
 from vedette.kernels.gaussian.linalg import cholesky
+from vedette.kernels.gaussian.scratch import Scratch, wrap_angle
 
 IDEAL = 0
 EXPECTED = 1
@@ -19,16 +19,12 @@ SAMPLED = 2
 
 
 class Futures(NamedTuple):
-    """Sampled multi-target states over the horizon, and the random numbers of their measurements.
+    """Sampled multi-target states over the horizon, and the random numbers of their measurements."""
 
-    Targets of sample `j` are `offsets[j]:offsets[j + 1]`. states: (horizon_steps, num_targets, state_dim).
-    uniforms: (horizon_steps, num_targets) decide detection. normals: (horizon_steps, num_targets, meas_dim) the noise.
-    """
-
-    offsets: Ints
-    states: Floats
-    uniforms: Floats
-    normals: Floats
+    offsets: Ints  # (num_samples + 1,) into the targets
+    states: Floats  # (horizon_steps, num_targets, state_dim)
+    uniforms: Floats  # (horizon_steps, num_targets) decide detection
+    normals: Floats  # (horizon_steps, num_targets, meas_dim) make the noise
 
 
 @kernel
@@ -38,29 +34,29 @@ def propagate_samples(motion: Motion, states: Floats, dt: float, horizon_steps: 
     out = np.empty((horizon_steps, num, dim))
     for h in range(horizon_steps):
         for i in range(num):
+            # Without process noise: the future is the sample's, and the spread of futures that of the samples.
             before = states[i] if h == 0 else out[h - 1, i]
             motion.transition(before, dt, motion.transition_params, out[h, i])
     return out
 
 
 class Horizon(NamedTuple):
-    """poses: (num_actions, horizon_steps, 3) where each action takes the sensor. dt: seconds a step.
-    mode, threshold: of the ideal measurements.
-    """
+    """Where and how a sensor will scan."""
 
-    poses: Floats
-    dt: float
-    mode: int
-    threshold: float
+    poses: Floats  # (num_actions, horizon_steps, pose_dim) where each action takes the sensor
+    dt: float  # seconds a step
+    mode: int  # IDEAL, EXPECTED or SAMPLED measurements
+    threshold: float  # detection probability from which a target is measured, where IDEAL
 
 
 class Decision(NamedTuple):
-    """What the pseudo-updates of one sensor depend on besides its prior. futures: as this sensor sees them."""
+    """What the pseudo-updates of one sensor depend on besides its prior."""
 
-    motion: Motion
+    birth: Lmb  # none: over the horizon nobody is born
+    motion: Motion  # all survive
     sensor: Sensor
     horizon: Horizon
-    futures: Futures
+    futures: Futures  # as this sensor sees them
     truncation: Truncation
 
 
@@ -98,6 +94,7 @@ def ideal_scan(decision: Decision, action: int, sample: int, step: int, scratch:
     for i in range(futures.offsets[sample], futures.offsets[sample + 1]):
         state = futures.states[step, i]
         detection = sensor.prob_detection(state, pose, sensor.detection_params)
+        # The uniforms are the same for all actions, so that actions are compared on common random numbers.
         seen = detection >= horizon.threshold if horizon.mode == IDEAL else futures.uniforms[step, i] < detection
         if seen:
             sensor.measurement(state, pose, sensor.measurement_params, out[count])

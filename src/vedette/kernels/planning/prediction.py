@@ -6,8 +6,9 @@ import numpy as np
 
 from vedette.kernels.base.compile import kernel
 from vedette.kernels.base.types import Floats, Motion
-from vedette.kernels.gaussian.kalman import make_scratch, predict
 from vedette.kernels.gaussian.mixtures import copy_component
+from vedette.kernels.gaussian.prediction import predict
+from vedette.kernels.gaussian.scratch import make_scratch
 
 
 @kernel

@@ -3,23 +3,35 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from vedette.kernels.association.assignment import ABSENT, MISSED, Options
 from vedette.kernels.association.children import Children, Parents
-from vedette.kernels.association.options import Rows
+from vedette.kernels.association.predicted import Rows
 from vedette.kernels.base.compile import borrowing, inlined, kernel
-from vedette.kernels.base.types import Floats, Glmb, Ints, Tracks
-from vedette.kernels.gaussian.kalman import update_mean
+from vedette.kernels.base.types import Glmb, Ints, Mixture, Tracks
+from vedette.kernels.gaussian.innovation import update_mean
 from vedette.kernels.gaussian.linalg import normalise_logs
 from vedette.kernels.gaussian.mixtures import copy_component
 
 
+class Naming(NamedTuple):
+    """Which tracks a posterior has, numbered by first use: one for each option that one of its hypotheses takes."""
+
+    track_of: Ints  # (num_options,) number of the track that an option makes, -1 where none is made
+    options: Ints  # (num_options,) option of each track
+    rows: Ints  # (num_options,) row of each track
+
+
+@kernel
+def make_naming(num_options: int) -> Naming:
+    return Naming(np.empty(num_options, np.int64), np.empty(num_options, np.int64), np.empty(num_options, np.int64))
+
+
 @inlined
-def write_updated(
-    row: int, option: int, rows: Rows, options: Options, start: int, log_weights: Floats, means: Floats, covs: Floats
-) -> int:
+def write_updated(row: int, option: int, rows: Rows, options: Options, start: int, out: Mixture) -> int:
     """Write the updated components of a row under one of its options from `start` on; returns the end.
 
     Their log weights sum to the option's own; components outside the gate are left out.
@@ -28,67 +40,60 @@ def write_updated(
     detected = options.columns[option] != MISSED
     for i in range(rows.offsets[row + 1] - first):
         weight = options.component_log_weights[entry + i]
+        # A component outside the gate cannot have made this measurement.
         if weight == -math.inf:
             continue
-        log_weights[start] = weight
+        out.log_weights[start] = weight
         if detected:
-            copy_component(rows.means, rows.innovation.covs, first + i, means, covs, start)
-            update_mean(rows.innovation, first + i, options.whitened[entry + i], rows.means[first + i], means[start])
+            c, whitened = first + i, options.whitened[entry + i]
+            copy_component(rows.means, rows.innovation.covs, c, out.means, out.covs, start)
+            update_mean(rows.innovation, c, whitened, rows.means[c], out.means[start])
         else:
-            copy_component(rows.means, rows.covs, first + i, means, covs, start)
+            copy_component(rows.means, rows.covs, first + i, out.means, out.covs, start)
         start += 1
     return start
 
 
 @borrowing
 def name_tracks(
-    children: Children,
-    kept: Ints,
-    parents: Parents,
-    options: Options,
-    track_of: Ints,
-    used_options: Ints,
-    used_rows: Ints,
-    hyp_offsets: Ints,
-    hyp_tracks: Ints,
-    log_weights: Floats,
+    children: Children, kept: Ints, parents: Parents, options: Options, naming: Naming, out: Parents
 ) -> tuple[int, int, float]:
-    """Write the hypotheses of the `kept` children, normalised, over tracks numbered by first use.
+    """Write the hypotheses of the `kept` children, normalised, as the next scan's parents: over the tracks of `naming`.
 
-    track_of: (num_options,) to work in. used_options, used_rows: the option and row of each track are written there.
-    Returns the numbers of tracks and of entries of `hyp_tracks`, and the log of the sum of the children's weights.
+    Returns the numbers of tracks and of entries of `out.rows`, and the log of the sum of the children's weights.
     """
     for option in range(options.offsets[len(options.offsets) - 1]):
-        track_of[option] = -1
-    num_used, filled = 0, 0
-    hyp_offsets[0] = 0
+        naming.track_of[option] = -1
+    num_tracks, filled = 0, 0
+    out.offsets[0] = 0
     for h in range(len(kept)):
         child = kept[h]
-        log_weights[h] = children.log_weights[child]
+        out.log_weights[h] = children.log_weights[child]
         start, first_row = children.offsets[child], parents.offsets[children.parents[child]]
         for i in range(children.offsets[child + 1] - start):
             option = children.options[start + i]
             if options.columns[option] == ABSENT:
                 continue
-            if track_of[option] < 0:
-                track_of[option] = num_used
-                used_options[num_used], used_rows[num_used] = option, parents.rows[first_row + i]
-                num_used += 1
-            hyp_tracks[filled] = track_of[option]
+            # An option stands for a row as well, so that it names the updated track whatever hypothesis takes it.
+            if naming.track_of[option] < 0:
+                naming.track_of[option] = num_tracks
+                naming.options[num_tracks], naming.rows[num_tracks] = option, parents.rows[first_row + i]
+                num_tracks += 1
+            out.rows[filled] = naming.track_of[option]
             filled += 1
-        hyp_offsets[h + 1] = filled
-    return num_used, filled, normalise_logs(log_weights[: len(kept)])
+        out.offsets[h + 1] = filled
+    return num_tracks, filled, normalise_logs(out.log_weights[: len(kept)])
 
 
 @borrowing
-def update_tracks(used_options: Ints, used_rows: Ints, rows: Rows, options: Options, out: Tracks) -> int:
-    """Write the track of each used option, its mixture normalised; returns the number of components."""
-    filled = 0
+def update_tracks(naming: Naming, num_tracks: int, rows: Rows, options: Options, out: Tracks) -> int:
+    """Write the tracks that have been named, their mixtures normalised; returns the number of components."""
+    filled, components = 0, Mixture(out.log_weights, out.means, out.covs)
     out.offsets[0] = 0
-    for i in range(len(used_options)):
-        row, option = used_rows[i], used_options[i]
+    for i in range(num_tracks):
+        row, option = naming.rows[i], naming.options[i]
         out.labels[i, 0], out.labels[i, 1] = rows.labels[row, 0], rows.labels[row, 1]
-        end = write_updated(row, option, rows, options, filled, out.log_weights, out.means, out.covs)
+        end = write_updated(row, option, rows, options, filled, components)
         if end == filled + 1:
             out.log_weights[filled] = 0.0
         else:
@@ -101,23 +106,12 @@ def update_tracks(used_options: Ints, used_rows: Ints, rows: Rows, options: Opti
 @kernel
 def assemble(children: Children, kept: Ints, parents: Parents, rows: Rows, options: Options) -> tuple[Glmb, float]:
     """The posterior of the kept children, normalised, and the log of their unnormalised sum."""
-    num_hyps, num_entries, num_options = len(kept), len(children.options), options.offsets[-1]
-    track_of, used_options, used_rows = (
-        np.empty(num_options, np.int64),
-        np.empty(num_options, np.int64),
-        np.empty(num_options, np.int64),
-    )
-    hyp_offsets, hyp_tracks, log_weights = (
-        np.empty(num_hyps + 1, np.int64),
-        np.empty(num_entries, np.int64),
-        np.empty(num_hyps),
-    )
-    num, filled, log_total = name_tracks(
-        children, kept, parents, options, track_of, used_options, used_rows, hyp_offsets, hyp_tracks, log_weights
-    )
+    naming = make_naming(options.offsets[-1])
+    hyps = Parents(np.empty(len(kept) + 1, np.int64), np.empty(children.filled[1], np.int64), np.empty(len(kept)))
+    num, filled, log_total = name_tracks(children, kept, parents, options, naming, hyps)
     most = 0
     for i in range(num):
-        most += rows.offsets[used_rows[i] + 1] - rows.offsets[used_rows[i]]
+        most += rows.offsets[naming.rows[i] + 1] - rows.offsets[naming.rows[i]]
     dim = rows.means.shape[1]
     tracks = Tracks(
         np.empty((num, 2), np.int64),
@@ -126,6 +120,6 @@ def assemble(children: Children, kept: Ints, parents: Parents, rows: Rows, optio
         np.empty((most, dim)),
         np.empty((most, dim, dim)),
     )
-    last = update_tracks(used_options[:num], used_rows[:num], rows, options, tracks)
+    last = update_tracks(naming, num, rows, options, tracks)
     trimmed = Tracks(tracks.labels, tracks.offsets, tracks.log_weights[:last], tracks.means[:last], tracks.covs[:last])
-    return Glmb(trimmed, hyp_offsets, hyp_tracks[:filled].copy(), log_weights), log_total
+    return Glmb(trimmed, hyps.offsets, hyps.rows[:filled].copy(), hyps.log_weights), log_total

@@ -11,37 +11,32 @@ from typing import NamedTuple
 import numpy as np
 
 from vedette.kernels.association.assignment import MISSED, Options
-from vedette.kernels.association.options import Rows, clutter_levels, list_options
+from vedette.kernels.association.options import weighed_options
+from vedette.kernels.association.predicted import Rows, predicted_rows
 from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.compile import kernel
-from vedette.kernels.base.types import Floats, Ints, Lmb, Motion, Sensor, Tracks
-from vedette.kernels.gaussian.kalman import make_scratch
+from vedette.kernels.base.types import Floats, Ints, Lmb, Motion, ScanInput, Sensor, Tracks
 from vedette.kernels.gaussian.linalg import log_add
-from vedette.kernels.gaussian.mixtures import require_gaussians
+from vedette.kernels.gaussian.mixtures import MixtureCaps, make_components, require_gaussians
 from vedette.kernels.labelled.labels import group_members
 from vedette.kernels.steps.assembly import write_updated
-from vedette.kernels.steps.glmb import prepare_rows
 from vedette.kernels.steps.lmb import Reduction, append_reduced, labels_to_keep, weigh_by_existence
 
 
 class CbMemberReport(NamedTuple):
-    """num_raised: as in `StepReport`. dropped_existence: summed existence of dropped Bernoullis."""
+    """What a step had to change and what it left out."""
 
-    num_raised: int
-    dropped_existence: float
+    num_raised: int  # measurements whose clutter intensity was raised to the floor
+    dropped_existence: float  # summed existence of dropped Bernoullis
 
 
 class Choices(NamedTuple):
-    """The options of a scan by measurement.
+    """The options of a scan by measurement."""
 
-    rows: (num_options,) row of each option. missed: (num_rows,) option of a missed detection, -1 where there is none.
-    offsets, detections: the detections as measurement `j` are `detections[offsets[j]:offsets[j + 1]]`.
-    """
-
-    rows: Ints
-    missed: Ints
-    offsets: Ints
-    detections: Ints
+    rows: Ints  # (num_options,) row of each option
+    missed: Ints  # (num_rows,) option of a missed detection, -1 where there is none
+    offsets: Ints  # (num_measurements + 1,) into detections
+    detections: Ints  # the options that are detections as each measurement
 
 
 @kernel
@@ -78,6 +73,7 @@ def existence_logits(rows: Rows, options: Options, choices: Choices) -> Floats:
         for i in range(choices.offsets[j], choices.offsets[j + 1]):
             option = choices.detections[i]
             row = choices.rows[option]
+            # o / (a + m)^2, the common factor of both sums.
             share = options.log_weights[option] - 2.0 * log_unseen[row]
             present = log_add(present, share + rows.log_absent[row])
             if choices.missed[row] >= 0:
@@ -115,34 +111,32 @@ def _most_components(sources: Ints, rows: Rows, choices: Choices) -> tuple[int, 
 
 
 @kernel
-def posterior_mixtures(sources: Ints, rows: Rows, options: Options, choices: Choices, reduction: Reduction) -> Tracks:
+def posterior_mixtures(sources: Ints, rows: Rows, options: Options, choices: Choices, caps: MixtureCaps) -> Tracks:
     """The reduced mixture of each kept Bernoulli: of the missed row, or of all rows that explain its
     measurement, weighed by the odds of their existence.
     """
     num_rows, dim = len(rows.log_absent), rows.means.shape[1]
     widest, total = _most_components(sources, rows, choices)
     offsets, labels = np.zeros(len(sources) + 1, np.int64), np.full((len(sources), 2), -1, np.int64)
-    log_weights, means, covs = np.empty(total), np.empty((total, dim)), np.empty((total, dim, dim))
-    wide_weights, wide_means, wide_covs = np.empty(widest), np.empty((widest, dim)), np.empty((widest, dim, dim))
+    out, wide = make_components(total, dim), make_components(widest, dim)
     filled = 0
     for k in range(len(sources)):
         width, source = 0, sources[k]
         if source < num_rows:
             missed = choices.missed[source]
-            width = write_updated(source, missed, rows, options, width, wide_weights, wide_means, wide_covs)
+            width = write_updated(source, missed, rows, options, width, wide)
         else:
             for i in range(choices.offsets[source - num_rows], choices.offsets[source - num_rows + 1]):
                 option = choices.detections[i]
                 row = choices.rows[option]
-                end = write_updated(row, option, rows, options, width, wide_weights, wide_means, wide_covs)
+                end = write_updated(row, option, rows, options, width, wide)
                 for c in range(width, end):
-                    wide_weights[c] -= rows.log_absent[row]
+                    # r / (1 - r): the odds of a row are its weight over that of being absent.
+                    wide.log_weights[c] -= rows.log_absent[row]
                 width = end
-        filled = append_reduced(
-            wide_weights[:width], wide_means[:width], wide_covs[:width], reduction, filled, log_weights, means, covs
-        )
+        filled = append_reduced(wide, width, caps, out, filled)
         offsets[k + 1] = filled
-    return Tracks(labels, offsets, log_weights[:filled], means[:filled], covs[:filled])
+    return Tracks(labels, offsets, out.log_weights[:filled], out.means[:filled], out.covs[:filled])
 
 
 @kernel
@@ -159,10 +153,7 @@ def _bounded(existence_logit: Floats, most: float) -> tuple[Floats, float]:
 @kernel
 def step_cb_member(
     prior: Lmb,
-    birth: Lmb,
-    scan: Floats,
-    pose: Floats,
-    dt: float,
+    scan: ScanInput,
     motion: Motion,
     sensor: Sensor,
     truncation: Truncation,
@@ -170,14 +161,11 @@ def step_cb_member(
     max_existence_logit: float,
 ) -> tuple[Lmb, CbMemberReport]:
     """One scan. max_existence_logit: prior existences are taken as at most this."""
-    scratch = make_scratch(prior.tracks.means.shape[1], len(sensor.angular))
-    rows = prepare_rows(prior.tracks, birth, pose, dt, motion, sensor, scratch)
+    rows = predicted_rows(prior.tracks, scan, motion, sensor)
     existence_logit, lost = _bounded(prior.existence_logit, max_existence_logit)
     weigh_by_existence(existence_logit, rows)
-    levels = np.empty(len(scan))
-    _, num_raised = clutter_levels(sensor, scan, pose, truncation.log_clutter_floor, levels)
-    options = list_options(rows, scan, levels, sensor, truncation.gate)
-    choices = list_choices(options, len(scan))
+    options, _, num_raised = weighed_options(rows, scan, sensor, truncation)
+    choices = list_choices(options, len(scan.measurements))
     logits = existence_logits(rows, options, choices)
     possible = _possible(logits)
     possible_logits = np.empty(len(possible))
@@ -187,6 +175,6 @@ def step_cb_member(
     sources, kept_logits = np.empty(len(kept), np.int64), np.empty(len(kept))
     for i in range(len(kept)):
         sources[i], kept_logits[i] = possible[kept[i]], possible_logits[kept[i]]
-    tracks = posterior_mixtures(sources, rows, options, choices, reduction)
+    tracks = posterior_mixtures(sources, rows, options, choices, reduction.mixture)
     require_gaussians(tracks.means, tracks.covs)
     return Lmb(tracks, kept_logits), CbMemberReport(num_raised, dropped + lost)

@@ -12,12 +12,13 @@ import math
 import numpy as np
 
 from vedette.kernels.association.assignment import MISSED
+from vedette.kernels.association.options import weighed_options
 from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.compile import borrowing, inlined, kernel
-from vedette.kernels.base.types import Floats, Ints, Lmb, Mixture, Motion, Sensor
+from vedette.kernels.base.types import Floats, Ints, Lmb, Mixture, Motion, ScanInput, Sensor
 from vedette.kernels.gaussian.linalg import log_add, log_sum, normalise_logs
-from vedette.kernels.steps.intensity import IntensityReport, corrected_intensity, intensity_options, predict_intensity
-from vedette.kernels.steps.lmb import Reduction
+from vedette.kernels.gaussian.mixtures import MixtureCaps
+from vedette.kernels.steps.intensity import IntensityReport, corrected_intensity, predict_intensity
 
 
 @inlined
@@ -42,6 +43,7 @@ def predict_cardinality(log_cardinality: Floats, log_lived: float, log_died: flo
     highest = len(log_cardinality) - 1
     predicted = np.full(highest + len(birth_logit) + 1, -math.inf)
     predicted[0] = log_cardinality[highest]
+    # Horner: ((rho_n (d + s z) + rho_(n-1)) (d + s z) + ...), d died and s lived on.
     for count in range(highest - 1, -1, -1):
         times_linear(predicted, highest - 1 - count, log_died, log_lived)
         predicted[0] = log_add(predicted[0], log_cardinality[count])
@@ -199,23 +201,20 @@ def _detections(columns: Ints) -> Ints:
 def step_cphd(
     log_cardinality: Floats,
     prior: Mixture,
-    birth: Lmb,
-    scan: Floats,
-    pose: Floats,
-    dt: float,
+    scan: ScanInput,
     motion: Motion,
     sensor: Sensor,
     truncation: Truncation,
-    reduction: Reduction,
+    caps: MixtureCaps,
 ) -> tuple[Floats, Mixture, IntensityReport]:
     """One scan (Vo, Vo and Cantoni 2007). As clutter is Poisson, its rate falls out of the paper's ratios.
 
     prior: the density of one target, weights that sum to one. Where no number of targets can have given the scan, the
     log total of the report is -inf and the prior comes back.
     """
-    rows, log_died = predict_intensity(prior, birth, pose, dt, motion, sensor)
-    predicted = _predict(log_cardinality, prior, birth, rows.log_weights, log_died)
-    options, log_clutter, num_raised = intensity_options(rows, scan, pose, sensor, truncation)
+    rows, log_died = predict_intensity(prior, scan, motion, sensor)
+    predicted = _predict(log_cardinality, prior, scan.birth, rows.log_weights, log_died)
+    options, log_clutter, num_raised = weighed_options(rows, scan, sensor, truncation)
     num_options = options.offsets[1]
     detections = _detections(options.columns[:num_options])
     log_ratios, log_missed = np.empty(len(detections)), -math.inf
@@ -230,11 +229,12 @@ def step_cphd(
     log_total = _log_products_sum(log_symmetric, derivatives, 0)
     if log_total == -math.inf:
         return log_cardinality, prior, IntensityReport(log_total, log_clutter, num_raised, 0.0)
+    # Vo, Vo, Cantoni 2007: a miss weighs <Upsilon1, rho> / <Upsilon0, rho>, each detection its own such ratio.
     log_factors = np.full(num_options, _log_products_sum(log_symmetric, derivatives, 1) - log_total)
     slopes = measurement_slopes(table, log_ratios, derivatives)
     for k in range(len(detections)):
         log_factors[detections[k]] = slopes[k] - log_total
     corrected = correct_cardinality(predicted, log_missed, log_symmetric)
-    cardinality, log_kept = trim_cardinality(corrected, truncation.max_log_gap)
-    posterior = _normalised(corrected_intensity(rows, options, log_factors, reduction))
+    cardinality, log_kept = trim_cardinality(corrected, truncation.search.max_log_gap)
+    posterior = _normalised(corrected_intensity(rows, options, log_factors, caps))
     return cardinality, posterior, IntensityReport(log_total, log_clutter, num_raised, log_kept)

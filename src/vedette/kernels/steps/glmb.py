@@ -1,4 +1,15 @@
-"""Joint prediction and update of a delta-GLMB density (Vo, Vo, Hoang 2017, eq. 29-35)."""
+"""Joint prediction and update of a delta-GLMB density (Vo, Vo, Hoang 2017, eq. 29-35).
+
+A child is a prior hypothesis with one option for each of its rows: a survivor or birth site is absent, missed or
+detected. Its weight is the prior one's times those of the options,
+
+    w+ = w  prod over rows of  P(absent)                                       where it is absent,
+                               P(there) <p+, 1 - p_D>                          where it is missed,
+                               P(there) <p+, p_D g(z | .)> / kappa(z)          where it is detected as z,
+
+relative to the weight of all measurements being clutter. A planner runs the same kernels in a workspace that it keeps
+(`vedette.kernels.planning.pseudo_glmb`); what a filter adds is births, and which children it keeps.
+"""
 
 from __future__ import annotations
 
@@ -7,43 +18,44 @@ from typing import NamedTuple
 import numpy as np
 
 from vedette.kernels.association.assignment import Options
-from vedette.kernels.association.coverage import add_uncovered, mark_heaviest, themes_of_options
+from vedette.kernels.association.children import Children, Parents
+from vedette.kernels.association.coverage import Associations, add_uncovered, associations_of_options, mark_heaviest
 from vedette.kernels.association.gibbs import sample_children
-from vedette.kernels.association.options import (
-    Rows,
-    clutter_levels,
-    expect_rows,
-    fill_births,
-    fill_survivors,
-    list_options,
-    make_rows,
-)
-from vedette.kernels.association.ranked import Children, Parents, rank_children
+from vedette.kernels.association.options import weighed_options
+from vedette.kernels.association.predicted import Rows, predicted_rows
+from vedette.kernels.association.ranked import rank_children
 from vedette.kernels.association.truncation import Truncation, heaviest_first, keep_heaviest, merge_equal
 from vedette.kernels.base.arrays import filled_ints
 from vedette.kernels.base.compile import kernel
-from vedette.kernels.base.types import Floats, Glmb, Ints, Lmb, Motion, Sensor, Tracks
-from vedette.kernels.gaussian.kalman import Scratch, make_scratch
+from vedette.kernels.base.types import Glmb, Motion, ScanInput, Sensor
 from vedette.kernels.gaussian.linalg import log_sum
 from vedette.kernels.gaussian.mixtures import require_gaussians
 from vedette.kernels.steps.assembly import assemble
 
 
 class StepReport(NamedTuple):
-    """log_total: log of the sum of the kept weights, relative to all measurements being clutter, whose log intensities
-    sum to log_clutter. log_bound: log of an upper bound on the sum of all weights.
-    num_raised: measurements whose clutter intensity was raised to the floor. cut: ranking stopped at `max_nodes`.
-    """
+    """What a step found and what it left out."""
 
-    log_total: float
-    log_bound: float
-    log_clutter: float
-    num_raised: int
-    cut: bool
+    log_total: float  # log of the sum of the kept weights, relative to all measurements being clutter
+    log_bound: float  # log of an upper bound on the sum of all weights, relative to the same
+    log_clutter: float  # sum of the log clutter intensities of the scan
+    num_raised: int  # measurements whose clutter intensity was raised to the floor
+    cut: bool  # the ranking stopped at its bound on nodes
+
+
+class Associated(NamedTuple):
+    """The rows of a scan, what may happen to each, and the prior hypotheses over them."""
+
+    rows: Rows
+    options: Options
+    parents: Parents
+    log_clutter: float  # as in `StepReport`
+    num_raised: int  # as in `StepReport`
 
 
 @kernel
-def _parents_with_births(prior: Glmb, num_births: int, groups: Ints) -> Parents:
+def parents_with_births(prior: Glmb, num_births: int) -> Parents:
+    """The prior's hypotheses, each with all birth sites: every one of them may have given birth under each."""
     num_hyps, num_tracks = len(prior.hyp_log_weights), len(prior.tracks.labels)
     offsets = np.zeros(num_hyps + 1, np.int64)
     rows = np.empty(len(prior.hyp_tracks) + num_hyps * num_births, np.int64)
@@ -56,7 +68,14 @@ def _parents_with_births(prior: Glmb, num_births: int, groups: Ints) -> Parents:
             rows[filled] = num_tracks + b
             filled += 1
         offsets[h + 1] = filled
-    return Parents(offsets, rows, prior.hyp_log_weights, groups)
+    return Parents(offsets, rows, prior.hyp_log_weights)
+
+
+@kernel
+def _associate(prior: Glmb, rows: Rows, scan: ScanInput, sensor: Sensor, truncation: Truncation) -> Associated:
+    options, log_clutter, num_raised = weighed_options(rows, scan, sensor, truncation)
+    parents = parents_with_births(prior, len(rows.labels) - len(prior.tracks.labels))
+    return Associated(rows, options, parents, log_clutter, num_raised)
 
 
 @kernel
@@ -74,123 +93,62 @@ def _log_total_bound(options: Options, parents: Parents) -> float:
 
 
 @kernel
-def prepare_rows(
-    tracks: Tracks, birth: Lmb, pose: Floats, dt: float, motion: Motion, sensor: Sensor, scratch: Scratch
-) -> Rows:
-    """Predicted survivors and birth sites with what each expects of a scan taken from `pose`."""
-    num_tracks, num_births = len(tracks.labels), len(birth.tracks.labels)
-    num_components = len(tracks.log_weights) + len(birth.tracks.log_weights)
-    rows = make_rows(num_tracks + num_births, num_components, tracks.means.shape[1], len(sensor.angular))
-    fill_survivors(tracks, motion, dt, rows, scratch)
-    fill_births(birth, num_tracks, rows)
-    expect_rows(sensor, pose, rows, scratch)
-    return rows
-
-
-@kernel
-def finish_step(
-    prior: Glmb,
-    num_births: int,
-    rows: Rows,
-    scan: Floats,
-    pose: Floats,
-    sensor: Sensor,
-    truncation: Truncation,
-    groups: Ints,
-) -> tuple[Glmb, Ints, StepReport]:
-    """Rank, truncate and assemble once the rows are prepared. Returns posterior, parent of each hypothesis, report."""
-    levels = np.empty(len(scan))
-    log_clutter, num_raised = clutter_levels(sensor, scan, pose, truncation.log_clutter_floor, levels)
-    options = list_options(rows, scan, levels, sensor, truncation.gate)
-    parents = _parents_with_births(prior, num_births, groups)
-    children, cut = rank_children(
-        options, parents, len(scan), truncation.max_hypotheses, truncation.max_log_gap, truncation.max_nodes
-    )
-    # A search that ran dry has left nothing out.
-    is_covered = len(children.parents) < truncation.max_hypotheses and not cut
-    return _conclude(children, parents, rows, options, len(scan), truncation, log_clutter, num_raised, cut, is_covered)
-
-
-@kernel
 def _conclude(
-    children: Children,
-    parents: Parents,
-    rows: Rows,
-    options: Options,
-    num_columns: int,
-    truncation: Truncation,
-    log_clutter: float,
-    num_raised: int,
-    cut: bool,
-    is_covered: bool,
-) -> tuple[Glmb, Ints, StepReport]:
+    found: Associated, children: Children, truncation: Truncation, cut: bool, is_covered: bool
+) -> tuple[Glmb, StepReport]:
     """Truncate and assemble. is_covered: nothing that `max_track_gap` would keep has been left out."""
+    rows, options, parents, caps = found.rows, found.options, found.parents, truncation.search
     covering = truncation.max_track_gap > 0.0 and not is_covered
-    themes, num_themes = np.empty(0, np.int64), 0
+    associations = Associations(np.empty(0, np.int64), 0)
     if covering:
-        themes, num_themes = themes_of_options(rows.labels, options, num_columns)
-        children = add_uncovered(options, themes, num_themes, parents, children, num_columns, truncation.max_track_gap)
+        associations = associations_of_options(rows.labels, options)
+        children = add_uncovered(options, associations, parents, children, truncation.max_track_gap)
+    # Two parents that differ in tracks which are now absent have the same child: it is one hypothesis.
     order = heaviest_first(children, merge_equal(children, options.columns))
-    needed = filled_ints(len(children.parents), 0)
+    needed = filled_ints(children.filled[0], 0)
     if covering:
-        half = truncation.max_hypotheses // 2
-        mark_heaviest(
-            children,
-            order,
-            themes,
-            num_themes,
-            truncation.max_hypotheses - half,
-            half,
-            truncation.max_track_gap,
-            needed,
-        )
-    kept = keep_heaviest(children, order, needed, truncation, parents.groups)
+        half = caps.max_hypotheses // 2
+        num_safe = caps.max_hypotheses - half
+        mark_heaviest(children, order, associations, num_safe, half, truncation.max_track_gap, needed)
+    kept = keep_heaviest(children, order, needed, caps)
     posterior, log_total = assemble(children, kept, parents, rows, options)
     require_gaussians(posterior.tracks.means, posterior.tracks.covs)
-    report = StepReport(log_total, _log_total_bound(options, parents), log_clutter, num_raised, cut)
-    origins = np.empty(len(kept), np.int64)
-    for h in range(len(kept)):
-        origins[h] = children.parents[kept[h]]
-    return posterior, origins, report
+    bound = _log_total_bound(options, parents)
+    return posterior, StepReport(log_total, bound, found.log_clutter, found.num_raised, cut)
+
+
+@kernel
+def finish_ranked(
+    prior: Glmb, rows: Rows, scan: ScanInput, sensor: Sensor, truncation: Truncation
+) -> tuple[Glmb, StepReport]:
+    """Weigh, rank, truncate and assemble once there are rows: the tracks of the prior, then birth sites."""
+    found = _associate(prior, rows, scan, sensor, truncation)
+    children, cut = rank_children(found.options, found.parents, truncation.search)
+    # A search that ran dry has left nothing out.
+    is_covered = children.filled[0] < truncation.search.max_hypotheses and not cut
+    return _conclude(found, children, truncation, cut, is_covered)
 
 
 @kernel
 def step_ranked(
-    prior: Glmb,
-    birth: Lmb,
-    scan: Floats,
-    pose: Floats,
-    dt: float,
-    motion: Motion,
-    sensor: Sensor,
-    truncation: Truncation,
-    groups: Ints,
-) -> tuple[Glmb, Ints, StepReport]:
-    """One scan with the exactly ranked hypotheses. groups: label-set number of each prior hypothesis, or empty."""
-    scratch = make_scratch(prior.tracks.means.shape[1], len(sensor.angular))
-    rows = prepare_rows(prior.tracks, birth, pose, dt, motion, sensor, scratch)
-    return finish_step(prior, len(birth.tracks.labels), rows, scan, pose, sensor, truncation, groups)
+    prior: Glmb, scan: ScanInput, motion: Motion, sensor: Sensor, truncation: Truncation
+) -> tuple[Glmb, StepReport]:
+    """One scan with the exactly ranked hypotheses."""
+    return finish_ranked(prior, predicted_rows(prior.tracks, scan, motion, sensor), scan, sensor, truncation)
 
 
 @kernel
 def step_gibbs(
     prior: Glmb,
-    birth: Lmb,
-    scan: Floats,
-    pose: Floats,
-    dt: float,
+    scan: ScanInput,
     motion: Motion,
     sensor: Sensor,
     truncation: Truncation,
     num_samples: int,
     rng: np.random.Generator,
-) -> tuple[Glmb, Ints, StepReport]:
+) -> tuple[Glmb, StepReport]:
     """One scan with hypotheses found by Gibbs sampling."""
-    scratch = make_scratch(prior.tracks.means.shape[1], len(sensor.angular))
-    rows = prepare_rows(prior.tracks, birth, pose, dt, motion, sensor, scratch)
-    levels = np.empty(len(scan))
-    log_clutter, num_raised = clutter_levels(sensor, scan, pose, truncation.log_clutter_floor, levels)
-    options = list_options(rows, scan, levels, sensor, truncation.gate)
-    parents = _parents_with_births(prior, len(birth.tracks.labels), np.empty(0, np.int64))
-    children = sample_children(options, parents, len(scan), num_samples, rng)
-    return _conclude(children, parents, rows, options, len(scan), truncation, log_clutter, num_raised, False, False)
+    rows = predicted_rows(prior.tracks, scan, motion, sensor)
+    found = _associate(prior, rows, scan, sensor, truncation)
+    children = sample_children(found.options, found.parents, num_samples, rng)
+    return _conclude(found, children, truncation, False, False)

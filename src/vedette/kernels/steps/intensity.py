@@ -12,32 +12,24 @@ from typing import NamedTuple
 import numpy as np
 
 from vedette.kernels.association.assignment import Options
-from vedette.kernels.association.options import Rows, clutter_levels, list_options
-from vedette.kernels.association.truncation import Truncation
+from vedette.kernels.association.predicted import Rows, predicted_rows
 from vedette.kernels.base.compile import kernel
-from vedette.kernels.base.types import Floats, Lmb, Mixture, Motion, Sensor, Tracks
-from vedette.kernels.gaussian.kalman import make_scratch
-from vedette.kernels.gaussian.mixtures import reduce_mixture, require_gaussians
+from vedette.kernels.base.types import Floats, Mixture, Motion, ScanInput, Sensor, Tracks
+from vedette.kernels.gaussian.mixtures import MixtureCaps, make_components, reduce_mixture, require_gaussians
 from vedette.kernels.steps.assembly import write_updated
-from vedette.kernels.steps.glmb import prepare_rows
-from vedette.kernels.steps.lmb import Reduction
 
 
 class IntensityReport(NamedTuple):
-    """log_total: log density of the scan relative to clutter alone. log_clutter, num_raised: as in `StepReport`.
-    log_kept: log of the share of the cardinality distribution that trimming left (0 where there is none).
-    """
+    """What a step found and what it left out."""
 
-    log_total: float
-    log_clutter: float
-    num_raised: int
-    log_kept: float
+    log_total: float  # log density of the scan relative to clutter alone
+    log_clutter: float  # sum of the log clutter intensities of the scan
+    num_raised: int  # measurements whose clutter intensity was raised to the floor
+    log_kept: float  # log of the share of the cardinality distribution that trimming left, 0 where there is none
 
 
 @kernel
-def predict_intensity(
-    prior: Mixture, birth: Lmb, pose: Floats, dt: float, motion: Motion, sensor: Sensor
-) -> tuple[Rows, float]:
+def predict_intensity(prior: Mixture, scan: ScanInput, motion: Motion, sensor: Sensor) -> tuple[Rows, float]:
     """The predicted intensity as one row, survivors before births, and the log of the weight that died.
 
     The births carry the intensity of the multi-Bernoulli birth: the sum of existence times density over the sites.
@@ -46,8 +38,7 @@ def predict_intensity(
     offsets = np.zeros(2, np.int64)
     offsets[1] = num
     one_track = Tracks(np.zeros((1, 2), np.int64), offsets, prior.log_weights, prior.means, prior.covs)
-    scratch = make_scratch(prior.means.shape[1], len(sensor.angular))
-    rows = prepare_rows(one_track, birth, pose, dt, motion, sensor, scratch)
+    rows = predicted_rows(one_track, scan, motion, sensor)
     log_died = rows.log_absent[0]
     all_components = np.zeros(2, np.int64)
     all_components[1] = len(rows.log_weights)
@@ -59,17 +50,7 @@ def predict_intensity(
 
 
 @kernel
-def intensity_options(
-    rows: Rows, scan: Floats, pose: Floats, sensor: Sensor, truncation: Truncation
-) -> tuple[Options, float, int]:
-    """The options of the one row, the sum of the log clutter intensities, and how many of them were raised."""
-    levels = np.empty(len(scan))
-    log_clutter, num_raised = clutter_levels(sensor, scan, pose, truncation.log_clutter_floor, levels)
-    return list_options(rows, scan, levels, sensor, truncation.gate), log_clutter, num_raised
-
-
-@kernel
-def corrected_intensity(rows: Rows, options: Options, log_factors: Floats, reduction: Reduction) -> Mixture:
+def corrected_intensity(rows: Rows, options: Options, log_factors: Floats, caps: MixtureCaps) -> Mixture:
     """The components of every option times the option's factor, reduced; their total weight is kept.
 
     log_factors: (>= num_options,) log of the factor of each option.
@@ -82,15 +63,12 @@ def corrected_intensity(rows: Rows, options: Options, log_factors: Floats, reduc
         for i in range(entry, entry + num_components):
             if options.component_log_weights[i] > -math.inf:
                 filled += 1
-    log_weights, means, covs = np.empty(filled), np.empty((filled, dim)), np.empty((filled, dim, dim))
-    start = 0
+    wide, start = make_components(filled, dim), 0
     for option in range(num_options):
-        end = write_updated(0, option, rows, options, start, log_weights, means, covs)
+        end = write_updated(0, option, rows, options, start, wide)
         for c in range(start, end):
-            log_weights[c] += log_factors[option]
+            wide.log_weights[c] += log_factors[option]
         start = end
-    few_weights, few_means, few_covs = reduce_mixture(
-        log_weights, means, covs, reduction.log_min_weight, reduction.merge_distance, reduction.max_components
-    )
+    few_weights, few_means, few_covs = reduce_mixture(wide.log_weights, wide.means, wide.covs, caps)
     require_gaussians(few_means, few_covs)
     return Mixture(few_weights, few_means, few_covs)

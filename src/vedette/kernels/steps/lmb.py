@@ -1,4 +1,12 @@
-"""Joint prediction and update of an LMB density (Reuter, Vo, Vo, Dietmayer 2014), with exact association marginals."""
+"""Joint prediction and update of an LMB density (Reuter, Vo, Vo, Dietmayer 2014), with exact association marginals.
+
+The update of an LMB is a GLMB; it is taken back to the LMB of the same existence probabilities and track moments. Both
+are sums over the options of a row weighed by their marginal probabilities, so that the GLMB itself is never listed:
+
+    r+ = sum over the options but absence of P(option),   p+ = sum of P(option) p(x | option) / r+.
+
+A planner runs the same kernels in a workspace that it keeps (`vedette.kernels.planning.pseudo_lmb`).
+"""
 
 from __future__ import annotations
 
@@ -8,46 +16,40 @@ from typing import NamedTuple
 import numpy as np
 
 from vedette.kernels.association.assignment import ABSENT, Options
-from vedette.kernels.association.marginals import option_marginals
-from vedette.kernels.association.options import Rows, clutter_levels, list_options
+from vedette.kernels.association.marginals import MarginalSums, option_marginals
+from vedette.kernels.association.options import weighed_options
+from vedette.kernels.association.predicted import Rows, predicted_rows
 from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.compile import borrowing, inlined, kernel
-from vedette.kernels.base.types import Floats, Ints, Lmb, Motion, Sensor, Tracks
-from vedette.kernels.gaussian.kalman import make_scratch
+from vedette.kernels.base.types import Floats, Ints, Lmb, Mixture, Motion, ScanInput, Sensor, Tracks
 from vedette.kernels.gaussian.linalg import log_add, normalise_logs
-from vedette.kernels.gaussian.mixtures import copy_component, descending_order, reduce_mixture, require_gaussians
+from vedette.kernels.gaussian.mixtures import (
+    MixtureCaps,
+    copy_component,
+    descending_order,
+    make_components,
+    reduce_mixture,
+    require_gaussians,
+)
 from vedette.kernels.steps.assembly import write_updated
-from vedette.kernels.steps.glmb import prepare_rows
 from vedette.kernels.steps.matching import make_mixture, match_rows
 
 
 class Reduction(NamedTuple):
-    """How track mixtures and the label set are kept small.
+    """How track mixtures and the label set are kept small."""
 
-    log_min_weight: components below are pruned. merge_distance: Mahalanobis distance within which components merge.
-    max_components: cap a track; 1 is one moment-matched Gaussian. min_existence_logit, max_labels: which labels stay.
-    """
-
-    log_min_weight: float
-    merge_distance: float
-    max_components: int
-    min_existence_logit: float
-    max_labels: int
+    mixture: MixtureCaps  # of each track
+    min_existence_logit: float  # labels less probable than this are dropped
+    max_labels: int  # how many of the others stay
 
 
 class LmbReport(NamedTuple):
-    """log_total: log of the sum of all joint weights, relative to clutter alone. log_clutter, num_raised: as in
-    `StepReport`. num_ranked: clusters summed over their heaviest choices only. log_kept: log of the least share of
-    all joint weight that is in the sum; 0 where no cluster was ranked. dropped_existence: summed existence of
-    dropped labels.
-    """
+    """What a step found and what it left out."""
 
-    log_total: float
-    log_clutter: float
-    num_raised: int
-    num_ranked: int
-    log_kept: float
-    dropped_existence: float
+    sums: MarginalSums  # its total is relative to all measurements being clutter
+    log_clutter: float  # sum of the log clutter intensities of the scan
+    num_raised: int  # measurements whose clutter intensity was raised to the floor
+    dropped_existence: float  # summed existence of dropped labels
 
 
 @inlined
@@ -55,6 +57,7 @@ def _log_presence(logit: float) -> tuple[float, float]:
     """log existence and log (1 - existence)."""
     if logit >= 0.0:
         log_existence = -math.log1p(math.exp(-logit))
+        # Whichever of the two is near 0 is taken by log1p, and the other from the difference.
         return log_existence, log_existence - logit
     log_absence = -math.log1p(math.exp(logit))
     return log_absence + logit, log_absence
@@ -65,6 +68,7 @@ def weigh_by_existence(existence_logit: Floats, rows: Rows) -> None:
     """Make the first rows, predicted as if certain, uncertain by the prior existence of their tracks."""
     for i in range(len(existence_logit)):
         log_existence, log_absence = _log_presence(existence_logit[i])
+        # Absent: never there, or there and died.
         rows.log_absent[i] = log_add(log_absence, log_existence + rows.log_absent[i])
         for c in range(rows.offsets[i], rows.offsets[i + 1]):
             rows.log_weights[c] += log_existence
@@ -77,6 +81,7 @@ def fill_existence(options: Options, marginals: Floats, logits: Floats) -> None:
         present, absent = -math.inf, -math.inf
         for option in range(options.offsets[row], options.offsets[row + 1]):
             if options.columns[option] == ABSENT:
+                # The logit from both sides, never 1 - r: existence near 1 keeps its digits.
                 absent = marginals[option]
             else:
                 present = log_add(present, marginals[option])
@@ -129,13 +134,12 @@ def _matched_tracks(kept: Ints, rows: Rows, options: Options, marginals: Floats)
 
 
 @kernel
-def _reduced_tracks(kept: Ints, rows: Rows, options: Options, marginals: Floats, reduction: Reduction) -> Tracks:
+def _reduced_tracks(kept: Ints, rows: Rows, options: Options, marginals: Floats, caps: MixtureCaps) -> Tracks:
     """Each kept row's mixture over its options, reduced."""
     dim = rows.means.shape[1]
     widest, total = _most_components(kept, rows, options)
     labels, offsets = np.empty((len(kept), 2), np.int64), np.zeros(len(kept) + 1, np.int64)
-    log_weights, means, covs = np.empty(total), np.empty((total, dim)), np.empty((total, dim, dim))
-    wide_weights, wide_means, wide_covs = np.empty(widest), np.empty((widest, dim)), np.empty((widest, dim, dim))
+    out, wide = make_components(total, dim), make_components(widest, dim)
     filled = 0
     for i in range(len(kept)):
         row = kept[i]
@@ -144,91 +148,53 @@ def _reduced_tracks(kept: Ints, rows: Rows, options: Options, marginals: Floats,
         for option in range(options.offsets[row], options.offsets[row + 1]):
             if options.columns[option] == ABSENT or marginals[option] == -math.inf:
                 continue
-            end = write_updated(row, option, rows, options, width, wide_weights, wide_means, wide_covs)
+            end = write_updated(row, option, rows, options, width, wide)
             for c in range(width, end):
-                wide_weights[c] += marginals[option] - options.log_weights[option]
+                wide.log_weights[c] += marginals[option] - options.log_weights[option]
             width = end
         if width == 0:
             # Existence 0: any density will do, as long as it is one.
             for c in range(rows.offsets[row], rows.offsets[row + 1]):
-                copy_component(rows.means, rows.covs, c, wide_means, wide_covs, width)
-                wide_weights[width] = 0.0
+                copy_component(rows.means, rows.covs, c, wide.means, wide.covs, width)
+                wide.log_weights[width] = 0.0
                 width += 1
-        filled = append_reduced(
-            wide_weights[:width], wide_means[:width], wide_covs[:width], reduction, filled, log_weights, means, covs
-        )
+        filled = append_reduced(wide, width, caps, out, filled)
         offsets[i + 1] = filled
-    return Tracks(labels, offsets, log_weights[:filled], means[:filled], covs[:filled])
+    return Tracks(labels, offsets, out.log_weights[:filled], out.means[:filled], out.covs[:filled])
 
 
 @kernel
-def append_reduced(
-    wide_weights: Floats,
-    wide_means: Floats,
-    wide_covs: Floats,
-    reduction: Reduction,
-    filled: int,
-    log_weights: Floats,
-    means: Floats,
-    covs: Floats,
-) -> int:
-    """Append the reduced mixture, its weights normalised to one; returns the new end."""
+def append_reduced(wide: Mixture, width: int, caps: MixtureCaps, out: Mixture, filled: int) -> int:
+    """Append the first `width` components, reduced and their weights normalised to one; returns the new end."""
     few_weights, few_means, few_covs = reduce_mixture(
-        wide_weights,
-        wide_means,
-        wide_covs,
-        reduction.log_min_weight,
-        reduction.merge_distance,
-        reduction.max_components,
+        wide.log_weights[:width], wide.means[:width], wide.covs[:width], caps
     )
     normalise_logs(few_weights)
     for c in range(len(few_weights)):
-        log_weights[filled] = few_weights[c]
-        copy_component(few_means, few_covs, c, means, covs, filled)
+        out.log_weights[filled] = few_weights[c]
+        copy_component(few_means, few_covs, c, out.means, out.covs, filled)
         filled += 1
     return filled
 
 
 @kernel
-def finish_lmb(
-    rows: Rows, scan: Floats, pose: Floats, sensor: Sensor, truncation: Truncation, reduction: Reduction
+def step_lmb(
+    prior: Lmb, scan: ScanInput, motion: Motion, sensor: Sensor, truncation: Truncation, reduction: Reduction
 ) -> tuple[Lmb, LmbReport]:
-    """Associate, marginalise and reduce once the rows are prepared and weighed by existence."""
-    levels = np.empty(len(scan))
-    log_clutter, num_raised = clutter_levels(sensor, scan, pose, truncation.log_clutter_floor, levels)
-    options = list_options(rows, scan, levels, sensor, truncation.gate)
-    marginals = np.empty(options.offsets[-1])
-    log_total, num_ranked, log_kept = option_marginals(
-        options, len(scan), truncation.max_hypotheses, truncation.max_log_gap, truncation.max_nodes, marginals
-    )
+    """One scan."""
+    rows = predicted_rows(prior.tracks, scan, motion, sensor)
+    weigh_by_existence(prior.existence_logit, rows)
+    options, log_clutter, num_raised = weighed_options(rows, scan, sensor, truncation)
+    marginals, sums = option_marginals(options, truncation.search)
     logits = np.empty(len(rows.log_absent))
     fill_existence(options, marginals, logits)
     kept, dropped = labels_to_keep(logits, reduction)
-    if reduction.max_components == 1:
+    if reduction.mixture.max_components == 1:
         tracks = _matched_tracks(kept, rows, options, marginals)
     else:
-        tracks = _reduced_tracks(kept, rows, options, marginals, reduction)
+        tracks = _reduced_tracks(kept, rows, options, marginals, reduction.mixture)
     require_gaussians(tracks.means, tracks.covs)
     kept_logits = np.empty(len(kept))
     for i in range(len(kept)):
         kept_logits[i] = logits[kept[i]]
-    return Lmb(tracks, kept_logits), LmbReport(log_total, log_clutter, num_raised, num_ranked, log_kept, dropped)
-
-
-@kernel
-def step_lmb(
-    prior: Lmb,
-    birth: Lmb,
-    scan: Floats,
-    pose: Floats,
-    dt: float,
-    motion: Motion,
-    sensor: Sensor,
-    truncation: Truncation,
-    reduction: Reduction,
-) -> tuple[Lmb, LmbReport]:
-    """One scan."""
-    scratch = make_scratch(prior.tracks.means.shape[1], len(sensor.angular))
-    rows = prepare_rows(prior.tracks, birth, pose, dt, motion, sensor, scratch)
-    weigh_by_existence(prior.existence_logit, rows)
-    return finish_lmb(rows, scan, pose, sensor, truncation, reduction)
+    return Lmb(tracks, kept_logits), LmbReport(sums, log_clutter, num_raised, dropped)

@@ -8,22 +8,18 @@ from typing import NamedTuple
 import numpy as np
 
 from vedette.kernels.association.assignment import ABSENT, MISSED, Options
-from vedette.kernels.association.options import Rows
+from vedette.kernels.association.predicted import Rows
 from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Floats, Ints
-from vedette.kernels.gaussian.kalman import update_mean
+from vedette.kernels.gaussian.innovation import update_mean
 
 
 class Mixture(NamedTuple):
-    """Room for the components of one row's mixture, an entry for each option and component.
+    """Room for the components of one row's mixture, an entry for each option and component."""
 
-    weights: linear, relative to the likeliest option. means: (num_entries, state_dim), then their deviations from the
-    mean of the mixture. sources: twice the number of the component among the rows', and one more where it is detected.
-    """
-
-    weights: Floats
-    means: Floats
-    sources: Ints
+    weights: Floats  # (num_entries,) linear, relative to the likeliest option
+    means: Floats  # (num_entries, state_dim), then their deviations from the mean of the mixture
+    sources: Ints  # (num_entries,) twice the number of the component among the rows', and one more where it is detected
 
 
 @kernel
@@ -49,6 +45,7 @@ def _gather(row: int, rows: Rows, options: Options, marginals: Floats, out: Mixt
             log_weight = options.component_log_weights[at] - options.log_weights[option]
             if log_weight == -math.inf:
                 continue
+            # The option's marginal, shared out over its components; a single Gaussian needs no exponential.
             out.weights[count] = scale if log_weight == 0.0 else scale * math.exp(log_weight)
             out.sources[count] = 2 * c + (1 if detected else 0)
             if detected:
@@ -87,6 +84,7 @@ def _moments(count: int, rows: Rows, mixture: Mixture, out_mean: Floats, out_cov
             means[k, i] -= out_mean[i]
         for j in range(i + 1):
             out_cov[i, j] = 0.0
+    # All detections of a component have one posterior covariance, so that only means and weights were gathered.
     for k in range(count):
         c, share = sources[k] // 2, weights[k] / total
         if sources[k] % 2 == 1:

@@ -13,22 +13,16 @@ from typing import NamedTuple
 import numpy as np
 
 from vedette.kernels.association.assignment import MISSED, Options
-from vedette.kernels.association.options import (
-    Rows,
-    clutter_levels,
-    expect_rows,
-    fill_births,
-    fill_survivors,
-    list_options,
-    make_rows,
-)
+from vedette.kernels.association.options import weighed_options
+from vedette.kernels.association.predicted import Rows, expect_rows, fill_births, fill_survivors, make_rows
 from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.arrays import filled_ints
 from vedette.kernels.base.compile import kernel
-from vedette.kernels.base.types import Floats, Ints, Lmb, Motion, Sensor
-from vedette.kernels.gaussian.kalman import make_innovation, make_scratch
+from vedette.kernels.base.types import Floats, Ints, Lmb, Mixture, Motion, ScanInput, Sensor
+from vedette.kernels.gaussian.innovation import make_innovation
 from vedette.kernels.gaussian.linalg import log_sum
 from vedette.kernels.gaussian.mixtures import descending_order
+from vedette.kernels.gaussian.scratch import make_scratch
 from vedette.kernels.steps.assembly import write_updated
 from vedette.kernels.steps.lmb import weigh_by_existence
 
@@ -36,36 +30,32 @@ from vedette.kernels.steps.lmb import weigh_by_existence
 class Combinations(NamedTuple):
     """Combinations of every track over the sensors so far.
 
-    rows: one a combination: the label of its track, and its updated components, whose log weights are those of the
-        track's presence, of its mixture, and of the likelihoods of what it took relative to clutter. None is absent.
-    tracks: (num,) number of the track that each is of, increasing.
-    columns: (num, num_sensors) measurement of each sensor, or MISSED; they are counted through all sensors.
-    log_absent: (num_tracks,) log probability that a track is not there.
+    The log weights of a row's components are those of the track's presence, of its mixture, and of the likelihoods of
+    what it took relative to clutter.
     """
 
-    rows: Rows
-    tracks: Ints
-    columns: Ints
-    log_absent: Floats
+    rows: Rows  # one a combination: the label of its track, and its updated components; none is absent
+    tracks: Ints  # (num,) number of the track that each is of, increasing
+    columns: Ints  # (num, num_sensors) measurement of each sensor, counted through all sensors, or MISSED
+    log_absent: Floats  # (num_tracks,) log probability that a track is not there
 
 
 class SensorReport(NamedTuple):
-    """log_clutter: sum of the log clutter intensities of a scan. num_raised: how many were raised to the floor.
-    log_kept: log of the share of the combinations' weight that the cap has left, as weighed at this sensor.
-    """
+    """What a sensor's scan added and what was left out of it."""
 
-    log_clutter: float
-    num_raised: int
-    log_kept: float
+    log_clutter: float  # sum of the log clutter intensities of the scan
+    num_raised: int  # measurements whose clutter intensity was raised to the floor
+    log_kept: float  # log of the share of the combinations' weight that the cap has left, as weighed at this sensor
 
 
 @kernel
-def predict_combinations(prior: Lmb, birth: Lmb, num_sensors: int, dt: float, motion: Motion) -> Combinations:
-    """One combination a predicted track or birth site, before the first sensor."""
+def predict_combinations(prior: Lmb, scan: ScanInput, num_sensors: int, motion: Motion) -> Combinations:
+    """One combination a predicted track or birth site, before the first sensor; measurements are not looked at."""
+    birth = scan.birth
     num_tracks, num_births = len(prior.tracks.labels), len(birth.tracks.labels)
     num, dim = num_tracks + num_births, prior.tracks.means.shape[1]
     rows = make_rows(num, len(prior.tracks.log_weights) + len(birth.tracks.log_weights), dim, 0)
-    fill_survivors(prior.tracks, motion, dt, rows, make_scratch(dim, 0))
+    fill_survivors(prior.tracks, motion, scan.dt, rows, make_scratch(dim, 0))
     fill_births(birth, num_tracks, rows)
     weigh_by_existence(prior.existence_logit, rows)
     log_absent, tracks, columns = (
@@ -110,12 +100,12 @@ def _taken(combinations: Combinations, rows: Rows, options: Options, kept: Ints,
             num_components += kept[option] * (rows.offsets[i + 1] - rows.offsets[i])
     columns, tracks = np.empty((num, combinations.columns.shape[1]), np.int64), np.empty(num, np.int64)
     grown = make_rows(num, num_components, rows.means.shape[1], 0)
-    filled, end = 0, 0
+    updated, filled, end = Mixture(grown.log_weights, grown.means, grown.covs), 0, 0
     for i in range(len(combinations.tracks)):
         for option in range(options.offsets[i], options.offsets[i + 1]):
             if kept[option] == 0:
                 continue
-            end = write_updated(i, option, rows, options, end, grown.log_weights, grown.means, grown.covs)
+            end = write_updated(i, option, rows, options, end, updated)
             tracks[filled] = combinations.tracks[i]
             for sensor in range(at):
                 columns[filled, sensor] = combinations.columns[i, sensor]
@@ -139,11 +129,9 @@ def _taken(combinations: Combinations, rows: Rows, options: Options, kept: Ints,
 
 @kernel
 def extend_combinations(
-    combinations: Combinations, at: int, shift: int, scan: Floats, pose: Floats, sensor: Sensor, truncation: Truncation
+    combinations: Combinations, at: int, shift: int, scan: ScanInput, sensor: Sensor, truncation: Truncation
 ) -> tuple[Combinations, SensorReport]:
     """The combinations after the scan of sensor `at`, whose measurements are counted from `shift` on."""
-    levels = np.empty(len(scan))
-    log_clutter, num_raised = clutter_levels(sensor, scan, pose, truncation.log_clutter_floor, levels)
     given, meas_dim = combinations.rows, len(sensor.angular)
     rows = Rows(
         given.labels,
@@ -154,7 +142,7 @@ def extend_combinations(
         given.covs,
         make_innovation(len(given.log_weights), given.means.shape[1], meas_dim),
     )
-    expect_rows(sensor, pose, rows, make_scratch(given.means.shape[1], meas_dim))
-    options = list_options(rows, scan, levels, sensor, truncation.gate)
-    kept, log_kept = _options_to_keep(combinations, options, truncation.max_hypotheses)
+    expect_rows(sensor, scan.pose, rows, make_scratch(given.means.shape[1], meas_dim))
+    options, log_clutter, num_raised = weighed_options(rows, scan, sensor, truncation)
+    kept, log_kept = _options_to_keep(combinations, options, truncation.search.max_hypotheses)
     return _taken(combinations, rows, options, kept, at, shift), SensorReport(log_clutter, num_raised, log_kept)

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
-from vedette.kernels.association.options import Rows, expect_rows, make_rows
+from vedette.kernels.association.predicted import Rows, expect_rows, make_rows
 from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.compile import kernel
-from vedette.kernels.base.types import Floats, Glmb, Sensor, Tracks
-from vedette.kernels.gaussian.kalman import make_scratch
+from vedette.kernels.base.types import Glmb, ScanInput, Sensor, Tracks
 from vedette.kernels.gaussian.mixtures import copy_component
-from vedette.kernels.steps.glmb import StepReport, finish_step
+from vedette.kernels.gaussian.scratch import make_scratch
+from vedette.kernels.steps.glmb import StepReport, finish_ranked
 
 
 @kernel
@@ -29,11 +27,8 @@ def _certain_rows(tracks: Tracks, meas_dim: int) -> Rows:
 
 
 @kernel
-def update_ranked(
-    prior: Glmb, scan: Floats, pose: Floats, sensor: Sensor, truncation: Truncation
-) -> tuple[Glmb, StepReport]:
+def update_ranked(prior: Glmb, scan: ScanInput, sensor: Sensor, truncation: Truncation) -> tuple[Glmb, StepReport]:
     """The exactly ranked hypotheses after one more sensor's scan of the same time."""
     rows = _certain_rows(prior.tracks, len(sensor.angular))
-    expect_rows(sensor, pose, rows, make_scratch(prior.tracks.means.shape[1], len(sensor.angular)))
-    posterior, _, report = finish_step(prior, 0, rows, scan, pose, sensor, truncation, np.empty(0, np.int64))
-    return posterior, report
+    expect_rows(sensor, scan.pose, rows, make_scratch(prior.tracks.means.shape[1], len(sensor.angular)))
+    return finish_ranked(prior, rows, scan, sensor, truncation)

@@ -6,12 +6,13 @@ import math
 
 import numpy as np
 
-from vedette.kernels.association.options import Rows
+from vedette.kernels.association.marginals import MarginalSums
+from vedette.kernels.association.predicted import Rows
 from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.compile import kernel
 from vedette.kernels.base.types import Floats, Ints, Lmb, Tracks
 from vedette.kernels.gaussian.linalg import log_add, log_sum
-from vedette.kernels.gaussian.mixtures import copy_component, require_gaussians
+from vedette.kernels.gaussian.mixtures import MixtureCaps, copy_component, make_components, require_gaussians
 from vedette.kernels.steps.lmb import LmbReport, Reduction, append_reduced, labels_to_keep
 from vedette.kernels.steps.multi_sensor_choices import Choices
 from vedette.kernels.steps.multi_sensor_combinations import Combinations
@@ -75,14 +76,13 @@ def _widths(chosen: Ints, rows: Rows, choices: Choices, sources: Ints) -> tuple[
 
 @kernel
 def _reduced_tracks(
-    chosen: Ints, rows: Rows, choices: Choices, sources: Ints, marginals: Floats, reduction: Reduction
+    chosen: Ints, rows: Rows, choices: Choices, sources: Ints, marginals: Floats, caps: MixtureCaps
 ) -> Tracks:
     """Each chosen track's mixture over its combinations, reduced."""
     dim = rows.means.shape[1]
     widest, total = _widths(chosen, rows, choices, sources)
     labels, offsets = np.empty((len(chosen), 2), np.int64), np.zeros(len(chosen) + 1, np.int64)
-    log_weights, means, covs = np.empty(total), np.empty((total, dim)), np.empty((total, dim, dim))
-    wide_weights, wide_means, wide_covs = np.empty(widest), np.empty((widest, dim)), np.empty((widest, dim, dim))
+    out, wide = make_components(total, dim), make_components(widest, dim)
     filled = 0
     for i in range(len(chosen)):
         width = 0
@@ -92,14 +92,12 @@ def _reduced_tracks(
             for c in range(rows.offsets[source], rows.offsets[source + 1]):
                 weight = rows.log_weights[c] + marginals[choice] - choices.log_weights[choice]
                 if weight > -math.inf:
-                    copy_component(rows.means, rows.covs, c, wide_means, wide_covs, width)
-                    wide_weights[width] = weight
+                    copy_component(rows.means, rows.covs, c, wide.means, wide.covs, width)
+                    wide.log_weights[width] = weight
                     width += 1
-        filled = append_reduced(
-            wide_weights[:width], wide_means[:width], wide_covs[:width], reduction, filled, log_weights, means, covs
-        )
+        filled = append_reduced(wide, width, caps, out, filled)
         offsets[i + 1] = filled
-    return Tracks(labels, offsets, log_weights[:filled], means[:filled], covs[:filled])
+    return Tracks(labels, offsets, out.log_weights[:filled], out.means[:filled], out.covs[:filled])
 
 
 @kernel
@@ -113,13 +111,14 @@ def update_lmb(
     """
     choices, sources, log_kept = _likely_choices(combinations, reduction.min_existence_logit)
     marginals, absent = np.empty(len(sources)), np.empty(len(choices.log_absent))
-    caps = StateCaps(truncation.max_hypotheses, truncation.max_log_gap)
+    caps = StateCaps(truncation.search.max_hypotheses, truncation.search.max_log_gap)
     log_total, num_inexact, log_summed = choice_marginals(choices, num_columns, caps, marginals, absent)
     logits = _logits(choices, marginals, absent)
     chosen, dropped = labels_to_keep(logits, reduction)
-    tracks = _reduced_tracks(chosen, combinations.rows, choices, sources, marginals, reduction)
+    tracks = _reduced_tracks(chosen, combinations.rows, choices, sources, marginals, reduction.mixture)
     require_gaussians(tracks.means, tracks.covs)
     chosen_logits = np.empty(len(chosen))
     for i in range(len(chosen)):
         chosen_logits[i] = logits[chosen[i]]
-    return Lmb(tracks, chosen_logits), LmbReport(log_total, 0.0, 0, num_inexact, log_kept + log_summed, dropped)
+    sums = MarginalSums(log_total, num_inexact, log_kept + log_summed)
+    return Lmb(tracks, chosen_logits), LmbReport(sums, 0.0, 0, dropped)

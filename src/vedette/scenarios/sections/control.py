@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 from pydantic import Field
 
@@ -59,13 +59,7 @@ class CustomReward(Custom):
     """A user's own `vedette.control.Reward`, a function of the predicted and the updated density, or `PowerReward`."""
 
     kind: Literal["custom"] = Field(default="custom", description="Kind of reward [-].")
-
-    @classmethod
-    def protocol(cls) -> type:
-        """What it gives."""
-        from vedette.control import Reward
-
-        return Reward
+    gives: ClassVar[str] = "vedette.control:Reward"
 
     def lacking(self, found: object) -> str:
         """As of other kinds; a reward of power integrals is no function."""
@@ -114,13 +108,7 @@ class CustomSearch(Custom):
     """A user's own `vedette.control.JointSearch`."""
 
     kind: Literal["custom"] = Field(default="custom", description="Kind of search [-].")
-
-    @classmethod
-    def protocol(cls) -> type:
-        """What it gives."""
-        from vedette.control import JointSearch
-
-        return JointSearch
+    gives: ClassVar[str] = "vedette.control:JointSearch"
 
     def build(self, folder: Path) -> JointSearch:
         """The user's own."""

@@ -52,6 +52,7 @@ class Custom(Section):
     function: Annotated[str, AfterValidator(_reference)] = Field(
         description="Where it is: `package.module:attribute`, or `file.py:attribute` relative to the scenario file [-]."
     )
+    gives: ClassVar[str]  # where the class or protocol of what it gives is: with it comes the compiler
     spared: ClassVar[tuple[str, ...]] = ()  # members of the protocol that it need not have
     arguments: dict[str, JsonValue] = Field(
         default={}, description="Keyword arguments, where the attribute is a class or function that is called [-]."
@@ -65,7 +66,9 @@ class Custom(Section):
     @classmethod
     def protocol(cls) -> type:
         """The class or protocol of what it gives."""
-        raise NotImplementedError
+        module, _, name = cls.gives.partition(":")
+        found: type = getattr(importlib.import_module(module), name)
+        return found
 
     def named(self, folder: Path) -> Any:
         """What `function` names; importing it runs the user's code. Raises `NotGiven` where it cannot be had."""

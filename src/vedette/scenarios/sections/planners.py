@@ -80,13 +80,7 @@ class CustomPlanner(Custom):
 
     kind: Literal["custom"] = Field(default="custom", description="Kind of planner [-].")
     spared: ClassVar[tuple[str, ...]] = ("name",)  # which the scenario gives
-
-    @classmethod
-    def protocol(cls) -> type:
-        """What it gives."""
-        from vedette.control import Planner
-
-        return Planner
+    gives: ClassVar[str] = "vedette.control:Planner"
 
     def build(self, name: str, parts: Parts, folder: Path) -> Planner:
         """The user's own, under the name that the scenario gives it."""

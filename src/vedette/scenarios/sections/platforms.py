@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 from pydantic import Field
 
@@ -146,13 +146,7 @@ class CustomPlatform(_PlatformSection, Custom):
 
     kind: Literal["custom"] = Field(default="custom", description="Kind of platform [-].")
     pose: Numbers = Field(default=(), description="Its pose at the start beyond place and heading [-].")
-
-    @classmethod
-    def protocol(cls) -> type:
-        """What it gives."""
-        from vedette.platforms import Platform
-
-        return Platform
+    gives: ClassVar[str] = "vedette.platforms:Platform"
 
     def build(self, folder: Path) -> Platform:
         """The user's own."""

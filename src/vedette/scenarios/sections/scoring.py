@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 from pydantic import Field
 
@@ -55,13 +55,7 @@ class CustomEstimator(Custom):
     """A user's own way to read the targets off a density: a function of the density and the number of the scan."""
 
     kind: Literal["custom"] = Field(default="custom", description="Kind of estimate [-].")
-
-    @classmethod
-    def protocol(cls) -> type:
-        """What it gives."""
-        from vedette.densities import Estimator
-
-        return Estimator
+    gives: ClassVar[str] = "vedette.densities:Estimator"
 
     def build(self, folder: Path) -> Estimator:
         """The user's own."""
@@ -76,13 +70,7 @@ class CustomMetric(Custom):
     """A measure of the user's own: a function of a run's record that gives one number a scan."""
 
     kind: Literal["custom"] = Field(default="custom", description="Kind of measure [-].")
-
-    @classmethod
-    def protocol(cls) -> type:
-        """What it gives."""
-        from vedette.simulation.records import Measure
-
-        return Measure
+    gives: ClassVar[str] = "vedette.simulation.records:Measure"
 
 
 class Ospa(Section):

@@ -77,13 +77,7 @@ class CustomMeasurement(Custom):
     kind: Literal["custom"] = Field(default="custom", description="Kind of measurement [-].")
     dim: ClassVar[int | None] = None
     angular: ClassVar[tuple[int, ...]] = ()
-
-    @classmethod
-    def protocol(cls) -> type:
-        """The class of what it gives."""
-        from vedette.models import MeasurementModel
-
-        return MeasurementModel
+    gives: ClassVar[str] = "vedette.models:MeasurementModel"
 
     def build(self, folder: Path) -> MeasurementModel:
         """What a sensor measures."""
@@ -142,13 +136,7 @@ class CustomNoise(Custom):
     """A user's `NoiseModel`."""
 
     kind: Literal["custom"] = Field(default="custom", description="Kind of noise [-].")
-
-    @classmethod
-    def protocol(cls) -> type:
-        """The class of what it gives."""
-        from vedette.models import NoiseModel
-
-        return NoiseModel
+    gives: ClassVar[str] = "vedette.models:NoiseModel"
 
     def build(self, measurement: Measurement, folder: Path) -> NoiseModel:
         """Measurement noise."""
@@ -238,13 +226,7 @@ class CustomDetection(Custom):
     """A user's `DetectionModel`."""
 
     kind: Literal["custom"] = Field(default="custom", description="Kind of detection [-].")
-
-    @classmethod
-    def protocol(cls) -> type:
-        """The class of what it gives."""
-        from vedette.models import DetectionModel
-
-        return DetectionModel
+    gives: ClassVar[str] = "vedette.models:DetectionModel"
 
     def build(self, folder: Path) -> DetectionModel:
         """Probability of detection."""
@@ -290,13 +272,7 @@ class CustomClutter(Custom):
     """A user's `ClutterModel`."""
 
     kind: Literal["custom"] = Field(default="custom", description="Kind of clutter [-].")
-
-    @classmethod
-    def protocol(cls) -> type:
-        """The class of what it gives."""
-        from vedette.models import ClutterModel
-
-        return ClutterModel
+    gives: ClassVar[str] = "vedette.models:ClutterModel"
 
     def build(self, measurement: MeasurementModel, kind: str, region: Region, folder: Path) -> ClutterModel:
         """False measurements; `kind` is that of the measurement."""

@@ -19,7 +19,7 @@ if TYPE_CHECKING:  # with the models comes the compiler, which a check does with
     from vedette.simulation import ScriptedTargets as ScriptedSource
 
 
-class World(Protocol):
+class _World(Protocol):
     """What of a scenario targets are made with."""
 
     @property
@@ -50,7 +50,7 @@ class ScriptedTargets(Section):
     kind: Literal["scripted"] = Field(default="scripted", description="Kind of targets [-].")
     tracks: Annotated[tuple[ScriptedTarget, ...], Field(strict=False)] = Field(description="The targets [-].")
 
-    def build(self, world: World, motion: MotionModel, folder: Path) -> ScriptedSource:
+    def build(self, world: _World, motion: MotionModel, folder: Path) -> ScriptedSource:
         """The targets, as `motion` moves them."""
         from vedette.simulation import ScriptedTargets
 
@@ -113,7 +113,7 @@ class RecordedTargets(Section):
     )
     crop: bool = Field(default=True, description="Whether tracks end at the edges of the region [-].")
 
-    def build(self, world: World, motion: MotionModel, folder: Path) -> RecordedSource:
+    def build(self, world: _World, motion: MotionModel, folder: Path) -> RecordedSource:
         """The targets, as they were recorded. Raises `InputError` for a file that cannot be read, or gives none."""
         from vedette.scenarios.records import recorded_source
 

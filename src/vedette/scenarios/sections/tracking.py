@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 from pydantic import Field
 
@@ -151,13 +151,7 @@ class CustomFilter(Custom):
     gaussian_method: GaussianMethod = Field(
         default="auto", description="Extended, unscented or cubature Kalman; auto: extended where Jacobians exist [-]."
     )
-
-    @classmethod
-    def protocol(cls) -> type:
-        """What it gives."""
-        from vedette.filters import Filter
-
-        return Filter
+    gives: ClassVar[str] = "vedette.filters:Filter"
 
     def build(self, targets: TargetModel, sensor: SensorModel, folder: Path) -> LocalFilter:
         """The filter of one sensor."""
@@ -252,13 +246,7 @@ class CustomFusion(Custom):
 
     kind: Literal["custom"] = Field(default="custom", description="Kind of fusion [-].")
     feedback: bool = Field(default=False, description="Whether the fused density replaces the sensors' own [-].")
-
-    @classmethod
-    def protocol(cls) -> type:
-        """What it gives."""
-        from vedette.fusion import Fusion
-
-        return Fusion
+    gives: ClassVar[str] = "vedette.fusion:Fusion"
 
     def build(self, num_sensors: int, folder: Path) -> FusionRule:
         """The fusion of the sensors' densities."""

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
@@ -129,13 +129,7 @@ class CustomMotion(Custom):
 
     kind: Literal["custom"] = Field(default="custom", description="Kind of motion [-].")
     state_dim: Annotated[Whole, Field(ge=2, le=100, description="Number of components of its state [-].")]
-
-    @classmethod
-    def protocol(cls) -> type:
-        """The class of what it gives."""
-        from vedette.models import MotionModel
-
-        return MotionModel
+    gives: ClassVar[str] = "vedette.models:MotionModel"
 
     @property
     def state_order(self) -> Literal["grouped"]:
@@ -177,13 +171,7 @@ class CustomSurvival(Custom):
     """A user's `SurvivalModel`."""
 
     kind: Literal["custom"] = Field(default="custom", description="Kind of survival [-].")
-
-    @classmethod
-    def protocol(cls) -> type:
-        """The class of what it gives."""
-        from vedette.models import SurvivalModel
-
-        return SurvivalModel
+    gives: ClassVar[str] = "vedette.models:SurvivalModel"
 
     def build(self, folder: Path) -> SurvivalModel:
         """The survival model."""

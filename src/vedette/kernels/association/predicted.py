@@ -1,0 +1,136 @@
+"""The rows of a scan: tracks predicted to its time, with what each of them expects to be measured as.
+
+Survivors stand before birth sites. That a track may be gone, or a site empty, is in its row's weights, so that one pass
+over the rows predicts and updates together (Vo, Vo, Hoang 2017, section III-C).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from vedette.errors import ModelError
+from vedette.kernels.base.compile import borrowing, inlined, kernel
+from vedette.kernels.base.types import Floats, Ints, Lmb, Motion, ScanInput, Sensor, Tracks
+from vedette.kernels.gaussian.innovation import Innovation, expect, make_innovation
+from vedette.kernels.gaussian.linalg import log_add
+from vedette.kernels.gaussian.mixtures import copy_component
+from vedette.kernels.gaussian.prediction import predict
+from vedette.kernels.gaussian.scratch import Scratch, make_scratch
+
+
+class Rows(NamedTuple):
+    """Predicted tracks, ready to be updated."""
+
+    labels: Ints  # (num_rows, 2)
+    offsets: Ints  # (num_rows + 1,) into the components
+    log_absent: Floats  # (num_rows,) log probability of not being there
+    log_weights: Floats  # (num_components,) log of mixture weight times probability of being there
+    means: Floats  # (num_components, state_dim) predicted
+    covs: Floats  # (num_components, state_dim, state_dim) predicted
+    innovation: Innovation
+
+
+@inlined
+def log_or_minus_inf(value: float) -> float:
+    return math.log(value) if value > 0.0 else -math.inf
+
+
+@kernel
+def make_rows(num_rows: int, num_components: int, state_dim: int, meas_dim: int) -> Rows:
+    return Rows(
+        np.empty((num_rows, 2), np.int64),
+        np.zeros(num_rows + 1, np.int64),
+        np.empty(num_rows),
+        np.empty(num_components),
+        np.empty((num_components, state_dim)),
+        np.empty((num_components, state_dim, state_dim)),
+        make_innovation(num_components, state_dim, meas_dim),
+    )
+
+
+@inlined
+def view_rows(rows: Rows, num: int) -> Rows:
+    """Room for `num` rows of one component each."""
+    innovation = rows.innovation
+    return Rows(
+        rows.labels[:num],
+        rows.offsets[: num + 1],
+        rows.log_absent[:num],
+        rows.log_weights[:num],
+        rows.means[:num],
+        rows.covs[:num],
+        Innovation(
+            innovation.predicted[:num],
+            innovation.factor[:num],
+            innovation.whitened_cross[:num],
+            innovation.covs[:num],
+            innovation.log_norm[:num],
+            innovation.prob_detection[:num],
+        ),
+    )
+
+
+@borrowing
+def fill_survivors(tracks: Tracks, motion: Motion, dt: float, rows: Rows, scratch: Scratch) -> None:
+    """Predict every track into the first rows."""
+    rows.offsets[0] = 0
+    for i in range(len(tracks.labels)):
+        absent = 0.0
+        for c in range(tracks.offsets[i], tracks.offsets[i + 1]):
+            mean = tracks.means[c]
+            survival = motion.prob_survival(mean, dt, motion.survival_params)
+            if not 0.0 <= survival <= 1.0:
+                raise ModelError("survival model: probability is not in [0, 1]")
+            # 1 - <p, P_S>: who is in this mixture has died. What survives keeps its weight in the mixture.
+            absent += math.exp(tracks.log_weights[c]) * (1.0 - survival)
+            rows.log_weights[c] = tracks.log_weights[c] + log_or_minus_inf(survival)
+            predict(motion, dt, mean, tracks.covs[c], rows.means[c], rows.covs[c], scratch)
+        rows.log_absent[i] = log_or_minus_inf(absent)
+        rows.labels[i, 0], rows.labels[i, 1] = tracks.labels[i, 0], tracks.labels[i, 1]
+        rows.offsets[i + 1] = tracks.offsets[i + 1]
+
+
+@borrowing
+def fill_births(birth: Lmb, first_row: int, rows: Rows) -> None:
+    """Append the birth sites after `first_row` survivors."""
+    sites = birth.tracks
+    shift = rows.offsets[first_row]
+    for i in range(len(sites.labels)):
+        row = first_row + i
+        rows.labels[row, 0], rows.labels[row, 1] = sites.labels[i, 0], sites.labels[i, 1]
+        # log (1 - r) and log r of the logit, exact near 0 and 1.
+        rows.log_absent[row] = -log_add(0.0, birth.existence_logit[i])
+        log_existence = -log_add(0.0, -birth.existence_logit[i])
+        rows.offsets[row + 1] = shift + sites.offsets[i + 1]
+        for c in range(sites.offsets[i], sites.offsets[i + 1]):
+            rows.log_weights[shift + c] = sites.log_weights[c] + log_existence
+            copy_component(sites.means, sites.covs, c, rows.means, rows.covs, shift + c)
+
+
+@borrowing
+def expect_rows(sensor: Sensor, pose: Floats, rows: Rows, scratch: Scratch) -> None:
+    """Write what every component of the rows expects of a scan taken from `pose`."""
+    for c in range(len(rows.log_weights)):
+        expect(sensor, pose, rows.means[c], rows.covs[c], c, rows.innovation, scratch)
+
+
+@inlined
+def predict_rows(tracks: Tracks, scan: ScanInput, motion: Motion, sensor: Sensor, rows: Rows, scratch: Scratch) -> None:
+    """Write the rows of a scan, as many as `rows` has room for; the measurements are not looked at."""
+    fill_survivors(tracks, motion, scan.dt, rows, scratch)
+    fill_births(scan.birth, len(tracks.labels), rows)
+    expect_rows(sensor, scan.pose, rows, scratch)
+
+
+@kernel
+def predicted_rows(tracks: Tracks, scan: ScanInput, motion: Motion, sensor: Sensor) -> Rows:
+    """As `predict_rows`, into arrays made for it."""
+    sites, state_dim, meas_dim = scan.birth.tracks, tracks.means.shape[1], len(sensor.angular)
+    # Every component has its innovation here once, whatever number of hypotheses hold its track.
+    num_rows = len(tracks.labels) + len(sites.labels)
+    rows = make_rows(num_rows, len(tracks.log_weights) + len(sites.log_weights), state_dim, meas_dim)
+    predict_rows(tracks, scan, motion, sensor, rows, make_scratch(state_dim, meas_dim))
+    return rows

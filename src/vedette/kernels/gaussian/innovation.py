@@ -1,0 +1,198 @@
+"""What a Gaussian expects of a measurement, and its update by one: extended, unscented and cubature Kalman filters."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from vedette.errors import ModelError
+from vedette.kernels.base import bundle_types as _bundle_types  # noqa: F401
+from vedette.kernels.base.compile import borrowing, inlined, kernel
+from vedette.kernels.base.types import Bools, Floats, Sensor
+from vedette.kernels.gaussian.joseph import posterior_of_squares
+from vedette.kernels.gaussian.linalg import LOG_2PI, cholesky_of_size, log_det_from_factor
+from vedette.kernels.gaussian.scratch import Scratch, wrap_angle
+from vedette.kernels.gaussian.sigma_points import LINEARISED, PointWeights, fill_sigma_points, moments_of_images
+
+# Where a scan leaves less than this of the volume that was expected of it, cov - cross' cross cancels too many digits.
+_LEAST_SHRINKAGE = 1e-8
+
+
+class Innovation(NamedTuple):
+    """What each component expects of a scan: everything that an update needs but the measurement.
+
+    With the state-measurement covariance C and the innovation covariance S = L L', the whitened cross W = L^-1 C' gives
+    the gain K = W' L^-1, the posterior covariance P - W'W, and the posterior mean m + W' v of a whitened residual v.
+    """
+
+    predicted: Floats  # (num, meas_dim) expected measurement
+    factor: Floats  # (num, meas_dim, meas_dim) L, in the lower triangle
+    whitened_cross: Floats  # (num, meas_dim, state_dim) W
+    covs: Floats  # (num, state_dim, state_dim) posterior covariances, the same for all measurements
+    log_norm: Floats  # (num,) log of the normalising constant of the predicted measurement's Gaussian
+    prob_detection: Floats  # (num,)
+
+
+@kernel
+def make_innovation(num: int, state_dim: int, meas_dim: int) -> Innovation:
+    return Innovation(
+        np.empty((num, meas_dim)),
+        np.empty((num, meas_dim, meas_dim)),
+        np.empty((num, meas_dim, state_dim)),
+        np.empty((num, state_dim, state_dim)),
+        np.empty(num),
+        np.empty(num),
+    )
+
+
+@borrowing
+def _expect_sigma_points(
+    sensor: Sensor, pose: Floats, mean: Floats, cov: Floats, predicted: Floats, cross: Floats, scratch: Scratch
+) -> PointWeights:
+    """Predicted measurement, innovation covariance without noise, and cross; the images are left as deviations."""
+    n, m = mean.shape[0], predicted.shape[0]
+    points, images = scratch.points, scratch.images
+    weights = fill_sigma_points(sensor.method, mean, cov, points, scratch.factor)
+    for i in range(weights.num):
+        sensor.measurement(points[i], pose, sensor.measurement_params, scratch.residual)
+        for a in range(m):
+            images[i, a] = scratch.residual[a]
+    moments_of_images(images, weights, m, sensor.angular, predicted, scratch.innovation_cov)
+    for a in range(m):
+        for j in range(n):
+            total = 0.0
+            for i in range(1, weights.num):
+                total += weights.other * images[i, a] * (points[i, j] - mean[j])
+            cross[a, j] = total
+    return weights
+
+
+@inlined
+def _project(jacobian: Floats, cov: Floats, cross: Floats, innovation: Floats, n: int, m: int) -> None:
+    """cross = jacobian cov; innovation = cross jacobian', its lower triangle."""
+    for a in range(m):
+        for j in range(n):
+            total = 0.0
+            for k in range(n):
+                total += jacobian[a, k] * cov[k, j]
+            cross[a, j] = total
+        for b in range(a + 1):
+            total = 0.0
+            for k in range(n):
+                total += cross[a, k] * jacobian[b, k]
+            innovation[a, b] = total
+
+
+@inlined
+def _has_volume(noise: Floats, factor: Floats, work: Floats, m: int) -> bool:
+    """Whether the noise has at least `_LEAST_SHRINKAGE` of the determinant of the innovation covariance L L'.
+
+    That share bounds from below what any direction of the state keeps of its variance. work: to be written.
+    """
+    expected = 1.0
+    for a in range(m):
+        expected *= factor[a, a] * factor[a, a]
+    if m == 1:
+        return noise[0, 0] > _LEAST_SHRINKAGE * expected
+    if m == 2:
+        skew = 0.5 * (noise[0, 1] + noise[1, 0])
+        return noise[0, 0] * noise[1, 1] - skew * skew > _LEAST_SHRINKAGE * expected
+    if not cholesky_of_size(noise, work, m):
+        return False
+    own = 1.0
+    for a in range(m):
+        own *= work[a, a] * work[a, a]
+    return own > _LEAST_SHRINKAGE * expected
+
+
+@inlined
+def _condition(
+    cov: Floats, noise: Floats, innovation: Floats, factor: Floats, cross: Floats, posterior: Floats, n: int, m: int
+) -> bool:
+    """Add the noise to `innovation` and factor it; whiten `cross`; posterior = cov - cross' cross.
+
+    False where that difference cancels so much that it must be taken by `posterior_of_squares`.
+    """
+    for a in range(m):
+        for b in range(a + 1):
+            innovation[a, b] += 0.5 * (noise[a, b] + noise[b, a])
+    if not cholesky_of_size(innovation, factor, m):
+        raise ModelError("measurement model: innovation covariance is not positive definite or not finite")
+    # W = L^-1 C': then K = W' L^-1, and K S K' = W'W needs no gain.
+    for a in range(m):
+        for j in range(n):
+            total = cross[a, j]
+            for k in range(a):
+                total -= factor[a, k] * cross[k, j]
+            cross[a, j] = total / factor[a, a]
+    for i in range(n):
+        for j in range(i + 1):
+            total = cov[i, j]
+            for a in range(m):
+                total -= cross[a, i] * cross[a, j]
+            posterior[i, j] = total
+            posterior[j, i] = total
+    return _has_volume(noise, factor, innovation, m)
+
+
+@inlined
+def expect(sensor: Sensor, pose: Floats, mean: Floats, cov: Floats, at: int, out: Innovation, scratch: Scratch) -> None:
+    """Fill entry `at` of `out`; noise and detection probability are taken at the predicted mean (paper-notes 3)."""
+    n, m = mean.shape[0], out.predicted.shape[1]
+    jacobian, noise, innovation = scratch.measurement_jacobian, scratch.measurement_noise, scratch.innovation_cov
+    factor, cross, posterior = out.factor[at], out.whitened_cross[at], out.covs[at]
+    linearised, weights = sensor.method == LINEARISED, PointWeights(0, 0.0, 0.0)
+    if linearised:
+        sensor.measurement(mean, pose, sensor.measurement_params, out.predicted[at])
+        sensor.measurement_jacobian(mean, pose, sensor.measurement_params, jacobian)
+    else:
+        weights = _expect_sigma_points(sensor, pose, mean, cov, out.predicted[at], cross, scratch)
+    sensor.measurement_noise_cov(mean, pose, sensor.noise_params, noise)
+    # A constant size is unrolled by the compiler.
+    if linearised and n == 4 and m == 2:
+        _project(jacobian, cov, cross, innovation, 4, 2)
+        exact = _condition(cov, noise, innovation, factor, cross, posterior, 4, 2)
+    else:
+        if linearised:
+            _project(jacobian, cov, cross, innovation, n, m)
+        exact = _condition(cov, noise, innovation, factor, cross, posterior, n, m)
+    if not exact:
+        posterior_of_squares(mean, cov, factor, cross, weights, scratch, posterior)
+    out.log_norm[at] = -0.5 * (log_det_from_factor(factor) + m * LOG_2PI)
+    detection = sensor.prob_detection(mean, pose, sensor.detection_params)
+    if not 0.0 <= detection <= 1.0:
+        raise ModelError("detection model: probability is not in [0, 1]")
+    out.prob_detection[at] = detection
+
+
+@inlined
+def whiten(innovation: Innovation, at: int, measurement: Floats, angular: Bools, gate: float, out: Floats) -> float:
+    """Whitened residual of a measurement against component `at`; returns its squared Mahalanobis distance.
+
+    Once that is known to be above `gate` the rest is left undone and a lower bound of it is returned.
+    """
+    factor = innovation.factor[at]
+    distance = 0.0
+    for a in range(measurement.shape[0]):
+        total = measurement[a] - innovation.predicted[at, a]
+        if angular[a]:
+            total = wrap_angle(total)
+        for k in range(a):
+            total -= factor[a, k] * out[k]
+        out[a] = total / factor[a, a]
+        distance += out[a] * out[a]
+        # The distance only grows: what is gated out need not be whitened to the end.
+        if distance > gate:
+            break
+    return distance
+
+
+@inlined
+def update_mean(innovation: Innovation, at: int, whitened: Floats, mean: Floats, out: Floats) -> None:
+    """Posterior mean of component `at` given the whitened residual of its measurement."""
+    for j in range(mean.shape[0]):
+        total = mean[j]
+        for a in range(whitened.shape[0]):
+            total += innovation.whitened_cross[at, a, j] * whitened[a]
+        out[j] = total

@@ -1,0 +1,58 @@
+"""Working arrays of the Gaussian kernels, and angles."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from vedette.kernels.base.compile import inlined, kernel
+from vedette.kernels.base.types import Bools, Floats
+
+_TWO_PI = 2.0 * math.pi
+
+
+class Scratch(NamedTuple):
+    """Working arrays of one thread for a state of n components and measurements of m."""
+
+    jacobian: Floats  # (n, n) of the motion
+    product: Floats  # (n, n) Jacobian times covariance
+    noise: Floats  # (n, n) of the motion; later K R K'
+    factor: Floats  # (n, n) Cholesky factor of the covariance, for sigma points
+    points: Floats  # (2 n + 1, n) sigma points
+    images: Floats  # (2 n + 1, max(n, m)) their images, then the deviations of these from their mean
+    measurement_jacobian: Floats  # (m, n)
+    measurement_noise: Floats  # (m, m)
+    innovation_cov: Floats  # (m, m)
+    residual: Floats  # (m,)
+    gain: Floats  # (m, n) transposed
+    angular_state: Bools  # (n,) all false: no component of a state is wrapped
+
+
+@kernel
+def make_scratch(state_dim: int, meas_dim: int) -> Scratch:
+    num_points = 2 * state_dim + 1
+    return Scratch(
+        np.empty((state_dim, state_dim)),
+        np.empty((state_dim, state_dim)),
+        np.empty((state_dim, state_dim)),
+        np.empty((state_dim, state_dim)),
+        np.empty((num_points, state_dim)),
+        np.empty((num_points, max(state_dim, meas_dim))),
+        np.empty((meas_dim, state_dim)),
+        np.empty((meas_dim, meas_dim)),
+        np.empty((meas_dim, meas_dim)),
+        np.empty(meas_dim),
+        np.empty((meas_dim, state_dim)),
+        np.zeros(state_dim, np.bool_),
+    )
+
+
+@inlined
+def wrap_angle(angle: float) -> float:
+    """The same direction in (-pi, pi]."""
+    if -math.pi < angle <= math.pi:
+        return angle
+    wrapped = angle - _TWO_PI * math.floor((angle + math.pi) / _TWO_PI)
+    return math.pi if wrapped <= -math.pi else wrapped
