@@ -23,9 +23,9 @@ BUILD = ROOT / "build"
 LOGS = BUILD / "check"
 GRACE = 10.0  # seconds that an interrupted stage has to tidy up
 
-# Tests that run the program as a user does, many in processes of their own; the others are of the library's parts.
-PROGRAM = [f"tests/{name}" for name in ("campaigns", "cli", "evaluation", "fuzz", "reports", "scenarios", "simulation")]
-PROGRAM += ["tests/test_examples.py", "tests/test_project.py"]
+# Tests that start processes, and those of the program as a user runs it; the others are of the library's parts.
+CAMPAIGNS = ["tests/campaigns", "tests/fuzz", "tests/test_extending.py", "tests/test_project.py"]
+PROGRAM = [f"tests/{name}" for name in ("cli", "evaluation", "reports", "scenarios", "simulation", "test_examples.py")]
 
 
 @dataclass(frozen=True)
@@ -48,21 +48,25 @@ def lane(purpose: str, name: str, **environment: str) -> Stage:
     return Stage(purpose, python("pytest", "-q", "-m", "lanes and not slow"), environment)
 
 
-# In the order in which they start: what takes longest comes first, and what starts processes when kernels are there.
+def tests(purpose: str, *places: str) -> Stage:
+    return Stage(purpose, python("pytest", "-q", "--durations=10", *places))
+
+
+# In the order in which they start. The library's tests compile nearly all kernels, while the other side is busy with
+# what needs none of them; what starts processes begins when the kernels are there.
 STAGES = {
-    "tests-library": Stage(
+    "tests-library": tests(
         "models, filters, fusion, control and all below",
-        python("pytest", "-q", "--durations=10", "tests", *(f"--ignore={path}" for path in PROGRAM)),
+        "tests",
+        *(f"--ignore={place}" for place in (*CAMPAIGNS, *PROGRAM)),
     ),
     "types": Stage("strict types of the library", python("mypy")),
     "types-tests": Stage("types of the tests", python("mypy", "--config-file", "tests/mypy.ini")),
     "jit-off": lane("kernels as plain Python", "jit-off", NUMBA_DISABLE_JIT="1"),
     # An index is out of bounds however well the code is optimised, and little optimisation compiles faster.
     "bounds": lane("kernels with bounds checks", "bounds", NUMBA_BOUNDSCHECK="1", NUMBA_OPT="1"),
-    "tests-program": Stage(
-        "campaigns, command line, reports, examples and what they stand on",
-        python("pytest", "-q", "--durations=10", *PROGRAM),
-    ),
+    "tests-program": tests("command line, scenarios, reports, examples", *PROGRAM),
+    "tests-campaigns": tests("campaigns, fuzzers, extensions, the project itself", *CAMPAIGNS),
     "docs": Stage(
         "the documentation, without warnings", python("mkdocs", "build", "--strict", "-q", "-d", "build/site")
     ),

@@ -61,14 +61,14 @@ class CauchySchwarzReward:
     """
 
     unit_volume: UnitVolume = 1.0
-    exponents: ClassVar[Exponents] = ((2.0, 0.0), (0.0, 2.0), (1.0, 1.0))
+    exponents: ClassVar[Exponents] = ((0.0, 2.0), (1.0, 1.0), (2.0, 0.0))
 
     def __post_init__(self) -> None:
         check_unit_volume(self.unit_volume)
 
     def combine(self, z: Floats) -> Floats:
         """(Z(2, 0) + Z(0, 2)) / 2 - Z(1, 1)."""
-        return 0.5 * (z[..., 0] + z[..., 1]) - z[..., 2]
+        return 0.5 * (z[..., 0] + z[..., 2]) - z[..., 1]
 
     def __call__(self, predicted: GLMB | LMB, updated: GLMB | LMB) -> float:
         volume = unit_volume_of(self, predicted)
@@ -100,12 +100,12 @@ class RenyiReward:
     @property
     def exponents(self) -> Exponents:
         """(order, 1 - order), and what normalises the two."""
-        return (self.order, 1.0 - self.order), (1.0, 0.0), (0.0, 1.0)
+        return (0.0, 1.0), (self.order, 1.0 - self.order), (1.0, 0.0)
 
     def combine(self, z: Floats) -> Floats:
         """(Z(order, 1 - order) - order Z(1, 0) - (1 - order) Z(0, 1)) / (order - 1)."""
         order = self.order
-        return np.asarray((z[..., 0] - order * z[..., 1] - (1.0 - order) * z[..., 2]) / (order - 1.0))
+        return np.asarray((z[..., 1] - order * z[..., 2] - (1.0 - order) * z[..., 0]) / (order - 1.0))
 
     def __call__(self, predicted: GLMB | LMB, updated: GLMB | LMB) -> float:
         return renyi(predicted, updated, self.order, support="common")

@@ -75,7 +75,7 @@ class PowerProducts:
             power_table(self.laid, self.first_cases, taken, terms, first, last, found)
 
         run_chunks(work, len(actions), self.num_threads)
-        return np.ascontiguousarray(found[:, :, np.argsort(order)])
+        return found if (np.diff(order) > 0).all() else np.ascontiguousarray(found[:, :, np.argsort(order)])
 
     def _terms(self, alone: Floats, crossed: Floats, own: Floats, log_unit_volume: float) -> Terms:
         sizes, dim = np.diff(self.laid.set_offsets), self.state_dim

@@ -73,7 +73,10 @@ def _tracker(scenario: Scenario, filters: tuple[Filter, ...]) -> Tracker:
     """The filters and their fusion, or one filter for all sensors."""
     model = scenario.model
     if model.fusion.kind == "central" and isinstance(model.filter, FilterSection):
-        return Central(model.filter.build_central(shared_targets(filters), tuple(local.sensor for local in filters)))
+        targets, sensors, own = shared_targets(filters), tuple(local.sensor for local in filters), model.fusion.filter
+        if own is not None:
+            return Central(own.made(scenario.folder, targets=targets, sensors=sensors))
+        return Central(model.filter.build_central(targets, sensors))
     return Distributed(filters, model.fusion.build(len(filters), scenario.folder), model.fusion.feedback)
 
 

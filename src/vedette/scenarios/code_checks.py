@@ -14,7 +14,7 @@ from vedette.scenarios.loading import Scenario, document_of, place_fault
 from vedette.scenarios.sections.custom import NotGiven
 
 # These are made of other parts, and so as parts of the whole.
-_MADE_OF_PARTS = ("filter", "fusion", "planner")
+_MADE_OF_PARTS = ("filter", "fusion", "central", "planner")
 
 
 def code_faults(scenario: Scenario) -> list[str]:

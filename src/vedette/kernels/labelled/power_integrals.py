@@ -27,6 +27,7 @@ from vedette.kernels.gaussian.linalg import log_add
 from vedette.kernels.gaussian.mixtures import match_components
 
 _SAME_POWER = 1e-12
+_LARGEST_PRODUCT = 1e200
 
 
 class SensorCases(NamedTuple):
@@ -77,7 +78,9 @@ class Work(NamedTuple):
     product: Floats  # (row_size,)
     joint: Floats  # (row_size,)
     crossed: Floats  # (num_crossed,) log integrals of p^a g^b over the labels of a set
-    sums: Floats  # (num_changing,) over the label sets of a factor
+    peaks: Floats  # (num_changing,) largest term among the label sets of a factor
+    sums: Floats  # (num_changing,) of the terms' exponentials, relative to it
+    products: Floats  # (num_changing,) of such sums over factors, of which one logarithm is taken for all
 
 
 @kernel
@@ -182,8 +185,26 @@ def _add_terms(at: int, weight: float, overlap: float, quadratic: float, terms: 
             term += work.crossed[e - num_alone]
         if math.isnan(term) and (math.isinf(weight) or math.isinf(given)):
             term = -math.inf  # both densities are zero, or one is whose power is positive
-        if work.sums[e] < math.inf:
-            work.sums[e] = log_add(work.sums[e], term)
+        peak = work.peaks[e]
+        if term > peak:
+            work.sums[e] = 1.0 + (work.sums[e] * math.exp(peak - term) if peak > -math.inf else 0.0)
+            work.peaks[e] = term
+        elif -math.inf < term < math.inf:
+            work.sums[e] += math.exp(term - peak)
+        elif math.isnan(term):
+            work.peaks[e] = term
+
+
+@inlined
+def _add_factor(work: Work, out: Floats) -> None:
+    """Add the log of a factor's sum to each total, but for what stays in `work.products`."""
+    for e in range(out.shape[0]):
+        out[e] += work.peaks[e]
+        if work.sums[e] > 0.0:
+            work.products[e] *= work.sums[e]
+        if work.products[e] > _LARGEST_PRODUCT:
+            out[e] += math.log(work.products[e])
+            work.products[e] = 1.0
 
 
 @inlined
@@ -199,11 +220,11 @@ def _power_integrals(laid: Laid, chosen: Ints, terms: Terms, work: Work, out: Fl
     """Z of all pairs for one product. A label set that no case holds is left out, also of Z(a, 0)."""
     num, all_held = work.sums.shape[0], True
     for e in range(num):
-        out[e] = 0.0
+        out[e], work.products[e] = 0.0, 1.0
     for factor in range(laid.factor_offsets.shape[0] - 1):
         any_held = False
         for e in range(num):
-            work.sums[e] = -math.inf
+            work.peaks[e], work.sums[e] = -math.inf, 0.0
         for at in range(laid.factor_offsets[factor], laid.factor_offsets[factor + 1]):
             if not (laid.all_held or _is_held(laid, chosen, at)):
                 all_held = False
@@ -214,8 +235,9 @@ def _power_integrals(laid: Laid, chosen: Ints, terms: Terms, work: Work, out: Fl
             overlap, quadratic = _integrate(laid, chosen, at, terms, work)
             _add_terms(at, weight, overlap, quadratic, terms, work)
         if any_held:
-            for e in range(num):
-                out[e] += work.sums[e]
+            _add_factor(work, out[:num])
+    for e in range(num):
+        out[e] += math.log(work.products[e])
     for e in range(terms.own_totals.shape[0]):
         out[num + e] = terms.own_totals[e] if all_held else _own_of_held(laid, chosen, terms.own[e])
 
@@ -243,7 +265,8 @@ def power_table(laid: Laid, first_cases: Ints, actions: Ints, terms: Terms, firs
     """
     num_sensors, num_samples, size = len(first_cases), out.shape[1], laid.rows.shape[2]
     chosen, num = np.empty(num_sensors, np.int64), len(terms.log_weights)
-    work = Work(np.empty(size), np.empty(size), np.empty(len(terms.own_powers)), np.empty(num))
+    sums = np.empty((3, num))
+    work = Work(np.empty(size), np.empty(size), np.empty(len(terms.own_powers)), sums[0], sums[1], sums[2])
     for joint in range(first, last):
         for sample in range(num_samples):
             for s in range(num_sensors):

@@ -184,6 +184,19 @@ class FusionLimits(Section):
     )
 
 
+class CustomCentral(Custom):
+    """A user's own `vedette.tracking.CentralFilter`, of all sensors' scans; called with `targets` and `sensors`."""
+
+    kind: Literal["custom"] = Field(default="custom", description="Kind of filter [-].")
+
+    @classmethod
+    def protocol(cls) -> type:
+        """What it gives."""
+        from vedette.tracking import CentralFilter
+
+        return CentralFilter
+
+
 class Fusion(Section):
     """How the sensors' densities become one: generalised covariance intersection (paper section II-D)."""
 
@@ -192,6 +205,11 @@ class Fusion(Section):
         description="Of marginalised delta-GLMB densities, of LMB densities, or none (a single sensor). central: one "
         "filter takes the scans of all sensors, and nothing is fused while tracking; what is set here then serves the "
         "joint decisions alone [-].",
+    )
+    filter: CustomCentral | None = Field(
+        default=None,
+        description="Of a central fusion: a filter of your own for all sensors' scans; none: that of the filter's kind "
+        "[-].",
     )
     weights: Weights | None = Field(
         default=None, description="Weight of each sensor, with sum 1; none: equal weights [-]."
@@ -216,6 +234,11 @@ class Fusion(Section):
     def _sum_to_one(self) -> Iterator[Finding]:
         if self.weights is not None and abs(math.fsum(self.weights) - 1.0) > _WEIGHT_TOLERANCE:
             yield ("weights",), "weights with sum 1", f"a sum of {math.fsum(self.weights):g}"
+
+    @check
+    def _filter_of_all(self) -> Iterator[Finding]:
+        if self.filter is not None and self.kind != "central":
+            yield ("filter",), "none, as the fusion is not central", "a filter"
 
     def scaled_weights(self, num_sensors: int) -> tuple[float, ...]:
         """Weight of each sensor: equal where none are given; scaled to sum to one beyond the rounding of the file."""
