@@ -31,7 +31,7 @@ def make_choices(tracks, log_absent, num_sensors):
 
 def enumerated(choices):
     """Log total weight of all joint choices; probability of each choice, and of each track's absence."""
-    num_tracks, log_all = len(choices.log_absent), []
+    num_tracks = len(choices.log_absent)
     lists = [[-1, *range(choices.offsets[t], choices.offsets[t + 1])] for t in range(num_tracks)]
     found = []
     for chosen in itertools.product(*lists):
