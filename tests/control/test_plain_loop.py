@@ -239,11 +239,11 @@ class Combination:
 @pytest.mark.parametrize("num_sensors", [1, 2, 3])
 def test_rewards_of_power_integrals(reward: Any, kind: str, num_sensors: int) -> None:
     """Laid out and one by one; with certain detection label sets lose all their weight in some cases."""
-    detection = {"detection": models.DetectionModel(certain)} if kind == "certain" else {}
+    detection: dict[str, Any] = {"detection": models.DetectionModel(certain)} if kind == "certain" else {}
     example = situation("lmb" if kind == "lmb" else "delta", num_sensors, seed=3, **detection)
     if kind == "glmbs to lmb":
-        fusion = Clmb(example.fusion.weights)
-        example = replace(example, fusion=fusion, fused=fusion.fuse(example.beliefs)[0])
+        clmb = Clmb(example.fusion.weights)
+        example = replace(example, fusion=clmb, fused=clmb.fuse(example.beliefs)[0])
     evaluator = evaluator_of(example, reward)
     if kind == "certain":
         assert any(np.isneginf(own.log_weights).any() for own in evaluator.posteriors)

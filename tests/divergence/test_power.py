@@ -24,7 +24,9 @@ K = 3.0
 
 def log_integral(a: float, p: Any, b: float, q: Any) -> float:
     """log of the integral of N(p)^a N(q)^b."""
-    precision, linear, constant = 0.0, 0.0, 0.0
+    precision: Any = 0.0
+    linear: Any = 0.0
+    constant = 0.0
     for power, (mean, cov) in ((a, p), (b, q)):
         inverse = np.linalg.inv(cov)
         precision, linear = precision + power * inverse, linear + power * inverse @ mean
@@ -94,7 +96,7 @@ def test_power_integrals_are_sums_over_label_sets(seed: int, kinds: str) -> None
             with pytest.raises(InputError, match="support: 'common' is for densities that share a label set"):
                 power_integrals(p, q, PAIRS, support=support)
             continue
-        got = power_integrals(p, q, PAIRS, unit_volume=K, support=support)  # type: ignore[arg-type]
+        got = power_integrals(p, q, PAIRS, unit_volume=K, support=support)
         expected = [enumerated(p, q, a, b, support) for a, b in PAIRS]
         np.testing.assert_allclose(got, expected, rtol=1e-10, atol=1e-10)
 

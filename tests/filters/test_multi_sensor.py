@@ -33,7 +33,7 @@ DT = 1.5
 POSES = [np.zeros(3)] * 3
 ORDERS = [(0, 1, 2), (2, 1, 0), (1, 2, 0)]
 KINDS = [MultiSensorGlmbFilter, MultiSensorLmbFilter]
-SCANS = [
+SCANS: Any = [
     [np.array([[112.0, 52.0], [131.0, 48.0]]), np.array([[118.0, 55.0]]), np.array([[125.0]])],
     [np.array([[120.0, 49.0]]), np.empty((0, 2)), np.array([[122.0]])],
 ]
@@ -156,9 +156,10 @@ def test_one_sensor_is_the_filter_of_one_sensor(name):
         pytest.skip("long in plain Python")
     scene, rng = SCENES[name](), np.random.default_rng(0)
     for several, one in ((MultiSensorGlmbFilter, DeltaGlmbFilter), (MultiSensorLmbFilter, LmbFilter)):
-        central = several(scene.targets, [scene.sensor], Limits.none())
+        central = several(scene.targets, (scene.sensor,), Limits.none())
         single = one(scene.targets, scene.sensor, Limits.none())
-        belief, expected = central.initial(), single.initial()
+        belief: Any = central.initial()
+        expected: Any = single.initial()
         for step, scan in enumerate(scene.scans[:2], 1):
             belief, info = central.step(belief, [scan], [scene.pose], DT, step, rng=rng)
             expected, expected_info = single.step(expected, scan, scene.pose, DT, step, rng=rng)
@@ -222,7 +223,7 @@ def test_scans_that_the_models_forbid(kind):
     certain = dataclasses.replace(SENSORS[0], detection=never_misses)
     tracker = kind(dataclasses.replace(TARGETS, survival=models.constant_survival(1.0)), [certain, certain], Limits())
     tracks = TrackTable.from_gaussians([[-2, 0]], BIRTH.means[:1], BIRTH.covs[:1])
-    belief = LMB(tracks, np.array([math.inf]))
+    belief: Any = LMB(tracks, np.array([math.inf]))
     if kind is MultiSensorGlmbFilter:
         belief, _ = lmb_to_glmb(belief, max_hypotheses=2)
     with pytest.raises(NumericalError, match="positive weight"):

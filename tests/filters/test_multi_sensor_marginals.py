@@ -10,7 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from vedette.kernels.steps.multi_sensor_marginals import Choices, StateCaps, choice_marginals
+from vedette.kernels.steps.multi_sensor_choices import Choices
+from vedette.kernels.steps.multi_sensor_marginals import StateCaps, choice_marginals
 
 pytestmark = pytest.mark.lanes
 
@@ -30,7 +31,7 @@ def make_choices(tracks, log_absent, num_sensors):
 
 def enumerated(choices):
     """Log total weight of all joint choices; probability of each choice, and of each track's absence."""
-    num_tracks, log_all = len(choices.log_absent), []
+    num_tracks = len(choices.log_absent)
     lists = [[-1, *range(choices.offsets[t], choices.offsets[t + 1])] for t in range(num_tracks)]
     found = []
     for chosen in itertools.product(*lists):

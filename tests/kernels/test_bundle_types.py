@@ -21,7 +21,7 @@ def slowly(bundle: Any) -> Any:
 
 def test_bundles_of_models_have_the_type_of_their_fields() -> None:
     survival = models.constant_survival(0.9)
-    bundles = [
+    bundles: list[Any] = [
         kernel_motion(models.constant_velocity(1.0), survival),
         kernel_motion(models.coordinated_turn(1.0, 0.1), survival),
     ]
@@ -35,8 +35,9 @@ def test_bundles_of_models_have_the_type_of_their_fields() -> None:
 
 def test_what_changes_a_type_is_not_taken_for_the_same() -> None:
     bundle = kernel_motion(models.constant_velocity(1.0), models.constant_survival(0.9))
-    fixed = bundle.noise_params.copy()
+    fixed: Any = bundle.noise_params.copy()
     fixed.flags.writeable = False
-    for params in (fixed, np.zeros(4)[::2], np.zeros(2, np.float32), np.zeros((2, 2))):
+    others: list[Any] = [fixed, np.zeros(4)[::2], np.zeros(2, np.float32), np.zeros((2, 2))]
+    for params in others:
         changed = bundle._replace(noise_params=params)
         assert typeof(changed) == slowly(changed) != typeof(bundle)

@@ -72,7 +72,7 @@ def test_a_sensor_of_a_longer_pose_beside_one_of_a_shorter():
         (lambda: Pointing([0.0], turn_rate_deg=0.0), "turn_rate_deg: expected a number above 0"),
         (lambda: Pointing([0.0]).actions(POSE[:3]), "pose: expected 5 components.*; got 3"),
         (lambda: Carried(Pointing([0.0]), Pointing([0.0])), "pointing: expected columns other than pointing_deg"),
-        (lambda: Carried(5, Pointing([0.0])), "carrier: expected a platform"),
+        (lambda: Carried(5, Pointing([0.0])), "carrier: expected a platform"),  # type: ignore[arg-type]
         (lambda: camera(0.9, 100.0, -1.0), "reference_half_width_rad: expected a number above 0"),
     ],
 )

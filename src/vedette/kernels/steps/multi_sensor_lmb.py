@@ -14,8 +14,9 @@ from vedette.kernels.base.types import Floats, Ints, Lmb, Tracks
 from vedette.kernels.gaussian.linalg import log_add, log_sum
 from vedette.kernels.gaussian.mixtures import MixtureCaps, copy_component, make_components, require_gaussians
 from vedette.kernels.steps.lmb import LmbReport, Reduction, append_reduced, labels_to_keep
+from vedette.kernels.steps.multi_sensor_choices import Choices
 from vedette.kernels.steps.multi_sensor_combinations import Combinations
-from vedette.kernels.steps.multi_sensor_marginals import Choices, StateCaps, choice_marginals
+from vedette.kernels.steps.multi_sensor_marginals import StateCaps, choice_marginals
 
 
 @kernel
