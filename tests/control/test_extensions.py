@@ -128,7 +128,7 @@ def test_what_is_computed_one_by_one_is_said_in_the_plan_and_once_by_a_warning()
     example = situation("marginal")
     warn_slow.cache_clear()
     planner = IndependentPlanner(example.sensors, example.fusion, SETTINGS, minus_cardinality_variance)
-    with pytest.warns(SlowRewardWarning, match="one by one, which takes some .* times as long.*: minus_card") as warned:
+    with pytest.warns(SlowRewardWarning, match="one by one: a joint decision .* times as long.*; minus_card") as warned:
         plans = [planner.plan(*example.arguments, rng=np.random.default_rng(5)) for _ in range(2)]
     assert len(warned) == 1
     for plan in plans:
