@@ -34,7 +34,7 @@ def test_the_tables_have_the_numbers() -> None:
     text = show("paper-a").stdout
     for line in (
         "scans 40, every 1 s from 1 to 40 s",
-        "sensor 1 -745 830 0 50 first decision",
+        "sensor 1 -745 830 0 courses first decision",
         "clutter region, rate 25",
         "2 1 40 -180 -205 -5.5 -19.0",
     ):
@@ -43,9 +43,8 @@ def test_the_tables_have_the_numbers() -> None:
 
 def test_sensors_that_differ_are_each_described(tmp_path: Path) -> None:
     file = tmp_path / "two.yaml"
-    file.write_text(
-        changed(("speed: 4.0", "measurement: {kind: range_only}, noise: {kind: range_dependent}")), encoding="utf-8"
-    )
+    other = "measurement: {kind: range_only}, noise: {kind: range_dependent}"
+    file.write_text(changed(("heading_deg: 4.0", other)), encoding="utf-8")
     text = show(str(file)).stdout
     assert "north: measures" in text
     assert "south: measures" in text
