@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vedette.kernels.base.types import Floats, Ints
+from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.platforms.actions import Actions
 from vedette.platforms.base import Platform, actions_at, course_of
 
@@ -37,18 +37,17 @@ def options_at(field: str, platform: Platform, pose: Floats, times: Floats) -> O
     Raises `InputError`, with the name of the platform, for actions or courses that are none.
     """
     actions = actions_at(field, platform, pose)
-    courses: list[Floats] = []
+    courses, num = np.empty((len(actions), len(times), len(pose))), 0
     which = np.empty(len(actions), np.int64)
     for i, row in enumerate(actions.values):
-        course = course_of(field, platform, pose, row, times)
-        which[i] = next((k for k, other in enumerate(courses) if _same(course, other)), len(courses))
-        if which[i] == len(courses):
-            courses.append(course)
-    return Options(actions, np.array(courses), which)
+        courses[num] = course_of(field, platform, pose, row, times)
+        which[i] = int(np.argmax(_same(courses[num], courses[: num + 1])))  # itself, if no other
+        num = max(num, int(which[i]) + 1)
+    return Options(actions, courses[:num].copy(), which)
 
 
-def _same(first: Floats, second: Floats) -> bool:
-    """Whether poses are equal up to rounding, headings up to whole turns."""
-    off = np.abs(first - second)
-    off[:, 2] = np.abs(np.remainder(off[:, 2] + math.pi, 2.0 * math.pi) - math.pi)
-    return bool((off <= _SAME_POSE * np.maximum(1.0, np.abs(first))).all())
+def _same(course: Floats, others: Floats) -> Bools:
+    """(num_others,) which courses are equal to one up to rounding, headings up to whole turns."""
+    off = np.abs(course - others)
+    off[..., 2] = np.abs(np.remainder(off[..., 2] + math.pi, 2.0 * math.pi) - math.pi)
+    return np.asarray((off <= _SAME_POSE * np.maximum(1.0, np.abs(course))).all(axis=(1, 2)))
