@@ -158,7 +158,7 @@ class CampaignResults:
             metrics, own = decode_metrics(entry.metrics, record.num_scans) if entry.metrics else (None, {})
             if metrics is None:
                 metrics = replace(measure_run(record, scenario), own=own)
-            metrics.own.update({metric.name: metric.of(record) for metric in self._own})
+            metrics = metrics.with_own(record, self._own)
         except InputError as error:
             place = f"{self.folder / DATABASE}: cell {entry.cell}, run {entry.run}"
             raise InputError(f"{place}: {error}") from error

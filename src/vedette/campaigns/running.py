@@ -160,8 +160,7 @@ def _measure_anew(store: Store, campaign: Campaign, watch: Watch) -> None:
     results = open_results(store.folder)
     for cell, run in lacking:
         there = results.run(cell, run)
-        there.metrics.own.update({metric.name: metric.of(there.record) for metric in own[cell]})
-        store.put_metrics(cell, run, encode_metrics(there.metrics))
+        store.put_metrics(cell, run, encode_metrics(there.metrics.with_own(there.record, own[cell])))
     if lacking:
         watch.note(f"measured anew: {counted(len(lacking), 'run')}")
 

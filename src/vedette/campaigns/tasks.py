@@ -12,6 +12,7 @@ from vedette.campaigns.codec import encode
 from vedette.errors import VedetteError
 from vedette.evaluation.metrics import encode_metrics
 from vedette.evaluation.runs import measure_run, own_metrics, run_scenario
+from vedette.scenarios.sections.planners import STRATEGIES
 from vedette.simulation.kept import encode_timings
 from vedette.simulation.storage import versions
 
@@ -139,7 +140,8 @@ class TaskQueue:
         for cell in self._campaign.cells:
             model = cell.scenario.model
             kinds = {sensor.measurement.kind for sensor in model.sensors}
-            plans = cell.planner if cell.planner not in ("random", "fixed", "still") else ""
+            strategy = STRATEGIES.get(cell.planner)
+            plans = cell.planner if strategy is None or strategy.needs_labels else ""
             kernels = (plans, model.filter.kind, model.fusion.kind, model.motion.kind, frozenset(kinds))
             if kernels not in seen and self._todo[cell.name]:
                 seen.add(kernels)

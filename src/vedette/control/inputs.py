@@ -10,7 +10,7 @@ import numpy as np
 from vedette.control.settings import MobileSensor, PlanningSettings
 from vedette.densities import GLMB, LMB
 from vedette.errors import InputError
-from vedette.filters import labels_targets, shared_targets
+from vedette.filters import shared_targets
 from vedette.kernels.base.types import Floats
 from vedette.models import TargetModel
 from vedette.models.arguments import float_array, reject
@@ -53,9 +53,10 @@ def check_state(sensors: Sequence[MobileSensor], state: State) -> None:
         raise InputError(f"state.local: expected {len(sensors)} beliefs, one a sensor; got {len(state.local)}")
     state_dim = shared_targets([sensor.filter for sensor in sensors]).state_dim
     for i, (belief, sensor) in enumerate(zip(state.local, sensors, strict=True)):
-        if not labels_targets(sensor.filter):
+        initial = sensor.filter.initial()
+        if not isinstance(initial, GLMB | LMB):
             raise reject(f"sensors[{i}].filter", "one that labels its targets", type(sensor.filter).__name__)
-        kind = GLMB if isinstance(sensor.filter.initial(), GLMB) else LMB
+        kind = GLMB if isinstance(initial, GLMB) else LMB
         _check_density(f"state.local[{i}]", belief, (kind,), state_dim)
     _check_density("state.fused", state.fused, (GLMB, LMB), state_dim)
 

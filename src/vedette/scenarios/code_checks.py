@@ -30,8 +30,9 @@ def code_faults(scenario: Scenario) -> list[str]:
 
 
 def _faults(scenario: Scenario) -> Iterator[Told]:
-    places = {id(section): path for path, section in customs(scenario.model, ())}
-    alone = [section for _, section in customs(scenario.model, ()) if section.field not in _MADE_OF_PARTS]
+    found = list(customs(scenario.model, ()))
+    places = {id(section): path for path, section in found}
+    alone = [section for _, section in found if section.field not in _MADE_OF_PARTS]
     attempts: list[Callable[[], Any]] = [partial(section.made, scenario.folder) for section in alone]
     attempts.append(partial(build_experiment, scenario))
     attempts += [partial(build_planner, scenario, name) for name in scenario.model.planners]

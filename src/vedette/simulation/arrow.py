@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
 # Columns of equal length by name: arrays of (num_rows,), or lists of texts.
 Columns: TypeAlias = dict[str, "Ints | Floats | Bools | list[str]"]
+# Columns that say which run a row is of, in tables of many runs.
+RUN_COLUMNS = frozenset({"cell", "run", "scenario", "planner", "variant", "filter", "fusion"})
 
 _MAGIC, _ALIGNMENT = b"ARROW1", 8
 

@@ -14,7 +14,7 @@ from vedette.control.plan import Plan, RewardTable
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats, Ints
 from vedette.platforms import Actions
-from vedette.simulation.arrow import Columns, Kind, Layout
+from vedette.simulation.arrow import RUN_COLUMNS, Columns, Kind, Layout
 from vedette.simulation.records import Decision
 from vedette.text import shown
 
@@ -38,7 +38,7 @@ PLANNED: dict[str, Layout] = {
 }
 _MOST_REWARDS = 2**26  # of a run, those that were not evaluated included: what a file leaves out takes memory, too
 # Names that tables of many runs have beside these: a platform's own number of such a name gets `action_` in front.
-_TAKEN = {*PLANNED["actions"].fixed, "cell", "run", "scenario", "planner", "variant", "filter", "fusion"}
+_TAKEN = {*PLANNED["actions"].fixed, *RUN_COLUMNS}
 
 
 def planned_tables(decisions: Sequence[Decision], num_sensors: int) -> dict[str, Columns]:

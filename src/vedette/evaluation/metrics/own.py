@@ -10,11 +10,9 @@ from vedette.errors import VedetteError
 from vedette.evaluation.metrics.run import COLUMNS
 from vedette.kernels.base.types import Floats
 from vedette.models.arguments import as_array, reject
+from vedette.simulation.arrow import RUN_COLUMNS
 from vedette.simulation.records import Measure, RunRecord
 from vedette.simulation.tables import LAYOUTS
-
-# Columns of the tables of many runs beside those of the scans of one.
-_TAKEN = {"cell", "run", "scenario", "planner", "variant", "filter", "fusion"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +33,7 @@ class Metric:
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name.isidentifier():
             raise reject("metric.name", "a Python identifier", self.name)
-        if self.name in _TAKEN or self.name in COLUMNS or LAYOUTS["scans"].kind(self.name) is not None:
+        if self.name in RUN_COLUMNS or self.name in COLUMNS or LAYOUTS["scans"].kind(self.name) is not None:
             raise reject("metric.name", "a name that no column has", self.name)
 
     def of(self, record: RunRecord) -> Floats:

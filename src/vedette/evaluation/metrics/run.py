@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -71,6 +71,13 @@ class RunMetrics:
         """Each array under its name, in the order above: float64, or int64 for numbers of things; one's own last."""
         return {**{name: getattr(self, name) for name in COLUMNS}, **self.own}
 
+    def with_own(self, record: RunRecord, own: Sequence[Metric]) -> RunMetrics:
+        """With measures of one's own besides, of the run's record; those that it has by the same names anew.
+
+        Raises `InputError` or `VedetteError` as `Metric.of`.
+        """
+        return replace(self, own={**self.own, **{metric.name: metric.of(record) for metric in own}})
+
     @classmethod
     def from_columns(cls, columns: Mapping[str, NDArray[np.float64] | NDArray[np.int64]]) -> RunMetrics:
         """Of what `columns` gives, in any order.
@@ -118,7 +125,7 @@ def measure(record: RunRecord, *, cutoff: float, order: float, window: int, own:
     full = nees_of_matching(truth, matching, position_only=False)
     position = nees_of_matching(truth, matching, position_only=True)
     breaks = continuity(truth, matching)
-    return RunMetrics(
+    metrics = RunMetrics(
         gospa_m=gospa.total,
         gospa_localisation=gospa.localisation,
         gospa_missed=gospa.missed,
@@ -132,5 +139,5 @@ def measure(record: RunRecord, *, cutoff: float, order: float, window: int, own:
         position_nees_mean=matching.mean_by_scan(position),
         label_switches=breaks.label_switches,
         fragmentations=breaks.fragmentations,
-        own={metric.name: metric.of(record) for metric in own},
     )
+    return metrics.with_own(record, own)

@@ -100,7 +100,7 @@ def _number_contested(choices: Choices, members: Ints, contested: Ints) -> tuple
 
 
 @kernel
-def _ordermembers_of(choices: Choices, members: Ints, bit_of: Ints, num_bits: int) -> None:
+def _order_members(choices: Choices, members: Ints, bit_of: Ints, num_bits: int) -> None:
     """Put next, again and again, the member that leaves the fewest measurements open: asked for before and after it."""
     num = len(members)
     wants, asked, is_open = (
@@ -159,7 +159,7 @@ def same_mask(first: Ints, second: Ints) -> bool:
 def make_classes(choices: Choices, members: Ints, contested: Ints, class_of: Ints) -> Classes:
     """Classes of the members, which are put in order. class_of: (num_choices,) to be written for their choices."""
     bit_of, num_bits = _number_contested(choices, members, contested)
-    _ordermembers_of(choices, members, bit_of, num_bits)
+    _order_members(choices, members, bit_of, num_bits)
     num_words, most = max(1, (num_bits + _BITS - 1) // _BITS), len(members)
     for track in members:
         most += choices.offsets[track + 1] - choices.offsets[track]

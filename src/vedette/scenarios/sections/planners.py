@@ -35,9 +35,8 @@ class Parts(NamedTuple):
 
 
 class Strategy(NamedTuple):
-    """A strategy that every scenario has: in a word, whether it needs labels, and how its planner is made."""
+    """A strategy that every scenario has: whether it needs labels, and how its planner is made."""
 
-    words: str
     needs_labels: bool
     planner: Callable[[Parts], Planner | None]
 
@@ -67,11 +66,11 @@ def _fixed(parts: Parts) -> Planner:
 
 
 STRATEGIES = {
-    "jdm": Strategy("joint", True, _joint),
-    "idm": Strategy("independent", True, _independent),
-    "random": Strategy("random", False, _random),
-    "fixed": Strategy("first course", False, _fixed),
-    "still": Strategy("never under way", False, lambda parts: None),
+    "jdm": Strategy(True, _joint),
+    "idm": Strategy(True, _independent),
+    "random": Strategy(False, _random),
+    "fixed": Strategy(False, _fixed),
+    "still": Strategy(False, lambda parts: None),
 }
 
 

@@ -188,13 +188,7 @@ class CustomCentral(Custom):
     """A user's own `vedette.tracking.CentralFilter`, of all sensors' scans; called with `targets` and `sensors`."""
 
     kind: Literal["custom"] = Field(default="custom", description="Kind of filter [-].")
-
-    @classmethod
-    def protocol(cls) -> type:
-        """What it gives."""
-        from vedette.tracking import CentralFilter
-
-        return CentralFilter
+    gives: ClassVar[str] = "vedette.tracking:CentralFilter"
 
 
 class Fusion(Section):
