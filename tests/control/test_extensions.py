@@ -84,7 +84,7 @@ def test_actions_of_the_users_own() -> None:
 class TrustsTheFirst:
     """A fusion of the user's own: the first sensor is right."""
 
-    def fuse(self, beliefs: Any) -> Any:
+    def fuse(self, beliefs: Any, views: Any = None) -> Any:
         return beliefs[0], None
 
 
@@ -107,9 +107,9 @@ class LaidOutBefore:
     def __init__(self, weights: Any) -> None:
         self.rule, self.fused = CmDeltaGlmb(weights), 0
 
-    def fuse(self, beliefs: Any) -> Any:
+    def fuse(self, beliefs: Any, views: Any = None) -> Any:
         self.fused += 1
-        return self.rule.fuse(beliefs)
+        return self.rule.fuse(beliefs, views)
 
     def lay_out(self, cases: Any, prediction: Any) -> Any:
         return self.rule.lay_out(cases, prediction)

@@ -277,7 +277,7 @@ def test_a_subclass_is_asked_itself() -> None:
             return 3.0 * CauchySchwarzReward.combine(self, z)
 
     class Fused(CmDeltaGlmb):
-        def fuse(self, beliefs: Any) -> Any:
+        def fuse(self, beliefs: Any, views: Any = None) -> Any:
             return CmDeltaGlmb((1.0,)).fuse(beliefs[:1])
 
     example = situation("marginal")

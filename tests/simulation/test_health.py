@@ -66,8 +66,8 @@ class _Recording:
     inner: Any
     said: list[Any]
 
-    def fuse(self, beliefs: Any) -> Any:
-        fused, info = self.inner.fuse(beliefs)
+    def fuse(self, beliefs: Any, views: Any = None) -> Any:
+        fused, info = self.inner.fuse(beliefs, views)
         self.said.append(info)
         return fused, info
 
@@ -182,11 +182,11 @@ class _FailingFusion:
     def __init__(self, inner: CmDeltaGlmb, at: int) -> None:
         self.inner, self.at, self.step = inner, at, 0
 
-    def fuse(self, beliefs: Any) -> Any:
+    def fuse(self, beliefs: Any, views: Any = None) -> Any:
         self.step += 1
         if self.step == self.at:
             raise NumericalError("fusion of tracks: no density")
-        return self.inner.fuse(beliefs)
+        return self.inner.fuse(beliefs, views)
 
 
 class _FailingPlanner:

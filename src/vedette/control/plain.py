@@ -38,7 +38,7 @@ class PlainRewards:
         for joint, chosen in enumerate(actions.tolist()):
             for sample in range(self.num_samples):
                 densities = [self._density(s, action, sample) for s, action in enumerate(chosen)]
-                updated = densities[0] if self.fusion is None else self.fusion.fuse(densities)[0]
+                updated = densities[0] if self.fusion is None else self.fusion.fuse(densities, None)[0]
                 rewards[joint, sample] = reward_value(self.reward, self.prediction, updated)
         return rewards
 

@@ -4,6 +4,7 @@ from vedette.fusion.base import MIXTURE_POWERS, Fusion, FusionInfo, FusionLimits
 from vedette.fusion.clmb import Clmb
 from vedette.fusion.cm_delta_glmb import CmDeltaGlmb
 from vedette.fusion.laid_out import LaidOut, LaysOut, lay_out_alone
+from vedette.fusion.views import Views
 
 __all__ = [
     "MIXTURE_POWERS",
@@ -15,5 +16,6 @@ __all__ = [
     "LaidOut",
     "LaysOut",
     "MixturePower",
+    "Views",
     "lay_out_alone",
 ]

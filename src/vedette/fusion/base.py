@@ -11,6 +11,7 @@ import numpy as np
 
 from vedette.errors import InputError
 from vedette.fusion.cubature import MAX_DIM, fifth_degree_rule
+from vedette.fusion.views import Views
 from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.gaussian.mixtures import MixtureCaps
 
@@ -66,8 +67,12 @@ class FusionInfo:
 class Fusion(Protocol):
     """One belief of all the sensors'. The order of `beliefs` is that of the fusion weights."""
 
-    def fuse(self, beliefs: Sequence[Any]) -> tuple[Any, FusionInfo]:
-        """The fused belief, and what had to be repaired or thrown away."""
+    def fuse(self, beliefs: Sequence[Any], views: Views | None = None) -> tuple[Any, FusionInfo]:
+        """The fused belief, and what had to be repaired or thrown away.
+
+        views: what each sensor could see, and what they were updated from; None where that is not known, as in the
+        decisions of a planner.
+        """
         ...
 
 

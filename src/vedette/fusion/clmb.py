@@ -28,10 +28,11 @@ from vedette.fusion.base import (
     count_lost,
     power_rule,
 )
+from vedette.fusion.lmbs import AlignedLmbs, align_lmbs, require_views, sum_over_sensors, weights_by_view
 from vedette.fusion.tracks import fused_tracks, reduced_tracks
-from vedette.kernels.base.types import Floats, Ints, Lmb, Tracks
+from vedette.fusion.views import Views
+from vedette.kernels.base.types import Bools, Floats, Ints, Lmb
 from vedette.kernels.labelled.conversions import glmb_to_lmb
-from vedette.kernels.labelled.stacking import stack_tracks
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,8 +48,11 @@ class Clmb:
     `FusionInfo`. A label in every hypothesis of a sensor's GLMB is certain there, and so in the fusion. (Truncation may
     have cut off the rest; to bound its certainty as its absence is bounded makes joint decisions worse, not better.)
 
-    Assumes that the sensors see the same part of the world and that a target has one label at all of them: what one
-    sensor surely sees is lost where another has none of its label, or does not see there.
+    With plain weights it assumes that the sensors see the same part of the world: what one sensor surely sees is lost
+    where another does not see there. By views, the weights at a label are w_sl proportional to w_s E[P_D^s(l)], so that
+    a sensor which cannot see where a target is (or did not scan) has no say in it, neither of its existence nor of its
+    density; one that sees there and lacks the label has its floor. Where nobody can see a label, those that have it
+    keep their plain weights. Both ways a target must have one label at all sensors (see `match_labels`).
 
     Attributes:
         weights: fusion weights, one a sensor, in the order of the beliefs; non-negative, sum 1. A sensor of weight 0
@@ -56,6 +60,7 @@ class Clmb:
         mixture_power: how a power of a mixture is taken; see `CmDeltaGlmb`.
         missing_existence: floor for the existence probability of a label that a sensor lacks, in (0, 1).
         limits: caps on the cost.
+        by_views: whether sensors count by how well they see each label; `fuse` then needs `views`.
 
     Raises `InputError` for weights, a floor or limits that cannot be used.
     """
@@ -64,41 +69,45 @@ class Clmb:
     mixture_power: MixturePower = "moment_matched"
     missing_existence: float = 1e-4
     limits: FusionLimits = field(default_factory=FusionLimits)
+    by_views: bool = False
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "weights", check_weights(self.weights))
         check_power(self.mixture_power, self.limits, len(self.weights))
         check_floor("missing_existence", math.log(self.missing_existence) if self.missing_existence > 0 else -math.inf)
 
-    def fuse(self, beliefs: Sequence[LMB | GLMB]) -> tuple[LMB, FusionInfo]:
+    def fuse(self, beliefs: Sequence[LMB | GLMB], views: Views | None = None) -> tuple[LMB, FusionInfo]:
         """Fused LMB of the sensors' LMBs (a GLMB is first converted), in increasing label order, and what was done.
 
-        Raises `InputError` for another number or kind of beliefs, for state dimensions that differ or a density that
-        is not valid, and `NumericalError` where a product of track densities cannot be integrated.
+        views: what the sensors could see; not used with plain weights. Raises `InputError` for another number or kind
+        of beliefs, for state dimensions that differ, a density that is not valid or views that are missing, and
+        `NumericalError` where a product of track densities cannot be integrated.
         """
         check_beliefs(beliefs, (LMB, GLMB), len(self.weights))
+        seen = require_views(self.by_views, views, len(self.weights))
         rule = power_rule(self.mixture_power, self.limits, beliefs[0].state_dim)
         active = [i for i, weight in enumerate(self.weights) if weight > 0.0]
         weights = np.array([self.weights[i] for i in active])
-        aligned = _align([_as_lmb(beliefs[i], rule) for i in active], self.missing_existence)
-        tracks, log_overlaps = fused_tracks(aligned.labels, aligned.chosen, weights, aligned.tracks, rule)
-        log_present = log_expit(aligned.logits) @ weights + log_overlaps
-        log_absent = log_expit(-aligned.logits) @ weights
-        held = aligned.chosen >= 0
-        missing = by_sensor(np.count_nonzero(~held, axis=0), active, len(beliefs))
-        logits = aligned.logits @ weights + log_overlaps
+        aligned = align_lmbs([as_lmb(beliefs[i], rule) for i in active], self.missing_existence)
+        powers = _Powers.plain(aligned, weights) if seen is None else _Powers.by_view(aligned, weights, seen, active)
+        tracks, log_overlaps = fused_tracks(aligned.labels, powers.chosen, powers.of_tracks, aligned.tracks, rule)
+        log_present = powers.mean(log_expit(aligned.logits)) + log_overlaps
+        log_absent = powers.mean(log_expit(-aligned.logits))
+        missing = by_sensor(np.count_nonzero(powers.taking_part & ~aligned.held, axis=0), active, len(beliefs))
+        logits = powers.mean(aligned.logits) + log_overlaps
+        common = np.all(aligned.held | ~powers.taking_part, axis=1)
         return unchecked(LMB, tracks, logits), FusionInfo(
             missing_sets=missing,
             missing_labels=missing,
-            num_sets=len(held),
+            num_sets=len(common),
             num_lost_labels=count_lost(expit(aligned.logits), expit(logits)),
-            empty_intersection=len(held) > 0 and not bool(held.all(axis=1).any()),
+            empty_intersection=len(common) > 0 and not bool(common.any()),
             log_normaliser=float(np.logaddexp(log_present, log_absent).sum()),
             discarded_weight=0.0,
         )
 
     def lay_out(self, cases: Sequence[LabelledCases], prediction: GLMB | LMB) -> PowerProducts | None:
-        """The fusions of any of the sensors' cases; None for a GLMB prediction, or where the powers are not exact.
+        """The fusions of any of the sensors' cases; None by views, for a GLMB prediction, or inexact powers.
 
         cases: one a sensor; a GLMB is first converted, as by `fuse`. prediction: of one Gaussian a track. Raises
         `InputError` for another number of cases.
@@ -107,7 +116,7 @@ class Clmb:
         active = [i for i, weight in enumerate(self.weights) if weight > 0.0]
         # A GLMB's labels become mixtures; powers of the single Gaussians of an LMB are exact.
         exact = self.mixture_power == "moment_matched" or all(own.kind is LMB for own in cases)
-        if not exact or not isinstance(prediction, LMB):
+        if self.by_views or not exact or not isinstance(prediction, LMB):
             return None
         shares = [self._share(cases[i], self.weights[i]) for i in active]
         return lay_out_products(shares, LabelledCases.of(prediction), active)
@@ -119,43 +128,38 @@ class Clmb:
         return Share(lmbs, weight, held, np.stack([log_expit(-least), log_expit(least)], axis=1))
 
 
-class _Aligned(NamedTuple):
-    """All sensors on the union of their labels. labels: (num_labels, 2), increasing.
+class _Powers(NamedTuple):
+    """The powers to which the sensors' densities are raised, label by label."""
 
-    chosen: (num_labels, S) place in `tracks`, -1 where the sensor lacks the label. logits: (num_labels, S).
-    """
+    of_labels: Floats  # (num_labels, num_sensors) rows that sum to one, or (num_sensors,) of all labels alike
+    of_tracks: Floats  # the same, for the tracks that are `chosen`
+    chosen: Ints  # (num_labels, num_sensors) tracks, -1 of those that are left out
+    taking_part: Bools  # (num_labels, num_sensors)
 
-    labels: Ints
-    chosen: Ints
-    tracks: Tracks
-    logits: Floats
+    @classmethod
+    def plain(cls, aligned: AlignedLmbs, weights: Floats) -> _Powers:
+        """The same weights at every label."""
+        return cls(weights, weights, aligned.chosen, np.ones(aligned.chosen.shape, np.bool_))
+
+    @classmethod
+    def by_view(cls, aligned: AlignedLmbs, weights: Floats, views: Views, active: Sequence[int]) -> _Powers:
+        """By how well each sensor sees each label."""
+        shares = weights_by_view(aligned, weights, views, active)
+        chosen = np.where(shares > 0.0, aligned.chosen, -1)
+        # Where all that see the place lack the label, its density is that of those that have it.
+        bare = (chosen < 0).all(axis=1, keepdims=True)
+        of_tracks = np.where(bare, weights, shares)
+        return cls(shares, of_tracks, np.where(bare, aligned.chosen, chosen), shares > 0.0)
+
+    def mean(self, values: Floats) -> Floats:
+        """(num_labels,) weighted mean of (num_labels, num_sensors) values, which may be infinite where none counts."""
+        if self.of_labels.ndim == 1:
+            return np.asarray(values @ self.of_labels)
+        return sum_over_sensors(self.of_labels * np.where(self.taking_part, values, 0.0))
 
 
-def _align(sensors: Sequence[Lmb], missing_existence: float) -> _Aligned:
-    floor = math.log(missing_existence) - math.log1p(-missing_existence)
-    places = [_places(sensor) for sensor in sensors]
-    labels = sorted(set().union(*places))
-    chosen, logits = np.full((len(labels), len(sensors)), -1), np.empty((len(labels), len(sensors)))
-    start = 0
-    for s, sensor in enumerate(sensors):
-        own = np.array([place for place, label in enumerate(labels) if label in places[s]], np.int64)
-        tracks = np.array([places[s][labels[place]] for place in own.tolist()], np.int64)
-        logits[:, s] = min(floor, float(sensor.existence_logit[tracks].min(initial=math.inf)))
-        logits[own, s] = sensor.existence_logit[tracks]
-        chosen[own, s] = start + tracks
-        start += len(sensor.existence_logit)
-    table = stack_tracks([sensor.tracks for sensor in sensors])
-    return _Aligned(np.array(labels, np.int64).reshape(-1, 2), chosen, table, logits)
-
-
-def _as_lmb(belief: LMB | GLMB, rule: PowerRule) -> Lmb:
+def as_lmb(belief: LMB | GLMB, rule: PowerRule) -> Lmb:
     """An LMB with reduced mixtures."""
     if isinstance(belief, GLMB):
         return glmb_to_lmb(belief.to_kernel(), rule.caps)
     return Lmb(reduced_tracks(belief.tracks.to_kernel(), rule), belief.existence_logit)
-
-
-def _places(lmb: Lmb) -> dict[tuple[int, int], int]:
-    """Place of each label of positive existence."""
-    labels = lmb.tracks.labels.tolist()
-    return {(labels[i][0], labels[i][1]): i for i in np.flatnonzero(lmb.existence_logit > -math.inf).tolist()}

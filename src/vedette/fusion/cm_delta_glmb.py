@@ -32,6 +32,7 @@ from vedette.fusion.base import (
 )
 from vedette.fusion.laid_out import lay_out_glmbs
 from vedette.fusion.tracks import fused_tracks
+from vedette.fusion.views import Views
 from vedette.kernels.base.types import Floats, Glmb
 from vedette.kernels.gaussian.linalg import log_sum
 from vedette.kernels.labelled.conversions import marginalise
@@ -75,12 +76,12 @@ class CmDeltaGlmb:
         check_power(self.mixture_power, self.limits, len(self.weights))
         check_floor("missing_log_weight", self.missing_log_weight)
 
-    def fuse(self, beliefs: Sequence[GLMB]) -> tuple[GLMB, FusionInfo]:
+    def fuse(self, beliefs: Sequence[GLMB], views: Views | None = None) -> tuple[GLMB, FusionInfo]:
         """Fused marginalised GLMB of the sensors' GLMBs (delta or marginalised), heaviest set first, and what was done.
 
-        Label sets of equal weight come in the order of their first occurrence. Raises `InputError` for another number
-        or kind of beliefs, for state dimensions that differ or a density that is not valid, and `NumericalError`
-        where a product of track densities cannot be integrated.
+        Label sets of equal weight come in the order of their first occurrence. views: not used. Raises `InputError` for
+        another number or kind of beliefs, for state dimensions that differ or a density that is not valid, and
+        `NumericalError` where a product of track densities cannot be integrated.
         """
         check_beliefs(beliefs, (GLMB,), len(self.weights))
         rule = power_rule(self.mixture_power, self.limits, beliefs[0].state_dim)

@@ -18,12 +18,16 @@ def fused_tracks(
     """Fused track of each label and log of the integral of the product of the powers (paper eqs. 11 and 12).
 
     labels: (num, 2). chosen: (num, S) each sensor's track in `tracks`, -1 where it does not know the label; of
-    mixtures already reduced. weights: (S,) positive fusion weights. The fused mixtures are reduced by the rule's
-    caps. Raises `NumericalError` where a product of powers is no density.
+    mixtures already reduced. weights: (S,) or (num, S) fusion weights, positive where a track is chosen. The fused
+    mixtures are reduced by the rule's caps. Raises `NumericalError` where a product of powers is no density.
     """
     try:
         offsets, log_weights, means, covs, log_overlaps = fuse_tracks(
-            chosen, weights, tracks, rule.points, rule.point_weights
+            chosen,
+            np.ascontiguousarray(np.broadcast_to(weights, chosen.shape)),
+            tracks,
+            rule.points,
+            rule.point_weights,
         )
     except FloatingPointError as fault:
         raise NumericalError(f"fusion of tracks: {fault}") from None

@@ -54,17 +54,17 @@ def _make_powers(num_sensors: int, most: int, dim: int) -> Powers:
 def _load(chosen: Ints, item: int, fusion_weights: Floats, tracks: Tracks, powers: Powers) -> None:
     """Raise the components of the sensors' tracks (-1: unknown there) to their powers."""
     total, used = 0.0, 0
-    for s in range(len(fusion_weights)):
+    for s in range(fusion_weights.shape[1]):
         if chosen[item, s] >= 0:
-            total += fusion_weights[s]
-    for s in range(len(fusion_weights)):
+            total += fusion_weights[item, s]
+    for s in range(fusion_weights.shape[1]):
         track = chosen[item, s]
         powers.starts[s + 1] = used
         powers.weights[s] = 0.0
         if track < 0:
             continue
         # Sensors that do not know the label have no say in its density: the others' weights sum to one.
-        weight = fusion_weights[s] / total
+        weight = fusion_weights[item, s] / total
         powers.weights[s] = weight
         for c in range(tracks.offsets[track], tracks.offsets[track + 1]):
             if used == 0:
@@ -172,7 +172,7 @@ def fuse_tracks(
     """Fused density of each label, and the log of the integral of prod_i p_i^(w_i) (paper eqs. 11 and 12).
 
     chosen: (num, S) track of each sensor, -1 where it does not know the label: its factor is left out and the other
-    sensors' weights are scaled to sum to one. fusion_weights: (S,) positive. points: (num_points, dim),
+    sensors' weights are scaled to sum to one. fusion_weights: (num, S) positive where known. points: (num_points, dim),
     point_weights: (num_points,) a cubature rule for the standard normal without negative weights; with no points the
     fused mixture is the component-wise power. A fused mixture has a component for every combination of the sensors'
     components.
@@ -182,7 +182,7 @@ def fuse_tracks(
     """
     num, dim = len(chosen), tracks.means.shape[1]
     offsets, most = _count_combinations(chosen, tracks)
-    powers, log_overlaps = _make_powers(len(fusion_weights), most, dim), np.empty(num)
+    powers, log_overlaps = _make_powers(fusion_weights.shape[1], most, dim), np.empty(num)
     log_weights = np.empty(offsets[num])
     means, covs = np.empty((offsets[num], dim)), np.empty((offsets[num], dim, dim))
     for item in range(num):
