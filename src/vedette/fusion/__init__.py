@@ -1,13 +1,16 @@
-"""How several sensors' beliefs become one: generalized covariance intersection (GCI) of labelled densities."""
+"""How several sensors' beliefs become one: covariance intersection, arithmetic average and parallel update."""
 
+from vedette.fusion.arithmetic_average import ArithmeticAverage
 from vedette.fusion.base import MIXTURE_POWERS, Fusion, FusionInfo, FusionLimits, MixturePower
 from vedette.fusion.clmb import Clmb
 from vedette.fusion.cm_delta_glmb import CmDeltaGlmb
 from vedette.fusion.laid_out import LaidOut, LaysOut, lay_out_alone
+from vedette.fusion.parallel import ParallelLimits, ParallelUpdate
 from vedette.fusion.views import Views
 
 __all__ = [
     "MIXTURE_POWERS",
+    "ArithmeticAverage",
     "Clmb",
     "CmDeltaGlmb",
     "Fusion",
@@ -16,6 +19,8 @@ __all__ = [
     "LaidOut",
     "LaysOut",
     "MixturePower",
+    "ParallelLimits",
+    "ParallelUpdate",
     "Views",
     "lay_out_alone",
 ]
