@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from scipy.special import expit, log_expit
@@ -58,6 +58,7 @@ class ParallelUpdate:
     Raises `InputError` for weights, a floor or limits that cannot be used.
     """
 
+    shares_prediction: ClassVar[bool] = True  # by which trackers know that its beliefs must be of one prediction
     weights: Sequence[float] | Floats | None = None
     missing_existence: float = 1e-4
     limits: ParallelLimits = field(default_factory=ParallelLimits)

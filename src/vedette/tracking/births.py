@@ -92,9 +92,7 @@ def _unexplained(belief: LMB, sensor: SensorModel, scan: Any, pose: Any, number:
     at = pose_vector("pose", pose)
     given = ScanInput(LMB.empty(belief.state_dim).to_kernel(), measurements, at, 0.0)
     with model_errors():
-        explained = prob_explained(
-            belief.to_kernel(), given, sensor.to_kernel(), Limits().truncation(sensor.meas_dim)
-        )
+        explained = prob_explained(belief.to_kernel(), given, sensor.to_kernel(), Limits().truncation(sensor.meas_dim))
     free = np.flatnonzero(explained < 1.0 - LEAST_UNEXPLAINED)
     positions = sensor.measurement.positions(measurements[free], at)
     return Unexplained(positions, 1.0 - explained[free], np.full(len(free), number))

@@ -10,7 +10,7 @@ import numpy as np
 
 from vedette.densities import LMB
 from vedette.errors import InputError
-from vedette.filters import Filter, FilterInfo
+from vedette.filters import Filter
 from vedette.fusion import Fusion, Views
 from vedette.kernels.base.types import Floats
 from vedette.models import SensorModel, TargetModel
@@ -100,8 +100,8 @@ class Distributed:
             local = [fused] * len(local)
         with stages.timing("births"):
             measured = self._measured(local, scans, at, step + 1)
-        info = TrackerInfo(tuple(infos), report, stages.seconds, sent)
-        return State(tuple(local), fused, step, float(time), measured), info
+        told = TrackerInfo(tuple(infos), report, stages.seconds, sent)
+        return State(tuple(local), fused, step, float(time), measured), told
 
     def _measured(
         self, local: Sequence[Any], scans: Sequence[Any], poses: Floats, step: int
