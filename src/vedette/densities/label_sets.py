@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple, TypeAlias, TypeVar
 
 import numpy as np
 
 from vedette.densities.checks import unchecked
 from vedette.densities.glmb import GLMB
-from vedette.densities.statistics import track_moments
+from vedette.densities.lmb import LMB
+from vedette.densities.statistics import existence_probabilities, track_moments
 from vedette.densities.tracks import TrackTable
 from vedette.kernels.base.types import Ints
 from vedette.kernels.labelled.labels import group_by_label_set
 
 Label: TypeAlias = tuple[int, ...]
 LabelSet: TypeAlias = tuple[Label, ...]
+_Labelled = TypeVar("_Labelled", GLMB, LMB)
 
 
 class LabelSets(NamedTuple):
@@ -76,3 +78,35 @@ def single_gaussians(tracks: TrackTable) -> TrackTable:
     if len(tracks.log_weights) == num:
         return tracks
     return unchecked(TrackTable, tracks.labels, np.arange(num + 1), np.zeros(num), *track_moments(tracks))
+
+
+def without_labels(belief: _Labelled, labels: Ints) -> tuple[_Labelled, float]:
+    """The belief of the targets that have none of (num, 2) `labels`, and the summed existence of those that do.
+
+    Hypotheses of a GLMB that then hold the same tracks become one.
+    """
+    if len(labels) == 0:
+        return belief, 0.0
+    gone = {tuple(label) for label in labels.tolist()}
+    known, existence = existence_probabilities(belief)
+    dropped = float(
+        sum(chance for label, chance in zip(known.tolist(), existence, strict=True) if tuple(label) in gone)
+    )
+    kept = np.array([tuple(label) not in gone for label in belief.tracks.labels.tolist()], np.bool_)
+    if isinstance(belief, LMB):
+        places = np.flatnonzero(kept)
+        return unchecked(LMB, take_tracks(belief.tracks, places), belief.existence_logit[places]), dropped
+    weights: dict[tuple[int, ...], float] = {}
+    for hyp, log_weight in enumerate(belief.hyp_log_weights.tolist()):
+        tracks = belief.hyp_tracks[belief.hyp_offsets[hyp] : belief.hyp_offsets[hyp + 1]]
+        members = tuple(tracks[kept[tracks]].tolist())
+        weights[members] = float(np.logaddexp(weights.get(members, -np.inf), log_weight))
+    order = sorted(weights, key=lambda members: -weights[members])
+    renumbered = np.cumsum(kept) - 1
+    return unchecked(
+        GLMB,
+        take_tracks(belief.tracks, np.flatnonzero(kept)),
+        offsets_of([len(members) for members in order]),
+        np.array([renumbered[track] for members in order for track in members], np.int64),
+        np.array([weights[members] for members in order]),
+    ), dropped

@@ -3,15 +3,17 @@
 from typing import TypeAlias
 
 from vedette.densities import GLMB, LMB, IidCluster, MultiBernoulli, Poisson
-from vedette.filters.base import Filter, labels_targets, shared_targets
+from vedette.filters.base import Filter, TwoStepFilter, labels_targets, shared_targets
 from vedette.filters.cbmember import CbMemberFilter
 from vedette.filters.cphd import CphdFilter
 from vedette.filters.glmb import DeltaGlmbFilter
 from vedette.filters.info import FilterInfo
 from vedette.filters.limits import Limits
 from vedette.filters.lmb import LmbFilter
-from vedette.filters.multi_sensor import MultiSensorGlmbFilter, MultiSensorLmbFilter
+from vedette.filters.multi_sensor_glmb import MultiSensorGlmbFilter
+from vedette.filters.multi_sensor_lmb import MultiSensorLmbFilter
 from vedette.filters.phd import PhdFilter
+from vedette.filters.sequential_lmb import SequentialLmbFilter
 
 Belief: TypeAlias = GLMB | LMB | Poisson | IidCluster | MultiBernoulli
 
@@ -27,6 +29,8 @@ __all__ = [
     "MultiSensorGlmbFilter",
     "MultiSensorLmbFilter",
     "PhdFilter",
+    "SequentialLmbFilter",
+    "TwoStepFilter",
     "labels_targets",
     "shared_targets",
 ]

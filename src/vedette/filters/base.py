@@ -11,7 +11,7 @@ import numpy as np
 from vedette.densities import GLMB, LMB
 from vedette.errors import InputError
 from vedette.filters.info import FilterInfo
-from vedette.filters.inputs import births_at, check_scan, check_step
+from vedette.filters.inputs import births_for, check_scan
 from vedette.filters.limits import Limits
 from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.types import Floats, Motion, ScanInput, Sensor
@@ -47,6 +47,37 @@ class Filter(Protocol):
         self, belief: Any, scan: Any, pose: Any, dt: float, step: int, *, rng: np.random.Generator
     ) -> tuple[Any, FilterInfo]:
         """Predict over `dt` seconds and update with a scan; see `DeltaGlmbFilter.step`."""
+        ...
+
+
+@runtime_checkable
+class TwoStepFilter(Filter, Protocol):
+    """A filter whose prediction and update can also be had apart: for several scans at one time, or none.
+
+    Needed of a filter of your own where a sensor may miss a scan, where sensors share their prediction, and where
+    targets are born of measurements: `births` then stand in for the sites of the targets' model.
+    """
+
+    def step(
+        self,
+        belief: Any,
+        scan: Any,
+        pose: Any,
+        dt: float,
+        step: int,
+        *,
+        rng: np.random.Generator,
+        births: LMB | None = None,
+    ) -> tuple[Any, FilterInfo]:
+        """Predict over `dt` seconds and update with a scan; see `DeltaGlmbFilter.step`."""
+        ...
+
+    def predict(self, belief: Any, dt: float, step: int, *, births: LMB | None = None) -> tuple[Any, FilterInfo]:
+        """The belief `dt` seconds later, with those who may have been born by then; see `DeltaGlmbFilter.predict`."""
+        ...
+
+    def update(self, belief: Any, scan: Any, pose: Any, *, rng: np.random.Generator) -> tuple[Any, FilterInfo]:
+        """The belief after a scan of its own time; see `DeltaGlmbFilter.update`."""
         ...
 
 
@@ -87,19 +118,26 @@ class SingleSensorFilter:
             if not isinstance(value, kind):
                 raise InputError(f"{name}: expected a {kind.__name__}; got {type(value).__name__}")
 
-    def _arguments(self, scan: Floats, pose: Any, dt: Any, step: Any, prior: GLMB | LMB | None = None) -> StepArguments:
+    def _arguments(
+        self, scan: Floats, pose: Any, dt: Any, step: Any, prior: GLMB | LMB | None = None, births: LMB | None = None
+    ) -> StepArguments:
         """Scan, models and truncation as the kernels take them, in their order.
 
-        prior: whose labels those of the births must not repeat; None where there are none.
+        prior: whose labels those of the births must not repeat; None where there are none. births: instead of those of
+        the targets' model.
         """
         targets = self.targets
-        birth = births_at(targets.birth, check_step(step, targets.birth, prior)).to_kernel()
-        return (
-            ScanInput(birth, scan, pose_vector("pose", pose), positive("dt", dt)),
-            kernel_motion(targets.motion, targets.survival),
-            self.sensor.to_kernel(),
-            self.limits.truncation(self.sensor.meas_dim),
-        )
+        birth = births_for(targets.birth, step, prior, births).to_kernel()
+        motion = kernel_motion(targets.motion, targets.survival)
+        return (ScanInput(birth, scan, pose_vector("pose", pose), positive("dt", dt)), motion, *self._own())
+
+    def _own(self) -> tuple[Sensor, Truncation]:
+        return self.sensor.to_kernel(), self.limits.truncation(self.sensor.meas_dim)
+
+    def _update_arguments(self, scan: Floats, pose: Any) -> tuple[ScanInput, Sensor, Truncation]:
+        """As `_arguments`, of a scan of the prior's own time."""
+        nobody = LMB.empty(self.targets.state_dim).to_kernel()
+        return (ScanInput(nobody, scan, pose_vector("pose", pose), 0.0), *self._own())
 
     def _check_scan(self, scan: Any, rng: Any) -> tuple[Floats, int]:
         generator(rng)

@@ -64,24 +64,30 @@ def _in_one_turn(scan: Floats, angular: Bools) -> Floats:
     return wrap_angular(scan, angular)
 
 
-def check_belief(belief: object, kind: type[_Density], state_dim: int) -> _Density:
+def check_belief(belief: object, kind: type[_Density], state_dim: int, name: str = "belief") -> _Density:
     """The belief; `InputError` unless it is of the filter's kind and dimension."""
     if not isinstance(belief, kind):
-        raise InputError(f"belief: expected a {kind.__name__}; got {type(belief).__name__}")
+        raise InputError(f"{name}: expected a {kind.__name__}; got {type(belief).__name__}")
     if belief.state_dim != state_dim:
-        raise InputError(f"belief: expected states of dimension {state_dim}; got {belief.state_dim}")
+        raise InputError(f"{name}: expected states of dimension {state_dim}; got {belief.state_dim}")
     return belief
 
 
-def check_step(step: Any, birth: BirthModel, belief: GLMB | LMB | None = None) -> int:
-    """The step; `InputError` unless it is from 1 on, and later than the belief's labels where targets may be born."""
+def births_for(birth: BirthModel, step: Any, belief: GLMB | LMB | None = None, births: LMB | None = None) -> LMB:
+    """Who may be born at a step: `births`, or the sites of the model where that is None.
+
+    Raises:
+        InputError: a step below 1; births of another kind or dimension; a belief with labels of that step or later
+            ones, which those of the births could repeat.
+    """
     number = step_number(step)
-    if belief is None:
-        return number
+    born = births_at(birth, number) if births is None else check_belief(births, LMB, birth.state_dim, "births")
+    if belief is None or born.tracks.num_tracks == 0:
+        return born
     newest = belief.tracks.labels[:, 0].max(initial=np.iinfo(np.int64).min)
-    if newest >= number and birth.is_active(number):
+    if newest >= born.tracks.labels[:, 0].min():
         raise reject("step", f"a step after those of the labels in the belief, of which the last is {newest}", step)
-    return number
+    return born
 
 
 def births_at(birth: BirthModel, step: int) -> LMB:

@@ -4,14 +4,21 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TypeVar
 
+import numpy as np
 from scipy.special import gammaincinv, logit
 
+from vedette.densities import GLMB, LMB, glmb_to_lmb, track_moments
+from vedette.densities.label_sets import without_labels
 from vedette.kernels.association.search import SearchCaps
 from vedette.kernels.association.truncation import Truncation
+from vedette.kernels.base.types import Bools, Ints
 from vedette.kernels.gaussian.mixtures import MixtureCaps
 from vedette.kernels.steps.lmb import Reduction
-from vedette.models.arguments import dimension, non_negative, probability, real, reject
+from vedette.models.arguments import dimension, non_negative, positive, probability, real, reject
+
+_Labelled = TypeVar("_Labelled", GLMB, LMB)
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,6 +43,8 @@ class Limits:
         max_components: components a track; 1 keeps one moment-matched Gaussian.
         min_existence: labels of an LMB, or Bernoullis, less probable than this are dropped.
         max_labels: labels of an LMB, or Bernoullis of a multi-Bernoulli, kept.
+        max_position_std: m; labels whose position is less certain than this along both axes are dropped after the scan:
+            targets that nobody has seen for long. Infinite: none is.
         max_intensity_components: components of the intensity of a PHD or CPHD filter, all targets together.
         max_existence: Bernoullis of the CB-MeMBer filter surer than this are taken as this sure; below 1, because the
             update weighs them by r / (1 - r), and leaves one that is certain as it was, whatever the scan says.
@@ -55,6 +64,7 @@ class Limits:
     max_components: int = 10
     min_existence: float = 1e-4
     max_labels: int = 200
+    max_position_std: float = math.inf
     max_intensity_components: int = 100
     max_existence: float = 0.999
 
@@ -70,6 +80,8 @@ class Limits:
         probability("Limits.min_track_weight", self.min_track_weight)
         if probability("Limits.gate_probability", self.gate_probability) == 0.0:
             raise reject("Limits.gate_probability", "a probability above 0", self.gate_probability)
+        if self.max_position_std != math.inf:
+            positive("Limits.max_position_std", self.max_position_std)
         non_negative("Limits.merge_distance", self.merge_distance)
         real("Limits.min_log_clutter", self.min_log_clutter)
 
@@ -114,7 +126,28 @@ class Limits:
         """The fields that bound tracks and labels, as kernels take them."""
         return Reduction(self.track_caps(), float(logit(self.min_existence)), int(self.max_labels))
 
+    def without_spread(self, belief: _Labelled) -> tuple[_Labelled, float]:
+        """The belief without the labels that `max_position_std` drops, and their summed existence."""
+        if math.isinf(self.max_position_std):
+            return belief, 0.0
+        return without_labels(belief, _spread_labels(belief, self.max_position_std))
+
+    def kept(self, belief: LMB) -> LMB:
+        """The belief without the labels that `min_existence`, `max_labels` and `max_position_std` drop."""
+        least, logits = float(logit(self.min_existence)), belief.existence_logit
+        likeliest = np.argsort(-logits, kind="stable")
+        gone = np.union1d(likeliest[self.max_labels :], np.flatnonzero(logits < least))
+        return self.without_spread(without_labels(belief, belief.tracks.labels[gone])[0])[0]
+
     @property
     def max_existence_logit(self) -> float:
         """Log-odds of `max_existence`."""
         return float(logit(self.max_existence))
+
+
+def _spread_labels(belief: GLMB | LMB, max_position_std: float) -> Ints:
+    """(num, 2) labels whose position has more than this standard deviation along both axes."""
+    lmb = glmb_to_lmb(belief) if isinstance(belief, GLMB) else belief
+    variances = np.diagonal(track_moments(lmb.tracks)[1], axis1=1, axis2=2)[:, :2]
+    wide: Bools = variances.min(axis=1, initial=np.inf) > max_position_std**2
+    return np.ascontiguousarray(lmb.tracks.labels[wide])

@@ -11,9 +11,12 @@ import numpy as np
 from vedette.densities import GLMB, LMB
 from vedette.errors import NumericalError
 from vedette.filters.base import SingleSensorFilter
+from vedette.filters.blind import NO_POSE, NO_SCAN, blind_sensor
 from vedette.filters.info import FilterInfo
 from vedette.filters.inputs import check_belief, model_errors
-from vedette.kernels.steps.lmb import step_lmb
+from vedette.filters.limits import Limits
+from vedette.kernels.base.types import Lmb
+from vedette.kernels.steps.lmb import LmbReport, step_lmb, update_lmb
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -34,7 +37,15 @@ class LmbFilter(SingleSensorFilter):
         return LMB.empty(self.targets.state_dim)
 
     def step(
-        self, belief: GLMB | LMB, scan: Any, pose: Any, dt: float, step: int, *, rng: np.random.Generator
+        self,
+        belief: GLMB | LMB,
+        scan: Any,
+        pose: Any,
+        dt: float,
+        step: int,
+        *,
+        rng: np.random.Generator,
+        births: LMB | None = None,
     ) -> tuple[LMB, FilterInfo]:
         """Predict over `dt` seconds and update with a scan; arguments, results and errors as `DeltaGlmbFilter.step`.
 
@@ -42,21 +53,42 @@ class LmbFilter(SingleSensorFilter):
         """
         measurements, num_duplicates = self._check_scan(scan, rng)
         prior = check_belief(belief, LMB, self.targets.state_dim)
-        arguments = self._arguments(measurements, pose, dt, step, prior)
+        arguments = self._arguments(measurements, pose, dt, step, prior, births)
         with model_errors():
             posterior, report = step_lmb(prior.to_kernel(), *arguments, self.limits.reduction())
-        if not np.isfinite(report.sums.log_total):
-            raise NumericalError(f"step {step}: no association has positive weight; do the models forbid this scan?")
-        info = FilterInfo(
+        return self._concluded(posterior, report, num_duplicates, f"step {step}: ")
+
+    def predict(self, belief: GLMB | LMB, dt: float, step: int, *, births: LMB | None = None) -> tuple[LMB, FilterInfo]:
+        """The belief `dt` seconds later, births included; nothing is dropped. As `DeltaGlmbFilter.predict`."""
+        prior = check_belief(belief, LMB, self.targets.state_dim)
+        blind = LmbFilter(self.targets, blind_sensor(), Limits.none())
+        arguments = blind._arguments(NO_SCAN, NO_POSE, dt, step, prior, births)
+        with model_errors():
+            posterior, report = step_lmb(prior.to_kernel(), *arguments, blind.limits.reduction())
+        return blind._concluded(posterior, report, 0, f"step {step}: ")
+
+    def update(self, belief: GLMB | LMB, scan: Any, pose: Any, *, rng: np.random.Generator) -> tuple[LMB, FilterInfo]:
+        """The belief after a scan of its own time; as `DeltaGlmbFilter.update`."""
+        measurements, num_duplicates = self._check_scan(scan, rng)
+        prior = check_belief(belief, LMB, self.targets.state_dim)
+        arguments = self._update_arguments(measurements, pose)
+        with model_errors():
+            posterior, report = update_lmb(prior.to_kernel(), *arguments, self.limits.reduction())
+        return self._concluded(posterior, report, num_duplicates, "")
+
+    def _concluded(self, posterior: Lmb, report: LmbReport, num_duplicates: int, place: str) -> tuple[LMB, FilterInfo]:
+        if not math.isfinite(report.sums.log_total):
+            raise NumericalError(f"{place}no association has positive weight; do the models forbid this scan?")
+        belief, spread = self.limits.without_spread(LMB.from_kernel(posterior))
+        return belief, FilterInfo(
             log_likelihood=report.sums.log_total + report.log_clutter - self.sensor.clutter.rate,
             num_hypotheses=1,
-            num_tracks=len(posterior.existence_logit),
+            num_tracks=belief.tracks.num_tracks,
             discarded_weight_bound=max(0.0, -math.expm1(report.sums.log_kept)),
-            dropped_existence=float(report.dropped_existence),
+            dropped_existence=float(report.dropped_existence) + spread,
             num_clutter_raised=int(report.num_raised),
             num_duplicates=num_duplicates,
             num_inexact_clusters=int(report.sums.num_ranked),
             search_cut=False,
             cap_met=len(posterior.existence_logit) >= self.limits.max_labels,
         )
-        return LMB.from_kernel(posterior), info

@@ -1,6 +1,6 @@
 """How targets move and what a sensor at a place sees of them; all of it functions that a user can write too."""
 
-from vedette.models.birth import BirthModel
+from vedette.models.birth import BirthModel, MeasurementBirth
 from vedette.models.cartesian import position
 from vedette.models.clutter import ClutterModel, ClutterSampler, measurement_space_clutter
 from vedette.models.detection import (
@@ -29,6 +29,7 @@ __all__ = [
     "ClutterModel",
     "ClutterSampler",
     "DetectionModel",
+    "MeasurementBirth",
     "MeasurementModel",
     "ModelFunction",
     "MotionModel",

@@ -1,4 +1,4 @@
-"""Labelled multi-Bernoulli birth at fixed sites."""
+"""Labelled multi-Bernoulli birth: at fixed sites, and where something unexplained was measured."""
 
 from __future__ import annotations
 
@@ -8,7 +8,42 @@ from dataclasses import dataclass
 import numpy as np
 
 from vedette.kernels.base.types import Floats
-from vedette.models.arguments import float_array, positive_definite, reject
+from vedette.models.arguments import float_array, positive, positive_definite, real, reject
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MeasurementBirth:
+    """Targets born where something was measured that no track explains (Reuter, Vo, Vo, Dietmayer 2014, section IV-C).
+
+    A measurement that came of no track with probability u may be a target with existence
+    min(max_existence, expected u / sum of all u) at the next scan, at rest where it was measured.
+
+    Attributes:
+        expected: expected number of such births a scan.
+        max_existence: the most that any of them may have, in (0, 1).
+        std: (state_dim,) standard deviation of the state of a birth.
+
+    Raises:
+        InputError: names the field, what was expected and what came.
+    """
+
+    expected: float
+    max_existence: float
+    std: Floats
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "expected", positive("MeasurementBirth.expected", self.expected))
+        if not 0.0 < real("MeasurementBirth.max_existence", self.max_existence) < 1.0:
+            raise reject("MeasurementBirth.max_existence", "a probability above 0 and below 1", self.max_existence)
+        std = float_array("MeasurementBirth.std", self.std, (None,))
+        if len(std) < 2 or (std <= 0.0).any():
+            raise reject("MeasurementBirth.std", "a standard deviation above 0 of each state component", std.tolist())
+        object.__setattr__(self, "std", std)
+
+    @property
+    def cov(self) -> Floats:
+        """(state_dim, state_dim) covariance of a birth."""
+        return np.diag(self.std**2)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -19,7 +54,9 @@ class BirthModel:
         existence: (num_sites,) birth probability of each site, in (0, 1).
         means: (num_sites, state_dim) mean state of a birth.
         covs: (num_sites, state_dim, state_dim) its covariance, symmetric positive definite.
-        steps: the filter steps at which births may happen; None: every step.
+        steps: the filter steps at which births at the sites may happen; None: every step.
+        from_measurements: births where a tracker finds measurements that no track explains, beside the sites; None:
+            there are none.
 
     Raises:
         InputError: names the field, what was expected and what came.
@@ -29,6 +66,7 @@ class BirthModel:
     means: Floats
     covs: Floats
     steps: frozenset[int] | None = None
+    from_measurements: MeasurementBirth | None = None
 
     def __post_init__(self) -> None:
         means = float_array("BirthModel.means", self.means, (None, None))
@@ -41,6 +79,11 @@ class BirthModel:
             raise reject("BirthModel.existence", "probabilities above 0 and below 1", existence.tolist())
         for site, cov in enumerate(covs):
             positive_definite(f"BirthModel.covs[{site}]", cov)
+        measured = self.from_measurements
+        if measured is not None and not isinstance(measured, MeasurementBirth):
+            raise reject("BirthModel.from_measurements", "a MeasurementBirth or None", measured)
+        if measured is not None and len(measured.std) != state_dim:
+            raise reject("BirthModel.from_measurements.std", f"{state_dim} numbers", measured.std.tolist())
         for name, value in (("existence", existence), ("means", means), ("covs", covs), ("steps", _steps(self.steps))):
             object.__setattr__(self, name, value)
 
@@ -55,7 +98,7 @@ class BirthModel:
         return int(self.means.shape[1])
 
     def is_active(self, step: int) -> bool:
-        """Whether targets may be born at this filter step."""
+        """Whether targets may be born at the sites at this filter step."""
         return self.num_sites > 0 and (self.steps is None or step in self.steps)
 
     @classmethod

@@ -22,6 +22,10 @@ def _position_jacobian(state: Floats, pose: Floats, params: Floats, out: Floats)
             out[i, j] = 1.0 if i == j else 0.0
 
 
+def _places(measurements: Floats, pose: Floats) -> Floats:
+    return measurements
+
+
 def position() -> MeasurementModel:
     """[px, py] of the target in metres, in the frame of the region; the sensor's pose plays no part."""
-    return MeasurementModel(2, _position, np.empty(0), _position_jacobian, np.array([False, False]))
+    return MeasurementModel(2, _position, np.empty(0), _position_jacobian, np.array([False, False]), _places)

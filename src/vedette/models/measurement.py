@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from vedette.errors import ModelError
 from vedette.kernels.base.types import Bools, Floats
-from vedette.models.arguments import dimension, params_vector, pose_vector, reject, state_table
+from vedette.models.arguments import dimension, float_array, params_vector, pose_vector, reject, state_table
 from vedette.models.functions import ModelFunction, call, require_kind
 from vedette.models.probe import probe_array, probe_covariance, probe_jacobian
 
@@ -47,6 +48,8 @@ class MeasurementModel:
         jacobian: model function of kind `measurement_jacobian` (same parameters), or None: sigma points are used.
         angular: one boolean a component, true where it is an angle in radians; () means none. Residuals of angles are
             wrapped to (-pi, pi].
+        places: plain function of (n, meas_dim) measurements and a pose: the (n, 2) positions where they were taken of a
+            target; None where a measurement does not say where. Births from measurements need it.
 
     Raises:
         InputError: a function of another kind, a bad dimension or parameter, a wrong number of angular flags.
@@ -57,12 +60,15 @@ class MeasurementModel:
     params: Floats = field(default_factory=lambda: np.empty(0))
     jacobian: ModelFunction | None = None
     angular: Bools = field(default_factory=lambda: np.empty(0, np.bool_))
+    places: Callable[[Floats, Floats], Floats] | None = None
 
     def __post_init__(self) -> None:
         dimension("MeasurementModel.meas_dim", self.meas_dim)
         require_kind("MeasurementModel.function", self.function, "measurement")
         if self.jacobian is not None:
             require_kind("MeasurementModel.jacobian", self.jacobian, "measurement_jacobian")
+        if self.places is not None and not callable(self.places):
+            raise reject("MeasurementModel.places", "a function or None", self.places)
         object.__setattr__(self, "params", params_vector("MeasurementModel.params", self.params))
         object.__setattr__(self, "angular", angular_flags("MeasurementModel.angular", self.angular, self.meas_dim))
 
@@ -77,6 +83,20 @@ class MeasurementModel:
         for state, measurement in zip(table, out, strict=True):
             call(self.function, state, at, self.params, measurement)
         return out
+
+    def positions(self, measurements: Floats, pose: ArrayLike) -> Floats:
+        """(n, 2) positions of (n, meas_dim) measurements, in m.
+
+        Raises:
+            InputError: a model that has no `places`.
+            ModelError: its function raised, or gave something else.
+        """
+        if self.places is None:
+            raise reject("MeasurementModel.places", "a function, as births from measurements need a position", None)
+        try:
+            return float_array("places", self.places(measurements, pose_vector("pose", pose)), (len(measurements), 2))
+        except Exception as error:
+            raise ModelError(f"places of a measurement at pose {pose}: {type(error).__name__}: {error}") from error
 
     def check(self, states: ArrayLike, pose: ArrayLike) -> None:
         """Try the functions at each state; `ModelError` names the function, the state, the expected and the actual."""

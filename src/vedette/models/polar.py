@@ -73,9 +73,14 @@ def _range_jacobian(state: Floats, pose: Floats, params: Floats, out: Floats) ->
     _range_row(state, pose, out, 0)
 
 
+def _places(measurements: Floats, pose: Floats) -> Floats:
+    bearings, ranges = measurements[:, 0], measurements[:, 1]
+    return np.stack([pose[0] + ranges * np.cos(bearings), pose[1] + ranges * np.sin(bearings)], axis=1)
+
+
 def bearing_range() -> MeasurementModel:
     """[bearing, range] of the target from the sensor (paper: z_k)."""
-    return MeasurementModel(2, _bearing_range, np.empty(0), _bearing_range_jacobian, np.array([True, False]))
+    return MeasurementModel(2, _bearing_range, np.empty(0), _bearing_range_jacobian, np.array([True, False]), _places)
 
 
 def bearing_only() -> MeasurementModel:

@@ -27,12 +27,14 @@ class State:
         fused: that of all together.
         step: number of the scan, from 1; 0 before the first.
         time: s, of that scan; None before the first.
+        memory: what the tracker itself must know at the next step, such as who may then be born; None: nothing.
     """
 
     local: tuple[Any, ...]
     fused: Any
     step: int = 0
     time: float | None = None
+    memory: Any = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -43,11 +45,13 @@ class TrackerInfo:
         filters: what the filters reported: one a sensor, or a single one for all sensors together.
         fusion: what the fusion reported; None where nothing was fused.
         seconds: wall time by stage, of which "filter" and "fusion" are kept in the record of a run.
+        bytes_sent: for each sensor, the bytes that it sent; empty where the tracker does not count them.
     """
 
     filters: tuple[FilterInfo, ...]
     fusion: Any
     seconds: Mapping[str, float]
+    bytes_sent: tuple[int, ...] = ()
 
 
 @runtime_checkable
@@ -75,7 +79,8 @@ class Tracker(Protocol):
 
         Args:
             state: as the step before left it.
-            scans: one a sensor: (num, meas_dim) measurements, in any order; angles in radians.
+            scans: one a sensor: (num, meas_dim) measurements, in any order; angles in radians. Empty where a scan
+                has found nothing; None of a sensor that did not scan at `time`.
             poses: (num_sensors, 3 or more) [px, py, heading_rad, ...] of each sensor at `time`.
             time: s, after `state.time`.
             rngs: one a sensor, for filters that draw.
@@ -84,8 +89,7 @@ class Tracker(Protocol):
             The state after these scans, and a report.
 
         Raises:
-            InputError: another number of scans, poses or generators than of sensors; a scan that is missing; a time
-                that is not after the last.
+            InputError: another number of scans, poses or generators than of sensors; a time that is not after the last.
             ModelError, NumericalError: as the filters and the fusion. Any exception has a note that says in which
                 stage it was raised (`vedette.tracking.stage_of`).
         """
@@ -102,12 +106,6 @@ def check_step(
         came = None if given is None else len(given)
         if came != num_sensors:
             raise InputError(f"{name}: expected {num_sensors}, one a sensor; got {came}")
-    missing = [s for s, scan in enumerate(scans) if scan is None]
-    if missing:
-        raise InputError(
-            f"scans[{missing[0]}]: expected measurements, an empty array for a scan without any; got None (a sensor "
-            "that does not scan is not yet provided for)"
-        )
     now = real("time", time)
     if state.time is not None and now <= state.time:
         raise InputError(f"time: expected one after that of the last scan, {state.time:g} s; got {now:g}")

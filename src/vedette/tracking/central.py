@@ -8,10 +8,13 @@ from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
+from vedette.densities import LMB
 from vedette.filters import FilterInfo
 from vedette.models import SensorModel, TargetModel
 from vedette.models.arguments import reject
 from vedette.tracking.base import State, TrackerInfo, check_step
+from vedette.tracking.births import births_due, births_from_scans
+from vedette.tracking.messages import bytes_of_scan
 from vedette.tracking.stages import Stages
 
 
@@ -36,7 +39,10 @@ class CentralFilter(Protocol):
     def step(
         self, belief: Any, scans: Any, poses: Any, dt: float, step: int, *, rng: np.random.Generator
     ) -> tuple[Any, FilterInfo]:
-        """Predict over `dt` seconds and update with one scan a sensor."""
+        """Predict over `dt` seconds and update with one scan a sensor, None of one that did not scan.
+
+        Where targets are born of measurements, a further argument `births` is an LMB of all who may have been born.
+        """
         ...
 
 
@@ -76,10 +82,15 @@ class Central:
     ) -> tuple[State, TrackerInfo]:
         """Update the one belief with all scans; see `Tracker.step`. Only the first of `rngs` is drawn from."""
         at, dt = check_step(state, scans, poses, time, rngs, len(self.sensors))
-        stages, step = Stages(), state.step + 1
+        stages, step, birth = Stages(), state.step + 1, self.targets.birth
+        due = births_due(birth, step, state.memory)
         with stages.timing("filter"):
-            belief, info = self.filter.step(state.fused, scans, at, dt, step, rng=rngs[0])
-        return self._state(belief, step, float(time)), TrackerInfo((info,), None, stages.seconds)
+            births = {} if due is None else {"births": due}
+            belief, info = self.filter.step(state.fused, scans, at, dt, step, rng=rngs[0], **births)
+        with stages.timing("births"):
+            measured = births_from_scans(birth, belief, self.sensors, scans, at, step + 1)
+        sent = tuple(bytes_of_scan(scan, pose) for scan, pose in zip(scans, at, strict=True))
+        return self._state(belief, step, float(time), measured), TrackerInfo((info,), None, stages.seconds, sent)
 
-    def _state(self, belief: Any, step: int, time: float | None) -> State:
-        return State((belief,) * len(self.sensors), belief, step, time)
+    def _state(self, belief: Any, step: int, time: float | None, measured: LMB | None = None) -> State:
+        return State((belief,) * len(self.sensors), belief, step, time, measured)

@@ -8,12 +8,16 @@ from typing import Any
 
 import numpy as np
 
+from vedette.densities import LMB
 from vedette.errors import InputError
-from vedette.filters import Filter, shared_targets
-from vedette.fusion import Fusion
+from vedette.filters import Filter, FilterInfo
+from vedette.fusion import Fusion, Views
+from vedette.kernels.base.types import Floats
 from vedette.models import SensorModel, TargetModel
-from vedette.models.arguments import reject
 from vedette.tracking.base import State, TrackerInfo, check_step
+from vedette.tracking.births import births_due, births_from_scans
+from vedette.tracking.local import LocalFilters
+from vedette.tracking.messages import bytes_of_belief
 from vedette.tracking.stages import Stages
 
 
@@ -27,7 +31,9 @@ class Distributed:
         feedback: whether the fused belief replaces the sensors' own (paper-notes 9).
 
     Raises:
-        InputError: no filter or something else, filters of different targets, several sensors without a fusion.
+        InputError: no filter or something else, filters of different targets, several sensors without a fusion; births
+            from measurements, a fusion of beliefs that share their prediction, or one that matches labels, where it
+            does not go together with `feedback`.
     """
 
     filters: tuple[Filter, ...]
@@ -35,20 +41,23 @@ class Distributed:
     feedback: bool = False
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "filters", tuple(self.filters))
-        if not self.filters:
-            raise InputError("filters: expected at least one; got none")
-        for s, local in enumerate(self.filters):
-            if not isinstance(local, Filter):
-                raise reject(f"filters[{s}]", "a Filter, with targets, sensor, initial() and step()", local)
-        shared_targets(self.filters)
+        object.__setattr__(self, "filters", LocalFilters(self.filters).filters)
         if self.fusion is None and len(self.filters) > 1:
             raise InputError(f"fusion: expected one for {len(self.filters)} sensors; got none")
+        if self.feedback or self.fusion is None:
+            return
+        if shares_prediction(self.fusion):
+            raise InputError("feedback: expected true, as the fusion is of beliefs that share their prediction")
+        if self.targets.birth.from_measurements is not None and not matches_labels(self.fusion):
+            raise InputError(
+                "fusion: expected one that matches labels, as each sensor makes its own from its measurements and "
+                "nothing is fed back; got one that fuses by label"
+            )
 
     @property
     def targets(self) -> TargetModel:
         """The targets as all sensors know them."""
-        return shared_targets(self.filters)
+        return self.filters[0].targets
 
     @property
     def sensors(self) -> tuple[SensorModel, ...]:
@@ -65,16 +74,55 @@ class Distributed:
     ) -> tuple[State, TrackerInfo]:
         """Filter each sensor's scan, then fuse; see `Tracker.step`."""
         at, dt = check_step(state, scans, poses, time, rngs, len(self.filters))
-        step, stages, local, infos = state.step + 1, Stages(), [], []
-        for s, own in enumerate(self.filters):
+        step, stages, filters = state.step + 1, Stages(), LocalFilters(self.filters)
+        births = [births_due(self.targets.birth, step, own) for own in state.memory or (None,) * len(self.filters)]
+        prediction, local, infos = None, [], []
+        if shares_prediction(self.fusion):
+            with stages.timing("filter"):
+                prediction, _ = filters.predicted(0, state.fused, dt, step, births[0])
+        for s in range(len(self.filters)):
             with stages.timing("filter", s):
-                belief, info = own.step(state.local[s], scans[s], at[s], dt, step, rng=rngs[s])
+                if prediction is None:
+                    belief, info = filters.stepped(s, state.local[s], scans[s], at[s], dt, step, births[s], rngs[s])
+                else:
+                    belief, info = filters.updated(s, prediction, scans[s], at[s], rngs[s])
             local.append(belief)
             infos.append(info)
         fused, report = local[0], None
+        sent = tuple(bytes_of_belief(belief) for belief in local)
         if self.fusion is not None:
+            views = Views(self.sensors, at, tuple(scan is not None for scan in scans), prediction)
             with stages.timing("fusion"):
-                fused, report = self.fusion.fuse(local)
+                fused, report = self.fusion.fuse(local, views)
+        if prediction is not None:
+            fused = filters.kept(fused)
         if self.feedback:
             local = [fused] * len(local)
-        return State(tuple(local), fused, step, float(time)), TrackerInfo(tuple(infos), report, stages.seconds)
+        with stages.timing("births"):
+            measured = self._measured(local, scans, at, step + 1)
+        info = TrackerInfo(tuple(infos), report, stages.seconds, sent)
+        return State(tuple(local), fused, step, float(time), measured), info
+
+    def _measured(
+        self, local: Sequence[Any], scans: Sequence[Any], poses: Floats, step: int
+    ) -> tuple[LMB | None, ...] | None:
+        """For each sensor, who may be born at `step`: the same for all where they share a belief."""
+        birth, sensors = self.targets.birth, self.sensors
+        if birth.from_measurements is None:
+            return None
+        if self.feedback or len(local) == 1:
+            return (births_from_scans(birth, local[0], sensors, scans, poses, step),) * len(local)
+        return tuple(
+            births_from_scans(birth, belief, sensors[s : s + 1], scans[s : s + 1], poses[s : s + 1], step, owner=s)
+            for s, belief in enumerate(local)
+        )
+
+
+def shares_prediction(fusion: Fusion | None) -> bool:
+    """Whether the fusion is of beliefs that were all updated from one prediction, as `ParallelUpdate` is."""
+    return bool(getattr(fusion, "shares_prediction", False))
+
+
+def matches_labels(fusion: Fusion | None) -> bool:
+    """Whether the fusion finds out itself which labels are of one target, as `Matched` does."""
+    return bool(getattr(fusion, "matches_labels", False))

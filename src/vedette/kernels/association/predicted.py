@@ -134,3 +134,18 @@ def predicted_rows(tracks: Tracks, scan: ScanInput, motion: Motion, sensor: Sens
     rows = make_rows(num_rows, len(tracks.log_weights) + len(sites.log_weights), state_dim, meas_dim)
     predict_rows(tracks, scan, motion, sensor, rows, make_scratch(state_dim, meas_dim))
     return rows
+
+
+@kernel
+def standing_rows(tracks: Tracks, scan: ScanInput, sensor: Sensor) -> Rows:
+    """The tracks as they are at the time of the scan, without births, deaths or motion; each is surely there."""
+    state_dim, meas_dim = tracks.means.shape[1], len(sensor.angular)
+    rows = make_rows(len(tracks.labels), len(tracks.log_weights), state_dim, meas_dim)
+    for i in range(len(tracks.labels)):
+        rows.labels[i, 0], rows.labels[i, 1] = tracks.labels[i, 0], tracks.labels[i, 1]
+        rows.log_absent[i], rows.offsets[i + 1] = -math.inf, tracks.offsets[i + 1]
+    for c in range(len(tracks.log_weights)):
+        rows.log_weights[c] = tracks.log_weights[c]
+        copy_component(tracks.means, tracks.covs, c, rows.means, rows.covs, c)
+    expect_rows(sensor, scan.pose, rows, make_scratch(state_dim, meas_dim))
+    return rows

@@ -22,7 +22,7 @@ from vedette.kernels.association.children import Children, Parents
 from vedette.kernels.association.coverage import Associations, add_uncovered, associations_of_options, mark_heaviest
 from vedette.kernels.association.gibbs import sample_children
 from vedette.kernels.association.options import weighed_options
-from vedette.kernels.association.predicted import Rows, predicted_rows
+from vedette.kernels.association.predicted import Rows, predicted_rows, standing_rows
 from vedette.kernels.association.ranked import rank_children
 from vedette.kernels.association.truncation import Truncation, heaviest_first, keep_heaviest, merge_equal
 from vedette.kernels.base.arrays import filled_ints
@@ -118,7 +118,7 @@ def _conclude(
 
 
 @kernel
-def finish_ranked(
+def _finish_ranked(
     prior: Glmb, rows: Rows, scan: ScanInput, sensor: Sensor, truncation: Truncation
 ) -> tuple[Glmb, StepReport]:
     """Weigh, rank, truncate and assemble once there are rows: the tracks of the prior, then birth sites."""
@@ -134,7 +134,13 @@ def step_ranked(
     prior: Glmb, scan: ScanInput, motion: Motion, sensor: Sensor, truncation: Truncation
 ) -> tuple[Glmb, StepReport]:
     """One scan with the exactly ranked hypotheses."""
-    return finish_ranked(prior, predicted_rows(prior.tracks, scan, motion, sensor), scan, sensor, truncation)
+    return _finish_ranked(prior, predicted_rows(prior.tracks, scan, motion, sensor), scan, sensor, truncation)
+
+
+@kernel
+def update_ranked(prior: Glmb, scan: ScanInput, sensor: Sensor, truncation: Truncation) -> tuple[Glmb, StepReport]:
+    """The exactly ranked hypotheses after a scan of the prior's own time; `scan` has no births and no period."""
+    return _finish_ranked(prior, standing_rows(prior.tracks, scan, sensor), scan, sensor, truncation)
 
 
 @kernel

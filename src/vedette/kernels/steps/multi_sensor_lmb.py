@@ -101,7 +101,7 @@ def _reduced_tracks(
 
 
 @kernel
-def update_lmb(
+def lmb_of_combinations(
     combinations: Combinations, num_columns: int, truncation: Truncation, reduction: Reduction
 ) -> tuple[Lmb, LmbReport]:
     """Associate, marginalise and reduce once the combinations are there; clutter is left to those who made them.

@@ -1,0 +1,96 @@
+"""The central LMB filter: all combinations of all sensors' measurements weighed jointly."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from vedette.densities import GLMB, LMB
+from vedette.errors import NumericalError
+from vedette.filters.info import FilterInfo
+from vedette.filters.inputs import births_for, check_belief, model_errors
+from vedette.filters.multi_sensor import MultiSensorFilter, log_likelihood
+from vedette.kernels.base.types import ScanInput
+from vedette.kernels.steps.multi_sensor_combinations import extend_combinations, predict_combinations
+from vedette.kernels.steps.multi_sensor_lmb import lmb_of_combinations
+from vedette.models import kernel_motion
+from vedette.models.arguments import positive
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MultiSensorLmbFilter(MultiSensorFilter):
+    """LMB filter of several sensors: the existences and densities of the exact posterior given all scans of a time.
+
+    Every track is weighed under each combination of a miss or a gated measurement at every sensor, and the combinations
+    of all tracks are summed jointly, no measurement twice; the posterior is projected to an LMB once, not after each
+    sensor. The order of the sensors does not matter where models are linear and neither noise nor detection depends on
+    the state; else a later sensor's model is linearised, and its noise and detection are taken, at what the earlier
+    ones have left.
+
+    What is cut, by `limits`, and counted: combinations of a track that are surely less probable than `min_existence`,
+    or beyond the `max_hypotheses` heaviest at a sensor (`search_cut`; counted as they weigh there, before later sensors
+    speak); and in a cluster of tracks that contend for many measurements, sets of taken measurements beyond the
+    `max_hypotheses` heaviest, or lighter than `min_relative_weight` times the heaviest (`num_inexact_clusters`). All of
+    it is in `discarded_weight_bound`. The number of combinations grows exponentially with the number of sensors that
+    see a track, up to `max_hypotheses`.
+
+    Attributes and errors: as `MultiSensorGlmbFilter`.
+    """
+
+    def initial(self) -> LMB:
+        """The belief before the first scans: no target."""
+        return LMB.empty(self.targets.state_dim)
+
+    def step(
+        self,
+        belief: GLMB | LMB,
+        scans: Any,
+        poses: Any,
+        dt: float,
+        step: int,
+        *,
+        rng: np.random.Generator,
+        births: LMB | None = None,
+    ) -> tuple[LMB, FilterInfo]:
+        """Predict over `dt` seconds and update; arguments, results and errors as `MultiSensorGlmbFilter.step`.
+
+        Nothing is drawn from `rng`; it is taken so that filters are interchangeable.
+        """
+        looks, num_duplicates = self._looks(scans, poses, rng)
+        targets, limits = self.targets, self.limits
+        prior = check_belief(belief, LMB, targets.state_dim)
+        born = births_for(targets.birth, step, prior, births)
+        motion, num_columns, reports = kernel_motion(targets.motion, targets.survival), 0, []
+        reduction = limits.reduction()
+        # A label that cannot exist has no density to be kept with.
+        reduction = reduction._replace(min_existence_logit=max(reduction.min_existence_logit, -1e300))
+        with model_errors():
+            inputs = [ScanInput(born.to_kernel(), look.scan, look.pose, positive("dt", dt)) for look in looks]
+            combinations = predict_combinations(prior.to_kernel(), inputs[0], len(looks), motion)
+            for s, look in enumerate(looks):
+                truncation = limits.truncation(look.sensor.meas_dim)
+                combinations, report = extend_combinations(
+                    combinations, s, num_columns, inputs[s], look.sensor.to_kernel(), truncation
+                )
+                num_columns += len(look.scan)
+                reports.append(report)
+            posterior, joint = lmb_of_combinations(combinations, num_columns, truncation, reduction)
+        if not math.isfinite(joint.sums.log_total):
+            raise NumericalError(f"step {step}: no association has positive weight; do the models forbid these scans?")
+        log_kept = joint.sums.log_kept + sum(report.log_kept for report in reports)
+        kept, spread = limits.without_spread(LMB.from_kernel(posterior))
+        return kept, FilterInfo(
+            log_likelihood=log_likelihood(joint.sums.log_total, [report.log_clutter for report in reports], looks),
+            num_hypotheses=1,
+            num_tracks=kept.tracks.num_tracks,
+            discarded_weight_bound=max(0.0, -math.expm1(log_kept)),
+            dropped_existence=float(joint.dropped_existence) + spread,
+            num_clutter_raised=sum(int(report.num_raised) for report in reports),
+            num_duplicates=num_duplicates,
+            num_inexact_clusters=int(joint.sums.num_ranked),
+            search_cut=any(report.log_kept < 0.0 for report in reports),
+            cap_met=len(posterior.existence_logit) >= limits.max_labels,
+        )

@@ -1,0 +1,35 @@
+"""Which measurements the tracks explain, so that the others may be new targets."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from vedette.kernels.association.options import weighed_options
+from vedette.kernels.association.predicted import standing_rows
+from vedette.kernels.association.truncation import Truncation
+from vedette.kernels.base.compile import kernel
+from vedette.kernels.base.types import Floats, Lmb, ScanInput, Sensor
+from vedette.kernels.steps.lmb import weigh_by_existence
+
+
+@kernel
+def prob_explained(belief: Lmb, scan: ScanInput, sensor: Sensor, truncation: Truncation) -> Floats:
+    """(num_measurements,) probability that each is of a track, if tracks did not contend for it:
+
+        sum over labels of r <p, p_D g(z | .)> / (kappa(z) + the same sum).
+    """
+    rows = standing_rows(belief.tracks, scan, sensor)
+    weigh_by_existence(belief.existence_logit, rows)
+    options, _, _ = weighed_options(rows, scan, sensor, truncation)
+    odds = np.zeros(len(scan.measurements))
+    for option in range(options.offsets[-1]):
+        if options.columns[option] >= 0:
+            odds[options.columns[option]] += math.exp(options.log_weights[option])
+    for j in range(len(odds)):
+        odds[j] = odds[j] / (1.0 + odds[j]) if odds[j] < math.inf else 1.0
+    return odds
+
+
+__all__ = ["prob_explained"]

@@ -1,0 +1,133 @@
+"""Births from measurements: who may have been born, as the scans of all sensors say and no track explains."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from vedette.densities import GLMB, LMB, TrackTable, glmb_to_lmb
+from vedette.densities.checks import unchecked
+from vedette.errors import InputError
+from vedette.filters import Limits
+from vedette.filters.inputs import births_at, check_scan, model_errors
+from vedette.kernels.base.types import Floats, Ints, ScanInput
+from vedette.kernels.labelled.stacking import stack_tracks
+from vedette.kernels.steps.explained import prob_explained
+from vedette.models import BirthModel, MeasurementBirth, SensorModel
+from vedette.models.arguments import pose_vector
+
+# Labels that a sensor makes by itself have an index from this times its number, counted from 1; no site has.
+LABELS_OF_A_SENSOR = 1_000_000
+# What a track explains surer than this is no birth: each costs a track until the next scan.
+LEAST_UNEXPLAINED = 0.01
+# Squared distance, in standard deviations of a birth, within which two sensors have measured one target: the 99 %
+# quantile of chi-squared of two degrees of freedom.
+_SAME_TARGET = 9.21
+
+
+class Unexplained(NamedTuple):
+    """Measurements that no track explains surely."""
+
+    positions: Floats  # (num, 2) m
+    probabilities: Floats  # (num,) that no track explains it
+    sensors: Ints  # (num,) which sensor measured it
+
+
+def births_due(birth: BirthModel, step: int, measured: LMB | None) -> LMB | None:
+    """Who may have been born by a step, at the sites or where was measured; None: at the sites alone.
+
+    measured: as `births_from_scans` gave for this step; None: of no scan.
+    """
+    if birth.from_measurements is None:
+        return None
+    sites = births_at(birth, step)
+    if measured is None:
+        return sites
+    tracks = TrackTable.from_kernel(stack_tracks([sites.tracks.to_kernel(), measured.tracks.to_kernel()]))
+    return unchecked(LMB, tracks, np.concatenate([sites.existence_logit, measured.existence_logit]))
+
+
+def births_from_scans(
+    birth: BirthModel,
+    belief: GLMB | LMB,
+    sensors: Sequence[SensorModel],
+    scans: Sequence[Any],
+    poses: Any,
+    step: int,
+    *,
+    owner: int | None = None,
+) -> LMB | None:
+    """Who may be born at `step`, after the scans before it; what several sensors measured of one target is one birth.
+
+    Args:
+        birth: whose `from_measurements` says how; None is returned where it says nothing.
+        belief: after those scans.
+        sensors, scans, poses: one a sensor; a scan is None where there was none.
+        step: with which the births are labelled; their indices follow those of the sites.
+        owner: the sensor that makes them by itself, with indices of its own; None: all sensors together.
+
+    Raises:
+        InputError: a belief without labels, or a measurement that does not say where its target is.
+    """
+    model = birth.from_measurements
+    if model is None:
+        return None
+    if not isinstance(belief, GLMB | LMB):
+        raise InputError(f"belief: expected a GLMB or an LMB for births from measurements; got {type(belief).__name__}")
+    lmb = glmb_to_lmb(belief) if isinstance(belief, GLMB) else belief
+    found = [
+        _unexplained(lmb, sensor, scans[s], poses[s], s) for s, sensor in enumerate(sensors) if scans[s] is not None
+    ]
+    if not found:
+        return LMB.empty(birth.state_dim)
+    pooled = _pool(Unexplained(*map(np.concatenate, zip(*found, strict=True))), model)
+    first = birth.num_sites if owner is None else LABELS_OF_A_SENSOR * (owner + 1)
+    return _born(pooled, model, step, first)
+
+
+def _unexplained(belief: LMB, sensor: SensorModel, scan: Any, pose: Any, number: int) -> Unexplained:
+    measurements, _ = check_scan(scan, sensor.measurement)
+    at = pose_vector("pose", pose)
+    given = ScanInput(LMB.empty(belief.state_dim).to_kernel(), measurements, at, 0.0)
+    with model_errors():
+        explained = prob_explained(
+            belief.to_kernel(), given, sensor.to_kernel(), Limits().truncation(sensor.meas_dim)
+        )
+    free = np.flatnonzero(explained < 1.0 - LEAST_UNEXPLAINED)
+    positions = sensor.measurement.positions(measurements[free], at)
+    return Unexplained(positions, 1.0 - explained[free], np.full(len(free), number))
+
+
+def _pool(found: Unexplained, model: MeasurementBirth) -> Unexplained:
+    """One entry for what different sensors have measured near each other, from the least explained on.
+
+    A group has at most one measurement of a sensor; it lies at their mean and is as unexplained as the least explained.
+    """
+    order = np.argsort(-found.probabilities, kind="stable")
+    places, totals = np.empty((len(order), 2)), np.zeros(len(order))
+    probabilities, members = np.empty(len(order)), np.zeros((len(order), int(found.sensors.max(initial=0)) + 1), bool)
+    num = 0
+    for i in order.tolist():
+        offsets = (places[:num] - found.positions[i]) / model.std[:2]
+        distances = np.where(members[:num, found.sensors[i]], np.inf, (offsets**2).sum(axis=1))
+        group = int(distances.argmin()) if num and distances.min() <= _SAME_TARGET else num
+        if group == num:
+            places[num], probabilities[num], num = found.positions[i], found.probabilities[i], num + 1
+        totals[group] += 1.0
+        places[group] += (found.positions[i] - places[group]) / totals[group]
+        members[group, found.sensors[i]] = True
+    return Unexplained(places[:num], probabilities[:num], np.empty(0, np.int64))
+
+
+def _born(found: Unexplained, model: MeasurementBirth, step: int, first_index: int) -> LMB:
+    num, dim = len(found.probabilities), len(model.std)
+    if num == 0:
+        return LMB.empty(dim)
+    labels = np.column_stack([np.full(num, step), first_index + np.arange(num)])
+    means = np.zeros((num, dim))
+    means[:, :2] = found.positions
+    shares = model.expected * found.probabilities / found.probabilities.sum()
+    existence = np.minimum(model.max_existence, shares)
+    return LMB.from_bernoullis(labels, existence, means, np.tile(model.cov, (num, 1, 1)))

@@ -1,0 +1,80 @@
+"""The filters of all sensors, and what a tracker asks of each of them: a step, a prediction or an update."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from vedette.densities import GLMB, LMB
+from vedette.errors import InputError
+from vedette.filters import Filter, FilterInfo, LmbFilter, TwoStepFilter, shared_targets
+from vedette.models.arguments import reject
+
+
+class LocalFilters:
+    """Filters of one sensor each, which hold the same targets.
+
+    Raises:
+        InputError: no filter or something else, filters of different targets.
+    """
+
+    def __init__(self, filters: Sequence[Filter]) -> None:
+        self.filters = tuple(filters)
+        if not self.filters:
+            raise InputError("filters: expected at least one; got none")
+        for s, local in enumerate(self.filters):
+            if not isinstance(local, Filter):
+                raise reject(f"filters[{s}]", "a Filter, with targets, sensor, initial() and step()", local)
+        shared_targets(self.filters)
+
+    def stepped(
+        self,
+        s: int,
+        belief: Any,
+        scan: Any,
+        pose: Any,
+        dt: float,
+        step: int,
+        births: LMB | None,
+        rng: np.random.Generator,
+    ) -> tuple[Any, FilterInfo]:
+        """What sensor `s` believes after a scan; where it did not scan, what it predicts."""
+        own = self.filters[s]
+        if scan is None:
+            return self.predicted(s, belief, dt, step, births)
+        if births is None:
+            return own.step(belief, scan, pose, dt, step, rng=rng)
+        return self._two_step(s, "targets are born of measurements").step(
+            belief, scan, pose, dt, step, rng=rng, births=births
+        )
+
+    def predicted(self, s: int, belief: Any, dt: float, step: int, births: LMB | None) -> tuple[Any, FilterInfo]:
+        """What sensor `s` expects `dt` seconds later."""
+        return self._two_step(s, "it must predict without a scan").predict(belief, dt, step, births=births)
+
+    def updated(
+        self, s: int, prediction: Any, scan: Any, pose: Any, rng: np.random.Generator
+    ) -> tuple[Any, FilterInfo]:
+        """The prediction after the scan of sensor `s`, no label dropped; the prediction where it did not scan."""
+        own = self.filters[s]
+        if not isinstance(own, LmbFilter):
+            raise reject(f"filters[{s}]", "an LmbFilter, as the sensors share their prediction", own)
+        whole = replace(own.limits, min_existence=0.0, max_labels=2**62, max_position_std=np.inf)
+        seen = np.empty((0, own.sensor.meas_dim)) if scan is None else scan
+        belief, info = replace(own, limits=whole).update(prediction, seen, pose, rng=rng)
+        return (prediction if scan is None else belief), info
+
+    def kept(self, belief: LMB) -> LMB:
+        """The belief without the labels that the limits of the first filter drop."""
+        own = self.filters[0]
+        assert isinstance(own, LmbFilter)
+        return own.limits.kept(belief)
+
+    def _two_step(self, s: int, why: str) -> TwoStepFilter:
+        own = self.filters[s]
+        if not isinstance(own, TwoStepFilter):
+            raise reject(f"filters[{s}]", f"a TwoStepFilter, with predict() and update(), as {why}", own)
+        return own

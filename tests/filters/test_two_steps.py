@@ -1,0 +1,175 @@
+"""Prediction and update apart: together they are the step; several scans of one time, or none; births from outside."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from filters.examples import assert_same_glmb, plain_glmb, plain_lmb
+from filters.test_multi_sensor import DT, POSES, SCANS, SENSORS, TARGETS
+from vedette import models
+from vedette.densities import GLMB, LMB, existence_probabilities, glmb_to_lmb, track_moments
+from vedette.errors import InputError
+from vedette.filters import (
+    DeltaGlmbFilter,
+    Limits,
+    LmbFilter,
+    MultiSensorGlmbFilter,
+    MultiSensorLmbFilter,
+    SequentialLmbFilter,
+    TwoStepFilter,
+)
+
+pytestmark = pytest.mark.lanes
+
+LOCAL = [LmbFilter, DeltaGlmbFilter]
+CENTRAL = [MultiSensorLmbFilter, MultiSensorGlmbFilter, SequentialLmbFilter]
+
+
+def rng() -> np.random.Generator:
+    return np.random.default_rng(1)
+
+
+def assert_same_lmb(one: LMB, other: LMB, tolerance: float = 1e-11) -> None:
+    mine, others = plain_lmb(one), plain_lmb(other)
+    assert mine.keys() == others.keys()
+    np.testing.assert_array_equal(one.tracks.labels, other.tracks.labels)
+    np.testing.assert_allclose(one.existence_logit, other.existence_logit, rtol=tolerance, atol=tolerance)
+    np.testing.assert_allclose(one.tracks.means, other.tracks.means, rtol=tolerance, atol=tolerance)
+    np.testing.assert_allclose(one.tracks.covs, other.tracks.covs, rtol=tolerance, atol=tolerance)
+
+
+@pytest.mark.parametrize("kind", LOCAL)
+def test_a_prediction_and_an_update_are_a_step(kind: Any) -> None:
+    local = kind(TARGETS, SENSORS[0], Limits.none())
+    assert isinstance(local, TwoStepFilter)
+    belief = two = local.initial()
+    for step, scans in enumerate(SCANS, start=1):
+        belief, info = local.step(belief, scans[0], POSES[0], DT, step, rng=rng())
+        predicted, before = local.predict(two, DT, step)
+        two, after = local.update(predicted, scans[0], POSES[0], rng=rng())
+        assert before.log_likelihood == pytest.approx(0.0, abs=1e-12)
+        assert after.log_likelihood == pytest.approx(info.log_likelihood, abs=1e-11)
+        if kind is LmbFilter:
+            assert_same_lmb(two, belief)
+        else:
+            assert_same_glmb(plain_glmb(two), plain_glmb(belief), 1e-11)
+
+
+def test_a_prediction_is_survival_motion_and_birth() -> None:
+    """Against the formulas: r+ = r P_S, m+ = F m, P+ = F P F' + Q; the sites as they are."""
+    local = LmbFilter(TARGETS, SENSORS[0])
+    posterior, _ = local.step(local.initial(), SCANS[0][0], POSES[0], DT, 1, rng=rng())
+    born = LMB.from_bernoullis([[2, 7]], [0.01], [[1.0, 2.0, 3.0, 4.0]], [np.diag([9.0, 8.0, 7.0, 6.0])])
+    predicted, info = local.predict(posterior, DT, 2, births=born)
+    transition = np.eye(4)
+    transition[0, 2] = transition[1, 3] = DT
+    for i in range(posterior.tracks.num_tracks):
+        rows = slice(posterior.tracks.offsets[i], posterior.tracks.offsets[i + 1])
+        np.testing.assert_allclose(predicted.tracks.means[rows], posterior.tracks.means[rows] @ transition.T)
+        noise = TARGETS.motion.noise_cov(posterior.tracks.means[rows][0], DT)
+        wanted = transition @ posterior.tracks.covs[rows] @ transition.T + noise
+        np.testing.assert_allclose(predicted.tracks.covs[rows], wanted)
+    num = posterior.tracks.num_tracks
+    np.testing.assert_allclose(predicted.existence[:num], 0.9 * posterior.existence, rtol=1e-12)
+    assert predicted.existence[num] == pytest.approx(0.01, rel=1e-12)
+    assert tuple(predicted.tracks.labels[num]) == (2, 7)
+    assert info.num_tracks == num + 1
+    # The same targets, hypothesis by hypothesis.
+    glmb = DeltaGlmbFilter(TARGETS, SENSORS[0], Limits.none())
+    joint, _ = glmb.step(glmb.initial(), SCANS[0][0], POSES[0], DT, 1, rng=rng())
+    labels, before = existence_probabilities(joint)
+    labels_after, after = existence_probabilities(glmb.predict(joint, DT, 2, births=born)[0])
+    np.testing.assert_array_equal(labels_after[: len(labels)], labels)
+    np.testing.assert_allclose(after, [*(0.9 * before), 0.01], rtol=1e-11)
+
+
+def test_sequential_scans_are_updates_in_turn() -> None:
+    """Labels are dropped after the last scan alone, and one sensor is the plain filter."""
+    limits = Limits(min_existence=0.05)
+    central = SequentialLmbFilter(TARGETS, SENSORS, limits)
+    whole = [LmbFilter(TARGETS, sensor, dataclasses.replace(limits, min_existence=0.0)) for sensor in SENSORS]
+    belief, info = central.step(central.initial(), SCANS[0], POSES, DT, 1, rng=rng())
+    turn, log_likelihood = whole[0].predict(whole[0].initial(), DT, 1)[0], 0.0
+    for local, scan in zip(whole, SCANS[0], strict=True):
+        turn, one = local.update(turn, scan, POSES[0], rng=rng())
+        log_likelihood += one.log_likelihood
+    kept = turn.existence >= 0.05
+    np.testing.assert_allclose(belief.existence, turn.existence[kept], rtol=1e-11)
+    np.testing.assert_allclose(info.log_likelihood, log_likelihood, rtol=1e-11)
+    alone = SequentialLmbFilter(TARGETS, SENSORS[:1], limits)
+    local = LmbFilter(TARGETS, SENSORS[0], limits)
+    mine, _ = alone.step(alone.initial(), SCANS[0][:1], POSES[:1], DT, 1, rng=rng())
+    assert_same_lmb(mine, local.step(local.initial(), SCANS[0][0], POSES[0], DT, 1, rng=rng())[0], 0.0)
+
+
+def test_sequential_is_exact_for_one_target() -> None:
+    """With a single possible target the projection to an LMB loses nothing but components that are merged."""
+    birth = models.BirthModel(np.array([0.3]), TARGETS.birth.means[:1], TARGETS.birth.covs[:1], frozenset({1}))
+    targets, limits = dataclasses.replace(TARGETS, birth=birth), Limits.none()
+    central = [kind(targets, SENSORS, limits) for kind in CENTRAL]
+    beliefs: list[Any] = [one.initial() for one in central]
+    for step, scans in enumerate(SCANS, start=1):
+        results = [one.step(b, scans, POSES, DT, step, rng=rng()) for one, b in zip(central, beliefs, strict=True)]
+        beliefs = [belief for belief, _ in results]
+        for _, info in results[1:]:
+            assert info.log_likelihood == pytest.approx(results[0][1].log_likelihood, rel=1e-10)
+    lmbs = [belief if isinstance(belief, LMB) else glmb_to_lmb(belief) for belief in beliefs]
+    singles = [(lmb.existence, *track_moments(lmb.tracks)) for lmb in lmbs]
+    for existence, mean, cov in singles[1:]:
+        np.testing.assert_allclose(existence, singles[0][0], rtol=1e-10)
+        np.testing.assert_allclose(mean, singles[0][1], rtol=1e-9)
+        np.testing.assert_allclose(cov, singles[0][2], rtol=1e-8)
+
+
+@pytest.mark.parametrize("kind", CENTRAL)
+def test_a_sensor_that_does_not_scan_is_as_if_it_were_not_there(kind: Any) -> None:
+    three, two = kind(TARGETS, SENSORS), kind(TARGETS, SENSORS[1:])
+    got, _ = three.step(three.initial(), [None, *SCANS[0][1:]], POSES, DT, 1, rng=rng())
+    wanted, _ = two.step(two.initial(), SCANS[0][1:], POSES[1:], DT, 1, rng=rng())
+    np.testing.assert_array_equal(got.tracks.means, wanted.tracks.means)
+    np.testing.assert_array_equal(existence_probabilities(got)[1], existence_probabilities(wanted)[1])
+    # A scan without measurements is another thing: it says that nothing was seen.
+    empty, _ = three.step(three.initial(), [np.empty((0, 2)), *SCANS[0][1:]], POSES, DT, 1, rng=rng())
+    assert existence_probabilities(empty)[1].sum() < existence_probabilities(got)[1].sum()
+    # Nobody at all: the prediction.
+    nobody, info = three.step(got, [None] * 3, POSES, DT, 2, rng=rng())
+    np.testing.assert_allclose(
+        existence_probabilities(nobody)[1].sum(), 0.9 * existence_probabilities(got)[1].sum(), rtol=1e-5
+    )
+    assert info.log_likelihood == pytest.approx(0.0, abs=1e-6)
+
+
+@pytest.mark.parametrize("kind", LOCAL)
+def test_labels_that_nobody_has_seen_for_long_are_dropped(kind: Any) -> None:
+    belief: Any = kind(TARGETS, SENSORS[0]).predict(kind(TARGETS, SENSORS[0]).initial(), DT, 1)[0]
+    # Of the births, one has a least std of position of 15 m, the other of 10 m.
+    limited = kind(TARGETS, SENSORS[0], Limits(max_position_std=12.0, min_existence=0.0))
+    blind = dataclasses.replace(limited, sensor=dataclasses.replace(SENSORS[0], detection=models.constant_detection(0)))
+    kept, info = blind.update(belief, np.empty((0, 2)), POSES[0], rng=rng())
+    labels, existence = existence_probabilities(kept)
+    np.testing.assert_array_equal(labels, [[1, 1]])
+    np.testing.assert_allclose(existence, [0.2], rtol=1e-12)
+    assert info.dropped_existence == pytest.approx(0.3, rel=1e-12)
+    kept.validate()
+    if isinstance(kept, GLMB):
+        assert kept.num_hyps == 2
+
+
+@pytest.mark.parametrize("kind", LOCAL)
+def test_births_must_be_new(kind: Any) -> None:
+    local = kind(TARGETS, SENSORS[0])
+    belief, _ = local.predict(local.initial(), DT, 1)
+    born = LMB.from_bernoullis([[1, 7]], [0.1], np.zeros((1, 4)), np.eye(4)[None])
+    with pytest.raises(InputError, match="after those of the labels in the belief, of which the last is 1"):
+        local.predict(belief, DT, 2, births=born)
+    with pytest.raises(InputError, match="births: expected a LMB; got GLMB"):
+        local.predict(belief, DT, 2, births=GLMB.empty(4))
+    with pytest.raises(InputError, match="births: expected states of dimension 4; got 5"):
+        local.step(belief, np.empty((0, 2)), POSES[0], DT, 2, rng=rng(), births=LMB.empty(5))
+    with pytest.raises(InputError, match="max_position_std"):
+        Limits(max_position_std=math.nan)
