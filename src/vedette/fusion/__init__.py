@@ -5,6 +5,7 @@ from vedette.fusion.base import MIXTURE_POWERS, Fusion, FusionInfo, FusionLimits
 from vedette.fusion.clmb import Clmb
 from vedette.fusion.cm_delta_glmb import CmDeltaGlmb
 from vedette.fusion.laid_out import LaidOut, LaysOut, lay_out_alone
+from vedette.fusion.matching import Matched, match_labels
 from vedette.fusion.parallel import ParallelLimits, ParallelUpdate
 from vedette.fusion.views import Views
 
@@ -18,9 +19,11 @@ __all__ = [
     "FusionLimits",
     "LaidOut",
     "LaysOut",
+    "Matched",
     "MixturePower",
     "ParallelLimits",
     "ParallelUpdate",
     "Views",
     "lay_out_alone",
+    "match_labels",
 ]

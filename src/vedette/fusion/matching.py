@@ -1,0 +1,198 @@
+"""Matching of labels across sensors, before a fusion that goes by labels."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+from scipy.special import gammaincinv
+
+from vedette.densities import GLMB, LMB, TrackTable, glmb_to_lmb
+from vedette.densities.cases import LabelledCases
+from vedette.densities.checks import unchecked
+from vedette.densities.label_sets import Label, single_gaussians, take_tracks
+from vedette.errors import InputError
+from vedette.fusion.base import Fusion, FusionInfo, check_beliefs
+from vedette.fusion.views import Views
+from vedette.kernels.base.types import Bools, Floats, Ints
+from vedette.kernels.gaussian.distances import pair_distances
+
+GATE_PROBABILITY = 0.999  # that two estimates of one target are within the gate
+LIKELY = 0.5  # existence from which a label is matched before the others
+# Sensor s makes labels whose index is at least this times s + 1.
+OWN_LABELS = 1_000_000
+_TIE = 1e-6  # between costs, in favour of equal labels
+
+
+class _Labelled(NamedTuple):
+    """The labels of a belief with one Gaussian each."""
+
+    labels: list[Label]
+    existence: Floats  # (num_labels,)
+    means: Floats  # (num_labels, dim)
+    covs: Floats  # (num_labels, dim, dim)
+
+    @classmethod
+    def of(cls, belief: GLMB | LMB) -> _Labelled:
+        lmb = glmb_to_lmb(belief) if isinstance(belief, GLMB) else belief
+        tracks = single_gaussians(lmb.tracks)
+        return cls([tuple(label) for label in tracks.labels.tolist()], lmb.existence, tracks.means, tracks.covs)
+
+
+def match_labels(beliefs: Sequence[GLMB | LMB], *, gate_probability: float = GATE_PROBABILITY) -> list[GLMB | LMB]:
+    """The sensors' beliefs with one label for what is one target by its place.
+
+    The first sensor's labels stay as they are. Each further sensor's labels are assigned to those found so far, at the
+    least sum of d'S^-1 d + log det S with S = P_a + P_b over the whole state, of one Gaussian a label; those that are
+    likely to exist first, the others among what is left; of equal sums, equal labels. Only pairs with d'S^-1 d within
+    the gate are assigned, as many as can be. What is assigned takes the label that it is assigned to. What is not keeps
+    its own, unless that is taken: then it gets one of its birth step and an index of the sensor's own, from
+    1 000 000 (sensor + 1) on.
+
+    A label is told by the density of the sensor that is surest of it so far. Beliefs that have been matched come back
+    as they are. Densities are not changed, and no two labels of a sensor become one.
+
+    gate_probability: that two independent estimates of one target are within the gate.
+
+    Raises `InputError` for something other than GLMBs and LMBs of one state dimension, a density that is not valid, or
+    a probability outside (0, 1).
+    """
+    check_beliefs(beliefs, (GLMB, LMB), len(beliefs))
+    if not 0.0 < gate_probability < 1.0:
+        raise InputError(f"gate_probability: expected a number between 0 and 1; got {gate_probability}")
+    if not beliefs:
+        return []
+    gate = 2.0 * float(gammaincinv(0.5 * beliefs[0].state_dim, gate_probability))  # chi-squared
+    owns = [_Labelled.of(belief) for belief in beliefs]
+    found, matched = owns[0], [beliefs[0]]
+    for sensor in range(1, len(beliefs)):
+        own = owns[sensor]
+        names = _names(own, found, _pairs(own, found, gate), sensor)
+        matched.append(_relabelled(beliefs[sensor], dict(zip(own.labels, names, strict=True))))
+        found = _joined(found, own._replace(labels=names))
+    return matched
+
+
+def _pairs(own: _Labelled, found: _Labelled, gate: float) -> dict[int, int]:
+    """Place in `found` of those of a sensor's labels that are assigned."""
+    squares, log_dets = pair_distances(own.means, own.covs, found.means, found.covs)
+    place = {label: i for i, label in enumerate(found.labels)}
+    costs = squares + log_dets
+    for i, label in enumerate(own.labels):
+        if label in place:
+            costs[i, place[label]] -= _TIE
+    allowed, pairs = squares <= gate, dict[int, int]()
+    likely = own.existence >= LIKELY, found.existence >= LIKELY
+    left = np.ones(len(own.labels), np.bool_), np.ones(len(found.labels), np.bool_)
+    for rows, columns in (likely, left):
+        _assign(costs, allowed, np.flatnonzero(rows & left[0]), np.flatnonzero(columns & left[1]), pairs)
+        left[0][list(pairs.keys())] = False
+        left[1][list(pairs.values())] = False
+    return pairs
+
+
+def _assign(costs: Floats, allowed: Bools, rows: Ints, columns: Ints, pairs: dict[int, int]) -> None:
+    """Add as many allowed pairs of these rows and columns as can be, at the least sum of costs."""
+    if not len(rows) or not len(columns):
+        return
+    block, fits = costs[np.ix_(rows, columns)], allowed[np.ix_(rows, columns)]
+    if not fits.any():
+        return
+    least, most = block[fits].min(), block[fits].max()
+    # More than any change of the allowed pairs can save.
+    forbidden = most + (most - least + 1.0) * min(block.shape)
+    for row, column in zip(*linear_sum_assignment(np.where(fits, block, forbidden)), strict=True):
+        if fits[row, column]:
+            pairs[int(rows[row])] = int(columns[column])
+
+
+def _names(own: _Labelled, found: _Labelled, pairs: dict[int, int], sensor: int) -> list[Label]:
+    """The new label of each of a sensor's labels."""
+    taken = set(found.labels)
+    names: dict[int, Label] = {i: found.labels[place] for i, place in pairs.items()}
+    alone = [i for i in range(len(own.labels)) if i not in pairs]
+    free = [i for i in alone if own.labels[i] not in taken]
+    names |= {i: own.labels[i] for i in free}
+    taken |= {own.labels[i] for i in free}
+    for i in alone:
+        if i not in names:
+            step, index = own.labels[i]
+            # From its own index on, so that it gets the same label at every scan.
+            index = OWN_LABELS * (sensor + 1) + index % OWN_LABELS
+            while (step, index) in taken:
+                index += 1
+            names[i] = step, index
+            taken.add(names[i])
+    return [names[i] for i in range(len(own.labels))]
+
+
+def _joined(found: _Labelled, own: _Labelled) -> _Labelled:
+    """All labels so far, each with the density of the sensor that is surest of it; of equals the first."""
+    place = {label: i for i, label in enumerate(found.labels)}
+    new = [i for i, label in enumerate(own.labels) if label not in place]
+    existence, means, covs = (
+        np.concatenate([getattr(found, name), getattr(own, name)[new]]) for name in ("existence", "means", "covs")
+    )
+    for i, label in enumerate(own.labels):
+        at = place.get(label)
+        if at is not None and own.existence[i] > existence[at]:
+            existence[at], means[at], covs[at] = own.existence[i], own.means[i], own.covs[i]
+    return _Labelled([*found.labels, *(own.labels[i] for i in new)], existence, means, covs)
+
+
+def _relabelled(belief: GLMB | LMB, names: dict[Label, Label]) -> GLMB | LMB:
+    """The belief under other labels."""
+    if all(old == new for old, new in names.items()):
+        return belief
+    tracks = belief.tracks
+    # A GLMB's table may have labels that are in no hypothesis.
+    labels = np.array([names.get(label, label) for label in map(tuple, tracks.labels.tolist())], np.int64)
+    named = unchecked(TrackTable, labels, tracks.offsets, tracks.log_weights, tracks.means, tracks.covs)
+    if isinstance(belief, LMB):
+        order = np.lexsort(labels.T[::-1])
+        return unchecked(LMB, take_tracks(named, order), belief.existence_logit[order])
+    members = labels[belief.hyp_tracks]
+    hyps = np.repeat(np.arange(belief.num_hyps), np.diff(belief.hyp_offsets))
+    order = np.lexsort((members[:, 1], members[:, 0], hyps))
+    return unchecked(GLMB, named, belief.hyp_offsets, belief.hyp_tracks[order], belief.hyp_log_weights)
+
+
+@dataclass(frozen=True, slots=True)
+class Matched:
+    """A fusion by labels of beliefs whose labels need not agree: they are matched first (`match_labels`).
+
+    For sensors that take targets up at different steps, or make labels of their own, and do not go on from the fused
+    belief. A tracker that keeps what `match` gives as the sensors' beliefs keeps labels stable over time, also where
+    the sensor that led a label loses it, and lets decisions go by the labels of the `rule` alone.
+
+    Attributes:
+        rule: the fusion.
+        gate_probability: as of `match_labels`.
+
+    Raises `InputError` for a gate that is no probability.
+    """
+
+    rule: Fusion
+    gate_probability: float = GATE_PROBABILITY
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.gate_probability < 1.0:
+            raise InputError(f"gate_probability: expected a number between 0 and 1; got {self.gate_probability}")
+
+    def match(self, beliefs: Sequence[GLMB | LMB]) -> list[GLMB | LMB]:
+        """The beliefs under common labels."""
+        return match_labels(beliefs, gate_probability=self.gate_probability)
+
+    def fuse(self, beliefs: Sequence[GLMB | LMB], views: Views | None = None) -> tuple[Any, FusionInfo]:
+        """The fusion of the beliefs under common labels; see the rule's. Raises as `match_labels` and the rule."""
+        return self.rule.fuse(self.match(beliefs), views)
+
+    def lay_out(self, cases: Sequence[LabelledCases], prediction: GLMB | LMB) -> None:
+        """None: which labels match differs from case to case. Of matched beliefs, ask the rule."""
+        return None
+
+
+__all__ = ["GATE_PROBABILITY", "LIKELY", "OWN_LABELS", "Matched", "match_labels"]
