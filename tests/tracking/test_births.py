@@ -13,9 +13,10 @@ from tracking.scenes import filters, lmb, rngs, scans_of, sensor, targets
 from vedette import models
 from vedette.errors import InputError, ModelError
 from vedette.filters import LmbFilter, MultiSensorGlmbFilter, MultiSensorLmbFilter, PhdFilter, SequentialLmbFilter
-from vedette.fusion import Clmb
+from vedette.fusion import Clmb, Matched
+from vedette.fusion.matching import OWN_LABELS
 from vedette.models import BirthModel, MeasurementBirth
-from vedette.tracking import LABELS_OF_A_SENSOR, Central, Distributed
+from vedette.tracking import Central, Distributed
 from vedette.tracking.births import births_due, births_from_scans
 
 STD = np.array([10.0, 10.0, 5.0, 5.0])
@@ -77,7 +78,7 @@ def test_labels_follow_the_sites_or_are_a_sensors_own() -> None:
     assert births_due(sites, 2, None).tracks.num_tracks == 0  # type: ignore[union-attr]  # sites at step 1 alone
     assert births_due(targets().birth, 1, None) is None
     own = born(NOBODY, [None, scan], owner=1)
-    np.testing.assert_array_equal(own.tracks.labels, [[7, 2 * LABELS_OF_A_SENSOR]])
+    np.testing.assert_array_equal(own.tracks.labels, [[7, 2 * OWN_LABELS]])
     assert born(NOBODY, [None, None]).tracks.num_tracks == 0
 
 
@@ -92,8 +93,12 @@ def test_a_bearing_and_range_say_where() -> None:
     made = births_from_scans(BIRTH, NOBODY, [polar], [np.array([[math.pi / 2, 50.0]])], [pose], 2)
     assert made is not None
     np.testing.assert_allclose(made.tracks.means[0, :2], [10.0, 30.0], atol=1e-12)
-    bearing = replace(polar, measurement=models.bearing_only(), noise=models.constant_noise([0.01]))
-    bearing = replace(bearing, clutter=models.measurement_space_clutter(1.0, [-3.0], [3.0], angular=[True]))
+    bearing = replace(
+        polar,
+        measurement=models.bearing_only(),
+        noise=models.constant_noise([0.01]),
+        clutter=models.measurement_space_clutter(1.0, [-3.0], [3.0], angular=[True]),
+    )
     with pytest.raises(InputError, match="births from measurements need a position"):
         births_from_scans(BIRTH, NOBODY, [bearing], [np.array([[1.0]])], [pose], 2)
     wrong = replace(polar, measurement=replace(polar.measurement, places=lambda z, pose: z[0]))
@@ -105,10 +110,14 @@ WORLD = targets(existence=(), measured=MeasurementBirth(0.5, 0.1, STD))
 TRUTH = np.array([[3.0, -4.0, 2.0, 1.0], [95.0, 5.0, -1.0, 2.0], [0.0, 200.0, 3.0, 3.0]])
 
 
-@pytest.mark.parametrize("kind", [SequentialLmbFilter, MultiSensorLmbFilter, MultiSensorGlmbFilter, "feedback"])
+@pytest.mark.parametrize(
+    "kind", [SequentialLmbFilter, MultiSensorLmbFilter, MultiSensorGlmbFilter, "feedback", "matched"]
+)
 def test_targets_are_found_without_any_site(kind: Any) -> None:
     if kind == "feedback":
         tracker: Any = Distributed(filters(WORLD, SENSORS), Clmb((0.5, 0.5)), feedback=True)
+    elif kind == "matched":
+        tracker = Distributed(filters(WORLD, SENSORS), Matched(Clmb((0.5, 0.5))))
     else:
         tracker = Central(kind(WORLD, SENSORS))
     state, rng = tracker.initial(), np.random.default_rng(0)
@@ -127,14 +136,14 @@ def test_a_birth_needs_labels_and_a_fusion_that_matches_them() -> None:
     with pytest.raises(InputError, match="expected one that matches labels"):
         Distributed(filters(WORLD, SENSORS), Clmb((0.5, 0.5)))
     phd = Distributed((PhdFilter(WORLD, SENSORS[0]),))
-    with pytest.raises(InputError, match=r"expected a GLMB or an LMB for births from measurements; got Poisson"):
+    with pytest.raises(InputError, match=r"expected a TwoStepFilter.*as targets are born of measurements"):
         phd.step(phd.initial(), [np.zeros((1, 2))], POSES[:1], 1.0, rngs=rngs(1))
     for fields, name in (
         ({"expected": 0.0}, "expected"),
         ({"max_existence": 1.0}, "max_existence"),
         ({"std": [1.0, -1.0, 1.0, 1.0]}, "std"),
     ):
-        with pytest.raises(InputError, match=f"MeasurementBirth.{name}"):
+        with pytest.raises(InputError, match=rf"MeasurementBirth\.{name}"):
             MeasurementBirth(**{"expected": 1.0, "max_existence": 0.1, "std": STD, **fields})  # type: ignore[arg-type]
     with pytest.raises(InputError, match=r"from_measurements.std: expected 5 numbers"):
         replace(BirthModel.none(5), from_measurements=MEASURED)
@@ -172,5 +181,7 @@ def test_scans_at_different_times() -> None:
             np.testing.assert_array_equal(state.local[s].tracks.means, beliefs[s].tracks.means)
         assert len(info.filters) == 3
     plain = Distributed((Plain(local[0]),))
-    with pytest.raises(InputError, match=r"a TwoStepFilter, with predict\(\) and update\(\), as it must predict without"):
+    with pytest.raises(
+        InputError, match=r"a TwoStepFilter, with predict\(\) and update\(\), as it must predict without"
+    ):
         plain.step(plain.initial(), [None], POSES[:1], 1.0, rngs=rngs(1))

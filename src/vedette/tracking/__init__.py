@@ -2,7 +2,6 @@
 
 from vedette.tracking.base import State, Tracker, TrackerInfo
 from vedette.tracking.belief_network import BeliefNetwork
-from vedette.tracking.births import LABELS_OF_A_SENSOR
 from vedette.tracking.central import Central, CentralFilter
 from vedette.tracking.distributed import Distributed
 from vedette.tracking.network import Network
@@ -10,7 +9,6 @@ from vedette.tracking.scan_network import ScanNetwork
 from vedette.tracking.stages import Stages, stage_of
 
 __all__ = [
-    "LABELS_OF_A_SENSOR",
     "BeliefNetwork",
     "Central",
     "CentralFilter",

@@ -11,7 +11,8 @@ import numpy as np
 from vedette.densities import LMB
 from vedette.errors import InputError
 from vedette.filters import Filter, FilterInfo
-from vedette.fusion import Fusion, FusionInfo, Views
+from vedette.fusion import Fusion, FusionInfo, Matched, Views
+from vedette.fusion.matching import common_names, relabelled
 from vedette.fusion.rebasing import rebased, with_labels_of
 from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.models import SensorModel, TargetModel
@@ -178,15 +179,17 @@ class BeliefNetwork:
             own = [self._current(sent, now, j) for sent, j in zip(messages, heard, strict=True)]
             return (own[0], None) if len(own) == 1 else with_weights(self.fusion, weights.tolist()).fuse(own, seen)
         predictions = [sent.predictions[j] for sent, j in zip(messages, heard, strict=True)]
+        posteriors = [sent.beliefs[j] for sent, j in zip(messages, heard, strict=True)]
         base = predictions[0]
         if any(prediction is not base for prediction in predictions):
+            if isinstance(self.merging, Matched):
+                names = common_names(predictions, gate_probability=self.merging.gate_probability)
+                predictions = list(map(relabelled, predictions, names))
+                posteriors = list(map(relabelled, posteriors, names))
             base, _ = with_weights(self.merging, (weights / weights.sum()).tolist()).fuse(predictions, seen)
             for prediction in predictions:
                 base = with_labels_of(base, prediction)
-        posteriors = [
-            rebased(sent.beliefs[j], prediction, base)
-            for sent, j, prediction in zip(messages, heard, predictions, strict=True)
-        ]
+        posteriors = [rebased(*own, base) for own in zip(posteriors, predictions, strict=True)]
         fused, report = with_weights(self.fusion, weights.tolist()).fuse(posteriors, replace(seen, prediction=base))
         return LocalFilters(self.filters).kept(fused), report
 

@@ -7,7 +7,7 @@ from dataclasses import fields, is_dataclass, replace
 from typing import Any
 
 from vedette.errors import InputError
-from vedette.fusion import Fusion, FusionInfo, Views
+from vedette.fusion import Fusion, FusionInfo, Matched, Views
 
 
 def merged(
@@ -37,13 +37,13 @@ def with_weights(fusion: Fusion, weights: Sequence[float]) -> Fusion:
     """The fusion under these weights, one a belief.
 
     Raises:
-        InputError: a fusion that is no dataclass with a field `weights`, or with a field `fusion` that is one.
+        InputError: a fusion that is no dataclass with a field `weights`, nor one that matches labels for such a rule.
     """
     names: list[str] = [field.name for field in fields(fusion)] if is_dataclass(fusion) else []
     if "weights" in names:
         return replace(fusion, weights=tuple(weights))  # type: ignore[type-var]
-    if "fusion" in names:
-        return replace(fusion, fusion=with_weights(fusion.fusion, weights))  # type: ignore[attr-defined, type-var]
+    if isinstance(fusion, Matched):
+        return replace(fusion, rule=with_weights(fusion.rule, weights))
     raise InputError(
         f"fusion: expected a dataclass with a field weights, as each sensor of a network fuses other beliefs; got "
         f"{type(fusion).__name__}"
