@@ -10,7 +10,16 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 from pydantic import Field
 
 from vedette.scenarios.faults import Finding
-from vedette.scenarios.sections.base import Chance, Count, GaussianMethod, Probability, Section, Share, check
+from vedette.scenarios.sections.base import (
+    Chance,
+    Count,
+    GaussianMethod,
+    Positive,
+    Probability,
+    Section,
+    Share,
+    check,
+)
 from vedette.scenarios.sections.custom import Custom
 
 if TYPE_CHECKING:  # with the filters comes the compiler, which a check does without
@@ -72,6 +81,10 @@ class FilterLimits(Section):
         default=1e-4, description="LMB tracks and Bernoullis less probable than this are dropped [-]."
     )
     max_labels: Count = Field(default=200, description="Most tracks of an LMB, Bernoullis of a cb_member [-].")
+    max_position_std: Positive | None = Field(
+        default=None,
+        description="Labels whose position is less certain than this along both axes are dropped; none: never [m].",
+    )
     max_intensity_components: Count = Field(
         default=100, description="Most Gaussian components of the intensity of a phd or cphd, all targets together [-]."
     )
@@ -83,7 +96,8 @@ class FilterLimits(Section):
         """Caps and thresholds of the filters."""
         from vedette.filters import Limits
 
-        return Limits(**self.model_dump())
+        given = self.model_dump()
+        return Limits(**given | {"max_position_std": self.max_position_std or math.inf})
 
 
 # Filters that keep no identity of their targets.
