@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from scipy.special import expit, log_expit
@@ -61,6 +61,7 @@ class ParallelUpdate:
     weights: Sequence[float] | Floats | None = None
     missing_existence: float = 1e-4
     limits: ParallelLimits = field(default_factory=ParallelLimits)
+    shares_prediction: ClassVar[bool] = True  # a tracker must update all beliefs from one
 
     def __post_init__(self) -> None:
         if self.weights is not None:

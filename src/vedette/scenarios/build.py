@@ -17,6 +17,7 @@ from vedette.models import TargetModel
 from vedette.platforms import Actions
 from vedette.platforms.base import actions_at
 from vedette.scenarios.loading import Scenario
+from vedette.scenarios.sections.fusion import CustomFusion
 from vedette.scenarios.sections.planners import STRATEGIES, Parts
 from vedette.scenarios.sections.tracking import Filter as FilterSection
 from vedette.simulation.experiment import Experiment
@@ -77,7 +78,7 @@ def _tracker(scenario: Scenario, filters: tuple[Filter, ...]) -> Tracker:
         if own is not None:
             return Central(own.made(scenario.folder, targets=targets, sensors=sensors))
         return Central(model.filter.build_central(targets, sensors))
-    return Distributed(filters, model.fusion.build(len(filters), scenario.folder), model.fusion.feedback)
+    return Distributed(filters, model.fusion.build(len(filters), scenario.folder), model.fusion.feeds_back)
 
 
 def build_poses(scenario: Scenario) -> Floats:
@@ -138,11 +139,8 @@ def build_planner(scenario: Scenario, name: str, num_threads: int = 0) -> Planne
 
 
 def _fusion_of_decisions(scenario: Scenario, local: Filter) -> Fusion:
-    """That of the tracker; where it fuses nothing, GCI of the filters' kind of density."""
+    """A user's own; otherwise plain GCI of the kind of density that is fused, or that the filters have."""
     section, num_sensors = scenario.model.fusion, len(scenario.model.sensors)
-    if section.kind in ("none", "central"):
-        kind = "clmb" if isinstance(local.initial(), LMB) else "cm_delta_glmb"
-        section = section.model_copy(update={"kind": kind})
-    fusion = section.build(num_sensors, scenario.folder)
-    assert fusion is not None
-    return fusion
+    if isinstance(section, CustomFusion):
+        return section.build(num_sensors, scenario.folder)
+    return section.build_of_decisions(num_sensors, of_lmbs=isinstance(local.initial(), LMB))

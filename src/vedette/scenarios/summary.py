@@ -8,9 +8,10 @@ from typing import Literal
 from vedette.scenarios.loading import Scenario
 from vedette.scenarios.sections import ScenarioModel
 from vedette.scenarios.sections.base import Section
+from vedette.scenarios.sections.fusion import AnyFusion, CustomFusion
 from vedette.scenarios.sections.sensors import Sensor
 from vedette.scenarios.sections.targets import RecordedTargets
-from vedette.scenarios.sections.tracking import AnyFilter, AnyFusion, CustomFusion, Filter
+from vedette.scenarios.sections.tracking import AnyFilter, Filter
 from vedette.text import counted
 
 
@@ -28,7 +29,9 @@ def one_line(scenario: Scenario) -> str:
 
 def _tracker(model: ScenarioModel) -> str:
     kinds = model.filter.kind, model.fusion.kind
-    return f"central {kinds[0]} filter" if kinds[1] == "central" else f"{kinds[0]} filter, {kinds[1]} fusion"
+    if kinds[1] in ("central", "sequential"):
+        return f"{kinds[1]} {kinds[0]} filter"
+    return f"{kinds[0]} filter, {kinds[1]} fusion"
 
 
 def settings(section: Section) -> str:
@@ -83,14 +86,27 @@ def _filter(section: AnyFilter) -> str:
     return settings(section) + assignment
 
 
+_IN_WORDS = {
+    "none": "none",
+    "central": "central: one filter takes the scans of all sensors",
+    "sequential": "sequential: one belief takes the sensors' scans in turn",
+    "parallel": "parallel: each sensor updates one prediction, by which their posteriors are divided",
+}
+
+
 def _fusion(section: AnyFusion) -> str:
     if isinstance(section, CustomFusion):
         return settings(section)
-    if section.kind in ("none", "central"):
-        return "none" if section.kind == "none" else "central: one filter takes the scans of all sensors"
-    weights = "equal weights" if section.weights is None else f"weights {short(section.weights)}"
-    feedback = "feedback" if section.feedback else "no feedback"
-    return f"{section.kind}, {weights}, {section.mixture_power} powers, {feedback}"
+    if section.kind in _IN_WORDS:
+        return _IN_WORDS[section.kind]
+    words = [section.kind, "equal weights" if section.weights is None else f"weights {short(section.weights)}"]
+    if section.by_views:
+        words.append("by views")
+    if section.kind != "arithmetic_average":
+        words.append(f"{section.mixture_power} powers")
+    if section.matching == "assignment":
+        words.append("labels matched by assignment")
+    return ", ".join([*words, "feedback" if section.feedback else "no feedback"])
 
 
 def _decisions(steps: Sequence[int]) -> str:

@@ -11,7 +11,7 @@ import numpy as np
 from vedette.densities import LMB
 from vedette.errors import InputError
 from vedette.filters import Filter, FilterInfo
-from vedette.fusion import Fusion, Views
+from vedette.fusion import Fusion, Matched, Views
 from vedette.kernels.base.types import Floats
 from vedette.models import SensorModel, TargetModel
 from vedette.tracking.base import State, TrackerInfo, check_step
@@ -93,7 +93,11 @@ class Distributed:
         if self.fusion is not None:
             views = Views(self.sensors, at, tuple(scan is not None for scan in scans), prediction)
             with stages.timing("fusion"):
-                fused, report = self.fusion.fuse(local, views)
+                rule = self.fusion
+                if isinstance(rule, Matched):
+                    # Labels then outlast the sensor that led them, and are those that decisions need.
+                    local, rule = rule.match(local), rule.rule
+                fused, report = rule.fuse(local, views)
         if prediction is not None:
             fused = filters.kept(fused)
         if self.feedback:

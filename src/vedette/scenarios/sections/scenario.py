@@ -11,11 +11,12 @@ from vedette.scenarios.faults import Finding, describe
 from vedette.scenarios.sections.base import Name, Section, attempt, check
 from vedette.scenarios.sections.checks import CHECKS, step_of_time
 from vedette.scenarios.sections.control import Control
+from vedette.scenarios.sections.fusion import AnyFusion, Fusion
 from vedette.scenarios.sections.planners import STRATEGIES, CustomPlanner
 from vedette.scenarios.sections.scoring import AnyEstimator, CustomMetric, MapEstimator, Ospa
 from vedette.scenarios.sections.sensors import Sensor, SensorDefaults
 from vedette.scenarios.sections.targets import Targets
-from vedette.scenarios.sections.tracking import AnyFilter, AnyFusion, Filter, Fusion
+from vedette.scenarios.sections.tracking import AnyFilter, Filter
 from vedette.scenarios.sections.world import (
     Birth,
     ConstantSurvival,
