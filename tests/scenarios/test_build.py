@@ -22,11 +22,11 @@ from vedette.filters import (
     MultiSensorLmbFilter,
     PhdFilter,
 )
-from vedette.fusion import Clmb, CmDeltaGlmb
+from vedette.fusion import ArithmeticAverage, Clmb, CmDeltaGlmb, Matched, ParallelUpdate
 from vedette.scenarios import Scenario, build, list_builtin, load_scenario, parse_scenario
 from vedette.scenarios.cautions import cautions
+from vedette.scenarios.sections.fusion import Fusion
 from vedette.scenarios.sections.scoring import MarginalEstimator
-from vedette.scenarios.sections.tracking import Fusion
 from vedette.scenarios.summary import facts, one_line
 from vedette.simulation import Truth, simulate_scans
 from vedette.tracking import Central
@@ -233,6 +233,47 @@ def test_fusions_of_each_kind_have_weights_that_sum_to_one() -> None:
     assert isinstance(clmb, Clmb)
     assert (clmb.weights, clmb.missing_existence) == ((0.25,) * 4, 0.01)
     assert Fusion(kind="none").build(1, Path()) is None
+
+
+def of_decisions(loaded: Scenario) -> Any:
+    planner: Any = build.build_planner(loaded, "jdm")
+    return planner.fusion
+
+
+@pytest.mark.parametrize(
+    ("kind", "filters", "rule", "of_decision"),
+    [
+        ("clmb, by_views: true", "lmb", Clmb((0.5, 0.5), by_views=True), Clmb((0.5, 0.5))),
+        ("arithmetic_average, by_views: true", "lmb", ArithmeticAverage((0.5, 0.5), True), Clmb((0.5, 0.5))),
+        ("arithmetic_average", "m_delta_glmb", ArithmeticAverage((0.5, 0.5)), Clmb((0.5, 0.5))),
+        ("clmb, matching: assignment", "lmb", Matched(Clmb((0.5, 0.5))), Clmb((0.5, 0.5))),
+        (
+            "cm_delta_glmb, matching: assignment",
+            "delta_glmb",
+            Matched(CmDeltaGlmb((0.5, 0.5))),
+            CmDeltaGlmb((0.5, 0.5)),
+        ),
+        ("parallel", "lmb", ParallelUpdate(), Clmb((0.5, 0.5))),
+    ],
+)
+def test_decisions_go_by_plain_covariance_intersection(kind: str, filters: str, rule: Any, of_decision: Any) -> None:
+    loaded = scenario(
+        ("kind: m_delta_glmb", f"kind: {filters}"),
+        ("{kind: cm_delta_glmb, weights: [0.5, 0.5]}", f"{{kind: {kind}, limits: {{merge_distance: 1.0}}}}"),
+    )
+    tracker: Any = build.build_experiment(loaded).tracker
+    for made, expected in ((tracker.fusion, rule), (of_decisions(loaded), of_decision)):
+        if isinstance(expected, Matched):
+            made, expected = made.rule, expected.rule
+        assert type(made) is type(expected)
+        if not isinstance(expected, ParallelUpdate):
+            assert made.weights == expected.weights
+            assert made.limits.merge_distance == 1.0
+        assert getattr(made, "by_views", False) == getattr(expected, "by_views", False)
+    assert tracker.feedback == (kind == "parallel")
+    assert isinstance(tracker.fusion, Matched) == ("matching" in kind)
+    assert kind.split(",")[0] in dict(facts(loaded.model))["fusion"]
+    assert ("by views" in dict(facts(loaded.model))["fusion"]) == ("by_views" in kind)
 
 
 CENTRAL = [

@@ -35,6 +35,28 @@ def test_births_after_the_first_step_warn_with_their_line(tmp_path: Path) -> Non
     (line,) = of(tmp_path)
     number = MINIMAL.splitlines().index("  steps: [1, 5]") + 1
     assert line.startswith(f"{tmp_path / 'scene.yaml'}:{number}:10: warning: births up to step 5 without feedback")
+    assert "take fusion.matching: assignment, or, where scans can be sent, fusion.kind: sequential" in line
+
+
+@pytest.mark.parametrize("kind", ["clmb", "arithmetic_average"])
+def test_the_warning_about_views_names_what_to_take_instead(tmp_path: Path, kind: str) -> None:
+    south, rule = "{name: south, position: [0.0, -40.0]", "{kind: cm_delta_glmb, weights: [0.5, 0.5]}"
+    blind = (south, f"{south}, heading_deg: 90.0, {SECTOR}")
+    (line,) = of(tmp_path, STEPS, blind, (rule, f"{{kind: {kind}}}"))
+    loses = {"clmb": "GCI", "arithmetic_average": "the arithmetic average"}[kind]
+    assert (
+        f"{loses} loses what one sensor sees and another does not; take fusion.kind: sequential where scans can be "
+        f"sent; parallel where only densities can; fusion: {{kind: {kind}, by_views: true}} where sensors do not share "
+        "a prediction"
+    ) in line
+    assert of(tmp_path, STEPS, blind, (rule, f"{{kind: {kind}, by_views: true}}")) == ()
+
+
+@pytest.mark.parametrize("kind", ["sequential", "parallel"])
+def test_rules_that_divide_by_the_prediction_do_not_warn(tmp_path: Path, kind: str) -> None:
+    south = "{name: south, position: [0.0, -40.0]"
+    changes = (south, f"{south}, heading_deg: 90.0, {SECTOR}"), ("kind: m_delta_glmb", "kind: lmb")
+    assert of(tmp_path, *changes, ("{kind: cm_delta_glmb, weights: [0.5, 0.5]}", f"{{kind: {kind}}}")) == ()
 
 
 @pytest.mark.parametrize(
@@ -42,13 +64,14 @@ def test_births_after_the_first_step_warn_with_their_line(tmp_path: Path) -> Non
     [
         (STEPS,),
         (("weights: [0.5, 0.5]}", "weights: [0.5, 0.5], feedback: true}"),),
+        (("weights: [0.5, 0.5]}", "weights: [0.5, 0.5], matching: assignment}"),),
         (
             ("  - {name: south, position: [0.0, -40.0]}\n", ""),
             ("fusion: {kind: cm_delta_glmb, weights: [0.5, 0.5]}", "fusion: {kind: none}"),
         ),
     ],
 )
-def test_births_at_once_with_feedback_or_of_one_sensor_do_not_warn(
+def test_births_at_once_with_feedback_matched_or_of_one_sensor_do_not_warn(
     tmp_path: Path, changes: tuple[tuple[str, str], ...]
 ) -> None:
     assert of(tmp_path, *changes) == ()

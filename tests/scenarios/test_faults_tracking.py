@@ -35,7 +35,7 @@ CASES = [
         "kind: lmb, assignment: {kind: gibbs, num_samples: 10}",
         [
             'f.yaml:19:40: filter.assignment.kind: expected ranked, as the filter is lmb, got "gibbs"',
-            'f.yaml:20:16: fusion.kind: expected clmb, central or none, as the filters are lmb, got "cm_delta_glmb"',
+            'f.yaml:20:16: fusion.kind: expected sequential, parallel, clmb, arithmetic_average, central or none, as the filters are lmb, got "cm_delta_glmb"',
         ],
     ),
     (
@@ -101,6 +101,30 @@ CASES = [
         "kind: cm_delta_glmb, weights",
         "kind: clmb, feedback: true, weights",
         ["f.yaml:20:32: fusion.feedback: expected false, as m_delta_glmb filters cannot go on from an LMB, got true"],
+    ),
+    (
+        "kind: cm_delta_glmb, weights: [0.5, 0.5]",
+        "kind: parallel, by_views: true, matching: assignment",
+        [
+            'f.yaml:20:16: fusion.kind: expected sequential, cm_delta_glmb or another, as parallel is of lmb filters, and these are m_delta_glmb, got "parallel"',
+            "f.yaml:20:36: fusion.by_views: expected false, as parallel does not weigh labels (clmb and arithmetic_average do), got true",
+            'f.yaml:20:52: fusion.matching: expected labels, as under parallel all sensors share them, got "assignment"',
+        ],
+    ),
+    (
+        "kind: cm_delta_glmb, weights: [0.5, 0.5]",
+        "kind: cm_delta_glmb, matching: assignment, feedback: true",
+        ['f.yaml:20:41: fusion.matching: expected labels, as with feedback all sensors share them, got "assignment"'],
+    ),
+    (
+        "kind: cm_delta_glmb, weights: [0.5, 0.5]",
+        "kind: arithmetic_average, feedback: true",
+        ["f.yaml:20:46: fusion.feedback: expected false, as m_delta_glmb filters cannot go on from an LMB, got true"],
+    ),
+    (
+        "kind: cm_delta_glmb, weights: [0.5, 0.5]",
+        "kind: sequential, feedback: true",
+        ["f.yaml:20:38: fusion.feedback: expected false, as nothing is fused while tracking, got true"],
     ),
     ("threshold: 0.6", "threshold: 1.0", ["f.yaml:21:40: estimator.threshold: expected a number below 1, got 1.0"]),
     (

@@ -70,7 +70,10 @@ def test_files_beside_the_scenario_stay_beside_it(tmp_path: Path) -> None:
         ({"control.num_samples": -3}, r"control\.num_samples: expected a number of at least 1, got -3"),
         ({"control.num_samples": "many"}, r"control\.num_samples: expected a whole number, got \"many\""),
         ({"filter.kind": "glmb"}, r"filter\.kind: expected one of .*, got \"glmb\""),
-        ({"filter.kind": "lmb"}, r"fusion\.kind: expected clmb, central or none, as the filters are lmb"),
+        (
+            {"filter.kind": "lmb"},
+            r"fusion\.kind: expected sequential, .*, clmb, .*, central or none, as the filters are lmb",
+        ),
         ({"time.num_steps": 5}, r"expected a (step|time)"),
         ({"control.num_samples": -3, "ospa.cutoff": 0}, r"(?s)control\.num_samples.*ospa\.cutoff"),
     ],

@@ -15,7 +15,7 @@ from vedette.control import CauchySchwarzReward, PlanningSettings, RenyiReward
 from vedette.control.settings import IDEAL_MODES
 from vedette.densities import marginal_estimate
 from vedette.filters import DeltaGlmbFilter, Limits
-from vedette.fusion import Clmb, CmDeltaGlmb
+from vedette.fusion import ArithmeticAverage, Clmb, CmDeltaGlmb, ParallelUpdate
 from vedette.fusion.base import _MERGE_DISTANCE
 from vedette.recorded import Cleaning
 from vedette.recorded import RecordedTargets as RecordedSource
@@ -25,9 +25,10 @@ from vedette.scenarios.sections.base import Section
 from vedette.scenarios.sections.control import CauchySchwarzReward as CauchySchwarzSection
 from vedette.scenarios.sections.control import Control
 from vedette.scenarios.sections.control import RenyiReward as RenyiSection
+from vedette.scenarios.sections.fusion import Fusion, FusionLimits
 from vedette.scenarios.sections.scoring import MarginalEstimator
 from vedette.scenarios.sections.targets import RecordedTargets
-from vedette.scenarios.sections.tracking import FilterLimits, Fusion, FusionLimits, GibbsAssignment
+from vedette.scenarios.sections.tracking import FilterLimits, GibbsAssignment
 
 
 def sections(base: type[BaseModel] = Section) -> list[type[BaseModel]]:
@@ -65,12 +66,19 @@ def test_default_planning_settings_are_those_of_the_library() -> None:
     assert Control().build() == PlanningSettings()
 
 
-@pytest.mark.parametrize(("kind", "library"), [("cm_delta_glmb", CmDeltaGlmb), ("clmb", Clmb)])
-def test_default_fusions_are_those_of_the_library(kind: Any, library: Any) -> None:
-    built, expected = Fusion(kind=kind).build(2, Path()), library((0.5, 0.5))
-    assert isinstance(built, CmDeltaGlmb | Clmb)
-    assert type(built) is library
-    for field in dataclasses.fields(library):
+DEFAULTS = [
+    ("cm_delta_glmb", CmDeltaGlmb((0.5, 0.5))),
+    ("clmb", Clmb((0.5, 0.5))),
+    ("arithmetic_average", ArithmeticAverage((0.5, 0.5))),
+    ("parallel", ParallelUpdate()),
+]
+
+
+@pytest.mark.parametrize(("kind", "expected"), DEFAULTS)
+def test_default_fusions_are_those_of_the_library(kind: Any, expected: Any) -> None:
+    built: Any = Fusion(kind=kind).build(2, Path())
+    assert type(built) is type(expected)
+    for field in dataclasses.fields(expected):
         got, wanted = getattr(built, field.name), getattr(expected, field.name)
         assert got == wanted or math.isclose(got, wanted), field.name
 

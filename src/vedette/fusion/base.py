@@ -11,6 +11,7 @@ import numpy as np
 
 from vedette.errors import InputError
 from vedette.fusion.cubature import MAX_DIM, fifth_degree_rule
+from vedette.fusion.validity import all_valid
 from vedette.fusion.views import Views
 from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.gaussian.mixtures import MixtureCaps
@@ -161,6 +162,8 @@ def check_beliefs(beliefs: Sequence[Any], kinds: tuple[type, ...], num_sensors: 
     dims = [belief.state_dim for belief in beliefs]
     if len(set(dims)) > 1:
         raise InputError(f"beliefs: expected one state dimension at all sensors; got {dims}")
+    if all_valid(beliefs):
+        return
     for i, belief in enumerate(beliefs):
         try:
             belief.validate(error=InputError)

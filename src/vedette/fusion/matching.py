@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
@@ -185,6 +185,7 @@ class Matched:
 
     rule: Fusion
     gate_probability: float = GATE_PROBABILITY
+    matches_labels: ClassVar[bool] = True  # labels need not agree across sensors
 
     def __post_init__(self) -> None:
         if not 0.0 < self.gate_probability < 1.0:

@@ -12,6 +12,7 @@ from vedette.evaluation.health import HealthSummary, health_findings, percent, s
 from vedette.fusion.base import LOST, SURE
 from vedette.reports.groups import Group
 from vedette.reports.tables import Table
+from vedette.scenarios.sections.fusion import ONE_BELIEF
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,7 +101,7 @@ def health_table(group: Group) -> Table | None:
     strategies = [each for each in group.strategies if each.records]
     if not strategies:
         return None
-    has_fusion = any(each.cell.scenario.model.fusion.kind not in ("none", "central") for each in strategies)
+    has_fusion = any(each.cell.scenario.model.fusion.kind not in ONE_BELIEF for each in strategies)
     summaries = [summarise_health(each.records) for each in strategies]
     rows = [row for row in _ROWS if has_fusion or not row.needs_fusion]
     caption = "What filters and fusion had to leave out, over all scans of all runs in common."

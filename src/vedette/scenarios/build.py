@@ -17,11 +17,13 @@ from vedette.models import TargetModel
 from vedette.platforms import Actions
 from vedette.platforms.base import actions_at
 from vedette.scenarios.loading import Scenario
+from vedette.scenarios.sections.fusion import CustomFusion
+from vedette.scenarios.sections.fusion import Fusion as FusionSection
 from vedette.scenarios.sections.planners import STRATEGIES, Parts
 from vedette.scenarios.sections.tracking import Filter as FilterSection
 from vedette.simulation.experiment import Experiment
 from vedette.simulation.truth import TargetSource
-from vedette.tracking import Central, Distributed, Tracker
+from vedette.tracking import BeliefNetwork, Central, CentralFilter, Distributed, ScanNetwork, Tracker
 
 
 def build_experiment(scenario: Scenario) -> Experiment:
@@ -70,14 +72,29 @@ def build_sensors(scenario: Scenario) -> tuple[MobileSensor, ...]:
 
 
 def _tracker(scenario: Scenario, filters: tuple[Filter, ...]) -> Tracker:
-    """The filters and their fusion, or one filter for all sensors."""
+    """The filters and their fusion, or one filter for all sensors; over a network, where there is one."""
+    model, fusion = scenario.model, scenario.model.fusion.build(len(filters), scenario.folder)
+    central = _central_filter(scenario, filters)
+    if model.network is None:
+        return Distributed(filters, fusion, model.fusion.feeds_back) if central is None else Central(central)
+    of_lmbs = isinstance(filters[0].initial(), LMB)
+    merging = FusionSection().build_merging(len(filters), of_lmbs=of_lmbs)
+    if central is not None:
+        return ScanNetwork(central, model.network.build(), merging)
+    assert fusion is not None  # a single sensor has no network
+    return BeliefNetwork(filters, fusion, model.network.build(), merging)
+
+
+def _central_filter(scenario: Scenario, filters: tuple[Filter, ...]) -> CentralFilter | None:
+    """The filter of all sensors' scans; None where each has its own."""
     model = scenario.model
-    if model.fusion.kind == "central" and isinstance(model.filter, FilterSection):
-        targets, sensors, own = shared_targets(filters), tuple(local.sensor for local in filters), model.fusion.filter
-        if own is not None:
-            return Central(own.made(scenario.folder, targets=targets, sensors=sensors))
-        return Central(model.filter.build_central(targets, sensors))
-    return Distributed(filters, model.fusion.build(len(filters), scenario.folder), model.fusion.feedback)
+    if model.fusion.kind not in ("central", "sequential") or not isinstance(model.filter, FilterSection):
+        return None
+    targets, sensors, own = shared_targets(filters), tuple(local.sensor for local in filters), model.fusion.filter
+    if own is not None:
+        made: CentralFilter = own.made(scenario.folder, targets=targets, sensors=sensors)
+        return made
+    return model.filter.build_central(targets, sensors, in_turn=model.fusion.kind == "sequential")
 
 
 def build_poses(scenario: Scenario) -> Floats:
@@ -138,11 +155,8 @@ def build_planner(scenario: Scenario, name: str, num_threads: int = 0) -> Planne
 
 
 def _fusion_of_decisions(scenario: Scenario, local: Filter) -> Fusion:
-    """That of the tracker; where it fuses nothing, GCI of the filters' kind of density."""
+    """A user's own; otherwise plain GCI of the kind of density that is fused, or that the filters have."""
     section, num_sensors = scenario.model.fusion, len(scenario.model.sensors)
-    if section.kind in ("none", "central"):
-        kind = "clmb" if isinstance(local.initial(), LMB) else "cm_delta_glmb"
-        section = section.model_copy(update={"kind": kind})
-    fusion = section.build(num_sensors, scenario.folder)
-    assert fusion is not None
-    return fusion
+    if isinstance(section, CustomFusion):
+        return section.build(num_sensors, scenario.folder)
+    return section.build_of_decisions(num_sensors, of_lmbs=isinstance(local.initial(), LMB))

@@ -12,6 +12,7 @@ from vedette.scenarios.faults import Path, Told
 from vedette.scenarios.loading import Scenario, document_of, place_fault
 from vedette.scenarios.names import sensor_names
 from vedette.scenarios.sections import ScenarioModel
+from vedette.scenarios.sections.fusion import BY_LABEL, Fusion
 from vedette.scenarios.sections.sensing import (
     CameraDetection,
     ConstantDetection,
@@ -49,25 +50,31 @@ def _records(scenario: Scenario) -> Iterator[tuple[Path, str]]:
         yield from record_cautions(scenario)
 
 
-def _fuses(model: ScenarioModel) -> bool:
-    return len(model.sensors) > 1 and model.fusion.kind not in ("none", "central", "custom")
+def _fusion_by_label(model: ScenarioModel) -> Fusion | None:
+    """The fusion of several sensors' own beliefs by their labels; None where there is no such."""
+    fusion = model.fusion
+    return fusion if isinstance(fusion, Fusion) and fusion.kind in BY_LABEL and len(model.sensors) > 1 else None
 
 
 def _births(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
-    steps = model.birth.steps
-    if not _fuses(model) or model.fusion.feedback or (steps != "every" and max(steps, default=1) <= 1):
+    steps, fusion = model.birth.steps, _fusion_by_label(model)
+    if fusion is None or fusion.feedback or fusion.matching == "assignment":
+        return
+    if steps != "every" and max(steps, default=1) <= 1:
         return
     when = "at every step" if steps == "every" else f"up to step {max(steps)}"
     yield (
         ("birth", "steps"),
         f"births {when} without feedback: sensors may take one target up at different steps, under different labels, "
-        "and GCI, which fuses by label, then loses it (births at step 1 alone, or fusion.feedback with a fusion of the "
-        "filters' kind, avoid this)",
+        f"and {_rule(fusion)}, which fuses by label, then loses it; take fusion.matching: assignment, or, where scans "
+        "can be sent, fusion.kind: sequential (births at step 1 alone, or fusion.feedback with a fusion of the "
+        "filters' kind, avoid this too)",
     )
 
 
 def _views(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
-    if not _fuses(model):
+    fusion = _fusion_by_label(model)
+    if fusion is None or fusion.by_views:
         return
     region = model.region
     axes = (
@@ -84,12 +91,28 @@ def _views(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
     spread = table.max(axis=0) - table.min(axis=0)
     worst = int(spread.argmax())
     if spread[worst] > MAX_DIFFERENCE:
-        yield ("sensors", list(chances)[int(table[:, worst].argmin())], "detection"), _unlike(names, table, grid)
+        yield (
+            ("sensors", list(chances)[int(table[:, worst].argmin())], "detection"),
+            _unlike(names, table, grid, fusion),
+        )
     elif model.decision_steps:
-        yield from _limited_and_moving(model)
+        yield from _limited_and_moving(model, fusion)
 
 
-def _unlike(names: list[str], table: Floats, grid: Floats) -> str:
+def _rule(fusion: Fusion) -> str:
+    return "the arithmetic average" if fusion.kind == "arithmetic_average" else "GCI"
+
+
+def _instead(fusion: Fusion) -> str:
+    """What loses nothing where views differ."""
+    kind = "arithmetic_average" if fusion.kind == "arithmetic_average" else "clmb"
+    return (
+        "take fusion.kind: sequential where scans can be sent; parallel where only densities can; "
+        f"fusion: {{kind: {kind}, by_views: true}} where sensors do not share a prediction"
+    )
+
+
+def _unlike(names: list[str], table: Floats, grid: Floats, fusion: Fusion) -> str:
     """How much (num_sensors, num_places) probabilities of detection differ, and where most."""
     spread = table.max(axis=0) - table.min(axis=0)
     worst = int(spread.argmax())
@@ -97,12 +120,12 @@ def _unlike(names: list[str], table: Floats, grid: Floats) -> str:
     share = f"{(spread > MAX_DIFFERENCE).mean():.0%}".replace("%", " %")
     return (
         f"sensors differ in what they see: in {share} of the region by more than {MAX_DIFFERENCE:g} in probability of "
-        f"detection ({chances} at x {grid[worst, 0]:g}, y {grid[worst, 1]:g} m); GCI loses what one sensor sees and "
-        "another does not"
+        f"detection ({chances} at x {grid[worst, 0]:g}, y {grid[worst, 1]:g} m); {_rule(fusion)} loses what one "
+        f"sensor sees and another does not; {_instead(fusion)}"
     )
 
 
-def _limited_and_moving(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
+def _limited_and_moving(model: ScenarioModel, fusion: Fusion) -> Iterator[tuple[Path, str]]:
     """Sensors that see alike where they start, and need not once they have moved."""
     region = model.region
     across = math.hypot(region.x_max - region.x_min, region.y_max - region.y_min)
@@ -111,8 +134,8 @@ def _limited_and_moving(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
         if (limited and sensor.platform.top_speed > 0.0) or isinstance(sensor.detection, CameraDetection):
             yield (
                 ("sensors", i, "detection"),
-                "sensors that move or turn and see only so far will differ in what they see; GCI loses what one sensor "
-                "sees and another does not",
+                f"sensors that move or turn and see only so far will differ in what they see; {_rule(fusion)} loses "
+                f"what one sensor sees and another does not; {_instead(fusion)}",
             )
             return
 

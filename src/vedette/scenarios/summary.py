@@ -8,9 +8,11 @@ from typing import Literal
 from vedette.scenarios.loading import Scenario
 from vedette.scenarios.sections import ScenarioModel
 from vedette.scenarios.sections.base import Section
+from vedette.scenarios.sections.fusion import AnyFusion, CustomFusion
 from vedette.scenarios.sections.sensors import Sensor
 from vedette.scenarios.sections.targets import RecordedTargets
-from vedette.scenarios.sections.tracking import AnyFilter, AnyFusion, CustomFusion, Filter
+from vedette.scenarios.sections.tracking import AnyFilter, Filter
+from vedette.scenarios.sections.world import Birth
 from vedette.text import counted
 
 
@@ -28,7 +30,9 @@ def one_line(scenario: Scenario) -> str:
 
 def _tracker(model: ScenarioModel) -> str:
     kinds = model.filter.kind, model.fusion.kind
-    return f"central {kinds[0]} filter" if kinds[1] == "central" else f"{kinds[0]} filter, {kinds[1]} fusion"
+    if kinds[1] in ("central", "sequential"):
+        return f"{kinds[1]} {kinds[0]} filter"
+    return f"{kinds[0]} filter, {kinds[1]} fusion"
 
 
 def settings(section: Section) -> str:
@@ -64,9 +68,10 @@ def facts(model: ScenarioModel) -> list[tuple[str, str]]:
         ("region", f"x {region.x_min:g} to {region.x_max:g} m, y {region.y_min:g} to {region.y_max:g} m"),
         ("motion", settings(model.motion)),
         ("survival", settings(model.survival)),
-        ("births", f"{counted(len(model.birth.sites), 'site')}, {_steps(model.birth.steps)}"),
+        ("births", _births(model.birth)),
         ("filter", _filter(model.filter)),
         ("fusion", _fusion(model.fusion)),
+        *(() if model.network is None else (("network", settings(model.network)),)),
         ("estimate", settings(model.estimator)),
         ("decisions", _decisions(model.decision_steps)),
         ("horizon", f"{counted(control.horizon_steps, 'step')} of {control.horizon_period:g} s"),
@@ -83,14 +88,33 @@ def _filter(section: AnyFilter) -> str:
     return settings(section) + assignment
 
 
+def _births(section: Birth) -> str:
+    sites = f"{counted(len(section.sites), 'site')}, {_steps(section.steps)}" if section.sites else "no site"
+    measured = section.from_measurements
+    return sites if measured is None else f"{sites}; {measured.expected:g} a scan from measurements"
+
+
+_IN_WORDS = {
+    "none": "none",
+    "central": "central: one filter takes the scans of all sensors",
+    "sequential": "sequential: one belief takes the sensors' scans in turn",
+    "parallel": "parallel: each sensor updates one prediction, by which their posteriors are divided",
+}
+
+
 def _fusion(section: AnyFusion) -> str:
     if isinstance(section, CustomFusion):
         return settings(section)
-    if section.kind in ("none", "central"):
-        return "none" if section.kind == "none" else "central: one filter takes the scans of all sensors"
-    weights = "equal weights" if section.weights is None else f"weights {short(section.weights)}"
-    feedback = "feedback" if section.feedback else "no feedback"
-    return f"{section.kind}, {weights}, {section.mixture_power} powers, {feedback}"
+    if section.kind in _IN_WORDS:
+        return _IN_WORDS[section.kind]
+    words = [section.kind, "equal weights" if section.weights is None else f"weights {short(section.weights)}"]
+    if section.by_views:
+        words.append("by views")
+    if section.kind != "arithmetic_average":
+        words.append(f"{section.mixture_power} powers")
+    if section.matching == "assignment":
+        words.append("labels matched by assignment")
+    return ", ".join([*words, "feedback" if section.feedback else "no feedback"])
 
 
 def _decisions(steps: Sequence[int]) -> str:

@@ -94,7 +94,7 @@ class Distributed:
             views, rule = Views(self.sensors, at, tuple(scan is not None for scan in scans), prediction), self.fusion
             with stages.timing("fusion"):
                 if isinstance(rule, Matched):
-                    # The sensors go on under the common labels, which then hardly change from scan to scan.
+                    # Labels then outlast the sensor that led them, and are those that decisions need.
                     local, rule = list(rule.match(local)), rule.rule
                 fused, report = rule.fuse(local, views)
         if prediction is not None:

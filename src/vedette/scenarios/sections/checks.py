@@ -13,6 +13,8 @@ import numpy as np
 from vedette.covariances import covariance_fault
 from vedette.scenarios.faults import Finding, Path, describe
 from vedette.scenarios.sections.base import attempt
+from vedette.scenarios.sections.fusion import OF_LMBS
+from vedette.scenarios.sections.network_checks import NETWORK_CHECKS
 from vedette.scenarios.sections.tracking import UNLABELLED
 from vedette.scenarios.sections.world import BirthSite
 
@@ -75,22 +77,27 @@ def _fusion_of_several(model: ScenarioModel) -> Iterator[Finding]:
 
 
 def _fusion_of_kind(model: ScenarioModel) -> Iterator[Finding]:
-    if model.fusion.kind == "cm_delta_glmb" and model.filter.kind == "lmb":
-        yield ("fusion", "kind"), "clmb, central or none, as the filters are lmb", '"cm_delta_glmb"'
-    if (
-        model.fusion.kind == "clmb"
-        and model.fusion.feedback
-        and model.filter.kind not in ("lmb", "custom", *UNLABELLED)
-    ):
-        wanted = f"false, as {model.filter.kind} filters cannot go on from an LMB"
-        yield ("fusion", "feedback"), wanted, "true"
+    kind, filters = model.fusion.kind, model.filter.kind
+    if kind == "cm_delta_glmb" and filters == "lmb":
+        wanted = "sequential, parallel, clmb, arithmetic_average, central or none, as the filters are lmb"
+        yield ("fusion", "kind"), wanted, describe(kind)
+    if filters in ("lmb", "custom", *UNLABELLED):
+        return
+    if kind == "parallel":
+        wanted = f"sequential, cm_delta_glmb or another, as parallel is of lmb filters, and these are {filters}"
+        yield ("fusion", "kind"), wanted, describe(kind)
+    if kind in OF_LMBS and model.fusion.feedback:
+        yield ("fusion", "feedback"), f"false, as {filters} filters cannot go on from an LMB", "true"
+
+
+def _one_belief(model: ScenarioModel) -> Iterator[Finding]:
+    if model.fusion.kind in ("central", "sequential") and model.fusion.feedback:
+        yield ("fusion", "feedback"), "false, as nothing is fused while tracking", "true"
 
 
 def _central(model: ScenarioModel) -> Iterator[Finding]:
     if model.fusion.kind != "central":
         return
-    if model.fusion.feedback:
-        yield ("fusion", "feedback"), "false, as nothing is fused while tracking", "true"
     if model.filter.kind == "custom":
         yield ("fusion", "kind"), "a fusion, as each sensor has a filter of your own", '"central"'
     elif model.filter.assignment.kind == "gibbs":
@@ -181,6 +188,7 @@ CHECKS = (
     _fusion_of_labels,
     _fusion_of_several,
     _fusion_of_kind,
+    _one_belief,
     _central,
     _estimator,
     _combinations,
@@ -189,4 +197,5 @@ CHECKS = (
     _targets,
     _sensor_names,
     _score,
+    *NETWORK_CHECKS,
 )

@@ -1,4 +1,4 @@
-"""Sections about tracking: the local filters, and the fusion of their densities."""
+"""Sections about tracking: the filters."""
 
 from __future__ import annotations
 
@@ -25,13 +25,8 @@ from vedette.scenarios.sections.custom import Custom
 if TYPE_CHECKING:  # with the filters comes the compiler, which a check does without
     from vedette.filters import Filter as LocalFilter
     from vedette.filters import Limits
-    from vedette.fusion import Clmb, CmDeltaGlmb
-    from vedette.fusion import Fusion as FusionRule
     from vedette.models import SensorModel, TargetModel
     from vedette.tracking import CentralFilter
-
-
-_WEIGHT_TOLERANCE = 1e-6
 
 
 class RankedAssignment(Section):
@@ -148,13 +143,13 @@ class Filter(Section):
             marginalised=self.kind == "m_delta_glmb",
         )
 
-    def build_central(self, targets: TargetModel, sensors: tuple[SensorModel, ...]) -> CentralFilter:
-        """The filter of all sensors' scans, for a fusion of kind central."""
-        from vedette.filters import MultiSensorGlmbFilter, MultiSensorLmbFilter
+    def build_central(self, targets: TargetModel, sensors: tuple[SensorModel, ...], *, in_turn: bool) -> CentralFilter:
+        """The filter of all sensors' scans; in_turn: whether they are taken one after the other, else jointly."""
+        from vedette.filters import MultiSensorGlmbFilter, MultiSensorLmbFilter, SequentialLmbFilter
 
         limits = self.limits.build()
         if self.kind == "lmb":
-            return MultiSensorLmbFilter(targets, sensors, limits)
+            return (SequentialLmbFilter if in_turn else MultiSensorLmbFilter)(targets, sensors, limits)
         return MultiSensorGlmbFilter(targets, sensors, limits, marginalised=self.kind == "m_delta_glmb")
 
 
@@ -174,115 +169,3 @@ class CustomFilter(Custom):
 
 
 AnyFilter = Annotated[Filter | CustomFilter, Field(discriminator="kind")]
-
-
-Weights = Annotated[tuple[Probability, ...], Field(strict=False, min_length=1)]
-
-
-class FusionLimits(Section):
-    """Caps on the cost of a fusion."""
-
-    max_hypotheses: Count = Field(default=1000, description="Most label sets of the fused density [-].")
-    max_components: Count = Field(
-        default=4, description="Most components of a track before its power is taken; unused when moment matched [-]."
-    )
-    min_component_weight: Chance = Field(
-        default=1e-5, description="Lighter components are dropped; unused when moment matched [-]."
-    )
-    merge_distance: Annotated[float, Field(ge=0.0)] | None = Field(
-        default=None,
-        description="Closer components are merged; none: 2 for component_wise, 0.5 for quadrature powers [-].",
-    )
-    max_combinations: Count = Field(
-        default=4096, description="Bound on the combinations of components of one label at all sensors [-]."
-    )
-
-
-class CustomCentral(Custom):
-    """A user's own `vedette.tracking.CentralFilter`, of all sensors' scans; called with `targets` and `sensors`."""
-
-    kind: Literal["custom"] = Field(default="custom", description="Kind of filter [-].")
-    gives: ClassVar[str] = "vedette.tracking:CentralFilter"
-
-
-class Fusion(Section):
-    """How the sensors' densities become one: generalised covariance intersection (paper section II-D)."""
-
-    kind: Literal["cm_delta_glmb", "clmb", "central", "none"] = Field(
-        default="cm_delta_glmb",
-        description="Of marginalised delta-GLMB densities, of LMB densities, or none (a single sensor). central: one "
-        "filter takes the scans of all sensors, and nothing is fused while tracking; what is set here then serves the "
-        "joint decisions alone [-].",
-    )
-    filter: CustomCentral | None = Field(
-        default=None,
-        description="Of a central fusion: a filter of your own for all sensors' scans; none: that of the filter's kind "
-        "[-].",
-    )
-    weights: Weights | None = Field(
-        default=None, description="Weight of each sensor, with sum 1; none: equal weights [-]."
-    )
-    mixture_power: Literal["moment_matched", "component_wise", "quadrature"] = Field(
-        default="moment_matched",
-        description="Power of a Gaussian mixture: of the Gaussian with its moments; of each component, which is valid "
-        "for well separated ones; or the latter corrected by cubature [-].",
-    )
-    missing_weight: Chance = Field(
-        default=1e-6, description="Weight of a label set where a sensor lost it by truncation (cm_delta_glmb) [-]."
-    )
-    missing_existence: Chance = Field(
-        default=1e-4, description="Existence of a label where a sensor lost it by truncation (clmb) [-]."
-    )
-    feedback: bool = Field(
-        default=False, description="Whether the fused density replaces the sensors' own; the paper's does not [-]."
-    )
-    limits: FusionLimits = Field(default=FusionLimits(), description="What is thrown away [-].")
-
-    @check
-    def _sum_to_one(self) -> Iterator[Finding]:
-        if self.weights is not None and abs(math.fsum(self.weights) - 1.0) > _WEIGHT_TOLERANCE:
-            yield ("weights",), "weights with sum 1", f"a sum of {math.fsum(self.weights):g}"
-
-    @check
-    def _filter_of_all(self) -> Iterator[Finding]:
-        if self.filter is not None and self.kind != "central":
-            yield ("filter",), "none, as the fusion is not central", "a filter"
-
-    def scaled_weights(self, num_sensors: int) -> tuple[float, ...]:
-        """Weight of each sensor: equal where none are given; scaled to sum to one beyond the rounding of the file."""
-        given = self.weights or (1.0,) * num_sensors
-        return tuple(weight / math.fsum(given) for weight in given)
-
-    def build(self, num_sensors: int, folder: Path) -> CmDeltaGlmb | Clmb | None:
-        """The fusion of the sensors' densities after each scan; None where there is none."""
-        from vedette.fusion import Clmb, CmDeltaGlmb, FusionLimits
-
-        if self.kind in ("none", "central"):
-            return None
-        weights, caps = self.scaled_weights(num_sensors), self.limits
-        limits = FusionLimits(
-            math.log(caps.min_component_weight),
-            caps.merge_distance,
-            caps.max_components,
-            caps.max_combinations,
-            caps.max_hypotheses,
-        )
-        if self.kind == "clmb":
-            return Clmb(weights, self.mixture_power, self.missing_existence, limits)
-        return CmDeltaGlmb(weights, self.mixture_power, math.log(self.missing_weight), limits)
-
-
-class CustomFusion(Custom):
-    """A user's own `vedette.fusion.Fusion`; called with `num_sensors`."""
-
-    kind: Literal["custom"] = Field(default="custom", description="Kind of fusion [-].")
-    feedback: bool = Field(default=False, description="Whether the fused density replaces the sensors' own [-].")
-    gives: ClassVar[str] = "vedette.fusion:Fusion"
-
-    def build(self, num_sensors: int, folder: Path) -> FusionRule:
-        """The fusion of the sensors' densities."""
-        made: FusionRule = self.made(folder, num_sensors=num_sensors)
-        return made
-
-
-AnyFusion = Annotated[Fusion | CustomFusion, Field(discriminator="kind")]

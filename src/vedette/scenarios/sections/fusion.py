@@ -1,0 +1,213 @@
+"""Sections about fusion: how what the sensors believe, or see, becomes one."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, TypeAlias
+
+from pydantic import Field
+
+from vedette.scenarios.faults import Finding, describe
+from vedette.scenarios.sections.base import Chance, Count, Probability, Section, check
+from vedette.scenarios.sections.custom import Custom
+
+if TYPE_CHECKING:  # with the fusions comes the compiler, which a check does without
+    from vedette.fusion import Fusion as FusionRule
+
+
+_WEIGHT_TOLERANCE = 1e-6
+
+FusionKind: TypeAlias = Literal[
+    "sequential", "parallel", "clmb", "cm_delta_glmb", "arithmetic_average", "central", "none"
+]
+# One belief takes the scans of all sensors: nothing is fused while tracking.
+ONE_BELIEF: tuple[FusionKind, ...] = ("sequential", "central", "none")
+# Of beliefs that each sensor keeps for itself, by their labels.
+BY_LABEL: tuple[FusionKind, ...] = ("clmb", "cm_delta_glmb", "arithmetic_average")
+# Of those, the ones whose fused density is an LMB, and which may go by views.
+OF_LMBS: tuple[FusionKind, ...] = ("clmb", "arithmetic_average")
+
+
+Weights = Annotated[tuple[Probability, ...], Field(strict=False, min_length=1)]
+
+
+class FusionLimits(Section):
+    """Caps on the cost of a fusion."""
+
+    max_hypotheses: Count = Field(default=1000, description="Most label sets of the fused density [-].")
+    max_components: Count = Field(
+        default=4, description="Most components of a track before its power is taken; unused when moment matched [-]."
+    )
+    min_component_weight: Chance = Field(
+        default=1e-5, description="Lighter components are dropped; unused when moment matched [-]."
+    )
+    merge_distance: Annotated[float, Field(ge=0.0)] | None = Field(
+        default=None,
+        description="Closer components are merged; none: 2 for component_wise, 0.5 for quadrature powers [-].",
+    )
+    max_combinations: Count = Field(
+        default=4096, description="Bound on the combinations of components of one label at all sensors [-]."
+    )
+
+
+class CustomCentral(Custom):
+    """A user's own `vedette.tracking.CentralFilter`, of all sensors' scans; called with `targets` and `sensors`."""
+
+    kind: Literal["custom"] = Field(default="custom", description="Kind of filter [-].")
+    gives: ClassVar[str] = "vedette.tracking:CentralFilter"
+
+
+class Fusion(Section):
+    """How what the sensors believe, or their scans, become one."""
+
+    kind: FusionKind = Field(
+        default="cm_delta_glmb",
+        description="cm_delta_glmb, clmb: generalised covariance intersection of marginalised delta-GLMB or of LMB "
+        "densities (paper section II-D). arithmetic_average: of LMB densities; other ones are converted. sequential: "
+        "one belief is predicted, then updated with each sensor's scan in turn. parallel: each sensor updates one "
+        "common prediction, and the LMB posteriors are divided by it; the sensors go on from the result. central: one "
+        "filter takes the scans of all sensors. none: of a single sensor. Joint decisions are by covariance "
+        "intersection of the same kind of density, without views, whatever the kind [-].",
+    )
+    filter: CustomCentral | None = Field(
+        default=None,
+        description="Of a central fusion: a filter of your own for all sensors' scans; none: that of the filter's kind "
+        "[-].",
+    )
+    weights: Weights | None = Field(
+        default=None,
+        description="Weight of each sensor, with sum 1; none: equal weights. Of sequential, parallel and central, they "
+        "serve the joint decisions alone [-].",
+    )
+    by_views: bool = Field(
+        default=False,
+        description="Whether a sensor's weight at each label is in proportion to the probability that it detects it, "
+        "so that one that cannot see a target has no say in it (clmb, arithmetic_average) [-].",
+    )
+    matching: Literal["labels", "assignment"] = Field(
+        default="labels",
+        description="What is one target at several sensors: that of one label, or what is found so by place before "
+        "each fusion (clmb, cm_delta_glmb, arithmetic_average without feedback) [-].",
+    )
+    mixture_power: Literal["moment_matched", "component_wise", "quadrature"] = Field(
+        default="moment_matched",
+        description="Power of a Gaussian mixture: of the Gaussian with its moments; of each component, which is valid "
+        "for well separated ones; or the latter corrected by cubature [-].",
+    )
+    missing_weight: Chance = Field(
+        default=1e-6, description="Weight of a label set where a sensor lost it by truncation (cm_delta_glmb) [-]."
+    )
+    missing_existence: Chance = Field(
+        default=1e-4,
+        description="Existence of a label where a sensor lost it by truncation (clmb, parallel) [-].",
+    )
+    feedback: bool = Field(
+        default=False,
+        description="Whether the fused density replaces the sensors' own; the paper's does not, that of parallel "
+        "always does [-].",
+    )
+    limits: FusionLimits = Field(default=FusionLimits(), description="What is thrown away [-].")
+
+    @check
+    def _sum_to_one(self) -> Iterator[Finding]:
+        if self.weights is not None and abs(math.fsum(self.weights) - 1.0) > _WEIGHT_TOLERANCE:
+            yield ("weights",), "weights with sum 1", f"a sum of {math.fsum(self.weights):g}"
+
+    @check
+    def _filter_of_all(self) -> Iterator[Finding]:
+        if self.filter is not None and self.kind != "central":
+            yield ("filter",), "none, as the fusion is not central", "a filter"
+
+    @check
+    def _views_of_lmbs(self) -> Iterator[Finding]:
+        if self.by_views and self.kind not in OF_LMBS:
+            yield ("by_views",), f"false, as {self.kind} does not weigh labels ({' and '.join(OF_LMBS)} do)", "true"
+
+    @check
+    def _matching_of_own_labels(self) -> Iterator[Finding]:
+        if self.matching == "labels":
+            return
+        if self.kind not in BY_LABEL:
+            yield ("matching",), f"labels, as under {self.kind} all sensors share them", describe(self.matching)
+        elif self.feedback:
+            yield ("matching",), "labels, as with feedback all sensors share them", describe(self.matching)
+
+    @property
+    def feeds_back(self) -> bool:
+        """Whether the sensors go on from the fused density."""
+        return self.feedback or self.kind == "parallel"
+
+    def scaled_weights(self, num_sensors: int) -> tuple[float, ...]:
+        """Weight of each sensor: equal where none are given; scaled to sum to one beyond the rounding of the file."""
+        given = self.weights or (1.0,) * num_sensors
+        return tuple(weight / math.fsum(given) for weight in given)
+
+    def build(self, num_sensors: int, folder: Path) -> FusionRule | None:
+        """The fusion of the sensors' densities after each scan; None where one belief takes all scans."""
+        from vedette.fusion import Matched, ParallelUpdate
+
+        if self.kind in ONE_BELIEF:
+            return None
+        if self.kind == "parallel":
+            return ParallelUpdate(missing_existence=self.missing_existence)
+        rule = self._by_label(num_sensors)
+        return Matched(rule) if self.matching == "assignment" else rule
+
+    def build_merging(self, num_sensors: int, *, of_lmbs: bool) -> FusionRule:
+        """The fusion of what sensors of a network believe after different pasts: covariance intersection.
+
+        of_lmbs: whether the filters keep LMBs, of which those count at a label that see it, and labels are matched.
+        """
+        from vedette.fusion import Clmb, CmDeltaGlmb, Matched
+
+        equal = (1.0 / num_sensors,) * num_sensors
+        return Matched(Clmb(equal, by_views=True)) if of_lmbs else CmDeltaGlmb(equal)
+
+    def build_of_decisions(self, num_sensors: int, *, of_lmbs: bool) -> FusionRule:
+        """The fusion that joint decisions go by: plain covariance intersection.
+
+        of_lmbs: whether the filters keep LMBs; what the fused density is says more, where there is one.
+        """
+        lmbs = self.kind in OF_LMBS or (of_lmbs and self.kind != "cm_delta_glmb")
+        kind: FusionKind = "clmb" if lmbs else "cm_delta_glmb"
+        return self.model_copy(update={"kind": kind, "by_views": False})._by_label(num_sensors)
+
+    def _by_label(self, num_sensors: int) -> FusionRule:
+        from vedette.fusion import ArithmeticAverage, Clmb, CmDeltaGlmb, FusionLimits
+
+        weights, caps = self.scaled_weights(num_sensors), self.limits
+        limits = FusionLimits(
+            math.log(caps.min_component_weight),
+            caps.merge_distance,
+            caps.max_components,
+            caps.max_combinations,
+            caps.max_hypotheses,
+        )
+        if self.kind == "arithmetic_average":
+            return ArithmeticAverage(weights, self.by_views, limits)
+        if self.kind == "clmb":
+            return Clmb(weights, self.mixture_power, self.missing_existence, limits, self.by_views)
+        return CmDeltaGlmb(weights, self.mixture_power, math.log(self.missing_weight), limits)
+
+
+class CustomFusion(Custom):
+    """A user's own `vedette.fusion.Fusion`; called with `num_sensors`."""
+
+    kind: Literal["custom"] = Field(default="custom", description="Kind of fusion [-].")
+    feedback: bool = Field(default=False, description="Whether the fused density replaces the sensors' own [-].")
+    gives: ClassVar[str] = "vedette.fusion:Fusion"
+
+    @property
+    def feeds_back(self) -> bool:
+        """Whether the sensors go on from the fused density."""
+        return self.feedback
+
+    def build(self, num_sensors: int, folder: Path) -> FusionRule:
+        """The fusion of the sensors' densities."""
+        made: FusionRule = self.made(folder, num_sensors=num_sensors)
+        return made
+
+
+AnyFusion = Annotated[Fusion | CustomFusion, Field(discriminator="kind")]
