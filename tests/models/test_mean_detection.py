@@ -10,7 +10,7 @@ from scipy.integrate import dblquad
 
 from vedette import models
 from vedette.errors import InputError, ModelError
-from vedette.models.gaussian_integrals import spread_nodes
+from vedette.kernels.gaussian.position_integrals import spread_nodes
 
 pytestmark = pytest.mark.lanes
 
@@ -117,6 +117,14 @@ def test_a_target_that_is_known_exactly_is_seen_as_at_its_place():
     for angle, expected in ((0.7, 0.9), (2.0, 0.0)):
         centre = POSE[:2] + 200.0 * np.array([math.cos(angle), math.sin(angle)])
         assert mean_detection(detection, centre, 1e-6 * np.eye(2)) == pytest.approx(expected, abs=1e-6)
+
+
+@pytest.mark.parametrize("half_width", [0.5, math.pi])
+def test_far_from_the_edge_there_is_nothing_below_0_or_above_1(half_width):
+    detection = models.limited_sector(0.9, 500.0, half_width)
+    for distance in np.linspace(1.0, 900.0, 300):
+        centre = POSE[:2] + distance * np.array([math.cos(0.71), math.sin(0.71)])
+        assert 0.0 <= mean_detection(detection, centre, 25.0 * np.eye(2)) <= 0.9
 
 
 def test_nodes_have_the_moments_of_the_gaussian():

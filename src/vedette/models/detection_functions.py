@@ -6,9 +6,9 @@ import math
 
 from vedette.kernels.base.compile import kernel
 from vedette.kernels.base.types import Floats
+from vedette.kernels.gaussian.position_integrals import gaussian_mean, share_in_sector
 from vedette.kernels.gaussian.scratch import wrap_angle
 from vedette.models.functions import model_function
-from vedette.models.gaussian_integrals import gaussian_mean, share_in_sector
 
 # The built-in models stay at or below this: certain detection would make a single missed detection impossible, and with
 # it every hypothesis that holds the target (paper-notes 4).

@@ -10,11 +10,11 @@ from numpy.typing import ArrayLike
 
 from vedette.kernels.base.types import Floats, Sensor
 from vedette.kernels.gaussian.detection import AT_CENTRE, BY_NODES, CLOSED_FORM, detection_probabilities
+from vedette.kernels.gaussian.position_integrals import spread_nodes
 from vedette.models.arguments import float_array, pose_vector, reject, state_table
 from vedette.models.clutter import ClutterModel
 from vedette.models.detection import DetectionModel
 from vedette.models.functions import model_function
-from vedette.models.gaussian_integrals import spread_nodes
 from vedette.models.measurement import MeasurementModel, NoiseModel
 from vedette.models.motion import resolve_method
 

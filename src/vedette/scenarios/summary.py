@@ -136,4 +136,18 @@ def sensing(sensor: Sensor) -> list[tuple[str, str]]:
         ("noise", settings(sensor.noise)),
         ("detection", settings(sensor.detection)),
         ("clutter", settings(sensor.clutter)),
+        *_in_truth(sensor),
     ]
+
+
+def _in_truth(sensor: Sensor) -> list[tuple[str, str]]:
+    """Where a sensor is not what the filters take it for, and when it scans if not at every step."""
+    found, truth = [], sensor.truth
+    if truth is not None:
+        parts = {name: getattr(truth, name) for name in type(truth).model_fields}
+        sections = [(name, value) for name, value in parts.items() if isinstance(value, Section)]
+        found = [(f"true {name.replace('_', ' ')}", settings(value)) for name, value in sections]
+        found += [("detection of", "the measurement")] if truth.detection_of == "measurement" else []
+    if sensor.scans.every > 1:
+        found.append(("scans", f"every {sensor.scans.every} steps from step {sensor.scans.first}"))
+    return found

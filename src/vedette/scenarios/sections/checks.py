@@ -176,6 +176,15 @@ def _name_once(path: Path, sensor: Sensor, names: set[str]) -> Iterator[Finding]
         names.add(sensor.name)
 
 
+def _scan_steps(model: ScenarioModel) -> Iterator[Finding]:
+    for i, sensor in enumerate(model.sensors):
+        yield from attempt(_first_scan(("sensors", i, "scans", "first"), sensor, model))
+
+
+def _first_scan(path: Path, sensor: Sensor, model: ScenarioModel) -> Iterator[Finding]:
+    yield from _up_to_last(path, sensor.scans.first, model.time.num_steps)
+
+
 def _score(model: ScenarioModel) -> Iterator[Finding]:
     for name in ("from_step", "to_step"):
         yield from attempt(_last_step(("ospa", name), model.ospa, name, model))
@@ -196,6 +205,7 @@ CHECKS = (
     _birth_sites,
     _targets,
     _sensor_names,
+    _scan_steps,
     _score,
     *NETWORK_CHECKS,
 )

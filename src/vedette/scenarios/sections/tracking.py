@@ -13,6 +13,7 @@ from vedette.scenarios.faults import Finding
 from vedette.scenarios.sections.base import (
     Chance,
     Count,
+    DetectionAt,
     GaussianMethod,
     Positive,
     Probability,
@@ -111,6 +112,11 @@ class Filter(Section):
     gaussian_method: GaussianMethod = Field(
         default="auto", description="Extended, unscented or cubature Kalman; auto: extended where Jacobians exist [-]."
     )
+    detection_at: DetectionAt = Field(
+        default="centre",
+        description="Of a predicted Gaussian, the probability of detection at its centre, as in the paper, or its mean "
+        "over the Gaussian: for sensors whose view ends [-].",
+    )
     assignment: Assignment = Field(default=RankedAssignment(), description="How associations are truncated [-].")
     limits: FilterLimits = Field(default=FilterLimits(), description="What is thrown away [-].")
 
@@ -159,6 +165,11 @@ class CustomFilter(Custom):
     kind: Literal["custom"] = Field(default="custom", description="Kind of filter [-].")
     gaussian_method: GaussianMethod = Field(
         default="auto", description="Extended, unscented or cubature Kalman; auto: extended where Jacobians exist [-]."
+    )
+    detection_at: DetectionAt = Field(
+        default="centre",
+        description="Of a predicted Gaussian, the probability of detection at its centre, as in the paper, or its mean "
+        "over the Gaussian: for sensors whose view ends [-].",
     )
     gives: ClassVar[str] = "vedette.filters:Filter"
 

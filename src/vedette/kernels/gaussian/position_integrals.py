@@ -86,6 +86,12 @@ def _near(start: float, stop: float, distance: float, toward: float, a: float, b
 
 
 @kernel
+def _share(total: float) -> float:
+    """Rounding leaves next to nothing below 0 or above 1."""
+    return min(max(total, 0.0), 1.0)
+
+
+@kernel
 def share_in_sector(dx: float, dy: float, cov: Floats, max_range: float, middle: float, half_width: float) -> float:
     """Share of a Gaussian within `max_range` of the origin and `half_width` of the direction `middle`, in [0, 1].
 
@@ -105,7 +111,7 @@ def share_in_sector(dx: float, dy: float, cov: Floats, max_range: float, middle:
     v = (dy - b * u) / c
     distance, toward = math.sqrt(u * u + v * v), math.atan2(v, u)
     if half_width >= math.pi:
-        return min(_near(toward - math.pi, toward + math.pi, distance, toward, a, b, c, max_range), 1.0)
+        return _share(_near(toward - math.pi, toward + math.pi, distance, toward, a, b, c, max_range))
     # A linear map with a positive determinant keeps the order of directions, and opposite ones opposite.
     total = 0.0
     for side in range(2):
@@ -118,4 +124,4 @@ def share_in_sector(dx: float, dy: float, cov: Floats, max_range: float, middle:
         if stop < start:
             stop += 2.0 * math.pi
         total += _near(start, stop, distance, toward, a, b, c, max_range)
-    return min(total, 1.0)
+    return _share(total)
