@@ -66,6 +66,7 @@ def replay_data(strategy: Strategy, record: RunRecord, group: str, *, trust: boo
         ],
         "scans": _scans(record, scenario, [sensor["kind"] for sensor in sensors], places, trust),
         "ospa": [_rounded(parts, 2) for parts in record.ospa],
+        "ospa_unit": scenario.model.ospa.unit,
         "decisions": [_decision(*each) for each in zip(record.decisions, choices_of(record), strict=True)],
     }
 

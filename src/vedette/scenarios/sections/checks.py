@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
 # How far a decision time may be from the time of a scan, in scans: rounding of sums of decimal fractions.
 _TIME_TOLERANCE = 1e-6
+# Components of the state of a recorded target: position and velocity.
+_RECORDED_DIM = 4
 
 
 def step_of_time(time: float, start: float, step_period: float) -> int | None:
@@ -188,6 +190,13 @@ def _first_scan(path: Path, sensor: Sensor, model: ScenarioModel) -> Iterator[Fi
 def _score(model: ScenarioModel) -> Iterator[Finding]:
     for name in ("from_step", "to_step"):
         yield from attempt(_last_step(("ospa", name), model.ospa, name, model))
+    if (
+        model.ospa.components == "state"
+        and model.targets.kind == "recorded"
+        and model.motion.state_dim != _RECORDED_DIM
+    ):
+        wanted = f"position, as states have {model.motion.state_dim} components and recorded targets {_RECORDED_DIM}"
+        yield ("ospa", "components"), wanted, '"state"'
 
 
 CHECKS = (

@@ -14,7 +14,7 @@ from vedette.scenarios.sections.control import Control
 from vedette.scenarios.sections.fusion import AnyFusion, Fusion
 from vedette.scenarios.sections.network import NetworkSection
 from vedette.scenarios.sections.planners import STRATEGIES, CustomPlanner
-from vedette.scenarios.sections.scoring import AnyEstimator, CustomMetric, MapEstimator, Ospa
+from vedette.scenarios.sections.scoring import AnyEstimator, AnyMetric, MapEstimator, Ospa
 from vedette.scenarios.sections.sensors import Sensor, SensorDefaults
 from vedette.scenarios.sections.targets import Targets
 from vedette.scenarios.sections.tracking import AnyFilter, Filter
@@ -66,8 +66,8 @@ class ScenarioModel(Section):
         default={}, description="Strategies of your own by name, beside jdm, idm, random, fixed and still [-]."
     )
     ospa: Ospa = Field(default=Ospa(), description="How the estimates are scored [-].")
-    metrics: dict[Name, CustomMetric] = Field(
-        default={}, description="Measures of your own by name, each a column of the scans [-]."
+    metrics: dict[Name, AnyMetric] = Field(
+        default={}, description="Measures beside the built-in ones by name, each a column of the scans [-]."
     )
 
     @check

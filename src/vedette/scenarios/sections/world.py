@@ -85,10 +85,20 @@ StateOrder = Annotated[
 
 
 class ConstantVelocity(Section):
-    """Constant velocity with white acceleration noise, held over a step. State [px, py, vx, vy]."""
+    """Constant velocity with white acceleration noise. State [px, py, vx, vy]."""
 
     kind: Literal["constant_velocity"] = Field(default="constant_velocity", description="Kind of motion [-].")
-    sigma_v: float = Field(default=5.0, ge=0.0, description="Standard deviation of the acceleration [m/s^2].")
+    sigma_v: float = Field(
+        default=5.0,
+        ge=0.0,
+        description="Standard deviation of a held acceleration; of a continuous one the root of its spectral density, "
+        "in m/s^1.5 [m/s^2].",
+    )
+    acceleration: Literal["held", "continuous"] = Field(
+        default="held",
+        description="Whether the acceleration is constant within a step, as in the paper, or white in continuous time "
+        "[-].",
+    )
     state_order: StateOrder = "grouped"
 
     @property
@@ -100,7 +110,7 @@ class ConstantVelocity(Section):
         """The motion model."""
         from vedette.models import constant_velocity
 
-        return constant_velocity(self.sigma_v, method=method)
+        return constant_velocity(self.sigma_v, acceleration=self.acceleration, method=method)
 
 
 class CoordinatedTurn(Section):
