@@ -127,6 +127,13 @@ def test_far_from_the_edge_there_is_nothing_below_0_or_above_1(half_width):
         assert 0.0 <= mean_detection(detection, centre, 25.0 * np.eye(2)) <= 0.9
 
 
+def test_a_gaussian_that_is_as_good_as_a_line():
+    direction = np.array([math.cos(0.7), math.sin(0.7)])
+    flat = 900.0 * np.outer(direction, direction)
+    detection = models.limited_range(0.9, 500.0)
+    assert mean_detection(detection, EDGE, flat) == pytest.approx(0.45, abs=1e-3)
+
+
 def test_nodes_have_the_moments_of_the_gaussian():
     nodes = spread_nodes()
     weights, points = nodes[:, 0], nodes[:, 1:]

@@ -17,6 +17,8 @@ NUM_NODES = 64
 _REACH = 6.5
 _ANGLES, _ANGLE_WEIGHTS = np.polynomial.legendre.leggauss(32)
 _NUM_PANELS_NEAR = 4
+# Of a variance, where the other coordinate as good as gives it: rounding must not leave it at 0 or below.
+_LEAST_SHARE = 1e-14
 
 
 def spread_nodes(num: int = NUM_NODES) -> Floats:
@@ -106,7 +108,7 @@ def share_in_sector(dx: float, dy: float, cov: Floats, max_range: float, middle:
     """
     a = math.sqrt(cov[0, 0])
     b = 0.5 * (cov[0, 1] + cov[1, 0]) / a
-    c = math.sqrt(cov[1, 1] - b * b)
+    c = math.sqrt(max(cov[1, 1] - b * b, _LEAST_SHARE * cov[1, 1]))
     u = dx / a
     v = (dy - b * u) / c
     distance, toward = math.sqrt(u * u + v * v), math.atan2(v, u)
