@@ -103,9 +103,7 @@ def test_init_never_overwrites_without_force(taken: str, tmp_path: Path) -> None
 def test_init_from_what_is_not_there_is_wrong_use(tmp_path: Path) -> None:
     result = vedette("init", str(tmp_path / "a.yaml"), "--from", "paper-z")
     assert result.exit_code == 2
-    assert "expected one of linear-10, paper-a, paper-e, polar-10, solent; got paper-z" in result.stderr.replace(
-        "\n", " "
-    )
+    assert f"expected one of {', '.join(list_builtin())}; got paper-z" in result.stderr.replace("\n", " ")
 
 
 def test_check_tells_all_faults_of_all_files(tmp_path: Path) -> None:

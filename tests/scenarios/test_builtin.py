@@ -57,7 +57,7 @@ def truth_of(scenario: Scenario) -> Truth:
 
 
 def test_they_are_all_there_and_valid() -> None:
-    assert list(list_builtin()) == ["linear-10", "paper-a", "paper-e", "polar-10", "solent"]
+    assert list(list_builtin()) == ["linear-10", "paper-a", "paper-e", "polar-10", "solent", "three-positions"]
     for name in list_builtin():
         assert load_scenario(name).name == name
 
@@ -95,7 +95,13 @@ def test_the_papers_scenario_has_the_papers_numbers(name: str) -> None:
     assert {sensor.platform.model_dump()["headings_deg"] for sensor in model.sensors} == {tuple(range(-180, 181, 30))}
     assert (control.horizon_steps, control.horizon_period, control.num_samples) == (5, 2.0, 40)
     assert (control.limits.max_prior_hypotheses, control.limits.max_hypotheses) == (10, 40)
-    assert model.ospa.model_dump() == {"cutoff": 100.0, "order": 1.0, "window": 10, "from_step": 11, "to_step": 40}
+    assert (model.ospa.cutoff, model.ospa.order, model.ospa.components, model.ospa.window) == (
+        100.0,
+        1.0,
+        "position",
+        10,
+    )
+    assert (model.ospa.from_step, model.ospa.to_step) == (11, 40)
 
 
 def field_at(model: Any, path: str) -> Any:
@@ -141,6 +147,21 @@ def test_the_targets_are_likely_births_of_the_sites(name: str) -> None:
             for site in model.birth.sites
         ]
         assert min(distances) < 3.0
+
+
+def test_three_positions_is_the_published_scene() -> None:
+    scenario = load_scenario("three-positions")
+    truth, model = truth_of(scenario), scenario.model
+    assert np.diff(truth.offsets).mean() == pytest.approx(5.28)
+    assert np.diff(truth.offsets)[[0, 19, 39, 59, 70, 80, 90, 99]].tolist() == [2, 4, 6, 10, 8, 6, 4, 4]
+    assert truth.at(69)[1][0].tolist() == [-80.0 + 69 * 0.75, -20.0 + 69 * 1.5, 0.75, 1.5]
+    assert {(site.existence, site.std) for site in model.birth.sites} == {(0.03, (10.0,) * 4)}
+    motion = model.motion.build("auto", scenario.folder)
+    axis = np.array([[1 / 3, 1 / 2], [1 / 2, 1.0]])
+    np.testing.assert_allclose(motion.noise_cov(np.zeros(4), 1.0), np.kron(axis, np.eye(2)), rtol=1e-15)
+    sensors = [(s.detection.model_dump()["probability"], s.noise.model_dump()["std"][0]) for s in model.sensors]
+    assert sensors == [(0.67, 4.0), (0.7, 3.0), (0.73, 2.0)]
+    assert (model.ospa.cutoff, model.ospa.order, model.ospa.unit) == (5.0, 2.0, "")
 
 
 def test_solent_has_three_to_twelve_real_ships_under_way_at_every_scan() -> None:

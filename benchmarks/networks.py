@@ -1,0 +1,80 @@
+"""The ways of making one picture of several sensors' scans, side by side on the yardsticks of docs/networks.md.
+
+    python benchmarks/networks.py                                              # every campaign network-*.toml
+    python benchmarks/networks.py examples/campaigns/network-three-positions.toml --runs 200 --workers 2
+
+Runs each campaign, in a folder that is kept (`--out`), and goes on with one that is there; then prints a Markdown
+table for each of its settings. Runs are paired: at the same number every rule meets the same truth and the same
+scans. OSPA and its parts are means over scans and runs, with one standard error over the runs; "N bias" is the number
+of estimates minus that of targets; "tracked" the share of the targets seen by some sensor that have an estimate;
+times are wall time of filters and fusion, all sensors together, in a process of one thread.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from vedette.campaigns import CampaignResults, load_spec, open_results, resolve, run_campaign
+from vedette.campaigns.results import GroupComparison
+from vedette.scenarios.sections.scoring import TrackedShare
+from vedette.text import named_in
+
+CAMPAIGNS = Path(__file__).parents[1] / "examples/campaigns"
+STAGES = ("filter", "fusion")
+
+
+def table(results: CampaignResults, group: GroupComparison) -> Iterator[str]:
+    """The lines of the table of one setting."""
+    comparison = group.comparison
+    shares = [
+        name for name, section in group.cells[0].scenario.model.metrics.items() if isinstance(section, TrackedShare)
+    ]
+    names = ["Rule", named_in("OSPA", comparison.unit), "Localisation", "Cardinality", "N bias"]
+    names += [*(["tracked"] * len(shares)), "ms a scan"]
+    yield "| " + " | ".join(names) + " |"
+    yield "| --- |" + " ---: |" * (len(names) - 1)
+    for label, cell in zip(group.labels, group.cells, strict=True):
+        score = comparison.summary(label)
+        parts = [f"{float(comparison.summary(label, part).mean):.3f}" for part in ("localisation", "cardinality")]
+        bias = f"{float(comparison.summary(label, 'cardinality_error').mean):+.3f}".replace("-", "\N{MINUS SIGN}")
+        tracked = [f"{100.0 * float(comparison.summary(label, name).mean):.1f} %" for name in shares]
+        error = f"{float(score.mean):.3f} ± {float(score.standard_error):.3f}"
+        yield "| " + " | ".join([label, error, *parts, bias, *tracked, f"{scan_ms(results, cell.name):.1f}"]) + " |"
+    yield ""
+    yield f"{comparison.num_runs} paired runs of {comparison.scenario}."
+
+
+def scan_ms(results: CampaignResults, cell: str) -> float:
+    """Median over the runs of a cell of the mean time that filters and fusion took for a scan, ms."""
+    timings = [results.record(cell, run).timings for run in results.finished(cell)]
+    return float(np.median([1e3 * sum(spent[stage].mean() for stage in STAGES if stage in spent) for spent in timings]))
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("specs", nargs="*", type=Path, help="campaigns; none: all network-*.toml of the examples")
+    parser.add_argument("--runs", type=int, help="of each rule, instead of the campaign's")
+    parser.add_argument("--workers", type=int, default=1, help="processes")
+    parser.add_argument("--out", type=Path, default=Path("network-results"), help="folder of the results folders")
+    given = parser.parse_args()
+    for path in given.specs or sorted(CAMPAIGNS.glob("network-*.toml")):
+        spec = load_spec(path)
+        if given.runs is not None:
+            spec = spec.model_copy(update={"runs": given.runs})
+        folder = given.out / path.stem
+        run_campaign(resolve(spec, path.parent), folder, num_workers=given.workers)
+        results = open_results(folder)
+        several = {axis for axis, values in results.campaign.axes.items() if len(values) > 1}
+        print(f"\n## {spec.name}\n")
+        for group in results.comparisons():
+            settings = ", ".join(f"{axis} {value}" for axis, value in group.settings.items() if axis in several)
+            print(*([f"{settings}:\n"] if settings else []), *table(results, group), sep="\n")
+            print()
+
+
+if __name__ == "__main__":
+    main()
