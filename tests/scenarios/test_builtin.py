@@ -57,7 +57,20 @@ def truth_of(scenario: Scenario) -> Truth:
 
 
 def test_they_are_all_there_and_valid() -> None:
-    assert list(list_builtin()) == ["linear-10", "paper-a", "paper-e", "polar-10", "solent", "three-positions"]
+    assert list(list_builtin()) == [
+        "eight-mobile",
+        "linear-10",
+        "paper-a",
+        "paper-e",
+        "polar-10",
+        "shore-radar",
+        "six-cameras",
+        "solent",
+        "three-positions",
+        "three-radars",
+        "two-views-1",
+        "two-views-2",
+    ]
     for name in list_builtin():
         assert load_scenario(name).name == name
 

@@ -1,0 +1,100 @@
+"""The scenes of several sensors with views of their own: the published truths, and who sees what."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from vedette.evaluation import seen_targets
+from vedette.kernels.base.types import Floats
+from vedette.scenarios import load_scenario
+from vedette.scenarios.build import build_experiment, build_targets
+from vedette.scenarios.loading import Scenario
+from vedette.simulation import Truth
+
+# Scene -> targets in all, targets at the first and the last scan, mean number.
+NUMBERS = {
+    "eight-mobile": (20, 20, 20, 20.0),
+    "shore-radar": (8, 6, 8, 7.65),
+    "six-cameras": (11, 11, 9, 10.26),
+    "three-radars": (8, 8, 8, 8.0),
+    "two-views-1": (3, 2, 2, 2.6375),
+    "two-views-2": (22, 4, 11, 14.725),
+}
+# Scene, step, number of the target -> where it is.
+PLACES = {
+    ("eight-mobile", 100, 0): (100.0, 396.0),
+    ("eight-mobile", 100, 10): (-300.0, 458.0),
+    ("six-cameras", 50, 0): (0.0, 100.0),
+    ("six-cameras", 50, 3): (-450.0, -650.0),
+    ("six-cameras", 50, 10): (450.0, -150.0),
+    ("two-views-1", 1, 0): (-183.0, 600.0),
+    ("two-views-1", 10, 2): (20.0, 210.0),
+    ("two-views-1", 60, 2): (1020.0, 710.0),
+    ("two-views-2", 80, 0): (40.0, 600.0),
+}
+
+
+def truth_of(scenario: Scenario) -> Truth:
+    return build_targets(scenario).truth(scenario.model.time.build(), rng=np.random.default_rng(0))
+
+
+def seen_by(scenario: Scenario, truth: Truth) -> Floats:
+    """(total, num_sensors) whether each sensor, lying still, sees each target."""
+    experiment = build_experiment(scenario)
+    sensors, columns = experiment.tracker.sensors, []
+    for s, sensor in enumerate(sensors):
+        poses = np.tile(experiment.poses[s], (truth.num_scans, 1, 1))
+        columns.append(seen_targets(truth, poses, [sensor], min_detection=0.4))
+    return np.stack(columns, axis=1)
+
+
+@pytest.mark.parametrize("name", NUMBERS)
+def test_their_truth_is_the_published_one(name: str) -> None:
+    truth = truth_of(load_scenario(name))
+    alive = np.diff(truth.offsets)
+    found: tuple[Any, ...] = (len(np.unique(truth.ids)), alive[0], alive[-1], alive.mean())
+    assert found == pytest.approx(NUMBERS[name])
+
+
+@pytest.mark.parametrize("name", NUMBERS)
+def test_targets_stay_in_the_region(name: str) -> None:
+    scenario = load_scenario(name)
+    region, states = scenario.model.region, truth_of(scenario).states
+    assert (states[:, :2] >= [region.x_min, region.y_min]).all()
+    assert (states[:, :2] <= [region.x_max, region.y_max]).all()
+
+
+@pytest.mark.parametrize(("scene", "place"), PLACES.items())
+def test_targets_go_where_they_are_said_to_go(scene: tuple[str, int, int], place: tuple[float, float]) -> None:
+    name, step, target = scene
+    ids, states = truth_of(load_scenario(name)).at(step - 1)
+    np.testing.assert_allclose(states[ids == target][0, :2], place)
+
+
+def test_most_ships_of_the_bay_are_seen_by_one_alone() -> None:
+    scenario = load_scenario("shore-radar")
+    truth = truth_of(scenario)
+    seen = seen_by(scenario, truth)
+    assert seen.any(axis=1).all()
+    alone = [{tuple(row) for row in seen[truth.ids == ship].tolist()} for ship in range(8)]
+    assert alone.count({(True, False, False)}) == 3
+    assert alone.count({(False, True, False)}) == 1
+    assert alone.count({(False, False, True)}) == 2
+
+
+@pytest.mark.parametrize("name", ["two-views-1", "two-views-2"])
+def test_both_views_together_miss_nothing_and_neither_sees_all(name: str) -> None:
+    scenario = load_scenario(name)
+    seen = seen_by(scenario, truth_of(scenario))
+    assert seen.any(axis=1).all()
+    assert not seen.all(axis=0).any()
+
+
+@pytest.mark.parametrize(("name", "share"), [("eight-mobile", 0.702), ("six-cameras", 0.598)])
+def test_sensors_that_stay_miss_most(name: str, share: float) -> None:
+    scenario = load_scenario(name)
+    seen = seen_by(scenario, truth_of(scenario))
+    assert (~seen.any(axis=1)).mean() == pytest.approx(share, abs=0.02)
