@@ -32,6 +32,16 @@ def counted(number: int, thing: str) -> str:
     return f"{number} {thing}" if number == 1 else f"{number} {thing}s"
 
 
+def named_in(name: str, unit: str) -> str:
+    """`OSPA (m)`; of a quantity without a unit its name alone."""
+    return f"{name} ({unit})" if unit else name
+
+
+def amount(number: str, unit: str) -> str:
+    """`1.25 m`; of a quantity without a unit the number alone."""
+    return f"{number} {unit}" if unit else number
+
+
 def plain(value: Any) -> str:
     """A value as a person would write it: numbers of NumPy as numbers, also inside lists."""
     import numpy as np  # here, as the command line starts without it

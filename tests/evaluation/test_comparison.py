@@ -10,7 +10,7 @@ import pytest
 from evaluation.synthetic import make_record
 from vedette.errors import InputError
 from vedette.evaluation import Comparison, compare, decision_rows, strategy_csv, strategy_markdown, strategy_rows
-from vedette.evaluation.tables import HEADER
+from vedette.evaluation.tables import header
 from vedette.simulation.records import RunRecord
 
 NUM_RUNS = 6
@@ -92,10 +92,17 @@ def test_unknown_strategy_is_named(comparison: Comparison) -> None:
 def test_table_has_a_row_a_strategy(comparison: Comparison) -> None:
     rows = strategy_rows(comparison)
     assert [row[0] for row in rows] == list(STRATEGIES)
-    assert all(len(row) == len(HEADER) for row in rows)
+    assert all(len(row) == len(header(comparison)) for row in rows)
     assert rows[0][4:] == ("", "", "")
     assert rows[2][4].startswith("+")
     assert rows[2][6] == "100%"
+
+
+def test_whole_states_have_no_unit_in_the_table(runs: dict[str, list[RunRecord]]) -> None:
+    assert header(compare(runs))[1:5] == ("OSPA (m)", "Localisation (m)", "Cardinality (m)", "Difference (m)")
+    plain = compare(runs, unit="")
+    assert header(plain)[1:5] == ("OSPA", "Localisation", "Cardinality", "Difference")
+    assert "(m)" not in strategy_markdown(plain)
 
 
 def test_table_of_a_single_run_claims_no_error(runs: dict[str, list[RunRecord]]) -> None:

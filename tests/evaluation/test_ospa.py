@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,9 +11,11 @@ from hypothesis.extra import numpy as hnp
 
 from evaluation.synthetic import make_record, make_truth
 from reference import ospa as reference
+from vedette.densities.estimates import Estimate
 from vedette.errors import InputError
 from vedette.evaluation import OspaResult, ospa, ospa_of_run
 from vedette.kernels.base.types import Floats
+from vedette.simulation.truth import Truth
 
 coordinates = st.floats(-1000.0, 1000.0, allow_subnormal=False)
 point_sets = st.integers(0, 5).flatmap(lambda num: hnp.arrays(np.float64, (num, 2), elements=coordinates))
@@ -128,6 +131,33 @@ def test_of_a_run_is_scan_by_scan() -> None:
         _, states = record.truth.at(scan)
         expected = ospa(record.estimates[scan].means[:, :2], states[:, :2], cutoff=50.0, order=2.0)
         assert tuple(table[scan]) == parts(expected)
+
+
+def test_of_whole_states_takes_all_components() -> None:
+    record = make_record("idm")
+    table = ospa_of_run(record.truth, record.estimates, cutoff=5.0, order=2.0, components="state")
+    for scan in (0, 9, 39):
+        _, states = record.truth.at(scan)
+        expected = reference.ospa(record.estimates[scan].means, states, 5.0, 2.0)
+        np.testing.assert_allclose(table[scan], expected, rtol=1e-12)
+    assert (table[:, 0] >= ospa_of_run(record.truth, record.estimates, cutoff=5.0, order=2.0)[:, 0]).all()
+
+
+def test_of_whole_states_by_hand() -> None:
+    truth = Truth(np.array([1.0]), np.array([0, 1]), np.array([0]), np.array([[0.0, 0.0, 1.0, 2.0]]))
+    estimate = Estimate(np.array([[1, 0]]), np.array([[0.0, 0.0, 1.0, 5.0]]), np.eye(4)[None], np.ones(1))
+    both = [ospa_of_run(truth, [estimate], cutoff=9.0, order=1.0, components=of) for of in ("position", "state")]
+    assert both[0].tolist() == [[0.0, 0.0, 0.0]]
+    assert both[1].tolist() == [[3.0, 3.0, 0.0]]
+
+
+def test_whole_states_of_other_components_are_refused() -> None:
+    truth, estimates = make_truth(), make_record().estimates
+    flat = replace(truth, states=np.ascontiguousarray(truth.states[:, :3]))
+    with pytest.raises(InputError, match=r"components: expected position, as true states have 3 .* estimated ones 4"):
+        ospa_of_run(flat, estimates, cutoff=50.0, order=2.0, components="state")
+    with pytest.raises(InputError, match="components: expected position or state; got velocity"):
+        ospa_of_run(truth, estimates, cutoff=50.0, order=2.0, components="velocity")
 
 
 def test_of_a_run_needs_one_estimate_a_scan() -> None:

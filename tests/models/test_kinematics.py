@@ -36,6 +36,17 @@ def test_constant_velocity_is_the_papers(dt):
     np.testing.assert_allclose(motion.noise_cov(STATES[0], dt), noise, rtol=1e-15)
 
 
+@pytest.mark.parametrize("dt", [0.1, 1.0, 2.0])
+def test_a_continuous_acceleration_has_the_noise_of_all_moments(dt):
+    motion = models.constant_velocity(3.0, acceleration="continuous")
+    identity = np.eye(2)
+    noise = 9.0 * np.block([[dt**3 / 3 * identity, dt**2 / 2 * identity], [dt**2 / 2 * identity, dt * identity]])
+    np.testing.assert_allclose(motion.noise_cov(STATES[0], dt), noise, rtol=1e-15)
+    transition = jacobian(motion, STATES[0], dt)
+    twice = transition @ motion.noise_cov(STATES[0], dt) @ transition.T + motion.noise_cov(STATES[0], dt)
+    np.testing.assert_allclose(motion.noise_cov(STATES[0], 2.0 * dt), twice, rtol=1e-14)
+
+
 @given(st.floats(0.01, 20.0), st.floats(0.01, 20.0))
 def test_constant_velocity_steps_compose(first, second):
     motion = models.constant_velocity(1.0)
@@ -111,6 +122,7 @@ def test_constant_survival():
     [
         (lambda: models.constant_velocity(-1.0), "sigma_v"),
         (lambda: models.constant_velocity(math.nan), "sigma_v"),
+        (lambda: models.constant_velocity(1.0, acceleration="jerk"), "acceleration"),
         (lambda: models.constant_velocity("5"), "sigma_v"),  # type: ignore[arg-type]
         (lambda: models.coordinated_turn(1.0, -0.1), "sigma_turn_rate"),
         (lambda: models.constant_survival(1.2), "prob_survival"),

@@ -81,6 +81,16 @@ def test_constant_noise():
     np.testing.assert_array_equal(noise.covs(STATES[:1], POSE, 2), [[[4.0, 0.0], [0.0, 9.0]]])
 
 
+def test_noise_by_axis_grows_with_the_offset_along_it():
+    noise = models.axis_noise([1.0, 2.0], [1e-5, 3e-5])
+    expected = np.zeros((30, 2, 2))
+    expected[:, 0, 0] = (1.0 + 1e-5 * OFFSETS[:, 0] ** 2) ** 2
+    expected[:, 1, 1] = (2.0 + 3e-5 * OFFSETS[:, 1] ** 2) ** 2
+    np.testing.assert_allclose(noise.covs(STATES, POSE, 2), expected, rtol=1e-13)
+    assert noise.meas_dim == 2
+    noise.check(STATES, POSE, 2)
+
+
 def test_gaussian_detection_is_the_papers():
     detection = models.gaussian_detection(500.0)
     peak, at = (math.exp(-0.5 * (d / 500.0) ** 2) / (500.0 * math.sqrt(2 * math.pi)) for d in (0.0, RANGES[0]))
@@ -119,6 +129,44 @@ def test_a_full_sector_is_a_limited_range():
     np.testing.assert_array_equal(sector, models.limited_range(0.9, 900.0).prob(STATES, POSE))
 
 
+def test_some_may_be_seen_beyond_the_edge():
+    ranging, sector = models.limited_range(0.9, 800.0, 0.2), models.limited_sector(0.9, 800.0, 0.7, outside=0.2)
+    np.testing.assert_array_equal(ranging.prob(STATES, POSE), np.where(RANGES <= 800.0, 0.9, 0.2))
+    off_axis = np.abs(np.angle(np.exp(1j * (BEARINGS - POSE[2]))))
+    expected = np.where((RANGES <= 800.0) & (off_axis <= 0.7), 0.9, 0.2)
+    np.testing.assert_array_equal(sector.prob(STATES, POSE), expected)
+
+
+def logistic(exponent):
+    return 1.0 / (1.0 + np.exp(exponent))
+
+
+@pytest.mark.parametrize("cut", [False, True])
+@pytest.mark.parametrize("half_width", [0.8, math.pi])
+def test_a_soft_sector_falls_off_at_its_edges(half_width, cut):
+    off_axis = np.abs(np.angle(np.exp(1j * (BEARINGS - POSE[2]))))
+    detection = models.soft_sector(0.9801, 900.0, half_width, range_slope=0.01, angle_slope=20.0, cut=cut)
+    expected = 0.9801 * logistic(0.01 * (RANGES - 900.0)) * logistic(20.0 * (off_axis - half_width))
+    if cut:
+        expected = np.where((off_axis <= half_width) & (RANGES <= 900.0), expected, 0.0)
+    np.testing.assert_allclose(detection.prob(STATES, POSE), expected, rtol=1e-11)
+    detection.check(STATES, POSE)
+
+
+@pytest.mark.parametrize("half_width", [0.8, math.pi])
+def test_a_soft_range_with_sharp_sides(half_width):
+    off_axis = np.abs(np.angle(np.exp(1j * (BEARINGS - POSE[2]))))
+    detection = models.soft_sector(0.9, 900.0, half_width, range_slope=0.01)
+    expected = np.where(off_axis <= half_width, 0.9 * logistic(0.01 * (RANGES - 900.0)), 0.0)
+    np.testing.assert_allclose(detection.prob(STATES, POSE), expected, rtol=1e-12)
+
+
+def test_a_soft_sector_far_away_and_at_the_sensor():
+    detection = models.soft_sector(1.0, 100.0, 0.5, range_slope=5.0, angle_slope=50.0)
+    there = detection.prob([[POSE[0] + 1e7, POSE[1], 0.0, 0.0], [POSE[0], POSE[1], 0.0, 0.0]], POSE)
+    np.testing.assert_allclose(there, [0.0, 1.0], atol=1e-8)
+
+
 @pytest.mark.parametrize(
     ("make", "field"),
     [
@@ -134,6 +182,15 @@ def test_a_full_sector_is_a_limited_range():
         (lambda: models.limited_range(0.5, -1.0), "max_range"),
         (lambda: models.limited_sector(0.5, 10.0, 0.0), "half_width_rad"),
         (lambda: models.limited_sector(0.5, 10.0, 3.2), "half_width_rad"),
+        (lambda: models.limited_range(0.5, 10.0, 1.1), "outside"),
+        (lambda: models.limited_sector(0.5, 10.0, 1.0, -0.1), "outside"),
+        (lambda: models.soft_sector(0.5, 10.0, 4.0, range_slope=1.0), "half_width_rad"),
+        (lambda: models.soft_sector(0.5, 10.0, range_slope=0.0), "range_slope"),
+        (lambda: models.soft_sector(0.5, 10.0, range_slope=1.0, angle_slope=-1.0), "angle_slope"),
+        (lambda: models.soft_sector(0.5, 10.0, range_slope=1.0, cut="yes"), "cut"),
+        (lambda: models.axis_noise([1.0], [0.0]), "std"),
+        (lambda: models.axis_noise([1.0, 0.0], [0.0, 0.0]), "std"),
+        (lambda: models.axis_noise([1.0, 1.0], [0.0, -1.0]), "growth"),
     ],
 )
 def test_bad_numbers_are_named(make, field):

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -24,6 +26,19 @@ def test_a_clear_difference_is_claimed_with_its_interval_and_share() -> None:
         "4 paired runs), and is better in 100 % of the runs."
     )
     assert (found.difference, found.share_won) == ("+1.00 (+0.87 to +1.13)", "100 %")
+
+
+def test_whole_states_have_no_unit() -> None:
+    errors = [1.0, 2.0, 3.0, 4.0], [2.0, 3.1, 3.9, 5.0]
+    there, back = (claim(replace(comparison_of(*of), unit=""), "a", "b") for of in (errors, errors[::-1]))
+    assert (
+        "1.00 less mean OSPA than b (95 % confidence interval of the paired difference 0.87 to 1.13, 4"
+        in there.sentence
+    )
+    assert "1.00 more mean OSPA than b" in back.sentence
+    untold = claim(replace(comparison_of([1.0, 2.0, 3.0, 4.0], [2.0, 1.0, 3.0, 4.5]), unit=""), "a", "b")
+    assert "is 0.12, but its 95 % confidence interval" in untold.sentence
+    assert claim(replace(comparison_of([1.0], [3.0]), unit=""), "a", "b").sentence.endswith("is 2.00 in it.")
 
 
 def test_the_other_way_round_is_worse() -> None:

@@ -57,7 +57,16 @@ detections = st.one_of(
     section("gaussian", sigma=positive),
     needed("constant", probability=probability),
     needed("limited_range", probability=probability, max_range=positive),
+    needed("limited_range", probability=probability, max_range=positive, outside=probability),
     needed("limited_sector", probability=probability, max_range=positive, half_width_deg=st.floats(0.1, 180.0)),
+    needed(
+        "soft_sector",
+        probability=probability,
+        max_range=positive,
+        range_slope=positive,
+        angle_slope=st.none() | positive,
+        cut=st.booleans(),
+    ),
     custom(),
 )
 MEASUREMENT_DIM = {"bearing_range": 2, "bearing_only": 1, "range_only": 1, "position": 2}
@@ -80,10 +89,13 @@ def sensors(draw: st.DrawFn) -> Data:
     kind = draw(st.sampled_from(list(MEASUREMENT_DIM)))
     dim = MEASUREMENT_DIM[kind]
     grown = section("range_dependent", sigma_range=positive, eta_range=zero_or_more, sigma_bearing_deg=positive)
-    noises = [needed("constant", std=vector(dim, positive)), custom(), *([] if kind == "position" else [grown])]
+    by_axis = needed("by_axis", std=vector(2, positive), growth=vector(2, zero_or_more))
+    noises = [needed("constant", std=vector(dim, positive)), custom(), by_axis if kind == "position" else grown]
     low = draw(vector(dim, st.floats(-3.0, 0.0)))  # of an angle and its high no further apart than a turn
     boxes = needed("measurement_space", rate=rates, low=st.just(low), high=vector(dim, st.floats(1.0, 3.0)))
-    clutters = st.one_of(section("region", rate=rates), boxes, custom())
+    around = needed("around_sensor", radius=positive) | needed("around_sensor", rate=rates, half_side=positive)
+    clutters = st.one_of(section("region", rate=rates), boxes, custom(), *([around] if dim == 2 else []))
+    truth = section(noise=st.one_of(noises), detection=detections, clutter=clutters, first_detection=detections)
     fixed = {"position": draw(vector(2)), "measurement": {"kind": kind}, "noise": draw(st.one_of(noises))}
     optional = section(
         heading_deg=finite,
@@ -91,6 +103,8 @@ def sensors(draw: st.DrawFn) -> Data:
         moves_from=st.sampled_from(["first_decision", "start"]),
         detection=detections,
         clutter=clutters,
+        truth=truth,
+        scans=st.just({}) | st.just({"every": 3}),
     )
     return {**fixed, **draw(optional)}
 
@@ -128,7 +142,7 @@ def tracking(draw: st.DrawFn, num_sensors: int) -> Data:
         min_relative_weight=st.floats(0.0, 0.5),
         gate_probability=inner,
     )
-    method = st.sampled_from(["auto", "ekf", "ukf", "ckf"])
+    method, at = st.sampled_from(["auto", "ekf", "ukf", "ckf"]), st.sampled_from(["centre", "mean"])
     weights = [1.0 / num_sensors] * num_sensors
     fusion = section(
         weights=st.just(weights),
@@ -142,7 +156,10 @@ def tracking(draw: st.DrawFn, num_sensors: int) -> Data:
     )
     marginal = section("marginal", threshold=inner)
     return {
-        "filter": {"kind": kind, **draw(section(gaussian_method=method, assignment=gibbs, limits=limits))},
+        "filter": {
+            "kind": kind,
+            **draw(section(gaussian_method=method, detection_at=at, assignment=gibbs, limits=limits)),
+        },
         "fusion": {"kind": {"lmb": "clmb"}.get(kind, "cm_delta_glmb" if "glmb" in kind else "none"), **draw(fusion)},
         "estimator": draw(st.just({"kind": "map"}) | marginal if "lmb" in kind else st.just({"kind": "map"})),
     }

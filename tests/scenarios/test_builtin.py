@@ -13,8 +13,10 @@ from vedette.scenarios import list_builtin, load_scenario
 from vedette.scenarios.build import build_targets
 from vedette.scenarios.loading import Scenario
 from vedette.scenarios.sections import ScenarioModel
+from vedette.scenarios.sections.clutter import RegionClutter
+from vedette.scenarios.sections.detection import GaussianDetection
 from vedette.scenarios.sections.platforms import Courses
-from vedette.scenarios.sections.sensing import BearingRange, GaussianDetection, RangeDependentNoise, RegionClutter
+from vedette.scenarios.sections.sensing import BearingRange, RangeDependentNoise
 from vedette.scenarios.sections.targets import RecordedTargets, ScriptedTargets
 from vedette.scenarios.sections.world import ConstantVelocity
 from vedette.simulation import Truth

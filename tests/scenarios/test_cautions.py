@@ -14,6 +14,8 @@ from vedette.scenarios import list_builtin, load_scenario
 from vedette.scenarios.cautions import cautions, prob_detection
 from vedette.scenarios.sections.sensors import Sensor
 
+SOFT: dict[str, object] = {"kind": "soft_sector", "probability": 0.9, "max_range": 150.0, "range_slope": 0.05}
+
 STEPS = ("steps: [1, 5]", "steps: [1]")
 SECTOR = "detection: {kind: limited_sector, probability: 0.9, max_range: 60.0, half_width_deg: 40.0}"
 
@@ -108,6 +110,13 @@ def test_sensors_of_one_limited_view_warn_if_they_will_move(tmp_path: Path, deci
         {"kind": "gaussian", "sigma": 120.0},
         {"kind": "limited_range", "probability": 0.9, "max_range": 150.0},
         {"kind": "limited_sector", "probability": 0.9, "max_range": 150.0, "half_width_deg": 70.0},
+        {"kind": "limited_range", "probability": 0.9, "max_range": 150.0, "outside": 0.2},
+        {"kind": "limited_sector", "probability": 0.9, "max_range": 150.0, "half_width_deg": 70.0, "outside": 0.2},
+        {**SOFT, "angle_slope": 20.0, "cut": True},
+        {**SOFT, "angle_slope": 5.0, "half_width_deg": 70.0},
+        {**SOFT, "half_width_deg": 70.0},
+        {**SOFT, "half_width_deg": 70.0, "cut": True},
+        SOFT,
     ],
 )
 def test_what_a_sensor_sees_is_what_its_model_says(detection: dict[str, object], tmp_path: Path) -> None:

@@ -41,7 +41,7 @@ CASES = [
         "  noise: {",
         "  nose: {",
         [
-            "f.yaml:15:3: sensor_defaults.nose: expected one of clutter, detection, heading_deg, measurement, moves_from, noise, platform, got an unknown key (did you mean noise?)"
+            "f.yaml:15:3: sensor_defaults.nose: expected one of clutter, detection, heading_deg, measurement, moves_from, noise, platform, scans, truth, got an unknown key (did you mean noise?)"
         ],
     ),
     (
@@ -81,7 +81,7 @@ CASES = [
         "heading_deg: 4.0",
         "speed: 4.0",
         [
-            "f.yaml:17:42: sensors[0].speed: expected one of clutter, detection, heading_deg, measurement, moves_from, name, noise, platform, position, got an unknown key (the platform of a sensor has it: `platform: {kind: courses, speed: 50.0, headings_deg: [0, 90]}`)"
+            "f.yaml:17:42: sensors[0].speed: expected one of clutter, detection, heading_deg, measurement, moves_from, name, noise, platform, position, scans, truth, got an unknown key (the platform of a sensor has it: `platform: {kind: courses, speed: 50.0, headings_deg: [0, 90]}`)"
         ],
     ),
     (
@@ -101,7 +101,7 @@ CASES = [
         "heading_deg: 4.0",
         "measurement: {kind: position}, noise: {kind: range_dependent}",
         [
-            "f.yaml:17:80: sensors[0].noise: expected constant or custom noise for a position measurement, got range_dependent noise"
+            "f.yaml:17:80: sensors[0].noise: expected constant, by_axis or custom noise for a position measurement, got range_dependent noise"
         ],
     ),
     (
@@ -133,6 +133,70 @@ CASES = [
         "heading_deg: 4.0",
         "clutter: {kind: region, rate: lots}",
         ['f.yaml:17:72: sensors[0].clutter.rate: expected a number, got "lots"'],
+    ),
+    (
+        "heading_deg: 4.0",
+        "noise: {kind: by_axis, std: [1.0, 1.0], growth: [0.0, 1e-5]}",
+        [
+            "f.yaml:17:49: sensors[0].noise: expected range_dependent, constant or custom noise for a bearing_range measurement, got by_axis noise"
+        ],
+    ),
+    (
+        "heading_deg: 4.0",
+        "detection: {kind: soft_sector, probability: 0.9, max_range: 50.0, half_width_deg: 200, range_slope: 0}",
+        [
+            "f.yaml:17:124: sensors[0].detection.half_width_deg: expected a number of at most 180, got 200",
+            "f.yaml:17:142: sensors[0].detection.range_slope: expected a number above 0, got 0",
+        ],
+    ),
+    (
+        "heading_deg: 4.0",
+        "clutter: {kind: around_sensor, radius: 10, half_side: 10}",
+        ["f.yaml:17:51: sensors[0].clutter: expected either radius or half_side, got both"],
+    ),
+    (
+        "heading_deg: 4.0",
+        "measurement: {kind: bearing_only}, noise: {kind: constant, std: [0.1]}, clutter: {kind: around_sensor, radius: 10}",
+        [
+            "f.yaml:17:123: sensors[0].clutter: expected region, measurement_space or custom clutter for a bearing_only measurement, got around_sensor clutter"
+        ],
+    ),
+    (
+        "heading_deg: 4.0",
+        "truth: {measurement: {kind: position}}",
+        [
+            'f.yaml:17:70: sensors[0].truth.measurement.kind: expected bearing_range or custom, as the filter takes it for that, got "position"'
+        ],
+    ),
+    (
+        "heading_deg: 4.0",
+        "truth: {noise: {kind: constant, std: [1.0]}, clutter: {kind: measurement_space, low: [0.0, 9.0], high: [1.0, 8.0]}}",
+        [
+            "f.yaml:17:79: sensors[0].truth.noise.std: expected 2 numbers, as a bearing_range measurement has, got a list of 1",
+            "f.yaml:17:151: sensors[0].truth.clutter.high[1]: expected a number above low, 9, got 8.0",
+        ],
+    ),
+    (
+        "heading_deg: 4.0",
+        "truth: {first_detection: {kind: camera, probability: 0.9, max_range: 9.0}}",
+        ["f.yaml:17:5: sensors[0].platform: expected a camera, as its detection is a camera's, got still"],
+    ),
+    (
+        "heading_deg: 4.0",
+        "measurement: {kind: range_only}, noise: {kind: constant, std: [1.0]}, truth: {detection_of: measurement}",
+        [
+            'f.yaml:17:134: sensors[0].truth.detection_of: expected state, as a range_only measurement does not say where the target is, got "measurement"'
+        ],
+    ),
+    (
+        "heading_deg: 4.0",
+        "scans: {every: 3, first: 4}",
+        ["f.yaml:17:67: sensors[0].scans.first: expected a step up to every, 3, got 4"],
+    ),
+    (
+        "heading_deg: 4.0",
+        "scans: {every: 30, first: 21}",
+        ["f.yaml:17:68: sensors[0].scans.first: expected a step up to the last, 20, got 21"],
     ),
 ]
 

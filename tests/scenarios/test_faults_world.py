@@ -156,3 +156,19 @@ def test_faults_are_named_with_their_places(old: str, new: str, faults: list[str
     with pytest.raises(ScenarioError) as error:
         parse_scenario(changed((old, new)), "f.yaml")
     assert error.value.faults == faults
+
+
+def test_recorded_targets_have_no_states_of_another_motion_to_score() -> None:
+    text = changed(
+        ("kind: constant_velocity, sigma_v: 1.0", "kind: coordinated_turn"),
+        ("mean: [0.0, 0.0, 0.0, 0.0], std: [5.0, 5.0, 2.0, 2.0]", "mean: [0.0, 0, 0, 0, 0], std: [5.0, 5, 2, 2, 1]"),
+        (
+            "  kind: scripted\n  tracks:\n    - {state: [1.0, 2.0, 0.5, -0.5], start_step: 2, end_step: 18}",
+            "  kind: recorded\n  path: nowhere.csv",
+        ),
+        ("cutoff: 50.0", "cutoff: 50.0, components: state"),
+    )
+    with pytest.raises(ScenarioError) as error:
+        parse_scenario(text, "f.yaml")
+    wanted = "position, as states have 5 components and recorded targets 4"
+    assert f'f.yaml:22:34: ospa.components: expected {wanted}, got "state"' in error.value.faults

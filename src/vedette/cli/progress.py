@@ -6,6 +6,7 @@ import time
 from typing import TYPE_CHECKING
 
 from vedette.cli.output import console
+from vedette.text import amount
 
 if TYPE_CHECKING:
     from vedette.campaigns import Campaign, Failed, Landed
@@ -36,6 +37,7 @@ class CampaignProgress:
         # Means over several settings would say nothing.
         alone = len(campaign.groups()) == 1
         self._label = {cell.name: str(cell.settings[campaign.compare]) for cell in campaign.cells} if alone else {}
+        self._unit = campaign.cells[0].scenario.model.ospa.unit
         self._errors: dict[str, list[float]] = {}
         self._found = self._landed = self._total = self._failures = 0
         self._first_at = self._said_at = time.monotonic()
@@ -86,5 +88,7 @@ class CampaignProgress:
         if rate:
             seconds = round((self._total - done) / rate)
             parts += [f"{rate:.1f}/s", f"{seconds // 60}:{seconds % 60:02d} left"]
-        parts += [f"{name} {sum(values) / len(values):.1f} m" for name, values in self._errors.items()]
+        parts += [
+            f"{name} {amount(f'{sum(values) / len(values):.1f}', self._unit)}" for name, values in self._errors.items()
+        ]
         return "  ".join(parts)

@@ -11,6 +11,7 @@ import typer
 from vedette.cli.comparisons import print_comparison
 from vedette.cli.errors import usage_error
 from vedette.cli.running import print_run
+from vedette.errors import VedetteError
 from vedette.text import counted
 
 if TYPE_CHECKING:
@@ -47,7 +48,7 @@ def results(
     opened: CampaignResults | RunRecord
     if holds_run(folder):
         opened = load_run(folder)
-        print_run(opened)
+        print_run(opened, _unit_of(folder))
     else:
         opened = open_results(folder)
         print_results(opened)
@@ -57,6 +58,17 @@ def results(
         for name in dict.fromkeys(formats or ("parquet",)):
             for path in FORMATS[name](opened, export):
                 typer.echo(f"wrote {path}")
+
+
+def _unit_of(folder: Path) -> str:
+    """Of the OSPA of a saved run; none where the scenario is not kept beside it, or cannot be read."""
+    from vedette.scenarios import load_scenario
+    from vedette.simulation.storage import SCENARIO
+
+    try:
+        return load_scenario(folder / SCENARIO).model.ospa.unit
+    except VedetteError:
+        return ""
 
 
 def print_failures(failed: Sequence[Failed | Failure], *, err: bool = False) -> None:

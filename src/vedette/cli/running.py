@@ -14,7 +14,7 @@ from vedette.cli.errors import INTERRUPTED, usage_error
 from vedette.cli.output import console as new_console
 from vedette.cli.scenario_files import warn
 from vedette.errors import InputError
-from vedette.text import counted
+from vedette.text import amount, counted
 
 if TYPE_CHECKING:
     from vedette.scenarios import Scenario
@@ -125,7 +125,7 @@ def run(
             if error.record is None:
                 _end(error, "nothing was written")
             record, stop = error.record, error
-        print_run(record)
+        print_run(record, loaded.model.ospa.unit)
         if stop is not None and out is None:
             _end(stop, "nothing was written")
         if stop is not None and _holds_whole_run(out):
@@ -153,8 +153,8 @@ def _end(stop: RunStopped | RunInterrupted, left: str) -> NoReturn:
     raise typer.Exit(INTERRUPTED if isinstance(stop, KeyboardInterrupt) else 1) from None
 
 
-def print_run(record: RunRecord) -> None:
-    """What was decided in a run, how good it was, what it cost, and what was cut off."""
+def print_run(record: RunRecord, unit: str) -> None:
+    """What was decided in a run, how good it was (OSPA in `unit`), what it cost, and what was cut off."""
     from rich.table import Table
 
     from vedette.evaluation.actions import choice_words
@@ -176,7 +176,8 @@ def print_run(record: RunRecord) -> None:
         for note in dict.fromkeys(note for decision in record.decisions for note in decision.plan.notes):
             console.print(f"note: {note}", soft_wrap=True)
     total, localisation, cardinality = record.ospa.mean(axis=0)
-    console.print(f"mean OSPA {total:.2f} m (localisation {localisation:.2f}, cardinality {cardinality:.2f})")
+    parts = f"(localisation {localisation:.2f}, cardinality {cardinality:.2f})"
+    console.print(f"mean OSPA {amount(f'{total:.2f}', unit)} {parts}")
     spent = ", ".join(f"{stage} {seconds.sum():.2f} s" for stage, seconds in record.timings.items())
     console.print(f"time spent: {spent}")
     console.print(health_line(record), soft_wrap=True)

@@ -13,6 +13,7 @@ from vedette.evaluation.metrics import (
     Metric,
     OspaResult,
     RunMetrics,
+    TrackedShare,
     TrackSet,
     average_nees,
     continuity,
@@ -28,6 +29,7 @@ from vedette.evaluation.metrics import (
     ospa2,
     ospa2_of_run,
     ospa_of_run,
+    seen_targets,
 )
 from vedette.evaluation.runs import measure_run, own_metrics, run_scenario
 from vedette.evaluation.statistics import PairedDifference, Summary, paired_difference, summarise
@@ -46,6 +48,7 @@ __all__ = [
     "RunMetrics",
     "Summary",
     "TrackSet",
+    "TrackedShare",
     "average_nees",
     "choices_of",
     "compare",
@@ -67,6 +70,7 @@ __all__ = [
     "own_metrics",
     "paired_difference",
     "run_scenario",
+    "seen_targets",
     "strategy_csv",
     "strategy_markdown",
     "strategy_rows",

@@ -33,10 +33,11 @@ class Comparison:
         strategies: their names, the one to compare the others with first.
         times: (num_scans,) s.
         decision_times: (num_decisions,) s, of all strategies together.
-        ospa: (num_strategies, num_runs, num_scans, 3) total, localisation and cardinality parts, m.
+        ospa: (num_strategies, num_runs, num_scans, 3) total, localisation and cardinality parts, in `unit`.
         since, until: scans after `since` (s) and up to `until` (s) count in the mean over time.
         choices: for each strategy, for each run, what each of its decisions chose.
         measures: (num_strategies, num_runs, num_scans) of each measure that all runs have, by the name of its column.
+        unit: of OSPA: "m", or none ("") where it compares whole states.
     """
 
     scenario: str
@@ -48,6 +49,7 @@ class Comparison:
     until: float
     choices: tuple[tuple[tuple[Choice, ...], ...], ...]
     measures: Mapping[str, Floats] = field(default_factory=dict)
+    unit: str = "m"
 
     @property
     def num_runs(self) -> int:
@@ -105,6 +107,7 @@ def compare(
     *,
     since: float | None = None,
     until: float = np.inf,
+    unit: str = "m",
 ) -> Comparison:
     """Put the runs of several strategies side by side.
 
@@ -114,6 +117,7 @@ def compare(
         since: only scans after this time (s) count in the mean over time; by default the time of the first decision,
             before which all strategies are alike, and every scan if none was made before the last.
         until: only scans up to this time (s) count.
+        unit: of OSPA; none ("") where it compares whole states.
 
     Raises `InputError` if there is no run, or the runs are not paired.
     """
@@ -143,6 +147,7 @@ def compare(
         until=until,
         choices=tuple(tuple(choices_of(record) for record in runs[name]) for name in strategies),
         measures=_measures([metrics[name] for name in strategies]) if metrics else {},
+        unit=unit,
     )
 
 
@@ -162,7 +167,7 @@ def scored(
     times = next(iter(runs.values()))[0].times
     since = None if window.from_step is None else float(np.nextafter(times[window.from_step - 1], -np.inf))
     until = np.inf if window.to_step is None else float(times[window.to_step - 1])
-    return compare(runs, metrics, since=since, until=until)
+    return compare(runs, metrics, since=since, until=until, unit=window.unit)
 
 
 def typical_run(comparison: Comparison, strategy: str, records: Sequence[RunRecord]) -> RunRecord:

@@ -8,11 +8,12 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
 
-from vedette.evaluation.metrics import Metric, RunMetrics, measure, ospa_of_run
+from vedette.evaluation.metrics import Metric, RunMetrics, TrackedShare, measure, ospa_of_run
 from vedette.scenarios import Scenario
-from vedette.scenarios.build import build_experiment, build_planner
+from vedette.scenarios.build import build_experiment, build_planner, build_sensors
+from vedette.scenarios.sections.scoring import AnyMetric, CustomMetric
 from vedette.simulation.loop import simulate
-from vedette.simulation.records import RunRecord
+from vedette.simulation.records import Measure, RunRecord
 
 
 def run_scenario(scenario: Scenario, planner: str, *, seed: int, run: int = 0, num_threads: int = 0) -> RunRecord:
@@ -27,15 +28,23 @@ def run_scenario(scenario: Scenario, planner: str, *, seed: int, run: int = 0, n
     Raises:
         VedetteError: the scenario's models, filters or planner cannot do what is asked.
     """
-    score = partial(ospa_of_run, cutoff=scenario.model.ospa.cutoff, order=scenario.model.ospa.order)
+    ospa = scenario.model.ospa
+    score = partial(ospa_of_run, cutoff=ospa.cutoff, order=ospa.order, components=ospa.components)
     decides = build_planner(scenario, planner, num_threads)
     return simulate(build_experiment(scenario), decides, seed=seed, run=run, score=score)
 
 
 def own_metrics(scenario: Scenario) -> tuple[Metric, ...]:
-    """The measures of its own that a scenario names. Raises `InputError` for one that cannot be had."""
-    folder = scenario.folder
-    return tuple(Metric(name, section.made(folder)) for name, section in scenario.model.metrics.items())
+    """The measures that a scenario names beside the built-in ones. Raises `InputError` for one that cannot be had."""
+    return tuple(Metric(name, _measure_of(scenario, section)) for name, section in scenario.model.metrics.items())
+
+
+def _measure_of(scenario: Scenario, section: AnyMetric) -> Measure:
+    if isinstance(section, CustomMetric):
+        made: Measure = section.made(scenario.folder)
+        return made
+    sensors, ospa = tuple(sensor.filter.sensor for sensor in build_sensors(scenario)), scenario.model.ospa
+    return TrackedShare(sensors, ospa.cutoff, ospa.order, section.min_detection)
 
 
 def measure_run(record: RunRecord, scenario: Scenario, own: Sequence[Metric] = ()) -> RunMetrics:

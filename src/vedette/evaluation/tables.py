@@ -12,12 +12,18 @@ import numpy as np
 from vedette.evaluation.actions import choice_words
 from vedette.evaluation.comparison import PARTS, Comparison
 from vedette.evaluation.statistics import PairedDifference, Summary, summarise
+from vedette.text import named_in
 
-HEADER = ("Strategy", "OSPA (m)", "Localisation (m)", "Cardinality (m)", "Difference (m)", "95 % interval", "Runs won")
+_ERRORS = ("OSPA", "Localisation", "Cardinality", "Difference")
+
+
+def header(comparison: Comparison) -> tuple[str, ...]:
+    """Of the columns of `strategy_rows`."""
+    return ("Strategy", *(named_in(name, comparison.unit) for name in _ERRORS), "95 % interval", "Runs won")
 
 
 def strategy_rows(comparison: Comparison) -> list[tuple[str, ...]]:
-    """One row a strategy, under `HEADER`: mean OSPA with standard error, its parts, and the paired difference.
+    """One row a strategy, under `header`: mean OSPA with standard error, its parts, and the paired difference.
 
     The difference is strategy minus the first strategy, so positive where the first is better; "Runs won" is the share
     of runs that the first strategy wins, and the share of ties if there are any. The first row has no difference.
@@ -38,7 +44,8 @@ def decision_rows(comparison: Comparison, strategy: str, *, at_most: int = 3) ->
 
 def strategy_markdown(comparison: Comparison) -> str:
     """The table as Markdown, with a line that says what was averaged."""
-    lines = ["| " + " | ".join(HEADER) + " |", "|" + " --- |" + " ---: |" * (len(HEADER) - 1)]
+    names = header(comparison)
+    lines = ["| " + " | ".join(names) + " |", "|" + " --- |" + " ---: |" * (len(names) - 1)]
     lines += ["| " + " | ".join(row) + " |" for row in strategy_rows(comparison)]
     return "\n".join([*lines, "", caption(comparison), ""])
 

@@ -6,7 +6,7 @@ from vedette.fusion.clmb import Clmb
 from vedette.fusion.cm_delta_glmb import CmDeltaGlmb
 from vedette.fusion.laid_out import LaidOut, LaysOut, lay_out_alone
 from vedette.fusion.matching import Matched, match_labels
-from vedette.fusion.parallel import ParallelLimits, ParallelUpdate
+from vedette.fusion.parallel import ParallelUpdate
 from vedette.fusion.views import Views
 
 __all__ = [
@@ -21,7 +21,6 @@ __all__ = [
     "LaysOut",
     "Matched",
     "MixturePower",
-    "ParallelLimits",
     "ParallelUpdate",
     "Views",
     "lay_out_alone",

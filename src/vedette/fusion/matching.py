@@ -60,6 +60,14 @@ def match_labels(beliefs: Sequence[GLMB | LMB], *, gate_probability: float = GAT
     Raises `InputError` for something other than GLMBs and LMBs of one state dimension, a density that is not valid, or
     a probability outside (0, 1).
     """
+    names = common_names(beliefs, gate_probability=gate_probability)
+    return [relabelled(belief, own) for belief, own in zip(beliefs, names, strict=True)]
+
+
+def common_names(
+    beliefs: Sequence[GLMB | LMB], *, gate_probability: float = GATE_PROBABILITY
+) -> list[dict[Label, Label]]:
+    """For each sensor, the label that `match_labels` gives to each of its labels. Raises as that."""
     check_beliefs(beliefs, (GLMB, LMB), len(beliefs))
     if not 0.0 < gate_probability < 1.0:
         raise InputError(f"gate_probability: expected a number between 0 and 1; got {gate_probability}")
@@ -67,13 +75,13 @@ def match_labels(beliefs: Sequence[GLMB | LMB], *, gate_probability: float = GAT
         return []
     gate = 2.0 * float(gammaincinv(0.5 * beliefs[0].state_dim, gate_probability))  # chi-squared
     owns = [_Labelled.of(belief) for belief in beliefs]
-    found, matched = owns[0], [beliefs[0]]
+    found, common = owns[0], [{label: label for label in owns[0].labels}]
     for sensor in range(1, len(beliefs)):
         own = owns[sensor]
         names = _names(own, found, _pairs(own, found, gate), sensor)
-        matched.append(_relabelled(beliefs[sensor], dict(zip(own.labels, names, strict=True))))
+        common.append(dict(zip(own.labels, names, strict=True)))
         found = _joined(found, own._replace(labels=names))
-    return matched
+    return common
 
 
 def _pairs(own: _Labelled, found: _Labelled, gate: float) -> dict[int, int]:
@@ -143,8 +151,8 @@ def _joined(found: _Labelled, own: _Labelled) -> _Labelled:
     return _Labelled([*found.labels, *(own.labels[i] for i in new)], existence, means, covs)
 
 
-def _relabelled(belief: GLMB | LMB, names: dict[Label, Label]) -> GLMB | LMB:
-    """The belief under other labels."""
+def relabelled(belief: GLMB | LMB, names: dict[Label, Label]) -> GLMB | LMB:
+    """The belief under other labels, of which no two are the same; labels without a new name keep theirs."""
     if all(old == new for old, new in names.items()):
         return belief
     tracks = belief.tracks
@@ -196,4 +204,4 @@ class Matched:
         return None
 
 
-__all__ = ["GATE_PROBABILITY", "LIKELY", "OWN_LABELS", "Matched", "match_labels"]
+__all__ = ["GATE_PROBABILITY", "LIKELY", "OWN_LABELS", "Matched", "common_names", "match_labels", "relabelled"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
 
 import numpy as np
@@ -12,7 +12,6 @@ from scipy.special import expit, log_expit
 
 from vedette.densities import LMB, TrackTable
 from vedette.densities.checks import unchecked
-from vedette.densities.label_sets import take_tracks
 from vedette.errors import InputError, NumericalError
 from vedette.fusion.base import FusionInfo, FusionLimits, by_sensor, check_beliefs, check_floor, count_lost, power_rule
 from vedette.fusion.lmbs import sum_over_sensors
@@ -21,13 +20,6 @@ from vedette.fusion.views import Views
 from vedette.kernels.base.types import Floats, Ints, Tracks
 from vedette.kernels.labelled.parallel import update_in_parallel
 from vedette.kernels.labelled.stacking import stack_tracks
-
-
-class ParallelLimits(NamedTuple):
-    """What a parallel update throws away."""
-
-    min_existence: float = 1e-4  # fused labels of a lower existence are dropped
-    max_labels: int = 200  # most labels of the fused density; the surest stay
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,14 +45,12 @@ class ParallelUpdate:
             dropped it. That is at most this sure there, and if the prediction was surer, the difference counts; the
             sensor then says nothing of where the target is. Counted in the `FusionInfo`. It should be the filters'
             `min_existence`, or these 0, so that nothing is dropped.
-        limits: what is thrown away after the fusion.
 
-    Raises `InputError` for weights, a floor or limits that cannot be used.
+    Raises `InputError` for weights or a floor that cannot be used.
     """
 
     weights: Sequence[float] | Floats | None = None
     missing_existence: float = 1e-4
-    limits: ParallelLimits = field(default_factory=ParallelLimits)
     shares_prediction: ClassVar[bool] = True  # a tracker must update all beliefs from one
 
     def __post_init__(self) -> None:
@@ -70,10 +60,6 @@ class ParallelUpdate:
                 raise InputError(f"weights: expected non-negative finite numbers, one a sensor; got {weights}")
             object.__setattr__(self, "weights", weights)
         check_floor("missing_existence", math.log(self.missing_existence) if self.missing_existence > 0 else -math.inf)
-        if not 0.0 <= self.limits.min_existence < 1.0:
-            raise InputError(f"limits.min_existence: expected a number in [0, 1); got {self.limits.min_existence}")
-        if self.limits.max_labels < 1:
-            raise InputError(f"limits.max_labels: expected at least 1; got {self.limits.max_labels}")
 
     def fuse(self, beliefs: Sequence[LMB], views: Views | None = None) -> tuple[LMB, FusionInfo]:
         """Fused LMB of the labels of the prediction, in increasing order, and what was done.
@@ -100,7 +86,6 @@ class ParallelUpdate:
         logits = _updated(prediction.existence_logit, given.logits, weights) + log_overlaps
         _check_evidence(prediction.tracks.labels, logits)
         tracks = TrackTable.from_kernel(Tracks(prior.labels, prior.offsets, prior.log_weights, means, covs))
-        fused, discarded_weight = self._cut(unchecked(LMB, tracks, logits))
         present, absent = (
             _updated(log_expit(sign * prediction.existence_logit), log_expit(sign * given.logits), weights)
             for sign in (1.0, -1.0)
@@ -108,25 +93,14 @@ class ParallelUpdate:
         active = np.flatnonzero(weights > 0.0).tolist()
         lacking = (given.chosen < 0)[:, active]
         missing = by_sensor(np.count_nonzero(lacking, axis=0), active, num_sensors)
-        return fused, FusionInfo(
+        return unchecked(LMB, tracks, logits), FusionInfo(
             missing_sets=missing,
             missing_labels=missing,
             num_sets=len(logits),
             num_lost_labels=count_lost(expit(given.logits[:, active]), expit(logits)),
             empty_intersection=len(logits) > 0 and bool(lacking.any(axis=1).all()),
             log_normaliser=float(np.logaddexp(present + log_overlaps, absent).sum()),
-            discarded_weight=discarded_weight,
-        )
-
-    def _cut(self, fused: LMB) -> tuple[LMB, float]:
-        """The labels within the limits, and the probability that there is a target among the others."""
-        kept = (fused.existence >= self.limits.min_existence) & (fused.existence_logit > -math.inf)
-        surest = np.argsort(-np.where(kept, fused.existence_logit, -math.inf), kind="stable")[: self.limits.max_labels]
-        kept &= np.isin(np.arange(len(kept)), surest)
-        log_none = log_expit(-fused.existence_logit[~kept]).sum()
-        places = np.flatnonzero(kept)
-        return unchecked(LMB, take_tracks(fused.tracks, places), fused.existence_logit[places]), float(
-            -np.expm1(log_none)
+            discarded_weight=0.0,
         )
 
 

@@ -50,11 +50,7 @@ class Views:
         """(num_tracks,) mean probability of detection by one sensor over each track's density; 0 without a scan."""
         if not self.scanned[sensor] or tracks.num_tracks == 0:
             return np.zeros(tracks.num_tracks)
-        chances = _mean_detection(self.sensors[sensor], tracks.means, tracks.covs, self.poses[sensor])
+        chances = self.sensors[sensor].mean_detection(tracks.means, tracks.covs, self.poses[sensor])
         if len(chances) == tracks.num_tracks:
             return chances
         return np.asarray(np.add.reduceat(np.exp(tracks.log_weights) * chances, tracks.offsets[:-1]))
-
-
-def _mean_detection(sensor: SensorModel, means: Floats, covs: Floats, pose: Floats) -> Floats:
-    return sensor.detection.prob(means, pose)

@@ -4,23 +4,25 @@ from vedette.models.birth import BirthModel, MeasurementBirth
 from vedette.models.cartesian import position
 from vedette.models.clutter import ClutterModel, ClutterSampler, measurement_space_clutter
 from vedette.models.detection import (
-    MAX_PROB_DETECTION,
     DetectionModel,
     camera,
     constant_detection,
     gaussian_detection,
     limited_range,
     limited_sector,
+    soft_sector,
 )
+from vedette.models.detection_functions import MAX_PROB_DETECTION
 from vedette.models.functions import ModelFunction, model_function
 from vedette.models.kinematics import constant_velocity, coordinated_turn
 from vedette.models.measurement import MeasurementModel, NoiseModel
 from vedette.models.motion import MotionModel, SurvivalModel, constant_survival, kernel_motion
-from vedette.models.noise import constant_noise, range_dependent_noise
+from vedette.models.noise import axis_noise, constant_noise, range_dependent_noise
 from vedette.models.polar import bearing_only, bearing_range, range_only
 from vedette.models.region import Region
 from vedette.models.region_clutter import region_clutter
 from vedette.models.sensor import SensorModel
+from vedette.models.sensor_clutter import around_sensor
 from vedette.models.targets import TargetModel
 
 __all__ = [
@@ -38,6 +40,8 @@ __all__ = [
     "SensorModel",
     "SurvivalModel",
     "TargetModel",
+    "around_sensor",
+    "axis_noise",
     "bearing_only",
     "bearing_range",
     "camera",
@@ -56,4 +60,5 @@ __all__ = [
     "range_dependent_noise",
     "range_only",
     "region_clutter",
+    "soft_sector",
 ]

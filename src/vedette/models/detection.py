@@ -9,14 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vedette.kernels.base.types import Floats
-from vedette.kernels.gaussian.scratch import wrap_angle
+from vedette.models import detection_functions as functions
 from vedette.models.arguments import params_vector, pose_vector, positive, probability, reject, state_table
-from vedette.models.functions import ModelFunction, call, model_function, require_kind
+from vedette.models.detection_functions import MAX_PROB_DETECTION
+from vedette.models.functions import ModelFunction, call, require_kind
 from vedette.models.probe import probe_probability
-
-# The built-in models stay at or below this: certain detection would make a single missed detection impossible, and with
-# it every hypothesis that holds the target (paper-notes 4).
-MAX_PROB_DETECTION = 1.0 - 1e-9
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -26,13 +23,18 @@ class DetectionModel:
     Attributes:
         function: model function of kind `prob_detection`.
         params: its parameter vector.
+        mean_function: model function of kind `mean_prob_detection` (same parameters): the mean over a Gaussian, where
+            it is known; None: it is taken by nodes, see `SensorModel.detection_at`.
     """
 
     function: ModelFunction
     params: Floats = field(default_factory=lambda: np.empty(0))
+    mean_function: ModelFunction | None = None
 
     def __post_init__(self) -> None:
         require_kind("DetectionModel.function", self.function, "prob_detection")
+        if self.mean_function is not None:
+            require_kind("DetectionModel.mean_function", self.mean_function, "mean_prob_detection")
         object.__setattr__(self, "params", params_vector("DetectionModel.params", self.params))
 
     def prob(self, states: ArrayLike, pose: ArrayLike) -> Floats:
@@ -41,80 +43,79 @@ class DetectionModel:
         return np.array([call(self.function, state, at, self.params) for state in table], dtype=np.float64)
 
     def check(self, states: ArrayLike, pose: ArrayLike) -> None:
-        """Try the function at each state; `ModelError` unless it gives a probability."""
+        """Try the functions at each state (the mean: variances of 1); `ModelError` unless they give probabilities."""
         at = pose_vector("pose", pose)
         for state in state_table("states", states):
             probe_probability(self.function, (state, at, self.params))
+            if self.mean_function is not None:
+                probe_probability(self.mean_function, (state, np.eye(len(state)), at, self.params))
 
 
-@model_function("prob_detection")
-def _constant(state: Floats, pose: Floats, params: Floats) -> float:
-    return params[0]  # type: ignore[no-any-return]
+def _guarded(prob_detection: float, field: str = "prob_detection") -> float:
+    return min(probability(field, prob_detection), MAX_PROB_DETECTION)
 
 
-@model_function("prob_detection")
-def _gaussian(state: Floats, pose: Floats, params: Floats) -> float:
-    dx, dy = state[0] - pose[0], state[1] - pose[1]
-    return min(math.exp(-0.5 * (dx * dx + dy * dy) / (params[0] * params[0])), MAX_PROB_DETECTION)
-
-
-@model_function("prob_detection")
-def _limited_range(state: Floats, pose: Floats, params: Floats) -> float:
-    dx, dy = state[0] - pose[0], state[1] - pose[1]
-    return params[0] if dx * dx + dy * dy <= params[1] * params[1] else 0.0
-
-
-@model_function("prob_detection")
-def _limited_sector(state: Floats, pose: Floats, params: Floats) -> float:
-    dx, dy = state[0] - pose[0], state[1] - pose[1]
-    square = dx * dx + dy * dy
-    if square > params[1] * params[1]:
-        return 0.0
-    if square > 0.0 and abs(wrap_angle(math.atan2(dy, dx) - pose[2])) > params[2]:
-        return 0.0
-    return params[0]  # type: ignore[no-any-return]
-
-
-@model_function("prob_detection")
-def _camera(state: Floats, pose: Floats, params: Floats) -> float:
-    if len(pose) < 5:
-        raise ValueError("camera: expected a pose with pointing_rad and half_width_rad")
-    dx, dy = state[0] - pose[0], state[1] - pose[1]
-    # The same pixels over a narrower field see farther.
-    reach = params[1] * params[2] / pose[4] if params[2] > 0.0 and pose[4] > 0.0 else params[1]
-    square = dx * dx + dy * dy
-    if square > reach * reach:
-        return 0.0
-    if square > 0.0 and abs(wrap_angle(math.atan2(dy, dx) - pose[3])) > pose[4]:
-        return 0.0
-    return params[0]  # type: ignore[no-any-return]
-
-
-def _guarded(prob_detection: float) -> float:
-    return min(probability("prob_detection", prob_detection), MAX_PROB_DETECTION)
+def _half_width(half_width_rad: float) -> float:
+    if positive("half_width_rad", half_width_rad) > math.pi:
+        raise reject("half_width_rad", "an angle in (0, pi]", half_width_rad)
+    return float(half_width_rad)
 
 
 def constant_detection(prob_detection: float) -> DetectionModel:
     """The same detection probability everywhere; 1 is taken as `MAX_PROB_DETECTION`."""
-    return DetectionModel(_constant, np.array([_guarded(prob_detection)]))
+    return DetectionModel(functions.constant, np.array([_guarded(prob_detection)]), functions.mean_constant)
 
 
 def gaussian_detection(sigma: float) -> DetectionModel:
     """exp(-d^2 / (2 sigma^2)) at distance d (paper section IV, sigma_D = 10000 m; paper-notes 4), capped alike."""
-    return DetectionModel(_gaussian, np.array([positive("sigma", sigma)]))
+    return DetectionModel(functions.gaussian, np.array([positive("sigma", sigma)]), functions.mean_gaussian)
 
 
-def limited_range(prob_detection: float, max_range: float) -> DetectionModel:
-    """Constant up to `max_range` metres, 0 beyond."""
-    return DetectionModel(_limited_range, np.array([_guarded(prob_detection), positive("max_range", max_range)]))
+def limited_range(prob_detection: float, max_range: float, outside: float = 0.0) -> DetectionModel:
+    """Constant up to `max_range` metres, `outside` beyond."""
+    params = np.array([_guarded(prob_detection), positive("max_range", max_range), _guarded(outside, "outside")])
+    return DetectionModel(functions.limited_range, params, functions.mean_limited_range)
 
 
-def limited_sector(prob_detection: float, max_range: float, half_width_rad: float) -> DetectionModel:
-    """Constant up to `max_range` metres and within `half_width_rad`, in (0, pi], of the heading; 0 elsewhere."""
-    if positive("half_width_rad", half_width_rad) > math.pi:
-        raise reject("half_width_rad", "an angle in (0, pi]", half_width_rad)
-    params = np.array([_guarded(prob_detection), positive("max_range", max_range), half_width_rad])
-    return DetectionModel(_limited_sector, params)
+def limited_sector(
+    prob_detection: float, max_range: float, half_width_rad: float, outside: float = 0.0
+) -> DetectionModel:
+    """Constant up to `max_range` metres, within `half_width_rad`, in (0, pi], of the heading; else `outside`."""
+    params = [_guarded(prob_detection), positive("max_range", max_range), _half_width(half_width_rad)]
+    return DetectionModel(
+        functions.limited_sector, np.array([*params, _guarded(outside, "outside")]), functions.mean_limited_sector
+    )
+
+
+def soft_sector(
+    prob_detection: float,
+    max_range: float,
+    half_width_rad: float = math.pi,
+    *,
+    range_slope: float,
+    angle_slope: float | None = None,
+    cut: bool = False,
+) -> DetectionModel:
+    """Detection that falls off gradually at the edges of a sector, as logistic functions of distance and angle.
+
+    p / (1 + exp(range_slope (rho - max_range))) / (1 + exp(angle_slope (|dtheta| - half_width_rad))) at the distance
+    rho and the angle dtheta from the heading. A target at the sensor itself is straight ahead.
+
+    Args:
+        prob_detection: p, deep within the sector; 1 is taken as `MAX_PROB_DETECTION`.
+        max_range: m; p / 2 there, straight ahead.
+        half_width_rad: in (0, pi]. With pi and no `angle_slope` detection does not depend on the angle.
+        range_slope: 1/m, above 0.
+        angle_slope: 1/rad, above 0; None: the edges at `half_width_rad` are sharp.
+        cut: whether nothing at all is detected beyond `max_range` and `half_width_rad`.
+    """
+    slope = 0.0 if angle_slope is None else positive("angle_slope", angle_slope)
+    if not isinstance(cut, bool):
+        raise reject("cut", "true or false", cut)
+    params = [_guarded(prob_detection), positive("max_range", max_range), _half_width(half_width_rad)]
+    return DetectionModel(
+        functions.soft_sector, np.array([*params, positive("range_slope", range_slope), slope, float(cut)])
+    )
 
 
 def camera(prob_detection: float, max_range: float, reference_half_width_rad: float | None = None) -> DetectionModel:
@@ -132,4 +133,4 @@ def camera(prob_detection: float, max_range: float, reference_half_width_rad: fl
         0.0 if reference_half_width_rad is None else positive("reference_half_width_rad", reference_half_width_rad)
     )
     params = np.array([_guarded(prob_detection), positive("max_range", max_range), reference])
-    return DetectionModel(_camera, params)
+    return DetectionModel(functions.camera, params, functions.mean_camera)

@@ -13,6 +13,7 @@ A model function sees one state at a time and writes its result into the last ar
 | `measurement_jacobian` | state, pose, params, out | out: (meas_dim, state_dim) derivative of the measurement |
 | `measurement_noise_cov` | state, pose, params, out | out: (meas_dim, meas_dim) symmetric, positive definite |
 | `prob_detection` | state, pose, params | probability in [0, 1] |
+| `mean_prob_detection` | mean, cov, pose, params | mean of `prob_detection` over states N(mean, cov) |
 | `log_clutter_intensity` | measurement, pose, params | log of the expected clutter per unit of measurement space |
 
 `state[0:2]` is always the position in metres; `pose` is [px, py, heading_rad], and further components that

@@ -12,7 +12,7 @@ import numpy as np
 
 from vedette.kernels.base.compile import kernel
 from vedette.kernels.base.types import Floats
-from vedette.models.arguments import non_negative
+from vedette.models.arguments import non_negative, reject
 from vedette.models.functions import model_function
 from vedette.models.motion import MotionModel
 
@@ -61,15 +61,39 @@ def _cv_noise(state: Floats, dt: float, params: Floats, out: Floats) -> None:
     _acceleration_cov(dt, params[0], out)
 
 
-def constant_velocity(sigma_v: float, *, method: str = "auto") -> MotionModel:
-    """Constant velocity with white acceleration that is constant within a step (paper section IV, F_k and Q_k).
+@model_function("process_noise_cov")
+def _cv_continuous_noise(state: Floats, dt: float, params: Floats, out: Floats) -> None:
+    variance = params[0] * params[0]
+    for i in range(4):
+        for j in range(4):
+            out[i, j] = 0.0
+    for axis in range(2):
+        out[axis, axis] = dt**3 / 3.0 * variance
+        out[axis, axis + 2] = 0.5 * dt**2 * variance
+        out[axis + 2, axis] = out[axis, axis + 2]
+        out[axis + 2, axis + 2] = dt * variance
+
+
+def constant_velocity(sigma_v: float, *, acceleration: str = "held", method: str = "auto") -> MotionModel:
+    """Constant velocity under white acceleration.
+
+    Held within a step (paper section IV, F_k and Q_k), the noise of an axis is sigma_v^2 [[dt^4/4, dt^3/2], [dt^3/2,
+    dt^2]]; continuous in time (Bar-Shalom, Li and Kirubarajan 2001, section 6.2.2), it is sigma_v^2 [[dt^3/3, dt^2/2],
+    [dt^2/2, dt]], and two steps have the noise of one of their length.
 
     Args:
-        sigma_v: standard deviation of the acceleration, m/s^2 (paper: 5).
+        sigma_v: standard deviation of the held acceleration, m/s^2 (paper: 5); of a continuous one the root of its
+            spectral density, m/s^1.5.
+        acceleration: "held" or "continuous".
         method: Gaussian method, see `MotionModel`.
     """
+    if acceleration not in _CV_NOISE:
+        raise reject("acceleration", f"one of {', '.join(_CV_NOISE)}", acceleration)
     params = np.array([non_negative("sigma_v", sigma_v)])
-    return MotionModel(4, _cv_transition, _cv_noise, np.empty(0), params, _cv_jacobian, method)
+    return MotionModel(4, _cv_transition, _CV_NOISE[acceleration], np.empty(0), params, _cv_jacobian, method)
+
+
+_CV_NOISE = {"held": _cv_noise, "continuous": _cv_continuous_noise}
 
 
 @kernel

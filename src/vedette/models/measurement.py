@@ -93,10 +93,11 @@ class MeasurementModel:
         """
         if self.places is None:
             raise reject("MeasurementModel.places", "a function, as births from measurements need a position", None)
+        at = pose_vector("pose", pose)
         try:
-            return float_array("places", self.places(measurements, pose_vector("pose", pose)), (len(measurements), 2))
+            return float_array("places", self.places(measurements, at), (len(measurements), 2))
         except Exception as error:
-            raise ModelError(f"places of a measurement at pose {pose}: {type(error).__name__}: {error}") from error
+            raise ModelError(f"places of measurements at pose {at}: {type(error).__name__}: {error}") from error
 
     def check(self, states: ArrayLike, pose: ArrayLike) -> None:
         """Try the functions at each state; `ModelError` names the function, the state, the expected and the actual."""

@@ -1,4 +1,4 @@
-"""Built-in measurement noise: constant, and growing with the target's distance as in the paper."""
+"""Built-in measurement noise: constant, and growing with the target's distance, as in the paper or axis by axis."""
 
 from __future__ import annotations
 
@@ -45,12 +45,36 @@ def _range(state: Floats, pose: Floats, params: Floats, out: Floats) -> None:
     out[0, 0] = sigma_range * sigma_range
 
 
+@model_function("measurement_noise_cov")
+def _by_axis(state: Floats, pose: Floats, params: Floats, out: Floats) -> None:
+    for i in range(2):
+        offset = state[i] - pose[i]
+        std = params[i] + params[2 + i] * offset * offset
+        out[i, i] = std * std
+        out[i, 1 - i] = 0.0
+
+
 def constant_noise(stds: ArrayLike) -> NoiseModel:
     """Independent noise with the given standard deviation of each measurement component, in its own unit."""
     values = float_array("stds", stds, (None,))
     if len(values) == 0 or (values <= 0.0).any():
         raise reject("stds", "one or more numbers above 0", stds)
     return NoiseModel(_constant, values, len(values))
+
+
+def axis_noise(std: ArrayLike, growth: ArrayLike) -> NoiseModel:
+    """Noise of a position measurement: standard deviation std_i + growth_i d_i^2, d_i the offset along axis i.
+
+    Args:
+        std: (2,) m, along x and y, above 0.
+        growth: (2,) 1/m, at least 0.
+    """
+    stds, growths = float_array("std", std, (2,)), float_array("growth", growth, (2,))
+    if (stds <= 0.0).any():
+        raise reject("std", "2 numbers above 0", std)
+    if (growths < 0.0).any():
+        raise reject("growth", "2 numbers of at least 0", growth)
+    return NoiseModel(_by_axis, np.concatenate([stds, growths]), 2)
 
 
 def range_dependent_noise(

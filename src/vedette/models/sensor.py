@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from vedette.kernels.base.types import Floats, Sensor
-from vedette.models.arguments import pose_vector, reject, state_table
+from vedette.kernels.gaussian.detection import AT_CENTRE, BY_NODES, CLOSED_FORM, detection_probabilities
+from vedette.kernels.gaussian.position_integrals import spread_nodes
+from vedette.models.arguments import float_array, pose_vector, reject, state_table
 from vedette.models.clutter import ClutterModel
 from vedette.models.detection import DetectionModel
 from vedette.models.functions import model_function
@@ -21,6 +24,15 @@ def _no_measurement_jacobian(state: Floats, pose: Floats, params: Floats, out: F
     """Fills the place of a missing Jacobian in a kernel bundle whose method never asks for one."""
     raise NotImplementedError("this measurement model has no Jacobian")
 
+
+@model_function("mean_prob_detection")
+def _no_mean_detection(mean: Floats, cov: Floats, pose: Floats, params: Floats) -> float:
+    """Fills the place of a missing mean in a kernel bundle that never asks for one; no probability."""
+    return math.nan
+
+
+_NODES = spread_nodes()
+_NO_NODES = np.empty((0, 3))
 
 _PARTS: dict[str, type] = {
     "measurement": MeasurementModel,
@@ -37,6 +49,8 @@ class SensorModel:
     Attributes:
         measurement, noise, detection, clutter: the four models.
         method: "auto" (EKF if the measurement has a Jacobian, else UKF), "ekf", "ukf" or "ckf".
+        detection_at: of a predicted Gaussian, the filters take the probability of detection at its "centre", as the
+            paper does, or its "mean" over the Gaussian: by the model's `mean_function`, or by nodes over the position.
 
     Raises:
         InputError: a part of another type, parts for different numbers of measurement components or different angles,
@@ -48,6 +62,7 @@ class SensorModel:
     detection: DetectionModel
     clutter: ClutterModel
     method: str = "auto"
+    detection_at: str = "centre"
 
     def __post_init__(self) -> None:
         for name, kind in _PARTS.items():
@@ -62,6 +77,8 @@ class SensorModel:
             expected = f"a model for measurements whose angular flags are {self.measurement.angular.tolist()}"
             raise reject("SensorModel.clutter", expected, angular.tolist())
         resolve_method("SensorModel.method", self.method, self.measurement.jacobian is not None)
+        if self.detection_at not in ("centre", "mean"):
+            raise reject("SensorModel.detection_at", "centre or mean", self.detection_at)
 
     @property
     def meas_dim(self) -> int:
@@ -70,12 +87,17 @@ class SensorModel:
 
     def to_kernel(self) -> Sensor:
         """The bundle of functions and parameters that update kernels take."""
-        jacobian = self.measurement.jacobian
+        return self._bundle(self.detection_at == "mean")
+
+    def _bundle(self, over_gaussian: bool) -> Sensor:
+        jacobian, mean = self.measurement.jacobian, self.detection.mean_function
+        rule = AT_CENTRE if not over_gaussian else BY_NODES if mean is None else CLOSED_FORM
         return Sensor(
             self.measurement.function,
             _no_measurement_jacobian if jacobian is None else jacobian,
             self.noise.function,
             self.detection.function,
+            _no_mean_detection if mean is None else mean,
             self.clutter.log_intensity,
             self.measurement.params,
             self.noise.params,
@@ -83,7 +105,26 @@ class SensorModel:
             self.clutter.params,
             self.measurement.angular,
             resolve_method("SensorModel.method", self.method, jacobian is not None),
+            rule,
+            _NODES if rule == BY_NODES else _NO_NODES,
         )
+
+    def mean_detection(self, means: ArrayLike, covs: ArrayLike, pose: ArrayLike) -> Floats:
+        """(n,) mean probability of detection over each of n Gaussians, whatever `detection_at` says.
+
+        Args:
+            means: (n, state_dim).
+            covs: (n, state_dim, state_dim), positive definite.
+            pose: (3 or more,) of the sensor.
+
+        Raises:
+            InputError: arrays of other shapes, or with numbers that are not finite.
+            ModelError: the detection model gave no probability.
+        """
+        centres = float_array("means", means, (None, None))
+        num, dim = centres.shape
+        spreads, at = float_array("covs", covs, (num, dim, dim)), pose_vector("pose", pose)
+        return detection_probabilities(self._bundle(True), at, centres, spreads)
 
     def check(self, states: ArrayLike, pose: ArrayLike) -> None:
         """Try every function of the sensor at each of (n, state_dim) states, seen from `pose`.

@@ -8,6 +8,7 @@ from typing import Literal
 from vedette.evaluation import Comparison, PairedDifference
 from vedette.evaluation.figures.style import strategy_label
 from vedette.evaluation.health import percent
+from vedette.text import amount
 
 Verdict = Literal["better", "worse", "untold", "unknown"]
 
@@ -20,7 +21,7 @@ class Claim:
         verdict: of `first` against `second`: better, worse, not told apart, or unknown for want of runs.
         first, second: names of the strategies.
         sentence: the finding with its numbers.
-        difference: second minus first, m, with its interval: "+1.20 (+0.80 to +1.60)".
+        difference: second minus first, with its interval: "+1.20 (+0.80 to +1.60)".
         share_won: of the runs, by `first`: "93 %"; "unknown" for want of runs.
     """
 
@@ -47,7 +48,7 @@ def claim(comparison: Comparison, first: str, second: str) -> Claim:
     """One strategy against another, run by run, in mean OSPA over the counted scans."""
     paired = comparison.difference(second, first)
     verdict, names = _verdict(paired), (strategy_label(first), strategy_label(second))
-    sentence = _SENTENCES[verdict](*names, paired)
+    sentence = _SENTENCES[verdict](*names, paired, comparison.unit)
     sentence = sentence[0].upper() + sentence[1:]
     mean, low, high = (float(each) for each in (paired.summary.mean, paired.summary.low, paired.summary.high))
     share = "unknown" if verdict == "unknown" else percent(paired.share_won)
@@ -63,46 +64,49 @@ def _verdict(paired: PairedDifference) -> Verdict:
     return "worse" if float(paired.summary.high) < 0.0 else "untold"
 
 
-def _better(first: str, second: str, paired: PairedDifference) -> str:
+def _better(first: str, second: str, paired: PairedDifference, unit: str) -> str:
+    less = amount(f"{float(paired.summary.mean):.2f}", unit)
     return (
-        f"{first} has {float(paired.summary.mean):.2f} m less mean OSPA than {second} (95 % confidence interval of the "
-        f"paired difference {_interval(paired)}, {_runs(paired)}), and is better in {_share(paired)}."
+        f"{first} has {less} less mean OSPA than {second} (95 % confidence interval of the "
+        f"paired difference {_interval(paired, unit)}, {_runs(paired)}), and is better in {_share(paired)}."
     )
 
 
-def _worse(first: str, second: str, paired: PairedDifference) -> str:
+def _worse(first: str, second: str, paired: PairedDifference, unit: str) -> str:
     low, high = -float(paired.summary.high), -float(paired.summary.low)
+    more = amount(f"{-float(paired.summary.mean):.2f}", unit)
     return (
-        f"{first} has {-float(paired.summary.mean):.2f} m more mean OSPA than {second} (95 % confidence interval of "
-        f"the paired difference {_range(low, high)}, {_runs(paired)}), and is better in {_share(paired)} only."
+        f"{first} has {more} more mean OSPA than {second} (95 % confidence interval of "
+        f"the paired difference {_range(low, high, unit)}, {_runs(paired)}), and is better in {_share(paired)} only."
     )
 
 
-def _untold(first: str, second: str, paired: PairedDifference) -> str:
+def _untold(first: str, second: str, paired: PairedDifference, unit: str) -> str:
+    difference = amount(_minus(f"{float(paired.summary.mean):.2f}"), unit)
     return (
         f"{first} and {second} are not told apart: the paired difference in mean OSPA, {second} minus {first}, is "
-        f"{_minus(f'{float(paired.summary.mean):.2f}')} m, but its 95 % confidence interval, {_interval(paired)}, "
+        f"{difference}, but its 95 % confidence interval, {_interval(paired, unit)}, "
         f"holds 0 ({_runs(paired)}); {first} is better in {_share(paired)}."
     )
 
 
-def _unknown(first: str, second: str, paired: PairedDifference) -> str:
-    difference = _minus(f"{float(paired.summary.mean):.2f}")
+def _unknown(first: str, second: str, paired: PairedDifference, unit: str) -> str:
+    difference = amount(_minus(f"{float(paired.summary.mean):.2f}"), unit)
     return (
         f"{first} and {second} have one run in common, and one run tells nothing apart: the difference in mean OSPA, "
-        f"{second} minus {first}, is {difference} m in it."
+        f"{second} minus {first}, is {difference} in it."
     )
 
 
 _SENTENCES = {"better": _better, "worse": _worse, "untold": _untold, "unknown": _unknown}
 
 
-def _interval(paired: PairedDifference) -> str:
-    return _range(float(paired.summary.low), float(paired.summary.high))
+def _interval(paired: PairedDifference, unit: str) -> str:
+    return _range(float(paired.summary.low), float(paired.summary.high), unit)
 
 
-def _range(low: float, high: float) -> str:
-    return _minus(f"{low:.2f} to {high:.2f} m")
+def _range(low: float, high: float, unit: str) -> str:
+    return amount(_minus(f"{low:.2f} to {high:.2f}"), unit)
 
 
 def _runs(paired: PairedDifference) -> str:

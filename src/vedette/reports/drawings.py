@@ -172,7 +172,7 @@ def sweep_drawings(campaign: Campaign, errors: Mapping[str, Floats]) -> Iterator
 
     Args:
         campaign: whose axes they are.
-        errors: for each cell by its name, the mean OSPA of its paired runs, m; cells without are left out.
+        errors: for each cell by its name, the mean OSPA of its paired runs; cells without are left out.
     """
     cells = [cell for cell in campaign.cells if cell.name in errors]
     for axis, values in campaign.axes.items():
@@ -190,7 +190,9 @@ def sweep_drawings(campaign: Campaign, errors: Mapping[str, Floats]) -> Iterator
             where = f" ({shared})" if shared else ""
             caption = f"Mean OSPA over the runs against {label}{where}; bars are 95 % confidence intervals."
             name = f"sweep-{label.replace(' ', '-')}{suffix}"
-            yield Drawing(name, f"Sweep of {label}{where}", caption, sweep_figure(drawn, label.capitalize() + unit))
+            of_score = next(iter(curves.values()))[0].scenario.model.ospa.unit
+            figure = sweep_figure(drawn, label.capitalize() + unit, of_score)
+            yield Drawing(name, f"Sweep of {label}{where}", caption, figure)
 
 
 def _panels(campaign: Campaign, cells: Sequence[Cell], axis: str) -> dict[str, dict[str, list[Cell]]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -17,22 +18,17 @@ from vedette.evaluation.figures.rewards import best_over_others, best_over_pair
 from vedette.kernels.base.types import Floats
 from vedette.reports.groups import Strategy
 from vedette.scenarios import Scenario
+from vedette.scenarios.build import build_scan_times, build_true_sensors
 from vedette.scenarios.names import sensor_names
-from vedette.scenarios.sections.sensing import (
-    BearingOnly,
-    BearingRange,
-    CameraDetection,
-    LimitedRange,
-    LimitedSector,
-    Position,
-    RangeOnly,
-)
+from vedette.scenarios.sections.detection import CameraDetection, LimitedRange, LimitedSector, SoftSector
+from vedette.scenarios.sections.sensing import BearingOnly, BearingRange, Position, RangeOnly
 from vedette.scenarios.sections.sensors import Sensor as SensorSection
 from vedette.scenarios.trust import code_of
 from vedette.scenarios.views import field_of_view
 from vedette.simulation.records import Decision, RunRecord
 from vedette.simulation.replay import scans_of_sensors
 from vedette.simulation.scans import Scan
+from vedette.simulation.true_sensors import scanning
 
 _DIGITS = 4  # of an extent that positions are kept to: well under a pixel
 _SIGMAS = 2.0
@@ -70,6 +66,7 @@ def replay_data(strategy: Strategy, record: RunRecord, group: str, *, trust: boo
         ],
         "scans": _scans(record, scenario, [sensor["kind"] for sensor in sensors], places, trust),
         "ospa": [_rounded(parts, 2) for parts in record.ospa],
+        "ospa_unit": scenario.model.ospa.unit,
         "decisions": [_decision(*each) for each in zip(record.decisions, choices_of(record), strict=True)],
     }
 
@@ -91,9 +88,11 @@ def _sensor(name: str, section: SensorSection) -> dict[str, Any]:
     """What a sensor sees, for drawing: how a measurement lies in the plane, and its field where that has an edge."""
     kinds = {BearingRange: "point", Position: "position", BearingOnly: "ray", RangeOnly: "circle"}
     found: dict[str, Any] = {"name": name, "kind": kinds.get(type(section.measurement), "none")}
-    if isinstance(section.detection, LimitedRange | LimitedSector) and math.isfinite(section.detection.max_range):
+    if isinstance(section.detection, LimitedRange | LimitedSector | SoftSector) and math.isfinite(
+        section.detection.max_range
+    ):
         found["range"] = section.detection.max_range
-    if isinstance(section.detection, LimitedSector) and "range" in found:
+    if isinstance(section.detection, LimitedSector | SoftSector) and "range" in found:
         found["half_width"] = round(math.radians(section.detection.half_width_deg), 4)
     return found
 
@@ -159,7 +158,8 @@ def code_of_sensors(scenario: Scenario) -> tuple[str, ...]:
         dict.fromkeys(
             name
             for sensor in scenario.model.sensors
-            for section in (sensor.measurement, sensor.noise, sensor.detection, sensor.clutter)
+            for section in (sensor.measurement, sensor.noise, sensor.detection, sensor.clutter, sensor.truth)
+            if section is not None
             for name in code_of(section)
         )
     )
@@ -178,7 +178,8 @@ def _scans(
     region, method = model.region.build(), model.filter.gaussian_method
     try:
         sensors = [section.build(region, method, scenario.folder) for section in model.sensors]
-        scans = scans_of_sensors(record, sensors)
+        true, scans_at = build_true_sensors(scenario, sensors), build_scan_times(scenario)
+        scans = scans_of_sensors(record, len(true), partial(scanning, true, scans_at))
     except VedetteError:
         return []
     return [
@@ -187,8 +188,10 @@ def _scans(
     ]
 
 
-def _measurements(scan: Scan, kind: str, pose: Floats, places: int) -> list[list[float]]:
+def _measurements(scan: Scan | None, kind: str, pose: Floats, places: int) -> list[list[float]]:
     found: list[list[float]] = []
+    if scan is None:
+        return found
     for origin, measurement in zip(scan.origins.tolist(), scan.measurements, strict=True):
         if kind == "point":
             bearing, distance = measurement[:2]

@@ -54,7 +54,7 @@ def _file_name(name: str) -> str:
 
 
 def run_errors(group: Group) -> dict[str, Floats]:
-    """(num_runs,) mean OSPA of the runs of each cell of a group, m; empty without runs in common."""
+    """(num_runs,) mean OSPA of the runs of each cell of a group; empty without runs in common."""
     if group.comparison is None:
         return {}
     comparison = group.comparison

@@ -11,7 +11,7 @@ from vedette.evaluation import AverageNees, RunMetrics, average_nees, summarise
 from vedette.evaluation.figures.cost import MIN_FOR_TAILS
 from vedette.evaluation.figures.style import strategy_label
 from vedette.evaluation.health import percent
-from vedette.evaluation.tables import HEADER, decision_rows, strategy_rows
+from vedette.evaluation.tables import decision_rows, header, strategy_rows
 from vedette.kernels.base.types import Bools, Floats
 from vedette.reports.groups import Group, Strategy
 from vedette.simulation.records import RunRecord
@@ -132,7 +132,7 @@ def error_table(group: Group) -> Table | None:
     if len(rows) > 1:
         won = f", run by run, so above 0 where {first} is better; runs won: by {first}." if several else "."
         caption += f" Difference: strategy minus {first}{won}"
-    return Table(caption, HEADER, rows)
+    return Table(caption, header(group.comparison), rows)
 
 
 def measure_table(group: Group) -> Table | None:

@@ -31,6 +31,7 @@ from vedette.reports.saving import run_errors
 from vedette.reports.spec_text import spec_toml
 from vedette.reports.svg import inline_svg
 from vedette.reports.tables import Table, cost_table, decision_table, error_table, measure_table
+from vedette.text import named_in
 
 # A page that a mail can carry: beyond these, groups show their errors alone, and typical runs are left out.
 MAX_FIGURE_BYTES, MAX_REPLAY_BYTES = 6_000_000, 4_000_000
@@ -48,6 +49,12 @@ class _Section:
     health: tuple[tuple[str, str], ...]
     tables: tuple[tuple[str, Table], ...]
     figures: tuple[tuple[Drawing, Markup], ...]
+
+    @property
+    def difference(self) -> str:
+        """Heading of the paired differences."""
+        comparison = self.group.comparison
+        return named_in("Difference", "m" if comparison is None else comparison.unit)
 
     @property
     def blocks(self) -> list[tuple[bool, list[tuple[Drawing, Markup]]]]:

@@ -5,6 +5,8 @@ Each section builds its own part (`vedette.scenarios.sections`); here they are p
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from vedette.control import MobileSensor, Planner
@@ -12,17 +14,19 @@ from vedette.densities import LMB
 from vedette.errors import InputError
 from vedette.filters import Filter, labels_targets, shared_targets
 from vedette.fusion import Fusion
-from vedette.kernels.base.types import Floats
-from vedette.models import TargetModel
+from vedette.kernels.base.types import Bools, Floats
+from vedette.models import SensorModel, TargetModel
 from vedette.platforms import Actions
 from vedette.platforms.base import actions_at
 from vedette.scenarios.loading import Scenario
 from vedette.scenarios.sections.fusion import CustomFusion
+from vedette.scenarios.sections.fusion import Fusion as FusionSection
 from vedette.scenarios.sections.planners import STRATEGIES, Parts
 from vedette.scenarios.sections.tracking import Filter as FilterSection
 from vedette.simulation.experiment import Experiment
+from vedette.simulation.true_sensors import TrueSensor
 from vedette.simulation.truth import TargetSource
-from vedette.tracking import Central, Distributed, Tracker
+from vedette.tracking import BeliefNetwork, Central, CentralFilter, Distributed, ScanNetwork, Tracker
 
 
 def build_experiment(scenario: Scenario) -> Experiment:
@@ -47,6 +51,8 @@ def build_experiment(scenario: Scenario) -> Experiment:
         ),
         estimate=model.estimator.build(scenario.folder),
         decision_steps=model.decision_steps,
+        true_sensors=build_true_sensors(scenario, tuple(sensor.filter.sensor for sensor in sensors)),
+        scans_at=build_scan_times(scenario),
     )
 
 
@@ -63,22 +69,51 @@ def build_sensors(scenario: Scenario) -> tuple[MobileSensor, ...]:
     )
     return tuple(
         MobileSensor(
-            model.filter.build(targets, sensor.build(region, method, folder), folder),
+            model.filter.build(targets, sensor.build(region, method, folder, model.filter.detection_at), folder),
             sensor.platform.build(folder),
         )
         for sensor in model.sensors
     )
 
 
-def _tracker(scenario: Scenario, filters: tuple[Filter, ...]) -> Tracker:
-    """The filters and their fusion, or one filter for all sensors."""
+def build_true_sensors(scenario: Scenario, known: Sequence[SensorModel]) -> tuple[TrueSensor, ...]:
+    """The sensors as they are, beside what the filters know of them; errors as of `build_sensors`."""
     model = scenario.model
-    if model.fusion.kind == "central" and isinstance(model.filter, FilterSection):
-        targets, sensors, own = shared_targets(filters), tuple(local.sensor for local in filters), model.fusion.filter
-        if own is not None:
-            return Central(own.made(scenario.folder, targets=targets, sensors=sensors))
-        return Central(model.filter.build_central(targets, sensors))
-    return Distributed(filters, model.fusion.build(len(filters), scenario.folder), model.fusion.feeds_back)
+    region = model.region.build()
+    places = zip(model.sensors, known, strict=True)
+    return tuple(section.build_true(sensor, region, scenario.folder) for section, sensor in places)
+
+
+def build_scan_times(scenario: Scenario) -> Bools:
+    """(num_sensors, num_steps) whether each sensor scans then."""
+    model = scenario.model
+    return np.array([sensor.scans.build(model.time.num_steps) for sensor in model.sensors])
+
+
+def _tracker(scenario: Scenario, filters: tuple[Filter, ...]) -> Tracker:
+    """The filters and their fusion, or one filter for all sensors; over a network, where there is one."""
+    model, fusion = scenario.model, scenario.model.fusion.build(len(filters), scenario.folder)
+    central = _central_filter(scenario, filters)
+    if model.network is None:
+        return Distributed(filters, fusion, model.fusion.feeds_back) if central is None else Central(central)
+    of_lmbs = isinstance(filters[0].initial(), LMB)
+    merging = FusionSection().build_merging(len(filters), of_lmbs=of_lmbs)
+    if central is not None:
+        return ScanNetwork(central, model.network.build(), merging)
+    assert fusion is not None  # a single sensor has no network
+    return BeliefNetwork(filters, fusion, model.network.build(), merging)
+
+
+def _central_filter(scenario: Scenario, filters: tuple[Filter, ...]) -> CentralFilter | None:
+    """The filter of all sensors' scans; None where each has its own."""
+    model = scenario.model
+    if model.fusion.kind not in ("central", "sequential") or not isinstance(model.filter, FilterSection):
+        return None
+    targets, sensors, own = shared_targets(filters), tuple(local.sensor for local in filters), model.fusion.filter
+    if own is not None:
+        made: CentralFilter = own.made(scenario.folder, targets=targets, sensors=sensors)
+        return made
+    return model.filter.build_central(targets, sensors, in_turn=model.fusion.kind == "sequential")
 
 
 def build_poses(scenario: Scenario) -> Floats:

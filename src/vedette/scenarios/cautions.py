@@ -7,19 +7,20 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from vedette.kernels.base.types import Floats
+from vedette.kernels.base.types import Bools, Floats
 from vedette.scenarios.faults import Path, Told
 from vedette.scenarios.loading import Scenario, document_of, place_fault
 from vedette.scenarios.names import sensor_names
 from vedette.scenarios.sections import ScenarioModel
-from vedette.scenarios.sections.fusion import BY_LABEL, Fusion
-from vedette.scenarios.sections.sensing import (
+from vedette.scenarios.sections.detection import (
     CameraDetection,
     ConstantDetection,
     GaussianDetection,
     LimitedRange,
     LimitedSector,
+    SoftSector,
 )
+from vedette.scenarios.sections.fusion import BY_LABEL, Fusion
 from vedette.scenarios.sections.sensors import Sensor
 from vedette.scenarios.sections.targets import RecordedTargets
 from vedette.scenarios.views import field_of_view
@@ -130,7 +131,8 @@ def _limited_and_moving(model: ScenarioModel, fusion: Fusion) -> Iterator[tuple[
     region = model.region
     across = math.hypot(region.x_max - region.x_min, region.y_max - region.y_min)
     for i, sensor in enumerate(model.sensors):
-        limited = isinstance(sensor.detection, LimitedRange | LimitedSector) and sensor.detection.max_range < across
+        field = field_of_view(sensor)
+        limited = field is not None and field.reach < across
         if (limited and sensor.platform.top_speed > 0.0) or isinstance(sensor.detection, CameraDetection):
             yield (
                 ("sensors", i, "detection"),
@@ -155,7 +157,24 @@ def prob_detection(sensor: Sensor, points: Floats) -> Floats | None:
     field = field_of_view(sensor)
     if field is not None:
         off = np.arctan2(ahead[:, 1], ahead[:, 0]) - field.middle
-        off = np.abs((off + math.pi) % (2.0 * math.pi) - math.pi)
-        seen = (distances <= field.reach) & ((distances == 0.0) | (off <= field.half_width))
-        return np.where(seen, field.probability, 0.0)
+        off = np.where(distances == 0.0, 0.0, np.abs((off + math.pi) % (2.0 * math.pi) - math.pi))
+        seen = (distances <= field.reach) & (off <= field.half_width)
+        if isinstance(section, SoftSector):
+            return _soft(section, distances - field.reach, off - field.half_width, seen)
+        outside = section.outside if isinstance(section, LimitedRange | LimitedSector) else 0.0
+        return np.where(seen, field.probability, outside)
     return None
+
+
+def _soft(section: SoftSector, beyond_range: Floats, beyond_angle: Floats, seen: Bools) -> Floats:
+    """(n,) probabilities of detection of a soft sector, by how far places lie beyond its edges in m and rad."""
+    detected = section.probability * _logistic(section.range_slope * beyond_range)
+    if section.angle_slope is not None:
+        detected = detected * _logistic(section.angle_slope * beyond_angle)
+    elif not section.cut:
+        seen = beyond_angle <= 0.0
+    return detected if section.angle_slope is not None and not section.cut else np.where(seen, detected, 0.0)
+
+
+def _logistic(exponent: Floats) -> Floats:
+    return np.asarray(1.0 / (1.0 + np.exp(np.minimum(exponent, 700.0))))

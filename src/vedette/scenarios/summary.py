@@ -12,6 +12,7 @@ from vedette.scenarios.sections.fusion import AnyFusion, CustomFusion
 from vedette.scenarios.sections.sensors import Sensor
 from vedette.scenarios.sections.targets import RecordedTargets
 from vedette.scenarios.sections.tracking import AnyFilter, Filter
+from vedette.scenarios.sections.world import Birth
 from vedette.text import counted
 
 
@@ -67,9 +68,10 @@ def facts(model: ScenarioModel) -> list[tuple[str, str]]:
         ("region", f"x {region.x_min:g} to {region.x_max:g} m, y {region.y_min:g} to {region.y_max:g} m"),
         ("motion", settings(model.motion)),
         ("survival", settings(model.survival)),
-        ("births", f"{counted(len(model.birth.sites), 'site')}, {_steps(model.birth.steps)}"),
+        ("births", _births(model.birth)),
         ("filter", _filter(model.filter)),
         ("fusion", _fusion(model.fusion)),
+        *(() if model.network is None else (("network", settings(model.network)),)),
         ("estimate", settings(model.estimator)),
         ("decisions", _decisions(model.decision_steps)),
         ("horizon", f"{counted(control.horizon_steps, 'step')} of {control.horizon_period:g} s"),
@@ -84,6 +86,12 @@ def facts(model: ScenarioModel) -> list[tuple[str, str]]:
 def _filter(section: AnyFilter) -> str:
     assignment = f", {section.assignment.kind} assignment" if isinstance(section, Filter) else ""
     return settings(section) + assignment
+
+
+def _births(section: Birth) -> str:
+    sites = f"{counted(len(section.sites), 'site')}, {_steps(section.steps)}" if section.sites else "no site"
+    measured = section.from_measurements
+    return sites if measured is None else f"{sites}; {measured.expected:g} a scan from measurements"
 
 
 _IN_WORDS = {
@@ -128,4 +136,18 @@ def sensing(sensor: Sensor) -> list[tuple[str, str]]:
         ("noise", settings(sensor.noise)),
         ("detection", settings(sensor.detection)),
         ("clutter", settings(sensor.clutter)),
+        *_in_truth(sensor),
     ]
+
+
+def _in_truth(sensor: Sensor) -> list[tuple[str, str]]:
+    """Where a sensor is not what the filters take it for, and when it scans if not at every step."""
+    found, truth = [], sensor.truth
+    if truth is not None:
+        parts = {name: getattr(truth, name) for name in type(truth).model_fields}
+        sections = [(name, value) for name, value in parts.items() if isinstance(value, Section)]
+        found = [(f"true {name.replace('_', ' ')}", settings(value)) for name, value in sections]
+        found += [("detection of", "the measurement")] if truth.detection_of == "measurement" else []
+    if sensor.scans.every > 1:
+        found.append(("scans", f"every {sensor.scans.every} steps from step {sensor.scans.first}"))
+    return found

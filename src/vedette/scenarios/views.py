@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from vedette.scenarios.sections.sensing import CameraDetection, LimitedRange, LimitedSector
+from vedette.scenarios.sections.detection import CameraDetection, LimitedRange, LimitedSector, SoftSector
 from vedette.scenarios.sections.sensors import Sensor
 
 
@@ -20,11 +20,14 @@ class FieldOfView(NamedTuple):
 
 
 def field_of_view(sensor: Sensor, pose: Sequence[float] | None = None) -> FieldOfView | None:
-    """Of a sensor at a pose, or where it starts; None where its view has no edge, or is of the user's own."""
+    """Of a sensor at a pose, or where it starts; None where its view has no edge, or is of the user's own.
+
+    The edge of a soft sector is where half of its probability is left.
+    """
     section, at = sensor.detection, sensor.pose if pose is None else pose
     if isinstance(section, LimitedRange):
         return FieldOfView(at[2], math.pi, section.max_range, section.probability)
-    if isinstance(section, LimitedSector):
+    if isinstance(section, LimitedSector | SoftSector):
         return FieldOfView(at[2], math.radians(section.half_width_deg), section.max_range, section.probability)
     if isinstance(section, CameraDetection) and len(at) >= 5:
         reference, width = section.reference_half_width_deg, at[4]

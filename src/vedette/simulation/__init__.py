@@ -5,6 +5,7 @@ from vedette.simulation.loop import simulate
 from vedette.simulation.records import Decision, RunRecord
 from vedette.simulation.scans import CLUTTER, Scan, simulate_scan, simulate_scans
 from vedette.simulation.storage import load_run, save_run
+from vedette.simulation.true_sensors import TrueSensor
 from vedette.simulation.truth import ScriptedTargets, TargetSource, Truth
 
 __all__ = [
@@ -15,6 +16,7 @@ __all__ = [
     "Scan",
     "ScriptedTargets",
     "TargetSource",
+    "TrueSensor",
     "Truth",
     "load_run",
     "save_run",

@@ -8,9 +8,10 @@ import numpy as np
 
 from vedette.densities import Estimator
 from vedette.errors import InputError
-from vedette.kernels.base.types import Floats
+from vedette.kernels.base.types import Bools, Floats
 from vedette.models.arguments import reject
 from vedette.platforms import Fleet, Platform
+from vedette.simulation.true_sensors import TrueSensor, scanning, true_sensors_of
 from vedette.simulation.truth import TargetSource
 from vedette.tracking import Tracker
 
@@ -23,7 +24,7 @@ class Experiment:
         name: of the scenario, for records.
         times: (num_scans,) s of the scans.
         targets: where the true targets come from.
-        tracker: follows them; its sensors are the ones that scan.
+        tracker: follows them.
         platforms: what carries each of its sensors.
         poses: (num_sensors, 3 or more) poses at the first scan, all as long as the longest; components that are not a
             sensor's own are 0.
@@ -31,6 +32,8 @@ class Experiment:
             the first decision.
         estimate: reads the targets off the fused belief, given the number of the scan (from 1).
         decision_steps: scans (counted from 1) after which the planner is asked.
+        true_sensors: the ones that scan; (): they are what the tracker takes them for.
+        scans_at: (num_sensors, num_scans or more) whether each scans then; None: at every step.
 
     Raises:
         InputError: parts that do not fit together.
@@ -45,6 +48,8 @@ class Experiment:
     first_actions: tuple[Floats | None, ...]
     estimate: Estimator
     decision_steps: tuple[int, ...]
+    true_sensors: tuple[TrueSensor, ...] = ()
+    scans_at: Bools | None = None
 
     def __post_init__(self) -> None:
         if not isinstance(self.tracker, Tracker):
@@ -62,11 +67,25 @@ class Experiment:
         bad = [step for step in self.decision_steps if not 1 <= step <= len(self.times)]
         if bad:
             raise InputError(f"decision_steps: expected scans from 1 to {len(self.times)}; got {bad[0]}")
+        true_sensors_of(self.true_sensors, self.tracker.sensors)
+        if self.scans_at is not None:
+            self._check_scans_at(np.asarray(self.scans_at))
+
+    def _check_scans_at(self, table: Bools) -> None:
+        wanted = f"booleans of shape ({self.num_sensors}, {len(self.times)} or more)"
+        if table.dtype != np.bool_ or table.ndim != 2:
+            raise InputError(f"scans_at: expected {wanted}; got {table.dtype} of shape {table.shape}")
+        if len(table) != self.num_sensors or table.shape[1] < len(self.times):
+            raise InputError(f"scans_at: expected {wanted}; got shape {table.shape}")
 
     @property
     def num_sensors(self) -> int:
         """Number of sensors."""
         return len(self.tracker.sensors)
+
+    def sensors_at(self, step: int) -> tuple[TrueSensor | None, ...]:
+        """The sensors as they are at a step (from 1); None for one that does not scan then."""
+        return scanning(true_sensors_of(self.true_sensors, self.tracker.sensors), self.scans_at, step)
 
     def fleet(self, *, moving: bool = True) -> Fleet:
         """The platforms at the first scan; those that are not under way, or not `moving` at all, lie still."""

@@ -37,6 +37,7 @@ class Health:
         cap_met: whether the posterior was as large as it may be.
         num_missing_sets: label sets that another sensor has and this one does not (for CLMB, labels).
         num_missing_labels: labels that this sensor does not know at all.
+        bytes_sent: that this sensor sent over its radio, or to where beliefs are fused; 0 where it is not counted.
         fusion_num_sets: label sets that were fused (for CLMB, labels).
         fusion_num_lost_labels: labels that a sensor is sure of and the fused density is not.
         fusion_empty_intersection: whether no label set is held by every sensor.
@@ -56,6 +57,7 @@ class Health:
     cap_met: Ints
     num_missing_sets: Ints
     num_missing_labels: Ints
+    bytes_sent: Ints
     fusion_num_sets: Ints
     fusion_num_lost_labels: Ints
     fusion_empty_intersection: Ints
@@ -97,6 +99,16 @@ class Health:
             self.num_missing_labels[scan] = info.missing_labels
             for name in FUSION_COLUMNS:
                 getattr(self, name)[scan] = getattr(info, name.removeprefix(_FUSION))
+
+    def note_sent(self, scan: int, bytes_sent: Sequence[int]) -> None:
+        """Write down what each sensor sent; nothing is counted where `bytes_sent` is empty.
+
+        Raises `InputError` for another number than of sensors.
+        """
+        num = self.bytes_sent.shape[1]
+        if len(bytes_sent) not in (0, num):
+            raise InputError(f"TrackerInfo.bytes_sent: expected {num}, one a sensor, or none; got {len(bytes_sent)}")
+        self.bytes_sent[scan] = bytes_sent or 0
 
     def check(self, num_scans: int, num_sensors: int) -> None:
         """Raise `InputError` unless every array has its shape and type."""

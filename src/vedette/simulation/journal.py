@@ -57,6 +57,7 @@ class Journal:
         with self.timing("report of the tracker"):
             self._health.note_filters(self.step - 1, info.filters)
             self._health.note_fusion(self.step - 1, info.fusion)
+            self._health.note_sent(self.step - 1, info.bytes_sent)
         self._fusion.append(float(info.seconds.get("fusion", 0.0)))
         self._poses.append(poses)
         self.estimates.append(estimate)

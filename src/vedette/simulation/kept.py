@@ -13,7 +13,7 @@ from vedette.simulation.records import RunRecord
 from vedette.simulation.tables import LAYOUTS, TIMINGS, check_record, record_of, tables_of, timing_table, timings_of
 from vedette.text import shown
 
-FORMAT_VERSION = 4  # of saved runs and of campaigns; another wherever a table gains, loses or renames a column
+FORMAT_VERSION = 5  # of saved runs and of campaigns; another wherever a table gains, loses or renames a column
 _ENDING = ".arrow"
 
 

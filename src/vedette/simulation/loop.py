@@ -66,9 +66,9 @@ def _go(experiment: Experiment, planner: Planner | None, journal: Journal) -> No
         journal.begin(step)
         poses = fleet.poses(time)
         with journal.timing("scans"):
-            scans = simulate_scans(journal.truth.at(step - 1)[1], poses, tracker.sensors, rngs=scan_rngs)
+            scans = simulate_scans(journal.truth.at(step - 1)[1], poses, experiment.sensors_at(step), rngs=scan_rngs)
         with journal.timing("filter"):
-            measurements = [scan.measurements for scan in scans]
+            measurements = [None if scan is None else scan.measurements for scan in scans]
             state, info = tracker.step(state, measurements, poses, time, rngs=filter_rngs)
         with journal.timing("estimate"):
             estimate = experiment.estimate(state.fused, step)

@@ -60,7 +60,7 @@ class RunRecord:
         poses: (num_scans, num_sensors, 3 or more) sensor poses [px, py, heading_rad, ...] at each scan.
         estimates: one a scan.
         decisions: in order of time.
-        ospa: (num_scans, 3) total, localisation and cardinality parts, m.
+        ospa: (num_scans, 3) total, localisation and cardinality parts, m; where whole states are compared, in no unit.
         health: what the filters and the fusion reported.
         timings: for each stage (`scans`, `filter`, `fusion`, `estimate`, `planning`), (num_scans,) seconds of wall time
             that it took at each scan; of all that is here the only thing that the seed does not fix.

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable
 
 from vedette.errors import InputError
-from vedette.models import SensorModel
 from vedette.simulation.experiment import Experiment
 from vedette.simulation.loop import SCANS, sensor_streams
 from vedette.simulation.records import RunRecord
 from vedette.simulation.scans import Scan, simulate_scans
+from vedette.simulation.true_sensors import TrueSensor
 
 
-def scans_of(record: RunRecord, experiment: Experiment) -> tuple[tuple[Scan, ...], ...]:
+def scans_of(record: RunRecord, experiment: Experiment) -> tuple[tuple[Scan | None, ...], ...]:
     """Every scan of every sensor of a run, exactly as the loop simulated it, with the ids of the targets behind it.
 
     Seed, run number, truth and poses fix all measurements: each sensor has its own stream of random numbers, and draws
@@ -20,24 +20,27 @@ def scans_of(record: RunRecord, experiment: Experiment) -> tuple[tuple[Scan, ...
 
     Args:
         record: of a run of this experiment, whatever the planner.
-        experiment: gives the sensors' models.
+        experiment: gives the sensors as they are, and the steps at which they scan.
 
     Returns:
-        For each scan, one `Scan` a sensor; its origins are ids of `record.truth`, or `CLUTTER`.
+        For each scan, one `Scan` a sensor, or None where it did not scan; its origins are ids of `record.truth`, or
+        `CLUTTER`.
 
     Raises:
         InputError: another number of sensors in the record than in the experiment.
         VedetteError: what the models raise.
     """
-    return scans_of_sensors(record, experiment.tracker.sensors)
+    return scans_of_sensors(record, experiment.num_sensors, experiment.sensors_at)
 
 
-def scans_of_sensors(record: RunRecord, sensors: Sequence[SensorModel]) -> tuple[tuple[Scan, ...], ...]:
-    """As `scans_of`, by the sensors' models alone."""
-    if record.num_sensors != len(sensors):
-        raise InputError(f"record: expected {len(sensors)} sensors; got {record.num_sensors}")
-    streams = sensor_streams(record.seed, record.run, SCANS, record.num_sensors)
+def scans_of_sensors(
+    record: RunRecord, num_sensors: int, sensors_at: Callable[[int], tuple[TrueSensor | None, ...]]
+) -> tuple[tuple[Scan | None, ...], ...]:
+    """As `scans_of`, by the sensors as they are at a step alone."""
+    if record.num_sensors != num_sensors:
+        raise InputError(f"record: expected {num_sensors} sensors; got {record.num_sensors}")
+    streams = sensor_streams(record.seed, record.run, SCANS, num_sensors)
     return tuple(
-        simulate_scans(states, record.poses[step], sensors, ids=ids, rngs=streams)
+        simulate_scans(states, record.poses[step], sensors_at(step + 1), ids=ids, rngs=streams)
         for step, (ids, states) in enumerate(record.truth.at(scan) for scan in range(record.num_scans))
     )

@@ -13,6 +13,7 @@ from vedette.kernels.base.types import Floats, Ints
 from vedette.models import SensorModel
 from vedette.models.arguments import float_array, generator, pose_vector, reject
 from vedette.models.measurement import wrap_angular
+from vedette.simulation.true_sensors import TrueSensor
 from vedette.tracking import Stages
 
 CLUTTER = -1
@@ -34,7 +35,7 @@ class Scan:
 def simulate_scan(
     truth_states: ArrayLike,
     pose: ArrayLike,
-    sensor: SensorModel,
+    sensor: SensorModel | TrueSensor,
     *,
     ids: ArrayLike | None = None,
     rng: np.random.Generator,
@@ -47,7 +48,7 @@ def simulate_scan(
     Args:
         truth_states: (num_targets, state_dim).
         pose: (3 or more,) px, py, heading_rad, ... of the sensor.
-        sensor: the functions that the filter uses too.
+        sensor: the functions that the filter uses too, or the sensor as it is where it differs from them.
         ids: (num_targets,) ids for `Scan.origins`; None: the place in `truth_states`.
         rng: every number drawn comes from it.
 
@@ -57,13 +58,15 @@ def simulate_scan(
     """
     states, pose = float_array("truth_states", truth_states, (None, None)), pose_vector("pose", pose)
     generator(rng)
-    num = len(states)
+    true = sensor if isinstance(sensor, TrueSensor) else TrueSensor(sensor)
+    num, model = len(states), true.model
     names = np.arange(num) if ids is None else np.asarray(ids)
     if names.shape != (num,):
         raise reject("ids", f"{num} ids, one a target", names.tolist())
-    seen = rng.uniform(size=num) < _probabilities(sensor, states, pose)
-    measured = _noisy_measurements(sensor, states, pose, rng.standard_normal((num, sensor.meas_dim)))
-    clutter = sensor.clutter.sample(pose, sensor.measurement, state_dim=states.shape[1], rng=rng)
+    luck = rng.uniform(size=num)
+    measured = _noisy_measurements(model, states, pose, rng.standard_normal((num, model.meas_dim)))
+    seen = luck < _probabilities(model, _detected_at(true, states, pose, measured), pose)
+    clutter = model.clutter.sample(pose, model.measurement, state_dim=states.shape[1], rng=rng)
     measurements = np.concatenate([measured, clutter])
     origins = np.concatenate([names, np.full(len(clutter), CLUTTER)]).astype(np.int64)
     order = np.argsort(rng.uniform(size=len(measurements)))
@@ -74,17 +77,33 @@ def simulate_scan(
 def simulate_scans(
     truth_states: ArrayLike,
     poses: Floats,
-    sensors: Sequence[SensorModel],
+    sensors: Sequence[SensorModel | TrueSensor | None],
     *,
     ids: ArrayLike | None = None,
     rngs: Sequence[np.random.Generator],
-) -> tuple[Scan, ...]:
-    """One scan a sensor, each with its own pose and random numbers; see `simulate_scan`."""
+) -> tuple[Scan | None, ...]:
+    """One scan a sensor, each with its own pose and random numbers; see `simulate_scan`.
+
+    None for a sensor that is None: it does not scan, and draws nothing.
+    """
     stages, scans = Stages(), []
     for s, (pose, sensor, rng) in enumerate(zip(poses, sensors, rngs, strict=True)):
         with stages.timing("scans", s):
-            scans.append(simulate_scan(truth_states, pose, sensor, ids=ids, rng=rng))
+            scans.append(None if sensor is None else simulate_scan(truth_states, pose, sensor, ids=ids, rng=rng))
     return tuple(scans)
+
+
+def _detected_at(sensor: TrueSensor, states: Floats, pose: Floats, measured: Floats) -> Floats:
+    """The states at which detection is decided: the true ones, or with the positions that were measured."""
+    if sensor.detection_of == "state":
+        return states
+    moved = states.copy()
+    if sensor.model.measurement.angular[0]:
+        bearings, ranges = measured.T
+        moved[:, :2] = pose[:2] + np.stack([ranges * np.cos(bearings), ranges * np.sin(bearings)], axis=1)
+    else:
+        moved[:, :2] = measured
+    return moved
 
 
 def _probabilities(sensor: SensorModel, states: Floats, pose: Floats) -> Floats:

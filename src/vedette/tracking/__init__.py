@@ -1,14 +1,20 @@
-"""All sensors' beliefs through time: each filters its own scans and they are fused, or one filter takes them all."""
+"""All sensors' beliefs through time: filtered apart and fused, by one filter of all scans, or over a radio network."""
 
 from vedette.tracking.base import State, Tracker, TrackerInfo
+from vedette.tracking.belief_network import BeliefNetwork
 from vedette.tracking.central import Central, CentralFilter
 from vedette.tracking.distributed import Distributed
+from vedette.tracking.network import Network
+from vedette.tracking.scan_network import ScanNetwork
 from vedette.tracking.stages import Stages, stage_of
 
 __all__ = [
+    "BeliefNetwork",
     "Central",
     "CentralFilter",
     "Distributed",
+    "Network",
+    "ScanNetwork",
     "Stages",
     "State",
     "Tracker",

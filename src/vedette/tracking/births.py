@@ -12,14 +12,13 @@ from vedette.densities.checks import unchecked
 from vedette.errors import InputError
 from vedette.filters import Limits
 from vedette.filters.inputs import births_at, check_scan, model_errors
+from vedette.fusion.matching import OWN_LABELS
 from vedette.kernels.base.types import Floats, Ints, ScanInput
 from vedette.kernels.labelled.stacking import stack_tracks
 from vedette.kernels.steps.explained import prob_explained
 from vedette.models import BirthModel, MeasurementBirth, SensorModel
 from vedette.models.arguments import pose_vector
 
-# Labels that a sensor makes by itself have an index from this times its number, counted from 1; no site has.
-LABELS_OF_A_SENSOR = 1_000_000
 # What a track explains surer than this is no birth: each costs a track until the next scan.
 LEAST_UNEXPLAINED = 0.01
 # Squared distance, in standard deviations of a birth, within which two sensors have measured one target: the 99 %
@@ -83,7 +82,7 @@ def births_from_scans(
     if not found:
         return LMB.empty(birth.state_dim)
     pooled = _pool(Unexplained(*map(np.concatenate, zip(*found, strict=True))), model)
-    first = birth.num_sites if owner is None else LABELS_OF_A_SENSOR * (owner + 1)
+    first = birth.num_sites if owner is None else OWN_LABELS * (owner + 1)
     return _born(pooled, model, step, first)
 
 
@@ -92,9 +91,7 @@ def _unexplained(belief: LMB, sensor: SensorModel, scan: Any, pose: Any, number:
     at = pose_vector("pose", pose)
     given = ScanInput(LMB.empty(belief.state_dim).to_kernel(), measurements, at, 0.0)
     with model_errors():
-        explained = prob_explained(
-            belief.to_kernel(), given, sensor.to_kernel(), Limits().truncation(sensor.meas_dim)
-        )
+        explained = prob_explained(belief.to_kernel(), given, sensor.to_kernel(), Limits().truncation(sensor.meas_dim))
     free = np.flatnonzero(explained < 1.0 - LEAST_UNEXPLAINED)
     positions = sensor.measurement.positions(measurements[free], at)
     return Unexplained(positions, 1.0 - explained[free], np.full(len(free), number))

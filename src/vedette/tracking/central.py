@@ -87,7 +87,6 @@ class Central:
         with stages.timing("filter"):
             births = {} if due is None else {"births": due}
             belief, info = self.filter.step(state.fused, scans, at, dt, step, rng=rngs[0], **births)
-        with stages.timing("births"):
             measured = births_from_scans(birth, belief, self.sensors, scans, at, step + 1)
         sent = tuple(bytes_of_scan(scan, pose) for scan, pose in zip(scans, at, strict=True))
         return self._state(belief, step, float(time), measured), TrackerInfo((info,), None, stages.seconds, sent)

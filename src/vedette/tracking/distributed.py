@@ -10,7 +10,7 @@ import numpy as np
 
 from vedette.densities import LMB
 from vedette.errors import InputError
-from vedette.filters import Filter, FilterInfo
+from vedette.filters import Filter
 from vedette.fusion import Fusion, Matched, Views
 from vedette.kernels.base.types import Floats
 from vedette.models import SensorModel, TargetModel
@@ -48,7 +48,7 @@ class Distributed:
             return
         if shares_prediction(self.fusion):
             raise InputError("feedback: expected true, as the fusion is of beliefs that share their prediction")
-        if self.targets.birth.from_measurements is not None and not matches_labels(self.fusion):
+        if self.targets.birth.from_measurements is not None and not isinstance(self.fusion, Matched):
             raise InputError(
                 "fusion: expected one that matches labels, as each sensor makes its own from its measurements and "
                 "nothing is fed back; got one that fuses by label"
@@ -91,42 +91,36 @@ class Distributed:
         fused, report = local[0], None
         sent = tuple(bytes_of_belief(belief) for belief in local)
         if self.fusion is not None:
-            views = Views(self.sensors, at, tuple(scan is not None for scan in scans), prediction)
+            views, rule = Views(self.sensors, at, tuple(scan is not None for scan in scans), prediction), self.fusion
             with stages.timing("fusion"):
-                rule = self.fusion
                 if isinstance(rule, Matched):
                     # Labels then outlast the sensor that led them, and are those that decisions need.
-                    local, rule = rule.match(local), rule.rule
+                    local, rule = list(rule.match(local)), rule.rule
                 fused, report = rule.fuse(local, views)
         if prediction is not None:
             fused = filters.kept(fused)
         if self.feedback:
             local = [fused] * len(local)
-        with stages.timing("births"):
-            measured = self._measured(local, scans, at, step + 1)
-        info = TrackerInfo(tuple(infos), report, stages.seconds, sent)
-        return State(tuple(local), fused, step, float(time), measured), info
+        measured = self._measured(local, scans, at, step + 1, stages)
+        told = TrackerInfo(tuple(infos), report, stages.seconds, sent)
+        return State(tuple(local), fused, step, float(time), measured), told
 
     def _measured(
-        self, local: Sequence[Any], scans: Sequence[Any], poses: Floats, step: int
+        self, local: Sequence[Any], scans: Sequence[Any], poses: Floats, step: int, stages: Stages
     ) -> tuple[LMB | None, ...] | None:
         """For each sensor, who may be born at `step`: the same for all where they share a belief."""
         birth, sensors = self.targets.birth, self.sensors
         if birth.from_measurements is None:
             return None
-        if self.feedback or len(local) == 1:
-            return (births_from_scans(birth, local[0], sensors, scans, poses, step),) * len(local)
-        return tuple(
-            births_from_scans(birth, belief, sensors[s : s + 1], scans[s : s + 1], poses[s : s + 1], step, owner=s)
-            for s, belief in enumerate(local)
-        )
+        with stages.timing("births"):
+            if self.feedback or len(local) == 1:
+                return (births_from_scans(birth, local[0], sensors, scans, poses, step),) * len(local)
+            return tuple(
+                births_from_scans(birth, belief, sensors[s : s + 1], scans[s : s + 1], poses[s : s + 1], step, owner=s)
+                for s, belief in enumerate(local)
+            )
 
 
 def shares_prediction(fusion: Fusion | None) -> bool:
     """Whether the fusion is of beliefs that were all updated from one prediction, as `ParallelUpdate` is."""
     return bool(getattr(fusion, "shares_prediction", False))
-
-
-def matches_labels(fusion: Fusion | None) -> bool:
-    """Whether the fusion finds out itself which labels are of one target, as `Matched` does."""
-    return bool(getattr(fusion, "matches_labels", False))

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from vedette.densities import GLMB, LMB
+from vedette.densities import LMB
 from vedette.errors import InputError
 from vedette.filters import Filter, FilterInfo, LmbFilter, TwoStepFilter, shared_targets
 from vedette.models.arguments import reject

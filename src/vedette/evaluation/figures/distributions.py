@@ -12,6 +12,7 @@ from vedette.evaluation.figures.labels import short_labels
 from vedette.evaluation.figures.style import GREY, INK, colour, new_figure, styled
 from vedette.evaluation.statistics import Summary, paired_difference
 from vedette.kernels.base.types import Floats
+from vedette.text import named_in
 
 _ROW = 0.36  # inches
 _SHORT, _ONE_LINE = 8, 20  # letters
@@ -35,7 +36,7 @@ def distributions_figure(comparison: Comparison) -> Figure:
         _draw_runs(panels[0], means, len(strategies) - 1 - index, colour(index))
         _draw_box(panels[0], means, len(strategies) - 1 - index)
     _name_rows(panels[0], list(short_labels(strategies)))
-    panels[0].set_xlabel("Mean OSPA of a run (m)")
+    panels[0].set_xlabel(named_in("Mean OSPA of a run", comparison.unit))
     if others:
         _draw_differences(panels[1], comparison)
     return figure
@@ -54,7 +55,7 @@ def _draw_differences(axes: Axes, comparison: Comparison) -> None:
     # The whole sentence where it fits; the names of the rows say the same.
     are_short = cell_len(name) <= _SHORT and max(map(cell_len, names)) <= _ONE_LINE - _SHORT
     better = f", right of 0: {name} better" if are_short else ""
-    axes.set_xlabel(f"Paired difference (m){better}")
+    axes.set_xlabel(f"{named_in('Paired difference', comparison.unit)}{better}")
 
 
 def _minus(name: str, reference: str) -> str:

@@ -23,8 +23,9 @@ from vedette.evaluation.figures.style import (
 )
 from vedette.evaluation.statistics import Summary
 from vedette.kernels.base.types import Bools, Floats
+from vedette.text import named_in
 
-_LABELS = {"total": "OSPA (m)", "localisation": "Localisation (m)", "cardinality": "Cardinality (m)"}
+_LABELS = {"total": "OSPA", "localisation": "Localisation", "cardinality": "Cardinality"}
 _DASH = 4.5  # line widths, of curves that lie on one another
 
 
@@ -76,7 +77,7 @@ def draw_ospa(axes: Axes, comparison: Comparison, part: str) -> None:
         axes.axvline(time, color=GREY, linestyle=(0, (2, 2)), linewidth=0.9, zorder=1, label=label)
     axes.set_ylim(bottom=0.0)
     span_times(axes, comparison.times)
-    axes.set_ylabel(_LABELS[part])
+    axes.set_ylabel(named_in(_LABELS[part], comparison.unit))
 
 
 def _draw_band(axes: Axes, times: Floats, curve: Summary, shown: Bools, shade: str) -> None:

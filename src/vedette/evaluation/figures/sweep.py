@@ -20,6 +20,7 @@ from vedette.evaluation.figures.style import (
 )
 from vedette.evaluation.statistics import Summary
 from vedette.kernels.base.types import Floats
+from vedette.text import named_in
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,7 +30,7 @@ class SweepCurve:
     Attributes:
         name: of the strategy.
         values: (num_values,) the number that was varied.
-        errors: for each value the mean over runs of the runs' mean OSPA, m.
+        errors: for each value the mean over runs of the runs' mean OSPA.
     """
 
     name: str
@@ -38,12 +39,13 @@ class SweepCurve:
 
 
 @styled
-def sweep_figure(curves: Sequence[SweepCurve], label: str) -> Figure:
+def sweep_figure(curves: Sequence[SweepCurve], label: str, unit: str = "m") -> Figure:
     """Mean OSPA over the runs against a varied number, with its 95 % confidence interval.
 
     Args:
         curves: one a strategy.
         label: what was varied, for the axis.
+        unit: of OSPA; none ("") where it compares whole states.
 
     Raises `InputError` for no curve.
     """
@@ -68,7 +70,7 @@ def sweep_figure(curves: Sequence[SweepCurve], label: str) -> Figure:
     axes.minorticks_off()
     axes.set_ylim(bottom=0.0)
     axes.set_xlabel(drawn_text(label))
-    axes.set_ylabel("Mean OSPA (m)")
+    axes.set_ylabel(named_in("Mean OSPA", unit))
     _, labels = axes.get_legend_handles_labels()
     figure.legend(loc="outside upper center", ncols=legend_columns(labels))
     return figure

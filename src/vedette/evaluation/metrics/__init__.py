@@ -8,6 +8,7 @@ from vedette.evaluation.metrics.point_gospa import GospaResult, GospaSeries, gos
 from vedette.evaluation.metrics.point_ospa import OspaResult, ospa, ospa_of_run
 from vedette.evaluation.metrics.run import RunMetrics, measure
 from vedette.evaluation.metrics.track_ospa import TrackSet, ospa2, ospa2_of_run
+from vedette.evaluation.metrics.tracked_share import TrackedShare, seen_targets
 from vedette.evaluation.metrics.trajectories import Continuity, continuity, continuity_of_run
 
 __all__ = [
@@ -20,6 +21,7 @@ __all__ = [
     "OspaResult",
     "RunMetrics",
     "TrackSet",
+    "TrackedShare",
     "average_nees",
     "continuity",
     "continuity_of_run",
@@ -37,4 +39,5 @@ __all__ = [
     "ospa2",
     "ospa2_of_run",
     "ospa_of_run",
+    "seen_targets",
 ]

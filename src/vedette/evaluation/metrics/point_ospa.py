@@ -24,7 +24,10 @@ from vedette.evaluation.metrics.assignment import (
     power_mean,
 )
 from vedette.kernels.base.types import Floats
+from vedette.models.arguments import reject
 from vedette.simulation.truth import Truth
+
+_ALIKE = "position, as true states have {} components and estimated ones {}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,19 +66,36 @@ def ospa(estimates: ArrayLike, truths: ArrayLike, *, cutoff: float, order: float
     return ospa_of_distances(cut_distances(first, second, cutoff), cutoff, order)
 
 
-def ospa_of_run(truth: Truth, estimates: Sequence[Estimate], *, cutoff: float, order: float) -> Floats:
-    """OSPA of the estimated positions at every scan of a run.
+def ospa_of_run(
+    truth: Truth, estimates: Sequence[Estimate], *, cutoff: float, order: float, components: str = "position"
+) -> Floats:
+    """OSPA of the estimates at every scan of a run.
 
-    Returns (num_scans, 3): total, localisation and cardinality parts, m.
-    Raises `InputError` as `ospa` does, and if there is not one estimate a scan.
+    Args:
+        truth: the targets at every scan.
+        estimates: one a scan.
+        cutoff: c > 0, m; of whole states in no unit.
+        order: p >= 1.
+        components: "position", in which estimates and targets are as far apart as their places; or "state": Euclidean
+            distance over all components, metres, m/s and rad/s taken as numbers of one kind.
+
+    Returns (num_scans, 3): total, localisation and cardinality parts, m; of whole states in no unit.
+    Raises `InputError` as `ospa` does, for other components, and if there is not one estimate a scan.
     """
     check_parameters(cutoff, order)
     check_scans(truth, estimates)
+    if components not in ("position", "state"):
+        raise reject("components", "position or state", components)
+    counted = 2 if components == "position" else None
     parts = np.empty((len(estimates), 3))
     for scan, estimate in enumerate(estimates):
         _, states = truth.at(scan)
-        found = point_set(estimate.means[:, :2], f"estimates[{scan}]")
-        distances = cut_distances(found, point_set(states[:, :2], f"truth at scan {scan}"), cutoff)
+        found, true = estimate.means[:, :counted], states[:, :counted]
+        if len(found) and len(true) and found.shape[1] != true.shape[1]:
+            raise reject("components", _ALIKE.format(true.shape[1], found.shape[1]), components)
+        distances = cut_distances(
+            point_set(found, f"estimates[{scan}]"), point_set(true, f"truth at scan {scan}"), cutoff
+        )
         result = ospa_of_distances(distances, cutoff, order)
         parts[scan] = result.total, result.localisation, result.cardinality
     return parts

@@ -71,6 +71,10 @@ SIGNATURES: dict[str, tuple[tuple[str, ...], Any]] = {
     "measurement_jacobian": (("state", "pose", "params", "out"), types.void(_VECTOR, _VECTOR, _VECTOR, _MATRIX)),
     "measurement_noise_cov": (("state", "pose", "params", "out"), types.void(_VECTOR, _VECTOR, _VECTOR, _MATRIX)),
     "prob_detection": (("state", "pose", "params"), types.float64(_VECTOR, _VECTOR, _VECTOR)),
+    "mean_prob_detection": (
+        ("mean", "cov", "pose", "params"),
+        types.float64(_VECTOR, _MATRIX, _VECTOR, _VECTOR),
+    ),
     "log_clutter_intensity": (("measurement", "pose", "params"), types.float64(_VECTOR, _VECTOR, _VECTOR)),
 }
 

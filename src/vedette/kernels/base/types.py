@@ -69,6 +69,7 @@ class Sensor(NamedTuple):
     measurement_jacobian: Any
     measurement_noise_cov: Any
     prob_detection: Any
+    mean_prob_detection: Any  # of a Gaussian; asked where `detection_rule` says so
     log_clutter_intensity: Any
     measurement_params: Floats
     noise_params: Floats
@@ -76,6 +77,8 @@ class Sensor(NamedTuple):
     clutter_params: Floats
     angular: Bools  # (meas_dim,) true of angles in radians, whose residuals are wrapped to (-pi, pi]
     method: int  # as of `Motion`
+    detection_rule: int  # AT_CENTRE, CLOSED_FORM or BY_NODES of `vedette.kernels.gaussian.detection`
+    detection_nodes: Floats  # (num, 3) weight and two standard deviates of a node; read BY_NODES alone
 
 
 class ScanInput(NamedTuple):

@@ -10,6 +10,7 @@ from vedette.errors import ModelError
 from vedette.kernels.base import bundle_types as _bundle_types  # noqa: F401
 from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Bools, Floats, Sensor
+from vedette.kernels.gaussian.detection import detection_probability
 from vedette.kernels.gaussian.joseph import posterior_of_squares
 from vedette.kernels.gaussian.linalg import LOG_2PI, cholesky_of_size, log_det_from_factor
 from vedette.kernels.gaussian.scratch import Scratch, wrap_angle
@@ -138,7 +139,7 @@ def _condition(
 
 @inlined
 def expect(sensor: Sensor, pose: Floats, mean: Floats, cov: Floats, at: int, out: Innovation, scratch: Scratch) -> None:
-    """Fill entry `at` of `out`; noise and detection probability are taken at the predicted mean (paper-notes 3)."""
+    """Fill entry `at` of `out`; noise is taken at the predicted mean (paper-notes 3), detection as the sensor says."""
     n, m = mean.shape[0], out.predicted.shape[1]
     jacobian, noise, innovation = scratch.measurement_jacobian, scratch.measurement_noise, scratch.innovation_cov
     factor, cross, posterior = out.factor[at], out.whitened_cross[at], out.covs[at]
@@ -160,10 +161,7 @@ def expect(sensor: Sensor, pose: Floats, mean: Floats, cov: Floats, at: int, out
     if not exact:
         posterior_of_squares(mean, cov, factor, cross, weights, scratch, posterior)
     out.log_norm[at] = -0.5 * (log_det_from_factor(factor) + m * LOG_2PI)
-    detection = sensor.prob_detection(mean, pose, sensor.detection_params)
-    if not 0.0 <= detection <= 1.0:
-        raise ModelError("detection model: probability is not in [0, 1]")
-    out.prob_detection[at] = detection
+    out.prob_detection[at] = detection_probability(sensor, pose, mean, cov, scratch.points[0])
 
 
 @inlined

@@ -18,7 +18,7 @@ from vedette.kernels.steps.lmb import weigh_by_existence
 def prob_explained(belief: Lmb, scan: ScanInput, sensor: Sensor, truncation: Truncation) -> Floats:
     """(num_measurements,) probability that each is of a track, if tracks did not contend for it:
 
-        sum over labels of r <p, p_D g(z | .)> / (kappa(z) + the same sum).
+    sum over labels of r <p, p_D g(z | .)> / (kappa(z) + the same sum).
     """
     rows = standing_rows(belief.tracks, scan, sensor)
     weigh_by_existence(belief.existence_logit, rows)

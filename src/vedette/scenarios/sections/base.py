@@ -76,6 +76,7 @@ Count = Annotated[Whole, Field(ge=1, le=1_000_000_000)]
 Share = Annotated[float, Field(ge=0.0, lt=1.0)]
 Chance = Annotated[float, Field(gt=0.0, lt=1.0)]
 GaussianMethod = Literal["auto", "ekf", "ukf", "ckf"]
+DetectionAt = Literal["centre", "mean"]
 
 
 IN_PART = {"in_part": True}  # validation context under which what cannot be read becomes an `Unread`

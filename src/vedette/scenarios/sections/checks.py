@@ -14,6 +14,7 @@ from vedette.covariances import covariance_fault
 from vedette.scenarios.faults import Finding, Path, describe
 from vedette.scenarios.sections.base import attempt
 from vedette.scenarios.sections.fusion import OF_LMBS
+from vedette.scenarios.sections.network_checks import NETWORK_CHECKS
 from vedette.scenarios.sections.tracking import UNLABELLED
 from vedette.scenarios.sections.world import BirthSite
 
@@ -23,6 +24,8 @@ if TYPE_CHECKING:
 
 # How far a decision time may be from the time of a scan, in scans: rounding of sums of decimal fractions.
 _TIME_TOLERANCE = 1e-6
+# Components of the state of a recorded target: position and velocity.
+_RECORDED_DIM = 4
 
 
 def step_of_time(time: float, start: float, step_period: float) -> int | None:
@@ -175,9 +178,25 @@ def _name_once(path: Path, sensor: Sensor, names: set[str]) -> Iterator[Finding]
         names.add(sensor.name)
 
 
+def _scan_steps(model: ScenarioModel) -> Iterator[Finding]:
+    for i, sensor in enumerate(model.sensors):
+        yield from attempt(_first_scan(("sensors", i, "scans", "first"), sensor, model))
+
+
+def _first_scan(path: Path, sensor: Sensor, model: ScenarioModel) -> Iterator[Finding]:
+    yield from _up_to_last(path, sensor.scans.first, model.time.num_steps)
+
+
 def _score(model: ScenarioModel) -> Iterator[Finding]:
     for name in ("from_step", "to_step"):
         yield from attempt(_last_step(("ospa", name), model.ospa, name, model))
+    if (
+        model.ospa.components == "state"
+        and model.targets.kind == "recorded"
+        and model.motion.state_dim != _RECORDED_DIM
+    ):
+        wanted = f"position, as states have {model.motion.state_dim} components and recorded targets {_RECORDED_DIM}"
+        yield ("ospa", "components"), wanted, '"state"'
 
 
 CHECKS = (
@@ -195,5 +214,7 @@ CHECKS = (
     _birth_sites,
     _targets,
     _sensor_names,
+    _scan_steps,
     _score,
+    *NETWORK_CHECKS,
 )

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, TypeAlias
 from pydantic import Field
 
 from vedette.scenarios.faults import Finding, describe
-from vedette.scenarios.sections.base import Chance, Count, Probability, Section, Share, check
+from vedette.scenarios.sections.base import Chance, Count, Probability, Section, check
 from vedette.scenarios.sections.custom import Custom
 
 if TYPE_CHECKING:  # with the fusions comes the compiler, which a check does without
@@ -50,10 +50,6 @@ class FusionLimits(Section):
     max_combinations: Count = Field(
         default=4096, description="Bound on the combinations of components of one label at all sensors [-]."
     )
-    min_existence: Share = Field(
-        default=1e-4, description="Fused labels less probable than this are dropped (parallel) [-]."
-    )
-    max_labels: Count = Field(default=200, description="Most labels of the fused density (parallel) [-].")
 
 
 class CustomCentral(Custom):
@@ -150,15 +146,24 @@ class Fusion(Section):
 
     def build(self, num_sensors: int, folder: Path) -> FusionRule | None:
         """The fusion of the sensors' densities after each scan; None where one belief takes all scans."""
-        from vedette.fusion import Matched, ParallelLimits, ParallelUpdate
+        from vedette.fusion import Matched, ParallelUpdate
 
         if self.kind in ONE_BELIEF:
             return None
         if self.kind == "parallel":
-            limits = ParallelLimits(self.limits.min_existence, self.limits.max_labels)
-            return ParallelUpdate(missing_existence=self.missing_existence, limits=limits)
+            return ParallelUpdate(missing_existence=self.missing_existence)
         rule = self._by_label(num_sensors)
         return Matched(rule) if self.matching == "assignment" else rule
+
+    def build_merging(self, num_sensors: int, *, of_lmbs: bool) -> FusionRule:
+        """The fusion of what sensors of a network believe after different pasts: covariance intersection.
+
+        of_lmbs: whether the filters keep LMBs, of which those count at a label that see it, and labels are matched.
+        """
+        from vedette.fusion import Clmb, CmDeltaGlmb, Matched
+
+        equal = (1.0 / num_sensors,) * num_sensors
+        return Matched(Clmb(equal, by_views=True)) if of_lmbs else CmDeltaGlmb(equal)
 
     def build_of_decisions(self, num_sensors: int, *, of_lmbs: bool) -> FusionRule:
         """The fusion that joint decisions go by: plain covariance intersection.

@@ -12,8 +12,9 @@ from vedette.scenarios.sections.base import Name, Section, attempt, check
 from vedette.scenarios.sections.checks import CHECKS, step_of_time
 from vedette.scenarios.sections.control import Control
 from vedette.scenarios.sections.fusion import AnyFusion, Fusion
+from vedette.scenarios.sections.network import NetworkSection
 from vedette.scenarios.sections.planners import STRATEGIES, CustomPlanner
-from vedette.scenarios.sections.scoring import AnyEstimator, CustomMetric, MapEstimator, Ospa
+from vedette.scenarios.sections.scoring import AnyEstimator, AnyMetric, MapEstimator, Ospa
 from vedette.scenarios.sections.sensors import Sensor, SensorDefaults
 from vedette.scenarios.sections.targets import Targets
 from vedette.scenarios.sections.tracking import AnyFilter, Filter
@@ -56,14 +57,17 @@ class ScenarioModel(Section):
     sensors: Annotated[tuple[Sensor, ...], Field(strict=False, min_length=1)] = Field(description="The sensors [-].")
     filter: AnyFilter = Field(default=Filter(), description="The local filters [-].")
     fusion: AnyFusion = Field(default=Fusion(), description="How their densities become one [-].")
+    network: NetworkSection | None = Field(
+        default=None, description="The radio between the sensors; none: all that one knows, all know at once [-]."
+    )
     estimator: AnyEstimator = Field(default=MapEstimator(), description="How estimates are read off [-].")
     control: Control = Field(default=Control(), description="When and how the sensors decide [-].")
     planners: dict[Name, CustomPlanner] = Field(
         default={}, description="Strategies of your own by name, beside jdm, idm, random, fixed and still [-]."
     )
     ospa: Ospa = Field(default=Ospa(), description="How the estimates are scored [-].")
-    metrics: dict[Name, CustomMetric] = Field(
-        default={}, description="Measures of your own by name, each a column of the scans [-]."
+    metrics: dict[Name, AnyMetric] = Field(
+        default={}, description="Measures beside the built-in ones by name, each a column of the scans [-]."
     )
 
     @check

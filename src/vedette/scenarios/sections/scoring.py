@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 from pydantic import Field
 
 from vedette.scenarios.faults import Finding, describe
-from vedette.scenarios.sections.base import Chance, Count, Positive, Section, check
+from vedette.scenarios.sections.base import Chance, Count, Positive, Probability, Section, check
 from vedette.scenarios.sections.custom import Custom
 
 if TYPE_CHECKING:  # with the densities comes the compiler, which a check does without
@@ -73,11 +73,28 @@ class CustomMetric(Custom):
     gives: ClassVar[str] = "vedette.simulation.records:Measure"
 
 
+class TrackedShare(Section):
+    """At each scan, the share of the targets seen by some sensor that have an estimate within the cutoff of `ospa`."""
+
+    kind: Literal["tracked_share"] = Field(default="tracked_share", description="Kind of measure [-].")
+    min_detection: Probability = Field(
+        default=0.5, description="Probability of detection from which on a sensor sees a target [-]."
+    )
+
+
+AnyMetric = Annotated[CustomMetric | TrackedShare, Field(discriminator="kind")]
+
+
 class Ospa(Section):
-    """The score: optimal subpattern assignment distance between estimates and truth, in position."""
+    """The score: optimal subpattern assignment distance between estimates and truth."""
 
     cutoff: Positive = Field(default=100.0, description="Cost of a missed or false target, c [m].")
     order: float = Field(default=1.0, ge=1.0, description="Order p [-].")
+    components: Literal["position", "state"] = Field(
+        default="position",
+        description="What OSPA compares: positions, in metres, or whole states, with metres, m/s and rad/s as numbers "
+        "of one kind, and the cutoff in no unit. Measures beside OSPA are of positions [-].",
+    )
     window: Count = Field(default=10, description="Scans of the window of OSPA(2) [-].")
     from_step: Count | None = Field(
         default=None, description="First scan of the reported mean; none: the one after the first decision, or 1 [-]."
@@ -88,3 +105,8 @@ class Ospa(Section):
     def _in_order(self) -> Iterator[Finding]:
         if self.from_step is not None and self.to_step is not None and self.to_step < self.from_step:
             yield ("to_step",), f"a step from from_step, {self.from_step}, on", describe(self.to_step)
+
+    @property
+    def unit(self) -> str:
+        """Of the score: that of a position, or none."""
+        return "m" if self.components == "position" else ""

@@ -7,24 +7,38 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
+import numpy as np
 from pydantic import Field
 
 from vedette.scenarios.faults import Finding, describe
-from vedette.scenarios.sections.base import GaussianMethod, Name, Point, Section, check
+from vedette.scenarios.sections.base import DetectionAt, GaussianMethod, Name, Point, Section, Step, check
+from vedette.scenarios.sections.clutter import Clutter, RegionClutter
+from vedette.scenarios.sections.detection import Detection, GaussianDetection
 from vedette.scenarios.sections.platforms import AnyPlatform, Still
-from vedette.scenarios.sections.sensing import (
-    BearingRange,
-    Clutter,
-    Detection,
-    GaussianDetection,
-    Measurement,
-    Noise,
-    RangeDependentNoise,
-    RegionClutter,
-)
+from vedette.scenarios.sections.sensing import BearingRange, Measurement, Noise, RangeDependentNoise
+from vedette.scenarios.sections.sensor_checks import clutter_box_findings, clutter_findings, noise_findings
+from vedette.scenarios.sections.true_sensors import TrueSensor
 
 if TYPE_CHECKING:  # with the models comes the compiler, which a check does without
+    from vedette.kernels.base.types import Bools
     from vedette.models import Region, SensorModel
+    from vedette.simulation import TrueSensor as TrueSensorModel
+
+
+class ScanTimes(Section):
+    """The steps at which a sensor scans: the first, and every so many after it."""
+
+    every: Step = Field(default=1, description="Steps from one scan to the next [-].")
+    first: Step = Field(default=1, description="Step of the first scan [-].")
+
+    @check
+    def _within_the_first_round(self) -> Iterator[Finding]:
+        if self.first > self.every:
+            yield ("first",), f"a step up to every, {self.every}", describe(self.first)
+
+    def build(self, num_steps: int) -> Bools:
+        """(num_steps,) whether it scans."""
+        return np.asarray((np.arange(1, num_steps + 1) - self.first) % self.every == 0)
 
 
 class Sensor(Section):
@@ -44,57 +58,45 @@ class Sensor(Section):
     detection: Detection = Field(default=GaussianDetection(), description="Probability of detection [-].")
     clutter: Clutter = Field(default=RegionClutter(), description="False measurements [-].")
 
+    truth: TrueSensor | None = Field(
+        default=None,
+        description="What it is in truth, where the filters' model of it differs [-].",
+    )
+    scans: ScanTimes = Field(default=ScanTimes(), description="Steps at which it scans [-].")
+
     @check
     def _a_camera_carries_a_camera(self) -> Iterator[Finding]:
-        if self.detection.kind == "camera" and len(self.pose) < 5:
+        true = () if self.truth is None else (self.truth.detection, self.truth.first_detection)
+        kinds = [section.kind for section in (self.detection, *true) if section is not None]
+        if "camera" in kinds and len(self.pose) < 5:
             yield ("platform",), "a camera, as its detection is a camera's", self.platform.kind
 
     @check
     def _noise_fits(self) -> Iterator[Finding]:
-        noise, dim = self.noise, self.measurement.dim
-        if noise.kind == "range_dependent" and self.measurement.kind in ("position", "custom"):
-            kind = self.measurement.kind
-            yield ("noise",), f"constant or custom noise for a {kind} measurement", "range_dependent noise"
-        elif noise.kind == "constant" and dim is not None and len(noise.std) != dim:
-            yield ("noise", "std"), self._components(dim), describe(noise.std)
+        yield from noise_findings(self.measurement, self.noise, ("noise",))
 
     @check
-    def _clutter_is_for_a_known_measurement(self) -> Iterator[Finding]:
-        if self.clutter.kind == "region" and self.measurement.kind == "custom":
-            yield ("clutter",), "measurement_space or custom clutter for a custom measurement", "region clutter"
-
-    @check
-    def _clutter_has_the_components(self) -> Iterator[Finding]:
-        if self.clutter.kind != "measurement_space":
-            return
-        low, high, dim = self.clutter.low, self.clutter.high, self.measurement.dim
-        for name, values in (("low", low), ("high", high)):
-            if dim is not None and len(values) != dim:
-                yield ("clutter", name), self._components(dim), describe(values)
-        if dim is None and len(low) != len(high):
-            yield ("clutter", "high"), f"as many numbers as low, {len(low)}", describe(high)
+    def _clutter_is_for_the_measurement(self) -> Iterator[Finding]:
+        yield from clutter_findings(self.measurement, self.clutter, ("clutter",))
 
     @check
     def _clutter_is_a_box(self) -> Iterator[Finding]:
-        if self.clutter.kind != "measurement_space":
-            return
-        for j, (low, high) in enumerate(zip(self.clutter.low, self.clutter.high, strict=False)):
-            if high <= low:
-                yield ("clutter", "high", j), f"a number above low, {low:g}", describe(high)
-            elif j in self.measurement.angular and high - low > 2.0 * math.pi * (1.0 + 1e-9):
-                yield ("clutter", "high", j), f"an angle of at most 2 pi above low, {low:g}", describe(high)
+        yield from clutter_box_findings(self.measurement, self.clutter, ("clutter",))
 
-    def _components(self, dim: int) -> str:
-        numbers = "1 number" if dim == 1 else f"{dim} numbers"
-        return f"{numbers}, as a {self.measurement.kind} measurement has"
+    @check
+    def _truth_is_of_one_kind_with_the_model(self) -> Iterator[Finding]:
+        if self.truth is not None:
+            yield from self.truth.findings_beside(self.measurement)
 
     @property
     def pose(self) -> tuple[float, ...]:
         """Where it starts: [px, py, heading_rad], and what else its platform has."""
         return (*self.position, math.radians(self.heading_deg), *self.platform.components())
 
-    def build(self, region: Region, method: GaussianMethod, folder: Path) -> SensorModel:
-        """What it sees; `folder` is what a custom model's file is relative to.
+    def build(
+        self, region: Region, method: GaussianMethod, folder: Path, detection_at: DetectionAt = "centre"
+    ) -> SensorModel:
+        """What the filters know of it; `folder` is what a custom model's file is relative to.
 
         Raises:
             InputError: a custom model that cannot be had, or parts that do not fit together.
@@ -108,7 +110,16 @@ class Sensor(Section):
             self.detection.build(folder),
             self.clutter.build(measurement, self.measurement.kind, region, folder),
             method,
+            detection_at,
         )
+
+    def build_true(self, known: SensorModel, region: Region, folder: Path) -> TrueSensorModel:
+        """What it is, beside what the filters know; errors as of `build`."""
+        from vedette.simulation.true_sensors import TrueSensor
+
+        if self.truth is None:
+            return TrueSensor(known)
+        return self.truth.build(known, self.measurement, region, folder)
 
 
 class SensorDefaults(Section):
@@ -123,3 +134,7 @@ class SensorDefaults(Section):
     noise: Noise | None = Field(default=None, description="Measurement noise [-].")
     detection: Detection | None = Field(default=None, description="Probability of detection [-].")
     clutter: Clutter | None = Field(default=None, description="False measurements [-].")
+    truth: TrueSensor | None = Field(
+        default=None, description="What they are in truth, where the filters' model of them differs [-]."
+    )
+    scans: ScanTimes | None = Field(default=None, description="Steps at which they scan [-].")

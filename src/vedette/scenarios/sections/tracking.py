@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
@@ -9,7 +10,17 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 from pydantic import Field
 
 from vedette.scenarios.faults import Finding
-from vedette.scenarios.sections.base import Chance, Count, GaussianMethod, Probability, Section, Share, check
+from vedette.scenarios.sections.base import (
+    Chance,
+    Count,
+    DetectionAt,
+    GaussianMethod,
+    Positive,
+    Probability,
+    Section,
+    Share,
+    check,
+)
 from vedette.scenarios.sections.custom import Custom
 
 if TYPE_CHECKING:  # with the filters comes the compiler, which a check does without
@@ -66,6 +77,10 @@ class FilterLimits(Section):
         default=1e-4, description="LMB tracks and Bernoullis less probable than this are dropped [-]."
     )
     max_labels: Count = Field(default=200, description="Most tracks of an LMB, Bernoullis of a cb_member [-].")
+    max_position_std: Positive | None = Field(
+        default=None,
+        description="Labels whose position is less certain than this along both axes are dropped; none: never [m].",
+    )
     max_intensity_components: Count = Field(
         default=100, description="Most Gaussian components of the intensity of a phd or cphd, all targets together [-]."
     )
@@ -77,7 +92,8 @@ class FilterLimits(Section):
         """Caps and thresholds of the filters."""
         from vedette.filters import Limits
 
-        return Limits(**self.model_dump())
+        given = self.model_dump()
+        return Limits(**given | {"max_position_std": self.max_position_std or math.inf})
 
 
 # Filters that keep no identity of their targets.
@@ -95,6 +111,11 @@ class Filter(Section):
     )
     gaussian_method: GaussianMethod = Field(
         default="auto", description="Extended, unscented or cubature Kalman; auto: extended where Jacobians exist [-]."
+    )
+    detection_at: DetectionAt = Field(
+        default="centre",
+        description="Of a predicted Gaussian, the probability of detection at its centre, as in the paper, or its mean "
+        "over the Gaussian: for sensors whose view ends [-].",
     )
     assignment: Assignment = Field(default=RankedAssignment(), description="How associations are truncated [-].")
     limits: FilterLimits = Field(default=FilterLimits(), description="What is thrown away [-].")
@@ -128,13 +149,13 @@ class Filter(Section):
             marginalised=self.kind == "m_delta_glmb",
         )
 
-    def build_central(self, targets: TargetModel, sensors: tuple[SensorModel, ...]) -> CentralFilter:
-        """The filter of all sensors' scans, for a fusion of kind central."""
-        from vedette.filters import MultiSensorGlmbFilter, MultiSensorLmbFilter
+    def build_central(self, targets: TargetModel, sensors: tuple[SensorModel, ...], *, in_turn: bool) -> CentralFilter:
+        """The filter of all sensors' scans; in_turn: whether they are taken one after the other, else jointly."""
+        from vedette.filters import MultiSensorGlmbFilter, MultiSensorLmbFilter, SequentialLmbFilter
 
         limits = self.limits.build()
         if self.kind == "lmb":
-            return MultiSensorLmbFilter(targets, sensors, limits)
+            return (SequentialLmbFilter if in_turn else MultiSensorLmbFilter)(targets, sensors, limits)
         return MultiSensorGlmbFilter(targets, sensors, limits, marginalised=self.kind == "m_delta_glmb")
 
 
@@ -144,6 +165,11 @@ class CustomFilter(Custom):
     kind: Literal["custom"] = Field(default="custom", description="Kind of filter [-].")
     gaussian_method: GaussianMethod = Field(
         default="auto", description="Extended, unscented or cubature Kalman; auto: extended where Jacobians exist [-]."
+    )
+    detection_at: DetectionAt = Field(
+        default="centre",
+        description="Of a predicted Gaussian, the probability of detection at its centre, as in the paper, or its mean "
+        "over the Gaussian: for sensors whose view ends [-].",
     )
     gives: ClassVar[str] = "vedette.filters:Filter"
 

@@ -14,6 +14,7 @@ from pydantic import Field
 from vedette.covariances import SMALLEST_VARIANCE
 from vedette.scenarios.faults import Finding, describe
 from vedette.scenarios.sections.base import (
+    Chance,
     GaussianMethod,
     Positive,
     Probability,
@@ -84,10 +85,20 @@ StateOrder = Annotated[
 
 
 class ConstantVelocity(Section):
-    """Constant velocity with white acceleration noise, held over a step. State [px, py, vx, vy]."""
+    """Constant velocity with white acceleration noise. State [px, py, vx, vy]."""
 
     kind: Literal["constant_velocity"] = Field(default="constant_velocity", description="Kind of motion [-].")
-    sigma_v: float = Field(default=5.0, ge=0.0, description="Standard deviation of the acceleration [m/s^2].")
+    sigma_v: float = Field(
+        default=5.0,
+        ge=0.0,
+        description="Standard deviation of a held acceleration; of a continuous one the root of its spectral density, "
+        "in m/s^1.5 [m/s^2].",
+    )
+    acceleration: Literal["held", "continuous"] = Field(
+        default="held",
+        description="Whether the acceleration is constant within a step, as in the paper, or white in continuous time "
+        "[-].",
+    )
     state_order: StateOrder = "grouped"
 
     @property
@@ -99,7 +110,7 @@ class ConstantVelocity(Section):
         """The motion model."""
         from vedette.models import constant_velocity
 
-        return constant_velocity(self.sigma_v, method=method)
+        return constant_velocity(self.sigma_v, acceleration=self.acceleration, method=method)
 
 
 class CoordinatedTurn(Section):
@@ -183,6 +194,15 @@ Survival = Annotated[ConstantSurvival | CustomSurvival, Field(discriminator="kin
 CovRows = Annotated[tuple[SomeNumbers, ...], Field(strict=False)]
 
 
+def _spreads(stds: SomeNumbers) -> Iterator[Finding]:
+    """What is wrong with standard deviations of a birth."""
+    for j, std in enumerate(stds):
+        if std <= 0.0:
+            yield ("std", j), "a number above 0", describe(std)
+        elif std * std < SMALLEST_VARIANCE:
+            yield ("std", j), f"a number of at least {math.sqrt(SMALLEST_VARIANCE):g}", describe(std)
+
+
 class BirthSite(Section):
     """A place where targets appear: one Bernoulli of the birth density."""
 
@@ -202,24 +222,42 @@ class BirthSite(Section):
 
     @check
     def _positive(self) -> Iterator[Finding]:
-        for j, std in enumerate(self.std or ()):
-            if std <= 0.0:
-                yield ("std", j), "a number above 0", describe(std)
-            elif std * std < SMALLEST_VARIANCE:
-                yield ("std", j), f"a number of at least {math.sqrt(SMALLEST_VARIANCE):g}", describe(std)
+        yield from _spreads(self.std or ())
 
     def covariance(self) -> Floats:
         """Covariance of the state, in the order of the file."""
         return np.array(self.cov) if self.cov is not None else np.diag(np.square(self.std or ()))
 
 
+class MeasuredBirth(Section):
+    """Births where something was measured at the scan before that no track explains."""
+
+    expected: Positive = Field(default=0.5, description="Mean number of such births a scan [-].")
+    max_existence: Chance = Field(default=0.03, description="Most that any of them may have as existence [-].")
+    std: SomeNumbers = Field(description="Standard deviation of each state component of a birth [m, m/s, ...].")
+
+    @check
+    def _positive(self) -> Iterator[Finding]:
+        yield from _spreads(self.std)
+
+
 class Birth(Section):
-    """LMB births, the same at every sensor: all share one label space. Label = (birth step, index of the site)."""
+    """LMB births. Label = (birth step, index of the site); those from measurements have the indices after the sites."""
 
     steps: Literal["every"] | Steps = Field(
-        default="every", description='Scans at which targets may appear: a list, or "every" [-].'
+        default="every", description='Scans at which targets may appear at the sites: a list, or "every" [-].'
     )
-    sites: Annotated[tuple[BirthSite, ...], Field(strict=False, min_length=1)] = Field(description="The sites [-].")
+    sites: Annotated[tuple[BirthSite, ...], Field(strict=False)] = Field(
+        default=(), description="The sites, the same at every sensor [-]."
+    )
+    from_measurements: MeasuredBirth | None = Field(
+        default=None, description="Births from measurements, beside the sites; none: at the sites alone [-]."
+    )
+
+    @check
+    def _somewhere(self) -> Iterator[Finding]:
+        if not self.sites and self.from_measurements is None:
+            yield ("sites",), "at least one site, or from_measurements", "neither"
 
     @check
     def _each_once(self) -> Iterator[Finding]:
@@ -229,13 +267,17 @@ class Birth(Section):
                 yield ("steps", i), "each step once", f"{step} again"
 
     def build(self, motion: Motion) -> BirthModel:
-        """The birth sites, shared by all sensors."""
-        from vedette.models import BirthModel
+        """The births, shared by all sensors."""
+        from vedette.models import BirthModel, MeasurementBirth
 
-        order = grouped_order(motion)
+        order, dim, num = grouped_order(motion), motion.state_dim, len(self.sites)
+        measured = self.from_measurements
         return BirthModel(
             np.array([site.existence for site in self.sites]),
-            np.array([site.mean for site in self.sites])[:, order],
-            np.array([site.covariance() for site in self.sites])[:, order][:, :, order],
+            np.array([site.mean for site in self.sites]).reshape(num, dim)[:, order],
+            np.array([site.covariance() for site in self.sites]).reshape(num, dim, dim)[:, order][:, :, order],
             None if self.steps == "every" else frozenset(self.steps),
+            None
+            if measured is None
+            else MeasurementBirth(measured.expected, measured.max_existence, np.array(measured.std)[order]),
         )

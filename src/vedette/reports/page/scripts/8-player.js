@@ -15,10 +15,10 @@ function startReplay(root) {
   }
 
   function tell() {
-    const { times, truth, estimates, ospa } = run();
+    const { times, truth, estimates, ospa, ospa_unit } = run();
     const [total, localisation, cardinality] = ospa[state.step];
     const time = +times[state.step].toFixed(3);
-    const errors = `OSPA ${total.toFixed(1)} m (localisation ${localisation.toFixed(1)}, cardinality ${cardinality.toFixed(1)})`;
+    const errors = `OSPA ${total.toFixed(1)}${ospa_unit && ` ${ospa_unit}`} (localisation ${localisation.toFixed(1)}, cardinality ${cardinality.toFixed(1)})`;
     const counts = `${truth[state.step].length} targets, ${estimates[state.step].length} estimates`;
     part("summary").textContent = `t = ${time} s: ${counts}, ${errors}`;
     part("decision").textContent = decisionText();

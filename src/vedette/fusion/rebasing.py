@@ -1,0 +1,96 @@
+"""What a scan has said of the targets, added to another prediction than the one that it updated."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from vedette.densities import LMB, TrackTable, track_moments
+from vedette.densities.checks import unchecked
+from vedette.densities.label_sets import Label, take_tracks
+from vedette.kernels.base.types import Floats, Ints
+from vedette.kernels.labelled.stacking import stack_tracks
+
+
+def with_labels_of(prediction: LMB, others: LMB) -> LMB:
+    """The prediction, and what it lacks of another's labels as the other has them."""
+    own = _places(prediction)
+    lacking = np.array([i for label, i in _places(others).items() if label not in own], np.int64)
+    if len(lacking) == 0:
+        return prediction
+    table = stack_tracks([prediction.tracks.to_kernel(), take_tracks(others.tracks, lacking).to_kernel()])
+    order = np.lexsort(table.labels.T[::-1])
+    logits = np.concatenate([prediction.existence_logit, others.existence_logit[lacking]])
+    return unchecked(LMB, take_tracks(TrackTable.from_kernel(table), order), logits[order])
+
+
+def rebased(posterior: LMB, own: LMB, prediction: LMB) -> LMB:
+    """A sensor's posterior as if its scan had updated `prediction` instead of `own`, label by label.
+
+    What the scan said is the ratio of the sensor's posterior to its own prediction, a Gaussian of information
+    Y = P^-1 - P_own^-1, its negative eigenvalues set to 0. With p(x) the new prediction,
+
+        logit = l_new + (l - l_own) + log integral of p(x) N(x; m, P) / N(x; m_own, P_own).
+
+    Labels that the sensor's own prediction or posterior lacks are as in the prediction: its scan said nothing of them.
+    Mixtures become Gaussians of their moments. The posterior itself is returned where the predictions are one object.
+    """
+    if own is prediction:
+        return posterior
+    means, covs = (np.array(moment) for moment in track_moments(prediction.tracks))
+    logits = prediction.existence_logit.copy()
+    at, before, after = _common(prediction, own, posterior)
+    own_means, own_covs = (moment[before] for moment in track_moments(own.tracks))
+    new_means, new_covs = (moment[after] for moment in track_moments(posterior.tracks))
+    means[at], covs[at], gained = _updated((means[at], covs[at]), (own_means, own_covs), (new_means, new_covs))
+    logits[at] += posterior.existence_logit[after] - own.existence_logit[before] + gained
+    num = len(logits)
+    tracks = unchecked(TrackTable, prediction.tracks.labels, np.arange(num + 1), np.zeros(num), means, covs)
+    return unchecked(LMB, tracks, logits)
+
+
+def _places(lmb: LMB) -> dict[Label, int]:
+    return {tuple(label): i for i, label in enumerate(lmb.tracks.labels.tolist())}
+
+
+def _common(*lmbs: LMB) -> tuple[Ints, ...]:
+    """Places in each of the LMBs of the labels that all have."""
+    places = [_places(lmb) for lmb in lmbs]
+    labels = [label for label in places[0] if all(label in other for other in places[1:])]
+    return tuple(np.array([own[label] for label in labels], np.int64) for own in places)
+
+
+def _updated(
+    prediction: tuple[Floats, Floats], own: tuple[Floats, Floats], posterior: tuple[Floats, Floats]
+) -> tuple[Floats, Floats, Floats]:
+    """(n, dim) means and (n, dim, dim) covariances of prediction times posterior over own, and log of its integral.
+
+    About the prediction's mean: the ratio is exp(c + y'u - u'Yu / 2) of u = x - m.
+    """
+    mean, cov = prediction
+    before, after = _inverse(own[1]), _inverse(posterior[1])
+    values, vectors = np.linalg.eigh(after - before)
+    information: Floats = (vectors * np.maximum(values, 0.0)[:, None, :]) @ vectors.swapaxes(1, 2)
+    clipped = before + information  # the posterior's, as far as a scan can have brought it
+    ahead, behind = posterior[0] - mean, own[0] - mean
+    pull = _times(clipped, ahead) - _times(before, behind)
+    constant = 0.5 * (_log_det(clipped) - _log_det(before) - _form(clipped, ahead) + _form(before, behind))
+    total = _inverse(cov) + information
+    fused = _inverse(total)
+    gained = constant + 0.5 * (_form(fused, pull) - _log_det(total) - _log_det(cov))
+    return mean + _times(fused, pull), 0.5 * (fused + fused.swapaxes(1, 2)), gained
+
+
+def _inverse(matrices: Floats) -> Floats:
+    return np.asarray(np.linalg.inv(matrices), np.float64)
+
+
+def _times(matrices: Floats, vectors: Floats) -> Floats:
+    return np.asarray(np.einsum("lij,lj->li", matrices, vectors))
+
+
+def _form(matrices: Floats, vectors: Floats) -> Floats:
+    return np.asarray(np.einsum("li,lij,lj->l", vectors, matrices, vectors))
+
+
+def _log_det(matrices: Floats) -> Floats:
+    return np.asarray(np.linalg.slogdet(matrices)[1])

@@ -1,0 +1,123 @@
+"""The built-in detection functions, and their means over a Gaussian where these can be had."""
+
+from __future__ import annotations
+
+import math
+
+from vedette.kernels.base.compile import kernel
+from vedette.kernels.base.types import Floats
+from vedette.kernels.gaussian.position_integrals import gaussian_mean, share_in_sector
+from vedette.kernels.gaussian.scratch import wrap_angle
+from vedette.models.functions import model_function
+
+# The built-in models stay at or below this: certain detection would make a single missed detection impossible, and with
+# it every hypothesis that holds the target (paper-notes 4).
+MAX_PROB_DETECTION = 1.0 - 1e-9
+
+# Beyond it the logistic function is 0 to the last bit, and its exponential no longer a double.
+_LARGEST_EXPONENT = 700.0
+
+
+@model_function("prob_detection")
+def constant(state: Floats, pose: Floats, params: Floats) -> float:
+    """params: probability."""
+    return params[0]  # type: ignore[no-any-return]
+
+
+@model_function("mean_prob_detection")
+def mean_constant(mean: Floats, cov: Floats, pose: Floats, params: Floats) -> float:
+    """As `constant`."""
+    return params[0]  # type: ignore[no-any-return]
+
+
+@model_function("prob_detection")
+def gaussian(state: Floats, pose: Floats, params: Floats) -> float:
+    """params: sigma."""
+    dx, dy = state[0] - pose[0], state[1] - pose[1]
+    return min(math.exp(-0.5 * (dx * dx + dy * dy) / (params[0] * params[0])), MAX_PROB_DETECTION)
+
+
+@model_function("mean_prob_detection")
+def mean_gaussian(mean: Floats, cov: Floats, pose: Floats, params: Floats) -> float:
+    """As `gaussian`; the cap is that of the mean."""
+    return min(gaussian_mean(mean[0] - pose[0], mean[1] - pose[1], cov, params[0] * params[0]), MAX_PROB_DETECTION)
+
+
+@model_function("prob_detection")
+def limited_range(state: Floats, pose: Floats, params: Floats) -> float:
+    """params: probability, max_range, outside."""
+    dx, dy = state[0] - pose[0], state[1] - pose[1]
+    return params[0] if dx * dx + dy * dy <= params[1] * params[1] else params[2]  # type: ignore[no-any-return]
+
+
+@model_function("mean_prob_detection")
+def mean_limited_range(mean: Floats, cov: Floats, pose: Floats, params: Floats) -> float:
+    """As `limited_range`."""
+    share = share_in_sector(mean[0] - pose[0], mean[1] - pose[1], cov, params[1], 0.0, math.pi)
+    return params[2] + (params[0] - params[2]) * share  # type: ignore[no-any-return]
+
+
+@kernel
+def _in_sector(dx: float, dy: float, max_range: float, middle: float, half_width: float) -> bool:
+    """Whether (dx, dy) is within `max_range` of the origin, and of `middle` by `half_width`; the origin itself is."""
+    square = dx * dx + dy * dy
+    if square > max_range * max_range:
+        return False
+    return not (square > 0.0 and abs(wrap_angle(math.atan2(dy, dx) - middle)) > half_width)
+
+
+@model_function("prob_detection")
+def limited_sector(state: Floats, pose: Floats, params: Floats) -> float:
+    """params: probability, max_range, half_width_rad, outside."""
+    seen = _in_sector(state[0] - pose[0], state[1] - pose[1], params[1], pose[2], params[2])
+    return params[0] if seen else params[3]  # type: ignore[no-any-return]
+
+
+@model_function("mean_prob_detection")
+def mean_limited_sector(mean: Floats, cov: Floats, pose: Floats, params: Floats) -> float:
+    """As `limited_sector`."""
+    share = share_in_sector(mean[0] - pose[0], mean[1] - pose[1], cov, params[1], pose[2], params[2])
+    return params[3] + (params[0] - params[3]) * share  # type: ignore[no-any-return]
+
+
+@kernel
+def _logistic(exponent: float) -> float:
+    return 1.0 / (1.0 + math.exp(min(exponent, _LARGEST_EXPONENT)))
+
+
+@model_function("prob_detection")
+def soft_sector(state: Floats, pose: Floats, params: Floats) -> float:
+    """params: probability, max_range, half_width_rad, range_slope, angle_slope (0: a sharp edge), cut (1 or 0)."""
+    dx, dy = state[0] - pose[0], state[1] - pose[1]
+    distance = math.sqrt(dx * dx + dy * dy)
+    off = abs(wrap_angle(math.atan2(dy, dx) - pose[2])) if distance > 0.0 else 0.0
+    beyond = distance - params[1], off - params[2]
+    if (params[5] > 0.0 and max(beyond[0], beyond[1]) > 0.0) or (params[4] == 0.0 and beyond[1] > 0.0):
+        return 0.0
+    angular = _logistic(params[4] * beyond[1]) if params[4] > 0.0 else 1.0
+    return params[0] * _logistic(params[3] * beyond[0]) * angular  # type: ignore[no-any-return]
+
+
+@kernel
+def _reach(pose: Floats, params: Floats) -> float:
+    """How far a camera sees: the same pixels over a narrower field see farther."""
+    if len(pose) < 5:
+        raise ValueError("camera: expected a pose with pointing_rad and half_width_rad")
+    return params[1] * params[2] / pose[4] if params[2] > 0.0 and pose[4] > 0.0 else params[1]  # type: ignore[no-any-return]
+
+
+@model_function("prob_detection")
+def camera(state: Floats, pose: Floats, params: Floats) -> float:
+    """params: probability, max_range, reference half width (0: none)."""
+    reach = _reach(pose, params)
+    seen = _in_sector(state[0] - pose[0], state[1] - pose[1], reach, pose[3], pose[4])
+    return params[0] if seen else 0.0
+
+
+@model_function("mean_prob_detection")
+def mean_camera(mean: Floats, cov: Floats, pose: Floats, params: Floats) -> float:
+    """As `camera`."""
+    reach = _reach(pose, params)
+    if not pose[4] > 0.0:
+        return 0.0
+    return params[0] * share_in_sector(mean[0] - pose[0], mean[1] - pose[1], cov, reach, pose[3], pose[4])  # type: ignore[no-any-return]

@@ -1,0 +1,128 @@
+"""Clutter that is uniform in a figure around the sensor, and so moves and turns with it.
+
+The figure is a disc or a square, or the part of it within an angle of the heading. Per square metre the intensity is
+rate / area in it and 0 elsewhere; at (bearing, range) it has the Jacobian too, rate * range / area (paper-notes 5).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from vedette.kernels.base.compile import kernel
+from vedette.kernels.base.types import Floats
+from vedette.kernels.gaussian.scratch import wrap_angle
+from vedette.models.arguments import non_negative, positive, reject
+from vedette.models.clutter import ClutterModel, log_or_minus_infinity
+from vedette.models.functions import ModelFunction, model_function
+from vedette.models.measurement import MeasurementModel
+
+# params of every function here: log rate, radius or half side, 1 of a square and 0 of a disc, half width of the sector
+
+
+@kernel
+def _square_up_to(angle: float) -> float:
+    """Area of a square of half side 1 between the direction -pi / 4 and `angle`; grows by 1 each quarter turn."""
+    quarters = math.floor((angle + 0.25 * math.pi) / (0.5 * math.pi))
+    return quarters + 0.5 * (math.tan(angle - 0.5 * math.pi * quarters) + 1.0)
+
+
+@kernel
+def _area(heading: float, size: float, is_square: bool, half_width: float) -> float:
+    """Of the figure, m^2; that of a part of a square depends on the heading."""
+    if is_square:
+        return size * size * (_square_up_to(heading + half_width) - _square_up_to(heading - half_width))
+    return half_width * size * size
+
+
+@kernel
+def _log_density(dx: float, dy: float, heading: float, params: Floats) -> float:
+    """Log of the expected number per square metre at an offset from the sensor."""
+    size, is_square, half_width = params[1], params[2] > 0.0, params[3]
+    reach = max(abs(dx), abs(dy)) if is_square else math.sqrt(dx * dx + dy * dy)
+    if not reach <= size or (half_width < math.pi and abs(wrap_angle(math.atan2(dy, dx) - heading)) > half_width):
+        return -math.inf
+    return params[0] - math.log(_area(heading, size, is_square, half_width))  # type: ignore[no-any-return]
+
+
+@model_function("log_clutter_intensity")
+def _position(measurement: Floats, pose: Floats, params: Floats) -> float:
+    return _log_density(measurement[0] - pose[0], measurement[1] - pose[1], pose[2], params)
+
+
+@model_function("log_clutter_intensity")
+def _bearing_range(measurement: Floats, pose: Floats, params: Floats) -> float:
+    distance = measurement[1]
+    if not distance > 0.0:
+        return -math.inf
+    dx, dy = distance * math.cos(measurement[0]), distance * math.sin(measurement[0])
+    return _log_density(dx, dy, pose[2], params) + math.log(distance)
+
+
+_KINDS: dict[str, tuple[ModelFunction, tuple[bool, ...]]] = {
+    "position": (_position, (False, False)),
+    "bearing_range": (_bearing_range, (True, False)),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class _AroundSampler:
+    rate: float
+    size: float
+    is_square: bool
+    half_width: float
+
+    def __call__(
+        self, pose: Floats, measurement: MeasurementModel, *, state_dim: int, rng: np.random.Generator
+    ) -> Floats:
+        num, heading = int(rng.poisson(self.rate)), float(pose[2])
+        share = rng.uniform(size=(num, 2))
+        angles = heading + self.half_width * (2.0 * share[:, 0] - 1.0)
+        reach = np.full(num, self.size)
+        if self.is_square:
+            # The inverse of the area up to an angle, so that equal areas are equally likely.
+            ends = [_square_up_to(heading + side * self.half_width) for side in (-1.0, 1.0)]
+            quarters, rest = np.divmod(ends[0] + share[:, 0] * (ends[1] - ends[0]), 1.0)
+            within = np.arctan(2.0 * rest - 1.0)
+            angles, reach = 0.5 * math.pi * quarters + within, self.size / np.cos(within)
+        states = np.zeros((num, state_dim))
+        distances = reach * np.sqrt(share[:, 1])
+        states[:, 0] = pose[0] + distances * np.cos(angles)
+        states[:, 1] = pose[1] + distances * np.sin(angles)
+        return measurement.measure(states, pose)
+
+
+def around_sensor(
+    rate: float,
+    kind: str,
+    *,
+    radius: float | None = None,
+    half_side: float | None = None,
+    half_width_rad: float = math.pi,
+) -> ClutterModel:
+    """Clutter uniform over a disc, a square along the axes, or a sector of either, centred on the sensor.
+
+    Points thrown over a larger figure of which only this part is kept: `rate` is then their number times the share of
+    the area that is kept, such as pi / 4 where a square is clipped to the disc in it.
+
+    Args:
+        rate: expected number a scan in the figure.
+        kind: "position" or "bearing_range": what the sensor measures.
+        radius: of the disc, m.
+        half_side: of the square, m; one of `radius` and `half_side` is to be given.
+        half_width_rad: greatest angle from the heading, in (0, pi]; pi: all round.
+    """
+    if kind not in _KINDS:
+        raise reject("kind", f"one of {', '.join(_KINDS)}", kind)
+    if (radius is None) == (half_side is None):
+        raise reject("radius, half_side", "one of them", "neither" if radius is None else "both")
+    if positive("half_width_rad", half_width_rad) > math.pi:
+        raise reject("half_width_rad", "an angle in (0, pi]", half_width_rad)
+    rate, is_square = non_negative("rate", rate), radius is None
+    size = positive("half_side", half_side) if is_square else positive("radius", radius)
+    function, angular = _KINDS[kind]
+    params = np.array([log_or_minus_infinity(rate), size, float(is_square), half_width_rad])
+    sampler = _AroundSampler(rate, size, is_square, half_width_rad)
+    return ClutterModel(rate, function, params, sampler, len(angular), np.array(angular))

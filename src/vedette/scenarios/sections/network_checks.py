@@ -1,0 +1,60 @@
+"""What must hold between networks, births from measurements, and the fusion of a scenario."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from vedette.scenarios.faults import Finding, describe
+from vedette.scenarios.sections.fusion import BY_LABEL, Fusion
+from vedette.scenarios.sections.tracking import UNLABELLED
+
+if TYPE_CHECKING:
+    from vedette.scenarios.sections.scenario import ScenarioModel
+
+
+def network_of_several(model: ScenarioModel) -> Iterator[Finding]:
+    """A network has sensors that fuse something."""
+    if model.network is None:
+        return
+    if len(model.sensors) < 2:
+        yield ("network",), "none, as there is a single sensor", "a network"
+    elif model.fusion.kind == "none":
+        yield ("network",), "none, as nothing is fused", "a network"
+
+
+def network_of_fusion(model: ScenarioModel) -> Iterator[Finding]:
+    """What is sent can be sent as the network does it."""
+    network, fusion = model.network, model.fusion
+    if network is None:
+        return
+    if fusion.kind in ("sequential", "central") and network.consensus_rounds is not None:
+        wanted = f"none, as under {fusion.kind} sensors send scans, of which there is no average"
+        yield ("network", "consensus_rounds"), wanted, describe(network.consensus_rounds)
+    if fusion.kind == "parallel" and network.delay > 0:
+        yield ("network", "delay"), "0, as parallel divides by the prediction of the same time", describe(network.delay)
+    if fusion.kind in (*BY_LABEL, "custom") and not fusion.feeds_back:
+        yield ("fusion", "feedback"), "true, as sensors of a network go on from what they have fused", "false"
+
+
+def births_from_measurements(model: ScenarioModel) -> Iterator[Finding]:
+    """Measurements say where a target may have been born, and labels whose it is."""
+    measured, fusion = model.birth.from_measurements, model.fusion
+    if measured is None:
+        return
+    path, dim = ("birth", "from_measurements"), model.motion.state_dim
+    if len(measured.std) != dim:
+        yield (*path, "std"), f"{dim} numbers, as a state under motion has", describe(measured.std)
+    if model.filter.kind in UNLABELLED:
+        yield path, f"none, as {model.filter.kind} filters have no labels", "births from measurements"
+    for i, sensor in enumerate(model.sensors):
+        if sensor.measurement.kind in ("bearing_only", "range_only"):
+            wanted = "a measurement that says where a target is, for birth.from_measurements"
+            yield ("sensors", i, "measurement", "kind"), wanted, describe(sensor.measurement.kind)
+    alone = len(model.sensors) > 1 and fusion.kind in BY_LABEL and not fusion.feeds_back
+    if alone and isinstance(fusion, Fusion) and fusion.matching == "labels":
+        wanted = "assignment, as without feedback each sensor makes labels of its own from its measurements"
+        yield ("fusion", "matching"), wanted, describe(fusion.matching)
+
+
+NETWORK_CHECKS = (network_of_several, network_of_fusion, births_from_measurements)

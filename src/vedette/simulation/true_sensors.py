@@ -1,0 +1,87 @@
+"""The sensors that are simulated, which need not be what the filters take them for."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from vedette.errors import InputError
+from vedette.kernels.base.types import Bools
+from vedette.models import DetectionModel, SensorModel
+from vedette.models.arguments import reject
+
+_POSITION, _BEARING_RANGE = [False, False], [True, False]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TrueSensor:
+    """A sensor as it is.
+
+    Attributes:
+        model: what it measures, with what noise, detection and clutter.
+        first_detection: its detection at its first scan alone; None: as at the others.
+        detection_of: where its probability of detection is taken: at the target's true "state", or at the position that
+            a "measurement" of [px, py] or [bearing, range] gives, noise included (the rest of the state stays).
+
+    Raises:
+        InputError: a part of another type; detection of the measurement where that gives no position.
+    """
+
+    model: SensorModel
+    first_detection: DetectionModel | None = None
+    detection_of: str = "state"
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.model, SensorModel):
+            raise reject("TrueSensor.model", "a SensorModel", self.model)
+        if self.first_detection is not None and not isinstance(self.first_detection, DetectionModel):
+            raise reject("TrueSensor.first_detection", "a DetectionModel or None", self.first_detection)
+        if self.detection_of not in ("state", "measurement"):
+            raise reject("TrueSensor.detection_of", "state or measurement", self.detection_of)
+        angular = self.model.measurement.angular.tolist()
+        if self.detection_of == "measurement" and angular not in (_POSITION, _BEARING_RANGE):
+            expected = "state, as only a position or a bearing with a range say where a target was measured"
+            raise reject("TrueSensor.detection_of", expected, self.detection_of)
+
+    def at_first_scan(self) -> TrueSensor:
+        """The sensor as it is at its first scan."""
+        if self.first_detection is None:
+            return self
+        return replace(self, model=replace(self.model, detection=self.first_detection), first_detection=None)
+
+
+def true_sensors_of(given: Sequence[TrueSensor], known: Sequence[SensorModel]) -> tuple[TrueSensor, ...]:
+    """Those that are given, or the ones that the filters know.
+
+    Raises:
+        InputError: another number of them, something else, or one that does not measure what the filter expects.
+    """
+    if not given:
+        return tuple(TrueSensor(model) for model in known)
+    if len(given) != len(known):
+        raise InputError(f"true_sensors: expected {len(known)}, one for each sensor of the tracker; got {len(given)}")
+    for s, (true, model) in enumerate(zip(given, known, strict=True)):
+        if not isinstance(true, TrueSensor):
+            raise reject(f"true_sensors[{s}]", "a TrueSensor", true)
+        wanted, angular = (which.measurement.angular.tolist() for which in (model, true.model))
+        if angular != wanted:
+            expected = f"measurements of {len(wanted)} components with the angular flags {wanted}, as the filter's"
+            raise reject(f"true_sensors[{s}]", expected, angular)
+    return tuple(given)
+
+
+def scanning(sensors: Sequence[TrueSensor], scans_at: Bools | None, step: int) -> tuple[TrueSensor | None, ...]:
+    """The sensors as they are at a step; None for one that does not scan then.
+
+    Args:
+        sensors: all of them.
+        scans_at: (num_sensors, num_scans) whether each scans; None: at every step.
+        step: of the run, from 1.
+    """
+    if scans_at is None:
+        return tuple(sensor.at_first_scan() if step == 1 else sensor for sensor in sensors)
+    found: list[TrueSensor | None] = []
+    for sensor, scans in zip(sensors, scans_at, strict=True):
+        is_first = not scans[: step - 1].any()
+        found.append(None if not scans[step - 1] else sensor.at_first_scan() if is_first else sensor)
+    return tuple(found)

@@ -1,0 +1,227 @@
+"""Sensors that send their beliefs: each fuses its own with those that it hears, or all agree by consensus."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from vedette.densities import LMB
+from vedette.errors import InputError
+from vedette.filters import Filter, FilterInfo
+from vedette.fusion import Fusion, FusionInfo, Matched, Views
+from vedette.fusion.matching import common_names, relabelled
+from vedette.fusion.rebasing import rebased, with_labels_of
+from vedette.kernels.base.types import Bools, Floats, Ints
+from vedette.models import SensorModel, TargetModel
+from vedette.models.arguments import reject
+from vedette.tracking.base import State, TrackerInfo, check_step
+from vedette.tracking.births import births_due, births_from_scans
+from vedette.tracking.distributed import shares_prediction
+from vedette.tracking.local import LocalFilters
+from vedette.tracking.merging import merged, views_of, with_weights
+from vedette.tracking.messages import bytes_of_belief
+from vedette.tracking.network import NEVER, Network, hop_counts, metropolis_weights
+from vedette.tracking.stages import Stages
+
+
+class _Sent(NamedTuple):
+    """What each sensor sent at a step, and when the others have it."""
+
+    step: int
+    time: float
+    predictions: tuple[Any, ...]  # what each belief was updated from, where the fusion divides by it; else None
+    beliefs: tuple[Any, ...]
+    arrives: Ints  # (num_sensors, num_sensors) as of `Network.arrivals`
+
+
+class _Memory(NamedTuple):
+    """Who may be born at the next step, by sensor, and the messages that may still be on their way."""
+
+    births: tuple[LMB | None, ...]
+    sent: tuple[_Sent, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BeliefNetwork:
+    """A filter at each sensor; the fused belief of what a sensor hears replaces its own.
+
+    Of each other sensor, a sensor fuses the newest belief that has arrived, predicted to the time of its own. Where the
+    fusion divides by the common prediction and the sensors' predictions differ (as of groups that have met again, or
+    after few rounds of consensus), they are first merged, and what each scan has said is added to the merged one.
+
+    Consensus: after L rounds of averaging with Metropolis weights W a sensor has the average of all that the sensors
+    put in, under the weights of its row of W^L; it is computed as that average. For sums, as of `ParallelUpdate`, it is
+    taken times the number of sensors in the group. As L grows both become those of all sensors together.
+
+    Attributes:
+        filters: one a sensor; all hold the same targets.
+        fusion: of beliefs that are heard; its weights are replaced by equal ones, or those of the consensus.
+        network: who hears whom.
+        merging: fusion of predictions of different pasts, and of the one belief that is reported where sensors believe
+            different things; weights likewise.
+
+    Raises:
+        InputError: filters as in `Distributed`; a fusion without weights; one that divides by the common prediction
+            with filters that are not of LMBs, or with messages that are delayed.
+    """
+
+    filters: tuple[Filter, ...]
+    fusion: Fusion
+    network: Network
+    merging: Fusion
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "filters", LocalFilters(self.filters).filters)
+        if not isinstance(self.network, Network):
+            raise reject("network", "a Network", self.network)
+        for rule in (self.fusion, self.merging):
+            with_weights(rule, [1.0])
+        if shares_prediction(self.fusion) and self.network.delay > 0:
+            raise InputError("network.delay: expected 0, as the fusion divides by the prediction of the same time")
+
+    @property
+    def targets(self) -> TargetModel:
+        """The targets as all sensors know them."""
+        return self.filters[0].targets
+
+    @property
+    def sensors(self) -> tuple[SensorModel, ...]:
+        """What each sensor sees."""
+        return tuple(local.sensor for local in self.filters)
+
+    def initial(self) -> State:
+        """No target anywhere: one belief, which all sensors share."""
+        belief = self.filters[0].initial()
+        return State((belief,) * len(self.filters), belief, memory=_Memory((None,) * len(self.filters), ()))
+
+    def step(
+        self, state: State, scans: Sequence[Any], poses: Any, time: float, *, rngs: Sequence[np.random.Generator]
+    ) -> tuple[State, TrackerInfo]:
+        """Filter each sensor's scan, send, and fuse what has arrived; see `Tracker.step`."""
+        at, dt = check_step(state, scans, poses, time, rngs, len(self.filters))
+        step, stages, num = state.step + 1, Stages(), len(self.filters)
+        links = self.network.links(at, rngs[0])
+        with stages.timing("filter"):
+            predictions, local, infos = self._filtered(state, scans, at, dt, rngs)
+        sent = _Sent(step, float(time), predictions, local, self.network.arrivals(links, step))
+        waiting = (*state.memory.sent, sent)
+        views = Views(self.sensors, at, tuple(scan is not None for scan in scans))
+        with stages.timing("fusion"):
+            fused, reports = self._fused(waiting, links, views)
+            whole, report = merged(self.merging, fused, range(num), views)
+        with stages.timing("births"):
+            births = self._births(fused, scans, at, sent)
+        longest = self.network.longest_delay(num)
+        memory = _Memory(births, tuple(own for own in waiting if own.step + longest > step))
+        sizes = [bytes_of_belief(belief) for belief in local]
+        if shares_prediction(self.fusion) and len({id(own) for own in predictions}) > 1:
+            sizes = [size + bytes_of_belief(own) for size, own in zip(sizes, predictions, strict=True)]
+        told = TrackerInfo(infos, report or reports[0], stages.seconds, self.network.bytes_sent(links, sizes))
+        return State(tuple(fused), whole, step, float(time), memory), told
+
+    def _filtered(
+        self, state: State, scans: Sequence[Any], poses: Floats, dt: float, rngs: Sequence[np.random.Generator]
+    ) -> tuple[tuple[Any, ...], tuple[Any, ...], tuple[FilterInfo, ...]]:
+        """Predictions (where the fusion divides by them), posteriors and reports of all sensors."""
+        filters, step, birth = LocalFilters(self.filters), state.step + 1, self.targets.birth
+        predictions: list[Any] = []
+        found: dict[tuple[int, int], Any] = {}
+        results = []
+        for s, (belief, own) in enumerate(zip(state.local, state.memory.births, strict=True)):
+            due = births_due(birth, step, own)
+            if not shares_prediction(self.fusion):
+                predictions.append(None)
+                results.append(filters.stepped(s, belief, scans[s], poses[s], dt, step, due, rngs[s]))
+                continue
+            key = id(belief), id(own)  # one prediction object for all who believe the same
+            if key not in found:
+                found[key], _ = filters.predicted(s, belief, dt, step, due)
+            predictions.append(found[key])
+            results.append(filters.updated(s, found[key], scans[s], poses[s], rngs[s]))
+        beliefs, infos = zip(*results, strict=True)
+        return tuple(predictions), beliefs, infos
+
+    def _fused(self, waiting: Sequence[_Sent], links: Bools, views: Views) -> tuple[list[Any], list[FusionInfo | None]]:
+        """What each sensor believes after fusing; one object for those who have fused the same."""
+        now, num = waiting[-1], len(self.filters)
+        shares = self._weights(links)
+        done: dict[tuple[Any, ...], tuple[Any, FusionInfo | None]] = {}
+        beliefs, reports = [], []
+        for i in range(num):
+            newest = [
+                max((own for own in waiting if own.arrives[i, j] <= now.step), key=lambda own: own.step, default=None)
+                for j in range(num)
+            ]
+            messages = {j: sent for j, sent in enumerate(newest) if sent is not None and shares[i, j] > 0.0}
+            weights = self._heard_weights(shares[i, list(messages)])
+            key = (*((j, sent.step) for j, sent in messages.items()), *weights.tolist())
+            if key not in done:
+                done[key] = self._fuse(list(messages.values()), list(messages), weights, views)
+            belief, report = done[key]
+            beliefs.append(belief)
+            reports.append(report)
+        return beliefs, reports
+
+    def _heard_weights(self, shares: Floats) -> Floats:
+        """Of a mean, scaled to those that are heard; of a sum, as they are: who is not heard adds nothing."""
+        return shares if shares_prediction(self.fusion) else shares / shares.sum()
+
+    def _fuse(
+        self, messages: Sequence[_Sent], heard: Sequence[int], weights: Floats, views: Views
+    ) -> tuple[Any, FusionInfo | None]:
+        """What these sensors' messages are together; `weights` are of a mean, or of a sum where predictions divide."""
+        seen = views_of(views, heard)
+        if not shares_prediction(self.fusion):
+            now = max(messages, key=lambda sent: sent.step)
+            own = [self._current(sent, now, j) for sent, j in zip(messages, heard, strict=True)]
+            return (own[0], None) if len(own) == 1 else with_weights(self.fusion, weights.tolist()).fuse(own, seen)
+        predictions = [sent.predictions[j] for sent, j in zip(messages, heard, strict=True)]
+        posteriors = [sent.beliefs[j] for sent, j in zip(messages, heard, strict=True)]
+        base = predictions[0]
+        if any(prediction is not base for prediction in predictions):
+            if isinstance(self.merging, Matched):
+                names = common_names(predictions, gate_probability=self.merging.gate_probability)
+                predictions = list(map(relabelled, predictions, names))
+                posteriors = list(map(relabelled, posteriors, names))
+            base, _ = with_weights(self.merging, (weights / weights.sum()).tolist()).fuse(predictions, seen)
+            for prediction in predictions:
+                base = with_labels_of(base, prediction)
+        posteriors = [rebased(*own, base) for own in zip(posteriors, predictions, strict=True)]
+        fused, report = with_weights(self.fusion, weights.tolist()).fuse(posteriors, replace(seen, prediction=base))
+        return LocalFilters(self.filters).kept(fused), report
+
+    def _current(self, sent: _Sent, now: _Sent, sensor: int) -> Any:
+        """A sensor's belief at the time of the step `now`; nobody is born on the way."""
+        if sent is now:
+            return sent.beliefs[sensor]
+        nobody = LMB.empty(self.targets.state_dim)
+        elapsed = now.time - sent.time
+        return LocalFilters(self.filters).predicted(sensor, sent.beliefs[sensor], elapsed, now.step, nobody)[0]
+
+    def _weights(self, links: Bools) -> Floats:
+        """(num_sensors, num_sensors) the weight that each sensor gives to each in its group, heard or not yet."""
+        groups = hop_counts(links) < NEVER
+        sizes = groups.sum(axis=1, keepdims=True)
+        rounds = self.network.consensus_rounds
+        shares = groups / sizes if rounds is None else np.linalg.matrix_power(metropolis_weights(links), rounds)
+        return np.asarray(shares * sizes if shares_prediction(self.fusion) else shares)
+
+    def _births(self, fused: Sequence[Any], scans: Sequence[Any], poses: Floats, sent: _Sent) -> tuple[LMB | None, ...]:
+        """For each sensor, who may be born at the next step: the same for those who have heard and believe the same."""
+        birth, num = self.targets.birth, len(fused)
+        if birth.from_measurements is None:
+            return (None,) * num
+        found: dict[tuple[Any, ...], LMB | None] = {}
+        births = []
+        for i, belief in enumerate(fused):
+            heard = tuple(np.flatnonzero(sent.arrives[i] <= sent.step).tolist())
+            key = id(belief), heard
+            if key not in found:
+                own = [scan if s in heard else None for s, scan in enumerate(scans)]
+                owner = None if len(heard) == num else heard[0]
+                found[key] = births_from_scans(birth, belief, self.sensors, own, poses, sent.step + 1, owner=owner)
+            births.append(found[key])
+        return tuple(births)

@@ -1,0 +1,111 @@
+"""Radio links between sensors: who hears whom, how late, and how much is sent."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from vedette.kernels.base.types import Bools, Floats, Ints
+from vedette.models.arguments import dimension, positive, probability, reject
+
+# Stands for "never" among step numbers and numbers of hops.
+NEVER = np.iinfo(np.int64).max // 2
+
+
+@dataclass(frozen=True, slots=True)
+class Network:
+    """A radio network of moving sensors, in which every message is passed on from neighbour to neighbour.
+
+    Attributes:
+        radio_range: m; sensors hear each other up to this distance.
+        hops: how many links a message may travel; None: as far as the links reach.
+        loss: probability that a link fails at a scan, in both directions, for all messages.
+        delay: scans that a message takes for each hop.
+        consensus_rounds: rounds of averaging with the neighbours (Metropolis weights) instead of messages that are
+            passed on; None: no consensus.
+
+    Raises:
+        InputError: names the field, what was expected and what came.
+    """
+
+    radio_range: float = math.inf
+    hops: int | None = None
+    loss: float = 0.0
+    delay: int = 0
+    consensus_rounds: int | None = None
+
+    def __post_init__(self) -> None:
+        if self.radio_range != math.inf:
+            positive("Network.radio_range", self.radio_range)
+        if probability("Network.loss", self.loss) == 1.0:
+            raise reject("Network.loss", "a probability below 1", self.loss)
+        if isinstance(self.delay, bool) or not isinstance(self.delay, int) or self.delay < 0:
+            raise reject("Network.delay", "a whole number of scans from 0 on", self.delay)
+        for name in ("hops", "consensus_rounds"):
+            if getattr(self, name) is not None:
+                dimension(f"Network.{name}", getattr(self, name))
+        if self.consensus_rounds is not None and (self.delay > 0 or self.hops is not None):
+            raise reject("Network.consensus_rounds", "None with a delay or a number of hops", self.consensus_rounds)
+
+    def links(self, poses: Floats, rng: np.random.Generator) -> Bools:
+        """(num_sensors, num_sensors) which sensors hear each other directly; symmetric, nobody itself.
+
+        Drawn from `rng` only where links fail.
+        """
+        offsets = poses[:, None, :2] - poses[None, :, :2]
+        near: Bools = np.hypot(offsets[..., 0], offsets[..., 1]) <= self.radio_range
+        np.fill_diagonal(near, False)
+        if self.loss > 0.0:
+            works = np.triu(rng.random(near.shape) >= self.loss, 1)
+            near &= works | works.T
+        return near
+
+    def arrivals(self, links: Bools, step: int) -> Ints:
+        """(num_sensors, num_sensors) step at which sensor i has the message that sensor j sends now, or `NEVER`.
+
+        links: as `links` gave; messages travel over those of the step at which they are sent.
+        """
+        hops = hop_counts(links)
+        hops[hops > (NEVER if self.hops is None else self.hops)] = NEVER
+        return np.where(hops < NEVER, step + self.delay * np.minimum(hops, len(links)), NEVER)
+
+    def longest_delay(self, num_sensors: int) -> int:
+        """Scans after which no message arrives any more."""
+        return self.delay * min(num_sensors - 1, NEVER if self.hops is None else self.hops)
+
+    def bytes_sent(self, links: Bools, sizes: Sequence[int]) -> tuple[int, ...]:
+        """What each sensor sends at a step, where sensor j has a message of `sizes[j]` bytes.
+
+        A message is sent once by each sensor that has it and may still pass it on, and heard by all its neighbours;
+        with consensus, each sensor sends its average, as large as the largest message, in each round.
+        """
+        heard: Bools = links.sum(axis=1) > 0
+        if self.consensus_rounds is not None:
+            return tuple(self.consensus_rounds * max(sizes) if hears else 0 for hears in heard.tolist())
+        passes_on = (hop_counts(links) < (NEVER if self.hops is None else self.hops)) & heard.reshape(-1, 1)
+        return tuple((passes_on @ np.asarray(sizes, np.int64)).tolist())
+
+
+def hop_counts(links: Bools) -> Ints:
+    """(n, n) fewest links between any two sensors; 0 from each to itself, `NEVER` where there is no way."""
+    num = len(links)
+    hops = np.full((num, num), NEVER)
+    reached = np.eye(num, dtype=np.bool_)
+    for count in range(num):
+        hops[reached & (hops == NEVER)] = count
+        reached = reached @ links | reached
+    return hops
+
+
+def metropolis_weights(links: Bools) -> Floats:
+    """(n, n) symmetric weights of one round of averaging: 1 / (1 + the larger number of neighbours) on each link.
+
+    Rows and columns sum to one, so that averages are kept and rounds converge to the mean of each connected group
+    (Xiao, Boyd and Lall 2005).
+    """
+    degrees = links.sum(axis=1)
+    weights = np.where(links, 1.0 / (1.0 + np.maximum(degrees[:, None], degrees[None, :])), 0.0)
+    return weights + np.diag(1.0 - weights.sum(axis=1))

@@ -1,0 +1,172 @@
+"""Sensors that send their scans: each updates with all that it hears, and puts what is late where it belongs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from vedette.densities import LMB
+from vedette.filters import FilterInfo
+from vedette.fusion import Fusion, Views
+from vedette.kernels.base.types import Floats, Ints
+from vedette.models import SensorModel, TargetModel
+from vedette.models.arguments import reject
+from vedette.tracking.base import State, TrackerInfo, check_step
+from vedette.tracking.births import births_due, births_from_scans
+from vedette.tracking.central import CentralFilter
+from vedette.tracking.merging import merged
+from vedette.tracking.messages import bytes_of_belief, bytes_of_scan
+from vedette.tracking.network import Network
+from vedette.tracking.stages import Stages
+
+
+class _Known(NamedTuple):
+    """What a sensor believes after a step, who may be born at the next, and what its filter said."""
+
+    belief: Any
+    births: LMB | None
+    info: FilterInfo | None
+
+
+class _Frame(NamedTuple):
+    """The scans of one step, and when each sensor has them."""
+
+    step: int
+    dt: float
+    scans: tuple[Any, ...]
+    poses: Floats
+    arrives: Ints  # (num_sensors, num_sensors) as of `Network.arrivals`
+
+
+class _Memory(NamedTuple):
+    """What every sensor knew before the first of the steps that messages may still arrive for, and these steps."""
+
+    known: tuple[_Known, ...]
+    frames: tuple[_Frame, ...]
+    last: _Frame | None  # the last step of all
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ScanNetwork:
+    """Every sensor runs the same filter of several sensors on the scans that it hears, its own among them.
+
+    A scan that comes late is put in its place: the steps since then are filtered again with it, so that sensors that
+    have heard the same believe the same, whatever came when. Where sensors that hear each other believe different
+    things (as two groups that have met again), they merge their beliefs first, unless messages are delayed.
+
+    Attributes:
+        filter: of all sensors' scans; a scan that was not heard is None to it.
+        network: who hears whom.
+        merging: fusion of beliefs of different pasts; all its weights are replaced by equal ones. It also makes the one
+            belief that is reported where sensors believe different things.
+
+    Raises:
+        InputError: a filter or network of another kind, or a network with consensus.
+    """
+
+    filter: CentralFilter
+    network: Network
+    merging: Fusion
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.filter, CentralFilter):
+            raise reject("filter", "one of several sensors, with targets, sensors, initial() and step()", self.filter)
+        if not isinstance(self.network, Network) or self.network.consensus_rounds is not None:
+            raise reject("network", "a Network without consensus, as scans are no averages", self.network)
+
+    @property
+    def targets(self) -> TargetModel:
+        """The targets."""
+        return self.filter.targets
+
+    @property
+    def sensors(self) -> tuple[SensorModel, ...]:
+        """What each sensor sees."""
+        return tuple(self.filter.sensors)
+
+    def initial(self) -> State:
+        """No target."""
+        belief = self.filter.initial()
+        known = (_Known(belief, None, None),) * len(self.sensors)
+        return State((belief,) * len(self.sensors), belief, memory=_Memory(known, (), None))
+
+    def step(
+        self, state: State, scans: Sequence[Any], poses: Any, time: float, *, rngs: Sequence[np.random.Generator]
+    ) -> tuple[State, TrackerInfo]:
+        """Send the scans and filter what has arrived; see `Tracker.step`. Only the first of `rngs` is drawn from."""
+        at, dt = check_step(state, scans, poses, time, rngs, len(self.sensors))
+        stages, step, num = Stages(), state.step + 1, len(self.sensors)
+        links = self.network.links(at, rngs[0])
+        frame = _Frame(step, dt, tuple(scans), at, self.network.arrivals(links, step))
+        views = Views(self.sensors, at, tuple(scan is not None for scan in scans))
+        sizes = [bytes_of_scan(scan, pose) for scan, pose in zip(scans, at, strict=True)]
+        known = state.memory.known
+        if self.network.delay == 0 and len({id(own.belief) for own in known}) > 1:
+            sizes = [size + bytes_of_belief(own.belief) for size, own in zip(sizes, known, strict=True)]
+            with stages.timing("fusion"):
+                known = self._merge(state.memory, frame, views)
+        frames, runs = (*state.memory.frames, frame), _Runs(self, rngs[0])
+        with stages.timing("filter"):
+            now = tuple(runs.through(known[i], frames, i, step) for i in range(num))
+            while frames and step - frames[0].step >= self.network.longest_delay(num):
+                known = tuple(runs.through(known[i], frames[:1], i, step) for i in range(num))
+                frames = frames[1:]
+        with stages.timing("fusion"):
+            fused, report = merged(self.merging, [own.belief for own in now], range(num), views)
+        infos = tuple(own.info for own in now if own.info is not None)
+        info = TrackerInfo(infos, report, stages.seconds, self.network.bytes_sent(links, sizes))
+        local = tuple(own.belief for own in now)
+        return State(local, fused, step, float(time), _Memory(known, frames, frame)), info
+
+    def _merge(self, memory: _Memory, frame: _Frame, views: Views) -> tuple[_Known, ...]:
+        """Each sensor's belief and those of all that it hears as one; the same for those who hear the same."""
+        found: dict[tuple[int, ...], _Known] = {}
+        everyone = [tuple(np.flatnonzero(row <= frame.step).tolist()) for row in frame.arrives]
+        for heard in everyone:
+            if heard not in found:
+                beliefs = [memory.known[j].belief for j in heard]
+                belief, report = merged(self.merging, beliefs, heard, views)
+                if report is None:
+                    found[heard] = memory.known[heard[0]]
+                else:
+                    assert memory.last is not None  # beliefs differ after a step alone
+                    found[heard] = _Known(belief, self._measured(belief, memory.last, heard), None)
+        return tuple(found[heard] for heard in everyone)
+
+    def _measured(self, belief: Any, frame: _Frame, heard: tuple[int, ...]) -> LMB | None:
+        """Who may be born after a step of which these sensors' scans are known."""
+        scans = [scan if s in heard else None for s, scan in enumerate(frame.scans)]
+        owner = None if len(heard) == len(self.sensors) else heard[0]
+        birth, after = self.targets.birth, frame.step + 1
+        return births_from_scans(birth, belief, self.sensors, scans, frame.poses, after, owner=owner)
+
+    def filtered(self, known: _Known, frame: _Frame, heard: tuple[int, ...], rng: np.random.Generator) -> _Known:
+        """What a sensor knows after a step of which it has heard these sensors' scans."""
+        scans = [scan if s in heard else None for s, scan in enumerate(frame.scans)]
+        due = births_due(self.targets.birth, frame.step, known.births)
+        births = {} if due is None else {"births": due}
+        belief, info = self.filter.step(known.belief, scans, frame.poses, frame.dt, frame.step, rng=rng, **births)
+        return _Known(belief, self._measured(belief, frame, heard), info)
+
+
+class _Runs:
+    """Steps of sensors, each computed once for all sensors that knew the same and heard the same."""
+
+    def __init__(self, tracker: ScanNetwork, rng: np.random.Generator) -> None:
+        self.tracker, self.rng = tracker, rng
+        self.done: dict[tuple[int, int, tuple[int, ...]], _Known] = {}
+        self.kept: list[_Known] = []  # so that no two of the ids are of one after the other
+
+    def through(self, known: _Known, frames: Sequence[_Frame], sensor: int, now: int) -> _Known:
+        """What a sensor knows after these steps, by what of them it has heard by now."""
+        for frame in frames:
+            heard = tuple(np.flatnonzero(frame.arrives[sensor] <= now).tolist())
+            key = id(known), frame.step, heard
+            if key not in self.done:
+                self.kept.append(known)
+                self.done[key] = self.tracker.filtered(known, frame, heard, self.rng)
+            known = self.done[key]
+        return known

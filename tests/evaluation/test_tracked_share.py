@@ -1,0 +1,134 @@
+"""The share of the seen targets that are tracked, by hand and against plain loops."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from evaluation.synthetic import SENSORS, make_record
+from scenarios.minimal import changed
+from vedette import models
+from vedette.densities.estimates import Estimate
+from vedette.errors import InputError, ScenarioError
+from vedette.evaluation import TrackedShare, measure_run, own_metrics, run_scenario, seen_targets
+from vedette.models import SensorModel
+from vedette.scenarios import load_scenario
+from vedette.simulation.records import RunRecord
+from vedette.simulation.truth import Truth
+
+
+def sensor(detection: models.DetectionModel) -> SensorModel:
+    clutter = models.measurement_space_clutter(1.0, [-9.0, -9.0], [9.0, 9.0])
+    return SensorModel(models.position(), models.constant_noise([1.0, 1.0]), detection, clutter)
+
+
+def record_of(truth: Truth, places: list[list[list[float]]]) -> RunRecord:
+    """A run with estimates at these places, and two sensors that lie still at x = -10 and 10 m."""
+    estimates = tuple(
+        Estimate(
+            np.array([[1, number] for number in range(len(scan))], np.int64).reshape(-1, 2),
+            np.array(scan, np.float64).reshape(-1, 2),
+            np.tile(np.eye(2), (len(scan), 1, 1)),
+            np.ones(len(scan)),
+        )
+        for scan in places
+    )
+    poses = np.tile(np.array([[-10.0, 0.0, 0.0], [10.0, 0.0, 0.0]]), (truth.num_scans, 1, 1))
+    first = make_record(num_scans=truth.num_scans)
+    return replace(first, times=truth.times, truth=truth, poses=poses, estimates=estimates, decisions=())
+
+
+# Left: seen by the first sensor; right: by the second; middle: by neither, as it lies at 10 m of either.
+TRUTH = Truth(
+    np.array([1.0, 2.0, 3.0, 4.0]),
+    np.array([0, 3, 6, 7, 7]),
+    np.array([0, 1, 2, 0, 1, 2, 2]),
+    np.array([[-10.0, 2], [10, 2], [0, 0], [-10, 3], [10, 3], [0, 0], [0, 0]]),
+)
+BOTH = (sensor(models.limited_range(0.9, 5.0)), sensor(models.limited_range(0.6, 5.0)))
+
+
+def test_by_hand() -> None:
+    run = record_of(TRUTH, [[[-10.0, 3.0], [0.0, 0.5]], [[-10.0, 3.0], [10.0, 5.5]], [[0.0, 0.0]], []])
+    share = TrackedShare(BOTH, cutoff=2.0, order=1.0)(run)
+    # Scan 1: of two seen the left one is tracked; scan 2: the right estimate is 2.5 m off; then none is seen.
+    np.testing.assert_array_equal(share, [0.5, 0.5, math.nan, math.nan])
+    np.testing.assert_array_equal(TrackedShare(BOTH, cutoff=3.0, order=1.0)(run)[:2], [0.5, 1.0])
+
+
+def test_a_sensor_that_hardly_detects_sees_nothing() -> None:
+    run = record_of(TRUTH, [[[-10.0, 3.0]]] * 4)
+    np.testing.assert_array_equal(TrackedShare(BOTH, 2.0, 1.0, min_detection=0.7)(run)[:2], [1.0, 1.0])
+    seen = seen_targets(TRUTH, run.poses, BOTH, min_detection=0.7)
+    assert seen.tolist() == [True, False, False, True, False, False, False]
+
+
+def test_an_estimate_stands_for_one_target() -> None:
+    close = replace(TRUTH, states=np.tile([-10.0, 0.0], (7, 1)))
+    share = TrackedShare(BOTH, cutoff=2.0, order=1.0)(record_of(close, [[[-10.0, 0.5]]] * 3 + [[]]))
+    assert share[:3] == pytest.approx([1 / 3, 1 / 3, 1.0])
+
+
+def test_equals_plain_loops() -> None:
+    record = make_record("random")  # of targets farther apart than twice the cutoff
+    sensors = (sensor(models.limited_range(0.8, 900.0)), sensor(models.limited_range(0.8, 700.0)))
+    expected = []
+    for scan, estimate in enumerate(record.estimates):
+        states = record.truth.at(scan)[1][:, :2]
+        apart = np.linalg.norm(states[:, None] - record.poses[scan][:, :2], axis=2)
+        seen = (apart <= [900.0, 700.0]).any(axis=1)
+        near = [np.linalg.norm(estimate.means[:, :2] - state, axis=1).min(initial=99.0) < 30.0 for state in states]
+        expected.append(np.mean(np.array(near)[seen]) if seen.any() else math.nan)
+    share = TrackedShare(sensors, cutoff=30.0, order=1.0)(record)
+    np.testing.assert_allclose(share, expected)
+    assert 0.0 < np.nanmean(share) < 1.0
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"cutoff": 0.0}, "cutoff: expected"),
+        ({"cutoff": math.inf}, "cutoff: expected"),
+        ({"order": 0.5}, "order: expected"),
+        ({"min_detection": 1.5}, "min_detection: expected"),
+    ],
+)
+def test_bad_arguments_are_named(change: dict[str, Any], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        TrackedShare(**{"sensors": BOTH, "cutoff": 2.0, "order": 1.0, **change})
+
+
+def test_a_run_of_other_sensors_is_refused() -> None:
+    run = record_of(TRUTH, [[]] * 4)
+    with pytest.raises(InputError, match="sensors: expected one for each of 2 sensors; got 1"):
+        TrackedShare(BOTH[:1], cutoff=2.0, order=1.0)(run)
+    assert len(SENSORS) == 2
+
+
+def test_a_scenario_names_it(tmp_path: Path) -> None:
+    text = changed(("ospa: {cutoff: 50.0", "metrics: {share: {kind: tracked_share}}\nospa: {cutoff: 50.0"))
+    file = tmp_path / "f.yaml"
+    file.write_text(text)
+    scenario = load_scenario(file)
+    record = run_scenario(scenario, "still", seed=1)
+    share = measure_run(record, scenario, own_metrics(scenario)).columns()["share"]
+    # Both sensors see everywhere, so the share is that of the targets which are not missed.
+    missed = measure_run(record, scenario).num_missed
+    alive = np.diff(record.truth.offsets)
+    np.testing.assert_allclose(share[alive > 0], 1.0 - missed[alive > 0] / alive[alive > 0])
+    assert np.isnan(share[alive == 0]).all()
+
+
+def test_a_mistake_in_it_is_placed(tmp_path: Path) -> None:
+    text = changed(
+        ("ospa: {cutoff: 50.0", "metrics: {share: {kind: tracked_share, min_detection: 2}}\nospa: {cutoff: 50.0")
+    )
+    file = tmp_path / "f.yaml"
+    file.write_text(text)
+    with pytest.raises(ScenarioError, match=r"metrics\.share\.min_detection: expected a number of at most 1, got 2"):
+        load_scenario(file)
