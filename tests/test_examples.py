@@ -52,6 +52,7 @@ SHOWN = {
     "docs/campaigns.md": ["paper-a"],
     "docs/control.md": ["+-", "joint actions evaluated", "filter_steps"],
     "docs/filters.md": ["target at"],
+    "docs/fusion.md": ["ParallelUpdate ", "Clmb by views "],
     "docs/metrics.md": ["True"],
     "docs/report.md": [],
     "docs/results.md": ["gospa_m", "margin", "jdm-rate-5.0", "heading_deg", "farthest_m"],
