@@ -12,11 +12,10 @@ from scipy.special import logit
 from fusion.sights import LABELS, assert_same_bits, views
 from vedette.densities import GLMB, LMB, TrackTable
 from vedette.errors import InputError, NumericalError
-from vedette.fusion import ParallelLimits, ParallelUpdate
+from vedette.fusion import ParallelUpdate
 from vedette.kernels.gaussian.eigen import clip_negative
 
 Floats = NDArray[np.float64]
-KEEP_ALL = ParallelLimits(min_existence=0.0)
 
 
 def spd(rng: np.random.Generator, dim: int) -> Floats:
@@ -88,7 +87,7 @@ def test_linear_sensors_give_what_kalman_updates_in_turn_give(seed: int) -> None
         log_odds, m, p = updated(start, mean, cov, h, noise, z, log_ratio)
         posteriors.append(one(m, p, log_odds))
         in_turn = updated(*in_turn, h, noise, z, log_ratio)
-    fused, info = ParallelUpdate(limits=KEEP_ALL).fuse(posteriors, shared(one(mean, cov, start), num))
+    fused, info = ParallelUpdate().fuse(posteriors, shared(one(mean, cov, start), num))
     fused.validate()
     assert_is(fused, in_turn, 1e-9)
     np.testing.assert_allclose(fused.tracks.means[0], in_turn[1], rtol=1e-10, atol=1e-10 * np.sqrt(cov.max()))
@@ -132,7 +131,7 @@ def test_it_is_what_numpy_makes_of_the_formulas(seed: int) -> None:
     prior = one(rng.normal(size=dim), spd(rng, dim), rng.normal())
     posteriors = [one(rng.normal(size=dim), spd(rng, dim), rng.normal()) for _ in range(num)]
     v = rng.uniform(0.0, 2.0, num)
-    fused, _ = ParallelUpdate(v, limits=KEEP_ALL).fuse(posteriors, shared(prior, num))
+    fused, _ = ParallelUpdate(v).fuse(posteriors, shared(prior, num))
     assert_is(fused, in_numpy(prior, posteriors, v), 1e-9)
 
 
@@ -184,14 +183,14 @@ def test_a_label_that_a_posterior_lacks_was_dropped_there_and_counts_so() -> Non
         TrackTable.from_gaussians(tracks.labels[keep], tracks.means[keep], tracks.covs[keep]),
         other.existence_logit[keep].copy(),
     )
-    fused, info = ParallelUpdate(missing_existence=1e-3, limits=KEEP_ALL).fuse([told, less], shared(prediction))
+    fused, info = ParallelUpdate(missing_existence=1e-3).fuse([told, less], shared(prediction))
     expected = told.existence_logit[1] + logit(1e-3) - prediction.existence_logit[1]
     assert fused.existence_logit[1] == pytest.approx(expected, rel=1e-12)
     np.testing.assert_allclose(fused.tracks.means[1], told.tracks.means[1], rtol=1e-10)
     assert (info.missing_labels, info.empty_intersection) == ((0, 1), False)
     # A prediction that was less sure than the floor loses nothing where it was dropped.
     faint = LMB(prediction.tracks, np.full(3, logit(1e-4)))
-    fused, _ = ParallelUpdate(missing_existence=1e-3, limits=KEEP_ALL).fuse([faint, LMB.empty(4)], shared(faint))
+    fused, _ = ParallelUpdate(missing_existence=1e-3).fuse([faint, LMB.empty(4)], shared(faint))
     assert_same_bits(fused, faint)
 
 
@@ -200,25 +199,14 @@ def test_certain_and_impossible_labels() -> None:
     tracks = three(rng).tracks
     prediction = LMB(tracks, np.array([np.inf, 0.5, -np.inf]))
     fused, info = ParallelUpdate().fuse([LMB(tracks, np.array([np.inf, np.inf, -np.inf]))] * 2, shared(prediction))
-    assert fused.tracks.labels.tolist() == [list(label) for label in LABELS[:2]]
-    assert fused.existence.tolist() == [1.0, 1.0]
+    assert fused.tracks.labels.tolist() == [list(label) for label in LABELS]
+    assert fused.existence.tolist() == [1.0, 1.0, 0.0]
     assert np.isfinite(info.log_normaliser)
     beliefs = [LMB(tracks, np.array([np.inf, sign * np.inf, -np.inf])) for sign in (1.0, -1.0)]
     with pytest.raises(NumericalError, match=r"label \[1, 1\] is certain to one sensor .* and impossible to another"):
         ParallelUpdate().fuse(beliefs, shared(prediction))
     with pytest.raises(NumericalError, match="certain"):
         ParallelUpdate().fuse([LMB.empty(4), LMB.empty(4)], shared(prediction))
-
-
-def test_labels_beyond_the_limits_are_dropped_and_counted() -> None:
-    tracks = three(np.random.default_rng(8)).tracks
-    prediction = LMB(tracks, logit(np.array([0.9, 1e-3, 0.6])))
-    fused, info = ParallelUpdate(limits=ParallelLimits(0.01)).fuse([prediction], shared(prediction, 1))
-    assert fused.tracks.labels.tolist() == [[1, 0], [3, 0]]
-    assert info.discarded_weight == pytest.approx(1e-3)
-    fused, info = ParallelUpdate(limits=ParallelLimits(0.0, 1)).fuse([prediction], shared(prediction, 1))
-    assert fused.tracks.labels.tolist() == [[1, 0]]
-    assert info.discarded_weight == pytest.approx(1.0 - 0.4 * (1.0 - 1e-3))
 
 
 def test_no_labels_at_all() -> None:
@@ -244,8 +232,6 @@ def test_what_cannot_be_fused_is_refused() -> None:
     for field, arguments in {
         "weights": {"weights": (1.0, -1.0)},
         "missing_existence": {"missing_existence": 0.0},
-        r"limits\.min_existence": {"limits": ParallelLimits(1.0)},
-        r"limits\.max_labels": {"limits": ParallelLimits(0.0, 0)},
     }.items():
         with pytest.raises(InputError, match=field):
             ParallelUpdate(**arguments)  # type: ignore[arg-type]
