@@ -37,7 +37,8 @@ def build_experiment(scenario: Scenario) -> Experiment:
     """
     model = scenario.model
     sensors = build_sensors(scenario)
-    tracker = _tracker(scenario, tuple(sensor.filter for sensor in sensors))
+    tracker, times = _tracker(scenario, tuple(sensor.filter for sensor in sensors)), build_scan_times(scenario)
+    known = tuple(sensor.filter.sensor for sensor in sensors)
     return Experiment(
         name=model.name,
         times=model.time.build(),
@@ -51,8 +52,9 @@ def build_experiment(scenario: Scenario) -> Experiment:
         ),
         estimate=model.estimator.build(scenario.folder),
         decision_steps=model.decision_steps,
-        true_sensors=build_true_sensors(scenario, tuple(sensor.filter.sensor for sensor in sensors)),
-        scans_at=build_scan_times(scenario),
+        # Where they are what the tracker takes them for, a tracker of other sensors may stand in for this one.
+        true_sensors=build_true_sensors(scenario, known) if any(sensor.truth for sensor in model.sensors) else (),
+        scans_at=None if times.all() else times,
     )
 
 
