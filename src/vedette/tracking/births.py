@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,9 +12,10 @@ from vedette.densities import GLMB, LMB, TrackTable, glmb_to_lmb
 from vedette.densities.checks import unchecked
 from vedette.errors import InputError
 from vedette.filters import Limits
-from vedette.filters.inputs import births_at, check_scan, model_errors
+from vedette.filters.inputs import births_at, model_errors
 from vedette.fusion.matching import OWN_LABELS
-from vedette.kernels.base.types import Floats, Ints, ScanInput
+from vedette.kernels.association.truncation import Truncation
+from vedette.kernels.base.types import Floats, Ints, Lmb, ScanInput
 from vedette.kernels.labelled.stacking import stack_tracks
 from vedette.kernels.steps.explained import prob_explained
 from vedette.models import BirthModel, MeasurementBirth, SensorModel
@@ -77,7 +79,9 @@ def births_from_scans(
         raise InputError(f"belief: expected a GLMB or an LMB for births from measurements; got {type(belief).__name__}")
     lmb = glmb_to_lmb(belief) if isinstance(belief, GLMB) else belief
     found = [
-        _unexplained(lmb, sensor, scans[s], poses[s], s) for s, sensor in enumerate(sensors) if scans[s] is not None
+        _unexplained(lmb.to_kernel(), sensor, scans[s], poses[s], s)
+        for s, sensor in enumerate(sensors)
+        if scans[s] is not None
     ]
     if not found:
         return LMB.empty(birth.state_dim)
@@ -86,15 +90,27 @@ def births_from_scans(
     return _born(pooled, model, step, first)
 
 
-def _unexplained(belief: LMB, sensor: SensorModel, scan: Any, pose: Any, number: int) -> Unexplained:
-    measurements, _ = check_scan(scan, sensor.measurement)
+def _unexplained(belief: Lmb, sensor: SensorModel, scan: Any, pose: Any, number: int) -> Unexplained:
+    # The filters have checked the scan.
+    measurements = np.ascontiguousarray(scan, np.float64).reshape(-1, sensor.meas_dim)
     at = pose_vector("pose", pose)
-    given = ScanInput(LMB.empty(belief.state_dim).to_kernel(), measurements, at, 0.0)
     with model_errors():
-        explained = prob_explained(belief.to_kernel(), given, sensor.to_kernel(), Limits().truncation(sensor.meas_dim))
+        given = ScanInput(_nobody(belief.tracks.means.shape[1]), measurements, at, 0.0)
+        explained = prob_explained(belief, given, sensor.to_kernel(), _truncation(sensor.meas_dim))
     free = np.flatnonzero(explained < 1.0 - LEAST_UNEXPLAINED)
     positions = sensor.measurement.positions(measurements[free], at)
     return Unexplained(positions, 1.0 - explained[free], np.full(len(free), number))
+
+
+@cache
+def _nobody(state_dim: int) -> Lmb:
+    return LMB.empty(state_dim).to_kernel()
+
+
+@cache
+def _truncation(meas_dim: int) -> Truncation:
+    """Gates and the floor of clutter, as filters have them by default."""
+    return Limits().truncation(meas_dim)
 
 
 def _pool(found: Unexplained, model: MeasurementBirth) -> Unexplained:
