@@ -1,0 +1,165 @@
+"""Networks, births from measurements and filters in turn: what a scenario builds, and what it refuses."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from scenarios.minimal import changed
+from vedette.errors import ScenarioError
+from vedette.filters import LmbFilter, MultiSensorGlmbFilter, MultiSensorLmbFilter, SequentialLmbFilter
+from vedette.fusion import Clmb, CmDeltaGlmb, Matched, ParallelUpdate
+from vedette.scenarios import Scenario, parse_scenario
+from vedette.scenarios.build import build_experiment
+from vedette.scenarios.summary import facts
+from vedette.tracking import BeliefNetwork, Central, Distributed, ScanNetwork
+
+FILTER = "kind: m_delta_glmb"
+FUSION = "fusion: {kind: cm_delta_glmb, weights: [0.5, 0.5]}"
+SITES = """  sites:
+    - {existence: 0.1, mean: [0.0, 0.0, 0.0, 0.0], std: [5.0, 5.0, 2.0, 2.0]}
+"""
+MEASURED = "  from_measurements: {expected: 0.4, max_existence: 0.1, std: [9.0, 8.0, 3.0, 2.0]}\n"
+
+
+def tracker_of(filter_: str, fusion: str, *more: tuple[str, str]) -> Any:
+    text = changed((FILTER, f"kind: {filter_}"), (FUSION, f"fusion: {fusion}"), *more)
+    return build_experiment(Scenario(parse_scenario(text, "f.yaml"), Path("f.yaml"))).tracker
+
+
+@pytest.mark.parametrize(
+    ("kind", "fusion", "central"),
+    [
+        ("lmb", "sequential", SequentialLmbFilter),
+        ("lmb", "central", MultiSensorLmbFilter),
+        ("delta_glmb", "sequential", MultiSensorGlmbFilter),
+        ("m_delta_glmb", "central", MultiSensorGlmbFilter),
+    ],
+)
+def test_scans_go_to_one_filter_or_over_the_radio(kind: str, fusion: str, central: type) -> None:
+    alone = tracker_of(kind, f"{{kind: {fusion}}}")
+    assert isinstance(alone, Central)
+    assert isinstance(alone.filter, central)
+    radio = tracker_of(kind, f"{{kind: {fusion}}}\nnetwork: {{radio_range: 50.0, hops: 2, loss: 0.1, delay: 1}}")
+    assert isinstance(radio, ScanNetwork)
+    assert isinstance(radio.filter, central)
+    network = radio.network
+    assert (network.radio_range, network.hops, network.loss, network.delay) == (50.0, 2, 0.1, 1)
+    assert isinstance(radio.merging, Matched if kind == "lmb" else CmDeltaGlmb)
+
+
+def test_beliefs_go_to_a_fusion_or_over_the_radio() -> None:
+    alone = tracker_of("lmb", "{kind: parallel}")
+    assert isinstance(alone, Distributed)
+    assert alone.feedback
+    assert isinstance(alone.fusion, ParallelUpdate)
+    radio = tracker_of("lmb", "{kind: parallel}\nnetwork: {consensus_rounds: 7}")
+    assert isinstance(radio, BeliefNetwork)
+    assert radio.network.consensus_rounds == 7
+    assert math.isinf(radio.network.radio_range)
+    assert isinstance(radio.merging, Matched)
+    views = tracker_of("lmb", "{kind: clmb, by_views: true, feedback: true}\nnetwork: {}")
+    assert isinstance(views.fusion, Clmb)
+    assert views.fusion.by_views
+    own = tracker_of("m_delta_glmb", "{kind: cm_delta_glmb, feedback: true}\nnetwork: {loss: 0.2}")
+    assert isinstance(own.merging, CmDeltaGlmb)
+
+
+def test_births_from_measurements_beside_sites_or_instead() -> None:
+    both = tracker_of("lmb", "{kind: sequential}", (SITES, SITES + MEASURED)).targets.birth
+    assert both.num_sites == 1
+    np.testing.assert_array_equal(both.from_measurements.std, [9.0, 8.0, 3.0, 2.0])
+    assert (both.from_measurements.expected, both.from_measurements.max_existence) == (0.4, 0.1)
+    interleaved = ("constant_velocity, sigma_v: 1.0", "constant_velocity, sigma_v: 1.0, state_order: interleaved")
+    alone = tracker_of("lmb", "{kind: sequential}", (SITES, MEASURED), interleaved).targets.birth
+    assert (alone.num_sites, alone.state_dim) == (0, 4)
+    np.testing.assert_array_equal(alone.from_measurements.std, [9.0, 3.0, 8.0, 2.0])
+
+
+def test_deletion_by_spread_is_a_limit_of_the_filters() -> None:
+    tracker = tracker_of("lmb, limits: {max_position_std: 40.0}", "{kind: clmb}")
+    assert isinstance(tracker.filters[0], LmbFilter)
+    assert tracker.filters[0].limits.max_position_std == 40.0
+    assert math.isinf(tracker_of("lmb", "{kind: clmb}").filters[0].limits.max_position_std)
+
+
+def test_show_says_what_is_sent_and_where_targets_are_born() -> None:
+    text = changed(
+        (FILTER, "kind: lmb"), (FUSION, "fusion: {kind: sequential}\nnetwork: {radio_range: 80.0}"), (SITES, MEASURED)
+    )
+    told = dict(facts(parse_scenario(text, "f.yaml")))
+    assert told["network"] == "radio_range 80 m, loss 0, delay 0"
+    assert told["births"] == "no site; 0.4 a scan from measurements"
+
+
+FAULTS = [
+    (
+        "lmb",
+        "{kind: sequential}\nnetwork: {consensus_rounds: 3}",
+        (),
+        "expected none, as under sequential sensors send scans, of which there is no average, got 3",
+    ),
+    (
+        "lmb",
+        "{kind: parallel}\nnetwork: {delay: 2}",
+        (),
+        "network.delay: expected 0, as parallel divides by the prediction of the same time, got 2",
+    ),
+    (
+        "lmb",
+        "{kind: clmb}\nnetwork: {}",
+        (),
+        "fusion.feedback: expected true, as sensors of a network go on from what they have fused, got false",
+    ),
+    (
+        "lmb",
+        "{kind: parallel}\nnetwork: {consensus_rounds: 3, delay: 2}",
+        (),
+        "network.delay: expected none with consensus_rounds, got 2",
+    ),
+    ("lmb", "{kind: parallel}\nnetwork: {loss: 1.0}", (), "network.loss: expected a number below 1, got 1.0"),
+    (
+        "lmb",
+        "{kind: clmb}",
+        ((SITES, SITES + MEASURED),),
+        "fusion.matching: expected assignment, as without feedback each sensor makes labels of its own from its "
+        'measurements, got "labels"',
+    ),
+    (
+        "lmb",
+        "{kind: sequential}",
+        ((SITES, MEASURED.replace(", 2.0]", "]")),),
+        "birth.from_measurements.std: expected 4 numbers, as a state under motion has, got a list of 3",
+    ),
+    (
+        "lmb",
+        "{kind: sequential}",
+        ((SITES, MEASURED.replace("9.0", "0.0")),),
+        "birth.from_measurements.std[0]: expected a number above 0, got 0.0",
+    ),
+    (
+        "lmb",
+        "{kind: sequential}",
+        (
+            (SITES, MEASURED),
+            (
+                "noise: {kind: constant, std: [0.02, 3.0]}",
+                "measurement: {kind: bearing_only}\n  noise: {kind: constant, std: [0.02]}",
+            ),
+        ),
+        "sensor_defaults.measurement.kind: expected a measurement that says where a target is, for birth.from_measurements, "
+        'got "bearing_only"',
+    ),
+]
+
+
+@pytest.mark.parametrize(("kind", "fusion", "changes", "message"), FAULTS)
+def test_what_does_not_go_together_is_refused(kind: str, fusion: str, changes: Any, message: str) -> None:
+    text = changed((FILTER, f"kind: {kind}"), (FUSION, f"fusion: {fusion}"), *changes)
+    with pytest.raises(ScenarioError) as raised:
+        parse_scenario(text, "f.yaml")
+    assert any(fault.endswith(message) for fault in str(raised.value).splitlines()), str(raised.value)
