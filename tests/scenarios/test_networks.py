@@ -151,8 +151,8 @@ FAULTS = [
                 "measurement: {kind: bearing_only}\n  noise: {kind: constant, std: [0.02]}",
             ),
         ),
-        "sensor_defaults.measurement.kind: expected a measurement that says where a target is, for birth.from_measurements, "
-        'got "bearing_only"',
+        "sensor_defaults.measurement.kind: expected a measurement that says where a target is, for "
+        'birth.from_measurements, got "bearing_only"',
     ),
 ]
 
