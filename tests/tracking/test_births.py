@@ -16,7 +16,7 @@ from vedette.filters import LmbFilter, MultiSensorGlmbFilter, MultiSensorLmbFilt
 from vedette.fusion import Clmb, Matched
 from vedette.fusion.matching import OWN_LABELS
 from vedette.models import BirthModel, MeasurementBirth
-from vedette.tracking import Central, Distributed
+from vedette.tracking import Central, Distributed, State
 from vedette.tracking.births import births_due, births_from_scans
 
 STD = np.array([10.0, 10.0, 5.0, 5.0])
@@ -185,3 +185,15 @@ def test_scans_at_different_times() -> None:
         InputError, match=r"a TwoStepFilter, with predict\(\) and update\(\), as it must predict without"
     ):
         plain.step(plain.initial(), [None], POSES[:1], 1.0, rngs=rngs(1))
+
+
+def test_a_sensor_that_keeps_its_belief_counts_by_what_it_sees_whether_it_scanned_or_not() -> None:
+    local, thirds, poses = filters(targets(), (*SENSORS, SENSORS[0])), (1 / 3, 1 / 3, 1 / 3), np.zeros((3, 3))
+    mean, cov = [[0.0, 0.0, 1.0, 1.0]], [np.diag([9.0, 9.0, 4.0, 4.0])]
+    beliefs = tuple(lmb([[1, 0]], [r], mean, cov) for r in (0.9, 0.5, 0.3))
+    tracker = Distributed(local, Clmb(thirds, by_views=True))
+    state, _ = tracker.step(State(beliefs, beliefs[0], 4, 4.0), [None] * 3, poses, 5.0, rngs=rngs(3))
+    predicted = [own.predict(belief, 1.0, 5)[0] for own, belief in zip(local, beliefs, strict=True)]
+    shares = np.array([0.9, 0.8, 0.9]) / 2.6  # their probabilities of detection
+    expected, _ = Clmb(tuple(shares)).fuse(predicted)
+    np.testing.assert_allclose(state.fused.existence, expected.existence, rtol=1e-12)

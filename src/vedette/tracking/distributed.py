@@ -28,7 +28,8 @@ class Distributed:
     Attributes:
         filters: one a sensor; all hold the same targets.
         fusion: of their beliefs, after every scan; None for a single sensor.
-        feedback: whether the fused belief replaces the sensors' own (paper-notes 9).
+        feedback: whether the fused belief replaces the sensors' own (paper-notes 9). Without it a fusion by views
+            counts a sensor that did not scan as if it had, since its belief is its own, of its earlier scans.
 
     Raises:
         InputError: no filter or something else, filters of different targets, several sensors without a fusion; births
@@ -91,7 +92,9 @@ class Distributed:
         fused, report = local[0], None
         sent = tuple(bytes_of_belief(belief) for belief in local)
         if self.fusion is not None:
-            views, rule = Views(self.sensors, at, tuple(scan is not None for scan in scans), prediction), self.fusion
+            # Without feedback a sensor still knows what it saw at earlier scans.
+            scanned = tuple(scan is not None or not self.feedback for scan in scans)
+            views, rule = Views(self.sensors, at, scanned, prediction), self.fusion
             with stages.timing("fusion"):
                 if isinstance(rule, Matched):
                     # Labels then outlast the sensor that led them, and are those that decisions need.
