@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 from scipy.integrate import dblquad
+from scipy.special import ndtr
 
 from vedette import models
 from vedette.errors import InputError, ModelError
@@ -89,6 +90,30 @@ def test_the_share_within_a_range(spread, further):
     share = by_polar_quadrature(centre, spread * ELONGATED, 500.0, 0.0, math.pi)
     detection = models.limited_range(0.9, 500.0, outside=0.1)
     assert mean_detection(detection, centre, spread * ELONGATED) == pytest.approx(0.1 + 0.8 * share, abs=2e-6)
+
+
+def share_of_disc(centre, long_std, short_std, direction, radius):
+    """Of a Gaussian with its long axis along `direction`: sums across it of the closed form along it."""
+    along = np.array([math.cos(direction), math.sin(direction)])
+    across = np.array([-along[1], along[0]])
+    z = np.linspace(-8.0, 8.0, 200_001)
+    off = (centre - POSE[:2]) @ across + short_std * z
+    half = np.sqrt(np.maximum(radius**2 - off**2, 0.0))
+    at = (centre - POSE[:2]) @ along
+    inner = np.where(abs(off) <= radius, ndtr((half - at) / long_std) - ndtr((-half - at) / long_std), 0.0)
+    return float((inner * np.exp(-0.5 * z**2)).sum() * (z[1] - z[0]) / math.sqrt(2.0 * math.pi))
+
+
+@pytest.mark.parametrize("ratio", [3.0, 10.0, 40.0, 400.0])
+@pytest.mark.parametrize("direction", [0.0, 0.7, 1.6, 2.5])
+@pytest.mark.parametrize("further", [-40.0, 0.0, 30.0])
+def test_the_share_of_a_long_and_thin_gaussian(ratio, direction, further):
+    """As of a target far off whose bearing is far less certain than its range."""
+    centre, std = EDGE + further * np.array([math.cos(0.7), math.sin(0.7)]), 80.0
+    axes = np.array([[math.cos(direction), -math.sin(direction)], [math.sin(direction), math.cos(direction)]])
+    cov = axes @ np.diag([std**2, (std / ratio) ** 2]) @ axes.T
+    share = share_of_disc(centre, std, std / ratio, direction, 500.0)
+    assert mean_detection(models.limited_range(0.9, 500.0), centre, cov) == pytest.approx(0.9 * share, abs=5e-6)
 
 
 @pytest.mark.parametrize("half_width", [0.2, 1.2, 2.5, math.pi])
