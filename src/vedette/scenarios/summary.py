@@ -8,11 +8,11 @@ from typing import Literal
 from vedette.scenarios.loading import Scenario
 from vedette.scenarios.sections import ScenarioModel
 from vedette.scenarios.sections.base import Section
+from vedette.scenarios.sections.birth import Birth
 from vedette.scenarios.sections.fusion import AnyFusion, CustomFusion
 from vedette.scenarios.sections.sensors import Sensor
 from vedette.scenarios.sections.targets import RecordedTargets
 from vedette.scenarios.sections.tracking import AnyFilter, Filter
-from vedette.scenarios.sections.world import Birth
 from vedette.text import counted
 
 

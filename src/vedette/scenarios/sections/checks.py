@@ -13,10 +13,10 @@ import numpy as np
 from vedette.covariances import covariance_fault
 from vedette.scenarios.faults import Finding, Path, describe
 from vedette.scenarios.sections.base import attempt
+from vedette.scenarios.sections.birth import BirthSite
 from vedette.scenarios.sections.fusion import OF_LMBS
 from vedette.scenarios.sections.network_checks import NETWORK_CHECKS
 from vedette.scenarios.sections.tracking import UNLABELLED
-from vedette.scenarios.sections.world import BirthSite
 
 if TYPE_CHECKING:
     from vedette.scenarios.sections.scenario import ScenarioModel

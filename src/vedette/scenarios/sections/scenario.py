@@ -9,6 +9,7 @@ from pydantic import Field, field_validator
 
 from vedette.scenarios.faults import Finding, describe
 from vedette.scenarios.sections.base import Name, Section, attempt, check
+from vedette.scenarios.sections.birth import Birth
 from vedette.scenarios.sections.checks import CHECKS, step_of_time
 from vedette.scenarios.sections.control import Control
 from vedette.scenarios.sections.fusion import AnyFusion, Fusion
@@ -19,7 +20,6 @@ from vedette.scenarios.sections.sensors import Sensor, SensorDefaults
 from vedette.scenarios.sections.targets import Targets
 from vedette.scenarios.sections.tracking import AnyFilter, Filter
 from vedette.scenarios.sections.world import (
-    Birth,
     ConstantSurvival,
     ConstantVelocity,
     Motion,

@@ -1,4 +1,4 @@
-"""Sections about the world: time, region, motion, survival and births."""
+"""Sections about the world: time, region, motion and survival."""
 
 from __future__ import annotations
 
@@ -11,16 +11,12 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from vedette.covariances import SMALLEST_VARIANCE
 from vedette.scenarios.faults import Finding, describe
 from vedette.scenarios.sections.base import (
-    Chance,
     GaussianMethod,
     Positive,
     Probability,
     Section,
-    SomeNumbers,
-    Steps,
     Whole,
     check,
 )
@@ -28,7 +24,7 @@ from vedette.scenarios.sections.custom import Custom, NotGiven
 
 if TYPE_CHECKING:  # with the models comes the compiler, which a check does without
     from vedette.kernels.base.types import Floats
-    from vedette.models import BirthModel, MotionModel, Region, SurvivalModel
+    from vedette.models import MotionModel, Region, SurvivalModel
 
 
 class Time(Section):
@@ -191,93 +187,3 @@ class CustomSurvival(Custom):
 
 
 Survival = Annotated[ConstantSurvival | CustomSurvival, Field(discriminator="kind")]
-CovRows = Annotated[tuple[SomeNumbers, ...], Field(strict=False)]
-
-
-def _spreads(stds: SomeNumbers) -> Iterator[Finding]:
-    """What is wrong with standard deviations of a birth."""
-    for j, std in enumerate(stds):
-        if std <= 0.0:
-            yield ("std", j), "a number above 0", describe(std)
-        elif std * std < SMALLEST_VARIANCE:
-            yield ("std", j), f"a number of at least {math.sqrt(SMALLEST_VARIANCE):g}", describe(std)
-
-
-class BirthSite(Section):
-    """A place where targets appear: one Bernoulli of the birth density."""
-
-    existence: float = Field(gt=0.0, lt=1.0, description="Probability that a target appears, at each such scan [-].")
-    mean: SomeNumbers = Field(description="Mean state [m, m/s, ...].")
-    std: SomeNumbers | None = Field(
-        default=None, description="Standard deviation of each state component; else give cov [m, m/s, ...]."
-    )
-    cov: CovRows | None = Field(
-        default=None, description="Covariance of the state, row by row; else give std [m^2, m^2/s, ...]."
-    )
-
-    @check
-    def _one_spread(self) -> Iterator[Finding]:
-        if (self.std is None) == (self.cov is None):
-            yield (), "either std or cov", "both" if self.std else "neither"
-
-    @check
-    def _positive(self) -> Iterator[Finding]:
-        yield from _spreads(self.std or ())
-
-    def covariance(self) -> Floats:
-        """Covariance of the state, in the order of the file."""
-        return np.array(self.cov) if self.cov is not None else np.diag(np.square(self.std or ()))
-
-
-class MeasuredBirth(Section):
-    """Births where something was measured at the scan before that no track explains."""
-
-    expected: Positive = Field(default=0.5, description="Mean number of such births a scan [-].")
-    max_existence: Chance = Field(default=0.03, description="Most that any of them may have as existence [-].")
-    std: SomeNumbers = Field(description="Standard deviation of each state component of a birth [m, m/s, ...].")
-
-    @check
-    def _positive(self) -> Iterator[Finding]:
-        yield from _spreads(self.std)
-
-
-class Birth(Section):
-    """LMB births. Label = (birth step, index of the site); those from measurements have the indices after the sites."""
-
-    steps: Literal["every"] | Steps = Field(
-        default="every", description='Scans at which targets may appear at the sites: a list, or "every" [-].'
-    )
-    sites: Annotated[tuple[BirthSite, ...], Field(strict=False)] = Field(
-        default=(), description="The sites, the same at every sensor [-]."
-    )
-    from_measurements: MeasuredBirth | None = Field(
-        default=None, description="Births from measurements, beside the sites; none: at the sites alone [-]."
-    )
-
-    @check
-    def _somewhere(self) -> Iterator[Finding]:
-        if not self.sites and self.from_measurements is None:
-            yield ("sites",), "at least one site, or from_measurements", "neither"
-
-    @check
-    def _each_once(self) -> Iterator[Finding]:
-        steps = () if self.steps == "every" else self.steps
-        for i, step in enumerate(steps):
-            if step in steps[:i]:
-                yield ("steps", i), "each step once", f"{step} again"
-
-    def build(self, motion: Motion) -> BirthModel:
-        """The births, shared by all sensors."""
-        from vedette.models import BirthModel, MeasurementBirth
-
-        order, dim, num = grouped_order(motion), motion.state_dim, len(self.sites)
-        measured = self.from_measurements
-        return BirthModel(
-            np.array([site.existence for site in self.sites]),
-            np.array([site.mean for site in self.sites]).reshape(num, dim)[:, order],
-            np.array([site.covariance() for site in self.sites]).reshape(num, dim, dim)[:, order][:, :, order],
-            None if self.steps == "every" else frozenset(self.steps),
-            None
-            if measured is None
-            else MeasurementBirth(measured.expected, measured.max_existence, np.array(measured.std)[order]),
-        )
