@@ -7,7 +7,8 @@ Runs each campaign, in a folder that is kept (`--out`), and goes on with one tha
 table for each of its settings. Runs are paired: at the same number every rule meets the same truth and the same
 scans. OSPA and its parts are means over scans and runs, with one standard error over the runs; "N bias" is the number
 of estimates minus that of targets; "tracked" the share of the targets seen by some sensor that have an estimate;
-times are wall time of filters and fusion, all sensors together, in a process of one thread.
+times are wall time of filters and fusion, all sensors together, in a process of one thread; "kB a scan" what all
+sensors together send, in units of 1000 bytes, numbers of 8 bytes uncompressed.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ def table(results: CampaignResults, group: GroupComparison) -> Iterator[str]:
         name for name, section in group.cells[0].scenario.model.metrics.items() if isinstance(section, TrackedShare)
     ]
     names = ["Rule", named_in("OSPA", comparison.unit), "Localisation", "Cardinality", "N bias"]
-    names += [*(["tracked"] * len(shares)), "ms a scan"]
+    names += [*(["tracked"] * len(shares)), "ms a scan", "kB a scan"]
     yield "| " + " | ".join(names) + " |"
     yield "| --- |" + " ---: |" * (len(names) - 1)
     for label, cell in zip(group.labels, group.cells, strict=True):
@@ -43,7 +44,8 @@ def table(results: CampaignResults, group: GroupComparison) -> Iterator[str]:
         bias = f"{float(comparison.summary(label, 'cardinality_error').mean):+.3f}".replace("-", "\N{MINUS SIGN}")
         tracked = [f"{100.0 * float(comparison.summary(label, name).mean):.1f} %" for name in shares]
         error = f"{float(score.mean):.3f} ± {float(score.standard_error):.3f}"
-        yield "| " + " | ".join([label, error, *parts, bias, *tracked, f"{scan_ms(results, cell.name):.1f}"]) + " |"
+        costs = (f"{scan_ms(results, cell.name):.1f}", f"{scan_kilobytes(results, cell.name):.1f}")
+        yield "| " + " | ".join([label, error, *parts, bias, *tracked, *costs]) + " |"
     yield ""
     yield f"{comparison.num_runs} paired runs of {comparison.scenario}."
 
@@ -52,6 +54,12 @@ def scan_ms(results: CampaignResults, cell: str) -> float:
     """Median over the runs of a cell of the mean time that filters and fusion took for a scan, ms."""
     timings = [results.record(cell, run).timings for run in results.finished(cell)]
     return float(np.median([1e3 * sum(spent[stage].mean() for stage in STAGES if stage in spent) for spent in timings]))
+
+
+def scan_kilobytes(results: CampaignResults, cell: str) -> float:
+    """Mean over scans and runs of a cell of what all sensors together sent at a scan, kB."""
+    sent = [results.record(cell, run).health.bytes_sent.sum(axis=1).mean() for run in results.finished(cell)]
+    return float(np.mean(sent)) / 1e3
 
 
 def main() -> None:

@@ -124,6 +124,19 @@ def test_a_scenario_names_it(tmp_path: Path) -> None:
     assert np.isnan(share[alive == 0]).all()
 
 
+def test_seen_is_what_the_true_sensors_see(tmp_path: Path) -> None:
+    text = changed(
+        ("ospa: {cutoff: 50.0", "metrics: {share: {kind: tracked_share}}\nospa: {cutoff: 50.0"),
+        ("sensor_defaults:\n", "sensor_defaults:\n  truth: {detection: {kind: limited_range, probability: 0.9, max_range: 1.0}}\n"),
+    )
+    file = tmp_path / "f.yaml"
+    file.write_text(text)
+    scenario = load_scenario(file)
+    record = run_scenario(scenario, "still", seed=1)
+    # The filters believe that they see everywhere; in truth no target comes within a metre.
+    assert np.isnan(measure_run(record, scenario, own_metrics(scenario)).columns()["share"]).all()
+
+
 def test_a_mistake_in_it_is_placed(tmp_path: Path) -> None:
     text = changed(
         ("ospa: {cutoff: 50.0", "metrics: {share: {kind: tracked_share, min_detection: 2}}\nospa: {cutoff: 50.0")

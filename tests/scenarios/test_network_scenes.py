@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from vedette.evaluation import seen_targets
+from vedette.evaluation import measure_run, own_metrics, run_scenario, seen_targets
 from vedette.kernels.base.types import Floats
-from vedette.scenarios import load_scenario
+from vedette.scenarios import load_scenario, with_fields
 from vedette.scenarios.build import build_experiment, build_targets
 from vedette.scenarios.loading import Scenario
 from vedette.simulation import Truth
@@ -35,6 +35,7 @@ PLACES = {
     ("two-views-1", 60, 2): (1020.0, 710.0),
     ("two-views-2", 80, 0): (40.0, 600.0),
 }
+NUM_SCANS = 6  # of the scenes as they are run here
 
 
 def truth_of(scenario: Scenario) -> Truth:
@@ -98,3 +99,35 @@ def test_sensors_that_stay_miss_most(name: str, share: float) -> None:
     scenario = load_scenario(name)
     seen = seen_by(scenario, truth_of(scenario))
     assert (~seen.any(axis=1)).mean() == pytest.approx(share, abs=0.02)
+
+
+def beginning(name: str) -> Scenario:
+    """The first scans of a scene, with its targets of then."""
+    scenario = load_scenario(name)
+    targets = scenario.model.targets.model_dump(mode="json")
+    targets["tracks"] = [
+        {**track, "end_step": None} for track in targets["tracks"] if (track["start_step"] or 1) <= NUM_SCANS
+    ]
+    fields: dict[str, Any] = {"time.num_steps": NUM_SCANS, "targets": targets}
+    if scenario.model.decision_steps:
+        fields["control.decision_steps"] = [2, 4]
+    return with_fields(scenario, fields)
+
+
+@pytest.mark.parametrize("name", NUMBERS)
+def test_their_beginning_runs_and_what_is_seen_is_tracked(name: str) -> None:
+    scenario = beginning(name)
+    record = run_scenario(scenario, "still", seed=1, num_threads=1)
+    share = measure_run(record, scenario, own_metrics(scenario)).columns()["tracked_share"]
+    assert (record.ospa[:, 0] <= scenario.model.ospa.cutoff).all()
+    assert share[-1] >= 0.8
+    scans = build_experiment(scenario).scans_at.T
+    np.testing.assert_array_equal(record.health.bytes_sent > 0, scans)
+
+
+@pytest.mark.parametrize("name", ["eight-mobile", "six-cameras"])
+def test_sensors_that_may_move_do(name: str) -> None:
+    scenario = beginning(name)
+    poses = run_scenario(scenario, "random", seed=1, num_threads=1).poses
+    moved = np.abs(np.diff(poses, axis=0)).max(axis=2) > 0.0
+    assert np.flatnonzero(moved.any(axis=1)).tolist() == [1, 3]  # in the second after each decision

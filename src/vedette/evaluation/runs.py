@@ -10,7 +10,7 @@ from functools import partial
 
 from vedette.evaluation.metrics import Metric, RunMetrics, TrackedShare, measure, ospa_of_run
 from vedette.scenarios import Scenario
-from vedette.scenarios.build import build_experiment, build_planner, build_sensors
+from vedette.scenarios.build import build_experiment, build_planner, build_sensors, build_true_sensors
 from vedette.scenarios.sections.scoring import AnyMetric, CustomMetric
 from vedette.simulation.loop import simulate
 from vedette.simulation.records import Measure, RunRecord
@@ -43,7 +43,8 @@ def _measure_of(scenario: Scenario, section: AnyMetric) -> Measure:
     if isinstance(section, CustomMetric):
         made: Measure = section.made(scenario.folder)
         return made
-    sensors, ospa = tuple(sensor.filter.sensor for sensor in build_sensors(scenario)), scenario.model.ospa
+    known, ospa = tuple(sensor.filter.sensor for sensor in build_sensors(scenario)), scenario.model.ospa
+    sensors = tuple(true.model for true in build_true_sensors(scenario, known))
     return TrackedShare(sensors, ospa.cutoff, ospa.order, section.min_detection)
 
 
