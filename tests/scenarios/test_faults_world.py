@@ -15,7 +15,7 @@ CASES = [
         "nane: small",
         [
             "f.yaml:1:1: name: expected a value, as it is required, got nothing",
-            "f.yaml:1:1: nane: expected one of birth, control, description, estimator, filter, format, fusion, metrics, motion, name, ospa, planners, region, sensor_defaults, sensors, survival, targets, time, got an unknown key (did you mean name?)",
+            "f.yaml:1:1: nane: expected one of birth, control, description, estimator, filter, format, fusion, metrics, motion, name, network, ospa, planners, region, sensor_defaults, sensors, survival, targets, time, got an unknown key (did you mean name?)",
         ],
     ),
     ("name: small", "name: ''", ['f.yaml:1:7: name: expected a name of one or more printable characters, got ""']),
@@ -116,7 +116,7 @@ CASES = [
     (
         "    - {existence: 0.1, mean: [0.0, 0.0, 0.0, 0.0], std: [5.0, 5.0, 2.0, 2.0]}\n",
         "    []\n",
-        ["f.yaml:9:5: birth.sites: expected a list of at least 1, got an empty list"],
+        ["f.yaml:9:5: birth.sites: expected at least one site, or from_measurements, got neither"],
     ),
     (
         "end_step: 18",
