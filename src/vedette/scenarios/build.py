@@ -97,7 +97,8 @@ def _tracker(scenario: Scenario, filters: tuple[Filter, ...]) -> Tracker:
     if model.network is None:
         return Distributed(filters, fusion, model.fusion.feeds_back) if central is None else Central(central)
     of_lmbs = isinstance(filters[0].initial(), LMB)
-    merging = FusionSection().build_merging(len(filters), of_lmbs=of_lmbs)
+    own_labels = model.birth.from_measurements is not None
+    merging = FusionSection().build_merging(len(filters), of_lmbs=of_lmbs, own_labels=own_labels)
     if central is not None:
         return ScanNetwork(central, model.network.build(), merging)
     assert fusion is not None  # a single sensor has no network
