@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.special import logit
 
-from fusion.sights import BLIND, LABELS, assert_same_bits, belief, moments, sensor, views
+from fusion.sights import BLIND, LABELS, PLACES, assert_same_bits, belief, moments, sensor, views
 from vedette.densities import LMB, TrackTable
 from vedette.errors import InputError
 from vedette.fusion import ArithmeticAverage, Clmb, Views
@@ -75,6 +75,19 @@ def test_where_nobody_sees_those_that_have_the_label_keep_their_weights() -> Non
     for found, wanted in zip(moments(fused)[LABELS[2]], expected, strict=True):
         np.testing.assert_allclose(found, wanted, rtol=1e-10)
     assert info.missing_labels == (0, 0, 0)
+
+
+@pytest.mark.parametrize("rule", RULES)
+def test_where_nobody_has_scanned_sensors_count_by_what_they_would_see(rule: Any) -> None:
+    rng = np.random.default_rng(8)
+    beliefs = [belief((0.95, 0.9, 0.1), rng), belief((0.1, 0.2, 0.9), rng)]
+    at = [PLACES[0, 0], PLACES[2, 0]]
+    expected, _ = rule((0.5, 0.5), by_views=True).fuse(beliefs, views([0.9, 0.9], at))
+    fused, _ = rule((0.5, 0.5), by_views=True).fuse(beliefs, views([0.9, 0.9], at, [False, False]))
+    assert_same_bits(fused, expected)
+    # The second has scanned, and does not see the first target.
+    fused, _ = rule((0.5, 0.5), by_views=True).fuse(beliefs, views([0.9, 0.9], at, [False, True]))
+    assert fused.existence[[0, 2]] == pytest.approx([0.95, 0.9])
 
 
 @pytest.mark.parametrize("rule", RULES)

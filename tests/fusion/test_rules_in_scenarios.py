@@ -98,3 +98,20 @@ def test_a_decision_of_matched_beliefs_goes_by_common_labels() -> None:
     loaded = scene("{kind: clmb, matching: assignment}", 1000.0, "every")
     planner: Any = build_planner(loaded, "idm")
     assert type(planner.fusion).__name__ == "Clmb"
+
+
+@pytest.mark.parametrize(
+    ("fusion", "said"),
+    [
+        ("{kind: parallel}", "(clmb); tracks are fused by another rule (parallel)"),
+        ("{kind: clmb, by_views: true}", "(clmb); tracks are fused by another rule (clmb by views)"),
+        ("{kind: clmb, matching: assignment}", None),
+    ],
+)
+def test_a_joint_decision_says_where_it_goes_by_another_rule_than_the_tracks(fusion: str, said: str | None) -> None:
+    loaded = scene(fusion)
+    experiment, planner = build_experiment(loaded), build_planner(loaded, "jdm", 1)
+    assert planner is not None
+    plan = planner.plan(experiment.tracker.initial(), experiment.poses, rng=np.random.default_rng(0))
+    said_of = f"joint rewards are of plain covariance intersection {said}"
+    assert plan.notes == (() if said is None else (said_of,))

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 
 from scenarios.minimal import changed
@@ -206,3 +208,22 @@ def test_faults_are_named_with_their_places(old: str, new: str, faults: list[str
     with pytest.raises(ScenarioError) as error:
         parse_scenario(changed((old, new)), "f.yaml")
     assert error.value.faults == faults
+
+
+@pytest.mark.parametrize(
+    ("network", "feedback", "when"),
+    [("", "false", "without feedback"), ("", "true", None), ("network: {hops: 1}\n", "true", "over a network")],
+)
+def test_labels_that_sensors_make_from_measurements_are_to_be_matched(network: str, feedback: str, when: Any) -> None:
+    measured = "  from_measurements: {std: [5.0, 5.0, 2.0, 2.0]}\n"
+    births = "  steps: [1, 5]\n", f"  steps: [1, 5]\n{measured}"
+    rule = "fusion: {kind: cm_delta_glmb, weights: [0.5, 0.5]}"
+    for matching in ("labels", "assignment"):
+        fusion = f"{network}fusion: {{kind: cm_delta_glmb, feedback: {feedback}, matching: {matching}}}"
+        text = changed(births, (rule, fusion))
+        if (matching == "labels") == (when is None):
+            parse_scenario(text)
+            continue
+        wanted = f"assignment, as {when} sensors make labels" if when else "labels, as with feedback all sensors share"
+        with pytest.raises(ScenarioError, match=f"fusion.matching: expected {wanted}"):
+            parse_scenario(text)

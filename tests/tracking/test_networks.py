@@ -11,7 +11,7 @@ import pytest
 from tracking.scenes import assert_same_lmb, filters, lmb, rngs, scans_of, sensor, targets
 from vedette.errors import InputError
 from vedette.filters import MultiSensorGlmbFilter, SequentialLmbFilter
-from vedette.fusion import ArithmeticAverage, Clmb, CmDeltaGlmb, FusionLimits, ParallelUpdate
+from vedette.fusion import ArithmeticAverage, Clmb, CmDeltaGlmb, FusionLimits, Matched, ParallelUpdate
 from vedette.fusion.rebasing import rebased, with_labels_of
 from vedette.models import MeasurementBirth
 from vedette.tracking import BeliefNetwork, Central, Distributed, Network, ScanNetwork, State, Tracker
@@ -241,3 +241,33 @@ def test_bad_networks() -> None:
         belief_network(ParallelUpdate(), Network(delay=1))
     with pytest.raises(InputError, match="a dataclass with a field weights"):
         belief_network(object(), Network())
+
+
+def test_what_a_late_message_says_goes_by_where_it_was_taken() -> None:
+    """Sensor 2 saw the target before it went away; sensor 1 sees nothing there."""
+    near = tuple(sensor(3.0, 0.95, 0.1, max_range=100.0) for _ in range(2))
+    world = targets(existence=(0.5,))
+    tracker = BeliefNetwork(filters(world, near), Clmb((0.5, 0.5), by_views=True), Network(delay=1), MERGING)
+    state = tracker.initial()
+    far, close = [1000.0, 0.0, 0.0], [0.0, 50.0, 0.0]
+    for time, second in ((1.0, close), (2.0, far)):
+        scans: Any = [np.empty((0, 2)), np.array([[1.0, -2.0]]) if second is close else np.empty((0, 2))]
+        state, _ = tracker.step(state, scans, np.array([far, second]), time, rngs=rngs(2))
+    assert state.local[0].existence[0] > 0.9
+
+
+@pytest.mark.parametrize("network", [Network(350.0, hops=1), Network(350.0, delay=1), Network(350.0, loss=0.3)])
+@pytest.mark.parametrize("rule", [Clmb(EQUAL), ArithmeticAverage(EQUAL)])
+def test_labels_that_sensors_make_themselves_are_matched_in_a_network(rule: Any, network: Network) -> None:
+    world = targets(existence=(), measured=MeasurementBirth(0.5, 0.1, np.array([10.0, 10.0, 5.0, 5.0])))
+    sharp = tuple(sensor(3.0, 0.98, 0.1) for _ in range(3))
+    with pytest.raises(InputError, match=r"fusion: expected one that matches labels"):
+        BeliefNetwork(filters(world, sharp), rule, network, MERGING)
+    tracker = BeliefNetwork(filters(world, sharp), Matched(rule), network, MERGING)
+    rng, state = np.random.default_rng(2), tracker.initial()
+    poses = np.array([[-300.0, 0.0, 0.0], [0.0, 0.0, 0.0], [300.0, 0.0, 0.0]])
+    for step in range(1, 9):
+        truth = TRUTH.copy()
+        truth[:, :2] += step * truth[:, 2:]
+        state, _ = tracker.step(state, scans_of(truth, sharp, poses, rng), poses, float(step), rngs=rngs(3, step))
+    assert [(belief.existence > 0.6).sum() for belief in (*state.local, state.fused)] == [2] * 4

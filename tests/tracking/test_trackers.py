@@ -149,6 +149,7 @@ def test_a_central_filter_is_every_sensors_belief(experiment: Experiment) -> Non
     assert isinstance(central.filter, CentralFilter)
     record = run(replace(experiment, tracker=central))
     only: Any = {"platforms": experiment.platforms[:1], "poses": experiment.poses[:1], "first_actions": (None,)}
+    only |= {"true_sensors": experiment.true_sensors[:1], "scans_at": None}
     alone = run(replace(experiment, tracker=Distributed((local,)), **only))
     assert_same(replace(record, poses=alone.poses), alone)
     both = record.health.num_hypotheses

@@ -44,6 +44,7 @@ class JointPlanner:
         settings: horizon, samples, caps.
         reward: Cauchy-Schwarz or Renyi divergence, or a reward of the user's own.
         search: which joint actions are evaluated: all of them, as in the paper, or fewer.
+        notes: what every plan is to say beside what comes up, such as that the tracks are fused in another way.
     """
 
     sensors: tuple[MobileSensor, ...]
@@ -51,6 +52,7 @@ class JointPlanner:
     settings: PlanningSettings = field(default_factory=PlanningSettings)
     reward: Reward | PowerReward = field(default_factory=CauchySchwarzReward)
     search: JointSearch = field(default_factory=ExhaustiveSearch)
+    notes: tuple[str, ...] = ()
 
     @property
     def name(self) -> str:
@@ -82,7 +84,8 @@ class JointPlanner:
             evidence.evaluate(np.array([best]))
         chosen = tuple(own.first_action(course) for own, course in zip(evaluator.options, best, strict=True))
         actions = tuple(own.actions for own in evaluator.options)
-        return Plan(self.name, actions, chosen, evidence.tables(best), *evaluator.account())
+        tables, (counts, found) = evidence.tables(best), evaluator.account()
+        return Plan(self.name, actions, chosen, tables, counts, (*self.notes, *found))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -51,8 +51,9 @@ class Clmb:
     With plain weights it assumes that the sensors see the same part of the world: what one sensor surely sees is lost
     where another does not see there. By views, the weights at a label are w_sl proportional to w_s E[P_D^s(l)], so that
     a sensor which cannot see where a target is (or did not scan) has no say in it, neither of its existence nor of its
-    density; one that sees there and lacks the label has its floor. Where nobody can see a label, those that have it
-    keep their plain weights. Both ways a target must have one label at all sensors (see `match_labels`).
+    density; one that sees there and lacks the label has its floor. Where nobody who scanned sees a label, sensors count
+    by how well they would; where nobody would, those that have it keep their plain weights. Both ways a target must
+    have one label at all sensors (see `match_labels`).
 
     Attributes:
         weights: fusion weights, one a sensor, in the order of the beliefs; non-negative, sum 1. A sensor of weight 0

@@ -63,9 +63,21 @@ def weights_by_view(aligned: AlignedLmbs, weights: Floats, views: Views, active:
 
     0 for a sensor that cannot see the label. The mean is over the density of the sensor that is surest of the label,
     among those that see it where they have it (of all that have it, where none does; of equals the first), so that what
-    a blind sensor believes changes nothing. Where nobody can see a label, those that have it keep their plain weights.
+    a blind sensor believes changes nothing. Where nobody who scanned sees a label, sensors count by how well they would
+    see it if they scanned; where nobody would, those that have it keep their plain weights.
     weights: (len(active),) of the sensors `active`, positive.
     """
+    detection = _detection(aligned, views, active)
+    unseen = ~(detection > 0.0).any(axis=1, keepdims=True)
+    if unseen.any() and not all(views.scanned):
+        detection = np.where(unseen, _detection(aligned, views.if_all_scanned(), active), detection)
+        unseen = ~(detection > 0.0).any(axis=1, keepdims=True)
+    shares = weights * np.where(unseen, aligned.held, detection)
+    return np.asarray(shares / sum_over_sensors(shares)[:, None])
+
+
+def _detection(aligned: AlignedLmbs, views: Views, active: Sequence[int]) -> Floats:
+    """(num_labels, len(active)) E[P_D^s(l)] over the density of the surest that sees the label."""
     table, held = TrackTable.from_kernel(aligned.tracks), aligned.held
     existence = np.where(held, aligned.logits, -math.inf)
     sure = np.full(held.shape, -math.inf)
@@ -75,10 +87,7 @@ def weights_by_view(aligned: AlignedLmbs, weights: Floats, views: Views, active:
         sure[own, s] = np.where(seen, existence[own, s], -math.inf)
     unseen = (sure == -math.inf).all(axis=1)
     surest = np.where(unseen[:, None], existence, sure).argmax(axis=1)
-    detection = views.detection(take_tracks(table, aligned.chosen[np.arange(len(held)), surest]))[:, list(active)]
-    blind = ~(detection > 0.0).any(axis=1, keepdims=True)
-    shares = weights * np.where(blind, held, detection)
-    return np.asarray(shares / sum_over_sensors(shares)[:, None])
+    return views.detection(take_tracks(table, aligned.chosen[np.arange(len(held)), surest]))[:, list(active)]
 
 
 def sum_over_sensors(values: Floats) -> Floats:

@@ -42,7 +42,9 @@ def rebased(posterior: LMB, own: LMB, prediction: LMB) -> LMB:
     own_means, own_covs = (moment[before] for moment in track_moments(own.tracks))
     new_means, new_covs = (moment[after] for moment in track_moments(posterior.tracks))
     means[at], covs[at], gained = _updated((means[at], covs[at]), (own_means, own_covs), (new_means, new_covs))
-    logits[at] += posterior.existence_logit[after] - own.existence_logit[before] + gained
+    said, known = posterior.existence_logit[after], own.existence_logit[before]
+    with np.errstate(invalid="ignore"):  # what was impossible or certain, and stays so, is no news
+        logits[at] += np.where(said == known, 0.0, said - known) + gained
     num = len(logits)
     tracks = unchecked(TrackTable, prediction.tracks.labels, np.arange(num + 1), np.zeros(num), means, covs)
     return unchecked(LMB, tracks, logits)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -41,6 +41,10 @@ class Views:
             raise reject("views.scanned", f"{num}, one a sensor", len(self.scanned))
         if not isinstance(self.prediction, GLMB | LMB | None):
             raise reject("views.prediction", "a GLMB, an LMB or None", type(self.prediction).__name__)
+
+    def if_all_scanned(self) -> Views:
+        """What the sensors would see if each had scanned."""
+        return replace(self, scanned=(True,) * len(self.sensors))
 
     def detection(self, tracks: TrackTable) -> Floats:
         """(num_tracks, num_sensors) mean probability of detection over each track's density; 0 without a scan."""

@@ -6,14 +6,15 @@ Each section builds its own part (`vedette.scenarios.sections`); here they are p
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from vedette.control import MobileSensor, Planner
+from vedette.control import JointPlanner, MobileSensor, Planner
 from vedette.densities import LMB
 from vedette.errors import InputError
 from vedette.filters import Filter, labels_targets, shared_targets
-from vedette.fusion import Fusion
+from vedette.fusion import Clmb, Fusion
 from vedette.kernels.base.types import Bools, Floats
 from vedette.models import SensorModel, TargetModel
 from vedette.platforms import Actions
@@ -99,7 +100,8 @@ def _tracker(scenario: Scenario, filters: tuple[Filter, ...]) -> Tracker:
     if model.network is None:
         return Distributed(filters, fusion, model.fusion.feeds_back) if central is None else Central(central)
     of_lmbs = isinstance(filters[0].initial(), LMB)
-    merging = FusionSection().build_merging(len(filters), of_lmbs=of_lmbs)
+    own_labels = model.birth.from_measurements is not None
+    merging = FusionSection().build_merging(len(filters), of_lmbs=of_lmbs, own_labels=own_labels)
     if central is not None:
         return ScanNetwork(central, model.network.build(), merging)
     assert fusion is not None  # a single sensor has no network
@@ -172,7 +174,22 @@ def build_planner(scenario: Scenario, name: str, num_threads: int = 0) -> Planne
     )
     if name in model.planners:
         return model.planners[name].build(name, parts, folder)
-    return STRATEGIES[name].planner(parts)
+    planner = STRATEGIES[name].planner(parts)
+    return (
+        replace(planner, notes=_notes_of_decisions(scenario, parts)) if isinstance(planner, JointPlanner) else planner
+    )
+
+
+def _notes_of_decisions(scenario: Scenario, parts: Parts) -> tuple[str, ...]:
+    """What joint decisions say of their fusion, where the tracks are fused in another way."""
+    section = scenario.model.fusion
+    if isinstance(section, CustomFusion) or (
+        section.kind in ("clmb", "cm_delta_glmb", "none") and not section.by_views
+    ):
+        return ()
+    own = f"{section.kind} by views" if section.by_views else section.kind
+    rule = "clmb" if isinstance(parts.fusion, Clmb) else "cm_delta_glmb"
+    return (f"joint rewards are of plain covariance intersection ({rule}); tracks are fused by another rule ({own})",)
 
 
 def _fusion_of_decisions(scenario: Scenario, local: Filter) -> Fusion:

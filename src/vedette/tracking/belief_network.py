@@ -19,7 +19,7 @@ from vedette.models import SensorModel, TargetModel
 from vedette.models.arguments import reject
 from vedette.tracking.base import State, TrackerInfo, check_step
 from vedette.tracking.births import births_due, births_from_scans
-from vedette.tracking.distributed import shares_prediction
+from vedette.tracking.distributed import check_labels_of_births, shares_prediction
 from vedette.tracking.local import LocalFilters
 from vedette.tracking.merging import merged, views_of, with_weights
 from vedette.tracking.messages import bytes_of_belief
@@ -32,6 +32,7 @@ class _Sent(NamedTuple):
 
     step: int
     time: float
+    views: Views  # from where, and by whom it was scanned
     predictions: tuple[Any, ...]  # what each belief was updated from, where the fusion divides by it; else None
     beliefs: tuple[Any, ...]
     arrives: Ints  # (num_sensors, num_sensors) as of `Network.arrivals`
@@ -65,7 +66,7 @@ class BeliefNetwork:
 
     Raises:
         InputError: filters as in `Distributed`; a fusion without weights; one that divides by the common prediction
-            with filters that are not of LMBs, or with messages that are delayed.
+            with messages that are delayed; one that goes by labels where sensors make their own from measurements.
     """
 
     filters: tuple[Filter, ...]
@@ -79,6 +80,7 @@ class BeliefNetwork:
             raise reject("network", "a Network", self.network)
         for rule in (self.fusion, self.merging):
             with_weights(rule, [1.0])
+        check_labels_of_births(self.fusion, self.targets)
         if shares_prediction(self.fusion) and self.network.delay > 0:
             raise InputError("network.delay: expected 0, as the fusion divides by the prediction of the same time")
 
@@ -106,11 +108,11 @@ class BeliefNetwork:
         links = self.network.links(at, rngs[0])
         with stages.timing("filter"):
             predictions, local, infos = self._filtered(state, scans, at, dt, rngs)
-        sent = _Sent(step, float(time), predictions, local, self.network.arrivals(links, step))
-        waiting = (*state.memory.sent, sent)
         views = Views(self.sensors, at, tuple(scan is not None for scan in scans))
+        sent = _Sent(step, float(time), views, predictions, local, self.network.arrivals(links, step))
+        waiting = (*state.memory.sent, sent)
         with stages.timing("fusion"):
-            fused, reports = self._fused(waiting, links, views)
+            fused, reports = self._fused(waiting, links)
             whole, report = merged(self.merging, fused, range(num), views)
         with stages.timing("births"):
             births = self._births(fused, scans, at, sent)
@@ -144,7 +146,7 @@ class BeliefNetwork:
         beliefs, infos = zip(*results, strict=True)
         return tuple(predictions), beliefs, infos
 
-    def _fused(self, waiting: Sequence[_Sent], links: Bools, views: Views) -> tuple[list[Any], list[FusionInfo | None]]:
+    def _fused(self, waiting: Sequence[_Sent], links: Bools) -> tuple[list[Any], list[FusionInfo | None]]:
         """What each sensor believes after fusing; one object for those who have fused the same."""
         now, num = waiting[-1], len(self.filters)
         shares = self._weights(links)
@@ -159,7 +161,7 @@ class BeliefNetwork:
             weights = self._heard_weights(shares[i, list(messages)])
             key = (*((j, sent.step) for j, sent in messages.items()), *weights.tolist())
             if key not in done:
-                done[key] = self._fuse(list(messages.values()), list(messages), weights, views)
+                done[key] = self._fuse(list(messages.values()), list(messages), weights)
             belief, report = done[key]
             beliefs.append(belief)
             reports.append(report)
@@ -169,11 +171,9 @@ class BeliefNetwork:
         """Of a mean, scaled to those that are heard; of a sum, as they are: who is not heard adds nothing."""
         return shares if shares_prediction(self.fusion) else shares / shares.sum()
 
-    def _fuse(
-        self, messages: Sequence[_Sent], heard: Sequence[int], weights: Floats, views: Views
-    ) -> tuple[Any, FusionInfo | None]:
+    def _fuse(self, messages: Sequence[_Sent], heard: Sequence[int], weights: Floats) -> tuple[Any, FusionInfo | None]:
         """What these sensors' messages are together; `weights` are of a mean, or of a sum where predictions divide."""
-        seen = views_of(views, heard)
+        seen = views_of([sent.views for sent in messages], heard)
         if not shares_prediction(self.fusion):
             now = max(messages, key=lambda sent: sent.step)
             own = [self._current(sent, now, j) for sent, j in zip(messages, heard, strict=True)]
@@ -186,7 +186,8 @@ class BeliefNetwork:
                 names = common_names(predictions, gate_probability=self.merging.gate_probability)
                 predictions = list(map(relabelled, predictions, names))
                 posteriors = list(map(relabelled, posteriors, names))
-            base, _ = with_weights(self.merging, (weights / weights.sum()).tolist()).fuse(predictions, seen)
+            merging = with_weights(self.merging, (weights / weights.sum()).tolist())
+            base, _ = merging.fuse(predictions, seen.if_all_scanned())
             for prediction in predictions:
                 base = with_labels_of(base, prediction)
         posteriors = [rebased(*own, base) for own in zip(posteriors, predictions, strict=True)]

@@ -49,11 +49,7 @@ class Distributed:
             return
         if shares_prediction(self.fusion):
             raise InputError("feedback: expected true, as the fusion is of beliefs that share their prediction")
-        if self.targets.birth.from_measurements is not None and not isinstance(self.fusion, Matched):
-            raise InputError(
-                "fusion: expected one that matches labels, as each sensor makes its own from its measurements and "
-                "nothing is fed back; got one that fuses by label"
-            )
+        check_labels_of_births(self.fusion, self.targets)
 
     @property
     def targets(self) -> TargetModel:
@@ -122,6 +118,20 @@ class Distributed:
                 births_from_scans(birth, belief, sensors[s : s + 1], scans[s : s + 1], poses[s : s + 1], step, owner=s)
                 for s, belief in enumerate(local)
             )
+
+
+def check_labels_of_births(fusion: Fusion, targets: TargetModel) -> None:
+    """Raise `InputError` where sensors make labels of their own from measurements, and the fusion goes by labels.
+
+    One that divides by a common prediction does not: a tracker gives it the labels of that prediction.
+    """
+    if targets.birth.from_measurements is None or shares_prediction(fusion):
+        return
+    if not getattr(fusion, "matches_labels", False):
+        raise InputError(
+            "fusion: expected one that matches labels, as sensors that do not share all they know make their own from "
+            f"their measurements; got {type(fusion).__name__}, which fuses by label"
+        )
 
 
 def shares_prediction(fusion: Fusion | None) -> bool:

@@ -11,6 +11,7 @@ import numpy as np
 from vedette.densities import LMB
 from vedette.errors import InputError
 from vedette.filters import Filter, FilterInfo, LmbFilter, TwoStepFilter, shared_targets
+from vedette.filters.blind import NO_POSE, NO_SCAN, blind_sensor
 from vedette.models.arguments import reject
 
 
@@ -58,14 +59,15 @@ class LocalFilters:
     def updated(
         self, s: int, prediction: Any, scan: Any, pose: Any, rng: np.random.Generator
     ) -> tuple[Any, FilterInfo]:
-        """The prediction after the scan of sensor `s`, no label dropped; the prediction where it did not scan."""
+        """The prediction after the scan of sensor `s`, no label dropped; as it is where the sensor did not scan."""
         own = self.filters[s]
         if not isinstance(own, LmbFilter):
             raise reject(f"filters[{s}]", "an LmbFilter, as the sensors share their prediction", own)
         whole = replace(own.limits, min_existence=0.0, max_labels=2**62, max_position_std=np.inf)
-        seen = np.empty((0, own.sensor.meas_dim)) if scan is None else scan
-        belief, info = replace(own, limits=whole).update(prediction, seen, pose, rng=rng)
-        return (prediction if scan is None else belief), info
+        if scan is None:
+            _, info = replace(own, sensor=blind_sensor(), limits=whole).update(prediction, NO_SCAN, NO_POSE, rng=rng)
+            return prediction, info
+        return replace(own, limits=whole).update(prediction, scan, pose, rng=rng)
 
     def kept(self, belief: LMB) -> LMB:
         """The belief without the labels that the limits of the first filter drop."""

@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from dataclasses import fields, is_dataclass, replace
 from typing import Any
 
+import numpy as np
+
 from vedette.errors import InputError
 from vedette.fusion import Fusion, FusionInfo, Matched, Views
 
@@ -20,16 +22,16 @@ def merged(
     if all(belief is beliefs[0] for belief in beliefs):
         return beliefs[0], None
     equal = with_weights(merging, [1.0 / len(beliefs)] * len(beliefs))
-    return equal.fuse(beliefs, views_of(views, sensors))
+    return equal.fuse(beliefs, views_of([views] * len(beliefs), sensors))
 
 
-def views_of(views: Views, sensors: Sequence[int]) -> Views:
-    """The views of some of the sensors, in that order."""
-    return replace(
-        views,
-        sensors=tuple(views.sensors[s] for s in sensors),
-        poses=views.poses[list(sensors)],
-        scanned=tuple(views.scanned[s] for s in sensors),
+def views_of(views: Sequence[Views], sensors: Sequence[int]) -> Views:
+    """The views of some of the sensors, in that order, each as of its own time."""
+    places = list(zip(views, sensors, strict=True))
+    return Views(
+        tuple(own.sensors[s] for own, s in places),
+        np.array([own.poses[s] for own, s in places]),
+        tuple(own.scanned[s] for own, s in places),
     )
 
 

@@ -122,13 +122,16 @@ class ScanNetwork:
         return State(local, fused, step, float(time), _Memory(known, frames, frame)), info
 
     def _merge(self, memory: _Memory, frame: _Frame, views: Views) -> tuple[_Known, ...]:
-        """Each sensor's belief and those of all that it hears as one; the same for those who hear the same."""
+        """Each sensor's belief and those of all that it hears as one; the same for those who hear the same.
+
+        Who scans at this step is not asked, as the beliefs are those of before.
+        """
         found: dict[tuple[int, ...], _Known] = {}
         everyone = [tuple(np.flatnonzero(row <= frame.step).tolist()) for row in frame.arrives]
         for heard in everyone:
             if heard not in found:
                 beliefs = [memory.known[j].belief for j in heard]
-                belief, report = merged(self.merging, beliefs, heard, views)
+                belief, report = merged(self.merging, beliefs, heard, views.if_all_scanned())
                 if report is None:
                     found[heard] = memory.known[heard[0]]
                 else:

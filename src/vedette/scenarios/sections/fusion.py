@@ -89,7 +89,7 @@ class Fusion(Section):
     matching: Literal["labels", "assignment"] = Field(
         default="labels",
         description="What is one target at several sensors: that of one label, or what is found so by place before "
-        "each fusion (clmb, cm_delta_glmb, arithmetic_average without feedback) [-].",
+        "each fusion (clmb, cm_delta_glmb, arithmetic_average, without feedback or over a network) [-].",
     )
     mixture_power: Literal["moment_matched", "component_wise", "quadrature"] = Field(
         default="moment_matched",
@@ -127,12 +127,8 @@ class Fusion(Section):
 
     @check
     def _matching_of_own_labels(self) -> Iterator[Finding]:
-        if self.matching == "labels":
-            return
-        if self.kind not in BY_LABEL:
+        if self.matching == "assignment" and self.kind not in BY_LABEL:
             yield ("matching",), f"labels, as under {self.kind} all sensors share them", describe(self.matching)
-        elif self.feedback:
-            yield ("matching",), "labels, as with feedback all sensors share them", describe(self.matching)
 
     @property
     def feeds_back(self) -> bool:
@@ -155,15 +151,18 @@ class Fusion(Section):
         rule = self._by_label(num_sensors)
         return Matched(rule) if self.matching == "assignment" else rule
 
-    def build_merging(self, num_sensors: int, *, of_lmbs: bool) -> FusionRule:
+    def build_merging(self, num_sensors: int, *, of_lmbs: bool, own_labels: bool) -> FusionRule:
         """The fusion of what sensors of a network believe after different pasts: covariance intersection.
 
         of_lmbs: whether the filters keep LMBs, of which those count at a label that see it, and labels are matched.
+        own_labels: whether sensors make labels of their own, so that those of GLMBs are matched as well.
         """
         from vedette.fusion import Clmb, CmDeltaGlmb, Matched
 
         equal = (1.0 / num_sensors,) * num_sensors
-        return Matched(Clmb(equal, by_views=True)) if of_lmbs else CmDeltaGlmb(equal)
+        if of_lmbs:
+            return Matched(Clmb(equal, by_views=True))
+        return Matched(CmDeltaGlmb(equal)) if own_labels else CmDeltaGlmb(equal)
 
     def build_of_decisions(self, num_sensors: int, *, of_lmbs: bool) -> FusionRule:
         """The fusion that joint decisions go by: plain covariance intersection.

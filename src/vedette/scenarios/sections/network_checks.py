@@ -51,10 +51,20 @@ def births_from_measurements(model: ScenarioModel) -> Iterator[Finding]:
         if sensor.measurement.kind in ("bearing_only", "range_only"):
             wanted = "a measurement that says where a target is, for birth.from_measurements"
             yield ("sensors", i, "measurement", "kind"), wanted, describe(sensor.measurement.kind)
-    alone = len(model.sensors) > 1 and fusion.kind in BY_LABEL and not fusion.feeds_back
-    if alone and isinstance(fusion, Fusion) and fusion.matching == "labels":
-        wanted = "assignment, as without feedback each sensor makes labels of its own from its measurements"
-        yield ("fusion", "matching"), wanted, describe(fusion.matching)
+    if len(model.sensors) > 1 and isinstance(fusion, Fusion) and fusion.kind in BY_LABEL:
+        when = "without feedback" if not fusion.feeds_back else None if model.network is None else "over a network"
+        if when is not None and fusion.matching == "labels":
+            wanted = f"assignment, as {when} sensors make labels of their own from their measurements"
+            yield ("fusion", "matching"), wanted, describe(fusion.matching)
 
 
-NETWORK_CHECKS = (network_of_several, network_of_fusion, births_from_measurements)
+def matching_of_own_labels(model: ScenarioModel) -> Iterator[Finding]:
+    """Labels are matched where sensors can have different ones for one target."""
+    fusion = model.fusion
+    if not isinstance(fusion, Fusion) or fusion.matching == "labels" or fusion.kind not in BY_LABEL:
+        return
+    if fusion.feedback and model.network is None:
+        yield ("fusion", "matching"), "labels, as with feedback all sensors share them", describe(fusion.matching)
+
+
+NETWORK_CHECKS = (network_of_several, network_of_fusion, births_from_measurements, matching_of_own_labels)
