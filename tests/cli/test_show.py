@@ -82,14 +82,14 @@ def test_the_picture_has_every_track_sensor_and_site(name: str) -> None:
     assert (markers.count("o"), markers.count("^")) == (num_targets, num_targets)
     assert markers.count("s") == len(scenario.model.sensors)
     assert markers.count("+") == len(scenario.model.birth.sites)
-    unit = "km" if name in ("polar-10", "solent") else "m"
+    unit = "km" if name in ("polar-10", "solent", "shore-radar", "three-radars") else "m"
     assert (axes.get_xlabel(), axes.get_ylabel()) == (f"x ({unit})", f"y ({unit})")
 
 
 def test_an_unknown_scenario_is_told_without_a_traceback() -> None:
     result = show("paper-b")
     assert (result.exit_code, result.stdout) == (1, "")
-    assert result.stderr.startswith("scenario: expected a YAML file or one of linear-10")
+    assert result.stderr.startswith("scenario: expected a YAML file or one of eight-mobile, linear-10")
 
 
 def test_a_faulty_scenario_is_told_without_a_traceback(tmp_path: Path) -> None:
