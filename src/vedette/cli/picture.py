@@ -44,7 +44,7 @@ def scenario_figure(scenario: Scenario, truth: Truth) -> Figure:
     axes.set_xlabel(f"x ({unit})")
     axes.set_ylabel(f"y ({unit})")
     axes.set_title(drawn_text(scenario.name))
-    figure.legend(handles=_legend(), loc="outside lower center", ncols=3)
+    figure.legend(handles=_legend(has_sites=bool(scenario.model.birth.sites)), loc="outside lower center", ncols=3)
     return figure
 
 
@@ -116,12 +116,12 @@ def _draw_heading(axes: Axes, place: tuple[float, float], heading: float) -> Non
     axes.annotate("", place, xytext=ahead, textcoords="offset points", arrowprops=arrow, zorder=4)
 
 
-def _legend() -> list[Line2D]:
+def _legend(*, has_sites: bool) -> list[Line2D]:
     target: dict[str, Any] = {"color": _INK, "linewidth": 1.0}
     return [
         Line2D([], [], marker="o", markerfacecolor="white", markersize=4.5, label="target start", **target),
         Line2D([], [], marker="^", markersize=5, label="target end", **target),
         Line2D([], [], linestyle="", marker="s", markersize=6, color=_INK, label="sensor"),
-        Line2D([], [], linestyle="", marker="+", markersize=6, color=VERMILION, label="birth site, 2 std"),
+        *([Line2D([], [], linestyle="", marker="+", color=VERMILION, label="birth site, 2 std")] if has_sites else []),
         Line2D([], [], linestyle="--", color=GREY, linewidth=0.8, label="region"),
     ]
