@@ -2,30 +2,54 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, Generic, NamedTuple, TypeVar
 
+import numpy as np
+
+from vedette.densities import GLMB, LMB
 from vedette.errors import InputError
 from vedette.filters.blind import NO_POSE, NO_SCAN, blind_sensor
-from vedette.filters.inputs import check_scan
+from vedette.filters.info import FilterInfo
+from vedette.filters.inputs import births_for, check_belief, check_scan
 from vedette.filters.limits import Limits
-from vedette.kernels.base.types import Floats
+from vedette.kernels.base.types import Floats, ScanInput
 from vedette.models import SensorModel, TargetModel
-from vedette.models.arguments import generator, pose_vector
+from vedette.models.arguments import generator, pose_vector, positive
+
+_Belief = TypeVar("_Belief", GLMB, LMB)
 
 
-class Look(NamedTuple):
-    """One sensor's scan from one pose."""
+class Looks(NamedTuple):
+    """The scans of one time, by the sensors that scanned."""
 
-    name: str
-    sensor: SensorModel
-    scan: Floats
-    pose: Floats
+    names: list[str]
+    sensors: list[SensorModel]
+    scans: list[Floats]
+    poses: list[Floats]
+    num_duplicates: int  # measurements that repeat another
+
+    def inputs(self, born: LMB, dt: float) -> list[ScanInput]:
+        """As kernels take them: each with the births and the period."""
+        return [ScanInput(born.to_kernel(), *own, dt) for own in zip(self.scans, self.poses, strict=True)]
+
+    def inputs_in_turn(self, born: LMB, dt: float) -> list[ScanInput]:
+        """As `inputs`, with births and a period for the first alone."""
+        nobody = LMB.empty(born.state_dim).to_kernel()
+        first, *others = self.inputs(born, dt)
+        return [first, *(own._replace(birth=nobody, dt=0.0) for own in others)]
+
+    def log_likelihood(self, log_total: float, log_clutters: Sequence[float]) -> float:
+        """From joint weights relative to clutter to a density of the scans."""
+        return log_total + sum(
+            log_clutter - sensor.clutter.rate for log_clutter, sensor in zip(log_clutters, self.sensors, strict=True)
+        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class MultiSensorFilter:
+class MultiSensorFilter(ABC, Generic[_Belief]):
     """The parts of a filter of several sensors.
 
     Attributes:
@@ -40,6 +64,7 @@ class MultiSensorFilter:
     targets: TargetModel
     sensors: tuple[SensorModel, ...]
     limits: Limits = field(default_factory=Limits)
+    kind: ClassVar[type[GLMB] | type[LMB]]  # of the belief
 
     def __post_init__(self) -> None:
         for name, kind in (("targets", TargetModel), ("limits", Limits)):
@@ -53,8 +78,53 @@ class MultiSensorFilter:
                 raise InputError(f"sensors[{s}]: expected a SensorModel; got {type(sensor).__name__}")
         object.__setattr__(self, "sensors", tuple(self.sensors))
 
-    def _looks(self, scans: Any, poses: Any, rng: Any) -> tuple[list[Look], int]:
-        """What each sensor that scanned saw and from where, and how many measurements repeat another.
+    def initial(self) -> _Belief:
+        """The belief before the first scans: no target."""
+        return self.kind.empty(self.targets.state_dim)  # type: ignore[return-value]
+
+    def step(
+        self,
+        belief: GLMB | LMB,
+        scans: Any,
+        poses: Any,
+        dt: float,
+        step: int,
+        *,
+        rng: np.random.Generator,
+        births: LMB | None = None,
+    ) -> tuple[_Belief, FilterInfo]:
+        """Predict over `dt` seconds and update with the scans of all sensors.
+
+        Args:
+            belief: posterior of the previous step.
+            scans: one a sensor, in their order: (num, meas_dim) measurements in any order; angles in radians, in
+                (-pi, pi]; None of a sensor that did not scan.
+            poses: one a sensor: [px, py, heading_rad, ...].
+            dt: seconds since the previous step.
+            step: number of this step, from 1 on; births are labelled with it.
+            rng: nothing is drawn from it; it is taken so that filters are interchangeable.
+            births: as of `DeltaGlmbFilter.step`.
+
+        Returns:
+            The posterior and a report on all scans together: log likelihoods, counts and bounds of all sensors.
+
+        Raises:
+            InputError: not one scan and one pose a sensor, or one of the wrong shape or kind; an angle beyond a full
+                turn; a step below 1.
+            ModelError: a model function raised or gave a value that is none of its kind.
+            NumericalError: no association has positive weight.
+        """
+        looks = self._looks(scans, poses, rng)
+        prior = check_belief(belief, self.kind, self.targets.state_dim)  # type: ignore[type-var]
+        born = births_for(self.targets.birth, step, prior, births)
+        return self._updated(prior, born, looks, positive("dt", dt), f"step {step}")  # type: ignore[arg-type]
+
+    @abstractmethod
+    def _updated(self, prior: _Belief, born: LMB, looks: Looks, dt: float, place: str) -> tuple[_Belief, FilterInfo]:
+        """The prediction of the prior, with those who may be born, after all looks. place: of errors."""
+
+    def _looks(self, scans: Any, poses: Any, rng: Any) -> Looks:
+        """What each sensor that scanned saw and from where.
 
         Where none scanned, a blind look, with which an update is the prediction.
         """
@@ -63,7 +133,7 @@ class MultiSensorFilter:
             if given is None or len(given) != len(self.sensors):
                 came = "None" if given is None else len(given)
                 raise InputError(f"{name}: expected {len(self.sensors)}, one a sensor; got {came}")
-        looks, num_duplicates = [], 0
+        looks = Looks([], [], [], [], 0)
         for s, sensor in enumerate(self.sensors):
             if scans[s] is None:
                 continue
@@ -71,13 +141,9 @@ class MultiSensorFilter:
                 scan, num = check_scan(scans[s], sensor.measurement)
             except InputError as error:
                 raise InputError(f"scans[{s}]: {error}") from None
-            looks.append(Look(f"sensor {s}", sensor, scan, pose_vector(f"poses[{s}]", poses[s])))
-            num_duplicates += num
-        return looks or [Look("no sensor", blind_sensor(), NO_SCAN, NO_POSE)], num_duplicates
-
-
-def log_likelihood(log_total: float, log_clutters: Sequence[float], looks: Sequence[Look]) -> float:
-    """From joint weights relative to clutter to a density of the scans."""
-    return log_total + sum(
-        log_clutter - look.sensor.clutter.rate for log_clutter, look in zip(log_clutters, looks, strict=True)
-    )
+            looks.names.append(f"sensor {s}")
+            looks.sensors.append(sensor)
+            looks.scans.append(scan)
+            looks.poses.append(pose_vector(f"poses[{s}]", poses[s]))
+            looks = looks._replace(num_duplicates=looks.num_duplicates + num)
+        return looks if looks.names else Looks(["no sensor"], [blind_sensor()], [NO_SCAN], [NO_POSE], 0)

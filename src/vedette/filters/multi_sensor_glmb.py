@@ -4,24 +4,20 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
-
-import numpy as np
+from typing import ClassVar
 
 from vedette.densities import GLMB, LMB
 from vedette.errors import NumericalError
 from vedette.filters.info import FilterInfo
-from vedette.filters.inputs import births_for, check_belief, model_errors
-from vedette.filters.multi_sensor import MultiSensorFilter, log_likelihood
-from vedette.kernels.base.types import ScanInput
+from vedette.filters.inputs import model_errors
+from vedette.filters.multi_sensor import Looks, MultiSensorFilter
 from vedette.kernels.labelled.conversions import marginalise
-from vedette.kernels.steps.glmb import StepReport, step_ranked, update_ranked
+from vedette.kernels.steps.glmb import step_ranked, update_ranked
 from vedette.models import kernel_motion
-from vedette.models.arguments import positive
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class MultiSensorGlmbFilter(MultiSensorFilter):
+class MultiSensorGlmbFilter(MultiSensorFilter[GLMB]):
     """delta-GLMB filter of several sensors: one prediction, then an update by each sensor's scan in turn.
 
     Without caps the posterior is the multi-sensor delta-GLMB (Vo, Vo and Beard 2019), whatever the order of the
@@ -43,61 +39,21 @@ class MultiSensorGlmbFilter(MultiSensorFilter):
     """
 
     marginalised: bool = False
+    kind: ClassVar[type[GLMB]] = GLMB
 
-    def initial(self) -> GLMB:
-        """The belief before the first scans: no target."""
-        return GLMB.empty(self.targets.state_dim)
-
-    def step(
-        self,
-        belief: GLMB | LMB,
-        scans: Any,
-        poses: Any,
-        dt: float,
-        step: int,
-        *,
-        rng: np.random.Generator,
-        births: LMB | None = None,
-    ) -> tuple[GLMB, FilterInfo]:
-        """Predict over `dt` seconds and update with the scans of all sensors.
-
-        Args:
-            belief: posterior of the previous step.
-            scans: one a sensor, in their order: (num, meas_dim) measurements in any order; angles in radians, in
-                (-pi, pi]; None of a sensor that did not scan.
-            poses: one a sensor: [px, py, heading_rad, ...].
-            dt: seconds since the previous step.
-            step: number of this step, from 1 on; births are labelled with it.
-            rng: nothing is drawn from it; it is taken so that filters are interchangeable.
-            births: as of `DeltaGlmbFilter.step`.
-
-        Returns:
-            The posterior and a report on all scans together: log likelihoods, counts and bounds of all sensors.
-
-        Raises:
-            InputError: not one scan and one pose a sensor, or one of the wrong shape or kind; an angle beyond a full
-                turn; a step below 1.
-            ModelError: a model function raised or gave a value that is none of its kind.
-            NumericalError: no hypothesis has positive weight.
-        """
-        looks, num_duplicates = self._looks(scans, poses, rng)
-        targets, limits = self.targets, self.limits
-        prior = check_belief(belief, GLMB, targets.state_dim)
-        born, nobody = births_for(targets.birth, step, prior, births), LMB.empty(targets.state_dim)
-        motion, posterior, cap_met = kernel_motion(targets.motion, targets.survival), prior.to_kernel(), False
-        reports: list[StepReport] = []
-        for look in looks:
-            own = (look.sensor.to_kernel(), limits.truncation(look.sensor.meas_dim))
+    def _updated(self, prior: GLMB, born: LMB, looks: Looks, dt: float, place: str) -> tuple[GLMB, FilterInfo]:
+        limits, cap_met, reports = self.limits, False, []
+        motion, posterior = kernel_motion(self.targets.motion, self.targets.survival), prior.to_kernel()
+        given = zip(looks.names, looks.sensors, looks.inputs_in_turn(born, dt), strict=True)
+        for s, (name, sensor, scan) in enumerate(given):
+            own = sensor.to_kernel(), limits.truncation(sensor.meas_dim)
             with model_errors():
-                if not reports:
-                    given = ScanInput(born.to_kernel(), look.scan, look.pose, positive("dt", dt))
-                    posterior, report = step_ranked(posterior, given, motion, *own)
-                else:
-                    given = ScanInput(nobody.to_kernel(), look.scan, look.pose, 0.0)
-                    posterior, report = update_ranked(posterior, given, *own)
+                posterior, report = (
+                    step_ranked(posterior, scan, motion, *own) if s == 0 else update_ranked(posterior, scan, *own)
+                )
             if len(posterior.hyp_log_weights) == 0:
                 raise NumericalError(
-                    f"step {step}, {look.name}: no hypothesis has positive weight; do the models forbid this scan?"
+                    f"{place}, {name}: no hypothesis has positive weight; do the models forbid this scan?"
                 )
             reports.append(report)
             cap_met = cap_met or len(posterior.hyp_log_weights) >= limits.max_hypotheses
@@ -107,13 +63,13 @@ class MultiSensorGlmbFilter(MultiSensorFilter):
         log_kept = sum(min(0.0, report.log_total - report.log_bound) for report in reports)
         log_total = sum(report.log_total for report in reports)
         return kept, FilterInfo(
-            log_likelihood=log_likelihood(log_total, [report.log_clutter for report in reports], looks),
+            log_likelihood=looks.log_likelihood(log_total, [report.log_clutter for report in reports]),
             num_hypotheses=kept.num_hyps,
             num_tracks=kept.tracks.num_tracks,
             discarded_weight_bound=-math.expm1(log_kept),
             dropped_existence=spread,
             num_clutter_raised=sum(int(report.num_raised) for report in reports),
-            num_duplicates=num_duplicates,
+            num_duplicates=looks.num_duplicates,
             num_inexact_clusters=0,
             search_cut=any(report.cut for report in reports),
             cap_met=cap_met,

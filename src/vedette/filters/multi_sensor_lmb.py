@@ -4,24 +4,20 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import ClassVar
 
-import numpy as np
-
-from vedette.densities import GLMB, LMB
+from vedette.densities import LMB
 from vedette.errors import NumericalError
 from vedette.filters.info import FilterInfo
-from vedette.filters.inputs import births_for, check_belief, model_errors
-from vedette.filters.multi_sensor import MultiSensorFilter, log_likelihood
-from vedette.kernels.base.types import ScanInput
+from vedette.filters.inputs import model_errors
+from vedette.filters.multi_sensor import Looks, MultiSensorFilter
 from vedette.kernels.steps.multi_sensor_combinations import extend_combinations, predict_combinations
 from vedette.kernels.steps.multi_sensor_lmb import lmb_of_combinations
 from vedette.models import kernel_motion
-from vedette.models.arguments import positive
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class MultiSensorLmbFilter(MultiSensorFilter):
+class MultiSensorLmbFilter(MultiSensorFilter[LMB]):
     """LMB filter of several sensors: the existences and densities of the exact posterior given all scans of a time.
 
     Every track is weighed under each combination of a miss or a gated measurement at every sensor, and the combinations
@@ -40,56 +36,37 @@ class MultiSensorLmbFilter(MultiSensorFilter):
     Attributes and errors: as `MultiSensorGlmbFilter`.
     """
 
-    def initial(self) -> LMB:
-        """The belief before the first scans: no target."""
-        return LMB.empty(self.targets.state_dim)
+    kind: ClassVar[type[LMB]] = LMB
 
-    def step(
-        self,
-        belief: GLMB | LMB,
-        scans: Any,
-        poses: Any,
-        dt: float,
-        step: int,
-        *,
-        rng: np.random.Generator,
-        births: LMB | None = None,
-    ) -> tuple[LMB, FilterInfo]:
-        """Predict over `dt` seconds and update; arguments, results and errors as `MultiSensorGlmbFilter.step`.
-
-        Nothing is drawn from `rng`; it is taken so that filters are interchangeable.
-        """
-        looks, num_duplicates = self._looks(scans, poses, rng)
-        targets, limits = self.targets, self.limits
-        prior = check_belief(belief, LMB, targets.state_dim)
-        born = births_for(targets.birth, step, prior, births)
-        motion, num_columns, reports = kernel_motion(targets.motion, targets.survival), 0, []
+    def _updated(self, prior: LMB, born: LMB, looks: Looks, dt: float, place: str) -> tuple[LMB, FilterInfo]:
+        limits, num_columns, reports = self.limits, 0, []
+        motion = kernel_motion(self.targets.motion, self.targets.survival)
         reduction = limits.reduction()
         # A label that cannot exist has no density to be kept with.
         reduction = reduction._replace(min_existence_logit=max(reduction.min_existence_logit, -1e300))
         with model_errors():
-            inputs = [ScanInput(born.to_kernel(), look.scan, look.pose, positive("dt", dt)) for look in looks]
-            combinations = predict_combinations(prior.to_kernel(), inputs[0], len(looks), motion)
-            for s, look in enumerate(looks):
-                truncation = limits.truncation(look.sensor.meas_dim)
+            inputs = looks.inputs(born, dt)
+            combinations = predict_combinations(prior.to_kernel(), inputs[0], len(inputs), motion)
+            for s, (sensor, scan) in enumerate(zip(looks.sensors, inputs, strict=True)):
+                truncation = limits.truncation(sensor.meas_dim)
                 combinations, report = extend_combinations(
-                    combinations, s, num_columns, inputs[s], look.sensor.to_kernel(), truncation
+                    combinations, s, num_columns, scan, sensor.to_kernel(), truncation
                 )
-                num_columns += len(look.scan)
+                num_columns += len(scan.measurements)
                 reports.append(report)
             posterior, joint = lmb_of_combinations(combinations, num_columns, truncation, reduction)
         if not math.isfinite(joint.sums.log_total):
-            raise NumericalError(f"step {step}: no association has positive weight; do the models forbid these scans?")
+            raise NumericalError(f"{place}: no association has positive weight; do the models forbid these scans?")
         log_kept = joint.sums.log_kept + sum(report.log_kept for report in reports)
         kept, spread = limits.without_spread(LMB.from_kernel(posterior))
         return kept, FilterInfo(
-            log_likelihood=log_likelihood(joint.sums.log_total, [report.log_clutter for report in reports], looks),
+            log_likelihood=looks.log_likelihood(joint.sums.log_total, [report.log_clutter for report in reports]),
             num_hypotheses=1,
             num_tracks=kept.tracks.num_tracks,
             discarded_weight_bound=max(0.0, -math.expm1(log_kept)),
             dropped_existence=float(joint.dropped_existence) + spread,
             num_clutter_raised=sum(int(report.num_raised) for report in reports),
-            num_duplicates=num_duplicates,
+            num_duplicates=looks.num_duplicates,
             num_inexact_clusters=int(joint.sums.num_ranked),
             search_cut=any(report.log_kept < 0.0 for report in reports),
             cap_met=len(posterior.existence_logit) >= limits.max_labels,

@@ -4,23 +4,19 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import ClassVar
 
-import numpy as np
-
-from vedette.densities import GLMB, LMB
+from vedette.densities import LMB
 from vedette.errors import NumericalError
 from vedette.filters.info import FilterInfo
-from vedette.filters.inputs import births_for, check_belief, model_errors
-from vedette.filters.multi_sensor import MultiSensorFilter, log_likelihood
-from vedette.kernels.base.types import ScanInput
-from vedette.kernels.steps.lmb import LmbReport, step_lmb, update_lmb
+from vedette.filters.inputs import model_errors
+from vedette.filters.multi_sensor import Looks, MultiSensorFilter
+from vedette.kernels.steps.lmb import step_lmb, update_lmb
 from vedette.models import kernel_motion
-from vedette.models.arguments import positive
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class SequentialLmbFilter(MultiSensorFilter):
+class SequentialLmbFilter(MultiSensorFilter[LMB]):
     """LMB filter of several sensors that takes their scans in turn ("iterated corrector").
 
     After each scan the posterior is projected to an LMB again, so that the order of the sensors matters a little. In
@@ -32,61 +28,35 @@ class SequentialLmbFilter(MultiSensorFilter):
     Attributes and errors: as `MultiSensorGlmbFilter`.
     """
 
-    def initial(self) -> LMB:
-        """The belief before the first scans: no target."""
-        return LMB.empty(self.targets.state_dim)
+    kind: ClassVar[type[LMB]] = LMB
 
-    def step(
-        self,
-        belief: GLMB | LMB,
-        scans: Any,
-        poses: Any,
-        dt: float,
-        step: int,
-        *,
-        rng: np.random.Generator,
-        births: LMB | None = None,
-    ) -> tuple[LMB, FilterInfo]:
-        """Predict over `dt` seconds and update; arguments, results and errors as `MultiSensorGlmbFilter.step`.
-
-        Nothing is drawn from `rng`; it is taken so that filters are interchangeable.
-        """
-        looks, num_duplicates = self._looks(scans, poses, rng)
-        targets, limits = self.targets, self.limits
-        prior = check_belief(belief, LMB, targets.state_dim)
-        born, nobody = births_for(targets.birth, step, prior, births), LMB.empty(targets.state_dim)
-        motion, posterior, reduction = (
-            kernel_motion(targets.motion, targets.survival),
-            prior.to_kernel(),
-            limits.reduction(),
-        )
-        reports: list[LmbReport] = []
-        for look in looks:
-            is_last = len(reports) == len(looks) - 1
+    def _updated(self, prior: LMB, born: LMB, looks: Looks, dt: float, place: str) -> tuple[LMB, FilterInfo]:
+        limits, reduction, reports = self.limits, self.limits.reduction(), []
+        motion, posterior = kernel_motion(self.targets.motion, self.targets.survival), prior.to_kernel()
+        given = zip(looks.names, looks.sensors, looks.inputs_in_turn(born, dt), strict=True)
+        for s, (name, sensor, scan) in enumerate(given):
+            is_last = s == len(looks.names) - 1
             keep = reduction if is_last else reduction._replace(min_existence_logit=-math.inf, max_labels=2**62)
-            own = (look.sensor.to_kernel(), limits.truncation(look.sensor.meas_dim), keep)
+            own = sensor.to_kernel(), limits.truncation(sensor.meas_dim), keep
             with model_errors():
-                if not reports:
-                    given = ScanInput(born.to_kernel(), look.scan, look.pose, positive("dt", dt))
-                    posterior, report = step_lmb(posterior, given, motion, *own)
-                else:
-                    given = ScanInput(nobody.to_kernel(), look.scan, look.pose, 0.0)
-                    posterior, report = update_lmb(posterior, given, *own)
+                posterior, report = (
+                    step_lmb(posterior, scan, motion, *own) if s == 0 else update_lmb(posterior, scan, *own)
+                )
             if not math.isfinite(report.sums.log_total):
                 raise NumericalError(
-                    f"step {step}, {look.name}: no association has positive weight; do the models forbid this scan?"
+                    f"{place}, {name}: no association has positive weight; do the models forbid this scan?"
                 )
             reports.append(report)
         kept, spread = limits.without_spread(LMB.from_kernel(posterior))
         log_total, log_kept = (sum(getattr(r.sums, name) for r in reports) for name in ("log_total", "log_kept"))
         return kept, FilterInfo(
-            log_likelihood=log_likelihood(log_total, [report.log_clutter for report in reports], looks),
+            log_likelihood=looks.log_likelihood(log_total, [report.log_clutter for report in reports]),
             num_hypotheses=1,
             num_tracks=kept.tracks.num_tracks,
             discarded_weight_bound=max(0.0, -math.expm1(log_kept)),
             dropped_existence=sum(float(report.dropped_existence) for report in reports) + spread,
             num_clutter_raised=sum(int(report.num_raised) for report in reports),
-            num_duplicates=num_duplicates,
+            num_duplicates=looks.num_duplicates,
             num_inexact_clusters=sum(int(report.sums.num_ranked) for report in reports),
             search_cut=False,
             cap_met=len(posterior.existence_logit) >= limits.max_labels,
