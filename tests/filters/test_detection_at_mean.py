@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -36,7 +37,8 @@ def plain_bernoulli(prob_detection):
     eye, zero = np.eye(2), np.zeros((2, 2))
     f = np.block([[eye, eye], [zero, eye]])
     q = 4.0 * np.block([[eye / 4, eye / 2], [eye / 2, eye]])
-    h, found = np.hstack([eye, zero]), []
+    h = np.hstack([eye, zero])
+    found: list[Any] = []
     for scan in SCANS:
         if not found:
             existence, mixture = BIRTH, [(1.0, MEAN, COV)]
@@ -58,7 +60,7 @@ def plain_bernoulli(prob_detection):
 
 
 def existences(kind, model):
-    birth = models.BirthModel([BIRTH], [MEAN], [COV], frozenset([1]))
+    birth = models.BirthModel(np.array([BIRTH]), np.array([MEAN]), np.array([COV]), frozenset([1]))
     targets = models.TargetModel(models.constant_velocity(2.0), models.constant_survival(SURVIVAL), birth)
     local = kind(targets, model, Limits.none())
     belief, found = local.initial(), []
@@ -88,7 +90,10 @@ def test_at_the_centre_only_the_mean_counts(name):
 
 
 def test_a_phd_filter_takes_it_too():
-    model, birth = sensor(DETECTIONS["rays"], "mean"), models.BirthModel([BIRTH], [MEAN], [COV])
+    model, birth = (
+        sensor(DETECTIONS["rays"], "mean"),
+        models.BirthModel(np.array([BIRTH]), np.array([MEAN]), np.array([COV])),
+    )
     targets = models.TargetModel(models.constant_velocity(2.0), models.constant_survival(SURVIVAL), birth)
     local = PhdFilter(targets, model, Limits.none())
     belief, _ = local.step(local.initial(), np.empty((0, 2)), POSE, 1.0, 1, rng=np.random.default_rng(0))

@@ -36,7 +36,8 @@ def test_weights_are_those_of_the_detection_at_each_label() -> None:
     seen = views([0.9, constant_detection(0.3)])
     fused, info = Clmb((0.5, 0.5), by_views=True).fuse(beliefs, seen)
     fused.validate()
-    own, parts = moments(fused), [moments(each) for each in beliefs]
+    own: Any = moments(fused)
+    parts: Any = [moments(each) for each in beliefs]
     for label, chances in zip(LABELS, ([0.9, 0.3], [0.0, 0.3], [0.0, 0.3]), strict=True):
         shares = np.array(chances) / sum(chances)
         expected = by_hand(shares, *zip(*(part[label] for part in parts), strict=True))
@@ -72,7 +73,8 @@ def test_where_nobody_sees_those_that_have_the_label_keep_their_weights() -> Non
     fused, info = Clmb((0.2, 0.3, 0.5), by_views=True).fuse(beliefs, views([0.9, 0.5, 0.7]))
     parts = [moments(each)[LABELS[2]] for each in beliefs[:2]]
     expected = by_hand(np.array([0.4, 0.6]), *zip(*parts, strict=True))
-    for found, wanted in zip(moments(fused)[LABELS[2]], expected, strict=True):
+    own: Any = moments(fused)[LABELS[2]]
+    for found, wanted in zip(own, expected, strict=True):
         np.testing.assert_allclose(found, wanted, rtol=1e-10)
     assert info.missing_labels == (0, 0, 0)
 
@@ -106,7 +108,7 @@ def test_a_blind_sensor_changes_nothing_to_the_last_bit(rule: Any, why: str) -> 
 @pytest.mark.parametrize("rule", RULES)
 def test_the_order_of_sensors_and_many_blind_ones_change_nothing(rule: Any) -> None:
     rng = np.random.default_rng(5)
-    beliefs = [belief(rng.uniform(0.1, 0.9, 3), rng) for _ in range(12)]
+    beliefs = [belief(rng.uniform(0.1, 0.9, 3).tolist(), rng) for _ in range(12)]
     detections = [constant_detection(0.8) if s in (2, 9) else BLIND for s in range(12)]
     fused, _ = rule(np.full(12, 1.0 / 12), by_views=True).fuse(beliefs, views(detections))
     two, _ = rule((0.5, 0.5), by_views=True).fuse([beliefs[2], beliefs[9]], views([constant_detection(0.8)] * 2))

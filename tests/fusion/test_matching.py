@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from itertools import permutations
+from typing import Any
 
 import numpy as np
 import pytest
@@ -125,10 +126,11 @@ def test_a_matched_fusion_is_the_rule_on_matched_beliefs() -> None:
     beliefs = [at({(1, 0): 0.0}, 0.95), at({(2, 0): 0.2}, 0.95)]
     assert Clmb(halves).fuse(beliefs)[0].existence.max() < 0.1
     fused, info = Matched(Clmb(halves)).fuse(beliefs)
-    assert_same_bits(fused, Clmb(halves).fuse(match_labels(beliefs))[0])  # type: ignore[arg-type]
+    assert_same_bits(fused, Clmb(halves).fuse(match_labels(beliefs))[0])
     assert (fused.tracks.labels.tolist(), info.num_missing_labels) == ([[1, 0]], 0)
     assert fused.existence[0] > 0.9
-    assert Matched(Clmb(halves)).lay_out([], fused) is None
+    matched: Any = Matched(Clmb(halves))
+    assert matched.lay_out([], fused) is None
     rng = np.random.default_rng(3)
     glmbs = [random_glmb(rng, 4, 8, 2) for _ in range(2)]
     Matched(CmDeltaGlmb(halves)).fuse(glmbs)[0].validate()

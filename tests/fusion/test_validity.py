@@ -16,7 +16,7 @@ from vedette.fusion.validity import all_valid
 
 
 def spoilt(belief: LMB, field: str, value: Any) -> LMB:
-    parts = {name: getattr(belief.tracks, name) for name in TrackTable.__match_args__}
+    parts: dict[str, Any] = {name: getattr(belief.tracks, name) for name in TrackTable.__match_args__}
     if field == "existence_logit":
         return unchecked(LMB, belief.tracks, value(belief.existence_logit.copy()))
     parts[field] = value(parts[field].copy())

@@ -210,10 +210,10 @@ def two_beyond(state, pose, params):
 
 def test_what_is_no_probability_is_refused():
     with pytest.raises(ModelError, match="mean_prob_detection function 'twice'"):
-        models.DetectionModel(beyond_the_edge, [0.9, 500.0], twice).check(np.zeros(4), POSE)
+        models.DetectionModel(beyond_the_edge, np.array([0.9, 500.0]), twice).check(np.zeros(4), POSE)
     for detection in (
-        models.DetectionModel(beyond_the_edge, [0.9, 1.0], twice),
-        models.DetectionModel(two_beyond, [45.0]),
+        models.DetectionModel(beyond_the_edge, np.array([0.9, 1.0]), twice),
+        models.DetectionModel(two_beyond, np.array([45.0])),
     ):
         with pytest.raises(ModelError, match="not in"):
             mean_detection(detection, POSE[:2], ELONGATED)
@@ -221,7 +221,7 @@ def test_what_is_no_probability_is_refused():
 
 def test_other_arguments_are_named():
     with pytest.raises(InputError, match="mean_function: expected a function decorated"):
-        models.DetectionModel(beyond_the_edge, [0.9, 1.0], beyond_the_edge)
+        models.DetectionModel(beyond_the_edge, np.array([0.9, 1.0]), beyond_the_edge)
     with pytest.raises(InputError, match="detection_at: expected centre or mean; got middle"):
         sensor(models.constant_detection(0.9), detection_at="middle")
     with pytest.raises(InputError, match="covs"):

@@ -187,7 +187,7 @@ def test_a_soft_sector_far_away_and_at_the_sensor():
         (lambda: models.soft_sector(0.5, 10.0, 4.0, range_slope=1.0), "half_width_rad"),
         (lambda: models.soft_sector(0.5, 10.0, range_slope=0.0), "range_slope"),
         (lambda: models.soft_sector(0.5, 10.0, range_slope=1.0, angle_slope=-1.0), "angle_slope"),
-        (lambda: models.soft_sector(0.5, 10.0, range_slope=1.0, cut="yes"), "cut"),
+        (lambda: models.soft_sector(0.5, 10.0, range_slope=1.0, cut="yes"), "cut"),  # type: ignore[arg-type]
         (lambda: models.axis_noise([1.0], [0.0]), "std"),
         (lambda: models.axis_noise([1.0, 0.0], [0.0, 0.0]), "std"),
         (lambda: models.axis_noise([1.0, 1.0], [0.0, -1.0]), "growth"),

@@ -61,7 +61,7 @@ def test_bearing_and_range_become_a_point(strategies: Mapping[str, Strategy]) ->
     strategy = strategies["fixed"]
     record = strategy.records[0]
     data = replay_data(strategy, record, "", trust=True)
-    scans = scans_of(record, build_experiment(strategy.cell.scenario))
+    scans: Any = scans_of(record, build_experiment(strategy.cell.scenario))
     for step in (0, 39):
         for sensor in (0, 1):
             rows = data["scans"][step][sensor]
@@ -77,7 +77,7 @@ def test_bearings_and_ranges_alone_stay_what_they_are(tmp_path: Path) -> None:
     assert [sensor["kind"] for sensor in data["sensors"]] == ["ray", "circle"]
     assert data["sensors"][0]["half_width"] == pytest.approx(math.pi / 3.0, abs=1e-4)
     assert data["sensors"][1]["range"] == 1200.0
-    scans = scans_of(strategy.records[0], build_experiment(strategy.cell.scenario))
+    scans: Any = scans_of(strategy.records[0], build_experiment(strategy.cell.scenario))
     bearings = [row[1] for row in data["scans"][7][0]]
     ranges = [row[1] for row in data["scans"][7][1]]
     np.testing.assert_allclose(bearings, scans[7][0].measurements[:, 0], atol=1e-4)

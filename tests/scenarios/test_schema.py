@@ -66,7 +66,7 @@ def test_default_planning_settings_are_those_of_the_library() -> None:
     assert Control().build() == PlanningSettings()
 
 
-DEFAULTS = [
+DEFAULT_FUSIONS = [
     ("cm_delta_glmb", CmDeltaGlmb((0.5, 0.5))),
     ("clmb", Clmb((0.5, 0.5))),
     ("arithmetic_average", ArithmeticAverage((0.5, 0.5))),
@@ -74,7 +74,7 @@ DEFAULTS = [
 ]
 
 
-@pytest.mark.parametrize(("kind", "expected"), DEFAULTS)
+@pytest.mark.parametrize(("kind", "expected"), DEFAULT_FUSIONS)
 def test_default_fusions_are_those_of_the_library(kind: Any, expected: Any) -> None:
     built: Any = Fusion(kind=kind).build(2, Path())
     assert type(built) is type(expected)

@@ -18,14 +18,14 @@ def test_the_scans_drawn_again_are_those_that_the_loop_simulated(monkeypatch: py
     simulated: list[Scan] = []
 
     def recording(*args: Any, **kwargs: Any) -> tuple[Scan, ...]:
-        scans = simulate_scans(*args, **kwargs)
+        scans: Any = simulate_scans(*args, **kwargs)
         simulated.extend(scans)
         return scans
 
     monkeypatch.setattr(loop, "simulate_scans", recording)
     scenario = load_scenario("paper-a")
     record = run_scenario(scenario, "random", seed=3, run=2)
-    again = scans_of(record, build_experiment(scenario))
+    again: Any = scans_of(record, build_experiment(scenario))
     assert len(again) == record.num_scans
     assert len(simulated) == record.num_scans * record.num_sensors
     for step, scans in enumerate(again):

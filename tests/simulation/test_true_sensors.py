@@ -114,7 +114,8 @@ def test_a_sensor_that_does_not_scan_hands_over_nothing_and_the_others_scan_as_b
     assert [scans[1] is not None for scans in some] == table[1].tolist()
     for mine, before in zip(some, every, strict=True):
         np.testing.assert_array_equal(mine[0], before[0])
-    for again, scans in zip(scans_of(record, experiment), some, strict=True):
+    drawn: Any = scans_of(record, experiment)
+    for again, scans in zip(drawn, some, strict=True):
         assert (again[1] is None) == (scans[1] is None)
         if scans[1] is not None:
             np.testing.assert_array_equal(again[1].measurements, scans[1])
@@ -135,7 +136,7 @@ def test_the_true_sensor_is_the_one_that_is_simulated(whole):
     later = np.ones((2, 7), np.bool_)
     later[0, :2] = False
     _, record, experiment = heard(whole, true_sensors=(first, TrueSensor(known[1])), scans_at=later)
-    found = [
+    found: list[Any] = [
         None if scans[0] is None else int((scans[0].origins != CLUTTER).sum()) for scans in scans_of(record, experiment)
     ]
     assert found[:2] == [None, None]

@@ -78,9 +78,8 @@ def test_links_fail_as_often_as_they_are_said_to() -> None:
 def test_metropolis_weights_keep_the_mean() -> None:
     links = np.array([[0, 1, 0, 0], [1, 0, 1, 0], [0, 1, 0, 0], [0, 0, 0, 0]], np.bool_)
     weights = metropolis_weights(links)
-    np.testing.assert_allclose(
-        weights, [[2 / 3, 1 / 3, 0, 0], [1 / 3, 1 / 3, 1 / 3, 0], [0, 1 / 3, 2 / 3, 0], [0, 0, 0, 1]]
-    )
+    expected = np.array([[2, 1, 0, 0], [1, 1, 1, 0], [0, 1, 2, 0], [0, 0, 0, 3]]) / 3.0
+    np.testing.assert_allclose(weights, expected, rtol=1e-15)
     limit = np.linalg.matrix_power(weights, 200)
     np.testing.assert_allclose(limit[:3, :3], 1 / 3, atol=1e-12)
 
@@ -164,7 +163,7 @@ def test_beliefs_that_are_late_are_predicted_to_now() -> None:
     local = filters(WORLD, SENSORS)
     # At step 1 nothing has arrived: each has its own. At step 2 it has those of step 1 of the others, a second older.
     rng = np.random.default_rng(4)
-    beliefs = []
+    beliefs: list[Any] = []
     for step in (1, 2):
         truth = TRUTH.copy()
         truth[:, :2] += step * truth[:, 2:]
@@ -234,7 +233,7 @@ def test_bad_networks() -> None:
         ({"consensus_rounds": 3, "delay": 1}, "consensus_rounds"),
     ):
         with pytest.raises(InputError, match=f"Network.{name}: expected"):
-            Network(**fields)  # type: ignore[arg-type]
+            Network(**fields)
     with pytest.raises(InputError, match="without consensus"):
         scan_network(Network(consensus_rounds=2))
     with pytest.raises(InputError, match=r"network\.delay: expected 0"):

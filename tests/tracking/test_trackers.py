@@ -166,7 +166,8 @@ def test_a_central_run_is_the_filter_on_the_scans_of_the_run(experiment: Experim
     shorter = replace(experiment, tracker=tracker, times=experiment.times[:4], decision_steps=())
     record = run(shorter)
     belief, rng = tracker.filter.initial(), np.random.default_rng(0)
-    for step, scans in enumerate(scans_of(record, shorter), start=1):
+    drawn: Any = scans_of(record, shorter)
+    for step, scans in enumerate(drawn, start=1):
         measurements = [scan.measurements for scan in scans]
         belief, info = tracker.filter.step(belief, measurements, experiment.poses, 1.0, step, rng=rng)
         assert (record.health.log_likelihood[step - 1] == info.log_likelihood).all()

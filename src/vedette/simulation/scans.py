@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -72,6 +73,28 @@ def simulate_scan(
     order = np.argsort(rng.uniform(size=len(measurements)))
     kept = order[np.concatenate([seen, np.ones(len(clutter), np.bool_)])[order]]
     return Scan(np.ascontiguousarray(measurements[kept]), origins[kept])
+
+
+@overload
+def simulate_scans(
+    truth_states: ArrayLike,
+    poses: Floats,
+    sensors: Sequence[SensorModel | TrueSensor],
+    *,
+    ids: ArrayLike | None = None,
+    rngs: Sequence[np.random.Generator],
+) -> tuple[Scan, ...]: ...
+
+
+@overload
+def simulate_scans(
+    truth_states: ArrayLike,
+    poses: Floats,
+    sensors: Sequence[SensorModel | TrueSensor | None],
+    *,
+    ids: ArrayLike | None = None,
+    rngs: Sequence[np.random.Generator],
+) -> tuple[Scan | None, ...]: ...
 
 
 def simulate_scans(
