@@ -13,8 +13,9 @@ from scenarios.minimal import changed
 from vedette.errors import ScenarioError
 from vedette.filters import LmbFilter, MultiSensorGlmbFilter, MultiSensorLmbFilter, SequentialLmbFilter
 from vedette.fusion import Clmb, CmDeltaGlmb, Matched, ParallelUpdate
-from vedette.scenarios import Scenario, parse_scenario
+from vedette.scenarios import Scenario, load_scenario, parse_scenario
 from vedette.scenarios.build import build_experiment
+from vedette.scenarios.cautions import cautions
 from vedette.scenarios.summary import facts
 from vedette.tracking import BeliefNetwork, Central, Distributed, ScanNetwork
 
@@ -126,7 +127,7 @@ FAULTS = [
         "lmb",
         "{kind: clmb}",
         ((SITES, SITES + MEASURED),),
-        "fusion.matching: expected assignment, as without feedback each sensor makes labels of its own from its "
+        "fusion.matching: expected assignment, as without feedback sensors make labels of their own from their "
         'measurements, got "labels"',
     ),
     (
@@ -163,3 +164,18 @@ def test_what_does_not_go_together_is_refused(kind: str, fusion: str, changes: A
     with pytest.raises(ScenarioError) as raised:
         parse_scenario(text, "f.yaml")
     assert any(fault.endswith(message) for fault in str(raised.value).splitlines()), str(raised.value)
+
+
+def test_beliefs_that_are_late_and_births_that_are_later_are_warned_of(tmp_path: Path) -> None:
+    file = tmp_path / "late.yaml"
+    for fusion, warned in (("{kind: clmb, feedback: true}", True), ("{kind: sequential}", False)):
+        file.write_text(
+            changed(
+                (FILTER, "kind: lmb"),
+                ("steps: [1, 5]", "steps: every"),
+                (FUSION, f"fusion: {fusion}\nnetwork: {{delay: 2}}"),
+            )
+        )
+        told = [line for line in cautions(load_scenario(file)) if "come 2 or more scans late" in line]
+        assert bool(told) == warned
+        assert all("take fusion.kind: sequential" in line for line in told)

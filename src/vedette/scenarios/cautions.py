@@ -32,7 +32,7 @@ _POINTS_A_SIDE = 21
 
 def cautions(scenario: Scenario) -> tuple[str, ...]:
     """Warnings of a valid scenario, one line each, with file, line and column where it was read from a file."""
-    found = [*_records(scenario), *_views(scenario.model), *_births(scenario.model)]
+    found = [*_records(scenario), *_views(scenario.model), *_births(scenario.model), *_late_beliefs(scenario.model)]
     if not found:
         return ()
     document = document_of(scenario)
@@ -70,6 +70,19 @@ def _births(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
         f"and {_rule(fusion)}, which fuses by label, then loses it; take fusion.matching: assignment, or, where scans "
         "can be sent, fusion.kind: sequential (births at step 1 alone, or fusion.feedback with a fusion of the "
         "filters' kind, avoid this too)",
+    )
+
+
+def _late_beliefs(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
+    fusion, network = _fusion_by_label(model), model.network
+    born_later = model.birth.from_measurements is not None or model.birth.steps == "every"
+    if fusion is None or network is None or network.delay == 0 or not born_later:
+        return
+    yield (
+        ("network", "delay"),
+        f"beliefs come {network.delay} or more scans late: a target that is new to one sensor is unlikely to those "
+        f"whose beliefs are older, and {_rule(fusion)} then keeps it down; take fusion.kind: sequential, where scans "
+        "that come late are put in their place",
     )
 
 

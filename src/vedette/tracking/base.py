@@ -12,7 +12,7 @@ from vedette.errors import InputError
 from vedette.filters import FilterInfo
 from vedette.kernels.base.types import Floats
 from vedette.models import SensorModel, TargetModel
-from vedette.models.arguments import real
+from vedette.models.arguments import float_array, real
 
 # s. The belief before the first scan holds no target, so that the time before it changes nothing.
 FIRST_PERIOD = 1.0
@@ -109,4 +109,5 @@ def check_step(
     now = real("time", time)
     if state.time is not None and now <= state.time:
         raise InputError(f"time: expected one after that of the last scan, {state.time:g} s; got {now:g}")
-    return poses, FIRST_PERIOD if state.time is None else now - state.time
+    at = float_array("poses", poses, (num_sensors, None))
+    return at, FIRST_PERIOD if state.time is None else now - state.time
