@@ -127,7 +127,10 @@ def test_a_scenario_names_it(tmp_path: Path) -> None:
 def test_seen_is_what_the_true_sensors_see(tmp_path: Path) -> None:
     text = changed(
         ("ospa: {cutoff: 50.0", "metrics: {share: {kind: tracked_share}}\nospa: {cutoff: 50.0"),
-        ("sensor_defaults:\n", "sensor_defaults:\n  truth: {detection: {kind: limited_range, probability: 0.9, max_range: 1.0}}\n"),
+        (
+            "sensor_defaults:\n",
+            "sensor_defaults:\n  truth: {detection: {kind: limited_range, probability: 0.9, max_range: 1.0}}\n",
+        ),
     )
     file = tmp_path / "f.yaml"
     file.write_text(text)
