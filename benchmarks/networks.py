@@ -21,19 +21,18 @@ import numpy as np
 
 from vedette.campaigns import CampaignResults, load_spec, open_results, resolve, run_campaign
 from vedette.campaigns.results import GroupComparison
-from vedette.scenarios.sections.scoring import TrackedShare
 from vedette.text import named_in
 
 CAMPAIGNS = Path(__file__).parents[1] / "examples/campaigns"
 STAGES = ("filter", "fusion")
+TRACKED = "tracked_share"  # as the scenes name the measure
 
 
 def table(results: CampaignResults, group: GroupComparison) -> Iterator[str]:
     """The lines of the table of one setting."""
     comparison = group.comparison
-    shares = [
-        name for name, section in group.cells[0].scenario.model.metrics.items() if isinstance(section, TrackedShare)
-    ]
+    first = group.cells[0].name
+    shares = [name for name in results.metrics(first, results.finished(first)[0]).own if name == TRACKED]
     names = ["Rule", named_in("OSPA", comparison.unit), "Localisation", "Cardinality", "N bias"]
     names += [*(["tracked"] * len(shares)), "ms a scan", "kB a scan"]
     yield "| " + " | ".join(names) + " |"

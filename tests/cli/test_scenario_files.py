@@ -14,6 +14,7 @@ from scenarios.minimal import MINIMAL
 from vedette import __version__
 from vedette.cli import app
 from vedette.scenarios import json_schema, list_builtin, load_scenario
+from vedette.scenarios.sections.fusion import Fusion
 
 
 def vedette(*words: str) -> Result:
@@ -76,9 +77,12 @@ def test_init_writes_a_commented_file_that_passes_check(name: str, tmp_path: Pat
     assert checked.stdout.count("\n") == 1
 
 
-def test_init_starts_from_paper_a_in_a_folder(tmp_path: Path) -> None:
+def test_init_starts_in_a_folder_from_a_scene_whose_fusion_loses_nothing(tmp_path: Path) -> None:
     assert vedette("init", str(tmp_path)).exit_code == 0
-    assert load_scenario(tmp_path / "scenario.yaml").model == load_scenario("paper-a").model
+    model = load_scenario(tmp_path / "scenario.yaml").model
+    assert model == load_scenario("shore-radar").model
+    assert isinstance(model.fusion, Fusion)
+    assert (len(model.sensors), model.fusion.kind) == (3, "sequential")
 
 
 def test_init_brings_recorded_data_and_its_licence_along(tmp_path: Path) -> None:

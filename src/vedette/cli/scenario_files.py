@@ -32,7 +32,7 @@ def list_() -> None:
 
 def init(
     path: Annotated[Path, typer.Argument(help="File to write, or a folder for scenario.yaml.")] = Path("scenario.yaml"),
-    source: Annotated[str, typer.Option("--from", metavar="NAME", help="Scenario to start from.")] = "paper-a",
+    source: Annotated[str, typer.Option("--from", metavar="NAME", help="Scenario to start from.")] = "shore-radar",
     force: Annotated[bool, typer.Option("--force", help="Overwrite what is there.")] = False,
 ) -> None:
     """Write a scenario file to start from.
