@@ -104,7 +104,7 @@ def test_sequential_scans_are_updates_in_turn() -> None:
     alone = SequentialLmbFilter(TARGETS, SENSORS[:1], limits)
     local = LmbFilter(TARGETS, SENSORS[0], limits)
     mine, _ = alone.step(alone.initial(), SCANS[0][:1], POSES[:1], DT, 1, rng=rng())
-    assert_same_lmb(mine, local.step(local.initial(), SCANS[0][0], POSES[0], DT, 1, rng=rng())[0], 0.0)
+    assert_same_lmb(mine, local.step(local.initial(), SCANS[0][0], POSES[0], DT, 1, rng=rng())[0])
 
 
 def test_sequential_is_exact_for_one_target() -> None:

@@ -16,7 +16,9 @@ from vedette.filters.info import FilterInfo
 from vedette.filters.inputs import check_belief, model_errors
 from vedette.filters.limits import Limits
 from vedette.kernels.base.types import Lmb
-from vedette.kernels.steps.lmb import LmbReport, step_lmb, update_lmb
+from vedette.kernels.steps.lmb import LmbReport, step_lmb
+from vedette.kernels.steps.multi_sensor_combinations import standing_combinations
+from vedette.kernels.steps.multi_sensor_lmb import update_lmb
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -73,7 +75,8 @@ class LmbFilter(SingleSensorFilter):
         prior = check_belief(belief, LMB, self.targets.state_dim)
         arguments = self._update_arguments(measurements, pose)
         with model_errors():
-            posterior, report = update_lmb(prior.to_kernel(), *arguments, self.limits.reduction())
+            before = standing_combinations(prior.to_kernel())
+            posterior, report = update_lmb(before, *arguments, self.limits.reduction())
         return self._concluded(posterior, report, num_duplicates, "")
 
     def _concluded(self, posterior: Lmb, report: LmbReport, num_duplicates: int, place: str) -> tuple[LMB, FilterInfo]:

@@ -42,8 +42,6 @@ class MultiSensorLmbFilter(MultiSensorFilter[LMB]):
         limits, num_columns, reports = self.limits, 0, []
         motion = kernel_motion(self.targets.motion, self.targets.survival)
         reduction = limits.reduction()
-        # A label that cannot exist has no density to be kept with.
-        reduction = reduction._replace(min_existence_logit=max(reduction.min_existence_logit, -1e300))
         with model_errors():
             inputs = looks.inputs(born, dt)
             combinations = predict_combinations(prior.to_kernel(), inputs[0], len(inputs), motion)

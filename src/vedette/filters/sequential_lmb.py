@@ -11,7 +11,9 @@ from vedette.errors import NumericalError
 from vedette.filters.info import FilterInfo
 from vedette.filters.inputs import model_errors
 from vedette.filters.multi_sensor import Looks, MultiSensorFilter
-from vedette.kernels.steps.lmb import step_lmb, update_lmb
+from vedette.kernels.steps.lmb import LmbReport
+from vedette.kernels.steps.multi_sensor_combinations import predict_combinations, standing_combinations
+from vedette.kernels.steps.multi_sensor_lmb import update_lmb
 from vedette.models import kernel_motion
 
 
@@ -31,23 +33,24 @@ class SequentialLmbFilter(MultiSensorFilter[LMB]):
     kind: ClassVar[type[LMB]] = LMB
 
     def _updated(self, prior: LMB, born: LMB, looks: Looks, dt: float, place: str) -> tuple[LMB, FilterInfo]:
-        limits, reduction, reports = self.limits, self.limits.reduction(), []
         motion, posterior = kernel_motion(self.targets.motion, self.targets.survival), prior.to_kernel()
+        reports: list[LmbReport] = []
         given = zip(looks.names, looks.sensors, looks.inputs_in_turn(born, dt), strict=True)
         for s, (name, sensor, scan) in enumerate(given):
-            is_last = s == len(looks.names) - 1
-            keep = reduction if is_last else reduction._replace(min_existence_logit=-math.inf, max_labels=2**62)
-            own = sensor.to_kernel(), limits.truncation(sensor.meas_dim), keep
+            truncation, reduction = self.limits.truncation(sensor.meas_dim), self.limits.reduction()
+            if s < len(looks.names) - 1:
+                reduction = reduction._replace(min_existence_logit=-math.inf, max_labels=2**62)
             with model_errors():
-                posterior, report = (
-                    step_lmb(posterior, scan, motion, *own) if s == 0 else update_lmb(posterior, scan, *own)
+                before = (
+                    predict_combinations(posterior, scan, 1, motion) if s == 0 else standing_combinations(posterior)
                 )
+                posterior, report = update_lmb(before, scan, sensor.to_kernel(), truncation, reduction)
             if not math.isfinite(report.sums.log_total):
                 raise NumericalError(
-                    f"{place}, {name}: no association has positive weight; do the models forbid this scan?"
+                    f"{place}, {name}: no association has positive weight; do the models forbid these scans?"
                 )
             reports.append(report)
-        kept, spread = limits.without_spread(LMB.from_kernel(posterior))
+        kept, spread = self.limits.without_spread(LMB.from_kernel(posterior))
         log_total, log_kept = (sum(getattr(r.sums, name) for r in reports) for name in ("log_total", "log_kept"))
         return kept, FilterInfo(
             log_likelihood=looks.log_likelihood(log_total, [report.log_clutter for report in reports]),
@@ -59,5 +62,5 @@ class SequentialLmbFilter(MultiSensorFilter[LMB]):
             num_duplicates=looks.num_duplicates,
             num_inexact_clusters=sum(int(report.sums.num_ranked) for report in reports),
             search_cut=False,
-            cap_met=len(posterior.existence_logit) >= limits.max_labels,
+            cap_met=len(posterior.existence_logit) >= self.limits.max_labels,
         )

@@ -18,7 +18,7 @@ import numpy as np
 from vedette.kernels.association.assignment import ABSENT, Options
 from vedette.kernels.association.marginals import MarginalSums, option_marginals
 from vedette.kernels.association.options import weighed_options
-from vedette.kernels.association.predicted import Rows, predicted_rows, standing_rows
+from vedette.kernels.association.predicted import Rows, predicted_rows
 from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Floats, Ints, Lmb, Mixture, Motion, ScanInput, Sensor, Tracks
@@ -178,10 +178,12 @@ def append_reduced(wide: Mixture, width: int, caps: MixtureCaps, out: Mixture, f
 
 
 @kernel
-def _finish_lmb(
-    rows: Rows, scan: ScanInput, sensor: Sensor, truncation: Truncation, reduction: Reduction
+def step_lmb(
+    prior: Lmb, scan: ScanInput, motion: Motion, sensor: Sensor, truncation: Truncation, reduction: Reduction
 ) -> tuple[Lmb, LmbReport]:
-    """Weigh, marginalise and reduce once there are rows."""
+    """One scan."""
+    rows = predicted_rows(prior.tracks, scan, motion, sensor)
+    weigh_by_existence(prior.existence_logit, rows)
     options, log_clutter, num_raised = weighed_options(rows, scan, sensor, truncation)
     marginals, sums = option_marginals(options, truncation.search)
     logits = np.empty(len(rows.log_absent))
@@ -196,23 +198,3 @@ def _finish_lmb(
     for i in range(len(kept)):
         kept_logits[i] = logits[kept[i]]
     return Lmb(tracks, kept_logits), LmbReport(sums, log_clutter, num_raised, dropped)
-
-
-@kernel
-def step_lmb(
-    prior: Lmb, scan: ScanInput, motion: Motion, sensor: Sensor, truncation: Truncation, reduction: Reduction
-) -> tuple[Lmb, LmbReport]:
-    """One scan."""
-    rows = predicted_rows(prior.tracks, scan, motion, sensor)
-    weigh_by_existence(prior.existence_logit, rows)
-    return _finish_lmb(rows, scan, sensor, truncation, reduction)
-
-
-@kernel
-def update_lmb(
-    prior: Lmb, scan: ScanInput, sensor: Sensor, truncation: Truncation, reduction: Reduction
-) -> tuple[Lmb, LmbReport]:
-    """A scan of the prior's own time; `scan` has no births and no period."""
-    rows = standing_rows(prior.tracks, scan, sensor)
-    weigh_by_existence(prior.existence_logit, rows)
-    return _finish_lmb(rows, scan, sensor, truncation, reduction)

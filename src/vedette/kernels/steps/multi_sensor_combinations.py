@@ -14,7 +14,14 @@ import numpy as np
 
 from vedette.kernels.association.assignment import MISSED, Options
 from vedette.kernels.association.options import weighed_options
-from vedette.kernels.association.predicted import Rows, expect_rows, fill_births, fill_survivors, make_rows
+from vedette.kernels.association.predicted import (
+    Rows,
+    expect_rows,
+    fill_births,
+    fill_survivors,
+    make_rows,
+    unmeasured_rows,
+)
 from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.arrays import filled_ints
 from vedette.kernels.base.compile import kernel
@@ -49,15 +56,10 @@ class SensorReport(NamedTuple):
 
 
 @kernel
-def predict_combinations(prior: Lmb, scan: ScanInput, num_sensors: int, motion: Motion) -> Combinations:
-    """One combination a predicted track or birth site, before the first sensor; measurements are not looked at."""
-    birth = scan.birth
-    num_tracks, num_births = len(prior.tracks.labels), len(birth.tracks.labels)
-    num, dim = num_tracks + num_births, prior.tracks.means.shape[1]
-    rows = make_rows(num, len(prior.tracks.log_weights) + len(birth.tracks.log_weights), dim, 0)
-    fill_survivors(prior.tracks, motion, scan.dt, rows, make_scratch(dim, 0))
-    fill_births(birth, num_tracks, rows)
+def _one_each(prior: Lmb, rows: Rows, num_sensors: int) -> Combinations:
+    """A combination for each of the rows, of which the first are the prior's tracks, as if they were certain."""
     weigh_by_existence(prior.existence_logit, rows)
+    num = len(rows.log_absent)
     log_absent, tracks, columns = (
         rows.log_absent.copy(),
         np.empty(num, np.int64),
@@ -66,6 +68,24 @@ def predict_combinations(prior: Lmb, scan: ScanInput, num_sensors: int, motion: 
     for i in range(num):
         rows.log_absent[i], tracks[i] = -math.inf, i
     return Combinations(rows, tracks, columns, log_absent)
+
+
+@kernel
+def predict_combinations(prior: Lmb, scan: ScanInput, num_sensors: int, motion: Motion) -> Combinations:
+    """One combination a predicted track or birth site, before the first sensor; measurements are not looked at."""
+    birth = scan.birth
+    num_tracks, num_births = len(prior.tracks.labels), len(birth.tracks.labels)
+    num, dim = num_tracks + num_births, prior.tracks.means.shape[1]
+    rows = make_rows(num, len(prior.tracks.log_weights) + len(birth.tracks.log_weights), dim, 0)
+    fill_survivors(prior.tracks, motion, scan.dt, rows, make_scratch(dim, 0))
+    fill_births(birth, num_tracks, rows)
+    return _one_each(prior, rows, num_sensors)
+
+
+@kernel
+def standing_combinations(prior: Lmb) -> Combinations:
+    """One combination a track, as it is at the time of one sensor's scan, without births, deaths or motion."""
+    return _one_each(prior, unmeasured_rows(prior.tracks), 1)
 
 
 @kernel

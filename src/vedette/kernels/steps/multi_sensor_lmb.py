@@ -10,13 +10,15 @@ from vedette.kernels.association.marginals import MarginalSums
 from vedette.kernels.association.predicted import Rows
 from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.compile import kernel
-from vedette.kernels.base.types import Floats, Ints, Lmb, Tracks
+from vedette.kernels.base.types import Floats, Ints, Lmb, ScanInput, Sensor, Tracks
 from vedette.kernels.gaussian.linalg import log_add, log_sum
 from vedette.kernels.gaussian.mixtures import MixtureCaps, copy_component, make_components, require_gaussians
 from vedette.kernels.steps.lmb import LmbReport, Reduction, append_reduced, labels_to_keep
 from vedette.kernels.steps.multi_sensor_choices import Choices
-from vedette.kernels.steps.multi_sensor_combinations import Combinations
+from vedette.kernels.steps.multi_sensor_combinations import Combinations, extend_combinations
 from vedette.kernels.steps.multi_sensor_marginals import StateCaps, choice_marginals
+
+_LEAST_LOGIT = -1e300  # of an existence that is not 0
 
 
 @kernel
@@ -106,9 +108,9 @@ def lmb_of_combinations(
 ) -> tuple[Lmb, LmbReport]:
     """Associate, marginalise and reduce once the combinations are there; clutter is left to those who made them.
 
-    num_columns: measurements of all sensors. The least existence logit must be above -inf: a track that cannot be there
-    has no density.
+    num_columns: measurements of all sensors. A track that cannot be there has no density, and is always dropped.
     """
+    reduction = Reduction(reduction.mixture, max(reduction.min_existence_logit, _LEAST_LOGIT), reduction.max_labels)
     choices, sources, log_kept = _likely_choices(combinations, reduction.min_existence_logit)
     marginals, absent = np.empty(len(sources)), np.empty(len(choices.log_absent))
     caps = StateCaps(truncation.search.max_hypotheses, truncation.search.max_log_gap)
@@ -122,3 +124,14 @@ def lmb_of_combinations(
         chosen_logits[i] = logits[chosen[i]]
     sums = MarginalSums(log_total, num_inexact, log_kept + log_summed)
     return Lmb(tracks, chosen_logits), LmbReport(sums, 0.0, 0, dropped)
+
+
+@kernel
+def update_lmb(
+    combinations: Combinations, scan: ScanInput, sensor: Sensor, truncation: Truncation, reduction: Reduction
+) -> tuple[Lmb, LmbReport]:
+    """The LMB after one sensor's scan of the time that `combinations`, before it, are of."""
+    taken, seen = extend_combinations(combinations, 0, 0, scan, sensor, truncation)
+    posterior, report = lmb_of_combinations(taken, len(scan.measurements), truncation, reduction)
+    sums = MarginalSums(report.sums.log_total, report.sums.num_ranked, report.sums.log_kept + seen.log_kept)
+    return posterior, LmbReport(sums, seen.log_clutter, seen.num_raised, report.dropped_existence)
