@@ -83,7 +83,8 @@ def simulate_scans(
     *,
     ids: ArrayLike | None = None,
     rngs: Sequence[np.random.Generator],
-) -> tuple[Scan, ...]: ...
+) -> tuple[Scan, ...]:
+    """One scan a sensor, where all scan."""
 
 
 @overload
@@ -94,7 +95,8 @@ def simulate_scans(
     *,
     ids: ArrayLike | None = None,
     rngs: Sequence[np.random.Generator],
-) -> tuple[Scan | None, ...]: ...
+) -> tuple[Scan | None, ...]:
+    """One scan a sensor, where some do not."""
 
 
 def simulate_scans(
