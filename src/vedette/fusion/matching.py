@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 from scipy.special import gammaincinv
 
 from vedette.densities import GLMB, LMB, TrackTable, glmb_to_lmb
@@ -109,6 +108,8 @@ def _assign(costs: Floats, allowed: Bools, rows: Ints, columns: Ints, pairs: dic
     block, fits = costs[np.ix_(rows, columns)], allowed[np.ix_(rows, columns)]
     if not fits.any():
         return
+    from scipy.optimize import linear_sum_assignment  # a third of a second that nobody else has to wait for
+
     least, most = block[fits].min(), block[fits].max()
     # More than any change of the allowed pairs can save.
     forbidden = most + (most - least + 1.0) * min(block.shape)
