@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
@@ -131,6 +131,10 @@ class Limits:
         if math.isinf(self.max_position_std):
             return belief, 0.0
         return without_labels(belief, _spread_labels(belief, self.max_position_std))
+
+    def keeping_labels(self) -> Limits:
+        """The same, but that no label is dropped."""
+        return replace(self, min_existence=0.0, max_labels=2**62, max_position_std=math.inf)
 
     def kept(self, belief: LMB) -> LMB:
         """The belief without the labels that `min_existence`, `max_labels` and `max_position_std` drop."""

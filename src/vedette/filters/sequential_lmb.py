@@ -34,12 +34,11 @@ class SequentialLmbFilter(MultiSensorFilter[LMB]):
 
     def _updated(self, prior: LMB, born: LMB, looks: Looks, dt: float, place: str) -> tuple[LMB, FilterInfo]:
         motion, posterior = kernel_motion(self.targets.motion, self.targets.survival), prior.to_kernel()
-        reports: list[LmbReport] = []
+        keeping, reports = self.limits.keeping_labels(), list[LmbReport]()
         given = zip(looks.names, looks.sensors, looks.inputs_in_turn(born, dt), strict=True)
         for s, (name, sensor, scan) in enumerate(given):
-            truncation, reduction = self.limits.truncation(sensor.meas_dim), self.limits.reduction()
-            if s < len(looks.names) - 1:
-                reduction = reduction._replace(min_existence_logit=-math.inf, max_labels=2**62)
+            limits = self.limits if s == len(looks.names) - 1 else keeping
+            truncation, reduction = limits.truncation(sensor.meas_dim), limits.reduction()
             with model_errors():
                 before = (
                     predict_combinations(posterior, scan, 1, motion) if s == 0 else standing_combinations(posterior)
