@@ -54,17 +54,17 @@ def test_who_hears_whom() -> None:
     links = network.links(LINE, rng)
     np.testing.assert_array_equal(links, [[0, 1, 0], [1, 0, 1], [0, 1, 0]])
     np.testing.assert_array_equal(hop_counts(links), [[0, 1, 2], [1, 0, 1], [2, 1, 0]])
-    np.testing.assert_array_equal(network.arrivals(links, 7), [[7, 9, NEVER], [9, 7, 9], [NEVER, 9, 7]])
-    np.testing.assert_array_equal(Network(120.0).arrivals(links, 7), np.full((3, 3), 7))
+    np.testing.assert_array_equal(network.arrivals(hop_counts(links), 7), [[7, 9, NEVER], [9, 7, 9], [NEVER, 9, 7]])
+    np.testing.assert_array_equal(Network(120.0).arrivals(hop_counts(links), 7), np.full((3, 3), 7))
     apart = Network(90.0).links(LINE, rng)
     assert not apart.any()
     np.testing.assert_array_equal(hop_counts(apart), np.where(np.eye(3, dtype=bool), 0, NEVER))
     # Of one message each of 10, 20 and 30 bytes: with one hop each is sent by its source alone, with two by the middle
     # as well, and without any link by nobody.
-    assert network.bytes_sent(links, [10, 20, 30]) == (10, 20, 30)
-    assert Network(120.0, hops=2).bytes_sent(links, [10, 20, 30]) == (30, 60, 50)
-    assert Network(90.0).bytes_sent(apart, [10, 20, 30]) == (0, 0, 0)
-    assert Network(120.0, consensus_rounds=4).bytes_sent(links, [10, 20, 30]) == (120, 120, 120)
+    assert network.bytes_sent(hop_counts(links), [10, 20, 30]) == (10, 20, 30)
+    assert Network(120.0, hops=2).bytes_sent(hop_counts(links), [10, 20, 30]) == (30, 60, 50)
+    assert Network(90.0).bytes_sent(hop_counts(apart), [10, 20, 30]) == (0, 0, 0)
+    assert Network(120.0, consensus_rounds=4).bytes_sent(hop_counts(links), [10, 20, 30]) == (120, 120, 120)
 
 
 def test_links_fail_as_often_as_they_are_said_to() -> None:

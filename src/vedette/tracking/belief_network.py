@@ -10,20 +10,19 @@ import numpy as np
 
 from vedette.densities import LMB
 from vedette.errors import InputError
-from vedette.filters import Filter, FilterInfo
+from vedette.filters import FilterInfo
 from vedette.fusion import Fusion, FusionInfo, Matched, Views
 from vedette.fusion.matching import common_names, relabelled
 from vedette.fusion.rebasing import rebased, with_labels_of
-from vedette.kernels.base.types import Bools, Floats, Ints
-from vedette.models import SensorModel, TargetModel
+from vedette.kernels.base.types import Floats, Ints
 from vedette.models.arguments import reject
 from vedette.tracking.base import State, TrackerInfo, check_step
-from vedette.tracking.births import births_due, births_from_scans
+from vedette.tracking.births import births_due, births_heard
 from vedette.tracking.distributed import check_labels_of_births, shares_prediction
 from vedette.tracking.local import LocalFilters
 from vedette.tracking.merging import merged, views_of, with_weights
 from vedette.tracking.messages import bytes_of_belief
-from vedette.tracking.network import NEVER, Network, hop_counts, metropolis_weights
+from vedette.tracking.network import NEVER, Network, heard_by, hop_counts, metropolis_weights
 from vedette.tracking.stages import Stages
 
 
@@ -46,7 +45,7 @@ class _Memory(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class BeliefNetwork:
+class BeliefNetwork(LocalFilters):
     """A filter at each sensor; the fused belief of what a sensor hears replaces its own.
 
     Of each other sensor, a sensor fuses the newest belief that has arrived, predicted to the time of its own. Where the
@@ -69,13 +68,12 @@ class BeliefNetwork:
             with messages that are delayed; one that goes by labels where sensors make their own from measurements.
     """
 
-    filters: tuple[Filter, ...]
     fusion: Fusion
     network: Network
     merging: Fusion
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "filters", LocalFilters(self.filters).filters)
+        LocalFilters.__post_init__(self)  # slots replace the class that super() looks for
         if not isinstance(self.network, Network):
             raise reject("network", "a Network", self.network)
         for rule in (self.fusion, self.merging):
@@ -83,16 +81,6 @@ class BeliefNetwork:
         check_labels_of_births(self.fusion, self.targets)
         if shares_prediction(self.fusion) and self.network.delay > 0:
             raise InputError("network.delay: expected 0, as the fusion divides by the prediction of the same time")
-
-    @property
-    def targets(self) -> TargetModel:
-        """The targets as all sensors know them."""
-        return self.filters[0].targets
-
-    @property
-    def sensors(self) -> tuple[SensorModel, ...]:
-        """What each sensor sees."""
-        return tuple(local.sensor for local in self.filters)
 
     def initial(self) -> State:
         """No target anywhere: one belief, which all sensors share."""
@@ -105,14 +93,14 @@ class BeliefNetwork:
         """Filter each sensor's scan, send, and fuse what has arrived; see `Tracker.step`."""
         at, dt = check_step(state, scans, poses, time, rngs, len(self.filters))
         step, stages, num = state.step + 1, Stages(), len(self.filters)
-        links = self.network.links(at, rngs[0])
+        hops = hop_counts(self.network.links(at, rngs[0]))
         with stages.timing("filter"):
             predictions, local, infos = self._filtered(state, scans, at, dt, rngs)
         views = Views(self.sensors, at, tuple(scan is not None for scan in scans))
-        sent = _Sent(step, float(time), views, predictions, local, self.network.arrivals(links, step))
+        sent = _Sent(step, float(time), views, predictions, local, self.network.arrivals(hops, step))
         waiting = (*state.memory.sent, sent)
         with stages.timing("fusion"):
-            fused, reports = self._fused(waiting, links)
+            fused, reports = self._fused(waiting, hops)
             whole, report = merged(self.merging, fused, range(num), views)
         with stages.timing("births"):
             births = self._births(fused, scans, at, sent)
@@ -121,14 +109,14 @@ class BeliefNetwork:
         sizes = [bytes_of_belief(belief) for belief in local]
         if shares_prediction(self.fusion) and len({id(own) for own in predictions}) > 1:
             sizes = [size + bytes_of_belief(own) for size, own in zip(sizes, predictions, strict=True)]
-        told = TrackerInfo(infos, report or reports[0], stages.seconds, self.network.bytes_sent(links, sizes))
+        told = TrackerInfo(infos, report or reports[0], stages.seconds, self.network.bytes_sent(hops, sizes))
         return State(tuple(fused), whole, step, float(time), memory), told
 
     def _filtered(
         self, state: State, scans: Sequence[Any], poses: Floats, dt: float, rngs: Sequence[np.random.Generator]
     ) -> tuple[tuple[Any, ...], tuple[Any, ...], tuple[FilterInfo, ...]]:
         """Predictions (where the fusion divides by them), posteriors and reports of all sensors."""
-        filters, step, birth = LocalFilters(self.filters), state.step + 1, self.targets.birth
+        step, birth = state.step + 1, self.targets.birth
         predictions: list[Any] = []
         found: dict[tuple[int, int], Any] = {}
         results = []
@@ -136,20 +124,20 @@ class BeliefNetwork:
             due = births_due(birth, step, own)
             if not shares_prediction(self.fusion):
                 predictions.append(None)
-                results.append(filters.stepped(s, belief, scans[s], poses[s], dt, step, due, rngs[s]))
+                results.append(self._stepped(s, belief, scans[s], poses[s], dt, step, due, rngs[s]))
                 continue
             key = id(belief), id(own)  # one prediction object for all who believe the same
             if key not in found:
-                found[key], _ = filters.predicted(s, belief, dt, step, due)
+                found[key], _ = self._predicted(s, belief, dt, step, due)
             predictions.append(found[key])
-            results.append(filters.updated(s, found[key], scans[s], poses[s], rngs[s]))
+            results.append(self._updated(s, found[key], scans[s], poses[s], rngs[s]))
         beliefs, infos = zip(*results, strict=True)
         return tuple(predictions), beliefs, infos
 
-    def _fused(self, waiting: Sequence[_Sent], links: Bools) -> tuple[list[Any], list[FusionInfo | None]]:
+    def _fused(self, waiting: Sequence[_Sent], hops: Ints) -> tuple[list[Any], list[FusionInfo | None]]:
         """What each sensor believes after fusing; one object for those who have fused the same."""
         now, num = waiting[-1], len(self.filters)
-        shares = self._weights(links)
+        shares = self._weights(hops)
         done: dict[tuple[Any, ...], tuple[Any, FusionInfo | None]] = {}
         beliefs, reports = [], []
         for i in range(num):
@@ -192,7 +180,7 @@ class BeliefNetwork:
                 base = with_labels_of(base, prediction)
         posteriors = [rebased(*own, base) for own in zip(posteriors, predictions, strict=True)]
         fused, report = with_weights(self.fusion, weights.tolist()).fuse(posteriors, replace(seen, prediction=base))
-        return LocalFilters(self.filters).kept(fused), report
+        return self._kept(fused), report
 
     def _current(self, sent: _Sent, now: _Sent, sensor: int) -> Any:
         """A sensor's belief at the time of the step `now`; nobody is born on the way."""
@@ -200,14 +188,14 @@ class BeliefNetwork:
             return sent.beliefs[sensor]
         nobody = LMB.empty(self.targets.state_dim)
         elapsed = now.time - sent.time
-        return LocalFilters(self.filters).predicted(sensor, sent.beliefs[sensor], elapsed, now.step, nobody)[0]
+        return self._predicted(sensor, sent.beliefs[sensor], elapsed, now.step, nobody)[0]
 
-    def _weights(self, links: Bools) -> Floats:
+    def _weights(self, hops: Ints) -> Floats:
         """(num_sensors, num_sensors) the weight that each sensor gives to each in its group, heard or not yet."""
-        groups = hop_counts(links) < NEVER
+        groups = hops < NEVER
         sizes = groups.sum(axis=1, keepdims=True)
         rounds = self.network.consensus_rounds
-        shares = groups / sizes if rounds is None else np.linalg.matrix_power(metropolis_weights(links), rounds)
+        shares = groups / sizes if rounds is None else np.linalg.matrix_power(metropolis_weights(hops == 1), rounds)
         return np.asarray(shares * sizes if shares_prediction(self.fusion) else shares)
 
     def _births(self, fused: Sequence[Any], scans: Sequence[Any], poses: Floats, sent: _Sent) -> tuple[LMB | None, ...]:
@@ -218,11 +206,9 @@ class BeliefNetwork:
         found: dict[tuple[Any, ...], LMB | None] = {}
         births = []
         for i, belief in enumerate(fused):
-            heard = tuple(np.flatnonzero(sent.arrives[i] <= sent.step).tolist())
+            heard = heard_by(i, sent.arrives, sent.step)
             key = id(belief), heard
             if key not in found:
-                own = [scan if s in heard else None for s, scan in enumerate(scans)]
-                owner = None if len(heard) == num else heard[0]
-                found[key] = births_from_scans(birth, belief, self.sensors, own, poses, sent.step + 1, owner=owner)
+                found[key] = births_heard(birth, belief, self.sensors, scans, poses, sent.step + 1, heard)
             births.append(found[key])
         return tuple(births)

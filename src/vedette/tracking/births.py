@@ -90,6 +90,21 @@ def births_from_scans(
     return _born(pooled, model, step, first)
 
 
+def births_heard(
+    birth: BirthModel,
+    belief: GLMB | LMB,
+    sensors: Sequence[SensorModel],
+    scans: Sequence[Any],
+    poses: Any,
+    step: int,
+    heard: Sequence[int],
+) -> LMB | None:
+    """As `births_from_scans`, of the scans of the sensors `heard`; where these are not all, the first of them owns."""
+    known = [scan if s in heard else None for s, scan in enumerate(scans)]
+    owner = None if len(heard) == len(sensors) else heard[0]
+    return births_from_scans(birth, belief, sensors, known, poses, step, owner=owner)
+
+
 def _unexplained(belief: Lmb, sensor: SensorModel, scan: Any, pose: Any, number: int) -> Unexplained:
     # The filters have checked the scan.
     measurements = np.ascontiguousarray(scan, np.float64).reshape(-1, sensor.meas_dim)

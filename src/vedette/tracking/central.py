@@ -10,6 +10,7 @@ import numpy as np
 
 from vedette.densities import LMB
 from vedette.filters import FilterInfo
+from vedette.kernels.base.types import Floats
 from vedette.models import SensorModel, TargetModel
 from vedette.models.arguments import reject
 from vedette.tracking.base import State, TrackerInfo, check_step
@@ -47,8 +48,8 @@ class CentralFilter(Protocol):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Central:
-    """A single belief, which is every sensor's and the fused one at once.
+class OfAllScans:
+    """What the trackers share that have one filter for the scans of all sensors.
 
     Attributes:
         filter: of all sensors' scans.
@@ -73,6 +74,29 @@ class Central:
         """What each sensor sees."""
         return tuple(self.filter.sensors)
 
+    def _filtered(
+        self,
+        belief: Any,
+        measured: LMB | None,
+        scans: Sequence[Any],
+        poses: Floats,
+        dt: float,
+        step: int,
+        rng: np.random.Generator,
+    ) -> tuple[Any, FilterInfo]:
+        """The belief after a step. measured: who may be born of measurements, as of `births_due`."""
+        due = births_due(self.targets.birth, step, measured)
+        births = {} if due is None else {"births": due}
+        return self.filter.step(belief, scans, poses, dt, step, rng=rng, **births)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Central(OfAllScans):
+    """A single belief, which is every sensor's and the fused one at once.
+
+    Attributes and errors: as `OfAllScans`.
+    """
+
     def initial(self) -> State:
         """No target."""
         return self._state(self.filter.initial(), 0, None)
@@ -82,12 +106,10 @@ class Central:
     ) -> tuple[State, TrackerInfo]:
         """Update the one belief with all scans; see `Tracker.step`. Only the first of `rngs` is drawn from."""
         at, dt = check_step(state, scans, poses, time, rngs, len(self.sensors))
-        stages, step, birth = Stages(), state.step + 1, self.targets.birth
-        due = births_due(birth, step, state.memory)
+        stages, step = Stages(), state.step + 1
         with stages.timing("filter"):
-            births = {} if due is None else {"births": due}
-            belief, info = self.filter.step(state.fused, scans, at, dt, step, rng=rngs[0], **births)
-            measured = births_from_scans(birth, belief, self.sensors, scans, at, step + 1)
+            belief, info = self._filtered(state.fused, state.memory, scans, at, dt, step, rngs[0])
+            measured = births_from_scans(self.targets.birth, belief, self.sensors, scans, at, step + 1)
         sent = tuple(bytes_of_scan(scan, pose) for scan, pose in zip(scans, at, strict=True))
         return self._state(belief, step, float(time), measured), TrackerInfo((info,), None, stages.seconds, sent)
 

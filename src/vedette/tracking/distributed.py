@@ -10,10 +10,9 @@ import numpy as np
 
 from vedette.densities import LMB
 from vedette.errors import InputError
-from vedette.filters import Filter
 from vedette.fusion import Fusion, Matched, Views
 from vedette.kernels.base.types import Floats
-from vedette.models import SensorModel, TargetModel
+from vedette.models import TargetModel
 from vedette.tracking.base import State, TrackerInfo, check_step
 from vedette.tracking.births import births_due, births_from_scans
 from vedette.tracking.local import LocalFilters
@@ -22,7 +21,7 @@ from vedette.tracking.stages import Stages
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Distributed:
+class Distributed(LocalFilters):
     """A filter at each sensor, and a fusion of what they believe.
 
     Attributes:
@@ -37,12 +36,11 @@ class Distributed:
             does not go together with `feedback`.
     """
 
-    filters: tuple[Filter, ...]
     fusion: Fusion | None = None
     feedback: bool = False
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "filters", LocalFilters(self.filters).filters)
+        LocalFilters.__post_init__(self)  # slots replace the class that super() looks for
         if self.fusion is None and len(self.filters) > 1:
             raise InputError(f"fusion: expected one for {len(self.filters)} sensors; got none")
         if self.feedback or self.fusion is None:
@@ -50,16 +48,6 @@ class Distributed:
         if shares_prediction(self.fusion):
             raise InputError("feedback: expected true, as the fusion is of beliefs that share their prediction")
         check_labels_of_births(self.fusion, self.targets)
-
-    @property
-    def targets(self) -> TargetModel:
-        """The targets as all sensors know them."""
-        return self.filters[0].targets
-
-    @property
-    def sensors(self) -> tuple[SensorModel, ...]:
-        """What each sensor sees."""
-        return tuple(local.sensor for local in self.filters)
 
     def initial(self) -> State:
         """No target anywhere; the fused belief is then the first sensor's."""
@@ -71,18 +59,18 @@ class Distributed:
     ) -> tuple[State, TrackerInfo]:
         """Filter each sensor's scan, then fuse; see `Tracker.step`."""
         at, dt = check_step(state, scans, poses, time, rngs, len(self.filters))
-        step, stages, filters = state.step + 1, Stages(), LocalFilters(self.filters)
+        step, stages = state.step + 1, Stages()
         births = [births_due(self.targets.birth, step, own) for own in state.memory or (None,) * len(self.filters)]
         prediction, local, infos = None, [], []
         if shares_prediction(self.fusion):
             with stages.timing("filter"):
-                prediction, _ = filters.predicted(0, state.fused, dt, step, births[0])
+                prediction, _ = self._predicted(0, state.fused, dt, step, births[0])
         for s in range(len(self.filters)):
             with stages.timing("filter", s):
                 if prediction is None:
-                    belief, info = filters.stepped(s, state.local[s], scans[s], at[s], dt, step, births[s], rngs[s])
+                    belief, info = self._stepped(s, state.local[s], scans[s], at[s], dt, step, births[s], rngs[s])
                 else:
-                    belief, info = filters.updated(s, prediction, scans[s], at[s], rngs[s])
+                    belief, info = self._updated(s, prediction, scans[s], at[s], rngs[s])
             local.append(belief)
             infos.append(info)
         fused, report = local[0], None
@@ -97,7 +85,7 @@ class Distributed:
                     local, rule = list(rule.match(local)), rule.rule
                 fused, report = rule.fuse(local, views)
         if prediction is not None:
-            fused = filters.kept(fused)
+            fused = self._kept(fused)
         if self.feedback:
             local = [fused] * len(local)
         measured = self._measured(local, scans, at, step + 1, stages)

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -12,18 +11,25 @@ from vedette.densities import LMB
 from vedette.errors import InputError
 from vedette.filters import Filter, FilterInfo, LmbFilter, TwoStepFilter, shared_targets
 from vedette.filters.blind import NO_POSE, NO_SCAN, blind_sensor
+from vedette.models import SensorModel, TargetModel
 from vedette.models.arguments import reject
 
 
+@dataclass(frozen=True, slots=True, eq=False)
 class LocalFilters:
-    """Filters of one sensor each, which hold the same targets.
+    """What the trackers share that keep a filter at each sensor.
+
+    Attributes:
+        filters: one a sensor; all hold the same targets.
 
     Raises:
         InputError: no filter or something else, filters of different targets.
     """
 
-    def __init__(self, filters: Sequence[Filter]) -> None:
-        self.filters = tuple(filters)
+    filters: tuple[Filter, ...]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "filters", tuple(self.filters))
         if not self.filters:
             raise InputError("filters: expected at least one; got none")
         for s, local in enumerate(self.filters):
@@ -31,7 +37,17 @@ class LocalFilters:
                 raise reject(f"filters[{s}]", "a Filter, with targets, sensor, initial() and step()", local)
         shared_targets(self.filters)
 
-    def stepped(
+    @property
+    def targets(self) -> TargetModel:
+        """The targets as all sensors know them."""
+        return self.filters[0].targets
+
+    @property
+    def sensors(self) -> tuple[SensorModel, ...]:
+        """What each sensor sees."""
+        return tuple(local.sensor for local in self.filters)
+
+    def _stepped(
         self,
         s: int,
         belief: Any,
@@ -45,31 +61,31 @@ class LocalFilters:
         """What sensor `s` believes after a scan; where it did not scan, what it predicts."""
         own = self.filters[s]
         if scan is None:
-            return self.predicted(s, belief, dt, step, births)
+            return self._predicted(s, belief, dt, step, births)
         if births is None:
             return own.step(belief, scan, pose, dt, step, rng=rng)
         return self._two_step(s, "targets are born of measurements").step(
             belief, scan, pose, dt, step, rng=rng, births=births
         )
 
-    def predicted(self, s: int, belief: Any, dt: float, step: int, births: LMB | None) -> tuple[Any, FilterInfo]:
+    def _predicted(self, s: int, belief: Any, dt: float, step: int, births: LMB | None) -> tuple[Any, FilterInfo]:
         """What sensor `s` expects `dt` seconds later."""
         return self._two_step(s, "it must predict without a scan").predict(belief, dt, step, births=births)
 
-    def updated(
+    def _updated(
         self, s: int, prediction: Any, scan: Any, pose: Any, rng: np.random.Generator
     ) -> tuple[Any, FilterInfo]:
         """The prediction after the scan of sensor `s`, no label dropped; as it is where the sensor did not scan."""
         own = self.filters[s]
         if not isinstance(own, LmbFilter):
             raise reject(f"filters[{s}]", "an LmbFilter, as the sensors share their prediction", own)
-        whole = replace(own.limits, min_existence=0.0, max_labels=2**62, max_position_std=np.inf)
+        whole = replace(own, limits=own.limits.keeping_labels())
         if scan is None:
-            _, info = replace(own, sensor=blind_sensor(), limits=whole).update(prediction, NO_SCAN, NO_POSE, rng=rng)
+            _, info = replace(whole, sensor=blind_sensor()).update(prediction, NO_SCAN, NO_POSE, rng=rng)
             return prediction, info
-        return replace(own, limits=whole).update(prediction, scan, pose, rng=rng)
+        return whole.update(prediction, scan, pose, rng=rng)
 
-    def kept(self, belief: LMB) -> LMB:
+    def _kept(self, belief: LMB) -> LMB:
         """The belief without the labels that the limits of the first filter drop."""
         own = self.filters[0]
         assert isinstance(own, LmbFilter)

@@ -50,6 +50,10 @@ class Network:
         if self.consensus_rounds is not None and (self.delay > 0 or self.hops is not None):
             raise reject("Network.consensus_rounds", "None with a delay or a number of hops", self.consensus_rounds)
 
+    @property
+    def _most_hops(self) -> int:
+        return NEVER - 1 if self.hops is None else self.hops
+
     def links(self, poses: Floats, rng: np.random.Generator) -> Bools:
         """(num_sensors, num_sensors) which sensors hear each other directly; symmetric, nobody itself.
 
@@ -63,40 +67,43 @@ class Network:
             near &= works | works.T
         return near
 
-    def arrivals(self, links: Bools, step: int) -> Ints:
+    def arrivals(self, hops: Ints, step: int) -> Ints:
         """(num_sensors, num_sensors) step at which sensor i has the message that sensor j sends now, or `NEVER`.
 
-        links: as `links` gave; messages travel over those of the step at which they are sent.
+        hops: `hop_counts` of the links of the step; messages travel over those of the step at which they are sent.
         """
-        hops = hop_counts(links)
-        hops[hops > (NEVER if self.hops is None else self.hops)] = NEVER
-        return np.where(hops < NEVER, step + self.delay * np.minimum(hops, len(links)), NEVER)
+        return np.where(hops <= self._most_hops, step + self.delay * np.minimum(hops, len(hops)), NEVER)
 
     def longest_delay(self, num_sensors: int) -> int:
         """Scans after which no message arrives any more."""
-        return self.delay * min(num_sensors - 1, NEVER if self.hops is None else self.hops)
+        return self.delay * min(num_sensors - 1, self._most_hops)
 
-    def bytes_sent(self, links: Bools, sizes: Sequence[int]) -> tuple[int, ...]:
-        """What each sensor sends at a step, where sensor j has a message of `sizes[j]` bytes.
+    def bytes_sent(self, hops: Ints, sizes: Sequence[int]) -> tuple[int, ...]:
+        """What each sensor sends at a step, where sensor j has a message of `sizes[j]` bytes; hops: as of `arrivals`.
 
         A message is sent once by each sensor that has it and may still pass it on, and heard by all its neighbours;
         with consensus, each sensor sends its average, as large as the largest message, in each round.
         """
-        heard: Bools = links.sum(axis=1) > 0
+        heard: Bools = (hops == 1).sum(axis=1) > 0
         if self.consensus_rounds is not None:
             return tuple(self.consensus_rounds * max(sizes) if hears else 0 for hears in heard.tolist())
-        passes_on = (hop_counts(links) < (NEVER if self.hops is None else self.hops)) & heard.reshape(-1, 1)
+        passes_on = (hops < self._most_hops) & heard.reshape(-1, 1)
         return tuple((passes_on @ np.asarray(sizes, np.int64)).tolist())
+
+
+def heard_by(sensor: int, arrives: Ints, step: int) -> tuple[int, ...]:
+    """The sensors whose messages, of `Network.arrivals`, a sensor has by a step; its own among them."""
+    return tuple(np.flatnonzero(arrives[sensor] <= step).tolist())
 
 
 def hop_counts(links: Bools) -> Ints:
     """(n, n) fewest links between any two sensors; 0 from each to itself, `NEVER` where there is no way."""
-    num = len(links)
-    hops = np.full((num, num), NEVER)
-    reached = np.eye(num, dtype=np.bool_)
-    for count in range(num):
-        hops[reached & (hops == NEVER)] = count
-        reached = reached @ links | reached
+    reached = np.eye(len(links), dtype=np.bool_)
+    hops, count = np.where(reached, 0, NEVER), 0
+    while reached.any():  # those that the last link has brought
+        count += 1
+        reached = (reached @ links) & (hops == NEVER)
+        hops[reached] = count
     return hops
 
 

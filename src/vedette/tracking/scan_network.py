@@ -12,14 +12,13 @@ from vedette.densities import LMB
 from vedette.filters import FilterInfo
 from vedette.fusion import Fusion, Views
 from vedette.kernels.base.types import Floats, Ints
-from vedette.models import SensorModel, TargetModel
 from vedette.models.arguments import reject
 from vedette.tracking.base import State, TrackerInfo, check_step
-from vedette.tracking.births import births_due, births_from_scans
-from vedette.tracking.central import CentralFilter
+from vedette.tracking.births import births_heard
+from vedette.tracking.central import OfAllScans
 from vedette.tracking.merging import merged
 from vedette.tracking.messages import bytes_of_belief, bytes_of_scan
-from vedette.tracking.network import Network
+from vedette.tracking.network import Network, heard_by, hop_counts
 from vedette.tracking.stages import Stages
 
 
@@ -50,7 +49,7 @@ class _Memory(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ScanNetwork:
+class ScanNetwork(OfAllScans):
     """Every sensor runs the same filter of several sensors on the scans that it hears, its own among them.
 
     A scan that comes late is put in its place: the steps since then are filtered again with it, so that sensors that
@@ -67,25 +66,13 @@ class ScanNetwork:
         InputError: a filter or network of another kind, or a network with consensus.
     """
 
-    filter: CentralFilter
     network: Network
     merging: Fusion
 
     def __post_init__(self) -> None:
-        if not isinstance(self.filter, CentralFilter):
-            raise reject("filter", "one of several sensors, with targets, sensors, initial() and step()", self.filter)
+        OfAllScans.__post_init__(self)  # slots replace the class that super() looks for
         if not isinstance(self.network, Network) or self.network.consensus_rounds is not None:
             raise reject("network", "a Network without consensus, as scans are no averages", self.network)
-
-    @property
-    def targets(self) -> TargetModel:
-        """The targets."""
-        return self.filter.targets
-
-    @property
-    def sensors(self) -> tuple[SensorModel, ...]:
-        """What each sensor sees."""
-        return tuple(self.filter.sensors)
 
     def initial(self) -> State:
         """No target."""
@@ -99,8 +86,8 @@ class ScanNetwork:
         """Send the scans and filter what has arrived; see `Tracker.step`. Only the first of `rngs` is drawn from."""
         at, dt = check_step(state, scans, poses, time, rngs, len(self.sensors))
         stages, step, num = Stages(), state.step + 1, len(self.sensors)
-        links = self.network.links(at, rngs[0])
-        frame = _Frame(step, dt, tuple(scans), at, self.network.arrivals(links, step))
+        hops = hop_counts(self.network.links(at, rngs[0]))
+        frame = _Frame(step, dt, tuple(scans), at, self.network.arrivals(hops, step))
         views = Views(self.sensors, at, tuple(scan is not None for scan in scans))
         sizes = [bytes_of_scan(scan, pose) for scan, pose in zip(scans, at, strict=True)]
         known = state.memory.known
@@ -117,7 +104,7 @@ class ScanNetwork:
         with stages.timing("fusion"):
             fused, report = merged(self.merging, [own.belief for own in now], range(num), views)
         infos = tuple(own.info for own in now if own.info is not None)
-        info = TrackerInfo(infos, report, stages.seconds, self.network.bytes_sent(links, sizes))
+        info = TrackerInfo(infos, report, stages.seconds, self.network.bytes_sent(hops, sizes))
         local = tuple(own.belief for own in now)
         return State(local, fused, step, float(time), _Memory(known, frames, frame)), info
 
@@ -127,7 +114,7 @@ class ScanNetwork:
         Who scans at this step is not asked, as the beliefs are those of before.
         """
         found: dict[tuple[int, ...], _Known] = {}
-        everyone = [tuple(np.flatnonzero(row <= frame.step).tolist()) for row in frame.arrives]
+        everyone = [heard_by(i, frame.arrives, frame.step) for i in range(len(self.sensors))]
         for heard in everyone:
             if heard not in found:
                 beliefs = [memory.known[j].belief for j in heard]
@@ -141,17 +128,13 @@ class ScanNetwork:
 
     def _measured(self, belief: Any, frame: _Frame, heard: tuple[int, ...]) -> LMB | None:
         """Who may be born after a step of which these sensors' scans are known."""
-        scans = [scan if s in heard else None for s, scan in enumerate(frame.scans)]
-        owner = None if len(heard) == len(self.sensors) else heard[0]
         birth, after = self.targets.birth, frame.step + 1
-        return births_from_scans(birth, belief, self.sensors, scans, frame.poses, after, owner=owner)
+        return births_heard(birth, belief, self.sensors, frame.scans, frame.poses, after, heard)
 
     def filtered(self, known: _Known, frame: _Frame, heard: tuple[int, ...], rng: np.random.Generator) -> _Known:
         """What a sensor knows after a step of which it has heard these sensors' scans."""
         scans = [scan if s in heard else None for s, scan in enumerate(frame.scans)]
-        due = births_due(self.targets.birth, frame.step, known.births)
-        births = {} if due is None else {"births": due}
-        belief, info = self.filter.step(known.belief, scans, frame.poses, frame.dt, frame.step, rng=rng, **births)
+        belief, info = self._filtered(known.belief, known.births, scans, frame.poses, frame.dt, frame.step, rng)
         return _Known(belief, self._measured(belief, frame, heard), info)
 
 
@@ -166,7 +149,7 @@ class _Runs:
     def through(self, known: _Known, frames: Sequence[_Frame], sensor: int, now: int) -> _Known:
         """What a sensor knows after these steps, by what of them it has heard by now."""
         for frame in frames:
-            heard = tuple(np.flatnonzero(frame.arrives[sensor] <= now).tolist())
+            heard = heard_by(sensor, frame.arrives, now)
             key = id(known), frame.step, heard
             if key not in self.done:
                 self.kept.append(known)
