@@ -123,11 +123,7 @@ def _detected_at(sensor: TrueSensor, states: Floats, pose: Floats, measured: Flo
     if sensor.detection_of == "state":
         return states
     moved = states.copy()
-    if sensor.model.measurement.angular[0]:
-        bearings, ranges = measured.T
-        moved[:, :2] = pose[:2] + np.stack([ranges * np.cos(bearings), ranges * np.sin(bearings)], axis=1)
-    else:
-        moved[:, :2] = measured
+    moved[:, :2] = sensor.model.measurement.positions(measured, pose)
     return moved
 
 

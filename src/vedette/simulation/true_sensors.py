@@ -10,8 +10,6 @@ from vedette.kernels.base.types import Bools
 from vedette.models import DetectionModel, SensorModel
 from vedette.models.arguments import reject
 
-_POSITION, _BEARING_RANGE = [False, False], [True, False]
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TrueSensor:
@@ -21,7 +19,7 @@ class TrueSensor:
         model: what it measures, with what noise, detection and clutter.
         first_detection: its detection at its first scan alone; None: as at the others.
         detection_of: where its probability of detection is taken: at the target's true "state", or at the position that
-            a "measurement" of [px, py] or [bearing, range] gives, noise included (the rest of the state stays).
+            the "measurement" gives (`MeasurementModel.places`), noise included (the rest of the state stays).
 
     Raises:
         InputError: a part of another type; detection of the measurement where that gives no position.
@@ -38,8 +36,7 @@ class TrueSensor:
             raise reject("TrueSensor.first_detection", "a DetectionModel or None", self.first_detection)
         if self.detection_of not in ("state", "measurement"):
             raise reject("TrueSensor.detection_of", "state or measurement", self.detection_of)
-        angular = self.model.measurement.angular.tolist()
-        if self.detection_of == "measurement" and angular not in (_POSITION, _BEARING_RANGE):
+        if self.detection_of == "measurement" and self.model.measurement.places is None:
             expected = "state, as only a position or a bearing with a range say where a target was measured"
             raise reject("TrueSensor.detection_of", expected, self.detection_of)
 
