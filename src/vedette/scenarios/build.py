@@ -14,14 +14,13 @@ from vedette.control import JointPlanner, MobileSensor, Planner
 from vedette.densities import LMB
 from vedette.errors import InputError
 from vedette.filters import Filter, labels_targets, shared_targets
-from vedette.fusion import Clmb, Fusion
+from vedette.fusion import Clmb, CmDeltaGlmb, Fusion, Matched
 from vedette.kernels.base.types import Bools, Floats
 from vedette.models import SensorModel, TargetModel
 from vedette.platforms import Actions
 from vedette.platforms.base import actions_at
 from vedette.scenarios.loading import Scenario
-from vedette.scenarios.sections.fusion import CustomFusion
-from vedette.scenarios.sections.fusion import Fusion as FusionSection
+from vedette.scenarios.sections.fusion import OF_SCANS, CustomFusion
 from vedette.scenarios.sections.planners import STRATEGIES, Parts
 from vedette.scenarios.sections.tracking import Filter as FilterSection
 from vedette.simulation.experiment import Experiment
@@ -101,17 +100,29 @@ def _tracker(scenario: Scenario, filters: tuple[Filter, ...]) -> Tracker:
         return Distributed(filters, fusion, model.fusion.feeds_back) if central is None else Central(central)
     of_lmbs = isinstance(filters[0].initial(), LMB)
     own_labels = model.birth.from_measurements is not None
-    merging = FusionSection().build_merging(len(filters), of_lmbs=of_lmbs, own_labels=own_labels)
+    merging = _merging(len(filters), of_lmbs=of_lmbs, own_labels=own_labels)
     if central is not None:
         return ScanNetwork(central, model.network.build(), merging)
     assert fusion is not None  # a single sensor has no network
     return BeliefNetwork(filters, fusion, model.network.build(), merging)
 
 
+def _merging(num_sensors: int, *, of_lmbs: bool, own_labels: bool) -> Fusion:
+    """The fusion of what sensors of a network believe after different pasts: covariance intersection.
+
+    of_lmbs: whether the filters keep LMBs, of which those count at a label that see it, and labels are matched.
+    own_labels: whether sensors make labels of their own, so that those of GLMBs are matched as well.
+    """
+    equal = (1.0 / num_sensors,) * num_sensors
+    if of_lmbs:
+        return Matched(Clmb(equal, by_views=True))
+    return Matched(CmDeltaGlmb(equal)) if own_labels else CmDeltaGlmb(equal)
+
+
 def _central_filter(scenario: Scenario, filters: tuple[Filter, ...]) -> CentralFilter | None:
     """The filter of all sensors' scans; None where each has its own."""
     model = scenario.model
-    if model.fusion.kind not in ("central", "sequential") or not isinstance(model.filter, FilterSection):
+    if model.fusion.kind not in OF_SCANS or not isinstance(model.filter, FilterSection):
         return None
     targets, sensors, own = shared_targets(filters), tuple(local.sensor for local in filters), model.fusion.filter
     if own is not None:

@@ -9,7 +9,7 @@ from vedette.scenarios.loading import Scenario
 from vedette.scenarios.sections import ScenarioModel
 from vedette.scenarios.sections.base import Section
 from vedette.scenarios.sections.birth import Birth
-from vedette.scenarios.sections.fusion import AnyFusion, CustomFusion
+from vedette.scenarios.sections.fusion import OF_SCANS, AnyFusion, CustomFusion
 from vedette.scenarios.sections.sensors import Sensor
 from vedette.scenarios.sections.targets import RecordedTargets
 from vedette.scenarios.sections.tracking import AnyFilter, Filter
@@ -30,7 +30,7 @@ def one_line(scenario: Scenario) -> str:
 
 def _tracker(model: ScenarioModel) -> str:
     kinds = model.filter.kind, model.fusion.kind
-    if kinds[1] in ("central", "sequential"):
+    if kinds[1] in OF_SCANS:
         return f"{kinds[1]} {kinds[0]} filter"
     return f"{kinds[0]} filter, {kinds[1]} fusion"
 

@@ -14,7 +14,7 @@ from vedette.covariances import covariance_fault
 from vedette.scenarios.faults import Finding, Path, describe
 from vedette.scenarios.sections.base import attempt
 from vedette.scenarios.sections.birth import BirthSite
-from vedette.scenarios.sections.fusion import OF_LMBS
+from vedette.scenarios.sections.fusion import OF_LMBS, OF_SCANS
 from vedette.scenarios.sections.network_checks import NETWORK_CHECKS
 from vedette.scenarios.sections.tracking import UNLABELLED
 
@@ -93,7 +93,7 @@ def _fusion_of_kind(model: ScenarioModel) -> Iterator[Finding]:
 
 
 def _one_belief(model: ScenarioModel) -> Iterator[Finding]:
-    if model.fusion.kind in ("central", "sequential") and model.fusion.feedback:
+    if model.fusion.kind in OF_SCANS and model.fusion.feedback:
         yield ("fusion", "feedback"), "false, as nothing is fused while tracking", "true"
 
 

@@ -23,7 +23,8 @@ FusionKind: TypeAlias = Literal[
     "sequential", "parallel", "clmb", "cm_delta_glmb", "arithmetic_average", "central", "none"
 ]
 # One belief takes the scans of all sensors: nothing is fused while tracking.
-ONE_BELIEF: tuple[FusionKind, ...] = ("sequential", "central", "none")
+OF_SCANS: tuple[FusionKind, ...] = ("sequential", "central")
+ONE_BELIEF: tuple[FusionKind, ...] = (*OF_SCANS, "none")
 # Of beliefs that each sensor keeps for itself, by their labels.
 BY_LABEL: tuple[FusionKind, ...] = ("clmb", "cm_delta_glmb", "arithmetic_average")
 # Of those, the ones whose fused density is an LMB, and which may go by views.
@@ -150,19 +151,6 @@ class Fusion(Section):
             return ParallelUpdate(missing_existence=self.missing_existence)
         rule = self._by_label(num_sensors)
         return Matched(rule) if self.matching == "assignment" else rule
-
-    def build_merging(self, num_sensors: int, *, of_lmbs: bool, own_labels: bool) -> FusionRule:
-        """The fusion of what sensors of a network believe after different pasts: covariance intersection.
-
-        of_lmbs: whether the filters keep LMBs, of which those count at a label that see it, and labels are matched.
-        own_labels: whether sensors make labels of their own, so that those of GLMBs are matched as well.
-        """
-        from vedette.fusion import Clmb, CmDeltaGlmb, Matched
-
-        equal = (1.0 / num_sensors,) * num_sensors
-        if of_lmbs:
-            return Matched(Clmb(equal, by_views=True))
-        return Matched(CmDeltaGlmb(equal)) if own_labels else CmDeltaGlmb(equal)
 
     def build_of_decisions(self, num_sensors: int, *, of_lmbs: bool) -> FusionRule:
         """The fusion that joint decisions go by: plain covariance intersection.

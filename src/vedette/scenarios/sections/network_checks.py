@@ -6,7 +6,8 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from vedette.scenarios.faults import Finding, describe
-from vedette.scenarios.sections.fusion import BY_LABEL, Fusion
+from vedette.scenarios.sections.fusion import BY_LABEL, OF_SCANS, Fusion
+from vedette.scenarios.sections.sensing import WITHOUT_PLACE
 from vedette.scenarios.sections.tracking import UNLABELLED
 
 if TYPE_CHECKING:
@@ -28,7 +29,7 @@ def network_of_fusion(model: ScenarioModel) -> Iterator[Finding]:
     network, fusion = model.network, model.fusion
     if network is None:
         return
-    if fusion.kind in ("sequential", "central") and network.consensus_rounds is not None:
+    if fusion.kind in OF_SCANS and network.consensus_rounds is not None:
         wanted = f"none, as under {fusion.kind} sensors send scans, of which there is no average"
         yield ("network", "consensus_rounds"), wanted, describe(network.consensus_rounds)
     if fusion.kind == "parallel" and network.delay > 0:
@@ -48,7 +49,7 @@ def births_from_measurements(model: ScenarioModel) -> Iterator[Finding]:
     if model.filter.kind in UNLABELLED:
         yield path, f"none, as {model.filter.kind} filters have no labels", "births from measurements"
     for i, sensor in enumerate(model.sensors):
-        if sensor.measurement.kind in ("bearing_only", "range_only"):
+        if sensor.measurement.kind in WITHOUT_PLACE:
             wanted = "a measurement that says where a target is, for birth.from_measurements"
             yield ("sensors", i, "measurement", "kind"), wanted, describe(sensor.measurement.kind)
     if len(model.sensors) > 1 and isinstance(fusion, Fusion) and fusion.kind in BY_LABEL:

@@ -88,6 +88,8 @@ class CustomMeasurement(Custom):
 Measurement = Annotated[
     BearingRange | BearingOnly | RangeOnly | Position | CustomMeasurement, Field(discriminator="kind")
 ]
+# Kinds of measurement that do not say where a target is.
+WITHOUT_PLACE = ("bearing_only", "range_only")
 
 
 class RangeDependentNoise(Section):

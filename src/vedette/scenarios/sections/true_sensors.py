@@ -13,7 +13,7 @@ from vedette.scenarios.faults import Finding, describe
 from vedette.scenarios.sections.base import Section
 from vedette.scenarios.sections.clutter import Clutter
 from vedette.scenarios.sections.detection import Detection
-from vedette.scenarios.sections.sensing import Measurement, Noise
+from vedette.scenarios.sections.sensing import WITHOUT_PLACE, Measurement, Noise
 from vedette.scenarios.sections.sensor_checks import (
     clutter_box_findings,
     clutter_findings,
@@ -52,7 +52,7 @@ class TrueSensor(Section):
         if self.clutter is not None:
             yield from clutter_findings(measurement, self.clutter, ("truth", "clutter"))
             yield from clutter_box_findings(measurement, self.clutter, ("truth", "clutter"))
-        if self.detection_of == "measurement" and measurement.kind in ("bearing_only", "range_only"):
+        if self.detection_of == "measurement" and measurement.kind in WITHOUT_PLACE:
             wanted = f"state, as a {measurement.kind} measurement does not say where the target is"
             yield ("truth", "detection_of"), wanted, describe(self.detection_of)
 
