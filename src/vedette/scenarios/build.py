@@ -6,11 +6,10 @@ Each section builds its own part (`vedette.scenarios.sections`); here they are p
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
-from vedette.control import JointPlanner, MobileSensor, Planner
+from vedette.control import MobileSensor, Planner
 from vedette.densities import LMB
 from vedette.errors import InputError
 from vedette.filters import Filter, labels_targets, shared_targets
@@ -174,24 +173,22 @@ def build_planner(scenario: Scenario, name: str, num_threads: int = 0) -> Planne
     if name in STRATEGIES and STRATEGIES[name].needs_labels and not labels_targets(sensors[0].filter):
         kinds = "delta_glmb, m_delta_glmb or lmb"
         raise InputError(f"filter.kind: expected {kinds}, as planner {name} needs labels; got {model.filter.kind}")
-    control = model.control
+    control, fusion = model.control, _fusion_of_decisions(scenario, sensors[0].filter)
     parts = Parts(
         sensors,
-        _fusion_of_decisions(scenario, sensors[0].filter),
+        fusion,
         control.build(num_threads),
         control.reward.build(folder),
         control.search.build(folder),
         _first_actions(scenario, sensors),
+        _notes_of_decisions(scenario, fusion),
     )
     if name in model.planners:
         return model.planners[name].build(name, parts, folder)
-    planner = STRATEGIES[name].planner(parts)
-    return (
-        replace(planner, notes=_notes_of_decisions(scenario, parts)) if isinstance(planner, JointPlanner) else planner
-    )
+    return STRATEGIES[name].planner(parts)
 
 
-def _notes_of_decisions(scenario: Scenario, parts: Parts) -> tuple[str, ...]:
+def _notes_of_decisions(scenario: Scenario, fusion: Fusion) -> tuple[str, ...]:
     """What joint decisions say of their fusion, where the tracks are fused in another way."""
     section = scenario.model.fusion
     if isinstance(section, CustomFusion) or (
@@ -199,7 +196,7 @@ def _notes_of_decisions(scenario: Scenario, parts: Parts) -> tuple[str, ...]:
     ):
         return ()
     own = f"{section.kind} by views" if section.by_views else section.kind
-    rule = "clmb" if isinstance(parts.fusion, Clmb) else "cm_delta_glmb"
+    rule = "clmb" if isinstance(fusion, Clmb) else "cm_delta_glmb"
     return (f"joint rewards are of plain covariance intersection ({rule}); tracks are fused by another rule ({own})",)
 
 

@@ -23,7 +23,7 @@ class Parts(NamedTuple):
 
     sensors: the sensors that are steered. fusion: how their densities become one; of one sensor, of it alone. settings:
     horizon, samples, caps, threads. reward: the value of a density. search: which joint actions are evaluated.
-    first_actions: what each sensor does where nothing decides.
+    first_actions: what each sensor does where nothing decides. notes: what plans are to say of the fusion.
     """
 
     sensors: tuple[MobileSensor, ...]
@@ -32,6 +32,7 @@ class Parts(NamedTuple):
     reward: Reward | PowerReward
     search: JointSearch
     first_actions: tuple[Actions, ...]
+    notes: tuple[str, ...]
 
 
 class Strategy(NamedTuple):
@@ -44,7 +45,7 @@ class Strategy(NamedTuple):
 def _joint(parts: Parts) -> Planner:
     from vedette.control import JointPlanner
 
-    return JointPlanner(parts.sensors, parts.fusion, parts.settings, parts.reward, parts.search)
+    return JointPlanner(parts.sensors, parts.fusion, parts.settings, parts.reward, parts.search, notes=parts.notes)
 
 
 def _independent(parts: Parts) -> Planner:
@@ -75,7 +76,8 @@ STRATEGIES = {
 
 
 class CustomPlanner(Custom):
-    """A user's own planner; called with `sensors`, `fusion`, `settings`, `reward`, `search` and `first_actions`."""
+    """A user's own planner; called with `sensors`, `fusion`, `settings`, `reward`, `search`, `first_actions`, `notes`,
+    of which it names those that it wants."""
 
     kind: Literal["custom"] = Field(default="custom", description="Kind of planner [-].")
     spared: ClassVar[tuple[str, ...]] = ("name",)  # which the scenario gives
