@@ -107,6 +107,19 @@ def test_sequential_scans_are_updates_in_turn() -> None:
     assert_same_lmb(mine, local.step(local.initial(), SCANS[0][0], POSES[0], DT, 1, rng=rng())[0])
 
 
+def test_what_a_cap_cuts_of_the_combinations_of_a_track_is_told() -> None:
+    """Of three options of a track, two are left; so it is for one sensor jointly, in turn, and updated apart."""
+    born = LmbFilter(TARGETS, SENSORS[0]).predict(LMB.empty(4), DT, 1)[0]
+    for limits, cut in ((Limits(max_hypotheses=2, min_existence=0.0), True), (Limits(), False)):
+        local, given = LmbFilter(TARGETS, SENSORS[0], limits), (SCANS[0][:1], POSES[:1], DT, 1)
+        infos = [local.update(born, SCANS[0][0], POSES[0], rng=rng())[1]]
+        for kind in (SequentialLmbFilter, MultiSensorLmbFilter):
+            central = kind(TARGETS, SENSORS[:1], limits)
+            infos.append(central.step(central.initial(), *given, rng=rng())[1])
+        assert [info.search_cut for info in infos] == [cut] * 3
+        assert all((info.discarded_weight_bound > 0.0) == cut for info in infos)
+
+
 def test_sequential_is_exact_for_one_target() -> None:
     """With a single possible target the projection to an LMB loses nothing but components that are merged."""
     birth = models.BirthModel(np.array([0.3]), TARGETS.birth.means[:1], TARGETS.birth.covs[:1], frozenset({1}))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
@@ -14,8 +13,8 @@ from vedette.filters.base import SingleSensorFilter
 from vedette.filters.blind import NO_POSE, NO_SCAN, blind_sensor
 from vedette.filters.info import FilterInfo
 from vedette.filters.inputs import check_belief, model_errors
+from vedette.filters.posteriors import glmb_posterior
 from vedette.kernels.base.types import Glmb
-from vedette.kernels.labelled.conversions import marginalise
 from vedette.kernels.steps.glmb import StepReport, step_gibbs, step_ranked, update_ranked
 from vedette.models.arguments import dimension
 
@@ -123,19 +122,12 @@ class DeltaGlmbFilter(SingleSensorFilter):
     ) -> tuple[GLMB, FilterInfo]:
         if len(posterior.hyp_log_weights) == 0:
             raise NumericalError(f"{place}no hypothesis has positive weight; do the models forbid this scan?")
-        cap_met = len(posterior.hyp_log_weights) >= self.limits.max_hypotheses
-        if self.marginalised:
-            posterior = marginalise(posterior, self.limits.track_caps())
-        belief, dropped = self.limits.without_spread(GLMB.from_kernel(posterior))
-        return belief, FilterInfo(
+        return glmb_posterior(
+            posterior,
+            [report],
+            self.limits,
             log_likelihood=report.log_total + report.log_clutter - self.sensor.clutter.rate,
-            num_hypotheses=belief.num_hyps,
-            num_tracks=belief.tracks.num_tracks,
-            discarded_weight_bound=max(0.0, -math.expm1(report.log_total - report.log_bound)),
-            dropped_existence=dropped,
-            num_clutter_raised=int(report.num_raised),
             num_duplicates=num_duplicates,
-            num_inexact_clusters=0,
-            search_cut=bool(report.cut),
-            cap_met=cap_met,
+            marginalised=self.marginalised,
+            cap_met=len(posterior.hyp_log_weights) >= self.limits.max_hypotheses,
         )

@@ -29,8 +29,8 @@ class FilterInfo:
         num_inexact_clusters: LMB clusters summed over their heaviest joint choices only (of several sensors: of which
             not all sets of taken measurements were followed); 0 for other filters.
         search_cut: whether ranking stopped at `Limits.max_search_nodes` before it had found all it was asked for; false
-            where nothing is ranked. For an LMB of several sensors whether a track had more than
-            `Limits.max_hypotheses` combinations.
+            where nothing is ranked. For an LMB of several sensors, or updated apart from its prediction, whether a
+            track had more than `Limits.max_hypotheses` combinations.
         cap_met: whether the posterior was as large as `Limits` allows, so that more may have been cut off: hypotheses
             of a GLMB, labels of an LMB, Bernoullis of a CB-MeMBer filter, components of a PHD or CPHD filter.
     """

@@ -15,6 +15,7 @@ from vedette.filters.blind import NO_POSE, NO_SCAN, blind_sensor
 from vedette.filters.info import FilterInfo
 from vedette.filters.inputs import check_belief, model_errors
 from vedette.filters.limits import Limits
+from vedette.filters.posteriors import lmb_posterior
 from vedette.kernels.base.types import Lmb
 from vedette.kernels.steps.lmb import LmbReport, step_lmb
 from vedette.kernels.steps.multi_sensor_combinations import standing_combinations
@@ -76,22 +77,19 @@ class LmbFilter(SingleSensorFilter):
         arguments = self._update_arguments(measurements, pose)
         with model_errors():
             before = standing_combinations(prior.to_kernel())
-            posterior, report = update_lmb(before, *arguments, self.limits.reduction())
-        return self._concluded(posterior, report, num_duplicates, "")
+            posterior, report, cut = update_lmb(before, *arguments, self.limits.reduction())
+        return self._concluded(posterior, report, num_duplicates, "", search_cut=bool(cut))
 
-    def _concluded(self, posterior: Lmb, report: LmbReport, num_duplicates: int, place: str) -> tuple[LMB, FilterInfo]:
+    def _concluded(
+        self, posterior: Lmb, report: LmbReport, num_duplicates: int, place: str, *, search_cut: bool = False
+    ) -> tuple[LMB, FilterInfo]:
         if not math.isfinite(report.sums.log_total):
             raise NumericalError(f"{place}no association has positive weight; do the models forbid this scan?")
-        belief, spread = self.limits.without_spread(LMB.from_kernel(posterior))
-        return belief, FilterInfo(
+        return lmb_posterior(
+            posterior,
+            [report],
+            self.limits,
             log_likelihood=report.sums.log_total + report.log_clutter - self.sensor.clutter.rate,
-            num_hypotheses=1,
-            num_tracks=belief.tracks.num_tracks,
-            discarded_weight_bound=max(0.0, -math.expm1(report.sums.log_kept)),
-            dropped_existence=float(report.dropped_existence) + spread,
-            num_clutter_raised=int(report.num_raised),
             num_duplicates=num_duplicates,
-            num_inexact_clusters=int(report.sums.num_ranked),
-            search_cut=False,
-            cap_met=len(posterior.existence_logit) >= self.limits.max_labels,
+            search_cut=search_cut,
         )

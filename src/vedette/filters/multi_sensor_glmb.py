@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -11,7 +10,7 @@ from vedette.errors import NumericalError
 from vedette.filters.info import FilterInfo
 from vedette.filters.inputs import model_errors
 from vedette.filters.multi_sensor import Looks, MultiSensorFilter
-from vedette.kernels.labelled.conversions import marginalise
+from vedette.filters.posteriors import glmb_posterior
 from vedette.kernels.steps.glmb import step_ranked, update_ranked
 from vedette.models import kernel_motion
 
@@ -57,20 +56,13 @@ class MultiSensorGlmbFilter(MultiSensorFilter[GLMB]):
                 )
             reports.append(report)
             cap_met = cap_met or len(posterior.hyp_log_weights) >= limits.max_hypotheses
-        if self.marginalised:
-            posterior = marginalise(posterior, limits.track_caps())
-        kept, spread = limits.without_spread(GLMB.from_kernel(posterior))
-        log_kept = sum(min(0.0, report.log_total - report.log_bound) for report in reports)
         log_total = sum(report.log_total for report in reports)
-        return kept, FilterInfo(
+        return glmb_posterior(
+            posterior,
+            reports,
+            limits,
             log_likelihood=looks.log_likelihood(log_total, [report.log_clutter for report in reports]),
-            num_hypotheses=kept.num_hyps,
-            num_tracks=kept.tracks.num_tracks,
-            discarded_weight_bound=-math.expm1(log_kept),
-            dropped_existence=spread,
-            num_clutter_raised=sum(int(report.num_raised) for report in reports),
             num_duplicates=looks.num_duplicates,
-            num_inexact_clusters=0,
-            search_cut=any(report.cut for report in reports),
+            marginalised=self.marginalised,
             cap_met=cap_met,
         )

@@ -11,6 +11,7 @@ from vedette.errors import NumericalError
 from vedette.filters.info import FilterInfo
 from vedette.filters.inputs import model_errors
 from vedette.filters.multi_sensor import Looks, MultiSensorFilter
+from vedette.filters.posteriors import lmb_posterior
 from vedette.kernels.steps.multi_sensor_combinations import extend_combinations, predict_combinations
 from vedette.kernels.steps.multi_sensor_lmb import lmb_of_combinations
 from vedette.models import kernel_motion
@@ -55,17 +56,13 @@ class MultiSensorLmbFilter(MultiSensorFilter[LMB]):
             posterior, joint = lmb_of_combinations(combinations, num_columns, truncation, reduction)
         if not math.isfinite(joint.sums.log_total):
             raise NumericalError(f"{place}: no association has positive weight; do the models forbid these scans?")
-        log_kept = joint.sums.log_kept + sum(report.log_kept for report in reports)
-        kept, spread = limits.without_spread(LMB.from_kernel(posterior))
-        return kept, FilterInfo(
+        sums = joint.sums._replace(log_kept=joint.sums.log_kept + sum(report.log_kept for report in reports))
+        whole = joint._replace(sums=sums, num_raised=sum(report.num_raised for report in reports))
+        return lmb_posterior(
+            posterior,
+            [whole],
+            limits,
             log_likelihood=looks.log_likelihood(joint.sums.log_total, [report.log_clutter for report in reports]),
-            num_hypotheses=1,
-            num_tracks=kept.tracks.num_tracks,
-            discarded_weight_bound=max(0.0, -math.expm1(log_kept)),
-            dropped_existence=float(joint.dropped_existence) + spread,
-            num_clutter_raised=sum(int(report.num_raised) for report in reports),
             num_duplicates=looks.num_duplicates,
-            num_inexact_clusters=int(joint.sums.num_ranked),
             search_cut=any(report.log_kept < 0.0 for report in reports),
-            cap_met=len(posterior.existence_logit) >= limits.max_labels,
         )

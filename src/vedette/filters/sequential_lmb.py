@@ -11,6 +11,7 @@ from vedette.errors import NumericalError
 from vedette.filters.info import FilterInfo
 from vedette.filters.inputs import model_errors
 from vedette.filters.multi_sensor import Looks, MultiSensorFilter
+from vedette.filters.posteriors import lmb_posterior
 from vedette.kernels.steps.lmb import LmbReport
 from vedette.kernels.steps.multi_sensor_combinations import predict_combinations, standing_combinations
 from vedette.kernels.steps.multi_sensor_lmb import update_lmb
@@ -25,7 +26,7 @@ class SequentialLmbFilter(MultiSensorFilter[LMB]):
     return the cost grows in proportion to the number of sensors, whatever they see, where that of
     `MultiSensorLmbFilter` grows exponentially. Of one sensor it is the `LmbFilter`. Labels are dropped, by
     `Limits.min_existence`, `max_labels` and `max_position_std`, after the last scan alone: one sensor's missed
-    detection does not lose a target that the next one sees.
+    detection does not lose a target that the next one sees. What is cut is counted as by `MultiSensorLmbFilter`.
 
     Attributes and errors: as `MultiSensorGlmbFilter`.
     """
@@ -34,7 +35,7 @@ class SequentialLmbFilter(MultiSensorFilter[LMB]):
 
     def _updated(self, prior: LMB, born: LMB, looks: Looks, dt: float, place: str) -> tuple[LMB, FilterInfo]:
         motion, posterior = kernel_motion(self.targets.motion, self.targets.survival), prior.to_kernel()
-        keeping, reports = self.limits.keeping_labels(), list[LmbReport]()
+        keeping, reports, search_cut = self.limits.keeping_labels(), list[LmbReport](), False
         given = zip(looks.names, looks.sensors, looks.inputs_in_turn(born, dt), strict=True)
         for s, (name, sensor, scan) in enumerate(given):
             limits = self.limits if s == len(looks.names) - 1 else keeping
@@ -43,23 +44,19 @@ class SequentialLmbFilter(MultiSensorFilter[LMB]):
                 before = (
                     predict_combinations(posterior, scan, 1, motion) if s == 0 else standing_combinations(posterior)
                 )
-                posterior, report = update_lmb(before, scan, sensor.to_kernel(), truncation, reduction)
+                posterior, report, cut = update_lmb(before, scan, sensor.to_kernel(), truncation, reduction)
             if not math.isfinite(report.sums.log_total):
                 raise NumericalError(
                     f"{place}, {name}: no association has positive weight; do the models forbid these scans?"
                 )
             reports.append(report)
-        kept, spread = self.limits.without_spread(LMB.from_kernel(posterior))
-        log_total, log_kept = (sum(getattr(r.sums, name) for r in reports) for name in ("log_total", "log_kept"))
-        return kept, FilterInfo(
+            search_cut = search_cut or bool(cut)
+        log_total = sum(report.sums.log_total for report in reports)
+        return lmb_posterior(
+            posterior,
+            reports,
+            self.limits,
             log_likelihood=looks.log_likelihood(log_total, [report.log_clutter for report in reports]),
-            num_hypotheses=1,
-            num_tracks=kept.tracks.num_tracks,
-            discarded_weight_bound=max(0.0, -math.expm1(log_kept)),
-            dropped_existence=sum(float(report.dropped_existence) for report in reports) + spread,
-            num_clutter_raised=sum(int(report.num_raised) for report in reports),
             num_duplicates=looks.num_duplicates,
-            num_inexact_clusters=sum(int(report.sums.num_ranked) for report in reports),
-            search_cut=False,
-            cap_met=len(posterior.existence_logit) >= self.limits.max_labels,
+            search_cut=search_cut,
         )

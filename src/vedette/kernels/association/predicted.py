@@ -137,29 +137,13 @@ def predicted_rows(tracks: Tracks, scan: ScanInput, motion: Motion, sensor: Sens
 
 
 @kernel
-def unmeasured_rows(tracks: Tracks) -> Rows:
-    """The tracks as they are, each surely there, with nothing expected of a scan."""
-    rows = make_rows(len(tracks.labels), len(tracks.log_weights), tracks.means.shape[1], 0)
-    fill_standing(tracks, rows)
-    return rows
-
-
-@borrowing
-def fill_standing(tracks: Tracks, rows: Rows) -> None:
-    """Write the tracks as they are; each is surely there."""
+def standing_rows(tracks: Tracks, meas_dim: int) -> Rows:
+    """The tracks as they are, without births, deaths or motion; each is surely there. `expect_rows` is left to do."""
+    rows = make_rows(len(tracks.labels), len(tracks.log_weights), tracks.means.shape[1], meas_dim)
     for i in range(len(tracks.labels)):
         rows.labels[i, 0], rows.labels[i, 1] = tracks.labels[i, 0], tracks.labels[i, 1]
         rows.log_absent[i], rows.offsets[i + 1] = -math.inf, tracks.offsets[i + 1]
     for c in range(len(tracks.log_weights)):
         rows.log_weights[c] = tracks.log_weights[c]
         copy_component(tracks.means, tracks.covs, c, rows.means, rows.covs, c)
-
-
-@kernel
-def standing_rows(tracks: Tracks, scan: ScanInput, sensor: Sensor) -> Rows:
-    """The tracks as they are at the time of the scan, without births, deaths or motion; each is surely there."""
-    state_dim, meas_dim = tracks.means.shape[1], len(sensor.angular)
-    rows = make_rows(len(tracks.labels), len(tracks.log_weights), state_dim, meas_dim)
-    fill_standing(tracks, rows)
-    expect_rows(sensor, scan.pose, rows, make_scratch(state_dim, meas_dim))
     return rows

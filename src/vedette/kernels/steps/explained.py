@@ -7,10 +7,11 @@ import math
 import numpy as np
 
 from vedette.kernels.association.options import weighed_options
-from vedette.kernels.association.predicted import standing_rows
+from vedette.kernels.association.predicted import expect_rows, standing_rows
 from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.compile import kernel
 from vedette.kernels.base.types import Floats, Lmb, ScanInput, Sensor
+from vedette.kernels.gaussian.scratch import make_scratch
 from vedette.kernels.steps.lmb import weigh_by_existence
 
 
@@ -20,7 +21,8 @@ def prob_explained(belief: Lmb, scan: ScanInput, sensor: Sensor, truncation: Tru
 
     sum over labels of r <p, p_D g(z | .)> / (kappa(z) + the same sum).
     """
-    rows = standing_rows(belief.tracks, scan, sensor)
+    rows = standing_rows(belief.tracks, len(sensor.angular))
+    expect_rows(sensor, scan.pose, rows, make_scratch(belief.tracks.means.shape[1], len(sensor.angular)))
     weigh_by_existence(belief.existence_logit, rows)
     options, _, _ = weighed_options(rows, scan, sensor, truncation)
     odds = np.zeros(len(scan.measurements))

@@ -22,7 +22,7 @@ from vedette.kernels.association.children import Children, Parents
 from vedette.kernels.association.coverage import Associations, add_uncovered, associations_of_options, mark_heaviest
 from vedette.kernels.association.gibbs import sample_children
 from vedette.kernels.association.options import weighed_options
-from vedette.kernels.association.predicted import Rows, predicted_rows, standing_rows
+from vedette.kernels.association.predicted import Rows, expect_rows, predicted_rows, standing_rows
 from vedette.kernels.association.ranked import rank_children
 from vedette.kernels.association.truncation import Truncation, heaviest_first, keep_heaviest, merge_equal
 from vedette.kernels.base.arrays import filled_ints
@@ -30,6 +30,7 @@ from vedette.kernels.base.compile import kernel
 from vedette.kernels.base.types import Glmb, Motion, ScanInput, Sensor
 from vedette.kernels.gaussian.linalg import log_sum
 from vedette.kernels.gaussian.mixtures import require_gaussians
+from vedette.kernels.gaussian.scratch import make_scratch
 from vedette.kernels.steps.assembly import assemble
 
 
@@ -140,7 +141,9 @@ def step_ranked(
 @kernel
 def update_ranked(prior: Glmb, scan: ScanInput, sensor: Sensor, truncation: Truncation) -> tuple[Glmb, StepReport]:
     """The exactly ranked hypotheses after a scan of the prior's own time; `scan` has no births and no period."""
-    return _finish_ranked(prior, standing_rows(prior.tracks, scan, sensor), scan, sensor, truncation)
+    rows = standing_rows(prior.tracks, len(sensor.angular))
+    expect_rows(sensor, scan.pose, rows, make_scratch(prior.tracks.means.shape[1], len(sensor.angular)))
+    return _finish_ranked(prior, rows, scan, sensor, truncation)
 
 
 @kernel

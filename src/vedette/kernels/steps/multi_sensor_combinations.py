@@ -20,7 +20,7 @@ from vedette.kernels.association.predicted import (
     fill_births,
     fill_survivors,
     make_rows,
-    unmeasured_rows,
+    standing_rows,
 )
 from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.arrays import filled_ints
@@ -85,7 +85,7 @@ def predict_combinations(prior: Lmb, scan: ScanInput, num_sensors: int, motion: 
 @kernel
 def standing_combinations(prior: Lmb) -> Combinations:
     """One combination a track, as it is at the time of one sensor's scan, without births, deaths or motion."""
-    return _one_each(prior, unmeasured_rows(prior.tracks), 1)
+    return _one_each(prior, standing_rows(prior.tracks, 0), 1)
 
 
 @kernel

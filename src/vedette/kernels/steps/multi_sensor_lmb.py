@@ -129,9 +129,13 @@ def lmb_of_combinations(
 @kernel
 def update_lmb(
     combinations: Combinations, scan: ScanInput, sensor: Sensor, truncation: Truncation, reduction: Reduction
-) -> tuple[Lmb, LmbReport]:
-    """The LMB after one sensor's scan of the time that `combinations`, before it, are of."""
+) -> tuple[Lmb, LmbReport, bool]:
+    """The LMB after one sensor's scan of the time that `combinations`, before it, are of.
+
+    Also whether a track had more combinations than the cap on hypotheses leaves.
+    """
     taken, seen = extend_combinations(combinations, 0, 0, scan, sensor, truncation)
     posterior, report = lmb_of_combinations(taken, len(scan.measurements), truncation, reduction)
     sums = MarginalSums(report.sums.log_total, report.sums.num_ranked, report.sums.log_kept + seen.log_kept)
-    return posterior, LmbReport(sums, seen.log_clutter, seen.num_raised, report.dropped_existence)
+    whole = LmbReport(sums, seen.log_clutter, seen.num_raised, report.dropped_existence)
+    return posterior, whole, seen.log_kept < 0.0

@@ -1,0 +1,68 @@
+"""What filters give from what their kernels left: the posterior, without labels too spread out, and the report."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from vedette.densities import GLMB, LMB
+from vedette.filters.info import FilterInfo
+from vedette.filters.limits import Limits
+from vedette.kernels.base.types import Glmb, Lmb
+from vedette.kernels.labelled.conversions import marginalise
+from vedette.kernels.steps.glmb import StepReport
+from vedette.kernels.steps.lmb import LmbReport
+
+
+def lmb_posterior(
+    posterior: Lmb,
+    reports: Sequence[LmbReport],
+    limits: Limits,
+    *,
+    log_likelihood: float,
+    num_duplicates: int,
+    search_cut: bool = False,
+) -> tuple[LMB, FilterInfo]:
+    """An LMB after updates, one report each; see `FilterInfo` for what is not of them."""
+    kept, spread = limits.without_spread(LMB.from_kernel(posterior))
+    return kept, FilterInfo(
+        log_likelihood=log_likelihood,
+        num_hypotheses=1,
+        num_tracks=kept.tracks.num_tracks,
+        discarded_weight_bound=max(0.0, -math.expm1(sum(report.sums.log_kept for report in reports))),
+        dropped_existence=sum(float(report.dropped_existence) for report in reports) + spread,
+        num_clutter_raised=sum(int(report.num_raised) for report in reports),
+        num_duplicates=num_duplicates,
+        num_inexact_clusters=sum(int(report.sums.num_ranked) for report in reports),
+        search_cut=search_cut,
+        cap_met=len(posterior.existence_logit) >= limits.max_labels,
+    )
+
+
+def glmb_posterior(
+    posterior: Glmb,
+    reports: Sequence[StepReport],
+    limits: Limits,
+    *,
+    log_likelihood: float,
+    num_duplicates: int,
+    marginalised: bool,
+    cap_met: bool,
+) -> tuple[GLMB, FilterInfo]:
+    """A delta-GLMB after updates, one report each, `marginalised` or not; cap_met: whether any of them met it."""
+    if marginalised:
+        posterior = marginalise(posterior, limits.track_caps())
+    kept, spread = limits.without_spread(GLMB.from_kernel(posterior))
+    log_kept = sum(min(0.0, report.log_total - report.log_bound) for report in reports)
+    return kept, FilterInfo(
+        log_likelihood=log_likelihood,
+        num_hypotheses=kept.num_hyps,
+        num_tracks=kept.tracks.num_tracks,
+        discarded_weight_bound=max(0.0, -math.expm1(log_kept)),
+        dropped_existence=spread,
+        num_clutter_raised=sum(int(report.num_raised) for report in reports),
+        num_duplicates=num_duplicates,
+        num_inexact_clusters=0,
+        search_cut=any(bool(report.cut) for report in reports),
+        cap_met=cap_met,
+    )
