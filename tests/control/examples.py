@@ -10,13 +10,9 @@ from typing import Any
 import numpy as np
 
 from vedette import models
-from vedette.control import (
-    CauchySchwarzReward,
-    Evaluator,
-    MobileSensor,
-    PlanningSettings,
-    planning_limits,
-)
+from vedette.control import CauchySchwarzReward, Evaluator, MobileSensor, PlanningSettings, planning_limits
+from vedette.control.additive.evaluator import AdditiveEvaluator
+from vedette.control.inputs import options_of
 from vedette.densities import GLMB, LMB, TrackTable
 from vedette.filters import DeltaGlmbFilter, LmbFilter
 from vedette.fusion import Clmb, CmDeltaGlmb
@@ -37,7 +33,13 @@ STD = np.array([25.0, 25.0, 4.0, 4.0, 0.03])  # of the states above, and of a tu
 HEADINGS = (-90.0, 0.0, 45.0)
 EXACT_LIMITS = replace(planning_limits(), max_hypotheses=1_000_000, min_relative_weight=0.0)
 SETTINGS = PlanningSettings(
-    horizon_steps=2, horizon_period=4.0, num_samples=3, max_prior_hypotheses=50, limits=EXACT_LIMITS, num_threads=1
+    horizon_steps=2,
+    horizon_period=4.0,
+    num_samples=3,
+    association="full",
+    max_prior_hypotheses=50,
+    limits=EXACT_LIMITS,
+    num_threads=1,
 )
 
 
@@ -165,9 +167,26 @@ def evaluator_of(situation: Situation, reward: Any = None, seed: int = 5) -> Eva
     """The evaluator of a situation, by default with K = 1."""
     return Evaluator.prepare(
         situation.sensors,
+        options_of(situation.sensors, situation.poses, situation.settings),
         situation.fusion,
         situation.settings,
         CauchySchwarzReward() if reward is None else reward,
-        *situation.arguments,
+        situation.state,
+        rng=np.random.default_rng(seed),
+    )
+
+
+def additive_of(situation: Situation, reward: Any = None, seed: int = 5) -> AdditiveEvaluator:
+    """The evaluator by sums over labels, of LMB beliefs; by default with K = 1."""
+    rule = situation.fusion.linear_rule(len(situation.sensors))
+    shared = getattr(situation.fusion, "shares_prediction", False)
+    return AdditiveEvaluator.prepare(
+        situation.sensors,
+        options_of(situation.sensors, situation.poses, situation.settings),
+        rule,
+        situation.settings,
+        CauchySchwarzReward() if reward is None else reward,
+        situation.fused,
+        (situation.fused,) * len(situation.sensors) if shared else situation.beliefs,
         rng=np.random.default_rng(seed),
     )

@@ -4,21 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 
-from vedette.control.inputs import Belief, check_sensors, check_state, options_of
+from vedette.control.inputs import Belief
 from vedette.control.laid_rewards import lay_out_rewards, warn_slow
 from vedette.control.plain import PlainRewards
 from vedette.control.priors import predicted
 from vedette.control.pseudo import draw_futures, pseudo_posteriors
-from vedette.control.reward import PowerReward, Reward
-from vedette.control.search import all_joint_actions, first_best
+from vedette.control.rewards.base import LabelReward, PowerReward, Reward
+from vedette.control.search import all_joint_actions
 from vedette.control.settings import MobileSensor, PlanningSettings
 from vedette.densities.cases import LabelledCases
 from vedette.errors import NumericalError
-from vedette.fusion import Fusion
+from vedette.filters import shared_targets
+from vedette.fusion import Fusion, Views
 from vedette.kernels.base.types import Floats, Ints
 from vedette.platforms import Options
 from vedette.tracking import State
@@ -43,7 +44,7 @@ class Evaluator:
     sensors: tuple[MobileSensor, ...]
     fusion: Fusion
     settings: PlanningSettings
-    reward: Reward | PowerReward
+    reward: Reward | PowerReward | LabelReward
     options: tuple[Options, ...]
     prediction: Belief
     posteriors: tuple[LabelledCases, ...]
@@ -54,11 +55,11 @@ class Evaluator:
     def prepare(
         cls,
         sensors: Sequence[MobileSensor],
+        options: Sequence[Options],
         fusion: Fusion,
         settings: PlanningSettings,
-        reward: Reward | PowerReward,
+        reward: Reward | PowerReward | LabelReward,
         state: State,
-        poses: Any,
         *,
         rng: np.random.Generator,
     ) -> Evaluator:
@@ -66,22 +67,28 @@ class Evaluator:
 
         Raises as `JointPlanner.plan`.
         """
-        targets = check_sensors(sensors)
-        options = options_of(sensors, poses, settings)
-        check_state(sensors, state)
+        targets = shared_targets([sensor.filter for sensor in sensors])
         prediction = predicted(state.fused, targets.motion, settings.horizon_steps, settings.horizon_period)
-        futures = draw_futures(state.fused, sensors, settings, rng=rng)
+        labels, futures = draw_futures(state.fused, sensors, settings, rng=rng)
         posteriors = tuple(
-            pseudo_posteriors(belief, sensor, own.courses, future, settings)
+            pseudo_posteriors(belief, sensor, own.courses, labels, future, settings)
             for belief, sensor, own, future in zip(state.local, sensors, options, futures, strict=True)
         )
         steps = sum(len(own.courses) for own in options) * settings.num_samples * settings.horizon_steps
         counts = {"filter_steps": steps, "fusions": 0, "divergences": 0}
-        return cls(tuple(sensors), fusion, settings, reward, options, prediction, posteriors, counts)
+        return cls(tuple(sensors), fusion, settings, reward, tuple(options), prediction, posteriors, counts)
 
     def joint_shape(self) -> tuple[int, ...]:
         """Number of different courses of each sensor."""
         return tuple(len(own.courses) for own in self.options)
+
+    def joint(self) -> SampleRewards:
+        """Of all sensors, fused: the function that gives (num_joint, num_samples) rewards; see `rewards`."""
+        return self.rewards(range(len(self.sensors)), self.fusion)
+
+    def alone(self, sensor: int) -> SampleRewards:
+        """Of one sensor's own density, actions (num, 1)."""
+        return self.rewards((sensor,), None)
 
     def rewards(self, which: Sequence[int], fusion: Fusion | None) -> SampleRewards:
         """The function that gives (num_joint, num_samples) rewards of joint actions (num_joint, num of `which`).
@@ -107,7 +114,13 @@ class Evaluator:
             return laid
         self.notes[f"rewards were computed one by one: {laid}"] = None
         warn_slow(laid)
-        return PlainRewards(posteriors, self.prediction, fusion, self.reward, self.settings.num_samples)
+        return PlainRewards(posteriors, self.prediction, fusion, self.reward, self.settings.num_samples, self._views)
+
+    def _views(self, chosen: Sequence[int]) -> Views:
+        """What the sensors could see at the end of chosen courses, and what all their updates began with."""
+        models = tuple(sensor.filter.sensor for sensor in self.sensors)
+        poses = np.stack([own.courses[course, -1] for own, course in zip(self.options, chosen, strict=True)])
+        return Views(models, poses, (True,) * len(models), self.prediction)
 
     def sample_rewards(self, which: Sequence[int], fusion: Fusion | None) -> Floats:
         """(num_joint, num_samples) rewards of all joint actions of the sensors `which`, the last one's fastest."""
@@ -117,11 +130,6 @@ class Evaluator:
     def account(self) -> tuple[dict[str, int], tuple[str, ...]]:
         """Counts and notes so far, as a plan holds them."""
         return dict(self.counts), tuple(self.notes)
-
-    def independent_choice(self) -> tuple[int, ...]:
-        """The course that is best for each sensor alone (paper, Algorithm 3); of equal ones the first."""
-        everyone = range(len(self.sensors))
-        return tuple(first_best(self.sample_rewards((s,), None).mean(axis=1)) for s in everyone)
 
     def _check_finite(self, which: Sequence[int], actions: Ints, rewards: Floats) -> None:
         bad = np.argwhere(~np.isfinite(rewards))

@@ -8,8 +8,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from vedette.control.evaluator import Evaluator, SampleRewards
-from vedette.control.plan import RewardTable
+from vedette.control.evaluator import SampleRewards
+from vedette.control.plan import RewardTable, SearchCurve
+from vedette.control.preparation import AnyEvaluator
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats, Ints
 
@@ -33,12 +34,14 @@ class Evidence:
         rewards: their sample rewards.
     """
 
-    evaluator: Evaluator
+    evaluator: AnyEvaluator
     which: tuple[int, ...]
     rewards: SampleRewards
     _actions: list[Ints] = field(default_factory=list)
     _means: list[Floats] = field(default_factory=list)
     _errors: list[Floats] = field(default_factory=list)
+    _evaluations: list[int] = field(default_factory=list)
+    _best: list[float] = field(default_factory=list)
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -47,24 +50,76 @@ class Evidence:
         return tuple(shape[s] for s in self.which)
 
     def evaluate(self, actions: Ints) -> Floats:
-        """(num,) mean rewards of joint actions (num, num_sensors); `InputError` for what are none."""
+        """(num,) mean rewards of joint actions (num, num_sensors); -inf where one is no number.
+
+        Raises `InputError` for what are no joint actions.
+        """
         checked = np.array(actions, order="C")
         fits = checked.ndim == 2 and checked.shape[1] == len(self.which) and checked.dtype.kind in "iu"
         if not fits or not ((checked >= 0) & (checked < self.shape)).all():
             raise InputError(f"joint actions: expected rows of whole numbers below {self.shape}; got {actions!r}")
         checked = checked.astype(np.int64)
         size = max(1, _BLOCK // self.evaluator.settings.num_samples)
-        means = [self._evaluate_block(checked[i : i + size]) for i in range(0, len(checked), size)]
+        means = [
+            self.note(checked[i : i + size], self.rewards(checked[i : i + size])) for i in range(0, len(checked), size)
+        ]
         return np.asarray(np.concatenate([np.empty(0), *means]))
 
-    def _evaluate_block(self, actions: Ints) -> Floats:
-        rewards = self.rewards(actions)
-        mean, num = np.asarray(rewards.mean(axis=1)), rewards.shape[1]
-        error = rewards.std(axis=1, ddof=1) / math.sqrt(num) if num > 1 else np.zeros(len(rewards))
+    def note(self, actions: Ints, rewards: Floats) -> Floats:
+        """Keep what was evaluated, (num, num_samples) rewards; returns their means, -inf where one is no number."""
+        num = rewards.shape[1]
+        with np.errstate(invalid="ignore"):
+            mean = np.asarray(rewards.mean(axis=1))
+            error = rewards.std(axis=1, ddof=1) / math.sqrt(num) if num > 1 else np.zeros(len(rewards))
+        bad = ~np.isfinite(mean)
+        if bad.any():
+            mean, error = np.where(bad, math.nan, mean), np.where(bad, math.nan, error)
+            first = self._named(actions[int(np.flatnonzero(bad)[0])])
+            self.evaluator.notes[f"joint actions without a finite reward were left out, the first: {first}"] = None
         self._actions.append(actions)
         self._means.append(mean)
         self._errors.append(error)
-        return mean
+        ranked = np.where(bad, -math.inf, mean)
+        self.progress(len(actions), float(ranked.max(initial=-math.inf)))
+        return ranked
+
+    def progress(self, num_evaluated: int, best: float) -> None:
+        """Note that so many joint actions more were evaluated, the best of them worth this."""
+        self._evaluations.append(num_evaluated + (self._evaluations[-1] if self._evaluations else 0))
+        self._best.append(max(best, self._best[-1] if self._best else -math.inf))
+
+    @property
+    def best(self) -> float:
+        """The largest mean reward that was found."""
+        return self._best[-1]
+
+    def is_complete(self) -> bool:
+        """Whether every joint action was evaluated."""
+        num = math.prod(self.shape)
+        if sum(map(len, self._actions)) < num:
+            return False
+        places = [np.ravel_multi_index(tuple(actions.T), self.shape) for actions in self._actions]
+        return len(np.unique(np.concatenate(places))) == num
+
+    def mean_of(self, choice: Sequence[int]) -> float:
+        """Mean reward of a joint action that was evaluated."""
+        for actions, means in zip(self._actions, self._means, strict=True):
+            at = np.flatnonzero((actions == np.array(choice)).all(axis=1))
+            if len(at):
+                return float(means[at[0]])
+        raise InputError(f"joint action: expected one that was evaluated; got {choice!r}")
+
+    def curve(self) -> SearchCurve:
+        """How the search went."""
+        return SearchCurve(np.array(self._evaluations, np.int64), np.array(self._best))
+
+    def _named(self, courses: Ints) -> str:
+        options = [self.evaluator.options[s] for s in self.which]
+        named = (
+            f"{own.actions.text(own.first_action(course))} of sensor {s + 1}"
+            for s, own, course in zip(self.which, options, courses.tolist(), strict=True)
+        )
+        return " and ".join(named)
 
     def holds(self, choice: Sequence[int]) -> bool:
         """Whether this joint action has been evaluated."""

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from vedette.control.inputs import Belief
-from vedette.control.reward import PowerReward, Reward, combined, speaks_for, unit_volume_of
+from vedette.control.rewards.base import LabelReward, PowerReward, Reward, combined, speaks_for, unit_volume_of
 from vedette.densities.cases import LabelledCases
 from vedette.errors import SlowRewardWarning
 from vedette.fusion import Fusion, LaidOut, LaysOut, lay_out_alone
@@ -39,7 +39,10 @@ class LaidRewards:
 
 
 def lay_out_rewards(
-    cases: Sequence[LabelledCases], prediction: Belief, fusion: Fusion | None, reward: Reward | PowerReward
+    cases: Sequence[LabelledCases],
+    prediction: Belief,
+    fusion: Fusion | None,
+    reward: Reward | PowerReward | LabelReward,
 ) -> LaidRewards | str:
     """The rewards laid out, or why they cannot be. fusion: None for a sensor alone."""
     if not isinstance(reward, PowerReward) or not speaks_for(reward, "combine", "__call__"):

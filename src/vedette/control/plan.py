@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from vedette.errors import InputError
-from vedette.kernels.base.types import Floats
+from vedette.kernels.base.types import Floats, Ints
 from vedette.platforms import Actions
 
 
@@ -43,6 +44,49 @@ class RewardTable:
 
 
 @dataclass(frozen=True, slots=True)
+class Bound:
+    """How good the best joint action can be at most, on the same samples.
+
+    Attributes:
+        upper: no joint action has a larger mean reward; inf where nothing is known of some target.
+        reward: mean reward of the choice.
+        kind: "exhaustive": every joint action was evaluated; "by target": every target is given the joint action that
+            is best for it.
+        unbounded: labels of which nothing is known, as too many sensors may see them.
+    """
+
+    upper: float
+    reward: float
+    kind: str
+    unbounded: int = 0
+
+    @property
+    def gap(self) -> float:
+        """How much better the best can be, in units of the reward."""
+        return self.upper - self.reward
+
+    @property
+    def relative(self) -> float:
+        """The gap relative to the magnitude of the bound or of the reward, the larger one; 0 for no gap."""
+        scale = max(abs(self.upper), abs(self.reward))
+        return self.gap / scale if self.gap > 0.0 else 0.0
+
+    def __str__(self) -> str:
+        if self.kind == "exhaustive":
+            return "the best of all joint actions"
+        if self.unbounded:
+            return f"no bound: {self.unbounded} targets may be seen in too many ways"
+        return f"at most {self.gap:.4g} ({100.0 * self.relative:.2g} %) below the best"
+
+
+class SearchCurve(NamedTuple):
+    """How a search went, step by step."""
+
+    evaluations: Ints  # (num_steps,) joint actions evaluated by then, increasing
+    best: Floats  # (num_steps,) the best mean reward found by then
+
+
+@dataclass(frozen=True, slots=True)
 class Plan:
     """One decision: the chosen action of each sensor, and what was evaluated to choose it.
 
@@ -55,6 +99,8 @@ class Plan:
             random and fixed control: none.
         counts: how many of each thing was evaluated.
         notes: what a reader must know, such as that rewards were taken one by one.
+        curve: of a joint decision, how the search went; else None.
+        bound: of a joint decision, how far from the best it can be; None where nothing is known of that.
     """
 
     planner: str
@@ -63,6 +109,8 @@ class Plan:
     tables: tuple[RewardTable, ...]
     counts: dict[str, int]
     notes: tuple[str, ...] = ()
+    curve: SearchCurve | None = None
+    bound: Bound | None = None
 
     @property
     def num_sensors(self) -> int:

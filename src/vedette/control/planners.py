@@ -7,12 +7,14 @@ from typing import Protocol
 
 import numpy as np
 
-from vedette.control.evaluator import Evaluator
+from vedette.control.bounds import bound_of
 from vedette.control.evidence import Evidence
 from vedette.control.inputs import check_choice, check_poses, options_of
 from vedette.control.plan import Plan, RewardTable
-from vedette.control.reward import CauchySchwarzReward, PowerReward, Reward
-from vedette.control.search import ExhaustiveSearch, JointProblem, JointSearch, all_joint_actions, first_best
+from vedette.control.preparation import AnyReward, prepare
+from vedette.control.problem import joint_problem, note_lines
+from vedette.control.rewards import CauchySchwarzReward
+from vedette.control.search import ExhaustiveSearch, JointSearch, all_joint_actions, first_best
 from vedette.control.settings import MobileSensor, PlanningSettings
 from vedette.fusion import Fusion
 from vedette.kernels.base.types import Floats
@@ -50,7 +52,7 @@ class JointPlanner:
     sensors: tuple[MobileSensor, ...]
     fusion: Fusion
     settings: PlanningSettings = field(default_factory=PlanningSettings)
-    reward: Reward | PowerReward = field(default_factory=CauchySchwarzReward)
+    reward: AnyReward = field(default_factory=CauchySchwarzReward)
     search: JointSearch = field(default_factory=ExhaustiveSearch)
     notes: tuple[str, ...] = ()
 
@@ -75,17 +77,16 @@ class JointPlanner:
             ModelError, NumericalError: as the filters; a reward that is not finite.
         """
         generator(rng)
-        evaluator = Evaluator.prepare(self.sensors, self.fusion, self.settings, self.reward, state, poses, rng=rng)
-        everyone = tuple(range(len(self.sensors)))
-        evidence = Evidence(evaluator, everyone, evaluator.rewards(everyone, self.fusion))
-        problem = JointProblem(evidence.shape, evidence.evaluate, evaluator.independent_choice)
+        evaluator = prepare(self.sensors, self.fusion, self.settings, self.reward, state, poses, rng=rng)
+        evidence = Evidence(evaluator, tuple(range(len(self.sensors))), evaluator.joint())
+        problem = joint_problem(evidence)
         best = check_choice("search", self.search.search(problem, rng=rng), evidence.shape)
         if not evidence.holds(best):
-            evidence.evaluate(np.array([best]))
+            note_lines(evidence, best)
         chosen = tuple(own.first_action(course) for own, course in zip(evaluator.options, best, strict=True))
         actions = tuple(own.actions for own in evaluator.options)
-        tables, (counts, found) = evidence.tables(best), evaluator.account()
-        return Plan(self.name, actions, chosen, tables, counts, (*self.notes, *found))
+        tables, (counts, found), bound = evidence.tables(best), evaluator.account(), bound_of(evidence, best)
+        return Plan(self.name, actions, chosen, tables, counts, (*self.notes, *found), evidence.curve(), bound)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -102,7 +103,7 @@ class IndependentPlanner:
     sensors: tuple[MobileSensor, ...]
     fusion: Fusion
     settings: PlanningSettings = field(default_factory=PlanningSettings)
-    reward: Reward | PowerReward = field(default_factory=CauchySchwarzReward)
+    reward: AnyReward = field(default_factory=CauchySchwarzReward)
 
     @property
     def name(self) -> str:
@@ -112,11 +113,11 @@ class IndependentPlanner:
     def plan(self, state: State, poses: Floats, *, rng: np.random.Generator) -> Plan:
         """Each sensor's action of largest mean reward; arguments, ties and errors as `JointPlanner.plan`."""
         generator(rng)
-        evaluator = Evaluator.prepare(self.sensors, self.fusion, self.settings, self.reward, state, poses, rng=rng)
+        evaluator = prepare(self.sensors, self.fusion, self.settings, self.reward, state, poses, rng=rng)
         chosen: list[int] = []
         tables: list[RewardTable] = []
         for s, own in enumerate(evaluator.options):
-            evidence = Evidence(evaluator, (s,), evaluator.rewards((s,), None))
+            evidence = Evidence(evaluator, (s,), evaluator.alone(s))
             best = first_best(evidence.evaluate(all_joint_actions((len(own.courses),))))
             chosen.append(own.first_action(best))
             tables.extend(evidence.tables((best,)))

@@ -15,8 +15,10 @@ from vedette.densities.checks import unchecked
 from vedette.densities.label_sets import label_sets, offsets_of, single_gaussians
 from vedette.filters import shared_targets
 from vedette.filters.inputs import model_errors
-from vedette.kernels.base.types import Floats
+from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.planning.ideal import Decision, Futures, Horizon, propagate_samples
+from vedette.kernels.planning.known import Belief as KnownBelief
+from vedette.kernels.planning.known import predict_paths, pseudo_update_known
 from vedette.kernels.planning.pseudo_glmb import GlmbResults, pseudo_update_glmb
 from vedette.kernels.planning.pseudo_lmb import LmbResults, pseudo_update_lmb
 from vedette.models import constant_survival, kernel_motion
@@ -25,10 +27,11 @@ from vedette.threads import run_chunks
 
 def draw_futures(
     fused: Belief, sensors: Sequence[MobileSensor], settings: PlanningSettings, *, rng: np.random.Generator
-) -> tuple[Futures, ...]:
+) -> tuple[Ints, tuple[Futures, ...]]:
     """Samples of the fused density carried over the horizon without noise; the same states for every sensor.
 
-    The random numbers of detections and noise are each sensor's own, and the same for all its actions.
+    Returns the labels (num_targets, 2) of the sampled targets, and the future as each sensor meets it. The random
+    numbers of detections and noise are each sensor's own, and the same for all its actions.
     """
     targets = shared_targets([sensor.filter for sensor in sensors])
     motion = kernel_motion(targets.motion, targets.survival)
@@ -42,15 +45,15 @@ def draw_futures(
         uniforms = rng.random(shape)
         normals = rng.standard_normal((*shape, sensor.filter.sensor.meas_dim))
         futures.append(Futures(samples.offsets, states, uniforms, normals))
-    return tuple(futures)
+    return samples.labels, tuple(futures)
 
 
 def pseudo_posteriors(
-    belief: Belief, sensor: MobileSensor, courses: Floats, futures: Futures, settings: PlanningSettings
+    belief: Belief, sensor: MobileSensor, courses: Floats, labels: Ints, futures: Futures, settings: PlanningSettings
 ) -> LabelledCases:
     """Run the sensor's filter over the horizon for every course and sample, without births or deaths.
 
-    courses: (num_courses, horizon_steps, pose_dim) poses at the pseudo-updates.
+    courses: (num_courses, horizon_steps, pose_dim) poses at the pseudo-updates. labels: of the targets of `futures`.
     The belief is one of the filter's kind. Raises `ModelError` and `NumericalError` as the filter.
     """
     horizon = Horizon(
@@ -70,7 +73,21 @@ def pseudo_posteriors(
     num_cases = len(courses) * settings.num_samples
     if isinstance(belief, GLMB):
         return _run_glmb(belief, decision, settings, num_cases)
-    return _run_lmb(belief, decision, settings, num_cases)
+    targets = targets_of(belief.tracks.labels, labels, futures.offsets)
+    return _run_lmb(belief, decision, settings, num_cases, targets)
+
+
+def targets_of(table: Ints, labels: Ints, offsets: Ints) -> Ints:
+    """(num_labels, num_samples) place of the target of each label of `table` in each sample, -1 where it is not there.
+
+    labels: of the sampled targets, which are `offsets[i]:offsets[i + 1]` of sample i.
+    """
+    place = {tuple(label): i for i, label in enumerate(table.tolist())}
+    rows = np.array([place.get(tuple(label), -1) for label in labels.tolist()], np.int64)
+    of_sample = np.repeat(np.arange(len(offsets) - 1), np.diff(offsets))
+    targets, known = np.full((len(table), len(offsets) - 1), -1), rows >= 0
+    targets[rows[known], of_sample[known]] = np.flatnonzero(known)
+    return targets
 
 
 def _run_glmb(belief: GLMB, decision: Decision, settings: PlanningSettings, num_cases: int) -> LabelledCases:
@@ -94,18 +111,30 @@ def _run_glmb(belief: GLMB, decision: Decision, settings: PlanningSettings, num_
     return LabelledCases.of_glmbs(found.sets, results.log_weights, results.means, results.covs, **_counts(settings))
 
 
-def _run_lmb(belief: LMB, decision: Decision, settings: PlanningSettings, num_cases: int) -> LabelledCases:
+def _run_lmb(
+    belief: LMB, decision: Decision, settings: PlanningSettings, num_cases: int, targets: Ints
+) -> LabelledCases:
     num, dim = belief.tracks.num_tracks, belief.tracks.state_dim
     results = LmbResults(
         np.empty((num_cases, num)), np.empty((num_cases, num, dim)), np.empty((num_cases, num, dim, dim))
     )
     prior = unchecked(LMB, single_gaussians(belief.tracks), belief.existence_logit).to_kernel()
 
-    def work(first: int, last: int) -> None:
-        pseudo_update_lmb(prior, decision, first, last, results)
-
     with model_errors():
-        run_chunks(work, num_cases, settings.threads())
+        if settings.association == "known":
+            own = KnownBelief(prior, predict_paths(prior, decision), targets)
+            num_courses = len(decision.horizon.poses)
+            run_chunks(
+                lambda first, last: pseudo_update_known(own, decision, first, last, results),
+                num_courses,
+                settings.threads(),
+            )
+        else:
+            run_chunks(
+                lambda first, last: pseudo_update_lmb(prior, decision, first, last, results),
+                num_cases,
+                settings.threads(),
+            )
     labels = [tuple(label) for label in belief.tracks.labels.tolist()]
     return LabelledCases.of_lmbs(labels, results.logits, results.means, results.covs, **_counts(settings))
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -27,16 +27,15 @@ def first_best(rewards: Floats) -> int:
 
 
 class JointProblem(NamedTuple):
-    """What a search may ask for. An action is a number, in printed order, among a sensor's different directions.
-
-    shape: number of different directions of each sensor. evaluate: mean joint reward (num,) of joint actions
-    (num, num_sensors), each row one action a sensor; the same row gives the same number again, at its price.
-    independent: the joint action in which every sensor takes what is best for it alone.
-    """
+    """What a search may ask for. An action is a number, in printed order, among a sensor's different directions."""
 
     shape: tuple[int, ...]
     evaluate: Callable[[Ints], Floats]
     independent: Callable[[], tuple[int, ...]]
+    mask: Any = None
+    line: Callable[[tuple[int, ...], int], Floats] | None = None
+    ascend: Callable[[tuple[int, ...]], tuple[int, ...]] | None = None
+    partial: Callable[[Ints], Floats] | None = None
 
 
 class JointSearch(Protocol):

@@ -37,8 +37,14 @@ class PlanningSettings:
             `detection_threshold`; "expected": noise-free, each target seen with its detection probability, so that the
             mean over samples is the expectation over detections; "sampled": seen likewise, with measurement noise.
         detection_threshold: the probability from which on "ideal" measurements see a target (paper-notes 12).
+        association: of LMBs. "known": each ideal measurement is of its own label or else clutter, so that labels are
+            independent and rewards are sums over them, which is fast for any number of targets and sensors; "full":
+            the filter's own update, which also asks which of several targets was measured.
+        max_glmb_sensors, max_glmb_targets: with more sensors, or more targets expected, GLMBs are planned on their
+            LMBs, which the plan then says.
         max_prior_hypotheses: heaviest hypotheses of each local posterior that enter the pseudo-updates. An LMB enters
             whole.
+        max_bound_work: ways to see a target, times samples, that are tried at most for the bound of a plan.
         limits: caps of the pseudo-updates, which are ranked, not Gibbs sampled, whatever the filter does. Every label
             set of the prior keeps its heaviest hypothesis beyond these caps, and an LMB keeps all its labels. Tracks
             that are mixtures are replaced by one Gaussian of their moments beforehand.
@@ -53,13 +59,22 @@ class PlanningSettings:
     num_samples: int = 40
     ideal_measurements: Literal["ideal", "expected", "sampled"] = "ideal"
     detection_threshold: float = 0.5
+    association: Literal["known", "full"] = "known"
+    max_glmb_sensors: int = 4
+    max_glmb_targets: int = 10
     max_prior_hypotheses: int = 10
+    max_bound_work: int = 4096
     limits: Limits = field(default_factory=planning_limits)
     num_threads: int = 0
 
     def __post_init__(self) -> None:
         for name in ("horizon_steps", "num_samples", "max_prior_hypotheses"):
             dimension(name, getattr(self, name))
+        for name in ("max_glmb_sensors", "max_glmb_targets", "max_bound_work"):
+            if getattr(self, name) != 0:
+                dimension(name, getattr(self, name))
+        if self.association not in ("known", "full"):
+            raise reject("association", "known or full", self.association)
         positive("horizon_period", self.horizon_period)
         probability("detection_threshold", self.detection_threshold)
         if self.num_threads != 0:

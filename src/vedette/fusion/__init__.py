@@ -1,7 +1,7 @@
 """How several sensors' beliefs become one: covariance intersection, arithmetic average and parallel update."""
 
 from vedette.fusion.arithmetic_average import ArithmeticAverage
-from vedette.fusion.base import MIXTURE_POWERS, Fusion, FusionInfo, FusionLimits, MixturePower
+from vedette.fusion.base import MIXTURE_POWERS, Fusion, FusionInfo, FusionLimits, Linear, LinearRule, MixturePower
 from vedette.fusion.clmb import Clmb
 from vedette.fusion.cm_delta_glmb import CmDeltaGlmb
 from vedette.fusion.laid_out import LaidOut, LaysOut, lay_out_alone
@@ -19,6 +19,8 @@ __all__ = [
     "FusionLimits",
     "LaidOut",
     "LaysOut",
+    "Linear",
+    "LinearRule",
     "Matched",
     "MixturePower",
     "ParallelUpdate",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple, Protocol
+from typing import Any, Literal, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -74,6 +74,29 @@ class Fusion(Protocol):
         views: what each sensor could see, and what they were updated from; None where that is not known, as in the
         decisions of a planner.
         """
+        ...
+
+
+class LinearRule(NamedTuple):
+    """A fusion of LMBs whose log is linear in the sensors' logs, label by label.
+
+    In proportion to pi+^prior_power prod_s pi_s^(powers_s).
+
+    prior_power: of the common prediction; not 0 where the sensors' beliefs must be updated from one. powers: one a
+    sensor. missing_existence: stands in for the existence of a label that a sensor lacks.
+    """
+
+    prior_power: float
+    powers: tuple[float, ...]
+    missing_existence: float
+
+
+@runtime_checkable
+class Linear(Protocol):
+    """A fusion whose decisions a planner can take by adding up what each sensor says of each label."""
+
+    def linear_rule(self, num_sensors: int) -> LinearRule | None:
+        """The rule for so many sensors, of single Gaussians; None where the fusion is none such."""
         ...
 
 

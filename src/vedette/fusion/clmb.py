@@ -17,6 +17,7 @@ from vedette.densities.products import PowerProducts, Share, lay_out_products
 from vedette.fusion.base import (
     FusionInfo,
     FusionLimits,
+    LinearRule,
     MixturePower,
     PowerRule,
     by_sensor,
@@ -106,6 +107,10 @@ class Clmb:
             log_normaliser=float(np.logaddexp(log_present, log_absent).sum()),
             discarded_weight=0.0,
         )
+
+    def linear_rule(self, num_sensors: int) -> LinearRule | None:
+        """The weights; None by views."""
+        return None if self.by_views else LinearRule(0.0, tuple(self.weights), self.missing_existence)
 
     def lay_out(self, cases: Sequence[LabelledCases], prediction: GLMB | LMB) -> PowerProducts | None:
         """The fusions of any of the sensors' cases; None by views, for a GLMB prediction, or inexact powers.

@@ -13,7 +13,16 @@ from scipy.special import expit, log_expit
 from vedette.densities import LMB, TrackTable
 from vedette.densities.checks import unchecked
 from vedette.errors import InputError, NumericalError
-from vedette.fusion.base import FusionInfo, FusionLimits, by_sensor, check_beliefs, check_floor, count_lost, power_rule
+from vedette.fusion.base import (
+    FusionInfo,
+    FusionLimits,
+    LinearRule,
+    by_sensor,
+    check_beliefs,
+    check_floor,
+    count_lost,
+    power_rule,
+)
 from vedette.fusion.lmbs import sum_over_sensors
 from vedette.fusion.tracks import reduced_tracks
 from vedette.fusion.views import Views
@@ -60,6 +69,11 @@ class ParallelUpdate:
                 raise InputError(f"weights: expected non-negative finite numbers, one a sensor; got {weights}")
             object.__setattr__(self, "weights", weights)
         check_floor("missing_existence", math.log(self.missing_existence) if self.missing_existence > 0 else -math.inf)
+
+    def linear_rule(self, num_sensors: int) -> LinearRule:
+        """pi+^(1 - sum of v) prod_s pi_s^(v_s)."""
+        powers = (1.0,) * num_sensors if self.weights is None else tuple(self.weights)
+        return LinearRule(1.0 - math.fsum(powers), powers, self.missing_existence)
 
     def fuse(self, beliefs: Sequence[LMB], views: Views | None = None) -> tuple[LMB, FusionInfo]:
         """Fused LMB of the labels of the prediction, in increasing order, and what was done.

@@ -14,6 +14,7 @@ A model function sees one state at a time and writes its result into the last ar
 | `measurement_noise_cov` | state, pose, params, out | out: (meas_dim, meas_dim) symmetric, positive definite |
 | `prob_detection` | state, pose, params | probability in [0, 1] |
 | `mean_prob_detection` | mean, cov, pose, params | mean of `prob_detection` over states N(mean, cov) |
+| `label_reward` | existence, mean, cov, the same of the update, params, out | out: what a target adds to a reward |
 | `log_clutter_intensity` | measurement, pose, params | log of the expected clutter per unit of measurement space |
 
 `state[0:2]` is always the position in metres; `pose` is [px, py, heading_rad], and further components that

@@ -85,11 +85,9 @@ class SensorModel:
         """Number of components of a measurement."""
         return self.measurement.meas_dim
 
-    def to_kernel(self) -> Sensor:
-        """The bundle of functions and parameters that update kernels take."""
-        return self._bundle(self.detection_at == "mean")
-
-    def _bundle(self, over_gaussian: bool) -> Sensor:
+    def to_kernel(self, detection_at: str | None = None) -> Sensor:
+        """The bundle of functions and parameters that kernels take. detection_at: instead of the sensor's own."""
+        over_gaussian = (self.detection_at if detection_at is None else detection_at) == "mean"
         jacobian, mean = self.measurement.jacobian, self.detection.mean_function
         rule = AT_CENTRE if not over_gaussian else BY_NODES if mean is None else CLOSED_FORM
         return Sensor(
@@ -124,7 +122,7 @@ class SensorModel:
         centres = float_array("means", means, (None, None))
         num, dim = centres.shape
         spreads, at = float_array("covs", covs, (num, dim, dim)), pose_vector("pose", pose)
-        return detection_probabilities(self._bundle(True), at, centres, spreads)
+        return detection_probabilities(self.to_kernel("mean"), at, centres, spreads)
 
     def check(self, states: ArrayLike, pose: ArrayLike) -> None:
         """Try every function of the sensor at each of (n, state_dim) states, seen from `pose`.

@@ -14,23 +14,35 @@ from numba.extending import typeof_impl
 
 from vedette.kernels.base.types import Motion, Sensor
 
-_FOUND: dict[tuple[Any, ...], Any] = {}
+_FOUND: dict[Any, Any] = {}
 
 
-@typeof_impl.register(Motion)  # type: ignore[untyped-decorator]
-@typeof_impl.register(Sensor)  # type: ignore[untyped-decorator]
+def _key(value: Any) -> Any:
+    """All that the type of a bundle's field depends on."""
+    if isinstance(value, np.ndarray):
+        return value.dtype, value.ndim, value.flags.num
+    if isinstance(value, tuple):
+        return (type(value), *map(_key, value))
+    if hasattr(value, "numba_type"):  # asking for it compiles the function, where that is still to do
+        return value.kind
+    return type(value)
+
+
 def _typeof_bundle(value: tuple[Any, ...], context: Any) -> Any:
     """The Numba type of a bundle, looked up by all that the types of its fields depend on."""
-    key: list[Any] = [type(value)]
-    for field in value:
-        if isinstance(field, np.ndarray):
-            key += (field.dtype, field.ndim, field.flags.num)
-        elif hasattr(field, "numba_type"):  # asking for it compiles the function, where that is still to do
-            key.append(field.kind)
-        else:
-            key.append(type(field))
-    found = _FOUND.get(tuple(key))
+    key = _key(value)
+    found = _FOUND.get(key)
     if found is None:
         found = types.NamedTuple([typeof(field) for field in value], type(value))
-        _FOUND[tuple(key)] = found
+        _FOUND[key] = found
     return found
+
+
+def typed_by_fields(bundle: Any) -> Any:
+    """Have a bundle that holds model functions typed quickly; for use as a decorator."""
+    typeof_impl.register(bundle)(_typeof_bundle)
+    return bundle
+
+
+for _bundle in (Motion, Sensor):
+    typed_by_fields(_bundle)

@@ -75,6 +75,10 @@ SIGNATURES: dict[str, tuple[tuple[str, ...], Any]] = {
         ("mean", "cov", "pose", "params"),
         types.float64(_VECTOR, _MATRIX, _VECTOR, _VECTOR),
     ),
+    "label_reward": (
+        ("existence", "mean", "cov", "new_existence", "new_mean", "new_cov", "params", "out"),
+        types.void(types.float64, _VECTOR, _MATRIX, types.float64, _VECTOR, _MATRIX, _VECTOR, _VECTOR),
+    ),
     "log_clutter_intensity": (("measurement", "pose", "params"), types.float64(_VECTOR, _VECTOR, _VECTOR)),
 }
 

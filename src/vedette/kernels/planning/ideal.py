@@ -8,6 +8,7 @@ import numpy as np
 
 from vedette.errors import ModelError
 from vedette.kernels.association.truncation import Truncation
+from vedette.kernels.base.bundle_types import typed_by_fields
 from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Floats, Ints, Lmb, Motion, Sensor
 from vedette.kernels.gaussian.linalg import cholesky
@@ -49,6 +50,7 @@ class Horizon(NamedTuple):
     threshold: float  # detection probability from which a target is measured, where IDEAL
 
 
+@typed_by_fields
 class Decision(NamedTuple):
     """What the pseudo-updates of one sensor depend on besides its prior."""
 
@@ -83,22 +85,29 @@ def _add_noise(sensor: Sensor, state: Floats, pose: Floats, normals: Floats, scr
 
 
 @inlined
-def ideal_scan(decision: Decision, action: int, sample: int, step: int, scratch: Scratch, out: Floats) -> int:
-    """Write the ideal measurements of a sample at a step of an action into `out`; returns their number.
+def ideal_measurement(decision: Decision, action: int, target: int, step: int, scratch: Scratch, out: Floats) -> bool:
+    """Write the ideal measurement of a sampled target at a step of an action into `out`; false where there is none.
 
-    IDEAL: without noise, of the targets whose detection probability is at least the threshold. EXPECTED: without noise,
-    each target seen with its detection probability. SAMPLED: seen likewise, with measurement noise. Never any clutter.
+    IDEAL: without noise, of a target whose detection probability is at least the threshold. EXPECTED: without noise, of
+    a target seen with its detection probability. SAMPLED: seen likewise, with measurement noise.
     """
     sensor, horizon, futures = decision.sensor, decision.horizon, decision.futures
-    pose, count = horizon.poses[action, step], 0
-    for i in range(futures.offsets[sample], futures.offsets[sample + 1]):
-        state = futures.states[step, i]
-        detection = sensor.prob_detection(state, pose, sensor.detection_params)
-        # The uniforms are the same for all actions, so that actions are compared on common random numbers.
-        seen = detection >= horizon.threshold if horizon.mode == IDEAL else futures.uniforms[step, i] < detection
-        if seen:
-            sensor.measurement(state, pose, sensor.measurement_params, out[count])
-            if horizon.mode == SAMPLED:
-                _add_noise(sensor, state, pose, futures.normals[step, i], scratch, out[count])
+    state, pose = futures.states[step, target], horizon.poses[action, step]
+    detection = sensor.prob_detection(state, pose, sensor.detection_params)
+    # The uniforms are the same for all actions, so that actions are compared on common random numbers.
+    seen = detection >= horizon.threshold if horizon.mode == IDEAL else futures.uniforms[step, target] < detection
+    if seen:
+        sensor.measurement(state, pose, sensor.measurement_params, out)
+        if horizon.mode == SAMPLED:
+            _add_noise(sensor, state, pose, futures.normals[step, target], scratch, out)
+    return seen
+
+
+@inlined
+def ideal_scan(decision: Decision, action: int, sample: int, step: int, scratch: Scratch, out: Floats) -> int:
+    """Write the ideal measurements of a sample at a step of an action into `out`; returns their number. No clutter."""
+    futures, count = decision.futures, 0
+    for target in range(futures.offsets[sample], futures.offsets[sample + 1]):
+        if ideal_measurement(decision, action, target, step, scratch, out[count]):
             count += 1
     return count

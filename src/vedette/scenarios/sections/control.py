@@ -13,67 +13,10 @@ from pydantic import Field
 from vedette.scenarios.faults import Finding, describe
 from vedette.scenarios.sections.base import Count, Numbers, Positive, Probability, Section, Share, Steps, Whole, check
 from vedette.scenarios.sections.custom import Custom
+from vedette.scenarios.sections.rewards import AnyReward, CauchySchwarzReward
 
 if TYPE_CHECKING:  # with the planners comes the compiler, which a check does without
-    from vedette.control import JointSearch, PlanningSettings, PowerReward, Reward
-
-
-class CauchySchwarzReward(Section):
-    """Cauchy-Schwarz divergence between the predicted and the updated density (paper eqs. 5, 8 and 13 to 17)."""
-
-    kind: Literal["cauchy_schwarz"] = Field(default="cauchy_schwarz", description="Kind of reward [-].")
-    unit_volume: Literal["reference"] | Positive = Field(
-        default=1.0,
-        description='Unit K of hyper-volume: a number, or "reference" for (4 pi)^(d/2) sqrt(det P) of the predicted '
-        "density, under which localisation counts as much as cardinality [-].",
-    )
-
-    def build(self, folder: Path) -> Reward | PowerReward:
-        """The value of an updated density."""
-        from vedette.control import CauchySchwarzReward
-
-        return CauchySchwarzReward(self.unit_volume)
-
-
-class RenyiReward(Section):
-    """Renyi divergence of the predicted from the updated density."""
-
-    kind: Literal["renyi"] = Field(default="renyi", description="Kind of reward [-].")
-    order: Positive = Field(
-        default=0.5, description="Exponent of the predicted density; not 1. 0.5: twice the Bhattacharyya distance [-]."
-    )
-
-    @check
-    def _not_one(self) -> Iterator[Finding]:
-        if self.order == 1.0:
-            yield ("order",), "a number other than 1", "1"
-
-    def build(self, folder: Path) -> Reward | PowerReward:
-        """The value of an updated density."""
-        from vedette.control import RenyiReward
-
-        return RenyiReward(self.order)
-
-
-class CustomReward(Custom):
-    """A user's own `vedette.control.Reward`, a function of the predicted and the updated density, or `PowerReward`."""
-
-    kind: Literal["custom"] = Field(default="custom", description="Kind of reward [-].")
-    gives: ClassVar[str] = "vedette.control:Reward"
-
-    def lacking(self, found: object) -> str:
-        """As of other kinds; a reward of power integrals is no function."""
-        from vedette.control import PowerReward
-
-        return "" if isinstance(found, PowerReward) else super().lacking(found)
-
-    def build(self, folder: Path) -> Reward | PowerReward:
-        """The user's own."""
-        made: Reward | PowerReward = self.made(folder)
-        return made
-
-
-AnyReward = Annotated[CauchySchwarzReward | RenyiReward | CustomReward, Field(discriminator="kind")]
+    from vedette.control import JointSearch, PlanningSettings
 
 
 class Exhaustive(Section):
@@ -124,6 +67,15 @@ class PlanningLimits(Section):
 
     max_prior_hypotheses: Count = Field(default=10, description="Most hypotheses at the start of the horizon [-].")
     max_hypotheses: Count = Field(default=40, description="Most hypotheses after each step of the horizon [-].")
+    max_glmb_sensors: Annotated[Whole, Field(ge=0)] = Field(
+        default=4, description="With more sensors GLMB beliefs are planned on as LMBs, which plans then say [-]."
+    )
+    max_glmb_targets: Annotated[Whole, Field(ge=0)] = Field(
+        default=10, description="The same with more targets expected [-]."
+    )
+    max_bound_work: Annotated[Whole, Field(ge=0)] = Field(
+        default=4096, description="Ways to see a target, times samples, that are tried for the bound of a plan [-]."
+    )
     min_relative_weight: Share = Field(
         default=1e-5, description="Hypotheses lighter than this times the heaviest are dropped [-]."
     )
@@ -157,6 +109,11 @@ class Control(Section):
     detection_threshold: Probability = Field(
         default=0.5, description="Ideal measurements see a target when its detection is at least so probable [-]."
     )
+    association: Literal["known", "full"] = Field(
+        default="known",
+        description="Pseudo-updates of LMB beliefs: each pseudo-measurement is of its own target or else clutter, which "
+        "is fast for any number of targets and sensors; or the filter's own update, which asks which it was [-].",
+    )
     reward: AnyReward = Field(default=CauchySchwarzReward(), description="Value of a density [-].")
     search: AnySearch = Field(default=Exhaustive(), description="Which joint actions a joint decision evaluates [-].")
     limits: PlanningLimits = Field(default=PlanningLimits(), description="How much it works with [-].")
@@ -184,6 +141,10 @@ class Control(Section):
             num_samples=self.num_samples,
             ideal_measurements=self.ideal_measurements,
             detection_threshold=self.detection_threshold,
+            association=self.association,
+            max_glmb_sensors=self.limits.max_glmb_sensors,
+            max_glmb_targets=self.limits.max_glmb_targets,
+            max_bound_work=self.limits.max_bound_work,
             max_prior_hypotheses=self.limits.max_prior_hypotheses,
             limits=replace(
                 planning_limits(),

@@ -153,10 +153,16 @@ class Fusion(Section):
         return Matched(rule) if self.matching == "assignment" else rule
 
     def build_of_decisions(self, num_sensors: int, *, of_lmbs: bool) -> FusionRule:
-        """The fusion that joint decisions go by: plain covariance intersection.
+        """The fusion that joint decisions go by.
 
+        Where one filter takes all scans, posteriors of one prediction are multiplied, by views or in averages sensors
+        are taken to say all they know: a parallel update. Otherwise, and for GLMBs, plain covariance intersection.
         of_lmbs: whether the filters keep LMBs; what the fused density is says more, where there is one.
         """
+        if of_lmbs and (self.kind in ("sequential", "central", "parallel", "arithmetic_average") or self.by_views):
+            from vedette.fusion import ParallelUpdate
+
+            return ParallelUpdate()
         lmbs = self.kind in OF_LMBS or (of_lmbs and self.kind != "cm_delta_glmb")
         kind: FusionKind = "clmb" if lmbs else "cm_delta_glmb"
         return self.model_copy(update={"kind": kind, "by_views": False})._by_label(num_sensors)

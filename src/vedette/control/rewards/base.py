@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any, ClassVar, Literal, Protocol, TypeAlias, runtime_checkable
+from typing import Any, Literal, Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
 
-from vedette.densities import GLMB, LMB, existence_probabilities
-from vedette.divergence import cauchy_schwarz, power_integrals, reference_unit_volume, renyi
+from vedette.densities import GLMB, LMB, existence_probabilities, glmb_to_lmb, track_moments
+from vedette.divergence import power_integrals, reference_unit_volume
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats
+from vedette.models.functions import ModelFunction
 
 Exponents: TypeAlias = Sequence[tuple[float, float]]
 UnitVolume: TypeAlias = float | Literal["reference"]
@@ -49,66 +49,32 @@ class PowerReward(Protocol):
         ...
 
 
-@dataclass(frozen=True, slots=True)
-class CauchySchwarzReward:
-    """Cauchy-Schwarz divergence between prediction and update (paper eq. 8), on the label sets that both have.
+@runtime_checkable
+class LabelReward(Protocol):
+    """A reward made of sums over the targets: then each target is valued by itself, and no density need be formed.
 
-    Attributes:
-        unit_volume: K of eq. 5; or "reference", under which K <p, p> of the prediction is about 1 (paper-notes 15).
-
-    Raises:
-        InputError: another word, or a number that is not finite and above 0.
+    Each label adds `num_terms` numbers, which `function` makes of its Bernoulli before and after; `combine` makes the
+    reward of their sums.
     """
-
-    unit_volume: UnitVolume = 1.0
-    exponents: ClassVar[Exponents] = ((0.0, 2.0), (1.0, 1.0), (2.0, 0.0))
-
-    def __post_init__(self) -> None:
-        check_unit_volume(self.unit_volume)
-
-    def combine(self, z: Floats) -> Floats:
-        """(Z(2, 0) + Z(0, 2)) / 2 - Z(1, 1)."""
-        return 0.5 * (z[..., 0] + z[..., 2]) - z[..., 1]
-
-    def __call__(self, predicted: GLMB | LMB, updated: GLMB | LMB) -> float:
-        volume = unit_volume_of(self, predicted)
-        return cauchy_schwarz(predicted, updated, unit_volume=volume, support="common")
-
-
-@dataclass(frozen=True, slots=True)
-class RenyiReward:
-    """Renyi divergence of the prediction from the update, on the label sets that both have, where both sum to one.
-
-    log(integral of predicted^order updated^(1 - order)) / (order - 1); see `vedette.divergence.renyi`. It needs no K.
-
-    Attributes:
-        order: above 0 and not 1. 1/2 is symmetric, twice the Bhattacharyya distance. Above 1 it is infinite, and so no
-            reward, where the prediction is much wider than the update.
-
-    Raises:
-        InputError: another order.
-    """
-
-    order: float = 0.5
-
-    def __post_init__(self) -> None:
-        value = self.order
-        number = isinstance(value, int | float) and not isinstance(value, bool)
-        if not number or not 0.0 < value < math.inf or value == 1.0:
-            raise InputError(f"order: expected a finite number above 0 other than 1; got {value!r}")
 
     @property
-    def exponents(self) -> Exponents:
-        """(order, 1 - order), and what normalises the two."""
-        return (0.0, 1.0), (self.order, 1.0 - self.order), (1.0, 0.0)
+    def function(self) -> ModelFunction:
+        """Of kind `label_reward`: see `vedette.models.model_function`."""
+        ...
 
-    def combine(self, z: Floats) -> Floats:
-        """(Z(order, 1 - order) - order Z(1, 0) - (1 - order) Z(0, 1)) / (order - 1)."""
-        order = self.order
-        return np.asarray((z[..., 1] - order * z[..., 2] - (1.0 - order) * z[..., 0]) / (order - 1.0))
+    @property
+    def params(self) -> Floats:
+        """The function's own vector."""
+        ...
 
-    def __call__(self, predicted: GLMB | LMB, updated: GLMB | LMB) -> float:
-        return renyi(predicted, updated, self.order, support="common")
+    @property
+    def num_terms(self) -> int:
+        """How many numbers a label adds."""
+        ...
+
+    def combine(self, sums: Floats) -> Floats:
+        """Rewards (...) of sums over the labels (..., num_terms)."""
+        ...
 
 
 def check_unit_volume(value: Any) -> None:
@@ -145,11 +111,29 @@ def speaks_for(thing: Any, method: str, other: str) -> bool:
     return True  # methods of the object itself
 
 
-def reward_value(reward: Reward | PowerReward, predicted: GLMB | LMB, updated: Any) -> float:
+def _of_labels(reward: LabelReward, predicted: GLMB | LMB, updated: GLMB | LMB) -> float:
+    """The reward of two densities, GLMBs taken as their LMBs; a label that the update lacks is not there any more."""
+    before, after = (density if isinstance(density, LMB) else glmb_to_lmb(density) for density in (predicted, updated))
+    place = {tuple(label): i for i, label in enumerate(after.tracks.labels.tolist())}
+    old, new = track_moments(before.tracks), track_moments(after.tracks)
+    sums, out = np.zeros(reward.num_terms), np.empty(reward.num_terms)
+    for i, label in enumerate(before.tracks.labels.tolist()):
+        at = place.get(tuple(label), -1)
+        existence, moments = (
+            (0.0, (old[0][i], old[1][i])) if at < 0 else (after.existence[at], (new[0][at], new[1][at]))
+        )
+        reward.function(before.existence[i], old[0][i], old[1][i], existence, *moments, reward.params, out)
+        sums += out
+    return float(reward.combine(sums))
+
+
+def reward_value(reward: Reward | PowerReward | LabelReward, predicted: GLMB | LMB, updated: Any) -> float:
     """The reward of one update; `InputError` where it is no number."""
     value: Any
     if callable(reward) and speaks_for(reward, "__call__", "combine"):
         value = reward(predicted, updated)
+    elif isinstance(reward, LabelReward):
+        value = _of_labels(reward, predicted, updated)
     else:
         assert isinstance(reward, PowerReward)
         volume = unit_volume_of(reward, predicted)

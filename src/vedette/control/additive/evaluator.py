@@ -1,0 +1,121 @@
+"""The evaluator of decisions that are sums over labels: for LMB beliefs, with known association."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from vedette.control.additive.rewards import AdditiveRewards, no_cells
+from vedette.control.additive.situation import Samples, starts_of
+from vedette.control.additive.table import lay_out_changes
+from vedette.control.additive.valuations import valuation_of
+from vedette.control.priors import predicted
+from vedette.control.rewards.loss import ExpectedLossReward
+from vedette.control.settings import MobileSensor, PlanningSettings
+from vedette.densities import LMB
+from vedette.filters import shared_targets
+from vedette.fusion import LinearRule
+from vedette.kernels.base.types import Floats, Ints
+from vedette.platforms import Options
+
+SampleRewards: TypeAlias = Callable[[Ints], Floats]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class AdditiveEvaluator:
+    """Everything that the rewards of one decision depend on; the changes are computed once, in `prepare`.
+
+    Attributes:
+        sensors, settings: as in the planners.
+        options: for each sensor, its actions in printed order and the different courses that they lead to.
+        prediction: the fused density at the end of the horizon, of one Gaussian a label.
+        additive: the rewards of joint actions.
+        counts: how many filter steps and label values have been evaluated so far.
+        notes: what a reader of the decision must know, in the order in which it came up (keys; no values).
+    """
+
+    sensors: tuple[MobileSensor, ...]
+    settings: PlanningSettings
+    options: tuple[Options, ...]
+    prediction: LMB
+    additive: AdditiveRewards
+    counts: dict[str, int] = field(default_factory=dict)
+    notes: dict[str, None] = field(default_factory=dict)
+
+    @classmethod
+    def prepare(
+        cls,
+        sensors: Sequence[MobileSensor],
+        options: Sequence[Options],
+        rule: LinearRule,
+        settings: PlanningSettings,
+        reward: Any,
+        fused: LMB,
+        beliefs: Sequence[LMB],
+        *,
+        rng: np.random.Generator,
+    ) -> AdditiveEvaluator:
+        """Draw the samples, predict, and follow every label over every course that reaches it.
+
+        rule: how the sensors' densities become one. beliefs: of each sensor. Raises as `JointPlanner.plan`.
+        """
+        sampled = not isinstance(reward, ExpectedLossReward)
+        motion = shared_targets([sensor.filter for sensor in sensors]).motion
+        prediction = predicted(fused, motion, settings.horizon_steps, settings.horizon_period)
+        assert isinstance(prediction, LMB)
+        samples = Samples.draw(fused, sensors, settings, rng=rng) if sampled else Samples.none(fused, settings)
+        start = starts_of(
+            prediction,
+            beliefs,
+            sensors,
+            [own.courses for own in options],
+            samples,
+            settings,
+            missing_existence=rule.missing_existence,
+            detection_at=None if sampled else "mean",
+            rng=rng,
+        )
+        num_samples = samples.targets.shape[1]
+        table = lay_out_changes(start, rule, num_samples, settings.threads(), sampled=sampled)
+        valuation = valuation_of(reward, prediction, start.prior)
+        assert not isinstance(valuation, str)
+        additive = AdditiveRewards(
+            table,
+            valuation,
+            start.bases,
+            reward if sampled else None,
+            no_cells(len(table.offsets) - 1),
+            settings.threads(),
+        )
+        counts = {"filter_steps": len(table.labels) * num_samples * settings.horizon_steps, "rewards": 0}
+        return cls(tuple(sensors), settings, tuple(options), prediction, additive, counts)
+
+    def joint_shape(self) -> tuple[int, ...]:
+        """Number of different courses of each sensor."""
+        return tuple(len(own.courses) for own in self.options)
+
+    def joint(self) -> SampleRewards:
+        """The function that gives (num_joint, num_samples) rewards of joint actions (num_joint, num_sensors).
+
+        Their actions are numbers of different courses. NaN where a sample's reward is no number.
+        """
+        return self._counted(self.additive)
+
+    def alone(self, sensor: int) -> SampleRewards:
+        """The same of one sensor's own density, actions (num, 1)."""
+        return self._counted(self.additive.alone(sensor))
+
+    def _counted(self, rewards: AdditiveRewards) -> SampleRewards:
+        def evaluate(actions: Ints) -> Floats:
+            found = rewards(actions)
+            self.counts["rewards"] += found.size
+            return found
+
+        return evaluate
+
+    def account(self) -> tuple[dict[str, int], tuple[str, ...]]:
+        """Counts and notes so far, as a plan holds them."""
+        return dict(self.counts), tuple(self.notes)

@@ -1,0 +1,110 @@
+"""Rewards of joint actions from the table of changes, and the searches that its shape makes cheap."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from vedette.control.rewards.base import combined
+from vedette.kernels.base.types import Floats, Ints
+from vedette.kernels.planning.ascent import Allowed, Cells, Trace, ascend
+from vedette.kernels.planning.bernoulli_rows import Table
+from vedette.kernels.planning.joint_values import joint_values, line_values
+from vedette.kernels.planning.label_values import Valuation
+from vedette.threads import run_chunks
+
+# Lines after which an ascent is stopped, a hundred sweeps of a hundred sensors.
+_MOST_LINES = 10_000
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class AdditiveRewards:
+    """Rewards that are made of sums over labels.
+
+    Attributes:
+        table: what the scans of each course say of each label.
+        valuation: what a label is worth.
+        bases: for each sensor, the rows of its own belief without scans.
+        reward: whose `combine` makes rewards of the sums; None: the sum itself.
+        cells: where targets may be that were not found yet.
+        num_threads: threads that may share the work; the result does not depend on it.
+    """
+
+    table: Table
+    valuation: Valuation
+    bases: tuple[Floats, ...]
+    reward: Any
+    cells: Cells
+    num_threads: int
+
+    @property
+    def num_samples(self) -> int:
+        """Samples of each reward."""
+        return int(self.table.changes.shape[1])
+
+    @property
+    def coefficients(self) -> Floats | None:
+        """Of the sums, where the reward is linear in them; None where it is not known to be."""
+        if self.reward is None:
+            return np.ones(1)
+        found = getattr(self.reward, "coefficients", None)
+        return None if found is None else np.asarray(found, np.float64)
+
+    def alone(self, sensor: int) -> AdditiveRewards:
+        """Of one sensor, compared by itself with the prediction."""
+        first, last = self.table.first_courses[sensor : sensor + 2].tolist()
+        offsets = self.table.offsets[first : last + 1]
+        own = Table(
+            np.array([0, last - first]), offsets, self.table.labels, self.table.changes, self.bases[sensor], np.ones(1)
+        )
+        cells = self.cells._replace(offsets=self.cells.offsets[first : last + 1])
+        return replace(self, table=own, bases=(self.bases[sensor],), cells=cells)
+
+    def __call__(self, actions: Ints) -> Floats:
+        """(num_joint, num_samples) rewards of joint actions (num_joint, num_sensors); -1: the sensor does not scan."""
+        sums = np.empty((len(actions), self.num_samples, self.valuation.num))
+
+        def work(first: int, last: int) -> None:
+            joint_values(self.table, self.valuation, actions, first, last, sums)
+
+        run_chunks(work, len(actions), self.num_threads)
+        found = np.array([self._found(joint) for joint in actions]) if len(self.cells.worth) else 0.0
+        return np.asarray(self._combined(sums) + np.reshape(found, (-1, 1)))
+
+    def line(self, chosen: Ints, sensor: int) -> Floats:
+        """(num_courses, num_samples) rewards of all courses of one sensor, the others as chosen."""
+        first, last = self.table.first_courses[sensor : sensor + 2].tolist()
+        sums = np.empty((last - first, self.num_samples, self.valuation.num))
+        line_values(self.table, self.valuation, chosen, sensor, 0, last - first, sums)
+        rewards = self._combined(sums)
+        if len(self.cells.worth):
+            others = np.tile(chosen, (last - first, 1))
+            others[:, sensor] = np.arange(last - first)
+            rewards += np.array([[self._found(joint)] for joint in others])
+        return rewards
+
+    def ascend(self, start: Ints, allowed: Allowed) -> tuple[Ints, float, Trace]:
+        """One compiled ascent; for rewards that are linear in their sums."""
+        coefficients = self.coefficients
+        assert coefficients is not None
+        return ascend(self.table, self.valuation, coefficients, self.cells, allowed, start, _MOST_LINES)
+
+    def _combined(self, sums: Floats) -> Floats:
+        return sums[..., 0] if self.reward is None else combined(self.reward, sums)
+
+    def _found(self, chosen: Ints) -> float:
+        """What the reward has for targets that are expected to be found."""
+        cells, totals = self.cells, np.zeros(len(self.cells.worth))
+        for s in np.flatnonzero(chosen >= 0).tolist():
+            course = self.table.first_courses[s] + chosen[s]
+            entries = slice(cells.offsets[course], cells.offsets[course + 1])
+            totals[cells.cells[entries]] += cells.log_miss[entries]
+        return float(-(cells.worth @ np.expm1(totals)))
+
+
+def no_cells(num_courses: int) -> Cells:
+    """Nothing to be found."""
+    none = np.empty(0)
+    return Cells(np.zeros(num_courses + 1, np.int64), np.empty(0, np.int64), none, none)

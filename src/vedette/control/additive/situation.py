@@ -1,0 +1,169 @@
+"""Where a decision by sums over labels starts: beliefs without scans, samples, sensors that can be worked on as one."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from scipy.special import logit
+
+from vedette.control.pseudo import targets_of
+from vedette.control.settings import IDEAL_MODES, MobileSensor, PlanningSettings
+from vedette.densities import LMB, sample_lmb
+from vedette.densities.checks import unchecked
+from vedette.densities.label_sets import offsets_of, single_gaussians, take_tracks
+from vedette.filters import shared_targets
+from vedette.filters.inputs import model_errors
+from vedette.kernels.base.types import Floats, Ints
+from vedette.kernels.planning.bernoulli_rows import bernoulli_size
+from vedette.kernels.planning.ideal import EXPECTED, IDEAL, Decision, Futures, Horizon, propagate_samples
+from vedette.kernels.planning.known import Belief, predict_paths, rows_without_scans
+from vedette.models import constant_survival, kernel_motion
+
+
+class Samples(NamedTuple):
+    """Samples of the fused density over the horizon, and which target is of which label."""
+
+    states: Floats  # (horizon_steps, num_targets, state_dim)
+    offsets: Ints  # (num_samples + 1,) into the targets
+    targets: Ints  # (num_labels, num_samples) place of each label's target, -1 where it is not there
+
+    @classmethod
+    def draw(
+        cls, fused: LMB, sensors: Sequence[MobileSensor], settings: PlanningSettings, *, rng: np.random.Generator
+    ) -> Samples:
+        """`num_samples` of them, carried over the horizon without noise."""
+        num, model = settings.num_samples, shared_targets([sensor.filter for sensor in sensors])
+        drawn = sample_lmb(fused, num, rng=rng)
+        with model_errors():
+            motion = kernel_motion(model.motion, model.survival)
+            states = propagate_samples(
+                motion, drawn.states, float(settings.horizon_period), int(settings.horizon_steps)
+            )
+        return cls(states, drawn.offsets, targets_of(fused.tracks.labels, drawn.labels, drawn.offsets))
+
+    @classmethod
+    def none(cls, fused: LMB, settings: PlanningSettings) -> Samples:
+        """One sample in which nobody is there, for what needs no samples."""
+        states = np.empty((settings.horizon_steps, 0, fused.state_dim))
+        return cls(states, np.zeros(2, np.int64), np.full((fused.tracks.num_tracks, 1), -1))
+
+    def futures(self, meas_dim: int, settings: PlanningSettings, *, rng: np.random.Generator) -> Futures:
+        """As one sensor meets them; random numbers of detections and noise are drawn where they are wanted."""
+        mode = IDEAL_MODES[settings.ideal_measurements]
+        shape = self.states.shape[:2]
+        uniforms = rng.random(shape) if mode != IDEAL else np.empty((0, 0))
+        noisy = mode not in (IDEAL, EXPECTED)
+        normals = rng.standard_normal((*shape, meas_dim)) if noisy else np.empty((0, 0, meas_dim))
+        return Futures(self.offsets, self.states, uniforms, normals)
+
+
+class SensorGroup(NamedTuple):
+    """Sensors of one model that start from one belief: their courses are those of one sensor."""
+
+    members: tuple[int, ...]
+    belief: Belief  # of labels that the fused density has
+    labels: Ints  # (num_own,) place of the sensor's labels among those of the fused density
+    decision: Decision
+    rows: Floats  # (num_own, bernoulli_size) without scans
+    course_offsets: Ints  # (num_members + 1,)
+
+
+class Start(NamedTuple):
+    """All groups, and the prediction's rows."""
+
+    groups: tuple[SensorGroup, ...]
+    references: Floats  # (num_labels, state_dim) means of the prediction, about which all rows are taken
+    prior: Floats  # (num_labels, bernoulli_size)
+    bases: tuple[Floats, ...]  # for each sensor (num_labels, bernoulli_size) of its own belief without scans
+
+
+def starts_of(
+    prediction: LMB,
+    beliefs: Sequence[LMB],
+    sensors: Sequence[MobileSensor],
+    courses: Sequence[Floats],
+    samples: Samples,
+    settings: PlanningSettings,
+    *,
+    missing_existence: float,
+    detection_at: str | None = None,
+    rng: np.random.Generator,
+) -> Start:
+    """What the changes of the sensors' scans are added to.
+
+    prediction: the fused density at the end of the horizon, of one Gaussian a label. beliefs: of each sensor now.
+    courses: of each sensor (num_courses, horizon_steps, pose_dim). missing_existence: of a label that a sensor lacks.
+    detection_at: as of `SensorModel.to_kernel`.
+    """
+    with model_errors():
+        references = prediction.tracks.means
+        prior = rows_without_scans(references, prediction.tracks.covs, prediction.existence_logit, references)
+        shared = IDEAL_MODES[settings.ideal_measurements] == IDEAL or detection_at is not None
+        groups = tuple(
+            _group(members, prediction, beliefs, sensors, courses, samples, settings, detection_at, rng)
+            for members in _alike(sensors, beliefs, shared=shared)
+        )
+    bases: list[Floats] = [prior] * len(sensors)
+    for group in groups:
+        row = _spread(group, len(prior), prediction.state_dim, missing_existence)
+        for s in group.members:
+            bases[s] = row
+    return Start(groups, references, prior, tuple(bases))
+
+
+def _alike(sensors: Sequence[MobileSensor], beliefs: Sequence[LMB], *, shared: bool) -> list[tuple[int, ...]]:
+    """Sensors with the same belief and equal models, together; each by itself unless `shared`."""
+    found: dict[object, list[int]] = {}
+    for s, (sensor, belief) in enumerate(zip(sensors, beliefs, strict=True)):
+        bundle = sensor.filter.sensor.to_kernel()
+        key = tuple(part.tobytes() if isinstance(part, np.ndarray) else part for part in bundle)
+        found.setdefault((id(belief), key) if shared else s, []).append(s)
+    return [tuple(members) for members in found.values()]
+
+
+def _group(
+    members: tuple[int, ...],
+    prediction: LMB,
+    beliefs: Sequence[LMB],
+    sensors: Sequence[MobileSensor],
+    courses: Sequence[Floats],
+    samples: Samples,
+    settings: PlanningSettings,
+    detection_at: str | None,
+    rng: np.random.Generator,
+) -> SensorGroup:
+    local, belief = sensors[members[0]].filter, beliefs[members[0]]
+    place = {tuple(label): i for i, label in enumerate(prediction.tracks.labels.tolist())}
+    places = np.array([place.get(tuple(label), -1) for label in belief.tracks.labels.tolist()], np.int64)
+    own = np.flatnonzero((places >= 0) & (belief.existence_logit > -np.inf))
+    prior = unchecked(LMB, single_gaussians(take_tracks(belief.tracks, own)), belief.existence_logit[own]).to_kernel()
+    horizon = Horizon(
+        np.ascontiguousarray(np.concatenate([courses[s] for s in members])),
+        float(settings.horizon_period),
+        IDEAL_MODES[settings.ideal_measurements],
+        float(settings.detection_threshold),
+    )
+    decision = Decision(
+        LMB.empty(belief.state_dim).to_kernel(),
+        kernel_motion(local.targets.motion, constant_survival(1.0)),
+        local.sensor.to_kernel(detection_at),
+        horizon,
+        samples.futures(local.sensor.meas_dim, settings, rng=rng),
+        settings.limits.truncation(local.sensor.meas_dim),
+    )
+    paths, labels = predict_paths(prior, decision), places[own]
+    ends = np.ascontiguousarray(paths.means[:, -1]), np.ascontiguousarray(paths.covs[:, -1])
+    rows = rows_without_scans(*ends, prior.existence_logit, prediction.tracks.means[labels])
+    targets = np.ascontiguousarray(samples.targets[labels])
+    offsets = offsets_of([len(courses[s]) for s in members])
+    return SensorGroup(members, Belief(prior, paths, targets), labels, decision, rows, offsets)
+
+
+def _spread(group: SensorGroup, num_labels: int, dim: int, missing_existence: float) -> Floats:
+    """The rows on all labels; of one that the sensor lacks, an existence that it would hardly have missed."""
+    rows = np.zeros((num_labels, bernoulli_size(dim)))
+    rows[:, -2] = min(float(logit(missing_existence)), float(group.rows[:, -2].min(initial=np.inf)))
+    rows[group.labels] = group.rows
+    return rows

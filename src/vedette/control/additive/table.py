@@ -1,0 +1,100 @@
+"""The changes of a decision: what the scans of every course say of every label in its reach."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from vedette.control.additive.situation import SensorGroup, Start
+from vedette.densities.label_sets import offsets_of
+from vedette.errors import InputError
+from vedette.filters.inputs import model_errors
+from vedette.fusion import LinearRule
+from vedette.kernels.base.types import Floats, Ints
+from vedette.kernels.planning.bernoulli_rows import Table
+from vedette.kernels.planning.expected import fill_expected_changes
+from vedette.kernels.planning.known import Entries, fill_changes, fill_reach
+from vedette.threads import run_chunks
+
+# A label that no sample and no prediction gives a higher probability of detection is out of reach.
+LEAST_DETECTION = 1e-6
+
+# Bytes of changes beyond which a decision is refused rather than left to run out of memory.
+_MOST_BYTES = 8e9
+
+
+def lay_out_changes(start: Start, rule: LinearRule, num_samples: int, num_threads: int, *, sampled: bool) -> Table:
+    """The changes of all sensors' courses, by samples or, without, as they are expected.
+
+    Raises:
+        InputError: more changes than memory should be asked for.
+        ModelError, NumericalError: as the models and the filters.
+    """
+    num_sensors, size = len(start.bases), start.prior.shape[1]
+    with model_errors():
+        reached = [_reach(group, num_threads) for group in start.groups]
+    sizes, first_courses = _sizes(start.groups, reached, num_sensors)
+    offsets = offsets_of(sizes)
+    if offsets[-1] * num_samples * size * 8 > _MOST_BYTES:
+        raise InputError(
+            f"decision: expected at most {_MOST_BYTES / 1e9:g} GB of what scans may say; got {offsets[-1]} pairs of an "
+            f"action and a target in its reach, x {num_samples} samples; take fewer samples or a shorter reach"
+        )
+    labels, changes = np.empty(offsets[-1], np.int64), np.empty((int(offsets[-1]), num_samples, size))
+    own = np.empty(len(labels), np.int64)
+    with model_errors():
+        for group, reach in zip(start.groups, reached, strict=True):
+            places = _places(group, first_courses)
+            entries = Entries(offsets[places], offsets[places + 1], own)
+            found, counts = np.nonzero(reach)[1], reach.sum(axis=1)
+            at = np.repeat(entries.first - offsets_of(counts)[:-1], counts) + np.arange(len(found))
+            own[at], labels[at] = found, group.labels[found]
+            run_chunks(_filling(group, entries, start, changes, sampled), len(places), num_threads)
+    powers = np.array(rule.powers)
+    joint = rule.prior_power * start.prior
+    for s, power in enumerate(rule.powers):
+        joint = joint + power * start.bases[s]
+    return Table(first_courses, offsets, labels, changes, np.ascontiguousarray(joint), powers)
+
+
+def _reach(group: SensorGroup, num_threads: int) -> Ints:
+    """(num_courses, num_own) 1 where a course reaches a label."""
+    num_courses = int(group.course_offsets[-1])
+    out = np.empty((num_courses, len(group.labels)), np.int64)
+
+    def work(first: int, last: int) -> None:
+        fill_reach(group.belief, group.decision, LEAST_DETECTION, first, last, out)
+
+    run_chunks(work, num_courses, num_threads)
+    return out
+
+
+def _sizes(groups: Sequence[SensorGroup], reached: Sequence[Ints], num_sensors: int) -> tuple[Ints, Ints]:
+    """Entries of each course, sensor after sensor, and the first course of each sensor."""
+    own: list[Ints] = [np.empty(0, np.int64)] * num_sensors
+    for group, reach in zip(groups, reached, strict=True):
+        counts = reach.sum(axis=1)
+        for i, s in enumerate(group.members):
+            own[s] = counts[group.course_offsets[i] : group.course_offsets[i + 1]]
+    return np.concatenate(own), offsets_of([len(counts) for counts in own])
+
+
+def _places(group: SensorGroup, first_courses: Ints) -> Ints:
+    """Place of each course of a group among those of all sensors."""
+    sizes = np.diff(group.course_offsets)
+    starts = first_courses[list(group.members)] - group.course_offsets[:-1]
+    return np.asarray(np.repeat(starts, sizes) + np.arange(group.course_offsets[-1]))
+
+
+def _filling(
+    group: SensorGroup, entries: Entries, start: Start, changes: Floats, sampled: bool
+) -> Callable[[int, int], None]:
+    if not sampled:
+        return lambda first, last: fill_expected_changes(
+            group.belief, group.decision, entries, group.rows, first, last, changes
+        )
+    references = np.ascontiguousarray(start.references[group.labels])
+    return lambda first, last: fill_changes(
+        group.belief, group.decision, entries, references, group.rows, first, last, changes
+    )

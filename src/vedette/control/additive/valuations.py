@@ -1,0 +1,93 @@
+"""How the labels of a decision are valued, by the kind of reward."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from scipy.special import log_expit
+
+from vedette.control.rewards.base import LabelReward, PowerReward, Reward, speaks_for, unit_volume_of
+from vedette.control.rewards.loss import ExpectedLossReward
+from vedette.densities import LMB
+from vedette.kernels.base.types import Floats
+from vedette.kernels.gaussian.linalg import LOG_2PI
+from vedette.kernels.planning.label_values import EXPECTED_LOSS, FUNCTION, POWER_INTEGRALS, Valuation
+from vedette.models.functions import ModelFunction, model_function
+
+
+@model_function("label_reward")
+def _nothing(
+    existence: float,
+    mean: Floats,
+    cov: Floats,
+    new_existence: float,
+    new_mean: Floats,
+    new_cov: Floats,
+    params: Floats,
+    out: Floats,
+) -> None:
+    """Fills the place of a function that is never asked."""
+    out[0] = 0.0
+
+
+def valuation_of(
+    reward: Reward | PowerReward | LabelReward | ExpectedLossReward, prediction: LMB, prior: Floats
+) -> Valuation | str:
+    """How a reward values the labels of a prediction, of one Gaussian each; or why it cannot.
+
+    prior: (num_labels, bernoulli_size) rows of the prediction.
+    """
+    if isinstance(reward, ExpectedLossReward):
+        covs = prediction.tracks.covs
+        unseen = np.minimum(covs[:, 0, 0] + covs[:, 1, 1], reward.cutoff**2)[:, np.newaxis]
+        return _valuation(EXPECTED_LOSS, 1, prediction, prior, unseen, params=np.array([reward.cutoff**2]))
+    if isinstance(reward, PowerReward) and speaks_for(reward, "combine", "__call__"):
+        volume = unit_volume_of(reward, prediction)
+        exponents = np.array([[float(a), float(b)] for a, b in reward.exponents])
+        own = _of_prediction(prediction, exponents, math.log(volume), prior[:, -2])
+        found = _valuation(POWER_INTEGRALS, len(exponents), prediction, prior, own, exponents=exponents)
+        return found._replace(log_volume=math.log(volume))
+    if isinstance(reward, LabelReward) and speaks_for(reward, "combine", "__call__"):
+        own = np.zeros((len(prior), reward.num_terms))
+        params = np.ascontiguousarray(reward.params, np.float64)
+        return _valuation(FUNCTION, reward.num_terms, prediction, prior, own, params=params, function=reward.function)
+    return f"{getattr(reward, '__name__', type(reward).__name__)} is a function of two densities"
+
+
+def _valuation(
+    kind: int,
+    num: int,
+    prediction: LMB,
+    prior: Floats,
+    own: Floats,
+    *,
+    exponents: Floats | None = None,
+    params: Floats | None = None,
+    function: ModelFunction = _nothing,
+) -> Valuation:
+    return Valuation(
+        kind,
+        num,
+        prior,
+        own,
+        np.empty((0, 2)) if exponents is None else exponents,
+        0.0,
+        np.empty(0) if params is None else params,
+        function,
+        prediction.tracks.means,
+        prediction.tracks.covs,
+    )
+
+
+def _of_prediction(prediction: LMB, exponents: Floats, log_volume: float, logits: Floats) -> Floats:
+    """(num_labels, num_exponents) a log(1 - r), and of pairs (a, 0) the whole of their term."""
+    dim = prediction.state_dim
+    log_dets = np.linalg.slogdet(prediction.tracks.covs)[1] + dim * LOG_2PI
+    terms = np.outer(log_expit(-logits), exponents[:, 0])
+    for e, (a, b) in enumerate(exponents.tolist()):
+        if b == 0.0 and a != 0.0:
+            # log integral N(m, P)^a = -((a - 1) log|2 pi P| + d log a) / 2.
+            integral = -0.5 * ((a - 1.0) * log_dets + dim * math.log(a)) if a > 0.0 else np.full(len(logits), np.inf)
+            terms[:, e] += np.logaddexp(0.0, a * logits + integral + (a - 1.0) * log_volume)
+    return terms

@@ -1,0 +1,24 @@
+"""How much a planned update is worth."""
+
+from vedette.control.rewards.base import LabelReward, PowerReward, Reward
+from vedette.control.rewards.labels import (
+    CardinalityVarianceReward,
+    ExpectedGospaReward,
+    KullbackLeiblerReward,
+    PeecsReward,
+)
+from vedette.control.rewards.loss import ExpectedLossReward
+from vedette.control.rewards.power import CauchySchwarzReward, RenyiReward
+
+__all__ = [
+    "CardinalityVarianceReward",
+    "CauchySchwarzReward",
+    "ExpectedGospaReward",
+    "ExpectedLossReward",
+    "KullbackLeiblerReward",
+    "LabelReward",
+    "PeecsReward",
+    "PowerReward",
+    "RenyiReward",
+    "Reward",
+]

@@ -1,0 +1,87 @@
+"""Divergences of prediction and update that are made of power integrals."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from vedette.control.rewards.base import Exponents, UnitVolume, check_unit_volume, unit_volume_of
+from vedette.densities import GLMB, LMB
+from vedette.divergence import cauchy_schwarz, renyi
+from vedette.errors import InputError
+from vedette.kernels.base.types import Floats
+
+
+@dataclass(frozen=True, slots=True)
+class CauchySchwarzReward:
+    """Cauchy-Schwarz divergence between prediction and update (paper eq. 8), on the label sets that both have.
+
+    Attributes:
+        unit_volume: K of eq. 5; or "reference", under which K <p, p> of the prediction is about 1 (paper-notes 15).
+
+    Raises:
+        InputError: another word, or a number that is not finite and above 0.
+    """
+
+    unit_volume: UnitVolume = 1.0
+    exponents: ClassVar[Exponents] = ((0.0, 2.0), (1.0, 1.0), (2.0, 0.0))
+
+    def __post_init__(self) -> None:
+        check_unit_volume(self.unit_volume)
+
+    @property
+    def coefficients(self) -> Floats:
+        """Of the power integrals, of which the reward is the sum: (Z(2, 0) + Z(0, 2)) / 2 - Z(1, 1)."""
+        return np.array([0.5, -1.0, 0.5])
+
+    def combine(self, z: Floats) -> Floats:
+        """(Z(2, 0) + Z(0, 2)) / 2 - Z(1, 1)."""
+        return 0.5 * (z[..., 0] + z[..., 2]) - z[..., 1]
+
+    def __call__(self, predicted: GLMB | LMB, updated: GLMB | LMB) -> float:
+        volume = unit_volume_of(self, predicted)
+        return cauchy_schwarz(predicted, updated, unit_volume=volume, support="common")
+
+
+@dataclass(frozen=True, slots=True)
+class RenyiReward:
+    """Renyi divergence of the prediction from the update, on the label sets that both have, where both sum to one.
+
+    log(integral of predicted^order updated^(1 - order)) / (order - 1); see `vedette.divergence.renyi`. It needs no K.
+
+    Attributes:
+        order: above 0 and not 1. 1/2 is symmetric, twice the Bhattacharyya distance. Above 1 it is infinite, and so no
+            reward, where the prediction is much wider than the update.
+
+    Raises:
+        InputError: another order.
+    """
+
+    order: float = 0.5
+
+    def __post_init__(self) -> None:
+        value = self.order
+        number = isinstance(value, int | float) and not isinstance(value, bool)
+        if not number or not 0.0 < value < math.inf or value == 1.0:
+            raise InputError(f"order: expected a finite number above 0 other than 1; got {value!r}")
+
+    @property
+    def exponents(self) -> Exponents:
+        """(order, 1 - order), and what normalises the two."""
+        return (0.0, 1.0), (self.order, 1.0 - self.order), (1.0, 0.0)
+
+    @property
+    def coefficients(self) -> Floats:
+        """Of the power integrals: see `combine`."""
+        return np.array([self.order - 1.0, 1.0, -self.order]) / (self.order - 1.0)
+
+    def combine(self, z: Floats) -> Floats:
+        """(Z(order, 1 - order) - order Z(1, 0) - (1 - order) Z(0, 1)) / (order - 1)."""
+        order = self.order
+        return np.asarray((z[..., 1] - order * z[..., 2] - (1.0 - order) * z[..., 0]) / (order - 1.0))
+
+    def __call__(self, predicted: GLMB | LMB, updated: GLMB | LMB) -> float:
+        return renyi(predicted, updated, self.order, support="common")

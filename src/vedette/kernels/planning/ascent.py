@@ -1,0 +1,189 @@
+"""Coordinate ascent on rewards that are sums over labels: a line costs what its sensor can reach, not more."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from vedette.kernels.base.compile import borrowing, inlined, kernel
+from vedette.kernels.base.types import Bools, Floats, Ints
+from vedette.kernels.planning.bernoulli_rows import Table
+from vedette.kernels.planning.joint_values import add_course, start_totals, value_changed, value_rows
+from vedette.kernels.planning.label_values import Valuation, ValueWork, make_value_work
+
+# Of equal courses the one that is taken stays: rounding must not lead an ascent in circles.
+_SAME = 1e-9
+
+
+class Cells(NamedTuple):
+    """Where targets may be that were not found yet; of the reward the expected number that is found."""
+
+    offsets: Ints  # (num_courses + 1,) into the entries
+    cells: Ints  # (num_entries,)
+    log_miss: Floats  # (num_entries,) log of the mean of 1 - P_D over the course
+    worth: Floats  # (num_cells,) expected number of targets times what one is worth
+
+
+class Allowed(NamedTuple):
+    """Which courses may be taken."""
+
+    single: Bools  # (num_courses,)
+    together: Bools  # (num_courses, num_courses) which go together; (0, 0) where all do
+
+
+class Ascent(NamedTuple):
+    """Where an ascent is; written as it goes."""
+
+    chosen: Ints  # (num_sensors,) number of the course of each sensor
+    totals: Floats  # (num_labels, num_samples, bernoulli_size) joint rows
+    values: Floats  # (num_labels,) mean value of each label
+    cell_totals: Floats  # (num_cells,) sums of log_miss
+
+
+class Trace(NamedTuple):
+    """What an ascent evaluated."""
+
+    evaluations: Ints  # (num_lines + 1,) so many joint actions by the end of each line; 1 at the start
+    best: Floats  # (num_lines + 1,) the reward reached by then
+
+
+@borrowing
+def _label_mean(values: Floats, coefficients: Floats) -> float:
+    total = 0.0
+    for sample in range(values.shape[0]):
+        for e in range(values.shape[1]):
+            total += coefficients[e] * values[sample, e]
+    return total / values.shape[0]
+
+
+@inlined
+def _found(cells: Cells, course: int, totals: Floats) -> float:
+    """What a course finds that nobody else does."""
+    total = 0.0
+    for entry in range(cells.offsets[course], cells.offsets[course + 1]):
+        cell = cells.cells[entry]
+        total -= cells.worth[cell] * math.exp(totals[cell]) * math.expm1(cells.log_miss[entry])
+    return total
+
+
+@inlined
+def _add_cells(cells: Cells, course: int, sign: float, totals: Floats) -> None:
+    for entry in range(cells.offsets[course], cells.offsets[course + 1]):
+        totals[cells.cells[entry]] += sign * cells.log_miss[entry]
+
+
+@inlined
+def _is_allowed(table: Table, allowed: Allowed, chosen: Ints, sensor: int, course: int) -> bool:
+    if not allowed.single[course]:
+        return False
+    if allowed.together.shape[0] > 0:
+        for s in range(chosen.shape[0]):
+            if s != sensor and not allowed.together[course, table.first_courses[s] + chosen[s]]:
+                return False
+    return True
+
+
+@borrowing
+def _line(
+    table: Table,
+    valuation: Valuation,
+    coefficients: Floats,
+    cells: Cells,
+    sensor: int,
+    at: Ascent,
+    before: Floats,
+    values: Floats,
+    work: ValueWork,
+    gains: Floats,
+) -> None:
+    """Gain of each course of a sensor over its not scanning, the others as chosen, whose rows alone are in `at`."""
+    first, last = table.first_courses[sensor], table.first_courses[sensor + 1]
+    for entry in range(table.offsets[first], table.offsets[last]):
+        before[table.labels[entry]] = math.inf
+    for course in range(first, last):
+        gain = _found(cells, course, at.cell_totals)
+        for entry in range(table.offsets[course], table.offsets[course + 1]):
+            label = table.labels[entry]
+            if before[label] == math.inf:
+                value_rows(valuation, label, at.totals[label], work, values)
+                before[label] = _label_mean(values, coefficients)
+            value_changed(table, valuation, sensor, entry, at.totals[label], work, values)
+            gain += _label_mean(values, coefficients) - before[label]
+        gains[course - first] = gain
+
+
+@borrowing
+def _best(table: Table, allowed: Allowed, chosen: Ints, sensor: int, gains: Floats, reward: float) -> int:
+    """The best allowed course of a line: the present one if no other is better, else the first of equal ones."""
+    first, num = table.first_courses[sensor], table.first_courses[sensor + 1] - table.first_courses[sensor]
+    best = -math.inf
+    for a in range(num):
+        if gains[a] > best and _is_allowed(table, allowed, chosen, sensor, first + a):
+            best = gains[a]
+    margin, present = _SAME * max(1.0, abs(reward)), chosen[sensor]
+    if best == -math.inf or (
+        gains[present] >= best - margin and _is_allowed(table, allowed, chosen, sensor, first + present)
+    ):
+        return present
+    for a in range(num):
+        if gains[a] >= best - margin and _is_allowed(table, allowed, chosen, sensor, first + a):
+            return a
+    return present
+
+
+@kernel
+def _start(table: Table, valuation: Valuation, coefficients: Floats, cells: Cells, chosen: Ints) -> Ascent:
+    num_labels, num_samples = len(table.start), table.changes.shape[1]
+    at = Ascent(chosen.copy(), start_totals(table), np.empty(num_labels), np.zeros(len(cells.worth)))
+    for s in range(len(chosen)):
+        add_course(table, s, table.first_courses[s] + chosen[s], 1.0, at.totals)
+        _add_cells(cells, table.first_courses[s] + chosen[s], 1.0, at.cell_totals)
+    work, values = make_value_work(valuation), np.empty((num_samples, valuation.num))
+    for label in range(num_labels):
+        value_rows(valuation, label, at.totals[label], work, values)
+        at.values[label] = _label_mean(values, coefficients)
+    return at
+
+
+@kernel
+def ascend(
+    table: Table,
+    valuation: Valuation,
+    coefficients: Floats,
+    cells: Cells,
+    allowed: Allowed,
+    start: Ints,
+    max_lines: int,
+) -> tuple[Ints, float, Trace]:
+    """One ascent from a joint action: one sensor after the other, until none alone can do better.
+
+    coefficients: (num,) of a label's numbers in the reward. max_lines: an end, for which no ascent is known to have
+    had need. Returns the joint action, its mean reward, and the trace.
+    """
+    at, num_sensors = _start(table, valuation, coefficients, cells, start), len(start)
+    work, values = make_value_work(valuation), np.empty((table.changes.shape[1], valuation.num))
+    before, gains = np.empty(len(table.start)), np.empty(np.max(np.diff(table.first_courses)))
+    found = np.sum(cells.worth * -np.expm1(at.cell_totals))
+    reward, settled, sensor, line = np.sum(at.values) + found, 0, 0, 0
+    evaluations, best = np.ones(max_lines + 1, np.int64), np.full(max_lines + 1, reward)
+    while settled < num_sensors and line < max_lines:
+        first, present = table.first_courses[sensor], at.chosen[sensor]
+        add_course(table, sensor, first + present, -1.0, at.totals)
+        _add_cells(cells, first + present, -1.0, at.cell_totals)
+        _line(table, valuation, coefficients, cells, sensor, at, before, values, work, gains)
+        chosen = _best(table, allowed, at.chosen, sensor, gains, reward)
+        reward += gains[chosen] - gains[present]
+        at.chosen[sensor] = chosen
+        add_course(table, sensor, first + chosen, 1.0, at.totals)
+        _add_cells(cells, first + chosen, 1.0, at.cell_totals)
+        line += 1
+        evaluations[line] = evaluations[line - 1] + table.first_courses[sensor + 1] - first - 1
+        best[line] = reward
+        settled = settled + 1 if chosen == present else 1
+        sensor = (sensor + 1) % num_sensors
+    return at.chosen, reward, Trace(evaluations[: line + 1], best[: line + 1])
+
+
+__all__ = ["Allowed", "Ascent", "Cells", "Trace", "ascend"]

@@ -1,0 +1,73 @@
+"""Bernoullis as rows of numbers that add up: what several sensors' scans say of one label is the sum of their rows.
+
+A Bernoulli of existence r and Gaussian density p, raised to a power, as a function of u = x - reference, has the
+*Bernoulli row*
+
+    information row of p (`vedette.kernels.gaussian.information`), then logit r, then log (1 - q):
+    bernoulli_size(dim) = row_size(dim) + 2 numbers,
+
+where q is the probability that the label was detected at all. Rows of independent evidence add, GCI scales rows by its
+weights and adds them, and the existence of a sum is its logit plus the log integral of its information row: the
+Bernoulli family is exponential. A *change* is the row after scans less the row without any.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from vedette.kernels.base.compile import borrowing, inlined
+from vedette.kernels.base.types import Floats, Ints
+from vedette.kernels.gaussian.information import log_integral, row_size
+
+# Certain and impossible targets are taken as all but that: a logit whose exponential is still a number.
+ALL_BUT_CERTAIN = 700.0
+
+_SAME_POWER = 1e-12
+
+
+class Table(NamedTuple):
+    """The changes of a decision: for every course of every sensor, the labels in its reach and their changes."""
+
+    first_courses: Ints  # (num_sensors + 1,) into the courses of all sensors
+    offsets: Ints  # (num_courses + 1,) into the entries
+    labels: Ints  # (num_entries,) increasing within a course
+    changes: Floats  # (num_entries, num_samples, bernoulli_size)
+    start: Floats  # (num_labels, bernoulli_size) rows of the joint density without any scan
+    powers: Floats  # (num_sensors,) to which the sensors' densities are raised
+
+
+@borrowing
+def bernoulli_size(dim: int) -> int:
+    """Length of the Bernoulli row of a state of `dim` components."""
+    return row_size(dim) + 2
+
+
+@inlined
+def log_miss(detection: float) -> float:
+    """log (1 - P_D); a sensor that never misses is taken as one that misses once in 1e12, so that nothing is sure."""
+    return math.log(max(1.0 - detection, 1e-12))
+
+
+@inlined
+def unscale(row: Floats) -> None:
+    """Where powers do not sum to one, as some sensors do not know the label, the others' are made to."""
+    power = row[row.shape[0] - 3]
+    if abs(power - 1.0) > _SAME_POWER and power > 0.0:
+        scale = 1.0 / power
+        for k in range(row.shape[0] - 2):
+            row[k] *= scale
+
+
+@inlined
+def integral_of(row: Floats, dim: int) -> float:
+    """log of the integral of the row's information part, which is used up: see `log_integral`."""
+    # The compiler unrolls a call of constant dimension.
+    if dim == 4:
+        return log_integral(row, 4)
+    if dim == 5:
+        return log_integral(row, 5)
+    return log_integral(row, dim)
+
+
+__all__ = ["ALL_BUT_CERTAIN", "Table", "bernoulli_size", "integral_of", "log_miss", "unscale"]

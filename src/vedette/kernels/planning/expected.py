@@ -1,0 +1,75 @@
+"""What scans are expected to teach of each label, without samples: information weighed by the chance of detection.
+
+Along the predicted path of a label, a scan that detects with probability P_D adds P_D times the information of a
+measurement, and the label is missed by all scans with the product of the 1 - P_D. P_D is the mean over the predicted
+Gaussian. As a change of a Bernoulli row: the information matrix and log (1 - q) alone.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from vedette.errors import NumericalError
+from vedette.kernels.base.compile import borrowing, inlined, kernel
+from vedette.kernels.base.types import Floats
+from vedette.kernels.gaussian.innovation import expect
+from vedette.kernels.gaussian.linalg import cholesky, inverse_from_factor
+from vedette.kernels.gaussian.prediction import predict
+from vedette.kernels.planning.bernoulli_rows import log_miss
+from vedette.kernels.planning.ideal import Decision
+from vedette.kernels.planning.known import Belief, Entries, Work, make_known_work
+
+
+@inlined
+def _invert(matrix: Floats, factor: Floats, out: Floats) -> None:
+    if not cholesky(matrix, factor):
+        raise NumericalError("expected information: covariance of a track is not positive definite")
+    inverse_from_factor(factor, out)
+
+
+@borrowing
+def _expected_cov(belief: Belief, decision: Decision, course: int, label: int, work: Work, out: Floats) -> float:
+    """Write the expected covariance at the end of the horizon; returns the log probability of never being detected."""
+    paths, horizon, n = belief.paths, decision.horizon, out.shape[0]
+    missed, prior, updated, factor = 0.0, work.inverse, work.predicted_cov, work.factor
+    for h in range(horizon.poses.shape[1]):
+        mean, cov = paths.means[label, h], paths.covs[label, h]
+        if h > 0:
+            predict(
+                decision.motion, horizon.dt, paths.means[label, h - 1], out, work.predicted_mean, work.cov, work.scratch
+            )
+            cov = work.cov
+        expect(decision.sensor, horizon.poses[course, h], mean, cov, 0, work.seen, work.scratch)
+        detection = work.seen.prob_detection[0]
+        missed += log_miss(detection)
+        _invert(cov, factor, prior)
+        _invert(work.seen.covs[0], factor, updated)
+        for i in range(n):
+            for j in range(n):
+                updated[i, j] = prior[i, j] + detection * (updated[i, j] - prior[i, j])
+        _invert(updated, factor, out)
+    return missed
+
+
+@kernel
+def fill_expected_changes(
+    belief: Belief, decision: Decision, entries: Entries, bases: Floats, first: int, last: int, changes: Floats
+) -> None:
+    """Changes (num_entries, 1, bernoulli_size) for courses `first:last` of a sensor; see `known.fill_changes`."""
+    dim, size = belief.paths.means.shape[2], bases.shape[1]
+    work = make_known_work(dim, len(decision.sensor.angular), decision.horizon.poses.shape[1])
+    cov, information = np.empty((dim, dim)), np.empty((dim, dim))
+    for course in range(first, last):
+        for entry in range(entries.first[course], entries.last[course]):
+            label, row, at = entries.own[entry], changes[entry, 0], 0
+            for k in range(size):
+                row[k] = 0.0
+            row[size - 1] = _expected_cov(belief, decision, course, label, work, cov)
+            _invert(cov, work.factor, information)
+            for i in range(dim):
+                for j in range(i + 1):
+                    row[at] = information[i, j] - bases[label, at]
+                    at += 1
+
+
+__all__ = ["fill_expected_changes"]

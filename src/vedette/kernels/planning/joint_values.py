@@ -1,0 +1,125 @@
+"""Rewards of joint actions as sums over labels: the changes of the chosen courses are added, label by label.
+
+A label that no chosen course reaches keeps its value without scans, which is taken once.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from vedette.kernels.base.compile import borrowing, inlined, kernel
+from vedette.kernels.base.types import Floats, Ints
+from vedette.kernels.planning.bernoulli_rows import Table
+from vedette.kernels.planning.label_values import Valuation, ValueWork, make_value_work, value_label
+
+
+@inlined
+def add_course(table: Table, sensor: int, course: int, sign: float, totals: Floats) -> None:
+    """Add, or with sign -1 take away, the changes of a course in totals (num_labels, num_samples, bernoulli_size)."""
+    power = sign * table.powers[sensor]
+    for entry in range(table.offsets[course], table.offsets[course + 1]):
+        label = table.labels[entry]
+        for sample in range(totals.shape[1]):
+            for k in range(totals.shape[2]):
+                totals[label, sample, k] += power * table.changes[entry, sample, k]
+
+
+@borrowing
+def value_rows(valuation: Valuation, label: int, rows: Floats, work: ValueWork, out: Floats) -> None:
+    """Values (num_samples, num) of a label's joint rows (num_samples, bernoulli_size)."""
+    for sample in range(rows.shape[0]):
+        for k in range(rows.shape[1]):
+            work.total[k] = rows[sample, k]
+        value_label(valuation, label, work, out[sample])
+
+
+@kernel
+def values_without_scans(rows: Floats, valuation: Valuation) -> Floats:
+    """(num_labels, num) values of rows (num_labels, bernoulli_size)."""
+    work, out = make_value_work(valuation), np.empty((len(rows), valuation.num))
+    for label in range(len(rows)):
+        for k in range(rows.shape[1]):
+            work.total[k] = rows[label, k]
+        value_label(valuation, label, work, out[label])
+    return out
+
+
+@kernel
+def start_totals(table: Table) -> Floats:
+    """(num_labels, num_samples, bernoulli_size) joint rows without any scan."""
+    num_labels, size = table.start.shape
+    totals = np.empty((num_labels, table.changes.shape[1], size))
+    for label in range(num_labels):
+        for sample in range(totals.shape[1]):
+            for k in range(size):
+                totals[label, sample, k] = table.start[label, k]
+    return totals
+
+
+@kernel
+def joint_values(table: Table, valuation: Valuation, actions: Ints, first: int, last: int, out: Floats) -> None:
+    """Sums over labels (num_joint, num_samples, num), of joint actions `first:last`.
+
+    actions: (num_joint, num_sensors) number of the course of each sensor; -1 for a sensor that does not scan.
+    """
+    totals, unseen = start_totals(table), values_without_scans(table.start, valuation)
+    num_labels, num_samples = totals.shape[0], totals.shape[1]
+    values, work = np.empty((num_samples, valuation.num)), make_value_work(valuation)
+    touched = np.empty(num_labels, np.int64)
+    for joint in range(first, last):
+        touched[:] = 0
+        for s in range(actions.shape[1]):
+            if actions[joint, s] >= 0:
+                course = table.first_courses[s] + actions[joint, s]
+                for entry in range(table.offsets[course], table.offsets[course + 1]):
+                    touched[table.labels[entry]] = 1
+                add_course(table, s, course, 1.0, totals)
+        out[joint] = 0.0
+        for label in range(num_labels):
+            if touched[label] == 1:
+                value_rows(valuation, label, totals[label], work, values)
+                totals[label] = table.start[label]
+            for sample in range(num_samples):
+                for e in range(valuation.num):
+                    out[joint, sample, e] += values[sample, e] if touched[label] == 1 else unseen[label, e]
+
+
+@borrowing
+def value_changed(
+    table: Table, valuation: Valuation, sensor: int, entry: int, rows: Floats, work: ValueWork, out: Floats
+) -> None:
+    """Values (num_samples, num) of the label of an entry, with its change added to the joint rows of the others."""
+    power = table.powers[sensor]
+    for sample in range(rows.shape[0]):
+        for k in range(rows.shape[1]):
+            work.total[k] = rows[sample, k] + power * table.changes[entry, sample, k]
+        value_label(valuation, table.labels[entry], work, out[sample])
+
+
+@kernel
+def line_values(
+    table: Table, valuation: Valuation, chosen: Ints, sensor: int, first: int, last: int, out: Floats
+) -> None:
+    """Sums over labels (num_courses of the sensor, num_samples, num), of its courses `first:last`, others as chosen.
+
+    chosen: (num_sensors,) as a row of `joint_values`; the sensor's own entry is not read.
+    """
+    totals, num_labels = start_totals(table), len(table.start)
+    num_samples = totals.shape[1]
+    for s in range(len(chosen)):
+        if s != sensor and chosen[s] >= 0:
+            add_course(table, s, table.first_courses[s] + chosen[s], 1.0, totals)
+    work, before = make_value_work(valuation), np.empty((num_labels, num_samples, valuation.num))
+    rest, values = np.zeros((num_samples, valuation.num)), np.empty((num_samples, valuation.num))
+    for label in range(num_labels):
+        value_rows(valuation, label, totals[label], work, before[label])
+        rest += before[label]
+    for course in range(first, last):
+        out[course] = rest
+        at = table.first_courses[sensor] + course
+        for entry in range(table.offsets[at], table.offsets[at + 1]):
+            label = table.labels[entry]
+            value_changed(table, valuation, sensor, entry, totals[label], work, values)
+            for sample in range(num_samples):
+                for e in range(valuation.num):
+                    out[course, sample, e] += values[sample, e] - before[label, sample, e]

@@ -1,0 +1,216 @@
+"""Decisions by sums over labels: against plain NumPy, densities fused one by one, and the full update."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from control.examples import (
+    SETTINGS,
+    A,
+    B,
+    C,
+    Situation,
+    additive_of,
+    evaluator_of,
+    lmb,
+    mobile_sensor,
+    situation,
+)
+from control.known_association import followed
+from vedette import models
+from vedette.control import CauchySchwarzReward, RenyiReward
+from vedette.control.bounds import best_values
+from vedette.control.pseudo import draw_futures
+from vedette.control.rewards import (
+    CardinalityVarianceReward,
+    ExpectedGospaReward,
+    ExpectedLossReward,
+    KullbackLeiblerReward,
+    PeecsReward,
+)
+from vedette.control.rewards.base import reward_value
+from vedette.control.search import all_joint_actions
+from vedette.densities.label_sets import single_gaussians
+from vedette.fusion import ParallelUpdate
+from vedette.kernels.planning.ascent import Allowed
+
+KNOWN = replace(SETTINGS, association="known")
+
+
+def shared(num_sensors: int = 2, seed: int = 3, **parts: Any) -> Situation:
+    """All sensors believe the same, and take their scans in full."""
+    rng = np.random.default_rng(seed)
+    belief = lmb((A, B, C), rng)
+    sensors = tuple(mobile_sensor("lmb", **parts) for _ in range(num_sensors))
+    example = situation("lmb", num_sensors, seed, KNOWN)
+    return replace(example, sensors=sensors, fusion=ParallelUpdate(), beliefs=(belief,) * num_sensors, fused=belief)
+
+
+def single(example: Situation) -> Situation:
+    """The same with one Gaussian a label at every sensor, the same labels at all."""
+    rng = np.random.default_rng(8)
+    beliefs = tuple(lmb((A, B), rng) for _ in example.sensors)
+    return replace(example, beliefs=beliefs, fused=example.fusion.fuse(beliefs)[0])
+
+
+@pytest.mark.lanes
+def test_labels_are_followed_as_in_plain_numpy() -> None:
+    """Existence, mean, covariance of every course, sample and label, at both sensors."""
+    example = situation("lmb", seed=2, settings=KNOWN)
+    evaluator = evaluator_of(example)
+    labels, futures = draw_futures(example.fused, example.sensors, KNOWN, rng=np.random.default_rng(5))
+    for s, (belief, sensor) in enumerate(zip(example.beliefs, example.sensors, strict=True)):
+        tracks, cases = single_gaussians(belief.tracks), evaluator.posteriors[s]
+        for course, sample in np.ndindex(len(evaluator.options[s].courses), KNOWN.num_samples):
+            ends = cases.density(course * KNOWN.num_samples + sample)
+            span = slice(futures[s].offsets[sample], futures[s].offsets[sample + 1])
+            for i, label in enumerate(tracks.labels.tolist()):
+                at = [place for place in range(span.start, span.stop) if labels[place].tolist() == label]
+                target = futures[s].states[:, at[0]] if at else None
+                logit, mean, cov, _ = followed(
+                    belief.existence_logit[i],
+                    tracks.means[i],
+                    tracks.covs[i],
+                    target,
+                    sensor,
+                    evaluator.options[s].courses[course],
+                    KNOWN,
+                )
+                np.testing.assert_allclose(ends.existence_logit[i], logit, rtol=1e-9, atol=1e-9)
+                np.testing.assert_allclose(ends.tracks.means[i], mean, rtol=1e-9)
+                np.testing.assert_allclose(ends.tracks.covs[i], cov, rtol=1e-8, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "reward",
+    [
+        CauchySchwarzReward(),
+        CauchySchwarzReward("reference"),
+        RenyiReward(0.3),
+        KullbackLeiblerReward(),
+        CardinalityVarianceReward(),
+        ExpectedGospaReward(50.0),
+        PeecsReward(0.3, 80.0),
+    ],
+)
+@pytest.mark.parametrize("rule", ["clmb", "parallel"])
+@pytest.mark.filterwarnings("ignore::vedette.errors.SlowRewardWarning")
+def test_sums_equal_densities_that_are_fused_one_by_one(reward: Any, rule: str) -> None:
+    """Every joint action and sample, and every sensor alone."""
+    example = single(situation("lmb", 2, 6, KNOWN)) if rule == "clmb" else shared()
+    actions = all_joint_actions((3, 3))
+    additive = additive_of(example, reward)
+    np.testing.assert_array_equal(additive.joint_shape(), (3, 3))
+
+    class OneByOne:
+        """The same reward as a function of two densities, or as power integrals of a fused one."""
+
+        def __call__(self, predicted: Any, updated: Any) -> float:
+            return reward_value(reward, predicted, updated)
+
+    plain = evaluator_of(example, OneByOne())
+    np.testing.assert_allclose(additive.joint()(actions), plain.joint()(actions), rtol=2e-8, atol=2e-8)
+    for s in range(2):
+        own = plain.alone(s)(actions[:3, 1:])
+        np.testing.assert_allclose(additive.alone(s)(actions[:3, 1:]), own, rtol=2e-8, atol=2e-8)
+
+
+@pytest.mark.lanes
+def test_known_association_is_the_full_update_where_labels_are_apart_and_always_seen() -> None:
+    """Nothing else can have given the measurement, and nothing else can have been measured."""
+    example = single(situation("lmb", 2, 6, SETTINGS, detection=models.constant_detection(1.0 - 1e-13)))
+    for full, known in zip(
+        evaluator_of(example).posteriors,
+        evaluator_of(replace(example, settings=KNOWN)).posteriors,
+        strict=True,
+    ):
+        np.testing.assert_allclose(known.means, full.means, rtol=1e-7, atol=1e-6)
+        np.testing.assert_allclose(known.covs, full.covs, rtol=1e-7, atol=1e-6)
+
+
+def test_lines_and_ascents_give_what_joint_actions_give() -> None:
+    """The same numbers, whichever way they are asked for; and no sensor alone can improve the end of an ascent."""
+    for seed in range(5):
+        evaluator = additive_of(shared(3, seed), CauchySchwarzReward("reference"))
+        additive, actions = evaluator.additive, all_joint_actions((3, 3, 3))
+        table = additive(actions).mean(axis=1).reshape(3, 3, 3)
+        chosen = np.array([1, 2, 0])
+        for s in range(3):
+            index = [*chosen.tolist()]
+            index[s] = slice(None)
+            np.testing.assert_allclose(additive.line(chosen, s).mean(axis=1), table[tuple(index)], rtol=1e-12)
+        allowed = Allowed(np.ones(9, np.bool_), np.ones((0, 0), np.bool_))
+        end, reward, trace = additive.ascend(chosen, allowed)
+        np.testing.assert_allclose(reward, table[tuple(end)], rtol=1e-12)
+        assert trace.best[-1] == reward
+        for s in range(3):
+            index = [*end.tolist()]
+            index[s] = slice(None)
+            assert table[tuple(index)].max() <= reward + 1e-8
+
+
+def test_an_ascent_takes_only_what_is_allowed() -> None:
+    """A course that may not be taken, and two that may not be taken together."""
+    additive = additive_of(shared(3, 1), CauchySchwarzReward("reference")).additive
+    table = additive(all_joint_actions((3, 3, 3))).mean(axis=1).reshape(3, 3, 3)
+    best = np.unravel_index(table.argmax(), table.shape)
+    single_mask, together = np.ones(9, np.bool_), np.ones((9, 9), np.bool_)
+    single_mask[best[0]] = False
+    together[3 + best[1], 6 + best[2]] = together[6 + best[2], 3 + best[1]] = False
+    start = np.array([(best[0] + 1) % 3, (best[1] + 1) % 3, best[2]])
+    end, reward, _ = additive.ascend(start, Allowed(single_mask, together))
+    assert end[0] != best[0]
+    assert (end[1], end[2]) != (best[1], best[2])
+    np.testing.assert_allclose(reward, table[tuple(end)], rtol=1e-12)
+
+
+@pytest.mark.parametrize("reward", [CauchySchwarzReward("reference"), ExpectedLossReward(60.0)])
+def test_no_joint_action_is_better_than_the_bound(reward: Any) -> None:
+    """By target, and for the expected loss also without trying what may be seen."""
+    for seed in range(8):
+        additive = additive_of(shared(3, seed), reward).additive
+        best = additive(all_joint_actions((3, 3, 3))).mean(axis=1).max()
+        tried = best_values(additive, 10**6)
+        assert best <= tried.sum() + 1e-9 * abs(best)
+        untried = best_values(additive, 0)
+        if isinstance(reward, ExpectedLossReward):
+            assert (tried <= untried + 1e-9 * np.abs(untried)).all()
+        else:
+            assert np.isinf(untried).all()
+
+
+def test_the_expected_loss_is_what_its_formula_says() -> None:
+    """Plain NumPy over one step, with the detection of the model's own mean over the Gaussian."""
+    settings = replace(KNOWN, horizon_steps=1)
+    example = replace(shared(2, 4), settings=settings)
+    evaluator = additive_of(example, ExpectedLossReward(60.0))
+    prediction, actions = evaluator.prediction, all_joint_actions((3, 3))
+    found = evaluator.joint()(actions)[:, 0]
+    for joint, value in zip(actions.tolist(), found.tolist(), strict=True):
+        total = 0.0
+        for i, (mean, cov) in enumerate(zip(prediction.tracks.means, prediction.tracks.covs, strict=True)):
+            missed, information = 1.0, np.zeros((4, 4))
+            for s, course in enumerate(joint):
+                own, pose = example.sensors[s].filter.sensor, evaluator.options[s].courses[course, 0]
+                detection = float(own.mean_detection(mean[None], cov[None], pose)[0])
+                slope = np.empty((2, 4))
+                own.measurement.jacobian(mean, pose, own.measurement.params, slope)
+                missed *= 1.0 - detection
+                information += detection * slope.T @ np.linalg.solve(own.noise.covs(mean[None], pose, 2)[0], slope)
+            seen = np.linalg.inv(np.linalg.inv(cov) + information / (1.0 - missed))
+            losses = [min(float(np.trace(each[:2, :2])), 3600.0) for each in (seen, cov)]
+            total -= prediction.existence[i] * ((1.0 - missed) * losses[0] + missed * losses[1])
+        np.testing.assert_allclose(value, total, rtol=1e-9)
+
+
+def test_threads_change_nothing() -> None:
+    """The same bytes from one thread and from three."""
+    tables = []
+    for num_threads in (1, 3):
+        example = replace(shared(3, 2), settings=replace(KNOWN, num_threads=num_threads))
+        tables.append(additive_of(example).joint()(all_joint_actions((3, 3, 3))))
+    np.testing.assert_array_equal(*tables)
