@@ -74,12 +74,12 @@ def test_nothing_in_view() -> None:
 
 
 @model_function("prob_detection")
-def _certain(state, pose, params):  # type: ignore[no-untyped-def]
+def _certain(state, pose, params):
     return params[0]
 
 
 def test_a_detection_that_is_certain_leaves_nothing() -> None:
-    own = sensor(models.DetectionModel(_certain, [1.0])).to_kernel()
+    own = sensor(models.DetectionModel(_certain, np.array([1.0]))).to_kernel()
     nodes, weights = GRID.states(4, 1), GRID.node_weights(1)
     offsets, cells, log_miss = cells_in_view(own, some_courses(1), nodes, weights, 0.5, math.inf)
     np.testing.assert_array_equal(offsets, [0, 35])
@@ -88,6 +88,6 @@ def test_a_detection_that_is_certain_leaves_nothing() -> None:
 
 
 def test_what_is_no_probability_is_refused() -> None:
-    own = sensor(models.DetectionModel(_certain, [1.5])).to_kernel()
+    own = sensor(models.DetectionModel(_certain, np.array([1.5]))).to_kernel()
     with pytest.raises(ModelError, match=r"probability is not in \[0, 1\]"):
         cells_in_view(own, some_courses(), STATES, WEIGHTS, 0.5, math.inf)

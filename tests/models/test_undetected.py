@@ -18,6 +18,8 @@ from vedette.models.undetected import cell_shares
 pytestmark = pytest.mark.lanes
 
 REGION = Region(-100.0, 140.0, 10.0, 90.0)
+ANY: Any = "box"
+HALF: Any = 2.5
 GRID = CellGrid(REGION, 6, 4)  # cells of 40 m x 20 m
 
 
@@ -62,14 +64,15 @@ def test_who_stands_still_stays() -> None:
 def test_prediction_is_the_map_of_all_pairs_of_cells() -> None:
     rng = np.random.default_rng(1)
     model = UndetectedModel(GRID, rng.uniform(0.0, 2.0, 24), birth_rate=0.3, enters="border", speed=9.0)
+    at_first = model.initial()
     survival, dt = rng.uniform(0.5, 1.0, 24), 2.0
     expected = model.births(dt)
     for i in range(24):
         for j in range(24):
             across, along = abs(i % 6 - j % 6), abs(i // 6 - j // 6)
             chance = share_by_quadrature(18.0, 40.0, across) * share_by_quadrature(18.0, 20.0, along)
-            expected[j] += chance * survival[i] * model.expected[i]
-    np.testing.assert_allclose(model.predict(model.expected, dt, survival), expected, rtol=1e-10)
+            expected[j] += chance * survival[i] * at_first[i]
+    np.testing.assert_allclose(model.predict(at_first, dt, survival), expected, rtol=1e-10)
 
 
 def as_matrix(model: UndetectedModel, dt: float) -> Any:
@@ -97,10 +100,10 @@ def test_targets_are_lost_over_the_edge_alone() -> None:
 
 def test_prediction_of_no_time_changes_nothing() -> None:
     model = UndetectedModel(GRID, np.arange(24.0), birth_rate=1.0, speed=5.0)
-    before = model.expected.copy()
-    np.testing.assert_array_equal(model.predict(model.expected, 0.0, 1.0), before)
-    model.predict(model.expected, 1.0, 0.5)
-    np.testing.assert_array_equal(model.expected, before)
+    before = model.initial()
+    np.testing.assert_array_equal(model.predict(before, 0.0, 1.0), np.arange(24.0))
+    model.predict(before, 1.0, 0.5)
+    np.testing.assert_array_equal(before, np.arange(24.0))
 
 
 @pytest.mark.parametrize(("columns", "rows"), [(6, 4), (1, 4), (3, 1), (1, 1)])
@@ -119,7 +122,7 @@ def test_who_enters_at_the_border_appears_along_it(columns: int, rows: int) -> N
 
 
 def test_a_number_for_the_region_is_spread_evenly() -> None:
-    np.testing.assert_allclose(UndetectedModel(GRID, 6.0).expected, np.full(24, 0.25))
+    np.testing.assert_allclose(UndetectedModel(GRID, 6.0).initial(), np.full(24, 0.25))
 
 
 def test_cells_go_from_the_south_west_row_after_row() -> None:
@@ -148,16 +151,16 @@ def test_a_grid_of_cells_up_to_a_size(cell: float, columns: int, rows: int) -> N
     assert (grid.columns, grid.rows) == (columns, rows)
 
 
-BAD = [
+BAD: list[tuple[Any, str]] = [
     (lambda: CellGrid(REGION, 0, 4), "CellGrid.columns: expected a whole number of at least 1; got 0"),
-    (lambda: CellGrid(REGION, 3, 2.5), "CellGrid.rows: expected a whole number of at least 1; got 2.5"),
-    (lambda: CellGrid((0, 1, 0, 1), 3, 2), "CellGrid.region: expected a Region; got"),
+    (lambda: CellGrid(REGION, 3, HALF), "CellGrid.rows: expected a whole number of at least 1; got 2.5"),
+    (lambda: CellGrid(ANY, 3, 2), "CellGrid.region: expected a Region; got box"),
     (lambda: CellGrid.covering(REGION, 0.0), "cell: expected a number above 0; got 0"),
     (lambda: GRID.states(1), "state_dim: expected at least 2, px and py first; got 1"),
     (lambda: GRID.states(4, 0), "nodes_a_side: expected a whole number of at least 1; got 0"),
-    (lambda: UndetectedModel("grid", 1.0), "UndetectedModel.grid: expected a CellGrid; got grid"),
+    (lambda: UndetectedModel(ANY, 1.0), "UndetectedModel.grid: expected a CellGrid; got box"),
     (lambda: UndetectedModel(GRID, -1.0), "UndetectedModel.expected: expected a number of at least 0; got -1"),
-    (lambda: UndetectedModel(GRID, [1.0]), r"UndetectedModel.expected: expected an array of shape \(24,\)"),
+    (lambda: UndetectedModel(GRID, np.ones(1)), r"UndetectedModel.expected: expected an array of shape \(24,\)"),
     (lambda: UndetectedModel(GRID, -np.ones(24)), "UndetectedModel.expected: expected numbers of at least 0; got"),
     (lambda: UndetectedModel(GRID, np.full(24, np.nan)), "UndetectedModel.expected: expected finite numbers"),
     (lambda: UndetectedModel(GRID, 1.0, birth_rate=-1.0), "UndetectedModel.birth_rate: expected a number of at least"),

@@ -103,7 +103,7 @@ def test_the_intensity_is_that_of_plain_numpy(survival: float | None) -> None:
 
 
 @model_function("prob_survival")
-def _by_place(state, dt, params):  # type: ignore[no-untyped-def]
+def _by_place(state, dt, params):
     return 0.5 if state[0] < 0.0 else 0.9 + state[2]
 
 
@@ -162,7 +162,7 @@ def test_it_wants_a_tracker_and_a_model() -> None:
 
 
 @model_function("prob_detection")
-def _no_probability(state, pose, params):  # type: ignore[no-untyped-def]
+def _no_probability(state, pose, params):
     return 1.2
 
 

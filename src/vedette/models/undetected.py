@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 from scipy.special import erfcx
 
 from vedette.kernels.base.types import Floats
@@ -26,8 +26,8 @@ class UndetectedModel:
 
     Attributes:
         grid: the cells.
-        expected: (num_cells,) mean number of undetected targets in each cell at the first scan, before it; or one
-            number for the whole region, spread evenly.
+        expected: mean number of undetected targets in the region at the first scan, before it, spread evenly; or
+            (num_cells,) that in each cell.
         birth_rate: mean number of targets that appear in the region in a second.
         enters: where: "anywhere" alike, or at the "border" of the region, in the cells along it.
         speed: m/s; standard deviation of each of the two components of the velocity.
@@ -39,7 +39,7 @@ class UndetectedModel:
     """
 
     grid: CellGrid
-    expected: Floats
+    expected: float | Floats
     birth_rate: float = 0.0
     enters: str = "anywhere"
     speed: float = 0.0
@@ -54,16 +54,19 @@ class UndetectedModel:
             raise reject("UndetectedModel.enters", "anywhere or border", self.enters)
         if self.survival is not None:
             object.__setattr__(self, "survival", probability("UndetectedModel.survival", self.survival))
-        object.__setattr__(self, "expected", self._spread_evenly(self.expected))
-
-    def _spread_evenly(self, expected: ArrayLike) -> Floats:
-        num = self.grid.num_cells
-        if np.ndim(expected) == 0:
-            return np.full(num, non_negative("UndetectedModel.expected", expected) / num)
-        values = float_array("UndetectedModel.expected", expected, (num,))
+        field = "UndetectedModel.expected"
+        if np.ndim(self.expected) == 0:
+            object.__setattr__(self, "expected", non_negative(field, self.expected))
+            return
+        values = float_array(field, self.expected, (self.grid.num_cells,))
         if (values < 0.0).any():
-            raise reject("UndetectedModel.expected", "numbers of at least 0", values[values < 0.0])
-        return values
+            raise reject(field, "numbers of at least 0", values[values < 0.0])
+        object.__setattr__(self, "expected", values)
+
+    def initial(self) -> Floats:
+        """(num_cells,) mean number of undetected targets in each cell at the first scan, before it."""
+        num = self.grid.num_cells
+        return np.full(num, self.expected / num) if np.ndim(self.expected) == 0 else np.array(self.expected)
 
     def births(self, dt: float) -> Floats:
         """(num_cells,) mean number of targets that appear within `dt` seconds."""

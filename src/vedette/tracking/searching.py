@@ -59,7 +59,7 @@ class Searching:
 
     def initial(self) -> State:
         """As the tracker's, with those that the model expects to be there at first."""
-        return replace(self.tracker.initial(), undetected=UndetectedIntensity(self.model.grid, self.model.expected))
+        return replace(self.tracker.initial(), undetected=UndetectedIntensity(self.model.grid, self.model.initial()))
 
     def step(
         self, state: State, scans: Sequence[Any], poses: Any, time: float, *, rngs: Sequence[np.random.Generator]
