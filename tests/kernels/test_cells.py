@@ -11,6 +11,7 @@ import pytest
 from vedette import models
 from vedette.errors import ModelError
 from vedette.kernels.planning.cells import cells_in_view
+from vedette.kernels.steps.undetected import survival_probabilities, take_out_detected
 from vedette.models.functions import model_function
 
 pytestmark = pytest.mark.lanes
@@ -63,6 +64,30 @@ def test_cells_in_view_are_those_of_plain_numpy(detection: Any, reach: float, le
         np.testing.assert_array_equal(cells, expected[1])
         np.testing.assert_allclose(log_miss, expected[2], rtol=1e-12)
     assert 0 < len(cells) <= 6 * GRID.num_cells
+
+
+@pytest.mark.parametrize("max_range", [12.0, 55.0])
+def test_what_a_scan_leaves_is_that_of_plain_numpy(max_range: float) -> None:
+    detection, expected = models.limited_range(0.9, max_range), np.linspace(0.0, 2.0, 35)
+    for pose in some_courses()[:, 0]:
+        left = take_out_detected(sensor(detection).to_kernel(), pose, STATES, WEIGHTS, expected)
+        missed = [1.0 - WEIGHTS @ detection.prob(states, pose) for states in STATES]
+        np.testing.assert_allclose(left, expected * missed, rtol=1e-13)
+    np.testing.assert_array_equal(expected, np.linspace(0.0, 2.0, 35))
+
+
+@model_function("prob_survival")
+def _by_place(state, dt, params):
+    return params[0] if state[0] < 0.0 else dt * state[1]
+
+
+def test_survival_is_asked_state_by_state() -> None:
+    motion = models.constant_velocity(1.0)
+    bundle = models.kernel_motion(motion, models.SurvivalModel(_by_place, np.array([0.3])))
+    states = np.array([[-1.0, 9.0, 0.0, 0.0], [1.0, 0.2, 0.0, 0.0]])
+    np.testing.assert_allclose(survival_probabilities(bundle, 2.0, states), [0.3, 0.4])
+    with pytest.raises(ModelError, match=r"survival model: probability is not in \[0, 1\]"):
+        survival_probabilities(bundle, 6.0, states)
 
 
 def test_nothing_in_view() -> None:
