@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from reference.differences import central_differences
 from vedette import models
-from vedette.errors import InputError
+from vedette.errors import InputError, ModelError
 
 pytestmark = pytest.mark.lanes
 
@@ -196,3 +197,31 @@ def test_a_soft_sector_far_away_and_at_the_sensor():
 def test_bad_numbers_are_named(make, field):
     with pytest.raises(InputError, match=field):
         make()
+
+
+@pytest.mark.parametrize(
+    ("detection", "reach"),
+    [
+        (models.limited_range(0.9, 600.0), 600.0),
+        (models.limited_range(0.9, 600.0, 0.1), math.inf),
+        (models.limited_sector(0.9, 600.0, 1.0), 600.0),
+        (models.limited_sector(0.9, 600.0, 1.0, 0.1), math.inf),
+        (models.camera(0.9, 600.0), 600.0),
+        (models.camera(0.9, 600.0, 0.3), math.inf),
+        (models.gaussian_detection(600.0), math.inf),
+        (models.constant_detection(0.9), math.inf),
+    ],
+)
+def test_nothing_is_detected_beyond_the_reach(detection, reach):
+    assert detection.reach == reach
+    detection.check(STATES, np.array([*POSE, 0.2, 0.5]))
+    assert not detection.prob(STATES, np.array([*POSE, 0.2, 0.5]))[reach < RANGES].any()
+
+
+def test_a_reach_that_is_not_true_is_found():
+    detection = replace(models.gaussian_detection(600.0), reach=900.0)
+    detection.check(STATES[RANGES < 900.0], POSE)
+    with pytest.raises(ModelError, match="expected 0, as its reach is 900 m; got 0"):
+        detection.check(STATES, POSE)
+    with pytest.raises(InputError, match=r"DetectionModel\.reach: expected a number above 0; got 0"):
+        replace(detection, reach=0.0)

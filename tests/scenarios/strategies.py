@@ -165,6 +165,13 @@ def tracking(draw: st.DrawFn, num_sensors: int) -> Data:
     }
 
 
+def undetected(side: float) -> st.SearchStrategy[Data]:
+    """side: of the region."""
+    fixed = needed(cell=st.floats(side / 400.0, side * 2.0), expected=rates, speed=zero_or_more)
+    more = section(birth_rate=rates, enters=st.sampled_from(["anywhere", "border"]), survival=probability)
+    return st.builds(lambda one, other: {**one, **other}, fixed, more)
+
+
 @st.composite
 def scenarios(draw: st.DrawFn) -> Data:
     """The data of a valid scenario file."""
@@ -194,6 +201,7 @@ def scenarios(draw: st.DrawFn) -> Data:
         "sensors": [{**item, "name": f"{draw(names)}{number}"} for number, item in enumerate(carried)],
         **draw(tracking(len(carried))),
         "control": draw(control),
+        **draw(section(undetected=undetected(max(y)))),
         "ospa": draw(
             section(
                 cutoff=positive,

@@ -50,6 +50,11 @@ CASES = [
         ["f.yaml:17:29: sensors[0].position: expected a list of 2, got a list of 3"],
     ),
     (
+        "heading_deg: 4.0",
+        "platform: {kind: waypoints, speed: 1.0, points: [[0.0, 1.0], [2.0]]}",
+        ["f.yaml:17:103: sensors[0].platform.points[1]: expected a list of 2, got a list of 1"],
+    ),
+    (
         "position: [0.0, 40.0], ",
         "",
         ["f.yaml:17:5: sensors[0].position: expected a value, as it is required, got nothing"],

@@ -15,7 +15,7 @@ CASES = [
         "nane: small",
         [
             "f.yaml:1:1: name: expected a value, as it is required, got nothing",
-            "f.yaml:1:1: nane: expected one of birth, control, description, estimator, filter, format, fusion, metrics, motion, name, network, ospa, planners, region, sensor_defaults, sensors, survival, targets, time, got an unknown key (did you mean name?)",
+            "f.yaml:1:1: nane: expected one of birth, control, description, estimator, filter, format, fusion, metrics, motion, name, network, ospa, planners, region, sensor_defaults, sensors, survival, targets, time, undetected, got an unknown key (did you mean name?)",
         ],
     ),
     ("name: small", "name: ''", ['f.yaml:1:7: name: expected a name of one or more printable characters, got ""']),

@@ -31,6 +31,7 @@ from vedette.densities.statistics import (
     track_moments,
 )
 from vedette.densities.tracks import TrackTable
+from vedette.densities.undetected import UndetectedIntensity
 
 __all__ = [
     "GLMB",
@@ -43,6 +44,7 @@ __all__ = [
     "Poisson",
     "TrackHistory",
     "TrackTable",
+    "UndetectedIntensity",
     "cardinality_distribution",
     "existence_probabilities",
     "glmb_to_lmb",

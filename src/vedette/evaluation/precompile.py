@@ -53,7 +53,8 @@ def _compile_planning(scenario: Scenario) -> None:
     fused = planner.fusion.fuse(beliefs)[0]
     experiment.estimate(fused, 1)
     quick = replace(planner, settings=replace(planner.settings, num_samples=2, horizon_steps=1, num_threads=1))
-    quick.plan(State(beliefs, fused), experiment.poses, rng=run_stream(0, 0))
+    state = State(beliefs, fused, undetected=experiment.tracker.initial().undetected)
+    quick.plan(state, experiment.poses, rng=run_stream(0, 0))
 
 
 def _belief(experiment: Experiment, num_targets: int) -> GLMB | LMB:

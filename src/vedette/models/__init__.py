@@ -14,6 +14,7 @@ from vedette.models.detection import (
 )
 from vedette.models.detection_functions import MAX_PROB_DETECTION
 from vedette.models.functions import ModelFunction, model_function
+from vedette.models.grid import CellGrid
 from vedette.models.kinematics import constant_velocity, coordinated_turn
 from vedette.models.measurement import MeasurementModel, NoiseModel
 from vedette.models.motion import MotionModel, SurvivalModel, constant_survival, kernel_motion
@@ -24,10 +25,12 @@ from vedette.models.region_clutter import region_clutter
 from vedette.models.sensor import SensorModel
 from vedette.models.sensor_clutter import around_sensor
 from vedette.models.targets import TargetModel
+from vedette.models.undetected import UndetectedModel
 
 __all__ = [
     "MAX_PROB_DETECTION",
     "BirthModel",
+    "CellGrid",
     "ClutterModel",
     "ClutterSampler",
     "DetectionModel",
@@ -40,6 +43,7 @@ __all__ = [
     "SensorModel",
     "SurvivalModel",
     "TargetModel",
+    "UndetectedModel",
     "around_sensor",
     "axis_noise",
     "bearing_only",

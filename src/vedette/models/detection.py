@@ -8,11 +8,12 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
+from vedette.errors import ModelError
 from vedette.kernels.base.types import Floats
 from vedette.models import detection_functions as functions
 from vedette.models.arguments import params_vector, pose_vector, positive, probability, reject, state_table
 from vedette.models.detection_functions import MAX_PROB_DETECTION
-from vedette.models.functions import ModelFunction, call, require_kind
+from vedette.models.functions import ModelFunction, call, describe, require_kind
 from vedette.models.probe import probe_probability
 
 
@@ -25,16 +26,21 @@ class DetectionModel:
         params: its parameter vector.
         mean_function: model function of kind `mean_prob_detection` (same parameters): the mean over a Gaussian, where
             it is known; None: it is taken by nodes, see `SensorModel.detection_at`.
+        reach: m; farther than this from the sensor the probability is known to be 0, so that who asks of many places
+            need not ask there; inf: nothing is known.
     """
 
     function: ModelFunction
     params: Floats = field(default_factory=lambda: np.empty(0))
     mean_function: ModelFunction | None = None
+    reach: float = math.inf
 
     def __post_init__(self) -> None:
         require_kind("DetectionModel.function", self.function, "prob_detection")
         if self.mean_function is not None:
             require_kind("DetectionModel.mean_function", self.mean_function, "mean_prob_detection")
+        if self.reach != math.inf:
+            positive("DetectionModel.reach", self.reach)
         object.__setattr__(self, "params", params_vector("DetectionModel.params", self.params))
 
     def prob(self, states: ArrayLike, pose: ArrayLike) -> Floats:
@@ -43,10 +49,17 @@ class DetectionModel:
         return np.array([call(self.function, state, at, self.params) for state in table], dtype=np.float64)
 
     def check(self, states: ArrayLike, pose: ArrayLike) -> None:
-        """Try the functions at each state (the mean: variances of 1); `ModelError` unless they give probabilities."""
+        """Try the functions at each state (the mean: variances of 1).
+
+        Raises:
+            ModelError: they do not give probabilities, or one above 0 beyond `reach`.
+        """
         at = pose_vector("pose", pose)
         for state in state_table("states", states):
-            probe_probability(self.function, (state, at, self.params))
+            chance, offset = probe_probability(self.function, (state, at, self.params)), state[:2] - at[:2]
+            if chance > 0.0 and offset @ offset > self.reach**2:
+                told = f"0, as its reach is {self.reach:g} m; got {chance:g}"
+                raise ModelError(f"{describe(self.function, state, at, self.params)}: expected {told}")
             if self.mean_function is not None:
                 probe_probability(self.mean_function, (state, np.eye(len(state)), at, self.params))
 
@@ -59,6 +72,11 @@ def _half_width(half_width_rad: float) -> float:
     if positive("half_width_rad", half_width_rad) > math.pi:
         raise reject("half_width_rad", "an angle in (0, pi]", half_width_rad)
     return float(half_width_rad)
+
+
+def _edge(max_range: float, outside: float) -> float:
+    """How far there is anything to detect."""
+    return float(max_range) if outside == 0.0 else math.inf
 
 
 def constant_detection(prob_detection: float) -> DetectionModel:
@@ -74,7 +92,7 @@ def gaussian_detection(sigma: float) -> DetectionModel:
 def limited_range(prob_detection: float, max_range: float, outside: float = 0.0) -> DetectionModel:
     """Constant up to `max_range` metres, `outside` beyond."""
     params = np.array([_guarded(prob_detection), positive("max_range", max_range), _guarded(outside, "outside")])
-    return DetectionModel(functions.limited_range, params, functions.mean_limited_range)
+    return DetectionModel(functions.limited_range, params, functions.mean_limited_range, _edge(max_range, outside))
 
 
 def limited_sector(
@@ -83,7 +101,10 @@ def limited_sector(
     """Constant up to `max_range` metres, within `half_width_rad`, in (0, pi], of the heading; else `outside`."""
     params = [_guarded(prob_detection), positive("max_range", max_range), _half_width(half_width_rad)]
     return DetectionModel(
-        functions.limited_sector, np.array([*params, _guarded(outside, "outside")]), functions.mean_limited_sector
+        functions.limited_sector,
+        np.array([*params, _guarded(outside, "outside")]),
+        functions.mean_limited_sector,
+        _edge(max_range, outside),
     )
 
 
@@ -133,4 +154,5 @@ def camera(prob_detection: float, max_range: float, reference_half_width_rad: fl
         0.0 if reference_half_width_rad is None else positive("reference_half_width_rad", reference_half_width_rad)
     )
     params = np.array([_guarded(prob_detection), positive("max_range", max_range), reference])
-    return DetectionModel(functions.camera, params, functions.mean_camera)
+    reach = float(max_range) if reference == 0.0 else math.inf
+    return DetectionModel(functions.camera, params, functions.mean_camera, reach)

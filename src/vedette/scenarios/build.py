@@ -25,7 +25,7 @@ from vedette.scenarios.sections.tracking import Filter as FilterSection
 from vedette.simulation.experiment import Experiment
 from vedette.simulation.true_sensors import TrueSensor
 from vedette.simulation.truth import TargetSource
-from vedette.tracking import BeliefNetwork, Central, CentralFilter, Distributed, ScanNetwork, Tracker
+from vedette.tracking import BeliefNetwork, Central, CentralFilter, Distributed, ScanNetwork, Searching, Tracker
 
 
 def build_experiment(scenario: Scenario) -> Experiment:
@@ -92,6 +92,12 @@ def build_scan_times(scenario: Scenario) -> Bools:
 
 
 def _tracker(scenario: Scenario, filters: tuple[Filter, ...]) -> Tracker:
+    """What follows the targets that are found, and where the scenario has them those that are not."""
+    section, found = scenario.model.undetected, _tracker_of_found(scenario, filters)
+    return found if section is None else Searching(found, section.build(scenario.model.region))
+
+
+def _tracker_of_found(scenario: Scenario, filters: tuple[Filter, ...]) -> Tracker:
     """The filters and their fusion, or one filter for all sensors; over a network, where there is one."""
     model, fusion = scenario.model, scenario.model.fusion.build(len(filters), scenario.folder)
     central = _central_filter(scenario, filters)

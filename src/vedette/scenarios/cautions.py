@@ -33,6 +33,7 @@ _POINTS_A_SIDE = 21
 def cautions(scenario: Scenario) -> tuple[str, ...]:
     """Warnings of a valid scenario, one line each, with file, line and column where it was read from a file."""
     found = [*_records(scenario), *_views(scenario.model), *_births(scenario.model), *_late_beliefs(scenario.model)]
+    found += _cells(scenario.model)
     if not found:
         return ()
     document = document_of(scenario)
@@ -84,6 +85,20 @@ def _late_beliefs(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
         f"whose beliefs are older, and {_rule(fusion)} then keeps it down; take fusion.kind: sequential, where scans "
         "that come late are put in their place",
     )
+
+
+def _cells(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
+    if model.undetected is None:
+        return
+    for name, sensor in zip(sensor_names(model), model.sensors, strict=True):
+        field = field_of_view(sensor)
+        if field is not None and field.reach < 0.5 * model.undetected.cell:
+            yield (
+                ("undetected", "cell"),
+                f"cells of {model.undetected.cell:g} m, and {name} sees as far as {field.reach:g} m: what it sees of a "
+                "cell is taken at nine places in it, and too rough; take cells of at most twice as far as it sees",
+            )
+            return
 
 
 def _views(model: ScenarioModel) -> Iterator[tuple[Path, str]]:

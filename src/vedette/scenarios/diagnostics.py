@@ -184,7 +184,7 @@ def _translate(error: ErrorDetails, annotation: Any, path: Path) -> Told:
         case "too_short" | "too_long":
             return Told(path, *_length_fault(error, inner))
         case "missing" if inside:
-            return Told(path[:-1], *_length_fault(error, annotation))
+            return Told(path[:-1], *_length_fault(error, _inside(error["loc"][:-1], annotation)[1]))
         case "missing":
             return Told(path, "a value, as it is required", "nothing")
         case "literal_error" if isinstance(error["input"], str):

@@ -13,6 +13,8 @@ from vedette.scenarios.sections.fusion import OF_SCANS, AnyFusion, CustomFusion
 from vedette.scenarios.sections.sensors import Sensor
 from vedette.scenarios.sections.targets import RecordedTargets
 from vedette.scenarios.sections.tracking import AnyFilter, Filter
+from vedette.scenarios.sections.undetected import UndetectedSection
+from vedette.scenarios.sections.world import RegionSection
 from vedette.text import counted
 
 
@@ -65,13 +67,14 @@ def facts(model: ScenarioModel) -> list[tuple[str, str]]:
     end = time.start + (time.num_steps - 1) * time.step_period
     return [
         ("scans", f"{time.num_steps}, every {time.step_period:g} s from {time.start:g} to {end:g} s"),
-        ("region", f"x {region.x_min:g} to {region.x_max:g} m, y {region.y_min:g} to {region.y_max:g} m"),
+        ("region", _bounds(region)),
         ("motion", settings(model.motion)),
         ("survival", settings(model.survival)),
         ("births", _births(model.birth)),
         ("filter", _filter(model.filter)),
         ("fusion", _fusion(model.fusion)),
         *(() if model.network is None else (("network", settings(model.network)),)),
+        *(() if model.undetected is None else (("not yet found", _undetected(model.undetected)),)),
         ("estimate", settings(model.estimator)),
         ("decisions", _decisions(model.decision_steps)),
         ("horizon", f"{counted(control.horizon_steps, 'step')} of {control.horizon_period:g} s"),
@@ -81,6 +84,14 @@ def facts(model: ScenarioModel) -> list[tuple[str, str]]:
         *((f"planner {name}", settings(section)) for name, section in model.planners.items()),
         *((f"metric {name}", settings(section)) for name, section in model.metrics.items()),
     ]
+
+
+def _bounds(region: RegionSection) -> str:
+    return f"x {region.x_min:g} to {region.x_max:g} m, y {region.y_min:g} to {region.y_max:g} m"
+
+
+def _undetected(section: UndetectedSection) -> str:
+    return settings(section) + ("" if section.region is None else f", in {_bounds(section.region)}")
 
 
 def _filter(section: AnyFilter) -> str:

@@ -6,6 +6,7 @@ from vedette.tracking.central import Central, CentralFilter
 from vedette.tracking.distributed import Distributed
 from vedette.tracking.network import Network
 from vedette.tracking.scan_network import ScanNetwork
+from vedette.tracking.searching import Searching
 from vedette.tracking.stages import Stages, stage_of
 
 __all__ = [
@@ -15,6 +16,7 @@ __all__ = [
     "Distributed",
     "Network",
     "ScanNetwork",
+    "Searching",
     "Stages",
     "State",
     "Tracker",

@@ -8,6 +8,7 @@ from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
+from vedette.densities import UndetectedIntensity
 from vedette.errors import InputError
 from vedette.filters import FilterInfo
 from vedette.kernels.base.types import Floats
@@ -28,6 +29,7 @@ class State:
         step: number of the scan, from 1; 0 before the first.
         time: s, of that scan; None before the first.
         memory: what the tracker itself must know at the next step, such as who may then be born; None: nothing.
+        undetected: the targets that no sensor has found yet, where the tracker keeps account of them (`Searching`).
     """
 
     local: tuple[Any, ...]
@@ -35,6 +37,7 @@ class State:
     step: int = 0
     time: float | None = None
     memory: Any = None
+    undetected: UndetectedIntensity | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -17,6 +17,7 @@ from vedette.scenarios.sections.birth import BirthSite
 from vedette.scenarios.sections.fusion import OF_LMBS, OF_SCANS
 from vedette.scenarios.sections.network_checks import NETWORK_CHECKS
 from vedette.scenarios.sections.tracking import UNLABELLED
+from vedette.scenarios.sections.undetected import cells_of_undetected
 
 if TYPE_CHECKING:
     from vedette.scenarios.sections.scenario import ScenarioModel
@@ -216,5 +217,6 @@ CHECKS = (
     _sensor_names,
     _scan_steps,
     _score,
+    cells_of_undetected,
     *NETWORK_CHECKS,
 )

@@ -19,6 +19,7 @@ from vedette.scenarios.sections.scoring import AnyEstimator, AnyMetric, MapEstim
 from vedette.scenarios.sections.sensors import Sensor, SensorDefaults
 from vedette.scenarios.sections.targets import Targets
 from vedette.scenarios.sections.tracking import AnyFilter, Filter
+from vedette.scenarios.sections.undetected import UndetectedSection
 from vedette.scenarios.sections.world import (
     ConstantSurvival,
     ConstantVelocity,
@@ -59,6 +60,9 @@ class ScenarioModel(Section):
     fusion: AnyFusion = Field(default=Fusion(), description="How their densities become one [-].")
     network: NetworkSection | None = Field(
         default=None, description="The radio between the sensors; none: all that one knows, all know at once [-]."
+    )
+    undetected: UndetectedSection | None = Field(
+        default=None, description="The targets not yet found, for planners that search; none: no account of them [-]."
     )
     estimator: AnyEstimator = Field(default=MapEstimator(), description="How estimates are read off [-].")
     control: Control = Field(default=Control(), description="When and how the sensors decide [-].")

@@ -1,0 +1,70 @@
+"""Poisson intensity of the targets that no sensor has found yet, on a grid."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vedette.densities import checks
+from vedette.errors import InputError
+from vedette.kernels.base.types import Floats
+from vedette.models import CellGrid, Region
+from vedette.models.arguments import non_negative, reject
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class UndetectedIntensity:
+    """Poisson density of undetected targets: any number in each cell, independent of the others, and anywhere in it.
+
+    Attributes:
+        grid: the cells of a region.
+        expected: (num_cells,) mean number of undetected targets in each; a copy of what is given.
+
+    Raises:
+        InputError: another number of cells, or a number that is negative or not finite.
+    """
+
+    grid: CellGrid
+    expected: Floats
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.grid, CellGrid):
+            raise reject("UndetectedIntensity.grid", "a CellGrid", self.grid)
+        field = "UndetectedIntensity.expected"
+        expected = checks.as_floats(field, self.expected, (self.grid.num_cells,))
+        checks.check_finite(field, expected, InputError)
+        if (expected < 0.0).any():
+            place = int(np.flatnonzero(expected < 0.0)[0])
+            raise reject(f"{field}[{place}]", "a number of at least 0", expected[place])
+        object.__setattr__(self, "expected", expected)
+
+    @classmethod
+    def uniform(cls, grid: CellGrid, total: float) -> UndetectedIntensity:
+        """So many in all, spread evenly. Raises `InputError` for a number that is negative or not finite."""
+        return cls(grid, np.full(grid.num_cells, non_negative("total", total) / grid.num_cells))
+
+    @property
+    def region(self) -> Region:
+        """Where they may be."""
+        return self.grid.region
+
+    @property
+    def num_cells(self) -> int:
+        """Number of cells."""
+        return self.grid.num_cells
+
+    @property
+    def centres(self) -> Floats:
+        """(num_cells, 2) middle of each cell in m."""
+        return self.grid.centres
+
+    @property
+    def total(self) -> float:
+        """Mean number of undetected targets in the region."""
+        return float(self.expected.sum())
+
+    @property
+    def table(self) -> Floats:
+        """(rows, columns) the same, as on a map whose first row is the southern one; for drawing."""
+        return self.expected.reshape(self.grid.rows, self.grid.columns).copy()

@@ -1,0 +1,103 @@
+"""A region cut into equal cells, and the nodes by which means over a cell are taken."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from vedette.kernels.base.types import Floats
+from vedette.models.arguments import dimension, positive, reject
+from vedette.models.region import Region
+
+# A side that is a whole number of cells but for rounding is cut into that number.
+_ROUNDING = 1e-9
+
+
+@dataclass(frozen=True, slots=True)
+class CellGrid:
+    """Equal rectangular cells that fill a region, numbered from the south-west corner, row after row to the north.
+
+    Attributes:
+        region: what is cut.
+        columns: number of cells from west to east.
+        rows: number of cells from south to north.
+
+    Raises:
+        InputError: names the field, what was expected and what came.
+    """
+
+    region: Region
+    columns: int
+    rows: int
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.region, Region):
+            raise reject("CellGrid.region", "a Region", self.region)
+        for name in ("columns", "rows"):
+            object.__setattr__(self, name, dimension(f"CellGrid.{name}", getattr(self, name)))
+
+    @classmethod
+    def covering(cls, region: Region, cell: float) -> CellGrid:
+        """The fewest cells of at most `cell` metres along each side. Raises `InputError` unless that is above 0."""
+        size = positive("cell", cell)
+        width, height = region.x_max - region.x_min, region.y_max - region.y_min
+        return cls(region, *(max(math.ceil(side / size - _ROUNDING), 1) for side in (width, height)))
+
+    @property
+    def num_cells(self) -> int:
+        """Number of cells."""
+        return self.columns * self.rows
+
+    @property
+    def cell_size(self) -> tuple[float, float]:
+        """Width (west to east) and height (south to north) of a cell in m."""
+        region = self.region
+        return (region.x_max - region.x_min) / self.columns, (region.y_max - region.y_min) / self.rows
+
+    @property
+    def centres(self) -> Floats:
+        """(num_cells, 2) middle of each cell in m."""
+        return self.states(2, 1)[:, 0]
+
+    def states(self, state_dim: int, nodes_a_side: int = 3) -> Floats:
+        """(num_cells, num_nodes, state_dim) targets at rest at the nodes of each cell.
+
+        Args:
+            state_dim: length of a state; its first two components are the position, the others 0.
+            nodes_a_side: nodes of a Gauss-Legendre rule along each side of a cell; their squares are num_nodes.
+
+        Raises:
+            InputError: a `state_dim` below 2, or no node.
+        """
+        if dimension("state_dim", state_dim) < 2:
+            raise reject("state_dim", "at least 2, px and py first", state_dim)
+        nodes, _ = np.polynomial.legendre.leggauss(dimension("nodes_a_side", nodes_a_side))
+        width, height = self.cell_size
+        x = self.region.x_min + width * (np.arange(self.columns)[:, None] + 0.5 + 0.5 * nodes)
+        y = self.region.y_min + height * (np.arange(self.rows)[:, None] + 0.5 + 0.5 * nodes)
+        states = np.zeros((self.rows, self.columns, nodes_a_side, nodes_a_side, state_dim))
+        states[..., 0] = x[None, :, None, :]
+        states[..., 1] = y[:, None, :, None]
+        return states.reshape(self.num_cells, nodes_a_side**2, state_dim)
+
+    @staticmethod
+    def node_weights(nodes_a_side: int = 3) -> Floats:
+        """(num_nodes,) weights of the nodes of `states` in a mean over a cell; they sum to 1."""
+        _, weights = np.polynomial.legendre.leggauss(dimension("nodes_a_side", nodes_a_side))
+        return np.outer(weights, weights).ravel() / 4.0
+
+    @property
+    def border(self) -> Floats:
+        """(num_cells,) length of the region's border along each cell in m; 0 of those inside."""
+        width, height = self.cell_size
+        lengths = np.zeros((self.rows, self.columns))
+        for edge, length in (
+            (np.s_[0, :], width),
+            (np.s_[-1, :], width),
+            (np.s_[:, 0], height),
+            (np.s_[:, -1], height),
+        ):
+            lengths[edge] += length
+        return lengths.ravel()

@@ -1,0 +1,68 @@
+"""The targets that no sensor has found yet, of which planners are told that search for them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Literal
+
+from pydantic import Field
+
+from vedette.scenarios.faults import Finding, describe
+from vedette.scenarios.sections.base import Positive, Probability, Section
+from vedette.scenarios.sections.world import RegionSection
+
+if TYPE_CHECKING:  # with the models comes the compiler, which a check does without
+    from vedette.models import UndetectedModel
+    from vedette.scenarios.sections.scenario import ScenarioModel
+
+# Of every sensor, P_D is asked at nine places in each at every scan: some 40 ms for so many.
+MAX_CELLS = 250_000
+
+
+class UndetectedSection(Section):
+    """How many targets there are that no sensor has found yet, on a grid: some at first, others that appear later."""
+
+    cell: Positive = Field(description="Side of a cell, at most [m].")
+    expected: float = Field(ge=0.0, description="Mean number of them at the first scan, spread evenly [-].")
+    birth_rate: float = Field(default=0.0, ge=0.0, description="Mean number that appear in the region [1/s].")
+    enters: Literal["anywhere", "border"] = Field(
+        default="anywhere", description="Where they appear: anywhere alike, or along the border of the region [-]."
+    )
+    speed: float = Field(
+        ge=0.0,
+        description="Standard deviation of both components of their velocity, drawn anew at every scan [m/s].",
+    )
+    survival: Probability | None = Field(
+        default=None, description="Probability of living through a second; none: as survival says of a scan [-]."
+    )
+    region: RegionSection | None = Field(
+        default=None, description="Where they are; none: in the region of the scenario [-]."
+    )
+
+    def build(self, region: RegionSection) -> UndetectedModel:
+        """The model; region: of the scenario, for want of one of its own."""
+        from vedette.models import CellGrid, UndetectedModel
+
+        grid = CellGrid.covering((self.region or region).build(), self.cell)
+        return UndetectedModel(grid, self.expected, self.birth_rate, self.enters, self.speed, self.survival)
+
+
+def cells_of_undetected(model: ScenarioModel) -> Iterator[Finding]:
+    """The region is cut into a number of cells that can be held and worked on."""
+    section = model.undetected
+    if section is None:
+        return
+    region = section.region or model.region
+    width, height = region.x_max - region.x_min, region.y_max - region.y_min
+    if min(width, height) <= 0.0:
+        return
+    if max(math.ceil(width / section.cell), 1) * max(math.ceil(height / section.cell), 1) > MAX_CELLS:
+        wanted = f"at least {_enough(width, height):.3g}, as at most {MAX_CELLS:,} cells may fill the region"
+        yield ("undetected", "cell"), wanted, describe(section.cell)
+
+
+def _enough(width: float, height: float) -> float:
+    """A size that is large enough and stays so when it is rounded to three digits."""
+    half = 0.5 * (width + height) / (MAX_CELLS - 1)  # (width / size + 1) (height / size + 1) = MAX_CELLS
+    return 1.005 * (half + math.sqrt(half * half + width * height / (MAX_CELLS - 1)))

@@ -1,0 +1,101 @@
+"""A tracker that also keeps account of the targets that no sensor has found yet, for planners that search."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from vedette.densities import UndetectedIntensity
+from vedette.errors import InputError
+from vedette.kernels.base.types import Floats
+from vedette.kernels.steps.undetected import survival_probabilities, take_out_detected
+from vedette.models import SensorModel, TargetModel, UndetectedModel, kernel_motion
+from vedette.models.arguments import float_array, reject
+from vedette.tracking.base import State, Tracker, TrackerInfo
+from vedette.tracking.stages import Stages
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Searching:
+    """Another tracker, whose states also say how many undetected targets are expected where (`State.undetected`).
+
+    The beliefs are the other tracker's, to the last bit. A scan takes out of every cell the share that it would have
+    detected, expected times the mean over the cell of 1 - P_D; what came of its measurements is the other tracker's
+    to say. All scans are taken as known at once, also where a network brings them late or not at all.
+
+    Attributes:
+        tracker: of the targets that are found.
+        model: how many others there are at first, and how they move, appear and end.
+
+    Raises:
+        InputError: something else than a tracker or a model.
+    """
+
+    tracker: Tracker
+    model: UndetectedModel
+    _nodes: Floats = field(init=False, repr=False)  # (num_cells, num_nodes, state_dim)
+    _node_weights: Floats = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.tracker, Tracker):
+            raise reject("tracker", "a Tracker, with targets, sensors, initial() and step()", self.tracker)
+        if not isinstance(self.model, UndetectedModel):
+            raise reject("model", "an UndetectedModel", self.model)
+        object.__setattr__(self, "_nodes", self.model.grid.states(self.targets.state_dim))
+        object.__setattr__(self, "_node_weights", self.model.grid.node_weights())
+
+    @property
+    def targets(self) -> TargetModel:
+        """The targets as all sensors know them."""
+        return self.tracker.targets
+
+    @property
+    def sensors(self) -> tuple[SensorModel, ...]:
+        """What each sensor sees."""
+        return self.tracker.sensors
+
+    def initial(self) -> State:
+        """As the tracker's, with those that the model expects to be there at first."""
+        return replace(self.tracker.initial(), undetected=UndetectedIntensity(self.model.grid, self.model.initial()))
+
+    def step(
+        self, state: State, scans: Sequence[Any], poses: Any, time: float, *, rngs: Sequence[np.random.Generator]
+    ) -> tuple[State, TrackerInfo]:
+        """The tracker's step, then the same time and scans for those not yet found; see `Tracker.step`.
+
+        Raises:
+            InputError: a state without `undetected`, or with that of another grid; and as the tracker.
+        """
+        after, info = self.tracker.step(state, scans, poses, time, rngs=rngs)
+        stages = Stages()
+        with stages.timing("targets not yet found"):
+            expected = self._predicted(state, time)
+            at = float_array("poses", poses, (len(self.sensors), None))
+            for sensor, scan, pose in zip(self.sensors, scans, at, strict=True):
+                if scan is not None:
+                    expected = take_out_detected(sensor.to_kernel(), pose, self._nodes, self._node_weights, expected)
+        seconds = {**info.seconds, **stages.seconds}
+        left = UndetectedIntensity(self.model.grid, expected)
+        return replace(after, undetected=left), replace(info, seconds=seconds)
+
+    def _predicted(self, state: State, time: float) -> Floats:
+        """(num_cells,) expected before the scans of a time; as at first, where they are the first."""
+        before, grid = state.undetected, self.model.grid
+        if before is None:
+            raise InputError("state.undetected: expected an UndetectedIntensity, as of initial(); got None")
+        if before.grid != grid:
+            raise InputError(f"state.undetected: expected one of the model's grid, {grid}; got one of {before.grid}")
+        if state.time is None:
+            return before.expected
+        dt = float(time) - state.time
+        return self.model.predict(before.expected, dt, self._survival(dt))
+
+    def _survival(self, dt: float) -> Floats | float:
+        """Probability of living through `dt` seconds, in each cell or everywhere."""
+        if self.model.survival is not None:
+            return float(self.model.survival**dt)
+        motion = kernel_motion(self.targets.motion, self.targets.survival)
+        return survival_probabilities(motion, dt, self.model.grid.states(self.targets.state_dim, 1)[:, 0].copy())

@@ -1,0 +1,196 @@
+"""The intensity of targets not yet found, carried beside any tracker."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tracking.scenes import SURVIVAL, filters, rngs, scans_of, sensor, targets
+from vedette import models
+from vedette.densities import UndetectedIntensity
+from vedette.errors import InputError, ModelError
+from vedette.filters import SequentialLmbFilter
+from vedette.fusion import Clmb, Matched
+from vedette.models.functions import model_function
+from vedette.tracking import (
+    BeliefNetwork,
+    Central,
+    Distributed,
+    Network,
+    ScanNetwork,
+    Searching,
+    State,
+    Tracker,
+    stage_of,
+)
+
+REGION = models.Region(-200.0, 200.0, -100.0, 100.0)
+GRID = models.CellGrid(REGION, 8, 5)
+WORLD, SENSORS = targets(), (sensor(max_range=120.0), sensor(prob=0.6))
+POSES = np.array([[-60.0, 20.0, 0.0], [150.0, -80.0, 1.0]])
+CLMB = Clmb((0.5, 0.5))
+TRACKERS: dict[str, Tracker] = {
+    "distributed": Distributed(filters(WORLD, SENSORS), CLMB, feedback=True),
+    "central": Central(SequentialLmbFilter(WORLD, SENSORS)),
+    "scans": ScanNetwork(SequentialLmbFilter(WORLD, SENSORS), Network(delay=1), Matched(CLMB)),
+    "beliefs": BeliefNetwork(filters(WORLD, SENSORS), CLMB, Network(), Matched(CLMB)),
+}
+
+
+def undetected(**changes: Any) -> models.UndetectedModel:
+    own: dict[str, Any] = {"birth_rate": 0.05, "enters": "border", "speed": 6.0, **changes}
+    return models.UndetectedModel(GRID, own.pop("expected", 3.0), **own)
+
+
+def follow(tracker: Any, times: Any = (1.0, 2.0, 4.5, 5.0)) -> list[Any]:
+    """States and reports of some steps; the first sensor does not scan at the second."""
+    truth, draws, noise = np.zeros((1, 4)), rngs(2, 3), np.random.default_rng(5)
+    state, found = tracker.initial(), []
+    for step, time in enumerate(times, start=1):
+        scans = scans_of(truth, SENSORS, POSES, noise)
+        if step == 2:
+            scans[0] = None
+        found.append(tracker.step(state, scans, POSES, time, rngs=draws))
+        state = found[-1][0]
+    return found
+
+
+def assert_same_bits(one: Any, other: Any) -> None:
+    for name in ("labels", "offsets", "log_weights", "means", "covs"):
+        assert getattr(one.tracks, name).tobytes() == getattr(other.tracks, name).tobytes()
+    assert one.existence_logit.tobytes() == other.existence_logit.tobytes()
+
+
+@pytest.mark.parametrize("name", TRACKERS)
+def test_beliefs_are_the_same_to_the_last_bit(name: str) -> None:
+    tracker = TRACKERS[name]
+    searching = Searching(tracker, undetected())
+    assert isinstance(searching, Tracker)
+    assert searching.targets is tracker.targets
+    assert searching.sensors == tracker.sensors
+    for (mine, told), (other, before) in zip(follow(searching), follow(tracker), strict=True):
+        assert_same_bits(mine.fused, other.fused)
+        for belief, another in zip(mine.local, other.local, strict=True):
+            assert_same_bits(belief, another)
+        assert (mine.step, mine.time) == (other.step, other.time)
+        assert mine.undetected is not None
+        assert other.undetected is None
+        assert told.bytes_sent == before.bytes_sent
+        assert told.seconds.keys() == {*before.seconds, "targets not yet found"}
+
+
+@pytest.mark.parametrize("survival", [None, 0.9])
+def test_the_intensity_is_that_of_plain_numpy(survival: float | None) -> None:
+    model = undetected(survival=survival)
+    nodes, weights = GRID.states(4), GRID.node_weights()
+    expected, last = np.full(40, 3.0 / 40), None
+    times = (1.0, 2.0, 4.5, 5.0)
+    for step, (time, (state, _)) in enumerate(
+        zip(times, follow(Searching(TRACKERS["central"], model), times), strict=True)
+    ):
+        if last is not None:
+            lives = SURVIVAL if survival is None else survival ** (time - last)
+            expected = model.predict(expected, time - last, lives)
+        for s, one in enumerate(SENSORS):
+            if (step, s) != (1, 0):
+                expected = expected * [1.0 - weights @ one.detection.prob(own, POSES[s]) for own in nodes]
+        np.testing.assert_allclose(state.undetected.expected, expected, rtol=1e-12)
+        assert state.undetected.grid == GRID
+        last = time
+
+
+@model_function("prob_survival")
+def _by_place(state, dt, params):
+    return 0.5 if state[0] < 0.0 else 0.9 + state[2]
+
+
+def test_survival_is_that_of_the_targets_at_rest_in_the_middle_of_a_cell() -> None:
+    world = replace(WORLD, survival=models.SurvivalModel(_by_place))
+    model = models.UndetectedModel(GRID, 3.0)
+    searching = Searching(Central(SequentialLmbFilter(world, SENSORS)), model)
+    state = replace(searching.initial(), time=1.0, step=1)
+    after, _ = searching.step(state, [None, None], POSES, 2.0, rngs=rngs(2))
+    assert after.undetected is not None
+    np.testing.assert_allclose(after.undetected.table[:, :4], 0.5 * 3.0 / 40, rtol=1e-15)
+    np.testing.assert_allclose(after.undetected.table[:, 4:], 0.9 * 3.0 / 40, rtol=1e-15)
+
+
+def test_before_the_first_scan_no_time_passes() -> None:
+    expected = np.arange(40.0)
+    searching = Searching(TRACKERS["central"], undetected(expected=expected))
+    state = searching.initial()
+    assert state.undetected is not None
+    np.testing.assert_array_equal(state.undetected.expected, expected)
+    after, _ = searching.step(state, [None, None], POSES, 7.0, rngs=rngs(2))
+    assert after.undetected is not None
+    np.testing.assert_array_equal(after.undetected.expected, expected)
+
+
+def test_a_sensor_that_sees_less_than_a_cell_is_not_missed() -> None:
+    tiny = sensor(max_range=12.0)
+    searching = Searching(Central(SequentialLmbFilter(WORLD, (tiny,))), undetected())
+    poses = np.array([[-175.0 + 14.0, 0.0, 0.0]])  # away from the middle of its cell
+    after, _ = searching.step(searching.initial(), [np.empty((0, 2))], poses, 1.0, rngs=rngs(1))
+    assert after.undetected is not None
+    share = after.undetected.expected / (3.0 / 40)
+    assert 0.0 < 1.0 - share[16] < 0.6
+    assert (np.delete(share, 16) == 1.0).all()
+
+
+def test_states_of_another_making_are_refused() -> None:
+    searching = Searching(TRACKERS["central"], undetected())
+    state, scans = searching.initial(), [None, None]
+    with pytest.raises(InputError, match=r"state\.undetected: expected an UndetectedIntensity, as of initial\(\)"):
+        searching.step(replace(state, undetected=None), scans, POSES, 1.0, rngs=rngs(2))
+    other = UndetectedIntensity.uniform(models.CellGrid(REGION, 2, 2), 1.0)
+    with pytest.raises(InputError, match=r"state\.undetected: expected one of the model's grid") as raised:
+        searching.step(replace(state, undetected=other), scans, POSES, 1.0, rngs=rngs(2))
+    assert stage_of(raised.value) == "the targets not yet found"
+    with pytest.raises(InputError, match="scans: expected 2, one a sensor; got 1"):
+        searching.step(state, [None], POSES, 1.0, rngs=rngs(2))
+
+
+def test_it_wants_a_tracker_and_a_model() -> None:
+    wrong: Any = "tracker"
+    with pytest.raises(InputError, match="tracker: expected a Tracker, with targets"):
+        Searching(wrong, undetected())
+    with pytest.raises(InputError, match="model: expected an UndetectedModel; got tracker"):
+        Searching(TRACKERS["central"], wrong)
+
+
+@model_function("prob_detection")
+def _no_probability(state, pose, params):
+    return 1.2
+
+
+def test_a_detection_that_is_no_probability_is_told() -> None:
+    bad = replace(SENSORS[0], detection=models.DetectionModel(_no_probability))
+    searching = Searching(Central(SequentialLmbFilter(targets(()), (bad,))), undetected())
+    with pytest.raises(ModelError, match=r"probability is not in \[0, 1\]"):
+        searching.step(searching.initial(), [np.empty((0, 2))], POSES[:1], 1.0, rngs=rngs(1))
+
+
+@dataclass
+class _Own:
+    """A tracker of one's own, of anything."""
+
+    targets: Any = WORLD
+    sensors: Any = SENSORS
+
+    def initial(self) -> State:
+        return State(("nothing", "nothing"), "nothing")
+
+    def step(self, state: State, scans: Any, poses: Any, time: float, *, rngs: Any) -> Any:
+        return replace(state, step=state.step + 1, time=time), TRACKERS["central"].step(
+            TRACKERS["central"].initial(), scans, poses, time, rngs=rngs
+        )[1]
+
+
+def test_a_tracker_of_ones_own_is_as_good() -> None:
+    state, _ = follow(Searching(_Own(), undetected()))[-1]
+    (other, _) = follow(Searching(TRACKERS["central"], undetected()))[-1]
+    assert state.fused == "nothing"
+    assert state.undetected.expected.tobytes() == other.undetected.expected.tobytes()
