@@ -57,7 +57,12 @@ def prepare(
         )
     else:
         fused, local = planned.state.fused, planned.state.local
-        evaluator = AdditiveEvaluator.prepare(sensors, options, rule, settings, reward, fused, local, rng=rng)
+        evaluator = AdditiveEvaluator.prepare(
+            sensors, options, rule, settings, reward, fused, local, state.undetected, rng=rng
+        )
+    if settings.undetected_worth > 0.0 and (rule is None or state.undetected is None):
+        why = "the state has no intensity of them" if state.undetected is None else "rewards are no sums over labels"
+        evaluator.notes[f"targets not found yet are not looked for: {why}"] = None
     evaluator.notes.update(dict.fromkeys(planned.notes))
     return evaluator
 

@@ -18,7 +18,7 @@ from vedette.filters.inputs import model_errors
 from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.planning.ideal import Decision, Futures, Horizon, propagate_samples
 from vedette.kernels.planning.known import Belief as KnownBelief
-from vedette.kernels.planning.known import predict_paths, pseudo_update_known
+from vedette.kernels.planning.known import label_radii, predict_paths, pseudo_update_known
 from vedette.kernels.planning.pseudo_glmb import GlmbResults, pseudo_update_glmb
 from vedette.kernels.planning.pseudo_lmb import LmbResults, pseudo_update_lmb
 from vedette.models import constant_survival, kernel_motion
@@ -122,7 +122,8 @@ def _run_lmb(
 
     with model_errors():
         if settings.association == "known":
-            own = KnownBelief(prior, predict_paths(prior, decision), targets)
+            paths = predict_paths(prior, decision)
+            own = KnownBelief(prior, paths, targets, label_radii(paths, targets, decision.futures.states))
             num_courses = len(decision.horizon.poses)
             run_chunks(
                 lambda first, last: pseudo_update_known(own, decision, first, last, results),

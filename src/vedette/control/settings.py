@@ -12,7 +12,7 @@ from vedette.errors import InputError
 from vedette.filters import Filter, Limits
 from vedette.kernels.base.types import Floats
 from vedette.kernels.planning.ideal import EXPECTED, IDEAL, SAMPLED
-from vedette.models.arguments import dimension, positive, probability, reject
+from vedette.models.arguments import dimension, non_negative, positive, probability, reject
 from vedette.platforms import Platform
 from vedette.platforms.base import check_platform
 
@@ -42,6 +42,8 @@ class PlanningSettings:
             the filter's own update, which also asks which of several targets was measured.
         max_glmb_sensors, max_glmb_targets: with more sensors, or more targets expected, GLMBs are planned on their
             LMBs, which the plan then says.
+        undetected_worth: of finding a target of `State.undetected`, in units of the reward (of the expected loss: m^2);
+            0: nobody is looked for. Targets not found are taken to stay where they are over the horizon.
         max_prior_hypotheses: heaviest hypotheses of each local posterior that enter the pseudo-updates. An LMB enters
             whole.
         max_bound_work: ways to see a target, times samples, that are tried at most for the bound of a plan.
@@ -64,6 +66,7 @@ class PlanningSettings:
     max_glmb_targets: int = 10
     max_prior_hypotheses: int = 10
     max_bound_work: int = 4096
+    undetected_worth: float = 0.0
     limits: Limits = field(default_factory=planning_limits)
     num_threads: int = 0
 
@@ -77,6 +80,7 @@ class PlanningSettings:
             raise reject("association", "known or full", self.association)
         positive("horizon_period", self.horizon_period)
         probability("detection_threshold", self.detection_threshold)
+        non_negative("undetected_worth", self.undetected_worth)
         if self.num_threads != 0:
             dimension("num_threads", self.num_threads)
         if self.ideal_measurements not in IDEAL_MODES:

@@ -50,7 +50,8 @@ def _compile_planning(scenario: Scenario) -> None:
     assert isinstance(planner, JointPlanner)
     num_sites, num_others = experiment.tracker.targets.birth.num_sites, experiment.num_sensors - 1
     beliefs = (_belief(experiment, num_sites), *(_belief(experiment, max(num_sites - 1, 1)),) * num_others)
-    fused = planner.fusion.fuse(beliefs)[0]
+    shared = getattr(planner.fusion, "shares_prediction", False)
+    fused = beliefs[0] if shared else planner.fusion.fuse(beliefs)[0]
     experiment.estimate(fused, 1)
     quick = replace(planner, settings=replace(planner.settings, num_samples=2, horizon_steps=1, num_threads=1))
     state = State(beliefs, fused, undetected=experiment.tracker.initial().undetected)

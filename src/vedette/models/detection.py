@@ -134,9 +134,8 @@ def soft_sector(
     if not isinstance(cut, bool):
         raise reject("cut", "true or false", cut)
     params = [_guarded(prob_detection), positive("max_range", max_range), _half_width(half_width_rad)]
-    return DetectionModel(
-        functions.soft_sector, np.array([*params, positive("range_slope", range_slope), slope, float(cut)])
-    )
+    params += [positive("range_slope", range_slope), slope, float(cut)]
+    return DetectionModel(functions.soft_sector, np.array(params), reach=float(max_range) if cut else math.inf)
 
 
 def camera(prob_detection: float, max_range: float, reference_half_width_rad: float | None = None) -> DetectionModel:

@@ -8,14 +8,15 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from vedette.control.additive.rewards import AdditiveRewards, no_cells
+from vedette.control.additive.rewards import AdditiveRewards
 from vedette.control.additive.situation import Samples, starts_of
 from vedette.control.additive.table import lay_out_changes
+from vedette.control.additive.undetected import cells_of, no_cells
 from vedette.control.additive.valuations import valuation_of
 from vedette.control.priors import predicted
 from vedette.control.rewards.loss import ExpectedLossReward
 from vedette.control.settings import MobileSensor, PlanningSettings
-from vedette.densities import LMB
+from vedette.densities import LMB, UndetectedIntensity
 from vedette.filters import shared_targets
 from vedette.fusion import LinearRule
 from vedette.kernels.base.types import Floats, Ints
@@ -55,12 +56,14 @@ class AdditiveEvaluator:
         reward: Any,
         fused: LMB,
         beliefs: Sequence[LMB],
+        undetected: UndetectedIntensity | None = None,
         *,
         rng: np.random.Generator,
     ) -> AdditiveEvaluator:
         """Draw the samples, predict, and follow every label over every course that reaches it.
 
-        rule: how the sensors' densities become one. beliefs: of each sensor. Raises as `JointPlanner.plan`.
+        rule: how the sensors' densities become one. beliefs: of each sensor. undetected: targets not found
+        yet. Raises as `JointPlanner.plan`.
         """
         sampled = not isinstance(reward, ExpectedLossReward)
         motion = shared_targets([sensor.filter for sensor in sensors]).motion
@@ -82,12 +85,16 @@ class AdditiveEvaluator:
         table = lay_out_changes(start, rule, num_samples, settings.threads(), sampled=sampled)
         valuation = valuation_of(reward, prediction, start.prior)
         assert not isinstance(valuation, str)
+        if undetected is None or settings.undetected_worth == 0.0:
+            cells = no_cells(len(table.offsets) - 1)
+        else:
+            cells = cells_of(start, undetected, settings.undetected_worth, table.first_courses, fused.state_dim)
         additive = AdditiveRewards(
             table,
             valuation,
             start.bases,
             reward if sampled else None,
-            no_cells(len(table.offsets) - 1),
+            cells,
             settings.threads(),
         )
         counts = {"filter_steps": len(table.labels) * num_samples * settings.horizon_steps, "rewards": 0}

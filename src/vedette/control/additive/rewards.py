@@ -102,9 +102,3 @@ class AdditiveRewards:
             entries = slice(cells.offsets[course], cells.offsets[course + 1])
             totals[cells.cells[entries]] += cells.log_miss[entries]
         return float(-(cells.worth @ np.expm1(totals)))
-
-
-def no_cells(num_courses: int) -> Cells:
-    """Nothing to be found."""
-    none = np.empty(0)
-    return Cells(np.zeros(num_courses + 1, np.int64), np.empty(0, np.int64), none, none)

@@ -18,7 +18,7 @@ from vedette.filters.inputs import model_errors
 from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.planning.bernoulli_rows import bernoulli_size
 from vedette.kernels.planning.ideal import EXPECTED, IDEAL, Decision, Futures, Horizon, propagate_samples
-from vedette.kernels.planning.known import Belief, predict_paths, rows_without_scans
+from vedette.kernels.planning.known import Belief, label_radii, predict_paths, rows_without_scans
 from vedette.models import constant_survival, kernel_motion
 
 
@@ -68,6 +68,7 @@ class SensorGroup(NamedTuple):
     decision: Decision
     rows: Floats  # (num_own, bernoulli_size) without scans
     course_offsets: Ints  # (num_members + 1,)
+    reach: float  # m, beyond which these sensors detect nothing
 
 
 class Start(NamedTuple):
@@ -158,7 +159,8 @@ def _group(
     rows = rows_without_scans(*ends, prior.existence_logit, prediction.tracks.means[labels])
     targets = np.ascontiguousarray(samples.targets[labels])
     offsets = offsets_of([len(courses[s]) for s in members])
-    return SensorGroup(members, Belief(prior, paths, targets), labels, decision, rows, offsets)
+    known = Belief(prior, paths, targets, label_radii(paths, targets, samples.states))
+    return SensorGroup(members, known, labels, decision, rows, offsets, local.sensor.detection.reach)
 
 
 def _spread(group: SensorGroup, num_labels: int, dim: int, missing_existence: float) -> Floats:

@@ -45,7 +45,7 @@ def lay_out_changes(start: Start, rule: LinearRule, num_samples: int, num_thread
     own = np.empty(len(labels), np.int64)
     with model_errors():
         for group, reach in zip(start.groups, reached, strict=True):
-            places = _places(group, first_courses)
+            places = places_of_courses(group, first_courses)
             entries = Entries(offsets[places], offsets[places + 1], own)
             found, counts = np.nonzero(reach)[1], reach.sum(axis=1)
             at = np.repeat(entries.first - offsets_of(counts)[:-1], counts) + np.arange(len(found))
@@ -64,7 +64,7 @@ def _reach(group: SensorGroup, num_threads: int) -> Ints:
     out = np.empty((num_courses, len(group.labels)), np.int64)
 
     def work(first: int, last: int) -> None:
-        fill_reach(group.belief, group.decision, LEAST_DETECTION, first, last, out)
+        fill_reach(group.belief, group.decision, LEAST_DETECTION, group.reach, first, last, out)
 
     run_chunks(work, num_courses, num_threads)
     return out
@@ -80,7 +80,7 @@ def _sizes(groups: Sequence[SensorGroup], reached: Sequence[Ints], num_sensors: 
     return np.concatenate(own), offsets_of([len(counts) for counts in own])
 
 
-def _places(group: SensorGroup, first_courses: Ints) -> Ints:
+def places_of_courses(group: SensorGroup, first_courses: Ints) -> Ints:
     """Place of each course of a group among those of all sensors."""
     sizes = np.diff(group.course_offsets)
     starts = first_courses[list(group.members)] - group.course_offsets[:-1]

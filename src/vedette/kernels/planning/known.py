@@ -43,6 +43,7 @@ class Belief(NamedTuple):
     prior: Lmb  # one Gaussian a label
     paths: Paths
     targets: Ints  # (num_labels, num_samples) place of the label's target in the samples, -1 where it is not there
+    radii: Floats  # (num_labels, horizon_steps) m, about the paths' means, within which the label is
 
 
 class Entries(NamedTuple):
@@ -109,12 +110,35 @@ def predict_paths(prior: Lmb, decision: Decision) -> Paths:
     return Paths(means, covs)
 
 
+@kernel
+def label_radii(paths: Paths, targets: Ints, states: Floats) -> Floats:
+    """(num_labels, horizon_steps) distance from a label's predicted mean beyond which none of its samples is.
+
+    At least eight standard deviations of its position. states: (horizon_steps, num_targets, state_dim) of the samples.
+    """
+    num_labels, num_steps = paths.means.shape[:2]
+    radii = np.empty((num_labels, num_steps))
+    for label in range(num_labels):
+        for h in range(num_steps):
+            cov, square = paths.covs[label, h], 0.0
+            for sample in range(targets.shape[1]):
+                if targets[label, sample] >= 0:
+                    at, mean = states[h, targets[label, sample]], paths.means[label, h]
+                    square = max(square, (at[0] - mean[0]) ** 2 + (at[1] - mean[1]) ** 2)
+            radii[label, h] = math.sqrt(max(square, 64.0 * (cov[0, 0] + cov[1, 1])))
+    return radii
+
+
 @borrowing
-def _in_reach(belief: Belief, decision: Decision, course: int, label: int, least: float, state: Floats) -> bool:
+def _in_reach(
+    belief: Belief, decision: Decision, course: int, label: int, least: float, reach: float, state: Floats
+) -> bool:
     sensor, paths = decision.sensor, belief.paths
     for h in range(decision.horizon.poses.shape[1]):
-        pose = decision.horizon.poses[course, h]
-        if detection_probability(sensor, pose, paths.means[label, h], paths.covs[label, h], state) >= least:
+        pose, mean = decision.horizon.poses[course, h], paths.means[label, h]
+        if math.hypot(mean[0] - pose[0], mean[1] - pose[1]) > reach + belief.radii[label, h]:
+            continue
+        if detection_probability(sensor, pose, mean, paths.covs[label, h], state) >= least:
             return True
         for sample in range(belief.targets.shape[1]):
             target = belief.targets[label, sample]
@@ -126,15 +150,17 @@ def _in_reach(belief: Belief, decision: Decision, course: int, label: int, least
 
 
 @kernel
-def fill_reach(belief: Belief, decision: Decision, least: float, first: int, last: int, out: Ints) -> None:
+def fill_reach(
+    belief: Belief, decision: Decision, least: float, reach: float, first: int, last: int, out: Ints
+) -> None:
     """Set out[course, label] to 1 where a course may detect a label with probability `least` or more, else to 0.
 
-    Judged by the samples and by the prediction, at every step.
+    Judged by the samples and by the prediction, at every step. reach: m, beyond which the sensor detects nothing.
     """
     state = np.empty(belief.prior.tracks.means.shape[1])
     for course in range(first, last):
         for label in range(out.shape[1]):
-            out[course, label] = 1 if _in_reach(belief, decision, course, label, least, state) else 0
+            out[course, label] = 1 if _in_reach(belief, decision, course, label, least, reach, state) else 0
 
 
 @borrowing

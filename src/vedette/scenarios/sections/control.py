@@ -111,10 +111,16 @@ class Control(Section):
     )
     association: Literal["known", "full"] = Field(
         default="known",
-        description="Pseudo-updates of LMB beliefs: each pseudo-measurement is of its own target or else clutter, which "
-        "is fast for any number of targets and sensors; or the filter's own update, which asks which it was [-].",
+        description="Pseudo-updates of LMB beliefs: each pseudo-measurement is of its own target or else clutter, "
+        "which is fast for any number of targets and sensors; or the filter's own update, which asks which it was "
+        "[-].",
     )
     reward: AnyReward = Field(default=CauchySchwarzReward(), description="Value of a density [-].")
+    undetected_worth: Annotated[float, Field(ge=0.0)] = Field(
+        default=0.0,
+        description="What finding a target of `undetected` is worth, in units of the reward; of the expected loss "
+        "m^2, such as its squared cutoff [-].",
+    )
     search: AnySearch = Field(default=Exhaustive(), description="Which joint actions a joint decision evaluates [-].")
     limits: PlanningLimits = Field(default=PlanningLimits(), description="How much it works with [-].")
 
@@ -144,6 +150,7 @@ class Control(Section):
             association=self.association,
             max_glmb_sensors=self.limits.max_glmb_sensors,
             max_glmb_targets=self.limits.max_glmb_targets,
+            undetected_worth=self.undetected_worth,
             max_bound_work=self.limits.max_bound_work,
             max_prior_hypotheses=self.limits.max_prior_hypotheses,
             limits=replace(

@@ -13,7 +13,8 @@ from pydantic import Field
 from vedette.scenarios.sections.custom import Custom
 
 if TYPE_CHECKING:  # with the planners comes the compiler, which a check does without
-    from vedette.control import JointSearch, MobileSensor, Plan, Planner, PlanningSettings, PowerReward, Reward
+    from vedette.control import JointSearch, MobileSensor, Plan, Planner, PlanningSettings
+    from vedette.control.preparation import AnyReward
     from vedette.fusion import Fusion
     from vedette.platforms import Actions
 
@@ -29,7 +30,7 @@ class Parts(NamedTuple):
     sensors: tuple[MobileSensor, ...]
     fusion: Fusion
     settings: PlanningSettings
-    reward: Reward | PowerReward
+    reward: AnyReward
     search: JointSearch
     first_actions: tuple[Actions, ...]
     notes: tuple[str, ...]

@@ -13,10 +13,7 @@ from vedette.scenarios.sections.base import Positive, Probability, Section, chec
 from vedette.scenarios.sections.custom import Custom
 
 if TYPE_CHECKING:  # with the planners comes the compiler, which a check does without
-    from vedette.control import ExpectedLossReward as BuiltExpectedLoss
-    from vedette.control import LabelReward, PowerReward, Reward
-
-    AnyBuilt = Reward | PowerReward | LabelReward | BuiltExpectedLoss
+    from vedette.control.preparation import AnyReward as Built
 
 
 class CauchySchwarzReward(Section):
@@ -29,7 +26,7 @@ class CauchySchwarzReward(Section):
         "density, under which localisation counts as much as cardinality [-].",
     )
 
-    def build(self, folder: Path) -> AnyBuilt:
+    def build(self, folder: Path) -> Built:
         """The value of an updated density."""
         from vedette.control import CauchySchwarzReward
 
@@ -49,7 +46,7 @@ class RenyiReward(Section):
         if self.order == 1.0:
             yield ("order",), "a number other than 1", "1"
 
-    def build(self, folder: Path) -> AnyBuilt:
+    def build(self, folder: Path) -> Built:
         """The value of an updated density."""
         from vedette.control import RenyiReward
 
@@ -61,7 +58,7 @@ class KullbackLeiblerReward(Section):
 
     kind: Literal["kullback_leibler"] = Field(default="kullback_leibler", description="Kind of reward [-].")
 
-    def build(self, folder: Path) -> AnyBuilt:
+    def build(self, folder: Path) -> Built:
         """The value of an updated density."""
         from vedette.control import KullbackLeiblerReward
 
@@ -73,7 +70,7 @@ class CardinalityVarianceReward(Section):
 
     kind: Literal["cardinality_variance"] = Field(default="cardinality_variance", description="Kind of reward [-].")
 
-    def build(self, folder: Path) -> AnyBuilt:
+    def build(self, folder: Path) -> Built:
         """The value of an updated density."""
         from vedette.control import CardinalityVarianceReward
 
@@ -86,7 +83,7 @@ class ExpectedGospaReward(Section):
     kind: Literal["expected_gospa"] = Field(default="expected_gospa", description="Kind of reward [-].")
     cutoff: Positive = Field(default=100.0, description="Error that counts as a lost target [m].")
 
-    def build(self, folder: Path) -> AnyBuilt:
+    def build(self, folder: Path) -> Built:
         """The value of an updated density."""
         from vedette.control import ExpectedGospaReward
 
@@ -100,7 +97,7 @@ class PeecsReward(Section):
     share: Probability = Field(default=0.5, description="Weight of the error of the number of targets [-].")
     cutoff: Positive = Field(default=100.0, description="Error of a position that counts as 1 [m].")
 
-    def build(self, folder: Path) -> AnyBuilt:
+    def build(self, folder: Path) -> Built:
         """The value of an updated density."""
         from vedette.control import PeecsReward
 
@@ -113,7 +110,7 @@ class ExpectedLossReward(Section):
     kind: Literal["expected_loss"] = Field(default="expected_loss", description="Kind of reward [-].")
     cutoff: Positive = Field(default=100.0, description="Error that counts as a lost target [m].")
 
-    def build(self, folder: Path) -> AnyBuilt:
+    def build(self, folder: Path) -> Built:
         """The value of the scans."""
         from vedette.control import ExpectedLossReward
 
@@ -133,9 +130,9 @@ class CustomReward(Custom):
 
         return "" if isinstance(found, PowerReward | LabelReward) else super().lacking(found)
 
-    def build(self, folder: Path) -> AnyBuilt:
+    def build(self, folder: Path) -> Built:
         """The user's own."""
-        made: AnyBuilt = self.made(folder)
+        made: Built = self.made(folder)
         return made
 
 
