@@ -12,7 +12,7 @@ from vedette.cli.errors import Commands
 from vedette.cli.reporting import report
 from vedette.cli.results import results
 from vedette.cli.running import run
-from vedette.cli.scenario_files import check, init, list_, schema
+from vedette.cli.scenario_files import check, generate, init, list_, schema
 from vedette.cli.show import show
 
 app = typer.Typer(
@@ -42,6 +42,7 @@ def main(
 
 app.command("list")(list_)
 app.command()(init)
+app.command()(generate)
 app.command()(check)
 app.command()(show)
 app.command()(schema)
