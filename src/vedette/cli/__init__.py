@@ -7,9 +7,10 @@ from typing import Annotated
 import typer
 
 from vedette import __version__
-from vedette.cli.campaign import campaign, reproduce
+from vedette.cli.campaign import campaign
 from vedette.cli.errors import Commands
 from vedette.cli.reporting import report
+from vedette.cli.reproducing import reproduce
 from vedette.cli.results import results
 from vedette.cli.running import run
 from vedette.cli.scenario_files import check, generate, init, list_, schema
