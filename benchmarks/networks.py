@@ -13,13 +13,13 @@ sensors together send, in units of 1000 bytes, numbers of 8 bytes uncompressed.
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Iterator
 from pathlib import Path
 
+import campaign_tables
 import numpy as np
 
-from vedette.campaigns import CampaignResults, load_spec, open_results, resolve, run_campaign
+from vedette.campaigns import CampaignResults, load_spec
 from vedette.campaigns.results import GroupComparison
 from vedette.text import named_in
 
@@ -62,25 +62,12 @@ def scan_kilobytes(results: CampaignResults, cell: str) -> float:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser = campaign_tables.parser(__doc__ or "", "network-results")
     parser.add_argument("specs", nargs="*", type=Path, help="campaigns; none: all network-*.toml of the examples")
-    parser.add_argument("--runs", type=int, help="of each rule, instead of the campaign's")
-    parser.add_argument("--workers", type=int, default=1, help="processes")
-    parser.add_argument("--out", type=Path, default=Path("network-results"), help="folder of the results folders")
     given = parser.parse_args()
     for path in given.specs or sorted(CAMPAIGNS.glob("network-*.toml")):
-        spec = load_spec(path)
-        if given.runs is not None:
-            spec = spec.model_copy(update={"runs": given.runs})
-        folder = given.out / path.stem
-        run_campaign(resolve(spec, path.parent), folder, num_workers=given.workers)
-        results = open_results(folder)
-        several = {axis for axis, values in results.campaign.axes.items() if len(values) > 1}
-        print(f"\n## {spec.name}\n")
-        for group in results.comparisons():
-            settings = ", ".join(f"{axis} {value}" for axis, value in group.settings.items() if axis in several)
-            print(*([f"{settings}:\n"] if settings else []), *table(results, group), sep="\n")
-            print()
+        results = campaign_tables.run(load_spec(path), given.out / path.stem, given, path.parent)
+        campaign_tables.print_tables(results, table)
 
 
 if __name__ == "__main__":

@@ -46,3 +46,12 @@ def test_one_run_claims_nothing(capsys: pytest.CaptureFixture[str]) -> None:
     assert "standard error" not in printed
     assert "runs won" not in printed
     assert "unknown unknown" in printed
+
+
+def test_many_decisions_are_counted_and_not_all_printed(capsys: pytest.CaptureFixture[str]) -> None:
+    found = comparison_of(2)
+    choices = tuple(tuple(run[:1] * 9 for run in runs) for runs in found.choices)
+    print_comparison(replace(found, decision_times=np.arange(9.0), choices=choices))
+    printed = capsys.readouterr().out
+    assert printed.count("jdm at ") == 6
+    assert "jdm: and at 3 other times\n" in printed

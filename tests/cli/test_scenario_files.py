@@ -29,7 +29,7 @@ def test_version() -> None:
 def test_help_names_every_command() -> None:
     result = vedette("--help")
     assert result.exit_code == 0
-    for command in ("list", "init", "check", "show", "schema"):
+    for command in ("list", "init", "generate", "check", "show", "schema"):
         assert f"  {command} " in result.stdout
 
 
@@ -75,6 +75,45 @@ def test_init_writes_a_commented_file_that_passes_check(name: str, tmp_path: Pat
     assert checked.exit_code == 0
     assert checked.stdout.startswith(f"{file}: ok: {name}, ")
     assert checked.stdout.count("\n") == 1
+
+
+def test_generate_writes_a_commented_file_that_passes_check(tmp_path: Path) -> None:
+    words = ("generate", str(tmp_path / "scenes"), "--sensors", "3", "--pattern", "crowd", "--seed", "2")
+    result = vedette(*words)
+    assert (result.exit_code, result.stderr) == (0, "")
+    file = tmp_path / "scenes" / "crowd-limited-3-seed-2.yaml"
+    assert (file.parent / "vedette.schema.json").exists()
+    text = file.read_text(encoding="utf-8")
+    assert text.startswith("# yaml-language-server: $schema=vedette.schema.json\n# Targets that start apart and meet")
+    checked = vedette("check", str(file))
+    assert (checked.exit_code, checked.stderr) == (0, "")
+    assert checked.stdout.startswith(f"{file}: ok: crowd-limited-3-seed-2, ")
+    again = vedette(*words)
+    assert (again.exit_code, again.stderr) == (1, f"{file}: already there; --force overwrites\n")
+    assert vedette(*words, "--force").exit_code == 0
+    assert file.read_text(encoding="utf-8") == text
+
+
+def test_generate_names_the_file_after_the_scene(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert vedette("generate", "--sensors", "2", "--view", "full").exit_code == 0
+    assert vedette("generate", "own.yml", "--targets", "3").exit_code == 0
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["own.yml", "spread-full-2.yaml", "vedette.schema.json"]
+
+
+@pytest.mark.parametrize(
+    ("words", "status", "message"),
+    [
+        (("--pattern", "swarm"), 2, "expected one of spread, crowd; got swarm"),
+        (("--view", "none"), 2, "expected one of full, limited; got none"),
+        (("--sensors", "0"), 2, "Invalid value for '--sensors'"),
+    ],
+)
+def test_generate_says_what_cannot_be(words: tuple[str, ...], status: int, message: str, tmp_path: Path) -> None:
+    result = vedette("generate", str(tmp_path / "new"), *words)
+    assert result.exit_code == status
+    assert message in " ".join(result.stderr.split())
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_init_starts_in_a_folder_from_a_scene_whose_fusion_loses_nothing(tmp_path: Path) -> None:

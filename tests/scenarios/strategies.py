@@ -118,7 +118,12 @@ def targets(draw: st.DrawFn, dim: int, last: int) -> Data:
     tracks = []
     for _ in range(draw(st.integers(0, 3))):
         first, final = sorted(draw(st.tuples(st.integers(1, last), st.integers(1, last))))
-        extent = section(start_step=st.just(first), end_step=st.just(final), process_noise=st.booleans())
+        extent = section(
+            start_step=st.just(first),
+            end_step=st.just(final),
+            process_noise=st.booleans(),
+            std=st.none() | vector(dim, positive),
+        )
         tracks.append({"state": draw(vector(dim)), **draw(extent)} | ({"end_step": final}))
     return {"kind": "scripted", "tracks": tracks}
 

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from scenarios.minimal import changed
+from scenarios.minimal import MINIMAL, changed
+from vedette.control import CoordinateAscent, IndependentPlanner, JointPlanner, RenyiReward
 from vedette.densities import GLMB, LMB
 from vedette.errors import InputError
 from vedette.filters import (
@@ -26,9 +27,10 @@ from vedette.fusion import ArithmeticAverage, Clmb, CmDeltaGlmb, Matched, Parall
 from vedette.scenarios import Scenario, build, list_builtin, load_scenario, parse_scenario
 from vedette.scenarios.cautions import cautions
 from vedette.scenarios.sections.fusion import Fusion
+from vedette.scenarios.sections.planners import Named
 from vedette.scenarios.sections.scoring import MarginalEstimator
 from vedette.scenarios.summary import facts, one_line
-from vedette.simulation import Truth, simulate_scans
+from vedette.simulation import ScriptedTargets, Truth, simulate_scans
 from vedette.tracking import Central
 
 OWN_MODELS = Path(__file__).with_name("own_models.py")
@@ -317,6 +319,59 @@ def test_actions_of_one_sensor_and_of_all() -> None:
     pose = np.array([0.0, 0.0, math.pi / 2])
     np.testing.assert_allclose(own.actions(pose)[:, 0], [80.0, 100.0])
     np.testing.assert_allclose(common.actions(pose)[:, 0], np.arange(-180, 181, 30))
+
+
+NAMED = """
+planners:
+  ascent: {kind: joint, search: {kind: coordinate_ascent}}
+  bhattacharyya: {kind: joint, reward: {kind: renyi}}
+  alone: {kind: independent, reward: {kind: renyi}}
+  as it is: {kind: joint}
+"""
+
+
+def test_named_strategies_replace_their_own_parts_alone() -> None:
+    named = Scenario(parse_scenario(MINIMAL + NAMED))
+    plain, settings = build.build_planner(named, "jdm"), named.model.control.build()
+    assert isinstance(plain, JointPlanner)
+    found = {name: build.build_planner(named, name) for name in named.model.planners}
+    assert [planner.name for planner in found.values()] == ["ascent", "bhattacharyya", "alone", "as it is"]
+    inner = {name: planner.planner for name, planner in found.items() if isinstance(planner, Named)}
+    assert [type(planner) for planner in inner.values()] == [
+        JointPlanner,
+        JointPlanner,
+        IndependentPlanner,
+        JointPlanner,
+    ]
+    assert all(planner.settings == settings for planner in inner.values())
+    searches = [planner.search for planner in inner.values() if isinstance(planner, JointPlanner)]
+    assert searches == [CoordinateAscent(0), plain.search, plain.search]
+    assert [planner.reward for planner in inner.values()] == [plain.reward, RenyiReward(), RenyiReward(), plain.reward]
+
+
+def test_named_strategies_need_labels_too() -> None:
+    text = changed(
+        ("{kind: m_delta_glmb}", "{kind: phd}"),
+        ("{kind: cm_delta_glmb, weights: [0.5, 0.5]}", "{kind: none}"),
+        ("{kind: marginal, threshold: 0.6}", "{kind: map}"),
+    )
+    text = text.replace("  - {name: south, position: [0.0, -40.0]}\n", "")
+    with pytest.raises(InputError, match="as planner ascent needs labels; got phd"):
+        build.build_planner(Scenario(parse_scenario(text + NAMED)), "ascent")
+
+
+def test_first_states_of_targets_have_their_spread_in_the_librarys_order() -> None:
+    drawn = ("end_step: 18", "end_step: 18, std: [3.0, 4.0, 0.5, 0.25]")
+    assert targets_of(scenario()).initial_stds is None
+    np.testing.assert_array_equal(targets_of(scenario(drawn)).initial_stds, [[3.0, 4.0, 0.5, 0.25]])
+    other = ("{kind: constant_velocity, sigma_v: 1.0}", "{kind: constant_velocity, state_order: interleaved}")
+    np.testing.assert_array_equal(targets_of(scenario(drawn, other)).initial_stds, [[3.0, 0.5, 4.0, 0.25]])
+
+
+def targets_of(built: Scenario) -> ScriptedTargets:
+    source = build.build_targets(built)
+    assert isinstance(source, ScriptedTargets)
+    return source
 
 
 def test_an_unknown_planner() -> None:

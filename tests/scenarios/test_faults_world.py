@@ -120,6 +120,16 @@ CASES = [
     ),
     (
         "end_step: 18",
+        "end_step: 18, std: [1.0, -1.0, 0.0, 0.0]",
+        ["f.yaml:13:78: targets.tracks[0].std[1]: expected a number of at least 0, got -1.0"],
+    ),
+    (
+        "end_step: 18",
+        "end_step: 18, std: [1.0]",
+        ["f.yaml:13:72: targets.tracks[0].std: expected 4 numbers, as a state under motion has, got a list of 1"],
+    ),
+    (
+        "end_step: 18",
         "end_step: 1",
         ["f.yaml:13:63: targets.tracks[0].end_step: expected a step from start_step, 2, on, got 1"],
     ),

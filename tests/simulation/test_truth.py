@@ -72,6 +72,20 @@ def test_process_noise_target_by_target():
     np.testing.assert_array_equal(some.states, targets.truth(TIMES, rng=rng()).states)
 
 
+def test_first_states_are_drawn_anew_in_each_run():
+    stds = np.array([[0.0, 0.0, 0.0, 0.0], [10.0, 20.0, 1.0, 2.0]])
+    targets = ScriptedTargets(models.constant_velocity(5.0), STARTS[:2], initial_stds=stds)
+    draws = np.random.default_rng(3)
+    first = np.array([targets.truth(TIMES[:2], rng=draws).at(0)[1] for _ in range(2000)])
+    np.testing.assert_array_equal(first[:, 0], np.broadcast_to(STARTS[0], (2000, 4)))
+    np.testing.assert_allclose(first[:, 1].mean(axis=0), STARTS[1], atol=5.0 * stds[1].max() / np.sqrt(2000))
+    np.testing.assert_allclose(first[:, 1].std(axis=0), stds[1], rtol=0.08)
+    np.testing.assert_allclose(np.corrcoef(first[:, 1].T), np.eye(4), atol=0.1)
+    truth = targets.truth(TIMES, rng=rng())
+    start, end = truth.at(0)[1], truth.at(39)[1]
+    np.testing.assert_allclose(end[:, :2], start[:, :2] + 39.0 * start[:, 2:])
+
+
 def test_no_targets():
     truth = ScriptedTargets(models.constant_velocity(5.0), np.empty((0, 4))).truth(TIMES, rng=rng())
     truth.validate()
@@ -100,6 +114,8 @@ def test_semidefinite_factor(dt):
         ({"start_times": [1.0, 2.0, 3.0], "end_times": [9.0, 9.0, 2.0]}, "end_times"),
         ({"process_noise": [True]}, "process_noise"),
         ({"process_noise": 3}, "process_noise"),
+        ({"initial_stds": STARTS[:2]}, "initial_stds"),
+        ({"initial_stds": -np.ones((3, 4))}, "initial_stds"),
     ],
 )
 def test_bad_targets_are_named(change, field):

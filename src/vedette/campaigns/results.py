@@ -104,6 +104,11 @@ class CampaignResults:
         """One for each group of cells, in order, that has finished runs in common."""
         return tuple(filter(None, map(self._comparison, self.campaign.groups())))
 
+    def title(self, group: GroupComparison) -> str:
+        """What sets a group apart from the others, such as "fusion clmb"; empty where it is the only one."""
+        several = {axis for axis, values in self.campaign.axes.items() if len(values) > 1}
+        return ", ".join(f"{axis} {value}" for axis, value in group.settings.items() if axis in several)
+
     def tables(self) -> dict[str, pyarrow.Table]:
         """Runs, scans, decisions, actions, rewards, tracks, truth, sensors and timings as Arrow tables.
 

@@ -18,6 +18,7 @@ from vedette.scenarios.sections.base import Name, Section, Whole, check
 from vedette.scenarios.sections.planners import STRATEGIES
 from vedette.text import elided, listed, printable
 
+BUILTIN_FOLDER = Path(__file__).parent / "builtin"
 _MOST_BYTES = 2_000_000
 # A cell is a scenario with its filters built: this many take minutes before the first run.
 _MOST_CELLS, _MOST_VALUES = 10_000, 1000
@@ -128,6 +129,15 @@ def spec_from_data(data: Any, place: str = "campaign") -> CampaignSpec:
     return spec
 
 
-def load_spec(path: Path | str) -> CampaignSpec:
-    """Read a specification from its TOML file. Raises `InputError` as `parse_spec`, and where there is no such file."""
-    return parse_spec(read_text(Path(path), "campaign file", _MOST_BYTES), str(path))
+def builtin_specs() -> dict[str, Path]:
+    """Names of the campaigns that come with the library, and their files."""
+    return {file.stem: file for file in sorted(BUILTIN_FOLDER.glob("*.toml"), key=lambda file: file.stem)}
+
+
+def load_spec(name_or_path: Path | str) -> CampaignSpec:
+    """Read a specification that comes with the library by its name, or one of your own from its TOML file.
+
+    Raises `InputError` as `parse_spec`, and where there is no such file.
+    """
+    path = builtin_specs().get(str(name_or_path), Path(name_or_path))
+    return parse_spec(read_text(path, "campaign file", _MOST_BYTES), str(path))

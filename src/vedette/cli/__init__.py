@@ -7,12 +7,13 @@ from typing import Annotated
 import typer
 
 from vedette import __version__
-from vedette.cli.campaign import campaign, reproduce
+from vedette.cli.campaign import campaign
 from vedette.cli.errors import Commands
 from vedette.cli.reporting import report
+from vedette.cli.reproducing import reproduce
 from vedette.cli.results import results
 from vedette.cli.running import run
-from vedette.cli.scenario_files import check, init, list_, schema
+from vedette.cli.scenario_files import check, generate, init, list_, schema
 from vedette.cli.show import show
 
 app = typer.Typer(
@@ -42,6 +43,7 @@ def main(
 
 app.command("list")(list_)
 app.command()(init)
+app.command()(generate)
 app.command()(check)
 app.command()(show)
 app.command()(schema)

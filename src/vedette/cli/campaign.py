@@ -1,4 +1,4 @@
-"""The commands that run many runs: campaign, and the paper's comparison, reproduce."""
+"""The command that runs many runs, campaign, and what commands that do share."""
 
 from __future__ import annotations
 
@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from vedette.cli.errors import usage_error
 from vedette.cli.progress import CampaignProgress
-from vedette.cli.results import print_failures, print_results
-from vedette.cli.running import TRUST_HELP, Approval, check_planner, compile_if_cold, interruptible, processors
+from vedette.cli.results import print_failures
+from vedette.cli.running import TRUST_HELP, Approval, compile_if_cold, interruptible, processors
 from vedette.text import counted
 
 if TYPE_CHECKING:
@@ -19,7 +18,9 @@ if TYPE_CHECKING:
 
 
 def campaign(
-    spec: Annotated[Path, typer.Argument(help="Campaign file (TOML): scenarios, planners, fields to sweep, runs.")],
+    spec: Annotated[
+        Path, typer.Argument(help="Campaign file (TOML), or the name of a campaign of `reproduce --list`.")
+    ],
     out: Annotated[
         Path | None, typer.Option("--out", metavar="DIR", help="Folder for the results; else named after the campaign.")
     ] = None,
@@ -55,46 +56,6 @@ def campaign(
     typer.echo(f"{folder}: {outcome.num_landed + outcome.num_found} of {resolved.total} runs")
     place = shlex.quote(str(folder))
     typer.echo(f"next: vedette results {place}; vedette report {place}")
-    report_failures(outcome.failed)
-
-
-def reproduce(
-    scenario: Annotated[str, typer.Argument(help="Name of a built-in scenario, or a scenario file.")] = "paper-a",
-    planners: Annotated[
-        str, typer.Option("--planners", metavar="LIST", help="Strategies to compare; the first is the reference.")
-    ] = "jdm,idm,random",
-    runs: Annotated[int, typer.Option("--runs", min=1, help="Paired runs of each strategy.")] = 30,
-    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of all runs.")] = 0,
-    workers: Annotated[int, typer.Option("--workers", min=0, help="Processes; 1: this one; 0: one a processor.")] = 0,
-    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for results, report and figures.")] = Path(
-        "reproduction"
-    ),
-    trust: Annotated[bool, typer.Option("--trust", help=TRUST_HELP)] = False,
-) -> None:
-    """Compare strategies over paired runs, as the paper does: a campaign with its report, tables and figures."""
-    names = [name.strip() for name in planners.split(",")]
-    from vedette.scenarios import load_scenario
-
-    loaded = load_scenario(scenario)
-    for name in names:
-        check_planner(loaded, name, "--planners")
-    if len(set(names)) != len(names):
-        raise usage_error(f"expected each strategy once; got {planners}", "--planners")
-    from vedette.campaigns import CampaignSpec, open_results, resolve
-    from vedette.reports import write_figures, write_report, write_summary
-
-    spec = CampaignSpec(
-        name="reproduction", scenarios=(scenario,), planners=tuple(names), runs=runs, seed=seed, compare="planner"
-    )
-    outcome = carry_out(resolve(spec, approve=Approval(trust)), out, workers)
-    opened = open_results(out)
-    print_results(opened)
-    with interruptible(f"{out} keeps every run; the same command writes the report"):
-        typer.echo("drawing the figures and the report ...", err=True)
-        write_summary(opened, out)
-        write_figures(opened, out / "figures")
-        write_report(opened, out / "report.html", trust=True)  # what it names has just been run
-    typer.echo(f"wrote {out}; open {out / 'report.html'}")
     report_failures(outcome.failed)
 
 

@@ -1,48 +1,70 @@
-"""Strategies side by side, in a terminal."""
+"""Strategies side by side, in a terminal.
+
+Labels that are too long are elided, numbers never: where they do not fit side by side they stand in lines.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from rich.cells import cell_len
 
 from vedette.cli.output import console as new_console
-from vedette.text import elided_apart, named_in
+from vedette.text import counted, elided_apart, named_in
 
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from vedette.campaigns.scores import StrategyScore
     from vedette.evaluation import Comparison
 
 # Of `vedette.evaluation.tables.header`, for a terminal of 80 columns; the caption under the table says the rest.
 _SHORT_HEADER = ("loc.", "card.", "difference", "95 %", "won")
+_SHORT_SCORES = ("worst", "difference", "N error", "tracked", "s", "runs")  # of `vedette.campaigns.scores.score_header`
 _LONGEST_LABEL, _SHORTEST_LABEL = 24, 8
+_MOST_DECISIONS = 6  # times of them; the tables and the report have all
 
 
 def print_comparison(comparison: Comparison) -> None:
-    """The table of the strategies, what its numbers are, and what each strategy decided.
-
-    Labels that are too long are elided, numbers never: where they do not fit side by side they stand in lines.
-    """
+    """The table of the strategies, what its numbers are, and what each strategy decided."""
     from vedette.evaluation import decision_rows, strategy_rows
     from vedette.evaluation.tables import caption
 
     console = new_console()
     names = (named_in("OSPA", comparison.unit), *_SHORT_HEADER)
     numbers = [row[1:] for row in strategy_rows(comparison)]
+    _print_rows(console, comparison.strategies, names, numbers)
+    console.print(caption(comparison), style="dim")
     labels = elided_apart(comparison.strategies, _LONGEST_LABEL)
+    for label, strategy in zip(labels, comparison.strategies, strict=True):
+        decisions = decision_rows(comparison, strategy)
+        for when, shares in decisions[:_MOST_DECISIONS]:
+            console.print(f"{label} at {when}: {shares}")
+        if len(decisions) > _MOST_DECISIONS:
+            console.print(f"{label}: and at {counted(len(decisions) - _MOST_DECISIONS, 'other time')}")
+
+
+def print_scores(scores: Sequence[StrategyScore], unit: str) -> None:
+    """What strategies brought and cost, beside what is published."""
+    from vedette.campaigns.scores import score_row
+
+    rows = [score_row(score)[1:] for score in scores]
+    names = (named_in("OSPA", unit), *_SHORT_SCORES)
+    _print_rows(new_console(), [score.label for score in scores], names, rows)
+
+
+def _print_rows(
+    console: Console, strategies: Sequence[str], names: tuple[str, ...], numbers: list[tuple[str, ...]]
+) -> None:
+    labels = elided_apart(strategies, _LONGEST_LABEL)
     longest = max(map(cell_len, labels))
     gap = 2 if _width(names, numbers, 2) + longest <= console.width else 1
     room = console.width - _width(names, numbers, gap)
     if room < min(_SHORTEST_LABEL, longest):
         _print_lines(console, labels, names, numbers)
     else:
-        shown = elided_apart(comparison.strategies, min(room, _LONGEST_LABEL))
-        _print_table(console, shown, names, numbers, gap)
-    console.print(caption(comparison), style="dim")
-    for label, strategy in zip(labels, comparison.strategies, strict=True):
-        for when, shares in decision_rows(comparison, strategy):
-            console.print(f"{label} at {when}: {shares}")
+        _print_table(console, elided_apart(strategies, min(room, _LONGEST_LABEL)), names, numbers, gap)
 
 
 def _width(names: tuple[str, ...], numbers: list[tuple[str, ...]], gap: int) -> int:

@@ -81,14 +81,17 @@ def print_failures(failed: Sequence[Failed | Failure], *, err: bool = False) -> 
 
 def print_results(opened: CampaignResults) -> None:
     """One comparison a group of settings, then how many runs there are and how many are missing."""
-    campaign = opened.campaign
-    several = {axis for axis, values in campaign.axes.items() if len(values) > 1}
     for group in opened.comparisons():
-        shared = ", ".join(f"{axis} {value}" for axis, value in group.settings.items() if axis in several)
-        if shared:
-            typer.echo(f"{shared}:")
+        if title := opened.title(group):
+            typer.echo(f"{title}:")
         print_comparison(group.comparison)
         typer.echo("")
+    print_progress(opened)
+
+
+def print_progress(opened: CampaignResults) -> None:
+    """How many runs there are and how many are missing, of which cells, and why."""
+    campaign = opened.campaign
     missing = {cell.name: len(opened.missing(cell.name)) for cell in campaign.cells}
     total = campaign.total
     typer.echo(f"{campaign.name}, seed {campaign.seed}: {total - sum(missing.values())} of {total} runs are finished")

@@ -1,4 +1,4 @@
-"""Commands about scenario files: list, init, check, schema."""
+"""Commands about scenario files: list, init, generate, check, schema."""
 
 from __future__ import annotations
 
@@ -45,14 +45,59 @@ def init(
     if source not in builtin:
         raise usage_error(f"expected one of {', '.join(builtin)}; got {source}", "--from")
     target = path if path.suffix in (".yaml", ".yml") else path / "scenario.yaml"
-    files = _starting_files(load_scenario(source), target)
+    _write_start(_starting_files(load_scenario(source), target), target, force)
+
+
+def generate(
+    path: Annotated[
+        Path | None, typer.Argument(help="File to write, or a folder; none: a file named after the scene.")
+    ] = None,
+    sensors: Annotated[int, typer.Option("--sensors", min=1, max=1000, help="Number of sensors.")] = 5,
+    targets: Annotated[
+        int | None, typer.Option("--targets", min=1, max=2000, help="Number of targets; else two a sensor.")
+    ] = None,
+    pattern: Annotated[
+        str, typer.Option("--pattern", metavar="NAME", help="spread: targets part in groups; crowd: they meet.")
+    ] = "spread",
+    view: Annotated[
+        str, typer.Option("--view", metavar="NAME", help="limited: sensors see 250 m; full: everything.")
+    ] = "limited",
+    decide_every: Annotated[
+        int, typer.Option("--decide-every", min=1, max=59, help="Scans between decisions, and the horizon.")
+    ] = 1,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Of places and courses.")] = 0,
+    force: Annotated[bool, typer.Option("--force", help="Overwrite what is there.")] = False,
+) -> None:
+    """Write a scene of any number of sensors, made from a seed.
+
+    A square of 500 m a sensor, so that scenes of few and of many sensors compare.
+    """
+    from vedette.scenarios.generated import PATTERNS, VIEWS, GeneratedScene
+    from vedette.scenarios.generated_text import scene_text
+
+    for name, value, known in (("--pattern", pattern, PATTERNS), ("--view", view, VIEWS)):
+        if value not in known:
+            raise usage_error(f"expected one of {', '.join(known)}; got {value}", name)
+    scene = GeneratedScene(
+        num_sensors=sensors, pattern=pattern, view=view, num_targets=targets, decide_every=decide_every, seed=seed
+    )
+    target = Path(f"{scene.name}.yaml") if path is None else path
+    target = target if target.suffix in (".yaml", ".yml") else target / f"{scene.name}.yaml"
+    _write_start({target: _with_schema(scene_text(scene))}, target, force)
+
+
+def _write_start(files: dict[Path, str], target: Path, force: bool) -> None:
+    """Write files to start from, and the schema beside `target`; `InputError` where one is there already."""
     taken = [str(file) for file in files if file.exists()]
     if taken and not force:
         raise InputError(f"{', '.join(taken)}: already there; --force overwrites")
-    files[target.parent / SCHEMA_FILE] = _schema_text()
-    for file, content in files.items():
+    for file, content in {**files, target.parent / SCHEMA_FILE: _schema_text()}.items():
         write_text(file, content)
         typer.echo(f"wrote {file}")
+
+
+def _with_schema(text: str) -> str:
+    return f"# yaml-language-server: $schema={SCHEMA_FILE}\n{text}"
 
 
 def _starting_files(scenario: Scenario, target: Path) -> dict[Path, str]:
@@ -67,7 +112,7 @@ def _starting_files(scenario: Scenario, target: Path) -> dict[Path, str]:
         text = text.replace(targets.path, data.name)
         files[target.with_name(data.name)] = data.read_text(encoding="utf-8")
         files[target.with_name(f"{data.name}.README.md")] = data.with_name("README.md").read_text(encoding="utf-8")
-    return {target: f"# yaml-language-server: $schema={SCHEMA_FILE}\n{text}", **files}
+    return {target: _with_schema(text), **files}
 
 
 def check(files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Scenario files.")]) -> None:

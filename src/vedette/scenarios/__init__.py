@@ -3,7 +3,18 @@
 What is built of them is in `vedette.scenarios.build`.
 """
 
+from vedette.scenarios.generated import GeneratedScene
+from vedette.scenarios.generated_text import scene_text
 from vedette.scenarios.loading import Scenario, json_schema, list_builtin, load_scenario, parse_scenario
 from vedette.scenarios.overrides import with_fields
 
-__all__ = ["Scenario", "json_schema", "list_builtin", "load_scenario", "parse_scenario", "with_fields"]
+__all__ = [
+    "GeneratedScene",
+    "Scenario",
+    "json_schema",
+    "list_builtin",
+    "load_scenario",
+    "parse_scenario",
+    "scene_text",
+    "with_fields",
+]

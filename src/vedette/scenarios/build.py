@@ -170,13 +170,15 @@ def build_planner(scenario: Scenario, name: str, num_threads: int = 0) -> Planne
         num_threads: share a decision; 0: one a processor.
 
     Raises:
-        InputError: another name, `jdm` or `idm` with filters that have no labels, or a custom part that cannot be had.
+        InputError: another name, joint or independent decisions with filters that have no labels, or a custom part
+            that cannot be had.
     """
     model, folder = scenario.model, scenario.folder
     if name not in (*STRATEGIES, *model.planners):
         raise InputError(f"planner: expected one of {', '.join((*STRATEGIES, *model.planners))}; got {name!r}")
     sensors = build_sensors(scenario)
-    if name in STRATEGIES and STRATEGIES[name].needs_labels and not labels_targets(sensors[0].filter):
+    strategy = model.planners[name] if name in model.planners else STRATEGIES[name]
+    if strategy.needs_labels and not labels_targets(sensors[0].filter):
         kinds = "delta_glmb, m_delta_glmb or lmb"
         raise InputError(f"filter.kind: expected {kinds}, as planner {name} needs labels; got {model.filter.kind}")
     control, fusion = model.control, _fusion_of_decisions(scenario, sensors[0].filter)

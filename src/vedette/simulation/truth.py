@@ -103,6 +103,8 @@ class ScriptedTargets:
         start_times: (num_targets,) s; None: the first scan.
         end_times: (num_targets,) s, the last moment of each, included; infinite or None: to the end.
         process_noise: whether the motion's process noise disturbs them; one flag, or one a target.
+        initial_stds: (num_targets, state_dim) standard deviations of the first states, which each run draws anew around
+            `initial_states`, components independent; None: all zero.
 
     Raises:
         InputError: names the field, what was expected and what came.
@@ -113,6 +115,7 @@ class ScriptedTargets:
     start_times: Floats | None = None
     end_times: Floats | None = None
     process_noise: bool | Sequence[bool] = False
+    initial_stds: Floats | None = None
 
     def __post_init__(self) -> None:
         states = float_array("ScriptedTargets.initial_states", self.initial_states, (None, self.motion.state_dim))
@@ -129,9 +132,14 @@ class ScriptedTargets:
         flags = np.array(self.process_noise)
         if flags.dtype != np.bool_ or flags.shape not in ((), (num,)):
             raise reject("ScriptedTargets.process_noise", f"one boolean, or {num}", self.process_noise)
+        if self.initial_stds is not None:
+            stds = float_array("ScriptedTargets.initial_stds", self.initial_stds, states.shape)
+            if (stds < 0.0).any():
+                raise reject("ScriptedTargets.initial_stds", "numbers of at least 0", stds.tolist())
+            object.__setattr__(self, "initial_stds", stds)
 
     def truth(self, times: ArrayLike, *, rng: np.random.Generator) -> Truth:
-        """Each target stepped from its start time through the scans, with process noise where it has any.
+        """Each target stepped from its start time through the scans, drawn and with process noise where it is so.
 
         Raises:
             InputError: the scan times do not increase.
@@ -145,8 +153,11 @@ class ScriptedTargets:
         noisy = np.broadcast_to(np.array(self.process_noise), (num,))
         alive = (scans >= starts[:, None] - TIME_TOLERANCE) & (scans <= ends[:, None] + TIME_TOLERANCE)
         states = np.zeros((num, len(scans), self.motion.state_dim))
+        first = self.initial_states
+        if self.initial_stds is not None:
+            first = first + self.initial_stds * rng.standard_normal(first.shape)
         for target in range(num):
-            state, time = self.initial_states[target], float(starts[target])
+            state, time = first[target], float(starts[target])
             for scan in np.flatnonzero(alive[target]):
                 dt = float(scans[scan]) - time
                 if dt > TIME_TOLERANCE:

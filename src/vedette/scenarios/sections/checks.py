@@ -157,7 +157,8 @@ def _targets(model: ScenarioModel) -> Iterator[Finding]:
         return
     for i, target in enumerate(model.targets.tracks):
         path: Path = ("targets", "tracks", i)
-        yield from attempt(_state_length((*path, "state"), target, "state", model))
+        for name in ("state", "std"):
+            yield from attempt(_state_length((*path, name), target, name, model))
         for name in ("start_step", "end_step"):
             yield from attempt(_last_step((*path, name), target, name, model))
 

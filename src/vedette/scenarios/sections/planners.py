@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 from pydantic import Field
 
+from vedette.scenarios.sections.base import Section
+from vedette.scenarios.sections.control import AnyReward, AnySearch
 from vedette.scenarios.sections.custom import Custom
 
 if TYPE_CHECKING:  # with the planners comes the compiler, which a check does without
@@ -76,6 +78,34 @@ STRATEGIES = {
 }
 
 
+class NamedJoint(Section):
+    """Joint decisions, as of jdm, by a search or a reward of its own: strategies to compare in one campaign."""
+
+    kind: Literal["joint"] = Field(default="joint", description="Kind of planner [-].")
+    search: AnySearch | None = Field(default=None, description="In place of control.search; none: that one [-].")
+    reward: AnyReward | None = Field(default=None, description="In place of control.reward; none: that one [-].")
+    needs_labels: ClassVar[bool] = STRATEGIES["jdm"].needs_labels
+
+    def build(self, name: str, parts: Parts, folder: Path) -> Planner:
+        """The planner, under the name that the scenario gives it."""
+        search = parts.search if self.search is None else self.search.build(folder)
+        reward = parts.reward if self.reward is None else self.reward.build(folder)
+        return Named(name, _joint(parts._replace(search=search, reward=reward)))
+
+
+class NamedIndependent(Section):
+    """Independent decisions, as of idm, by a reward of its own."""
+
+    kind: Literal["independent"] = Field(default="independent", description="Kind of planner [-].")
+    reward: AnyReward | None = Field(default=None, description="In place of control.reward; none: that one [-].")
+    needs_labels: ClassVar[bool] = STRATEGIES["idm"].needs_labels
+
+    def build(self, name: str, parts: Parts, folder: Path) -> Planner:
+        """The planner, under the name that the scenario gives it."""
+        reward = parts.reward if self.reward is None else self.reward.build(folder)
+        return Named(name, _independent(parts._replace(reward=reward)))
+
+
 class CustomPlanner(Custom):
     """A user's own planner; called with `sensors`, `fusion`, `settings`, `reward`, `search`, `first_actions`, `notes`,
     of which it names those that it wants."""
@@ -83,6 +113,7 @@ class CustomPlanner(Custom):
     kind: Literal["custom"] = Field(default="custom", description="Kind of planner [-].")
     spared: ClassVar[tuple[str, ...]] = ("name",)  # which the scenario gives
     gives: ClassVar[str] = "vedette.control:Planner"
+    needs_labels: ClassVar[bool] = False
 
     def build(self, name: str, parts: Parts, folder: Path) -> Planner:
         """The user's own, under the name that the scenario gives it."""
@@ -91,7 +122,7 @@ class CustomPlanner(Custom):
 
 @dataclass(frozen=True, slots=True)
 class Named:
-    """A planner of the user's own under the name that the scenario gives it."""
+    """A planner under the name that the scenario gives it."""
 
     name: str
     planner: Planner
@@ -99,3 +130,6 @@ class Named:
     def plan(self, *situation: Any, rng: np.random.Generator) -> Plan:
         """What the planner decides."""
         return replace(self.planner.plan(*situation, rng=rng), planner=self.name)
+
+
+AnyPlanner = Annotated[NamedJoint | NamedIndependent | CustomPlanner, Field(discriminator="kind")]

@@ -14,7 +14,7 @@ from vedette.scenarios.sections.checks import CHECKS, step_of_time
 from vedette.scenarios.sections.control import Control
 from vedette.scenarios.sections.fusion import AnyFusion, Fusion
 from vedette.scenarios.sections.network import NetworkSection
-from vedette.scenarios.sections.planners import STRATEGIES, CustomPlanner
+from vedette.scenarios.sections.planners import STRATEGIES, AnyPlanner
 from vedette.scenarios.sections.scoring import AnyEstimator, AnyMetric, MapEstimator, Ospa
 from vedette.scenarios.sections.sensors import Sensor, SensorDefaults
 from vedette.scenarios.sections.targets import Targets
@@ -66,8 +66,8 @@ class ScenarioModel(Section):
     )
     estimator: AnyEstimator = Field(default=MapEstimator(), description="How estimates are read off [-].")
     control: Control = Field(default=Control(), description="When and how the sensors decide [-].")
-    planners: dict[Name, CustomPlanner] = Field(
-        default={}, description="Strategies of your own by name, beside jdm, idm, random, fixed and still [-]."
+    planners: dict[Name, AnyPlanner] = Field(
+        default={}, description="Further strategies by name, beside jdm, idm, random, fixed and still [-]."
     )
     ospa: Ospa = Field(default=Ospa(), description="How the estimates are scored [-].")
     metrics: dict[Name, AnyMetric] = Field(

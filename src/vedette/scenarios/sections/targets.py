@@ -37,6 +37,17 @@ class ScriptedTarget(Section):
     start_step: Step = Field(default=1, description="First scan at which it is there [-].")
     end_step: Step | None = Field(default=None, description="Last scan at which it is there; none: to the end [-].")
     process_noise: bool = Field(default=False, description="Whether its motion is disturbed by the process noise [-].")
+    std: SomeNumbers | None = Field(
+        default=None,
+        description="Standard deviation of each component of its first state, which every run draws anew around state; "
+        "none: the same in every run [m, m/s, ...].",
+    )
+
+    @check
+    def _not_negative(self) -> Iterator[Finding]:
+        for j, std in enumerate(self.std or ()):
+            if std < 0.0:
+                yield ("std", j), "a number of at least 0", describe(std)
 
     @check
     def _lifetime(self) -> Iterator[Finding]:
@@ -55,13 +66,16 @@ class ScriptedTargets(Section):
         from vedette.simulation import ScriptedTargets
 
         times, tracks = world.time.build(), self.tracks
-        states = np.array([track.state for track in tracks]).reshape(len(tracks), motion.state_dim)
+        order, shape = grouped_order(world.motion), (len(tracks), motion.state_dim)
+        states = np.array([track.state for track in tracks]).reshape(shape)
+        stds = np.array([track.std or (0.0,) * motion.state_dim for track in tracks]).reshape(shape)
         return ScriptedTargets(
             motion,
-            states[:, grouped_order(world.motion)],
+            states[:, order],
             np.array([times[track.start_step - 1] for track in tracks]),
             np.array([times[(track.end_step or len(times)) - 1] for track in tracks]),
             [track.process_noise for track in tracks] or False,
+            stds[:, order] if stds.any() else None,
         )
 
 

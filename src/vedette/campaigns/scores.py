@@ -1,0 +1,120 @@
+"""What deciding one way or another brought and cost: strategies of a campaign side by side."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vedette.campaigns.results import CampaignResults, GroupComparison
+from vedette.evaluation import Summary
+from vedette.kernels.base.types import Floats
+from vedette.simulation.records import RunRecord
+from vedette.text import named_in
+
+TRACKED_OF_ALL = "tracked_of_all"  # as scenes and campaigns name the measure
+_MINUS = "\N{MINUS SIGN}"
+_UNKNOWN = ""
+_LEAST_SECONDS = 1e-4
+
+
+@dataclass(frozen=True, slots=True)
+class StrategyScore:
+    """One strategy over the paired runs of a setting, or a method as it is published.
+
+    Attributes:
+        label: of the strategy.
+        ospa: mean over scans and runs, in the unit of the comparison.
+        standard_error: of it over the runs; None: not known.
+        worst: largest mean over the scans of a run; None: not known.
+        difference: to the first strategy, run by run; None: it is the first, or not paired with it.
+        cardinality_error: mean number of estimates minus that of targets.
+        tracked: mean share of all targets, seen or not, that have an estimate within the cutoff; None: not measured.
+        decision_seconds: wall time of a decision of all sensors, s: the median over decisions and runs; of a published
+            method what is published. None: no decisions.
+        num_runs: number of runs.
+    """
+
+    label: str
+    ospa: float
+    standard_error: float | None
+    worst: float | None
+    difference: Summary | None
+    cardinality_error: float
+    tracked: float | None
+    decision_seconds: float | None
+    num_runs: int
+
+
+def score_strategies(results: CampaignResults, group: GroupComparison) -> tuple[StrategyScore, ...]:
+    """The strategies of a group, over the runs that it has in common, in its order; the first is the reference."""
+    comparison, scores = group.comparison, []
+    for label, cell in zip(group.labels, group.cells, strict=True):
+        total = comparison.summary(label)
+        seconds = [decision_seconds(results.record(cell.name, run)) for run in results.finished(cell.name)]
+        decisions = np.concatenate(seconds)
+        known = TRACKED_OF_ALL in comparison.measures
+        scores.append(
+            StrategyScore(
+                label=label,
+                ospa=float(total.mean),
+                standard_error=_or_none(float(total.standard_error)),
+                worst=float(comparison.run_means(label).max()),
+                difference=comparison.difference(label).summary if label != group.labels[0] else None,
+                cardinality_error=float(comparison.summary(label, "cardinality_error").mean),
+                tracked=float(comparison.summary(label, TRACKED_OF_ALL).mean) if known else None,
+                decision_seconds=float(np.median(decisions)) if len(decisions) else None,
+                num_runs=comparison.num_runs,
+            )
+        )
+    return tuple(scores)
+
+
+def decision_seconds(record: RunRecord) -> Floats:
+    """(num_decisions,) wall time that each decision of a run took, s."""
+    decided = np.isin(record.times, [decision.time for decision in record.decisions])
+    return np.asarray(record.timings["planning"][decided]) if "planning" in record.timings else np.empty(0)
+
+
+def score_header(unit: str, reference: str) -> tuple[str, ...]:
+    """Of the columns of `score_row`."""
+    names = (named_in("OSPA", unit), named_in("Worst run", unit), named_in(f"More than {reference}", unit))
+    return ("Strategy", *names, "N error", "Tracked", "s a decision", "Runs")
+
+
+def score_row(score: StrategyScore) -> tuple[str, ...]:
+    """One row under `score_header`; empty where something is not known."""
+    more = score.difference
+    return (
+        score.label,
+        _with_error(score.ospa, score.standard_error),
+        _UNKNOWN if score.worst is None else f"{score.worst:.2f}",
+        _UNKNOWN if more is None else _with_error(float(more.mean), _or_none(float(more.standard_error)), sign="+"),
+        f"{score.cardinality_error:+.2f}".replace("-", _MINUS),
+        _UNKNOWN if score.tracked is None else f"{100.0 * score.tracked:.1f} %",
+        _UNKNOWN if score.decision_seconds is None else _seconds(score.decision_seconds),
+        str(score.num_runs),
+    )
+
+
+def score_markdown(scores: tuple[StrategyScore, ...], unit: str, reference: str) -> str:
+    """The table as Markdown."""
+    names = score_header(unit, reference)
+    lines = ["| " + " | ".join(names) + " |", "| --- |" + " ---: |" * (len(names) - 1)]
+    return "\n".join([*lines, *("| " + " | ".join(score_row(score)) + " |" for score in scores)]) + "\n"
+
+
+def _or_none(value: float) -> float | None:
+    return None if np.isnan(value) else value
+
+
+def _seconds(value: float) -> str:
+    """Two digits that count, without an exponent."""
+    if value < _LEAST_SECONDS:
+        return f"<{_LEAST_SECONDS:g}"
+    return f"{value:.2g}" if value < 10.0 else f"{value:.0f}"
+
+
+def _with_error(mean: float, error: float | None, sign: str = "") -> str:
+    text = f"{mean:{sign}.2f}".replace("-", _MINUS)
+    return text if error is None else f"{text} ± {error:.2f}"

@@ -1,0 +1,142 @@
+"""The command that repeats a published comparison: reproduce."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from vedette.cli.campaign import carry_out, report_failures
+from vedette.cli.comparisons import print_scores
+from vedette.cli.errors import usage_error
+from vedette.cli.output import console
+from vedette.cli.results import print_progress, print_results
+from vedette.cli.running import TRUST_HELP, Approval, check_planner, interruptible
+from vedette.cli.scenario_files import write_text
+from vedette.errors import InputError
+from vedette.text import shown
+
+if TYPE_CHECKING:
+    from vedette.campaigns import CampaignResults, CampaignSpec
+    from vedette.campaigns.yardsticks import Yardstick
+
+YARDSTICK = "yardstick.md"
+_RUNS = 30
+_STRATEGIES = ("jdm", "idm", "random")
+_FOLDER = "reproduction"
+
+
+def reproduce(
+    name: Annotated[
+        str, typer.Argument(help="A yardstick of --list, a built-in scenario, or a scenario file.")
+    ] = "paper-a",
+    planners: Annotated[
+        str | None,
+        typer.Option(
+            "--planners",
+            metavar="LIST",
+            help="Strategies to compare, the first is the reference; else the yardstick's, or jdm,idm,random.",
+        ),
+    ] = None,
+    runs: Annotated[
+        int | None, typer.Option("--runs", min=1, help="Paired runs of each strategy; else the yardstick's, or 30.")
+    ] = None,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of all runs.")] = 0,
+    workers: Annotated[int, typer.Option("--workers", min=0, help="Processes; 1: this one; 0: one a processor.")] = 0,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", metavar="DIR", help="Folder for all of it; else reproduction, or as the yardstick."),
+    ] = None,
+    list_: Annotated[bool, typer.Option("--list", help="List the yardsticks, and stop.")] = False,
+    trust: Annotated[bool, typer.Option("--trust", help=TRUST_HELP)] = False,
+) -> None:
+    """Compare strategies over paired runs, as the paper does, or on a published scene beside what is published of it.
+
+    A campaign with its report, tables and figures.
+    """
+    from vedette.campaigns import open_results, resolve
+    from vedette.campaigns.yardsticks import yardsticks
+
+    known = yardsticks()
+    if list_:
+        _list(known)
+        return
+    yardstick = known.get(name)
+    spec = _spec_of_scenario(name, planners) if yardstick is None else yardstick.spec
+    campaign = resolve(_changed(spec, planners, runs, seed), approve=Approval(trust))
+    folder = out or Path(_FOLDER if yardstick is None else campaign.default_folder)
+    outcome = carry_out(campaign, folder, workers)
+    opened = open_results(folder)
+    if yardstick is None:
+        print_results(opened)
+    else:
+        _print_beside_published(opened, yardstick)
+    _write(opened, yardstick, folder)
+    report_failures(outcome.failed)
+
+
+def _spec_of_scenario(scenario: str, planners: str | None) -> CampaignSpec:
+    from vedette.campaigns import CampaignSpec
+    from vedette.campaigns.yardsticks import yardsticks
+    from vedette.scenarios import list_builtin, load_scenario
+
+    if scenario not in list_builtin() and not os.path.isfile(scenario):
+        known = f"a yardstick ({', '.join(yardsticks())}), a built-in scenario ({', '.join(list_builtin())}) or a file"
+        raise InputError(f"name: expected {known}; got {shown(scenario)}")
+    loaded = load_scenario(scenario)
+    for strategy in _names(planners) or ():
+        check_planner(loaded, strategy, "--planners")
+    return CampaignSpec(name=_FOLDER, scenarios=(scenario,), planners=_STRATEGIES, runs=_RUNS, compare="planner")
+
+
+def _changed(spec: CampaignSpec, planners: str | None, runs: int | None, seed: int) -> CampaignSpec:
+    """The campaign with what the command line says otherwise."""
+    names = _names(planners)
+    if names is not None and len(set(names)) != len(names):
+        raise usage_error(f"expected each strategy once; got {planners}", "--planners")
+    return spec.model_copy(update={"planners": names or spec.planners, "runs": runs or spec.runs, "seed": seed})
+
+
+def _names(planners: str | None) -> tuple[str, ...] | None:
+    return None if planners is None else tuple(name.strip() for name in planners.split(","))
+
+
+def _list(known: dict[str, Yardstick]) -> None:
+    from rich.table import Table
+
+    table = Table.grid(padding=(0, 2))
+    table.add_row("paper-a", "The paper's experiment: joint, independent and random control")
+    for name, yardstick in known.items():
+        table.add_row(name, yardstick.title)
+    console().print(table)
+
+
+def _print_beside_published(opened: CampaignResults, yardstick: Yardstick) -> None:
+    from vedette.campaigns.scores import score_strategies
+    from vedette.campaigns.yardsticks import provenance
+
+    for group in opened.comparisons():
+        if title := opened.title(group):
+            typer.echo(f"{title}:")
+        print_scores((*score_strategies(opened, group), *yardstick.published), group.comparison.unit)
+        typer.echo("")
+    for line in provenance(yardstick):
+        console().print(line)
+    print_progress(opened)
+
+
+def _write(opened: CampaignResults, yardstick: Yardstick | None, folder: Path) -> None:
+    from vedette.campaigns.yardsticks import yardstick_markdown
+    from vedette.reports import write_figures, write_report, write_summary
+
+    with interruptible(f"{folder} keeps every run; the same command writes the report"):
+        typer.echo("drawing the report ...", err=True)
+        if yardstick is None:
+            write_summary(opened, folder)
+            write_figures(opened, folder / "figures")
+        else:  # of decisions at every scan, figures by the decision would be hundreds: `vedette report --figures`
+            write_text(folder / YARDSTICK, yardstick_markdown(opened, yardstick))
+        write_report(opened, folder / "report.html", trust=True)  # what it names has just been run
+    typer.echo(f"wrote {folder}; open {folder / 'report.html'}")

@@ -1,0 +1,108 @@
+"""Scenes of any number of sensors, made from a seed: who decides how, asked of many sensors and many targets alike."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vedette.errors import InputError
+
+PATTERNS = ("spread", "crowd")
+VIEWS = ("full", "limited")
+_MOST_SENSORS, _MOST_TARGETS = 1000, 2000
+
+NUM_STEPS = 60
+_SIDE = 500.0  # m, of the square that each sensor adds
+_GROUP = 4  # targets that start, or end, at one place
+_SPEEDS = (3.0, 8.0)  # m/s
+# Additive recurrence of least discrepancy in two dimensions (M. Roberts, 2018), the plastic number's first two powers.
+_PLASTIC = 1.3247179572447460
+_STRIDE = (1.0 / _PLASTIC, 1.0 / _PLASTIC**2)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GeneratedScene:
+    """What a generated scene is made from; equal settings give the same file.
+
+    Every sensor adds a square of 500 m, so that density, speeds and ranges are the same for two sensors and for a
+    hundred. Targets move at 3 to 8 m/s for 60 scans of 1 s in groups of up to four: `spread` groups start at one place
+    and part, `crowd` groups start apart and meet. Their first states are drawn anew in each run, and their motion is
+    disturbed; the filters know both distributions. Sensors start spread over the square and take steps of 20 m/s in
+    eight directions, or stay.
+
+    Attributes:
+        num_sensors: 1 to 1000.
+        pattern: "spread" or "crowd".
+        view: "full": every sensor sees everything, the worse the farther it is; "limited": 250 m, with a soft edge.
+        num_targets: 1 to 2000; None: two a sensor.
+        decide_every: scans between decisions, 1 to 59; the horizon is as long.
+        seed: of places and courses, at least 0.
+
+    Raises:
+        InputError: names the field, what was expected and what came.
+    """
+
+    num_sensors: int
+    pattern: str = "spread"
+    view: str = "limited"
+    num_targets: int | None = None
+    decide_every: int = 1
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        for name, known in (("pattern", PATTERNS), ("view", VIEWS)):
+            if getattr(self, name) not in known:
+                raise InputError(f"{name}: expected one of {', '.join(known)}; got {getattr(self, name)!r}")
+        bounds = {
+            "num_sensors": (1, _MOST_SENSORS),
+            "num_targets": (1, _MOST_TARGETS),
+            "decide_every": (1, NUM_STEPS - 1),
+            "seed": (0, 2**63),
+        }
+        for name, (least, most) in bounds.items():
+            value = getattr(self, name)
+            if name == "num_targets" and value is None:
+                continue
+            if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
+                raise InputError(f"{name}: expected a whole number from {least} to {most}; got {value!r}")
+
+    @property
+    def total_targets(self) -> int:
+        """Number of targets."""
+        return 2 * self.num_sensors if self.num_targets is None else self.num_targets
+
+    @property
+    def side(self) -> float:
+        """Of the square in which sensors and groups are, m."""
+        return _SIDE * math.sqrt(self.num_sensors)
+
+    @property
+    def name(self) -> str:
+        """Such as `crowd-limited-8`; what is not as usual is added."""
+        parts = [self.pattern, self.view, str(self.num_sensors)]
+        parts += [] if self.num_targets is None else [f"targets-{self.num_targets}"]
+        parts += [] if self.decide_every == 1 else [f"every-{self.decide_every}"]
+        parts += [] if self.seed == 0 else [f"seed-{self.seed}"]
+        return "-".join(parts)
+
+    def places(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """(num_sensors, 2) where the sensors start, m, and (num_targets, 4) mean first states [px, py, vx, vy]."""
+        rng = np.random.default_rng(np.random.SeedSequence(self.seed, spawn_key=(self.num_sensors, self.total_targets)))
+        sensors = self._spread_out(self.num_sensors, rng)
+        num = self.total_targets
+        groups = np.arange(num) // _GROUP
+        centres = self._spread_out(int(groups[-1]) + 1, rng)
+        first = rng.uniform(0.0, 2.0 * np.pi, len(centres))[groups]
+        courses = first + 2.0 * np.pi * (np.arange(num) % _GROUP + rng.uniform(-0.25, 0.25, num)) / _GROUP
+        velocities = rng.uniform(*_SPEEDS, num)[:, None] * np.stack([np.cos(courses), np.sin(courses)], axis=1)
+        if self.pattern == "spread":
+            return sensors, np.hstack([centres[groups], velocities])
+        return sensors, np.hstack([centres[groups] + (NUM_STEPS - 1) * velocities, -velocities])
+
+    def _spread_out(self, num: int, rng: np.random.Generator) -> NDArray[np.float64]:
+        """(num, 2) places spread evenly over the square."""
+        shares = (rng.uniform(size=2) + np.arange(num)[:, None] * np.array(_STRIDE)) % 1.0
+        return np.asarray((shares - 0.5) * self.side)

@@ -1,0 +1,116 @@
+"""The command that repeats a published comparison, on a scene cut short."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner, Result
+
+from vedette.campaigns import open_results, yardsticks
+from vedette.campaigns.yardsticks import Yardstick
+from vedette.cli import app
+
+NAME = "deciding-six-cameras"
+
+
+@pytest.fixture
+def short(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Yardstick:
+    """The first three scans of a yardstick, in a working folder of its own."""
+    whole = yardsticks.yardsticks()[NAME]
+    targets = {"kind": "scripted", "tracks": [{"state": [0.0, 296.0, 0.0, -4.0]}, {"state": [0.0, 500.0, 0.0, 0.0]}]}
+    fields = {"time.num_steps": 3, "control.decision_steps": [1, 2], "control.num_samples": 1, "targets": targets}
+    cut = Yardstick(
+        whole.spec.model_copy(update={"set": fields, "runs": 2}),
+        whole.title,
+        whole.source,
+        whole.remark,
+        whole.published,
+    )
+    monkeypatch.setattr(yardsticks, "yardsticks", lambda: {NAME: cut})
+    monkeypatch.chdir(tmp_path)
+    return cut
+
+
+def call(*words: str, columns: int = 80) -> Result:
+    return CliRunner().invoke(app, ["reproduce", *words, "--workers", "1"], env={"COLUMNS": str(columns)})
+
+
+def test_the_list_names_every_yardstick() -> None:
+    result = call("--list", columns=160)
+    assert (result.exit_code, result.stderr) == (0, "")
+    assert [line.split()[0] for line in result.stdout.splitlines()] == ["paper-a", *yardsticks.yardsticks()]
+
+
+def test_a_yardstick_is_run_and_printed_beside_what_is_published(short: Yardstick) -> None:
+    result = call(NAME, "--planners", "random,fixed")
+    assert result.exit_code == 0, result.output
+    assert "published: FDCD     3.39 ± 0.15" in result.stdout
+    assert "arXiv 2604.19160" in " ".join(result.stdout.split())
+    assert f"{NAME}, seed 0: 4 of 4 runs are finished" in result.stdout
+    folder = Path(f"{NAME}-results")
+    assert [open_results(folder).finished(cell) for cell in ("random", "fixed")] == [(0, 1), (0, 1)]
+    assert sorted(file.name for file in folder.iterdir() if file.suffix in (".md", ".html")) == [
+        "report.html",
+        "yardstick.md",
+    ]
+    page = (folder / "yardstick.md").read_text(encoding="utf-8")
+    assert page.startswith(f"# {short.title}\n\n| Strategy | OSPA (m) |")
+
+
+def test_the_same_command_goes_on_and_may_ask_for_more_runs(short: Yardstick) -> None:
+    assert call(NAME, "--planners", "fixed", "--runs", "1", "--out", "there").exit_code == 0
+    assert open_results("there").finished("fixed") == (0,)
+    result = call(NAME, "--planners", "fixed", "--runs", "2", "--out", "there")
+    assert result.exit_code == 0, result.output
+    assert "1 are there already" in result.stderr
+    assert open_results("there").finished("fixed") == (0, 1)
+    other = call(NAME, "--planners", "random", "--out", "there")
+    assert other.exit_code == 1
+    assert "expected a folder of this campaign" in other.stderr
+
+
+@pytest.mark.parametrize("columns", [40, 60, 80, 120])
+def test_every_number_is_shown_at_any_width(short: Yardstick, columns: int) -> None:
+    result = call(NAME, "--planners", "fixed", "--runs", "1", columns=columns)
+    assert result.exit_code == 0, result.output
+    table = result.stdout[: result.stdout.index("Published: ")]
+    assert max(map(len, table.splitlines())) <= columns
+    for number in ("22.39 ± 2.07", "34.50", "\N{MINUS SIGN}1.93", "0.59"):
+        assert number in table
+
+
+def test_ctrl_c_says_how_to_go_on(short: Yardstick, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("vedette.campaigns.run_campaign", interrupted)
+    result = call(NAME)
+    assert result.exit_code == 130
+    assert f"{NAME}-results keeps every run that is finished; the same command goes on from there" in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("words", "status", "message"),
+    [
+        ((NAME, "--planners", "fixed,fixed"), 2, "expected each strategy once; got fixed,fixed"),
+        ((NAME, "--planners", "clever"), 1, "expected one of jdm, idm, random, fixed, still; got 'clever'"),
+        (
+            ("deciding-six-camera",),
+            1,
+            "expected a yardstick (deciding-six-cameras), a built-in scenario (eight-mobile, ",
+        ),
+        ((NAME, "--runs", "0"), 2, "--runs"),
+    ],
+)
+def test_mistakes(short: Yardstick, words: tuple[str, ...], status: int, message: str) -> None:
+    result = call(*words)
+    assert result.exit_code == status
+    assert message in " ".join(result.stderr.split())
+    assert not Path(f"{NAME}-results").exists()
+
+
+def test_a_campaign_may_be_one_that_comes_with_the_library() -> None:
+    result = CliRunner().invoke(app, ["campaign", "deciding-eight-mobile", "--dry-run"])
+    assert result.exit_code == 0, result.output
+    assert result.stdout.startswith("deciding-eight-mobile: ")
