@@ -32,22 +32,22 @@ class Evidence:
         evaluator: that gives the rewards.
         which: the sensors.
         rewards: their sample rewards.
+        shape: number of different courses of each of the sensors.
     """
 
     evaluator: AnyEvaluator
     which: tuple[int, ...]
     rewards: SampleRewards
+    shape: tuple[int, ...] = field(init=False)
     _actions: list[Ints] = field(default_factory=list)
     _means: list[Floats] = field(default_factory=list)
     _errors: list[Floats] = field(default_factory=list)
     _evaluations: list[int] = field(default_factory=list)
     _best: list[float] = field(default_factory=list)
 
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """Number of different courses of each of the sensors."""
+    def __post_init__(self) -> None:
         shape = self.evaluator.joint_shape()
-        return tuple(shape[s] for s in self.which)
+        object.__setattr__(self, "shape", tuple(shape[s] for s in self.which))
 
     def evaluate(self, actions: Ints) -> Floats:
         """(num,) mean rewards of joint actions (num, num_sensors); -inf where one is no number.
@@ -131,20 +131,28 @@ class Evidence:
         A line holds one sensor's actions with the others at their `choice`.
         """
         num_entries = math.prod(len(self.evaluator.options[s].actions) for s in self.which)
+        actions, means, errors = (
+            np.concatenate(self._actions),
+            np.concatenate(self._means),
+            np.concatenate(self._errors),
+        )
         if num_entries <= MAX_TABLE and len(self.which) <= _MAX_AXES:
-            return (self._table(self.which, range(len(self.which)), choice),)
-        return tuple(self._table((s,), (axis,), choice) for axis, s in enumerate(self.which))
+            return (self._table(self.which, actions, means, errors),)
+        off = actions != np.array(choice, np.int64)
+        num_off, first_off = off.sum(axis=1), off.argmax(axis=1)
+        found = []
+        for axis, s in enumerate(self.which):
+            rows = (num_off == 0) | ((num_off == 1) & (first_off == axis))
+            found.append(self._table((s,), actions[rows, axis : axis + 1], means[rows], errors[rows]))
+        return tuple(found)
 
-    def _table(self, sensors: tuple[int, ...], axes: Sequence[int], choice: Sequence[int]) -> RewardTable:
-        """Rewards over the courses on `axes` where all others are chosen, spread over the actions."""
-        actions = np.concatenate(self._actions)
-        others = [axis for axis in range(len(self.which)) if axis not in axes]
-        rows = (actions[:, others] == np.array(choice, np.int64)[others]).all(axis=1)
-        place = tuple(actions[rows][:, axis] for axis in axes)
-        spread = np.ix_(*(self.evaluator.options[s].which for s in sensors))
+    def _table(self, sensors: tuple[int, ...], actions: Ints, means: Floats, errors: Floats) -> RewardTable:
+        """Rewards of joint actions (num, num of `sensors`), numbers of courses, spread over the actions."""
+        options = [self.evaluator.options[s] for s in sensors]
+        spread = np.ix_(*(own.which for own in options))
         filled = []
-        for values in (self._means, self._errors):
-            table = np.full([self.shape[axis] for axis in axes], math.nan)
-            table[place] = np.concatenate(values)[rows]
+        for values in (means, errors):
+            table = np.full([len(own.courses) for own in options], math.nan)
+            table[tuple(actions.T)] = values
             filled.append(table[spread])
         return RewardTable(sensors, *filled)

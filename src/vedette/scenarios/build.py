@@ -13,7 +13,7 @@ from vedette.control import MobileSensor, Planner
 from vedette.densities import LMB
 from vedette.errors import InputError
 from vedette.filters import Filter, labels_targets, shared_targets
-from vedette.fusion import Clmb, CmDeltaGlmb, Fusion, Matched
+from vedette.fusion import Clmb, CmDeltaGlmb, Fusion, Matched, ParallelUpdate
 from vedette.kernels.base.types import Bools, Floats
 from vedette.models import SensorModel, TargetModel
 from vedette.platforms import Actions
@@ -204,6 +204,9 @@ def _notes_of_decisions(scenario: Scenario, fusion: Fusion) -> tuple[str, ...]:
     ):
         return ()
     own = f"{section.kind} by views" if section.by_views else section.kind
+    if isinstance(fusion, ParallelUpdate):
+        exact = section.kind in (*OF_SCANS, "parallel") and not section.by_views
+        return () if exact else (f"joint rewards take all scans in full; tracks are fused by another rule ({own})",)
     rule = "clmb" if isinstance(fusion, Clmb) else "cm_delta_glmb"
     return (f"joint rewards are of plain covariance intersection ({rule}); tracks are fused by another rule ({own})",)
 

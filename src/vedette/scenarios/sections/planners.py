@@ -11,12 +11,13 @@ import numpy as np
 from pydantic import Field
 
 from vedette.scenarios.sections.base import Section
-from vedette.scenarios.sections.control import AnyReward, AnySearch
+from vedette.scenarios.sections.control import AnySearch
 from vedette.scenarios.sections.custom import Custom
+from vedette.scenarios.sections.rewards import AnyReward
 
 if TYPE_CHECKING:  # with the planners comes the compiler, which a check does without
     from vedette.control import JointSearch, MobileSensor, Plan, Planner, PlanningSettings
-    from vedette.control.preparation import AnyReward
+    from vedette.control.preparation import AnyReward as PlannedReward
     from vedette.fusion import Fusion
     from vedette.platforms import Actions
 
@@ -32,7 +33,7 @@ class Parts(NamedTuple):
     sensors: tuple[MobileSensor, ...]
     fusion: Fusion
     settings: PlanningSettings
-    reward: AnyReward
+    reward: PlannedReward
     search: JointSearch
     first_actions: tuple[Actions, ...]
     notes: tuple[str, ...]
