@@ -12,7 +12,7 @@ from vedette.control.evidence import Evidence
 from vedette.control.inputs import check_choice, check_poses, options_of
 from vedette.control.plan import Plan, RewardTable
 from vedette.control.reward import CauchySchwarzReward, PowerReward, Reward
-from vedette.control.search import ExhaustiveSearch, JointProblem, JointSearch, all_joint_actions, first_best
+from vedette.control.search import AutomaticSearch, JointProblem, JointSearch, all_joint_actions, first_best
 from vedette.control.settings import MobileSensor, PlanningSettings
 from vedette.fusion import Fusion
 from vedette.kernels.base.types import Floats
@@ -51,7 +51,7 @@ class JointPlanner:
     fusion: Fusion
     settings: PlanningSettings = field(default_factory=PlanningSettings)
     reward: Reward | PowerReward = field(default_factory=CauchySchwarzReward)
-    search: JointSearch = field(default_factory=ExhaustiveSearch)
+    search: JointSearch = field(default_factory=AutomaticSearch)
     notes: tuple[str, ...] = ()
 
     @property
