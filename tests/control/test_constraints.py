@@ -276,10 +276,10 @@ def test_beliefs_for_all_times_are_enough() -> None:
         (lambda: Separation(0.0), "distance: expected a number above 0; got 0"),
         (lambda: StayInside((0, 1, 0, 1)), "region: expected a Region"),  # type: ignore[arg-type]
         (
-            lambda: KeepOut([[0, 0], [1, 1]]),
+            lambda: KeepOut(CORNERS[:2]),
             "area: expected a Region, or a polygon of at least 3 corners; got 2 corners",
         ),  # type: ignore[arg-type]
-        (lambda: KeepOut([[0, 0, 0]]), "area: expected an array of shape"),  # type: ignore[arg-type]
+        (lambda: KeepOut(np.zeros((1, 3))), "area: expected an array of shape"),  # type: ignore[arg-type]
         (lambda: KeepOut("here"), "area: expected"),  # type: ignore[arg-type]
     ],
 )

@@ -152,7 +152,9 @@ def test_where_no_target_is_known_all_is_void(belief: Any) -> None:
 
 def test_what_exists_for_certain_and_is_certainly_there() -> None:
     belief = LMB.from_bernoullis([(0, 0)], [1.0], [[10.0, 0.0, 0.0, 0.0]], [np.eye(4)])
-    np.testing.assert_allclose(void_probability(belief, [[0.0, 0.0], [60.0, 0.0]], 25.0), [0.0, 1.0], atol=1e-12)
+    np.testing.assert_allclose(
+        void_probability(belief, np.array([[0.0, 0.0], [60.0, 0.0]]), 25.0), [0.0, 1.0], atol=1e-12
+    )
 
 
 def test_courses_keep_it_at_every_time() -> None:

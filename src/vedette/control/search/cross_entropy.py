@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vedette.control.search.known import Joint, Known
+from vedette.control.constraints import Mask
+from vedette.control.search.known import Known
 from vedette.control.search.problem import JointProblem
 from vedette.kernels.base.types import Floats, Ints
 from vedette.models.arguments import dimension, reject
@@ -25,8 +26,8 @@ class CrossEntropy:
     are degenerate (every sensor has an action of 0.99), when a round draws nothing new, or after `max_rounds`. No joint
     action is evaluated twice: what is drawn again keeps its reward.
 
-    With a mask, courses that are forbidden are never drawn, and joint actions that are not allowed are moved to ones
-    near them that are (`vedette.control.constraints.repaired`, `opened`).
+    With a mask, each sensor's action is drawn from those that go with the sensors before it; where there are none, the
+    joint action is moved to one near it that is allowed (`vedette.control.constraints.repaired`, `opened`).
 
     Attributes:
         num_samples: joint actions drawn in a round.
@@ -58,7 +59,7 @@ class CrossEntropy:
         num_elite = math.ceil(self.elite_share * self.num_samples)
         drawn = [known.allowed(problem.independent())]
         for _ in range(self.max_rounds):
-            drawn += [known.allowed(joint) for joint in _draw(probabilities, self.num_samples, rng)]
+            drawn += known.all_allowed(_draw(known.mask, probabilities, self.num_samples, rng))
             num_known = len(known.values)
             order = np.argsort(-known.rewards(drawn), kind="stable")
             elite = np.array([drawn[i] for i in order[:num_elite].tolist()])
@@ -78,12 +79,20 @@ def _uniform(known: Known) -> Floats:
     return np.asarray(found / found.sum(axis=1, keepdims=True))
 
 
-def _draw(probabilities: Floats, num: int, rng: np.random.Generator) -> list[Joint]:
-    """`num` joint actions, each sensor's by its own probabilities."""
-    ends = probabilities.cumsum(axis=1)
-    last = probabilities.shape[1] - 1 - (probabilities[:, ::-1] > 0.0).argmax(axis=1)
-    at = (rng.random((num, len(ends)))[:, :, np.newaxis] >= ends).sum(axis=2)
-    return list(map(tuple, np.minimum(at, last).tolist()))  # rounding may leave the last end below 1
+def _draw(mask: Mask | None, probabilities: Floats, num: int, rng: np.random.Generator) -> Ints:
+    """(num, num_sensors) drawn sensor by sensor, of what goes with those before it, if anything does."""
+    at = np.empty((num, len(probabilities)), np.int64)
+    for s, own in enumerate(probabilities):
+        weights = np.tile(own, (num, 1))
+        for other, clash in mask.others(s).items() if mask is not None else ():
+            if other < s:
+                weights[:, : clash.shape[1]] *= clash[at[:, other]] == 0
+        weights[weights.sum(axis=1) == 0.0] = own
+        ends = weights.cumsum(axis=1)
+        # Below the last end, so that what cannot be drawn is not, whatever the rounding.
+        drawn = np.minimum(rng.random(num) * ends[:, -1], np.nextafter(ends[:, -1], 0.0))
+        at[:, s] = (drawn[:, np.newaxis] >= ends).sum(axis=1)
+    return at
 
 
 def _shares(joint_actions: Ints, num_courses: int) -> Floats:

@@ -8,7 +8,7 @@ import numpy as np
 
 from vedette.control.constraints import Mask, opened, repaired
 from vedette.control.search.problem import JointProblem, least_equal
-from vedette.kernels.base.types import Floats
+from vedette.kernels.base.types import Floats, Ints
 
 Joint = tuple[int, ...]
 
@@ -55,17 +55,21 @@ class Known:
 
     def allowed(self, joint: Sequence[int]) -> Joint:
         """A joint action itself where it is allowed; else one near it that is."""
+        return self.all_allowed(np.array([joint], np.int64))[0]
+
+    def all_allowed(self, actions: Ints) -> list[Joint]:
+        """Joint actions (num, num_sensors), each itself where it is allowed; else one near it that is."""
+        joints: list[Joint] = list(map(tuple, actions.tolist()))
         if self.mask is None or self._allowed is None:
-            return tuple(joint)
-        near = repaired(self.mask, joint)
-        return near if self.mask.allows(np.array([near]))[0] else self._allowed
+            return joints
+        for row in np.flatnonzero(~self.mask.allows(actions)).tolist():
+            near = repaired(self.mask, joints[row])
+            joints[row] = near if self.mask.allows(np.array([near]))[0] else self._allowed
+        return joints
 
     def drawn(self, num: int, *, rng: np.random.Generator) -> list[Joint]:
-        """`num` allowed joint actions: drawn uniformly, and those that are not allowed moved to near ones that are."""
-        return [
-            self.allowed(joint)
-            for joint in rng.integers(self.problem.shape, size=(num, len(self.problem.shape))).tolist()
-        ]
+        """`num` joint actions, drawn uniformly, and those that are not allowed moved to near ones that are."""
+        return self.all_allowed(rng.integers(self.problem.shape, size=(num, len(self.problem.shape))))
 
     def best(self) -> Joint:
         """The best of all that are known; of equal ones the first in printed order."""
