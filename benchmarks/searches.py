@@ -1,6 +1,6 @@
 """How good the searches of joint actions are at equal numbers of evaluations, on rewards that cost nothing.
 
-    python benchmarks/searches.py [--scenes N] [--sensors N ...]
+    python benchmarks/searches.py [--scenes N] [--sensors N ...] [--kinds KIND ...]
 
 Course a of sensor s sees target l with probability p[s, a, l]. Rewards, with targets of several values: that of the
 targets seen by anyone ("spread": most courses see several targets a little; "sharp": few see one well, most none), and
@@ -109,8 +109,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--scenes", type=int, default=60)
     parser.add_argument("--sensors", type=int, nargs="+", default=[3, 5, 8, 20])
+    parser.add_argument("--kinds", choices=KINDS, nargs="+", default=KINDS)
     arguments = parser.parse_args()
-    for kind in KINDS:
+    for kind in arguments.kinds:
         for num_sensors in arguments.sensors:
             num_courses, table = 9 if num_sensors <= 5 else 12, dict[str, list[tuple[float, int]]]()
             for number in range(arguments.scenes):
