@@ -278,8 +278,8 @@ def test_beliefs_for_all_times_are_enough() -> None:
         (
             lambda: KeepOut(CORNERS[:2]),
             "area: expected a Region, or a polygon of at least 3 corners; got 2 corners",
-        ),  # type: ignore[arg-type]
-        (lambda: KeepOut(np.zeros((1, 3))), "area: expected an array of shape"),  # type: ignore[arg-type]
+        ),
+        (lambda: KeepOut(np.zeros((1, 3))), "area: expected an array of shape"),
         (lambda: KeepOut("here"), "area: expected"),  # type: ignore[arg-type]
     ],
 )
