@@ -83,7 +83,7 @@ def test_coordinate_ascent_is_exact_where_sensors_do_not_interact(shape: tuple[i
     draw = np.random.default_rng(seed)
     own = [draw.random(size) for size in shape]
     table = Table(sum(np.ix_(*own), start=np.zeros(shape)))
-    found = CoordinateAscent().search(table.problem(), rng=draw)
+    found = CoordinateAscent(0).search(table.problem(), rng=draw)
     assert found == tuple(int(values.argmax()) for values in own)
     assert len(table.asked) <= 1 + 2 * sum(shape)
 
@@ -92,7 +92,7 @@ def test_restarts_leave_a_local_maximum() -> None:
     rewards = np.zeros((6, 6))
     rewards[0, 0], rewards[4, 5] = 1.0, 2.0
     problem = Table(rewards).problem()
-    assert CoordinateAscent().search(problem, rng=rng()) == (0, 0)
+    assert CoordinateAscent(0).search(problem, rng=rng()) == (0, 0)
     assert CoordinateAscent(40).search(problem, rng=rng()) == (4, 5)
 
 
@@ -136,7 +136,7 @@ COURSES = Courses(30.0, (-180.0, -90.0, 0.0, 45.0, 90.0, 180.0))
 @pytest.mark.parametrize("seed", range(3))
 def test_a_partial_search_has_the_rewards_of_the_exhaustive_one(kind: str, seed: int) -> None:
     example = situation(kind, 3, seed, platform=COURSES)
-    full, partial = joint_plan(example, ExhaustiveSearch()), joint_plan(example, CoordinateAscent())
+    full, partial = joint_plan(example, ExhaustiveSearch()), joint_plan(example, CoordinateAscent(0))
     (table,), (some,) = full.tables, partial.tables
     evaluated = np.isfinite(some.mean)
     np.testing.assert_array_equal(some.mean[evaluated], table.mean[evaluated])
@@ -158,14 +158,14 @@ def test_restarts_are_drawn_from_the_planners_generator() -> None:
     first, again = (joint_plan(example, CoordinateAscent(3)) for _ in range(2))
     np.testing.assert_array_equal(first.tables[0].mean, again.tables[0].mean)
     more = np.isfinite(first.tables[0].mean).sum()
-    assert more > np.isfinite(joint_plan(example, CoordinateAscent()).tables[0].mean).sum()
+    assert more > np.isfinite(joint_plan(example, CoordinateAscent(0)).tables[0].mean).sum()
 
 
 def test_a_table_too_large_to_hold_is_kept_as_a_line_a_sensor(monkeypatch: pytest.MonkeyPatch) -> None:
     example = situation("marginal", 3, platform=COURSES)
-    whole = joint_plan(example, CoordinateAscent())
+    whole = joint_plan(example, CoordinateAscent(0))
     monkeypatch.setattr(evidence, "MAX_TABLE", 6**3 - 1)
-    lines = joint_plan(example, CoordinateAscent())
+    lines = joint_plan(example, CoordinateAscent(0))
     assert lines.chosen == whole.chosen
     assert [table.sensors for table in lines.tables] == [(0,), (1,), (2,)]
     for s, table in enumerate(lines.tables):
@@ -188,7 +188,7 @@ def test_many_sensors() -> None:
     example = replace(example, sensors=tuple(replace(sensor, platform=Courses(30.0)) for sensor in example.sensors))
     with pytest.raises(InputError, match="CoordinateAscent"):
         joint_plan(example, ExhaustiveSearch())
-    plan = joint_plan(example, CoordinateAscent())
+    plan = joint_plan(example, CoordinateAscent(0))
     assert len(plan.tables) == 8
     assert max(float(table.mean.max()) for table in plan.tables) == plan.tables[0].mean[plan.chosen[0]]
 

@@ -93,6 +93,22 @@ class FirstOfAll:
         return (0,) * len(problem.shape)
 
 
+class OddOnes:
+    """No sensor but the first takes a course of even number."""
+
+    name, needs_beliefs = "odd_ones", False
+
+    def __init__(self, spared: int = 1) -> None:
+        self.spared = spared
+
+    def courses(self, situation: Any) -> Any:
+        numbers = [np.arange(len(own)) for own in situation.courses]
+        return tuple((own % 2 == 1) | (s < self.spared) for s, own in enumerate(numbers))
+
+    def pairs(self, situation: Any, first: int, second: int) -> None:
+        return None
+
+
 class Last:
     """Every sensor takes the last of what it may do."""
 

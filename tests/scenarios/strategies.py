@@ -177,6 +177,30 @@ def undetected(side: float) -> st.SearchStrategy[Data]:
     return st.builds(lambda one, other: {**one, **other}, fixed, more)
 
 
+searches = st.one_of(
+    section("automatic", max_joint_actions=counts),
+    section("exhaustive", max_joint_actions=counts),
+    section("coordinate_ascent", num_restarts=st.integers(0, 100)),
+    section("sequential_greedy", order=st.sampled_from(["printed", "best_first"])),
+    section("cross_entropy", num_samples=counts, elite_share=inner, smoothing=st.floats(0.1, 1.0), max_rounds=counts),
+    custom(),
+)
+
+
+@st.composite
+def constraints(draw: st.DrawFn) -> Data:
+    x, y = draw(vector(2)), draw(vector(2, st.floats(1.0, 1e6)))
+    region = st.just({"x_min": x[0], "x_max": x[0] + y[0], "y_min": x[1], "y_max": x[1] + y[1]})
+    return draw(
+        needed("stay_inside", region=region)
+        | needed("keep_out", region=region)
+        | needed("keep_out", polygon=st.lists(vector(2), min_size=3, max_size=5))
+        | needed("separation", distance=positive)
+        | needed("void_probability", radius=positive, probability=probability)
+        | custom()
+    )
+
+
 @st.composite
 def scenarios(draw: st.DrawFn) -> Data:
     """The data of a valid scenario file."""
@@ -192,6 +216,8 @@ def scenarios(draw: st.DrawFn) -> Data:
         detection_threshold=probability,
         reward=section("cauchy_schwarz", unit_volume=st.just("reference") | positive)
         | section("renyi", order=positive.filter(lambda order: order != 1.0)),
+        search=searches,
+        constraints=st.lists(constraints(), max_size=3),
         limits=section(max_prior_hypotheses=counts, max_hypotheses=counts),
     )
     return {

@@ -37,7 +37,7 @@ ALL = (
     ("{kind: marginal, threshold: 0.6}", own("sure", "{threshold: 0.4}")),
     (
         "{decision_steps: [4, 8]}",
-        f"\n  decision_steps: [2, 4]\n  horizon_steps: 1\n  num_samples: 2\n  reward: {own('reward', '{scale: 2.0}')}\n  search: {own('FirstOfAll')}\nplanners:\n  last: {own('Last')}\n  third: {own('Last', '{skip: 1}')}\n  breaks: {own('Breaks')}",
+        f"\n  decision_steps: [2, 4]\n  horizon_steps: 1\n  num_samples: 2\n  reward: {own('reward', '{scale: 2.0}')}\n  search: {own('FirstOfAll')}\n  constraints: [{own('OddOnes', '{spared: 2}')}]\nplanners:\n  last: {own('Last')}\n  third: {own('Last', '{skip: 1}')}\n  breaks: {own('Breaks')}",
     ),
     ("from_step: 5, to_step: 20}", f"from_step: 1, to_step: 6}}\nmetrics:\n  found: {own('count', '{factor: 2.0}')}"),
 )
@@ -133,6 +133,8 @@ def test_a_reward_of_power_integrals_is_one_too(folder: Path) -> None:
         ("last: {kind: custom, function: 'own_parts.py:Last'", "last: {kind: custom, function: 'own_parts.py:plans_otherwise'", "planners.last.function: expected own_parts.py:plans_otherwise to give a Planner, got a Otherwise that cannot be called as plan("),
         ("own_parts.py:Hopper", "own_parts.py:FirstOfAll", "sensor_defaults.platform.function: expected own_parts.py:FirstOfAll to give a Platform, got TypeError"),
         ("own_parts.py:FirstOfAll'", "own_parts.py:NoPlan'", "control.search.function: expected own_parts.py:NoPlan to give a JointSearch, got a NoPlan without search(problem, *, rng)"),
+        ("own_parts.py:OddOnes", "own_parts.py:FirstOfAll", "control.constraints[0].function: expected own_parts.py:FirstOfAll to give a Constraint, got TypeError"),
+        ("own_parts.py:OddOnes', arguments: {spared: 2}", "own_parts.py:NoPlan', arguments: {}", "control.constraints[0].function: expected own_parts.py:NoPlan to give a Constraint, got a NoPlan without name"),
         ("own_parts.py:sure", "own_parts.py:cardinality", "estimator.function: expected own_parts.py:cardinality to give a Estimator, got a partial that cannot be called as (density, step)"),
         ("own_parts.py:Filter", "own_parts.py:NoPlan", "filter.function: expected own_parts.py:NoPlan to give a Filter, got TypeError"),
         ("own_parts.py:fusion", "own_parts.py:Last", "fusion.function: expected own_parts.py:Last to give a Fusion, got TypeError"),
@@ -150,7 +152,7 @@ def test_the_check_says_what_is_missing(folder: Path, old: str, new: str, fault:
 
 def test_code_that_others_may_have_written_is_said_and_not_imported(folder: Path) -> None:
     (folder / "own_parts.py").write_text(
-        "raise SystemExit('run')\nHopper = Filter = fusion = sure = reward = 1\nFirstOfAll = Last = Breaks = count = 1\n"
+        "raise SystemExit('run')\nHopper = Filter = fusion = sure = reward = 1\nFirstOfAll = OddOnes = Last = Breaks = count = 1\n"
     )
     (folder / "own_parts.py").chmod(0o666)
     code, text = check(folder / "scene.yaml")

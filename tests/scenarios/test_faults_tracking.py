@@ -164,7 +164,7 @@ CASES = [
         "decision_steps: [4, 8]",
         "actions_deg: [0, 90]",
         [
-            "f.yaml:22:11: control.actions_deg: expected one of decision_steps, decision_times, detection_threshold, horizon_period, horizon_steps, ideal_measurements, limits, num_samples, reward, search, got an unknown key (the platform of a sensor has it: `platform: {kind: courses, speed: 50.0, headings_deg: [0, 90]}`)"
+            "f.yaml:22:11: control.actions_deg: expected one of constraints, decision_steps, decision_times, detection_threshold, horizon_period, horizon_steps, ideal_measurements, limits, num_samples, reward, search, got an unknown key (the platform of a sensor has it: `platform: {kind: courses, speed: 50.0, headings_deg: [0, 90]}`)"
         ],
     ),
     (

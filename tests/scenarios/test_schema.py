@@ -11,7 +11,16 @@ from typing import Any, get_args
 import pytest
 from pydantic import BaseModel
 
-from vedette.control import CauchySchwarzReward, PlanningSettings, RenyiReward
+from vedette.control import (
+    AutomaticSearch,
+    CauchySchwarzReward,
+    CoordinateAscent,
+    CrossEntropy,
+    ExhaustiveSearch,
+    PlanningSettings,
+    RenyiReward,
+    SequentialGreedy,
+)
 from vedette.control.settings import IDEAL_MODES
 from vedette.densities import marginal_estimate
 from vedette.filters import DeltaGlmbFilter, Limits
@@ -21,6 +30,7 @@ from vedette.recorded import Cleaning
 from vedette.recorded import RecordedTargets as RecordedSource
 from vedette.scenarios import json_schema
 from vedette.scenarios.diagnostics import kinds_of
+from vedette.scenarios.sections import search
 from vedette.scenarios.sections.base import Section
 from vedette.scenarios.sections.control import CauchySchwarzReward as CauchySchwarzSection
 from vedette.scenarios.sections.control import Control
@@ -105,6 +115,15 @@ DEFAULTS: list[tuple[type[BaseModel], Any, dict[str, str]]] = [
     (RecordedTargets, RecordedSource, {"time_origin": "time_origin"}),
     (CauchySchwarzSection, CauchySchwarzReward, {"unit_volume": "unit_volume"}),
     (RenyiSection, RenyiReward, {"order": "order"}),
+    (search.Automatic, AutomaticSearch, {"max_joint_actions": "max_joint_actions"}),
+    (search.Exhaustive, ExhaustiveSearch, {"max_joint_actions": "max_joint_actions"}),
+    (search.Ascent, CoordinateAscent, {"num_restarts": "num_restarts"}),
+    (search.Greedy, SequentialGreedy, {"order": "order"}),
+    (
+        search.CrossEntropy,
+        CrossEntropy,
+        {name: name for name in ("num_samples", "elite_share", "smoothing", "max_rounds")},
+    ),
     (GibbsAssignment, DeltaGlmbFilter, {"num_samples": "num_gibbs_samples"}),
     (Fusion, Clmb, {"mixture_power": "mixture_power", "missing_existence": "missing_existence"}),
     (MarginalEstimator, marginal_estimate, {"threshold": "threshold"}),

@@ -7,14 +7,16 @@ from typing import Protocol
 
 import numpy as np
 
+from vedette.control.allowed import mask_of_decision, single_mask
 from vedette.control.bounds import bound_of
+from vedette.control.constraints import Constraint, repaired
 from vedette.control.evidence import Evidence
 from vedette.control.inputs import check_choice, check_poses, options_of
 from vedette.control.plan import Plan, RewardTable
 from vedette.control.preparation import AnyReward, prepare
 from vedette.control.problem import joint_problem, note_lines
 from vedette.control.rewards import CauchySchwarzReward
-from vedette.control.search import ExhaustiveSearch, JointSearch, all_joint_actions, first_best
+from vedette.control.search import AutomaticSearch, JointSearch, all_joint_actions, first_best
 from vedette.control.settings import MobileSensor, PlanningSettings
 from vedette.fusion import Fusion
 from vedette.kernels.base.types import Floats
@@ -44,8 +46,9 @@ class JointPlanner:
         sensors: the sensors, in the order of the beliefs and of the fusion weights.
         fusion: how their pseudo-updated densities become one.
         settings: horizon, samples, caps.
-        reward: Cauchy-Schwarz or Renyi divergence, or a reward of the user's own.
+        reward: one of `vedette.control.rewards`, or of the user's own.
         search: which joint actions are evaluated: all of them, as in the paper, or fewer.
+        constraints: what the sensors must not do.
         notes: what every plan is to say beside what comes up, such as that the tracks are fused in another way.
     """
 
@@ -53,7 +56,8 @@ class JointPlanner:
     fusion: Fusion
     settings: PlanningSettings = field(default_factory=PlanningSettings)
     reward: AnyReward = field(default_factory=CauchySchwarzReward)
-    search: JointSearch = field(default_factory=ExhaustiveSearch)
+    search: JointSearch = field(default_factory=AutomaticSearch)
+    constraints: tuple[Constraint, ...] = ()
     notes: tuple[str, ...] = ()
 
     @property
@@ -79,14 +83,17 @@ class JointPlanner:
         generator(rng)
         evaluator = prepare(self.sensors, self.fusion, self.settings, self.reward, state, poses, rng=rng)
         evidence = Evidence(evaluator, tuple(range(len(self.sensors))), evaluator.joint())
-        problem = joint_problem(evidence)
+        mask = mask_of_decision(
+            self.constraints, self.sensors, evaluator.options, state.fused, np.asarray(poses), self.settings
+        )
+        problem = joint_problem(evidence, mask)
         best = check_choice("search", self.search.search(problem, rng=rng), evidence.shape)
-        if not evidence.holds(best):
-            note_lines(evidence, best)
+        note_lines(evidence, best, mask)
         chosen = tuple(own.first_action(course) for own, course in zip(evaluator.options, best, strict=True))
         actions = tuple(own.actions for own in evaluator.options)
         tables, (counts, found), bound = evidence.tables(best), evaluator.account(), bound_of(evidence, best)
-        return Plan(self.name, actions, chosen, tables, counts, (*self.notes, *found), evidence.curve(), bound)
+        notes = (*self.notes, *(mask.notes if mask is not None else ()), *found)
+        return Plan(self.name, actions, chosen, tables, counts, notes, evidence.curve(), bound)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -97,13 +104,15 @@ class IndependentPlanner:
         sensors: the sensors, in the order of the beliefs.
         fusion: how the beliefs became one; the decision itself does not use it.
         settings: horizon, samples, caps.
-        reward: Cauchy-Schwarz or Renyi divergence, or a reward of the user's own.
+        reward: one of `vedette.control.rewards`, or of the user's own.
+        constraints: what each sensor by itself must not do; those on pairs of sensors are not looked at.
     """
 
     sensors: tuple[MobileSensor, ...]
     fusion: Fusion
     settings: PlanningSettings = field(default_factory=PlanningSettings)
     reward: AnyReward = field(default_factory=CauchySchwarzReward)
+    constraints: tuple[Constraint, ...] = ()
 
     @property
     def name(self) -> str:
@@ -114,15 +123,21 @@ class IndependentPlanner:
         """Each sensor's action of largest mean reward; arguments, ties and errors as `JointPlanner.plan`."""
         generator(rng)
         evaluator = prepare(self.sensors, self.fusion, self.settings, self.reward, state, poses, rng=rng)
+        mask = mask_of_decision(
+            self.constraints, self.sensors, evaluator.options, state.fused, np.asarray(poses), self.settings
+        )
         chosen: list[int] = []
         tables: list[RewardTable] = []
         for s, own in enumerate(evaluator.options):
             evidence = Evidence(evaluator, (s,), evaluator.alone(s))
-            best = first_best(evidence.evaluate(all_joint_actions((len(own.courses),))))
+            allowed = all_joint_actions((len(own.courses),))[single_mask(mask, s, len(own.courses))]
+            best = int(allowed[first_best(evidence.evaluate(allowed)), 0])
             chosen.append(own.first_action(best))
             tables.extend(evidence.tables((best,)))
         actions = tuple(own.actions for own in evaluator.options)
-        return Plan(self.name, actions, tuple(chosen), tuple(tables), *evaluator.account())
+        counts, found = evaluator.account()
+        notes = (*(mask.notes if mask is not None else ()), *found)
+        return Plan(self.name, actions, tuple(chosen), tuple(tables), counts, notes)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -132,10 +147,12 @@ class RandomPlanner:
     Attributes:
         sensors: the sensors.
         settings: the horizon, over which courses are told apart.
+        constraints: what the sensors must not do; a joint action that is drawn and not allowed is moved to one near it.
     """
 
     sensors: tuple[MobileSensor, ...]
     settings: PlanningSettings = field(default_factory=PlanningSettings)
+    constraints: tuple[Constraint, ...] = ()
 
     @property
     def name(self) -> str:
@@ -143,11 +160,14 @@ class RandomPlanner:
         return "random"
 
     def plan(self, state: State, poses: Floats, *, rng: np.random.Generator) -> Plan:
-        """Drawn from `rng`; the beliefs are not looked at."""
+        """Drawn from `rng`; the beliefs are not looked at, but by constraints."""
         generator(rng)
         options = options_of(self.sensors, poses, self.settings)
-        chosen = tuple(own.first_action(int(rng.integers(len(own.courses)))) for own in options)
-        return Plan(self.name, tuple(own.actions for own in options), chosen, (), {})
+        mask = mask_of_decision(self.constraints, self.sensors, options, state.fused, np.asarray(poses), self.settings)
+        drawn = tuple(int(rng.integers(len(own.courses))) for own in options)
+        joint = drawn if mask is None else repaired(mask, drawn)
+        chosen = tuple(own.first_action(course) for own, course in zip(options, joint, strict=True))
+        return Plan(self.name, tuple(own.actions for own in options), chosen, (), {}, mask.notes if mask else ())
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -7,60 +7,68 @@ from collections.abc import Sequence
 import numpy as np
 
 from vedette.control.additive.evaluator import AdditiveEvaluator
+from vedette.control.allowed import allowed_of, single_mask
+from vedette.control.constraints import Mask
 from vedette.control.evidence import Evidence
 from vedette.control.search import JointProblem, all_joint_actions, first_best
-from vedette.kernels.base.types import Floats
-from vedette.kernels.planning.ascent import Allowed
+from vedette.kernels.base.types import Floats, Ints
 
 
-def joint_problem(evidence: Evidence) -> JointProblem:
+def joint_problem(evidence: Evidence, mask: Mask | None) -> JointProblem:
     """The search problem of a joint decision; what it evaluates is kept in the evidence."""
     evaluator = evidence.evaluator
+    plain = JointProblem(evidence.shape, evidence.evaluate, lambda: _independent(evidence, mask), mask)
     if not isinstance(evaluator, AdditiveEvaluator):
-        return JointProblem(evidence.shape, evidence.evaluate, lambda: _independent(evidence))
-    additive = evaluator.additive
-    allowed = Allowed(np.ones(sum(evidence.shape), np.bool_), np.ones((0, 0), np.bool_))
+        return plain
+    additive, allowed = evaluator.additive, allowed_of(mask, evidence.shape)
 
     def line(through: tuple[int, ...], sensor: int) -> Floats:
-        return evidence.note(_line_of(evidence.shape, through, sensor), additive.line(np.array(through), sensor))
+        rewards = additive.line(np.array(through), sensor)
+        _note_line(evidence, mask, through, sensor, rewards)
+        means = rewards.mean(axis=1)
+        return np.where(np.isnan(means), -np.inf, means)
 
     def ascend(start: tuple[int, ...]) -> tuple[int, ...]:
+        assert allowed is not None
         chosen, _, trace = additive.ascend(np.array(start), allowed)
         for num, best in zip(np.diff(trace.evaluations, prepend=0).tolist(), trace.best.tolist(), strict=True):
             evidence.progress(num, best)
         evaluator.counts["rewards"] += int(trace.evaluations[-1]) * additive.num_samples
         return tuple(chosen.tolist())
 
-    return JointProblem(
-        evidence.shape,
-        evidence.evaluate,
-        lambda: _independent(evidence),
-        line=line,
-        ascend=None if additive.coefficients is None else ascend,
-        partial=lambda actions: np.asarray(additive(np.asarray(actions, np.int64)).mean(axis=1)),
-    )
+    def partial(actions: Ints) -> Floats:
+        return np.asarray(additive(np.ascontiguousarray(actions, np.int64)).mean(axis=1))
+
+    compiled = additive.coefficients is not None and allowed is not None
+    return plain._replace(line=line, ascend=ascend if compiled else None, partial=partial)
 
 
-def note_lines(evidence: Evidence, choice: Sequence[int]) -> None:
-    """Evaluate a joint action, and with sums over labels all that differ from it in one sensor's action."""
+def note_lines(evidence: Evidence, choice: Sequence[int], mask: Mask | None) -> None:
+    """Evaluate a joint action, and with sums over labels all allowed ones that differ in one sensor's action."""
     evaluator, chosen = evidence.evaluator, np.array(choice, np.int64)
-    if not isinstance(evaluator, AdditiveEvaluator):
+    if not evidence.holds(choice):
         evidence.evaluate(chosen[np.newaxis])
-        return
-    for s in range(len(chosen)):
-        evidence.note(_line_of(evidence.shape, choice, s), evaluator.additive.line(chosen, s))
+    if isinstance(evaluator, AdditiveEvaluator) and not evidence.is_complete():
+        rewards = evaluator.additive.lines(chosen)
+        for s, own in enumerate(np.split(rewards, np.cumsum(evidence.shape)[:-1])):
+            _note_line(evidence, mask, choice, s, own)
 
 
-def _line_of(shape: Sequence[int], through: Sequence[int], sensor: int) -> np.ndarray:
-    actions = np.tile(np.array(through, np.int64), (shape[sensor], 1))
-    actions[:, sensor] = np.arange(shape[sensor])
-    return actions
+def _note_line(evidence: Evidence, mask: Mask | None, through: Sequence[int], sensor: int, rewards: Floats) -> None:
+    actions = np.tile(np.array(through, np.int64), (evidence.shape[sensor], 1))
+    actions[:, sensor] = np.arange(evidence.shape[sensor])
+    kept = slice(None) if mask is None else mask.allows(actions)
+    evidence.note(actions[kept], rewards[kept])
 
 
-def _independent(evidence: Evidence) -> tuple[int, ...]:
-    """The course that is best for each sensor alone (paper, Algorithm 3); of equal ones the first."""
-    evaluator = evidence.evaluator
-    means = [
-        evaluator.alone(s)(all_joint_actions((num,))).mean(axis=1) for s, num in enumerate(evaluator.joint_shape())
-    ]
-    return tuple(first_best(np.where(np.isnan(own), -np.inf, own)) for own in means)
+def _independent(evidence: Evidence, mask: Mask | None) -> tuple[int, ...]:
+    """The course that is best for each sensor alone (paper, Algorithm 3), of what it may do; of equal ones the first."""
+    evaluator, shape = evidence.evaluator, evidence.shape
+    if isinstance(evaluator, AdditiveEvaluator):
+        means = np.split(evaluator.additive.each_alone().mean(axis=1), np.cumsum(shape)[:-1])
+    else:
+        means = [evaluator.alone(s)(all_joint_actions((num,))).mean(axis=1) for s, num in enumerate(shape)]
+    best = []
+    for s, own in enumerate(means):
+        best.append(first_best(np.where(np.isnan(own) | ~single_mask(mask, s, len(own)), -np.inf, own)))
+    return tuple(best)

@@ -189,6 +189,7 @@ def build_planner(scenario: Scenario, name: str, num_threads: int = 0) -> Planne
         control.reward.build(folder),
         control.search.build(folder),
         _first_actions(scenario, sensors),
+        control.build_constraints(folder),
         _notes_of_decisions(scenario, fusion),
     )
     if name in model.planners:

@@ -79,6 +79,8 @@ def facts(model: ScenarioModel) -> list[tuple[str, str]]:
         ("decisions", _decisions(model.decision_steps)),
         ("horizon", f"{counted(control.horizon_steps, 'step')} of {control.horizon_period:g} s"),
         ("reward", f"{settings(control.reward)}, {counted(control.num_samples, 'sample')}"),
+        ("search", settings(control.search)),
+        *(("constraint", settings(section)) for section in control.constraints),
         ("pseudo-scans", f"{control.ideal_measurements} measurements"),
         ("OSPA", settings(model.ospa)),
         *((f"planner {name}", settings(section)) for name, section in model.planners.items()),

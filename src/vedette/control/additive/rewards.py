@@ -11,7 +11,7 @@ from vedette.control.rewards.base import combined
 from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.planning.ascent import Allowed, Cells, Trace, ascend
 from vedette.kernels.planning.bernoulli_rows import Table
-from vedette.kernels.planning.joint_values import joint_values, line_values
+from vedette.kernels.planning.joint_values import alone_values, joint_values, line_values
 from vedette.kernels.planning.label_values import Valuation
 from vedette.threads import run_chunks
 
@@ -76,13 +76,42 @@ class AdditiveRewards:
     def line(self, chosen: Ints, sensor: int) -> Floats:
         """(num_courses, num_samples) rewards of all courses of one sensor, the others as chosen."""
         first, last = self.table.first_courses[sensor : sensor + 2].tolist()
-        sums = np.empty((last - first, self.num_samples, self.valuation.num))
-        line_values(self.table, self.valuation, chosen, sensor, 0, last - first, sums)
+        return self._lines(chosen, sensor, sensor + 1)[first:last]
+
+    def lines(self, chosen: Ints) -> Floats:
+        """(num_courses, num_samples) the lines of all sensors through a joint action, one after the other."""
+        return self._lines(chosen, 0, len(chosen))
+
+    def _lines(self, chosen: Ints, first: int, last: int) -> Floats:
+        sums = np.empty((len(self.table.offsets) - 1, self.num_samples, self.valuation.num))
+
+        def work(begin: int, end: int) -> None:
+            line_values(self.table, self.valuation, chosen, first + begin, first + end, sums)
+
+        run_chunks(work, last - first, self.num_threads)
         rewards = self._combined(sums)
         if len(self.cells.worth):
-            others = np.tile(chosen, (last - first, 1))
-            others[:, sensor] = np.arange(last - first)
-            rewards += np.array([[self._found(joint)] for joint in others])
+            for s in range(first, last):
+                begin, end = self.table.first_courses[s : s + 2].tolist()
+                joint = np.tile(chosen, (end - begin, 1))
+                joint[:, s] = np.arange(end - begin)
+                rewards[begin:end] += np.array([[self._found(each)] for each in joint])
+        return rewards
+
+    def each_alone(self) -> Floats:
+        """(num_courses, num_samples) rewards of all courses of each sensor by itself, one sensor after the other."""
+        distinct = {id(base): base for base in self.bases}
+        bases, places = np.stack(list(distinct.values())), {key: place for place, key in enumerate(distinct)}
+        which = np.array([places[id(base)] for base in self.bases])
+        sums = np.empty((len(self.table.offsets) - 1, self.num_samples, self.valuation.num))
+
+        def work(first: int, last: int) -> None:
+            alone_values(self.table, self.valuation, bases, which, first, last, sums)
+
+        run_chunks(work, len(which), self.num_threads)
+        rewards = self._combined(sums)
+        if len(self.cells.worth):
+            rewards += self._found_alone()[:, np.newaxis]
         return rewards
 
     def ascend(self, start: Ints, allowed: Allowed) -> tuple[Ints, float, Trace]:
@@ -93,6 +122,13 @@ class AdditiveRewards:
 
     def _combined(self, sums: Floats) -> Floats:
         return sums[..., 0] if self.reward is None else combined(self.reward, sums)
+
+    def _found_alone(self) -> Floats:
+        """(num_courses,) what each course finds by itself."""
+        cells = self.cells
+        shares = -cells.worth[cells.cells] * np.expm1(cells.log_miss)
+        course = np.repeat(np.arange(len(cells.offsets) - 1), np.diff(cells.offsets))
+        return np.bincount(course, shares, len(cells.offsets) - 1)
 
     def _found(self, chosen: Ints) -> float:
         """What the reward has for targets that are expected to be found."""

@@ -97,29 +97,67 @@ def value_changed(
 
 
 @kernel
-def line_values(
-    table: Table, valuation: Valuation, chosen: Ints, sensor: int, first: int, last: int, out: Floats
-) -> None:
-    """Sums over labels (num_courses of the sensor, num_samples, num), of its courses `first:last`, others as chosen.
+def line_values(table: Table, valuation: Valuation, chosen: Ints, first: int, last: int, out: Floats) -> None:
+    """Sums over labels (num_courses, num_samples, num) of each course of sensors `first:last`, the others as chosen.
 
-    chosen: (num_sensors,) as a row of `joint_values`; the sensor's own entry is not read.
+    chosen: (num_sensors,) as a row of `joint_values`; of a sensor's own courses its entry is not read. out: of the
+    courses of all sensors.
     """
     totals, num_labels = start_totals(table), len(table.start)
-    num_samples = totals.shape[1]
+    num_samples, num = totals.shape[1], valuation.num
     for s in range(len(chosen)):
-        if s != sensor and chosen[s] >= 0:
+        if chosen[s] >= 0:
             add_course(table, s, table.first_courses[s] + chosen[s], 1.0, totals)
-    work, before = make_value_work(valuation), np.empty((num_labels, num_samples, valuation.num))
-    rest, values = np.zeros((num_samples, valuation.num)), np.empty((num_samples, valuation.num))
+    work, values = make_value_work(valuation), np.empty((num_labels, num_samples, num))
+    whole, rest, before = np.zeros((num_samples, num)), np.empty((num_samples, num)), np.empty_like(values)
+    changed, seen = np.empty((num_samples, num)), np.zeros(num_labels, np.int64)
     for label in range(num_labels):
-        value_rows(valuation, label, totals[label], work, before[label])
-        rest += before[label]
-    for course in range(first, last):
-        out[course] = rest
-        at = table.first_courses[sensor] + course
-        for entry in range(table.offsets[at], table.offsets[at + 1]):
+        value_rows(valuation, label, totals[label], work, values[label])
+        whole += values[label]
+    for s in range(first, last):
+        begin, end = table.first_courses[s], table.first_courses[s + 1]
+        if chosen[s] >= 0:
+            add_course(table, s, begin + chosen[s], -1.0, totals)
+        rest[:] = whole
+        for entry in range(table.offsets[begin], table.offsets[end]):
             label = table.labels[entry]
-            value_changed(table, valuation, sensor, entry, totals[label], work, values)
+            if seen[label] != s + 1:
+                seen[label] = s + 1
+                value_rows(valuation, label, totals[label], work, before[label])
+                rest += before[label] - values[label]
+        for course in range(begin, end):
+            out[course] = rest
+            for entry in range(table.offsets[course], table.offsets[course + 1]):
+                label = table.labels[entry]
+                value_changed(table, valuation, s, entry, totals[label], work, changed)
+                out[course] += changed - before[label]
+        if chosen[s] >= 0:
+            add_course(table, s, begin + chosen[s], 1.0, totals)
+
+
+@kernel
+def alone_values(
+    table: Table, valuation: Valuation, bases: Floats, which: Ints, first: int, last: int, out: Floats
+) -> None:
+    """Sums over labels (num_courses, num_samples, num) of each course of sensors `first:last` by themselves.
+
+    bases: (num_bases, num_labels, bernoulli_size) rows of sensors' own beliefs without scans. which: (num_sensors,)
+    those of each sensor. out: of the courses of all sensors.
+    """
+    num_samples, size, work = table.changes.shape[1], bases.shape[2], make_value_work(valuation)
+    value, unseen, taken = np.empty(valuation.num), np.empty((bases.shape[1], valuation.num)), -1
+    for s in range(first, last):
+        base = bases[which[s]]
+        if which[s] != taken:
+            unseen, taken = values_without_scans(base, valuation), which[s]
+        for course in range(table.first_courses[s], table.first_courses[s + 1]):
             for sample in range(num_samples):
-                for e in range(valuation.num):
-                    out[course, sample, e] += values[sample, e] - before[label, sample, e]
+                out[course, sample] = 0.0
+                for label in range(len(unseen)):
+                    out[course, sample] += unseen[label]
+                for entry in range(table.offsets[course], table.offsets[course + 1]):
+                    label = table.labels[entry]
+                    for k in range(size):
+                        work.total[k] = base[label, k] + table.changes[entry, sample, k]
+                    value_label(valuation, label, work, value)
+                    out[course, sample] += value - unseen[label]

@@ -6,60 +6,18 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field
 
 from vedette.scenarios.faults import Finding, describe
 from vedette.scenarios.sections.base import Count, Numbers, Positive, Probability, Section, Share, Steps, Whole, check
-from vedette.scenarios.sections.custom import Custom
+from vedette.scenarios.sections.constraints import AnyConstraint
 from vedette.scenarios.sections.rewards import AnyReward, CauchySchwarzReward
+from vedette.scenarios.sections.search import AnySearch, Automatic
 
 if TYPE_CHECKING:  # with the planners comes the compiler, which a check does without
-    from vedette.control import JointSearch, PlanningSettings
-
-
-class Exhaustive(Section):
-    """Every joint action, as in the paper."""
-
-    kind: Literal["exhaustive"] = Field(default="exhaustive", description="Kind of search [-].")
-    max_joint_actions: Count = Field(default=1_000_000, description="Bound on their number [-].")
-
-    def build(self, folder: Path) -> JointSearch:
-        """The search."""
-        from vedette.control import ExhaustiveSearch
-
-        return ExhaustiveSearch(self.max_joint_actions)
-
-
-class Ascent(Section):
-    """One sensor at a time, the others held, until no sensor alone can do better; for many sensors."""
-
-    kind: Literal["coordinate_ascent"] = Field(default="coordinate_ascent", description="Kind of search [-].")
-    num_restarts: Annotated[Whole, Field(ge=0, le=1_000_000)] = Field(
-        default=0, description="Ascents from random joint actions, after that from the independent decision [-]."
-    )
-
-    def build(self, folder: Path) -> JointSearch:
-        """The search."""
-        from vedette.control import CoordinateAscent
-
-        return CoordinateAscent(self.num_restarts)
-
-
-class CustomSearch(Custom):
-    """A user's own `vedette.control.JointSearch`."""
-
-    kind: Literal["custom"] = Field(default="custom", description="Kind of search [-].")
-    gives: ClassVar[str] = "vedette.control:JointSearch"
-
-    def build(self, folder: Path) -> JointSearch:
-        """The user's own."""
-        made: JointSearch = self.made(folder)
-        return made
-
-
-AnySearch = Annotated[Exhaustive | Ascent | CustomSearch, Field(discriminator="kind")]
+    from vedette.control import Constraint, PlanningSettings
 
 
 class PlanningLimits(Section):
@@ -121,7 +79,10 @@ class Control(Section):
         description="What finding a target of `undetected` is worth, in units of the reward; of the expected loss "
         "m^2, such as its squared cutoff [-].",
     )
-    search: AnySearch = Field(default=Exhaustive(), description="Which joint actions a joint decision evaluates [-].")
+    search: AnySearch = Field(default=Automatic(), description="Which joint actions a joint decision evaluates [-].")
+    constraints: Annotated[tuple[AnyConstraint, ...], Field(strict=False)] = Field(
+        default=(), description="What the sensors must not do [-]."
+    )
     limits: PlanningLimits = Field(default=PlanningLimits(), description="How much it works with [-].")
 
     @check
@@ -160,3 +121,7 @@ class Control(Section):
             ),
             num_threads=num_threads,
         )
+
+    def build_constraints(self, folder: Path) -> tuple[Constraint, ...]:
+        """What the sensors must not do; raises `InputError` for what cannot be had."""
+        return tuple(constraint.build(folder) for constraint in self.constraints)

@@ -11,12 +11,12 @@ import numpy as np
 from pydantic import Field
 
 from vedette.scenarios.sections.base import Section
-from vedette.scenarios.sections.control import AnySearch
 from vedette.scenarios.sections.custom import Custom
 from vedette.scenarios.sections.rewards import AnyReward
+from vedette.scenarios.sections.search import AnySearch
 
 if TYPE_CHECKING:  # with the planners comes the compiler, which a check does without
-    from vedette.control import JointSearch, MobileSensor, Plan, Planner, PlanningSettings
+    from vedette.control import Constraint, JointSearch, MobileSensor, Plan, Planner, PlanningSettings
     from vedette.control.preparation import AnyReward as PlannedReward
     from vedette.fusion import Fusion
     from vedette.platforms import Actions
@@ -27,7 +27,8 @@ class Parts(NamedTuple):
 
     sensors: the sensors that are steered. fusion: how their densities become one; of one sensor, of it alone. settings:
     horizon, samples, caps, threads. reward: the value of a density. search: which joint actions are evaluated.
-    first_actions: what each sensor does where nothing decides. notes: what plans are to say of the fusion.
+    first_actions: what each sensor does where nothing decides. constraints: what they must not do. notes: what plans
+    are to say of the fusion.
     """
 
     sensors: tuple[MobileSensor, ...]
@@ -36,6 +37,7 @@ class Parts(NamedTuple):
     reward: PlannedReward
     search: JointSearch
     first_actions: tuple[Actions, ...]
+    constraints: tuple[Constraint, ...]
     notes: tuple[str, ...]
 
 
@@ -49,19 +51,27 @@ class Strategy(NamedTuple):
 def _joint(parts: Parts) -> Planner:
     from vedette.control import JointPlanner
 
-    return JointPlanner(parts.sensors, parts.fusion, parts.settings, parts.reward, parts.search, notes=parts.notes)
+    return JointPlanner(
+        parts.sensors,
+        parts.fusion,
+        parts.settings,
+        parts.reward,
+        parts.search,
+        parts.constraints,
+        parts.notes,
+    )
 
 
 def _independent(parts: Parts) -> Planner:
     from vedette.control import IndependentPlanner
 
-    return IndependentPlanner(parts.sensors, parts.fusion, parts.settings, parts.reward)
+    return IndependentPlanner(parts.sensors, parts.fusion, parts.settings, parts.reward, parts.constraints)
 
 
 def _random(parts: Parts) -> Planner:
     from vedette.control import RandomPlanner
 
-    return RandomPlanner(parts.sensors, parts.settings)
+    return RandomPlanner(parts.sensors, parts.settings, parts.constraints)
 
 
 def _fixed(parts: Parts) -> Planner:
@@ -108,8 +118,8 @@ class NamedIndependent(Section):
 
 
 class CustomPlanner(Custom):
-    """A user's own planner; called with `sensors`, `fusion`, `settings`, `reward`, `search`, `first_actions`, `notes`,
-    of which it names those that it wants."""
+    """A user's own planner; called with `sensors`, `fusion`, `settings`, `reward`, `search`, `first_actions`,
+    `constraints`, `notes`, of which it names those that it wants."""
 
     kind: Literal["custom"] = Field(default="custom", description="Kind of planner [-].")
     spared: ClassVar[tuple[str, ...]] = ("name",)  # which the scenario gives

@@ -1,0 +1,23 @@
+"""What sensors must not do: which of their courses, and which pairs of courses, are allowed."""
+
+from vedette.control.constraints.feasible import opened, repaired
+from vedette.control.constraints.mask import Mask
+from vedette.control.constraints.masks import mask_of
+from vedette.control.constraints.protocol import Constraint, Situation
+from vedette.control.constraints.regions import KeepOut, StayInside
+from vedette.control.constraints.separation import Separation
+from vedette.control.constraints.void import VoidProbability, void_probability
+
+__all__ = [
+    "Constraint",
+    "KeepOut",
+    "Mask",
+    "Separation",
+    "Situation",
+    "StayInside",
+    "VoidProbability",
+    "mask_of",
+    "opened",
+    "repaired",
+    "void_probability",
+]

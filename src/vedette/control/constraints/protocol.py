@@ -1,0 +1,82 @@
+"""The protocol of constraints, and what they judge by."""
+
+from __future__ import annotations
+
+from itertools import accumulate
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from vedette.densities import GLMB, LMB
+from vedette.kernels.base.types import Bools, Floats
+
+
+class Situation(NamedTuple):
+    """What constraints judge by. Positions are the first two components of a pose and of a state, m.
+
+    courses: (num_courses, num_times, pose_dim) where each course takes its sensor, one array a sensor.
+    times: (num_times,) s from now.
+    beliefs: the fused belief predicted to each of `times`, one Gaussian a track; () where no constraint needs it.
+    poses: (num_sensors, pose_dim) where the sensors are now, from which the way to the first of `times` begins; None:
+        nothing is asked of that way.
+    """
+
+    courses: tuple[Floats, ...]
+    times: Floats
+    beliefs: tuple[LMB | GLMB, ...] = ()
+    poses: Floats | None = None
+
+    def ways(self, sensor: int) -> Floats:
+        """(num_courses, num_points, 2) corners of the ways of one sensor: where it is now, if known, and later."""
+        if self.poses is None:
+            return self.courses[sensor][:, :, :2]
+        return with_start(self.courses[sensor][:, :, :2], self.poses[sensor, :2])
+
+    def split(self, values: Bools) -> tuple[Bools, ...]:
+        """Values of all sensors' courses (sum of num_courses,), one sensor's after another's, as an array a sensor."""
+        ends = list(accumulate(len(own) for own in self.courses))
+        return tuple(np.split(values, ends[:-1]))
+
+
+class Constraint(Protocol):
+    """Says which courses a sensor may take, and which courses of two sensors go together.
+
+    A constraint may have one more member, `reach`: `pairs` is then asked only about sensors of which some two courses
+    might come nearer to each other than so many metres; 0: about none. Without it, about all.
+    """
+
+    @property
+    def name(self) -> str:
+        """What it is called in messages."""
+        ...
+
+    @property
+    def needs_beliefs(self) -> bool:
+        """Whether it looks at `Situation.beliefs`."""
+        ...
+
+    def courses(self, situation: Situation) -> tuple[Bools, ...]:
+        """(num_courses,) which courses each sensor may take, one array a sensor."""
+        ...
+
+    def pairs(self, situation: Situation, first: int, second: int) -> Bools | None:
+        """(num_courses of first, of second) which courses of two sensors go together; None: all."""
+        ...
+
+
+class Alone:
+    """A constraint on each sensor by itself: any courses go together."""
+
+    __slots__ = ()
+    reach = 0.0
+
+    def pairs(self, situation: Situation, first: int, second: int) -> Bools | None:
+        """All."""
+        return None
+
+
+def with_start(ways: Floats, start: Floats) -> Floats:
+    """(num_courses, num_times + 1, 2) ways (num_courses, num_times, 2) that begin at `start` (2,)."""
+    found = np.empty((len(ways), ways.shape[1] + 1, 2))
+    found[:, 0], found[:, 1:] = start, ways
+    return found

@@ -1,0 +1,129 @@
+"""Where platforms have to stay, and where they must not go."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from vedette.control.constraints.protocol import Alone, Situation
+from vedette.kernels.base.types import Bools, Floats
+from vedette.models import Region
+from vedette.models.arguments import float_array, reject
+
+
+@dataclass(frozen=True, slots=True)
+class StayInside(Alone):
+    """Every platform stays inside a rectangle, its edge included, at all times of the horizon.
+
+    Attributes:
+        region: the rectangle.
+
+    Raises:
+        InputError: something else than a region.
+    """
+
+    region: Region
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.region, Region):
+            raise reject("region", "a Region", self.region)
+
+    @property
+    def name(self) -> str:
+        """Stay inside."""
+        return "stay_inside"
+
+    @property
+    def needs_beliefs(self) -> bool:
+        """No."""
+        return False
+
+    def courses(self, situation: Situation) -> tuple[Bools, ...]:
+        """Those that never leave it. Between two places in a rectangle the straight way is in it, too."""
+        places = np.concatenate([own[:, :, :2] for own in situation.courses])
+        return situation.split(np.asarray(self.region.contains(places).all(axis=1)))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class KeepOut(Alone):
+    """No platform enters a region: neither at the times of the horizon nor on the straight way between two of them.
+
+    The way from where it is now counts where it is not inside already.
+
+    Attributes:
+        area: a `Region`, or the corners (num_corners, 2) of a polygon in order, m, 3 or more; one that crosses itself
+            forbids what is inside by the even-odd rule. Its edge is forbidden, too.
+
+    Raises:
+        InputError: an area that is neither.
+    """
+
+    area: Region | Floats
+
+    def __post_init__(self) -> None:
+        corners = float_array("area", _corners(self.area), (None, 2))
+        if len(corners) < 3:
+            raise reject("area", "a Region, or a polygon of at least 3 corners", f"{len(corners)} corners")
+        if not isinstance(self.area, Region):
+            object.__setattr__(self, "area", corners)
+
+    @property
+    def name(self) -> str:
+        """Keep out."""
+        return "keep_out"
+
+    @property
+    def needs_beliefs(self) -> bool:
+        """No."""
+        return False
+
+    def courses(self, situation: Situation) -> tuple[Bools, ...]:
+        """Those that never touch it."""
+        corners = _corners(self.area)
+        ways = np.concatenate([situation.ways(s) for s in range(len(situation.courses))])
+        inside, crosses = _inside(ways, corners), _cross(ways, corners)
+        if situation.poses is not None:
+            crosses[:, 0] &= ~inside[:, 0]
+            inside[:, 0] = False
+        return situation.split(np.asarray(~(inside.any(axis=1) | crosses.any(axis=1))))
+
+
+def _corners(area: Any) -> Any:
+    if isinstance(area, Region):
+        x_min, x_max, y_min, y_max = area.bounds
+        return np.array([[x_min, y_min], [x_max, y_min], [x_max, y_max], [x_min, y_max]])
+    return area
+
+
+def _inside(points: Floats, corners: Floats) -> Bools:
+    """(...) whether points (..., 2) are inside a polygon: whether a ray to the east crosses its edge an odd number
+    of times."""
+    x, y = points[..., 0, np.newaxis], points[..., 1, np.newaxis]
+    (x1, y1), (x2, y2) = corners.T, np.roll(corners, -1, axis=0).T
+    spans = (y1 > y) != (y2 > y)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        crossing = x1 + (y - y1) / (y2 - y1) * (x2 - x1)
+    return np.asarray((spans & (x < crossing)).sum(axis=-1) % 2 == 1)
+
+
+def _cross(ways: Floats, corners: Floats) -> Bools:
+    """(num_courses, num_legs) whether the straight legs of ways (num_courses, num_points, 2) touch a polygon's edge.
+
+    Of one point only there is one leg, without length.
+    """
+    starts = ways[:, :-1] if ways.shape[1] > 1 else ways
+    ends = ways[:, 1:] if ways.shape[1] > 1 else ways
+    a, b = starts[:, :, np.newaxis], ends[:, :, np.newaxis]
+    c, d = corners, np.roll(corners, -1, axis=0)
+    # Two segments touch where neither lies wholly on one side of the other, nor beside it.
+    apart = (_side(a, b, c) * _side(a, b, d) > 0.0) | (_side(c, d, a) * _side(c, d, b) > 0.0)
+    beside = (np.maximum(a, b) < np.minimum(c, d)) | (np.maximum(c, d) < np.minimum(a, b))
+    return np.asarray((~(apart | beside.any(axis=-1))).any(axis=-1))
+
+
+def _side(start: Floats, end: Floats, point: Floats) -> Floats:
+    """Sign of the side of a line on which a point is."""
+    along, to = end - start, point - start
+    return np.asarray(np.sign(along[..., 0] * to[..., 1] - along[..., 1] * to[..., 0]))

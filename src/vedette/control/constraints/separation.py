@@ -1,0 +1,75 @@
+"""Platforms that keep their distance from each other."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vedette.control.constraints.protocol import Situation
+from vedette.kernels.base.types import Bools, Floats
+from vedette.models.arguments import positive
+
+
+@dataclass(frozen=True, slots=True)
+class Separation:
+    """Any two platforms keep a least distance: at the times of the horizon, and between two of them, where both are
+    taken to go straight and evenly from one position to the next. The way from where they are now counts where they are
+    not too near already.
+
+    Attributes:
+        distance: m, which is allowed itself.
+
+    Raises:
+        InputError: a distance that is not above 0.
+    """
+
+    distance: float
+
+    def __post_init__(self) -> None:
+        positive("distance", self.distance)
+
+    @property
+    def name(self) -> str:
+        """Separation."""
+        return "separation"
+
+    @property
+    def needs_beliefs(self) -> bool:
+        """No."""
+        return False
+
+    @property
+    def reach(self) -> float:
+        """Sensors further apart need not be asked about."""
+        return self.distance
+
+    def courses(self, situation: Situation) -> tuple[Bools, ...]:
+        """All."""
+        return tuple(np.ones(len(own), bool) for own in situation.courses)
+
+    def pairs(self, situation: Situation, first: int, second: int) -> Bools | None:
+        """The courses on which two sensors are never nearer than `distance`."""
+        one, other = situation.ways(first), situation.ways(second)
+        x = one[:, np.newaxis, :, 0] - other[:, :, 0]
+        y = one[:, np.newaxis, :, 1] - other[:, :, 1]
+        least = self.distance**2
+        if situation.poses is not None and x[0, 0, 0] ** 2 + y[0, 0, 0] ** 2 < least:
+            x, y = x[:, :, 1:], y[:, :, 1:]
+        nearest = (x * x + y * y).min(axis=2)
+        if x.shape[2] > 1:
+            nearest = np.minimum(nearest, _on_legs(x, y).min(axis=2))
+        return np.asarray(nearest >= least)
+
+
+def _on_legs(x: Floats, y: Floats) -> Floats:
+    """(..., num_points - 1) least squared length of vectors that go straight and evenly from one to the next.
+
+    x, y: (..., num_points). It is least at the foot of the origin on their line, or at an end.
+    """
+    from_x, from_y = x[..., :-1], y[..., :-1]
+    leg_x, leg_y = x[..., 1:] - from_x, y[..., 1:] - from_y
+    length = leg_x * leg_x + leg_y * leg_y
+    share = -(from_x * leg_x + from_y * leg_y) / np.maximum(length, np.finfo(float).tiny)
+    share = np.minimum(np.maximum(share, 0.0), 1.0)
+    return np.asarray((from_x + share * leg_x) ** 2 + (from_y + share * leg_y) ** 2)

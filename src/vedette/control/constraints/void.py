@@ -1,0 +1,108 @@
+"""Sensors that keep their distance from the targets, as far as it is known where these are."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import expit
+
+from vedette.control.constraints.discs import disc_probabilities, near_pairs
+from vedette.control.constraints.protocol import Alone, Situation
+from vedette.densities import GLMB, LMB, TrackTable
+from vedette.kernels.base.types import Bools, Floats, Ints
+from vedette.models.arguments import float_array, positive, probability
+
+# Entries of the tables that a GLMB's hypotheses take at a time.
+_BLOCK = 1 << 21
+
+
+@dataclass(frozen=True, slots=True)
+class VoidProbability(Alone):
+    """Around every sensor no target is near, with a least probability at each time of the horizon (Beard et al.).
+
+    M. Beard, B.-T. Vo, B.-N. Vo and S. Arulampalam, Void probabilities and Cauchy-Schwarz divergence for generalized
+    labeled multi-Bernoulli models, IEEE Transactions on Signal Processing 65 (2017) 5047-5061, arXiv:1510.05532.
+
+    Attributes:
+        radius: m, within which no target is to be.
+        probability: that there is none, at least.
+
+    Raises:
+        InputError: a radius that is not above 0, or no probability.
+    """
+
+    radius: float
+    probability: float
+
+    def __post_init__(self) -> None:
+        positive("radius", self.radius)
+        probability("probability", self.probability)
+
+    @property
+    def name(self) -> str:
+        """Void probability."""
+        return "void_probability"
+
+    @property
+    def needs_beliefs(self) -> bool:
+        """Yes."""
+        return True
+
+    def courses(self, situation: Situation) -> tuple[Bools, ...]:
+        """Those on which the void probability is never less than `probability`."""
+        places = np.concatenate([own[:, :, :2] for own in situation.courses])
+        allowed = np.ones(len(places), bool)
+        for t, belief in enumerate(situation.beliefs):
+            allowed &= void_probability(belief, places[:, t], self.radius) >= self.probability
+        return situation.split(allowed)
+
+
+def void_probability(belief: LMB | GLMB, centres: Floats, radius: float) -> Floats:
+    """(num,) probability that no target is within `radius`, m, of `centres` (num, 2).
+
+    With P_l the probability of the disc under a track: the product over l of 1 - r_l P_l for an LMB; for a GLMB the sum
+    over hypotheses of weight times the product over their tracks of 1 - P_l (Beard et al., as in `VoidProbability`).
+    Tracks with less than 1.3e-14 in the disc are passed over. Raises `InputError` for centres that are no positions, or
+    a radius that is not above 0.
+    """
+    positive("radius", radius)
+    places = float_array("centres", centres, (None, 2))
+    disc, track, inside = _inside(belief.tracks, places, radius)
+    if isinstance(belief, LMB):
+        with np.errstate(divide="ignore"):
+            log_void = np.log1p(-expit(belief.existence_logit)[track] * inside)
+        return np.asarray(np.exp(np.bincount(disc, log_void, minlength=len(places))))
+    outside = np.ones((len(places), belief.tracks.num_tracks))
+    outside[disc, track] = 1.0 - inside
+    return _over_hypotheses(belief, outside)
+
+
+def _inside(tracks: TrackTable, centres: Floats, radius: float) -> tuple[Ints, Ints, Floats]:
+    """Discs, tracks, and the probability of the one under the other, of those near each other."""
+    means, covs = tracks.means[:, :2], tracks.covs[:, :2, :2]
+    disc, component = near_pairs(centres, means, covs, radius)
+    parts = disc_probabilities(centres[disc] - means[component], component, covs, radius)
+    owner = np.repeat(np.arange(tracks.num_tracks), np.diff(tracks.offsets))
+    track = owner[component]
+    # Components of one track follow each other, and so do the entries of one disc and track.
+    new = (np.diff(disc, prepend=-1) != 0) | (np.diff(track, prepend=-1) != 0)
+    total = np.bincount(np.cumsum(new) - 1, np.exp(tracks.log_weights[component]) * parts)
+    return disc[new], track[new], np.minimum(total, 1.0)
+
+
+def _over_hypotheses(belief: GLMB, outside: Floats) -> Floats:
+    """(num,) mean over hypotheses of the products of their tracks' columns of (num, num_tracks)."""
+    found = np.zeros(len(outside))
+    weights, sizes = np.exp(belief.hyp_log_weights), np.diff(belief.hyp_offsets)
+    found += weights[sizes == 0].sum()
+    filled = np.flatnonzero(sizes)
+    if len(filled) == 0:
+        return found
+    rows = max(1, _BLOCK // len(belief.hyp_tracks))
+    for begun in range(0, len(outside), rows):
+        factors = outside[begun : begun + rows, belief.hyp_tracks]
+        # Between the starts of hypotheses with tracks there are no others' tracks.
+        products = np.multiply.reduceat(factors, belief.hyp_offsets[filled], axis=1)
+        found[begun : begun + rows] += products @ weights[filled]
+    return found

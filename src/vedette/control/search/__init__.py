@@ -1,0 +1,20 @@
+"""Searching the joint actions of all sensors for the one of largest mean reward."""
+
+from vedette.control.search.ascent import CoordinateAscent
+from vedette.control.search.automatic import AutomaticSearch
+from vedette.control.search.cross_entropy import CrossEntropy
+from vedette.control.search.exhaustive import ExhaustiveSearch
+from vedette.control.search.greedy import SequentialGreedy
+from vedette.control.search.problem import JointProblem, JointSearch, all_joint_actions, first_best
+
+__all__ = [
+    "AutomaticSearch",
+    "CoordinateAscent",
+    "CrossEntropy",
+    "ExhaustiveSearch",
+    "JointProblem",
+    "JointSearch",
+    "SequentialGreedy",
+    "all_joint_actions",
+    "first_best",
+]

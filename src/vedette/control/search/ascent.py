@@ -1,0 +1,56 @@
+"""One sensor at a time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vedette.control.search.known import Joint, Known
+from vedette.control.search.problem import JointProblem
+from vedette.models.arguments import dimension
+
+
+@dataclass(frozen=True, slots=True)
+class CoordinateAscent:
+    """One sensor at a time, the others held, until no sensor alone can do better; for many sensors.
+
+    The first ascent starts at the independent decision, so that its end is never worse than that. The end is a local
+    maximum: no change of one sensor's action improves it, a change of two might. No joint action is evaluated twice.
+
+    With a mask it goes from one allowed joint action to another. A start that is not allowed is first moved to one near
+    it that is; where none is, the mask is opened (`vedette.control.constraints.opened`).
+
+    Attributes:
+        num_restarts: further ascents, from joint actions drawn at random.
+
+    Raises:
+        InputError: a number below 0.
+    """
+
+    num_restarts: int = 2
+
+    def __post_init__(self) -> None:
+        if self.num_restarts != 0:
+            dimension("num_restarts", self.num_restarts)
+
+    def search(self, problem: JointProblem, *, rng: np.random.Generator) -> tuple[int, ...]:
+        """The best of all ascents; of equal ones that were evaluated the first in printed order."""
+        known = Known(problem)
+        starts = [known.allowed(problem.independent()), *known.drawn(self.num_restarts, rng=rng)]
+        if problem.ascend is not None:
+            known.rewards([starts[0], *(known.allowed(problem.ascend(start)) for start in starts)])
+        else:
+            for start in starts:
+                _ascend(known, start)
+        return known.best()
+
+
+def _ascend(known: Known, start: Joint) -> None:
+    """One ascent. Along a line the first of the largest is taken, to the last digit, so that none goes in circles."""
+    at, settled, sensor, num_sensors = start, 0, 0, len(start)
+    while settled < num_sensors:
+        line = known.line(at, sensor)
+        best = max(line, key=known.values.__getitem__)
+        settled = settled + 1 if best == at else 1
+        at, sensor = best, (sensor + 1) % num_sensors

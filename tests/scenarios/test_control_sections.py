@@ -1,0 +1,125 @@
+# ruff: noqa: E501
+"""Searches and constraints as a scenario says them: what is built, what is refused, and a run with them."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from scenarios.minimal import changed
+from vedette import models
+from vedette.control import (
+    AutomaticSearch,
+    CoordinateAscent,
+    CrossEntropy,
+    ExhaustiveSearch,
+    KeepOut,
+    Separation,
+    SequentialGreedy,
+    StayInside,
+    VoidProbability,
+)
+from vedette.errors import ScenarioError
+from vedette.evaluation import run_scenario
+from vedette.scenarios import Scenario, load_scenario
+from vedette.scenarios.dumping import dump_scenario
+
+
+def written(folder: Path, control: str) -> Scenario:
+    """The minimal scenario with something more under `control`, as read."""
+    file = folder / "f.yaml"
+    file.write_text(changed(("{decision_steps: [4, 8]}", f"{{decision_steps: [4], {control}}}")))
+    return load_scenario(file)
+
+
+@pytest.mark.parametrize(
+    ("text", "made"),
+    [
+        ("num_samples: 3", AutomaticSearch()),
+        ("search: {kind: automatic, max_joint_actions: 50}", AutomaticSearch(50)),
+        ("search: {kind: exhaustive, max_joint_actions: 1e3}", ExhaustiveSearch(1000)),
+        ("search: {kind: coordinate_ascent}", CoordinateAscent(2)),
+        ("search: {kind: coordinate_ascent, num_restarts: 0}", CoordinateAscent(0)),
+        ("search: {kind: sequential_greedy, order: best_first}", SequentialGreedy("best_first")),
+        ("search: {kind: cross_entropy, num_samples: 50, elite_share: 0.2}", CrossEntropy(50, 0.2)),
+    ],
+)
+def test_searches(tmp_path: Path, text: str, made: Any) -> None:
+    scenario = written(tmp_path, text)
+    assert scenario.model.control.search.build(scenario.folder) == made
+
+
+def test_constraints_in_their_order(tmp_path: Path) -> None:
+    box = "region: {x_min: -90.0, x_max: 90.0, y_min: -40.0, y_max: 45.0}"
+    scenario = written(
+        tmp_path,
+        f"constraints: [{{kind: stay_inside, {box}}}, {{kind: keep_out, polygon: [[0, 0], [9, 0], [0, 9]]}}, "
+        f"{{kind: separation, distance: 20}}, {{kind: void_probability, radius: 8, probability: 0.9}}, "
+        f"{{kind: keep_out, {box}}}]",
+    )
+    region = models.Region(-90.0, 90.0, -40.0, 45.0)
+    inside, triangle, apart, void, rectangle = scenario.model.control.build_constraints(scenario.folder)
+    assert (inside, apart, void) == (StayInside(region), Separation(20.0), VoidProbability(8.0, 0.9))
+    assert isinstance(triangle, KeepOut)
+    assert isinstance(rectangle, KeepOut)
+    np.testing.assert_array_equal(triangle.area, [[0.0, 0.0], [9.0, 0.0], [0.0, 9.0]])
+    assert rectangle.area == region
+    again = tmp_path / "again.yaml"
+    again.write_text(dump_scenario(scenario.model))
+    assert load_scenario(again).model == scenario.model
+
+
+def test_no_constraints_unless_said(tmp_path: Path) -> None:
+    assert written(tmp_path, "num_samples: 3").model.control.build_constraints(tmp_path) == ()
+
+
+def test_a_constraint_of_ones_own(tmp_path: Path) -> None:
+    shutil.copy(Path(__file__).with_name("own_parts.py"), tmp_path)
+    scenario = written(
+        tmp_path, "constraints: [{kind: custom, function: 'own_parts.py:OddOnes', arguments: {spared: 0}}]"
+    )
+    (own,) = scenario.model.control.build_constraints(scenario.folder)
+    assert (own.name, own.needs_beliefs) == ("odd_ones", False)
+
+
+KINDS = "one of stay_inside, keep_out, separation, void_probability, custom"
+
+
+@pytest.mark.parametrize(
+    ("text", "fault"),
+    [
+        ("search: {kind: annealing}", 'control.search.kind: expected one of automatic, exhaustive, coordinate_ascent, sequential_greedy, cross_entropy, custom, got "annealing"'),
+        ("search: {kind: coordinate_ascent, num_restarts: -1}", "control.search.num_restarts: expected a number of at least 0, got -1"),
+        ("search: {kind: sequential_greedy, order: last}", 'control.search.order: expected one of printed, best_first, got "last"'),
+        ("search: {kind: cross_entropy, elite_share: 1.0}", "control.search.elite_share: expected a number below 1, got 1.0"),
+        ("search: {kind: cross_entropy, smoothing: 0.0}", "control.search.smoothing: expected a number above 0, got 0.0"),
+        ("search: {kind: automatic, num_restarts: 2}", "control.search.num_restarts: expected one of kind, max_joint_actions, got an unknown key"),
+        ("constraints: [{kind: distance}]", f'control.constraints[0].kind: expected {KINDS}, got "distance"'),
+        ("constraints: [{distance: 3.0}]", f"control.constraints[0]: expected a mapping with kind: {KINDS}, got no kind"),
+        ("constraints: [{kind: separation, distance: 0.0}]", "control.constraints[0].distance: expected a number above 0, got 0.0"),
+        ("constraints: [{kind: separation}]", "control.constraints[0].distance: expected a value, as it is required, got nothing"),
+        ("constraints: [{kind: keep_out}]", "control.constraints[0]: expected either region or polygon, got none"),
+        ("constraints: [{kind: keep_out, polygon: [[0, 0], [1, 1]]}]", "control.constraints[0].polygon: expected"),
+        ("constraints: [{kind: stay_inside, region: {x_min: 1.0, x_max: 0.0, y_min: 0.0, y_max: 1.0}}]", "control.constraints[0].region.x_max: expected a number above x_min, 1, got 0.0"),
+        ("constraints: [{kind: separation, distance: 3.0}, {kind: void_probability, radius: 5.0, probability: 2.0}]", "control.constraints[1].probability: expected a number of at most 1, got 2.0"),
+    ],
+)  # fmt: skip
+def test_what_is_refused(tmp_path: Path, text: str, fault: str) -> None:
+    with pytest.raises(ScenarioError) as caught:
+        written(tmp_path, text)
+    assert fault in str(caught.value)
+
+
+@pytest.mark.parametrize("kind", ["automatic", "exhaustive", "coordinate_ascent", "cross_entropy"])
+def test_a_run_with_a_search(tmp_path: Path, kind: str) -> None:
+    """Of two sensors all find what is best."""
+    control = f"horizon_steps: 1, num_samples: 2, search: {{kind: {kind}}}"
+    plans = [
+        run_scenario(written(tmp_path, text), "jdm", seed=1).decisions[0].plan
+        for text in (control, control.split(", search")[0])
+    ]
+    assert plans[0].chosen == plans[1].chosen
