@@ -15,15 +15,16 @@ _GROWTH = 8
 _WAIT_TIME = 0.2
 
 
-def run_chunks(work: Callable[[int, int], None], num_items: int, num_threads: int) -> None:
+def run_chunks(work: Callable[[int, int], None], num_items: int, num_threads: int, *, first_piece: int = 1) -> None:
     """Call `work(first, last)`, piece after piece, so that every item in range(num_items) is covered once.
 
     Each item writes its own results, so they depend neither on the pieces nor on the number of threads. Of several
     exceptions that of the first item is raised. An interruption is raised when the pieces that have begun are done:
-    each takes about a tenth of a second, or as long as its one item.
+    each takes about a tenth of a second, or as long as its one item. first_piece: items of the first piece of a thread,
+    more than one where they are known to be quick.
     """
     num_workers = max(1, min(num_threads, num_items))
-    pieces = _Pieces(work, num_items, num_workers)
+    pieces = _Pieces(work, num_items, num_workers, first_piece)
     if num_workers == 1:
         pieces.run()
     else:
@@ -50,13 +51,14 @@ class _Pieces:
     work: Callable[[int, int], None]
     num_items: int
     num_workers: int
+    first_piece: int
     next_item: int = 0
     faults: list[tuple[int, Exception]] = field(default_factory=list)
     lock: Lock = field(default_factory=Lock)
 
     def run(self) -> None:
         """Work on pieces until none is left."""
-        most = 1
+        most = self.first_piece
         while (piece := self._take(most))[0] < piece[1]:
             first, last = piece
             began = time.perf_counter()

@@ -53,7 +53,7 @@ def best_values(additive: AdditiveRewards, max_work: int) -> Floats:
     def work(first: int, last: int) -> None:
         best_of_labels(table, additive.valuation, coefficients, choices, first, last, best)
 
-    run_chunks(work, len(best), additive.num_threads)
+    run_chunks(work, len(best), additive.num_threads, first_piece=32)
     if np.isnan(best).any():
         others = np.full(len(best), math.inf)
         if additive.valuation.kind == EXPECTED_LOSS:

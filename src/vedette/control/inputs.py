@@ -52,25 +52,30 @@ def check_state(sensors: Sequence[MobileSensor], state: State) -> None:
     if len(state.local) != len(sensors):
         raise InputError(f"state.local: expected {len(sensors)} beliefs, one a sensor; got {len(state.local)}")
     state_dim = shared_targets([sensor.filter for sensor in sensors]).state_dim
+    checked: set[int] = set()
     for i, (belief, sensor) in enumerate(zip(state.local, sensors, strict=True)):
         initial = sensor.filter.initial()
         if not isinstance(initial, GLMB | LMB):
             raise reject(f"sensors[{i}].filter", "one that labels its targets", type(sensor.filter).__name__)
         kind = GLMB if isinstance(initial, GLMB) else LMB
-        _check_density(f"state.local[{i}]", belief, (kind,), state_dim)
-    _check_density("state.fused", state.fused, (GLMB, LMB), state_dim)
+        _check_density(f"state.local[{i}]", belief, (kind,), state_dim, checked)
+    _check_density("state.fused", state.fused, (GLMB, LMB), state_dim, checked)
 
 
-def _check_density(name: str, density: Any, kinds: tuple[type[Belief], ...], state_dim: int) -> None:
+def _check_density(name: str, density: Any, kinds: tuple[type[Belief], ...], state_dim: int, checked: set[int]) -> None:
+    """checked: identities of densities that are known to be valid, of which one tracker's sensors may share one."""
     if not isinstance(density, kinds):
         expected = " or ".join(kind.__name__ for kind in kinds)
         raise InputError(f"{name}: expected {expected}; got {type(density).__name__}")
     if density.state_dim != state_dim:
         raise InputError(f"{name}: expected states of dimension {state_dim}, as its filter; got {density.state_dim}")
+    if id(density) in checked:
+        return
     try:
         density.validate(error=InputError)
     except InputError as fault:
         raise InputError(f"{name}: {fault}") from None
+    checked.add(id(density))
 
 
 def check_choice(name: str, choice: Any, shape: tuple[int, ...]) -> tuple[int, ...]:

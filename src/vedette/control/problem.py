@@ -62,7 +62,7 @@ def _note_line(evidence: Evidence, mask: Mask | None, through: Sequence[int], se
 
 
 def _independent(evidence: Evidence, mask: Mask | None) -> tuple[int, ...]:
-    """The course that is best for each sensor alone (paper, Algorithm 3), of what it may do; of equal ones the first."""
+    """The course that is best for each sensor alone (paper, Algorithm 3), of those it may take."""
     evaluator, shape = evidence.evaluator, evidence.shape
     if isinstance(evaluator, AdditiveEvaluator):
         means = np.split(evaluator.additive.each_alone().mean(axis=1), np.cumsum(shape)[:-1])

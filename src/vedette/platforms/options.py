@@ -37,17 +37,20 @@ def options_at(field: str, platform: Platform, pose: Floats, times: Floats) -> O
     Raises `InputError`, with the name of the platform, for actions or courses that are none.
     """
     actions = actions_at(field, platform, pose)
-    courses, num = np.empty((len(actions), len(times), len(pose))), 0
-    which = np.empty(len(actions), np.int64)
-    for i, row in enumerate(actions.values):
-        courses[num] = course_of(field, platform, pose, row, times)
-        which[i] = int(np.argmax(_same(courses[num], courses[: num + 1])))  # itself, if no other
-        num = max(num, int(which[i]) + 1)
-    return Options(actions, courses[:num].copy(), which)
+    courses = np.stack([course_of(field, platform, pose, row, times) for row in actions.values])
+    firsts = _same(courses).argmax(axis=1)  # itself, if none before it
+    own, which = np.unique(firsts, return_inverse=True)
+    return Options(actions, courses[own], which)
 
 
-def _same(course: Floats, others: Floats) -> Bools:
-    """(num_others,) which courses are equal to one up to rounding, headings up to whole turns."""
-    off = np.abs(course - others)
-    off[..., 2] = np.abs(np.remainder(off[..., 2] + math.pi, 2.0 * math.pi) - math.pi)
-    return np.asarray((off <= _SAME_POSE * np.maximum(1.0, np.abs(course))).all(axis=(1, 2)))
+def _same(courses: Floats) -> Bools:
+    """(num, num) which courses are equal up to rounding, headings up to whole turns; the second is compared to."""
+    num = len(courses)
+    equal = np.ones((num, num), np.bool_)
+    for component in range(courses.shape[2]):
+        values = courses[:, :, component]
+        off = np.abs(values[:, np.newaxis] - values)
+        if component == 2:
+            off = np.abs(np.remainder(off + math.pi, 2.0 * math.pi) - math.pi)
+        equal &= (off <= _SAME_POSE * np.maximum(1.0, np.abs(values))[:, np.newaxis]).all(axis=2)
+    return equal

@@ -69,14 +69,13 @@ class AdditiveRewards:
         def work(first: int, last: int) -> None:
             joint_values(self.table, self.valuation, actions, first, last, sums)
 
-        run_chunks(work, len(actions), self.num_threads)
+        run_chunks(work, len(actions), self.num_threads, first_piece=8)
         found = np.array([self._found(joint) for joint in actions]) if len(self.cells.worth) else 0.0
         return np.asarray(self._combined(sums) + np.reshape(found, (-1, 1)))
 
     def line(self, chosen: Ints, sensor: int) -> Floats:
         """(num_courses, num_samples) rewards of all courses of one sensor, the others as chosen."""
-        first, last = self.table.first_courses[sensor : sensor + 2].tolist()
-        return self._lines(chosen, sensor, sensor + 1)[first:last]
+        return self._lines(chosen, sensor, sensor + 1)
 
     def lines(self, chosen: Ints) -> Floats:
         """(num_courses, num_samples) the lines of all sensors through a joint action, one after the other."""
@@ -88,11 +87,12 @@ class AdditiveRewards:
         def work(begin: int, end: int) -> None:
             line_values(self.table, self.valuation, chosen, first + begin, first + end, sums)
 
-        run_chunks(work, last - first, self.num_threads)
-        rewards = self._combined(sums)
+        run_chunks(work, last - first, self.num_threads, first_piece=8)
+        start, stop = self.table.first_courses[[first, last]].tolist()
+        rewards = self._combined(sums[start:stop])
         if len(self.cells.worth):
             for s in range(first, last):
-                begin, end = self.table.first_courses[s : s + 2].tolist()
+                begin, end = (self.table.first_courses[s : s + 2] - start).tolist()
                 joint = np.tile(chosen, (end - begin, 1))
                 joint[:, s] = np.arange(end - begin)
                 rewards[begin:end] += np.array([[self._found(each)] for each in joint])
@@ -108,7 +108,7 @@ class AdditiveRewards:
         def work(first: int, last: int) -> None:
             alone_values(self.table, self.valuation, bases, which, first, last, sums)
 
-        run_chunks(work, len(which), self.num_threads)
+        run_chunks(work, len(which), self.num_threads, first_piece=8)
         rewards = self._combined(sums)
         if len(self.cells.worth):
             rewards += self._found_alone()[:, np.newaxis]
@@ -128,7 +128,7 @@ class AdditiveRewards:
         cells = self.cells
         shares = -cells.worth[cells.cells] * np.expm1(cells.log_miss)
         course = np.repeat(np.arange(len(cells.offsets) - 1), np.diff(cells.offsets))
-        return np.bincount(course, shares, len(cells.offsets) - 1)
+        return np.asarray(np.bincount(course, shares, len(cells.offsets) - 1), np.float64)
 
     def _found(self, chosen: Ints) -> float:
         """What the reward has for targets that are expected to be found."""

@@ -14,11 +14,14 @@ from vedette.fusion import LinearRule
 from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.planning.bernoulli_rows import Table
 from vedette.kernels.planning.expected import fill_expected_changes
-from vedette.kernels.planning.known import Entries, fill_changes, fill_reach
+from vedette.kernels.planning.known import Entries, fill_changes, fill_near, fill_reach
 from vedette.threads import run_chunks
 
 # A label that no sample and no prediction gives a higher probability of detection is out of reach.
 LEAST_DETECTION = 1e-6
+
+# Courses that a thread works on before it looks at the clock.
+_QUICK = 16
 
 # Bytes of changes beyond which a decision is refused rather than left to run out of memory.
 _MOST_BYTES = 8e9
@@ -33,7 +36,7 @@ def lay_out_changes(start: Start, rule: LinearRule, num_samples: int, num_thread
     """
     num_sensors, size = len(start.bases), start.prior.shape[1]
     with model_errors():
-        reached = [_reach(group, num_threads) for group in start.groups]
+        reached = [_reach(group, num_threads, sampled=sampled) for group in start.groups]
     sizes, first_courses = _sizes(start.groups, reached, num_sensors)
     offsets = offsets_of(sizes)
     if offsets[-1] * num_samples * size * 8 > _MOST_BYTES:
@@ -50,23 +53,35 @@ def lay_out_changes(start: Start, rule: LinearRule, num_samples: int, num_thread
             found, counts = np.nonzero(reach)[1], reach.sum(axis=1)
             at = np.repeat(entries.first - offsets_of(counts)[:-1], counts) + np.arange(len(found))
             own[at], labels[at] = found, group.labels[found]
-            run_chunks(_filling(group, entries, start, changes, sampled), len(places), num_threads)
+            run_chunks(_filling(group, entries, start, changes, sampled), len(places), num_threads, first_piece=_QUICK)
     powers = np.array(rule.powers)
     joint = rule.prior_power * start.prior
     for s, power in enumerate(rule.powers):
         joint = joint + power * start.bases[s]
-    return Table(first_courses, offsets, labels, changes, np.ascontiguousarray(joint), powers)
+    table = Table(first_courses, offsets, labels, changes, np.ascontiguousarray(joint), powers)
+    return table if sampled else _seen(table)
 
 
-def _reach(group: SensorGroup, num_threads: int) -> Ints:
-    """(num_courses, num_own) 1 where a course reaches a label."""
+def _seen(table: Table) -> Table:
+    """Without the entries that say nothing."""
+    kept = table.changes[:, 0, -1] < 0.0
+    course = np.repeat(np.arange(len(table.offsets) - 1), np.diff(table.offsets))
+    offsets = offsets_of(np.bincount(course[kept], minlength=len(table.offsets) - 1))
+    return table._replace(offsets=offsets, labels=table.labels[kept], changes=table.changes[kept])
+
+
+def _reach(group: SensorGroup, num_threads: int, *, sampled: bool) -> Ints:
+    """(num_courses, num_own) 1 where a course reaches a label; without samples, where it might."""
     num_courses = int(group.course_offsets[-1])
     out = np.empty((num_courses, len(group.labels)), np.int64)
 
     def work(first: int, last: int) -> None:
-        fill_reach(group.belief, group.decision, LEAST_DETECTION, group.reach, first, last, out)
+        if sampled:
+            fill_reach(group.belief, group.decision, LEAST_DETECTION, group.reach, first, last, out)
+        else:
+            fill_near(group.belief, group.decision, group.reach, first, last, out)
 
-    run_chunks(work, num_courses, num_threads)
+    run_chunks(work, num_courses, num_threads, first_piece=_QUICK)
     return out
 
 
@@ -92,7 +107,7 @@ def _filling(
 ) -> Callable[[int, int], None]:
     if not sampled:
         return lambda first, last: fill_expected_changes(
-            group.belief, group.decision, entries, group.rows, first, last, changes
+            group.belief, group.decision, entries, group.rows, LEAST_DETECTION, first, last, changes
         )
     references = np.ascontiguousarray(start.references[group.labels])
     return lambda first, last: fill_changes(

@@ -140,6 +140,15 @@ def _condition(
 @inlined
 def expect(sensor: Sensor, pose: Floats, mean: Floats, cov: Floats, at: int, out: Innovation, scratch: Scratch) -> None:
     """Fill entry `at` of `out`; noise is taken at the predicted mean (paper-notes 3), detection as the sensor says."""
+    expect_measurement(sensor, pose, mean, cov, at, out, scratch)
+    out.prob_detection[at] = detection_probability(sensor, pose, mean, cov, scratch.points[0])
+
+
+@inlined
+def expect_measurement(
+    sensor: Sensor, pose: Floats, mean: Floats, cov: Floats, at: int, out: Innovation, scratch: Scratch
+) -> None:
+    """As `expect`, but for the probability of detection."""
     n, m = mean.shape[0], out.predicted.shape[1]
     jacobian, noise, innovation = scratch.measurement_jacobian, scratch.measurement_noise, scratch.innovation_cov
     factor, cross, posterior = out.factor[at], out.whitened_cross[at], out.covs[at]
@@ -161,7 +170,6 @@ def expect(sensor: Sensor, pose: Floats, mean: Floats, cov: Floats, at: int, out
     if not exact:
         posterior_of_squares(mean, cov, factor, cross, weights, scratch, posterior)
     out.log_norm[at] = -0.5 * (log_det_from_factor(factor) + m * LOG_2PI)
-    out.prob_detection[at] = detection_probability(sensor, pose, mean, cov, scratch.points[0])
 
 
 @inlined

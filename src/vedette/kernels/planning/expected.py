@@ -12,7 +12,8 @@ import numpy as np
 from vedette.errors import NumericalError
 from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Floats
-from vedette.kernels.gaussian.innovation import expect
+from vedette.kernels.gaussian.detection import detection_probability
+from vedette.kernels.gaussian.innovation import expect_measurement
 from vedette.kernels.gaussian.linalg import cholesky, inverse_from_factor
 from vedette.kernels.gaussian.prediction import predict
 from vedette.kernels.planning.bernoulli_rows import log_miss
@@ -28,7 +29,22 @@ def _invert(matrix: Floats, factor: Floats, out: Floats) -> None:
 
 
 @borrowing
-def _expected_cov(belief: Belief, decision: Decision, course: int, label: int, work: Work, out: Floats) -> float:
+def _is_seen(
+    belief: Belief, decision: Decision, course: int, label: int, least: float, work: Work, detections: Floats
+) -> bool:
+    """Whether a label is detected with probability `least` or more at some step; the probabilities are written."""
+    paths, seen = belief.paths, False
+    for h in range(len(detections)):
+        pose, state = decision.horizon.poses[course, h], work.scratch.points[0]
+        detections[h] = detection_probability(decision.sensor, pose, paths.means[label, h], paths.covs[label, h], state)
+        seen |= detections[h] >= least
+    return seen
+
+
+@borrowing
+def _expected_cov(
+    belief: Belief, decision: Decision, course: int, label: int, detections: Floats, work: Work, out: Floats
+) -> float:
     """Write the expected covariance at the end of the horizon; returns the log probability of never being detected."""
     paths, horizon, n = belief.paths, decision.horizon, out.shape[0]
     missed, prior, updated, factor = 0.0, work.inverse, work.predicted_cov, work.factor
@@ -39,8 +55,8 @@ def _expected_cov(belief: Belief, decision: Decision, course: int, label: int, w
                 decision.motion, horizon.dt, paths.means[label, h - 1], out, work.predicted_mean, work.cov, work.scratch
             )
             cov = work.cov
-        expect(decision.sensor, horizon.poses[course, h], mean, cov, 0, work.seen, work.scratch)
-        detection = work.seen.prob_detection[0]
+        expect_measurement(decision.sensor, horizon.poses[course, h], mean, cov, 0, work.seen, work.scratch)
+        detection = detections[h]
         missed += log_miss(detection)
         _invert(cov, factor, prior)
         _invert(work.seen.covs[0], factor, updated)
@@ -53,18 +69,31 @@ def _expected_cov(belief: Belief, decision: Decision, course: int, label: int, w
 
 @kernel
 def fill_expected_changes(
-    belief: Belief, decision: Decision, entries: Entries, bases: Floats, first: int, last: int, changes: Floats
+    belief: Belief,
+    decision: Decision,
+    entries: Entries,
+    bases: Floats,
+    least: float,
+    first: int,
+    last: int,
+    changes: Floats,
 ) -> None:
-    """Changes (num_entries, 1, bernoulli_size) for courses `first:last` of a sensor; see `known.fill_changes`."""
+    """Changes (num_entries, 1, bernoulli_size) for courses `first:last` of a sensor; see `known.fill_changes`.
+
+    Zeros for a label that is detected with a probability below `least` at every step. P_D is that of the prediction,
+    also where earlier scans of the horizon are expected to have narrowed it.
+    """
     dim, size = belief.paths.means.shape[2], bases.shape[1]
     work = make_known_work(dim, len(decision.sensor.angular), decision.horizon.poses.shape[1])
-    cov, information = np.empty((dim, dim)), np.empty((dim, dim))
+    cov, information, detections = np.empty((dim, dim)), np.empty((dim, dim)), np.empty(belief.paths.means.shape[1])
     for course in range(first, last):
         for entry in range(entries.first[course], entries.last[course]):
             label, row, at = entries.own[entry], changes[entry, 0], 0
             for k in range(size):
                 row[k] = 0.0
-            row[size - 1] = _expected_cov(belief, decision, course, label, work, cov)
+            if not _is_seen(belief, decision, course, label, least, work, detections):
+                continue
+            row[size - 1] = _expected_cov(belief, decision, course, label, detections, work, cov)
             _invert(cov, work.factor, information)
             for i in range(dim):
                 for j in range(i + 1):

@@ -114,7 +114,8 @@ def predict_paths(prior: Lmb, decision: Decision) -> Paths:
 def label_radii(paths: Paths, targets: Ints, states: Floats) -> Floats:
     """(num_labels, horizon_steps) distance from a label's predicted mean beyond which none of its samples is.
 
-    At least eight standard deviations of its position. states: (horizon_steps, num_targets, state_dim) of the samples.
+    At least 5.3 standard deviations of its position along its longest axis, beyond which is less than 1e-6 of its
+    Gaussian. states: (horizon_steps, num_targets, state_dim) of the samples.
     """
     num_labels, num_steps = paths.means.shape[:2]
     radii = np.empty((num_labels, num_steps))
@@ -125,8 +126,17 @@ def label_radii(paths: Paths, targets: Ints, states: Floats) -> Floats:
                 if targets[label, sample] >= 0:
                     at, mean = states[h, targets[label, sample]], paths.means[label, h]
                     square = max(square, (at[0] - mean[0]) ** 2 + (at[1] - mean[1]) ** 2)
-            radii[label, h] = math.sqrt(max(square, 64.0 * (cov[0, 0] + cov[1, 1])))
+            mean_variance, skew = 0.5 * (cov[0, 0] + cov[1, 1]), 0.5 * (cov[0, 0] - cov[1, 1])
+            longest = mean_variance + math.sqrt(skew * skew + cov[1, 0] * cov[1, 0])
+            radii[label, h] = math.sqrt(max(square, 5.3 * 5.3 * longest))
     return radii
+
+
+@inlined
+def _beyond(belief: Belief, decision: Decision, course: int, label: int, step: int, reach: float) -> bool:
+    """Whether a label is, at a step of a course, where a sensor of this reach detects nothing."""
+    pose, mean = decision.horizon.poses[course, step], belief.paths.means[label, step]
+    return math.hypot(mean[0] - pose[0], mean[1] - pose[1]) > reach + belief.radii[label, step]
 
 
 @borrowing
@@ -135,9 +145,9 @@ def _in_reach(
 ) -> bool:
     sensor, paths = decision.sensor, belief.paths
     for h in range(decision.horizon.poses.shape[1]):
-        pose, mean = decision.horizon.poses[course, h], paths.means[label, h]
-        if math.hypot(mean[0] - pose[0], mean[1] - pose[1]) > reach + belief.radii[label, h]:
+        if _beyond(belief, decision, course, label, h, reach):
             continue
+        pose, mean = decision.horizon.poses[course, h], paths.means[label, h]
         if detection_probability(sensor, pose, mean, paths.covs[label, h], state) >= least:
             return True
         for sample in range(belief.targets.shape[1]):
@@ -161,6 +171,17 @@ def fill_reach(
     for course in range(first, last):
         for label in range(out.shape[1]):
             out[course, label] = 1 if _in_reach(belief, decision, course, label, least, reach, state) else 0
+
+
+@kernel
+def fill_near(belief: Belief, decision: Decision, reach: float, first: int, last: int, out: Ints) -> None:
+    """As `fill_reach`, by distance alone: of all that are not farther than `reach` at every step."""
+    for course in range(first, last):
+        for label in range(out.shape[1]):
+            out[course, label] = 0
+            for h in range(decision.horizon.poses.shape[1]):
+                if not _beyond(belief, decision, course, label, h, reach):
+                    out[course, label] = 1
 
 
 @borrowing
