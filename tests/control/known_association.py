@@ -19,6 +19,8 @@ def followed(
     of linearised sensors.
     """
     own, motion = sensor.filter.sensor, sensor.filter.targets.motion
+    assert motion.transition_jacobian is not None
+    assert own.measurement.jacobian is not None
     missed = 1.0
     for h, pose in enumerate(course):
         jacobian, noise = np.empty((len(mean), len(mean))), np.empty((len(mean), len(mean)))

@@ -34,6 +34,7 @@ from vedette.control.rewards import (
 )
 from vedette.control.rewards.base import reward_value
 from vedette.control.search import all_joint_actions
+from vedette.densities import LMB
 from vedette.densities.label_sets import single_gaussians
 from vedette.fusion import ParallelUpdate
 from vedette.kernels.planning.ascent import Allowed
@@ -67,6 +68,7 @@ def test_labels_are_followed_as_in_plain_numpy() -> None:
         tracks, cases = single_gaussians(belief.tracks), evaluator.posteriors[s]
         for course, sample in np.ndindex(len(evaluator.options[s].courses), KNOWN.num_samples):
             ends = cases.density(course * KNOWN.num_samples + sample)
+            assert isinstance(ends, LMB)
             span = slice(futures[s].offsets[sample], futures[s].offsets[sample + 1])
             for i, label in enumerate(tracks.labels.tolist()):
                 at = [place for place in range(span.start, span.stop) if labels[place].tolist() == label]
@@ -202,6 +204,7 @@ def test_the_expected_loss_is_what_its_formula_says() -> None:
                 own, pose = example.sensors[s].filter.sensor, evaluator.options[s].courses[course, 0]
                 detection = float(own.mean_detection(mean[None], cov[None], pose)[0])
                 slope = np.empty((2, 4))
+                assert own.measurement.jacobian is not None
                 own.measurement.jacobian(mean, pose, own.measurement.params, slope)
                 missed *= 1.0 - detection
                 information += detection * slope.T @ np.linalg.solve(own.noise.covs(mean[None], pose, 2)[0], slope)
@@ -217,4 +220,4 @@ def test_threads_change_nothing() -> None:
     for num_threads in (1, 3):
         example = replace(shared(3, 2), settings=replace(KNOWN, num_threads=num_threads))
         tables.append(additive_of(example).joint()(all_joint_actions((3, 3, 3))))
-    np.testing.assert_array_equal(*tables)
+    np.testing.assert_array_equal(tables[0], tables[1])

@@ -153,6 +153,10 @@ def _end(stop: RunStopped | RunInterrupted, left: str) -> NoReturn:
     raise typer.Exit(INTERRUPTED if isinstance(stop, KeyboardInterrupt) else 1) from None
 
 
+# Of a run, so many are printed.
+_MOST_DECISIONS = 12
+
+
 def print_run(record: RunRecord, unit: str) -> None:
     """What was decided in a run, how good it was (OSPA in `unit`), what it cost, and what was cut off."""
     from rich.table import Table
@@ -169,10 +173,16 @@ def print_run(record: RunRecord, unit: str) -> None:
         table = Table(box=None, pad_edge=False)
         for heading in ("time", "actions", "expected reward"):
             table.add_column(heading)
-        for decision, choice in zip(record.decisions, choices_of(record), strict=True):
-            rewards = ", ".join(f"{mean:.3f} ± {error:.3f}" for mean, error in decision.plan.expected_rewards)
-            table.add_row(f"{decision.time:g} s", choice_words(choice), rewards)
+        rows = list(zip(record.decisions, choices_of(record), strict=True))
+        left_out = len(rows) - _MOST_DECISIONS
+        shown = rows if left_out <= 0 else [*rows[: _MOST_DECISIONS - 1], rows[-1]]
+        for decision, choice in shown:
+            told = (f"{mean:.3f} ± {error:.3f}" for mean, error in decision.plan.expected_rewards)
+            # A joint decision of many sensors has a line a sensor, all through the one reward.
+            table.add_row(f"{decision.time:g} s", choice_words(choice), ", ".join(dict.fromkeys(told)))
         console.print(table)
+        if left_out > 0:
+            console.print(f"({left_out} decisions between the last two are not shown; --out keeps them all)")
         for note in dict.fromkeys(note for decision in record.decisions for note in decision.plan.notes):
             console.print(f"note: {note}", soft_wrap=True)
     total, localisation, cardinality = record.ospa.mean(axis=0)

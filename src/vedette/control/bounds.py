@@ -46,6 +46,8 @@ def best_values(additive: AdditiveRewards, max_work: int) -> Floats:
     """
     table, coefficients = additive.table, additive.coefficients
     assert coefficients is not None
+    if len(table.start) == 0:
+        return np.empty(0)
     choices = choices_of(table)
     ways = _ways(choices, len(table.start))
     best = np.where(ways * additive.num_samples <= max_work, 0.0, math.nan)

@@ -65,7 +65,7 @@ class PlanningSettings:
     max_glmb_sensors: int = 4
     max_glmb_targets: int = 10
     max_prior_hypotheses: int = 10
-    max_bound_work: int = 1024
+    max_bound_work: int = 256
     undetected_worth: float = 0.0
     limits: Limits = field(default_factory=planning_limits)
     num_threads: int = 0

@@ -90,9 +90,11 @@ def soft_sector(state: Floats, pose: Floats, params: Floats) -> float:
     """params: probability, max_range, half_width_rad, range_slope, angle_slope (0: a sharp edge), cut (1 or 0)."""
     dx, dy = state[0] - pose[0], state[1] - pose[1]
     distance = math.sqrt(dx * dx + dy * dy)
+    if params[5] > 0.0 and distance > params[1]:
+        return 0.0
     off = abs(wrap_angle(math.atan2(dy, dx) - pose[2])) if distance > 0.0 else 0.0
     beyond = distance - params[1], off - params[2]
-    if (params[5] > 0.0 and max(beyond[0], beyond[1]) > 0.0) or (params[4] == 0.0 and beyond[1] > 0.0):
+    if (params[5] > 0.0 or params[4] == 0.0) and beyond[1] > 0.0:
         return 0.0
     angular = _logistic(params[4] * beyond[1]) if params[4] > 0.0 else 1.0
     return params[0] * _logistic(params[3] * beyond[0]) * angular  # type: ignore[no-any-return]

@@ -36,6 +36,15 @@ class Platform(Protocol):
         ...
 
 
+@runtime_checkable
+class TakesManyActions(Protocol):
+    """A platform that gives the courses of many actions at once, equal to those of `Platform.course`."""
+
+    def courses(self, pose: Floats, actions: Floats, times: Floats) -> Floats:
+        """(num_actions, num_times, 3 or more) for actions (num_actions, num_columns)."""
+        ...
+
+
 def check_platform(field: str, platform: Any) -> None:
     """`InputError` for what lacks a member of `Platform`."""
     if isinstance(platform, type) or not isinstance(platform, Platform):
@@ -53,11 +62,27 @@ def actions_at(field: str, platform: Platform, pose: Floats) -> Actions:
 
 def course_of(field: str, platform: Platform, pose: Floats, action: Floats, times: Floats) -> Floats:
     """(num_times, pose_dim) poses after an action; `InputError`, with the name of the platform, for what are none."""
-    given = as_array(f"{field}.course", platform.course(pose.copy(), action.copy(), times.copy()), "fiu", "numbers")
-    fits = given.ndim == 2 and len(given) == len(times) and 3 <= given.shape[1] <= len(pose)
-    if not fits or not np.isfinite(given).all():
-        expected = f"finite poses of shape ({len(times)}, 3 to {len(pose)}), one a time"
-        raise reject(f"{field}.course", expected, f"shape {given.shape}" if not fits else given)
-    poses = np.tile(pose, (len(times), 1))
-    poses[:, : given.shape[1]] = given
+    course = platform.course(pose.copy(), action.copy(), times.copy())
+    return _checked(f"{field}.course", course, (len(times),), pose)
+
+
+def courses_of(field: str, platform: Platform, pose: Floats, actions: Floats, times: Floats) -> Floats:
+    """(num_actions, num_times, pose_dim) poses after each action; `InputError` as `course_of`."""
+    if isinstance(platform, TakesManyActions):
+        courses = platform.courses(pose.copy(), actions.copy(), times.copy())
+        return _checked(f"{field}.courses", courses, (len(actions), len(times)), pose)
+    return np.stack([course_of(field, platform, pose, action, times) for action in actions])
+
+
+def _checked(field: str, given: Any, shape: tuple[int, ...], pose: Floats) -> Floats:
+    """Poses of this shape, with the components of `pose` where they are not given."""
+    array = as_array(field, given, "fiu", "numbers")
+    fits = array.shape[:-1] == shape and 3 <= array.shape[-1] <= len(pose)
+    if not fits or not np.isfinite(array).all():
+        sizes = ", ".join(map(str, shape))
+        expected = f"finite poses of shape ({sizes}, 3 to {len(pose)}), one a time"
+        raise reject(field, expected, f"shape {array.shape}" if not fits else array)
+    poses = np.empty((*shape, len(pose)))
+    poses[...] = pose
+    poses[..., : array.shape[-1]] = array
     return poses

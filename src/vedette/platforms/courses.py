@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -59,10 +58,15 @@ class Courses:
 
     def course(self, pose: Floats, action: Floats, times: Floats) -> Floats:
         """Straight on; headings of -180 and 180 lead to the same poses, bit for bit."""
-        heading = float(wrap_angles(np.radians(action[0])))
-        speed = self.speed if isinstance(self.speed, float) else float(action[1])
-        poses = np.tile(pose, (len(times), 1))
-        poses[:, 0] += times * speed * math.cos(heading)
-        poses[:, 1] += times * speed * math.sin(heading)
-        poses[:, 2] = heading
+        return np.asarray(self.courses(pose, action[np.newaxis], times)[0])
+
+    def courses(self, pose: Floats, actions: Floats, times: Floats) -> Floats:
+        """Those of many actions at once."""
+        headings = wrap_angles(np.radians(actions[:, 0]))
+        speeds = np.full(len(actions), self.speed) if isinstance(self.speed, float) else actions[:, 1]
+        poses = np.empty((len(actions), len(times), len(pose)))
+        poses[...] = pose
+        poses[:, :, 0] += times * (speeds * np.cos(headings))[:, np.newaxis]
+        poses[:, :, 1] += times * (speeds * np.sin(headings))[:, np.newaxis]
+        poses[:, :, 2] = headings[:, np.newaxis]
         return poses

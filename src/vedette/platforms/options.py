@@ -9,7 +9,7 @@ import numpy as np
 
 from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.platforms.actions import Actions
-from vedette.platforms.base import Platform, actions_at, course_of
+from vedette.platforms.base import Platform, actions_at, courses_of
 
 # Poses nearer than this, relative to their size, are one: rounding of degrees to radians and back stays below.
 _SAME_POSE = 1e-9
@@ -37,7 +37,7 @@ def options_at(field: str, platform: Platform, pose: Floats, times: Floats) -> O
     Raises `InputError`, with the name of the platform, for actions or courses that are none.
     """
     actions = actions_at(field, platform, pose)
-    courses = np.stack([course_of(field, platform, pose, row, times) for row in actions.values])
+    courses = courses_of(field, platform, pose, actions.values, times)
     firsts = _same(courses).argmax(axis=1)  # itself, if none before it
     own, which = np.unique(firsts, return_inverse=True)
     return Options(actions, courses[own], which)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -71,12 +70,18 @@ class Steps:
 
     def course(self, pose: Floats, action: Floats, times: Floats) -> Floats:
         """On the way, then at its end; the heading is that of the step, and stays while it stays."""
-        poses = np.tile(pose, (len(times), 1))
-        length = math.hypot(action[0], action[1])
-        if length > 0.0:
-            shares = np.minimum(times * self.speed / length, 1.0)
-            poses[:, :2] += shares[:, np.newaxis] * action
-            poses[:, 2] = math.atan2(action[1], action[0])
+        return np.asarray(self.courses(pose, action[np.newaxis], times)[0])
+
+    def courses(self, pose: Floats, actions: Floats, times: Floats) -> Floats:
+        """Those of many actions at once."""
+        lengths = np.hypot(actions[:, 0], actions[:, 1])
+        moves = lengths > 0.0
+        shares = np.minimum(times * self.speed / np.where(moves, lengths, 1.0)[:, np.newaxis], 1.0)
+        poses = np.empty((len(actions), len(times), len(pose)))
+        poses[...] = pose
+        poses[:, :, :2] += shares[:, :, np.newaxis] * actions[:, np.newaxis]
+        headings = np.arctan2(actions[:, 1], actions[:, 0])
+        poses[:, :, 2] = np.where(moves, headings, pose[2])[:, np.newaxis]
         return poses
 
 

@@ -32,7 +32,7 @@ class PlanningLimits(Section):
         default=10, description="The same with more targets expected [-]."
     )
     max_bound_work: Annotated[Whole, Field(ge=0)] = Field(
-        default=1024, description="Ways to see a target, times samples, that are tried for the bound of a plan [-]."
+        default=256, description="Ways to see a target, times samples, that are tried for the bound of a plan [-]."
     )
     min_relative_weight: Share = Field(
         default=1e-5, description="Hypotheses lighter than this times the heaviest are dropped [-]."
