@@ -163,7 +163,8 @@ class RandomPlanner:
         """Drawn from `rng`; the beliefs are not looked at, but by constraints."""
         generator(rng)
         options = options_of(self.sensors, poses, self.settings)
-        mask = mask_of_decision(self.constraints, self.sensors, options, state.fused, np.asarray(poses), self.settings)
+        fused = state.fused if self.constraints else None
+        mask = mask_of_decision(self.constraints, self.sensors, options, fused, np.asarray(poses), self.settings)
         drawn = tuple(int(rng.integers(len(own.courses))) for own in options)
         joint = drawn if mask is None else repaired(mask, drawn)
         chosen = tuple(own.first_action(course) for own, course in zip(options, joint, strict=True))
