@@ -2,6 +2,7 @@
 
 from vedette.control.additive.evaluator import AdditiveEvaluator
 from vedette.control.evaluator import Evaluator
+from vedette.control.explanation import Explanation, Had, RunnerUp, TargetGains
 from vedette.control.plan import Bound, Plan, RewardTable, SearchCurve
 from vedette.control.planners import FixedPlanner, IndependentPlanner, JointPlanner, Planner, RandomPlanner
 from vedette.control.rewards import (
@@ -29,7 +30,9 @@ __all__ = [
     "ExhaustiveSearch",
     "ExpectedGospaReward",
     "ExpectedLossReward",
+    "Explanation",
     "FixedPlanner",
+    "Had",
     "IndependentPlanner",
     "JointPlanner",
     "JointProblem",
@@ -46,6 +49,8 @@ __all__ = [
     "RenyiReward",
     "Reward",
     "RewardTable",
+    "RunnerUp",
     "SearchCurve",
+    "TargetGains",
     "planning_limits",
 ]

@@ -9,6 +9,7 @@ import numpy as np
 
 from vedette.control.bounds import bound_of
 from vedette.control.evidence import Evidence
+from vedette.control.explaining import Part, Questions
 from vedette.control.inputs import check_choice, check_poses, options_of
 from vedette.control.plan import Plan, RewardTable
 from vedette.control.preparation import AnyReward, prepare
@@ -86,7 +87,17 @@ class JointPlanner:
         chosen = tuple(own.first_action(course) for own, course in zip(evaluator.options, best, strict=True))
         actions = tuple(own.actions for own in evaluator.options)
         tables, (counts, found), bound = evidence.tables(best), evaluator.account(), bound_of(evidence, best)
-        return Plan(self.name, actions, chosen, tables, counts, (*self.notes, *found), evidence.curve(), bound)
+        return Plan(
+            self.name,
+            actions,
+            chosen,
+            tables,
+            counts,
+            (*self.notes, *found),
+            evidence.curve(),
+            bound,
+            questions=Questions(self.name, (Part.together(evidence, best),), bound),
+        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -116,13 +127,15 @@ class IndependentPlanner:
         evaluator = prepare(self.sensors, self.fusion, self.settings, self.reward, state, poses, rng=rng)
         chosen: list[int] = []
         tables: list[RewardTable] = []
+        parts: list[Part] = []
         for s, own in enumerate(evaluator.options):
             evidence = Evidence(evaluator, (s,), evaluator.alone(s))
             best = first_best(evidence.evaluate(all_joint_actions((len(own.courses),))))
             chosen.append(own.first_action(best))
             tables.extend(evidence.tables((best,)))
-        actions = tuple(own.actions for own in evaluator.options)
-        return Plan(self.name, actions, tuple(chosen), tuple(tables), *evaluator.account())
+            parts.append(Part.alone(evidence, best))
+        actions, questions = tuple(own.actions for own in evaluator.options), Questions(self.name, tuple(parts))
+        return Plan(self.name, actions, tuple(chosen), tuple(tables), *evaluator.account(), questions=questions)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

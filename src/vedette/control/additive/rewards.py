@@ -71,14 +71,14 @@ class AdditiveRewards:
 
         run_chunks(work, len(actions), self.num_threads)
         found = np.array([self._found(joint) for joint in actions]) if len(self.cells.worth) else 0.0
-        return np.asarray(self._combined(sums) + np.reshape(found, (-1, 1)))
+        return np.asarray(self.of_sums(sums) + np.reshape(found, (-1, 1)))
 
     def line(self, chosen: Ints, sensor: int) -> Floats:
         """(num_courses, num_samples) rewards of all courses of one sensor, the others as chosen."""
         first, last = self.table.first_courses[sensor : sensor + 2].tolist()
         sums = np.empty((last - first, self.num_samples, self.valuation.num))
         line_values(self.table, self.valuation, chosen, sensor, 0, last - first, sums)
-        rewards = self._combined(sums)
+        rewards = self.of_sums(sums)
         if len(self.cells.worth):
             others = np.tile(chosen, (last - first, 1))
             others[:, sensor] = np.arange(last - first)
@@ -91,7 +91,8 @@ class AdditiveRewards:
         assert coefficients is not None
         return ascend(self.table, self.valuation, coefficients, self.cells, allowed, start, _MOST_LINES)
 
-    def _combined(self, sums: Floats) -> Floats:
+    def of_sums(self, sums: Floats) -> Floats:
+        """(...) rewards of sums over labels (..., num), cells left out."""
         return sums[..., 0] if self.reward is None else combined(self.reward, sums)
 
     def _found(self, chosen: Ints) -> float:
