@@ -116,6 +116,11 @@ class Control(Section):
     )
     reward: AnyReward = Field(default=CauchySchwarzReward(), description="Value of a density [-].")
     search: AnySearch = Field(default=Exhaustive(), description="Which joint actions a joint decision evaluates [-].")
+    explain: bool = Field(
+        default=True,
+        description="Whether decisions are kept with why they were taken: what targets and sensors contribute to their "
+        "rewards, and how near the second best came [-].",
+    )
     limits: PlanningLimits = Field(default=PlanningLimits(), description="How much it works with [-].")
 
     @check
