@@ -66,7 +66,7 @@ def text_fits(explanation: Explanation) -> None:
 
 @pytest.mark.parametrize("reward", [*LINEAR, PeecsReward(0.3, 80.0)])
 def test_contributions_add_up_and_are_what_joint_actions_say(reward: Any) -> None:
-    """Baseline, sensors in both orders, each left out, all from rewards of joint actions with sensors that do not scan."""
+    """In both orders, and each sensor left out: all from rewards of joint actions with sensors that do not scan."""
     plan, additive = planned(shared(3, 2), reward)
     why, chosen = plan.explain(), np.array(plan.chosen)
     assert why.reward == plan.expected_rewards[0][0]

@@ -159,6 +159,7 @@ def print_run(record: RunRecord, unit: str) -> None:
 
     from vedette.evaluation.actions import choice_words
     from vedette.evaluation.comparison import choices_of
+    from vedette.evaluation.certainty import certainty_lines
     from vedette.evaluation.health import health_line
 
     console = new_console()
@@ -175,6 +176,8 @@ def print_run(record: RunRecord, unit: str) -> None:
         console.print(table)
         for note in dict.fromkeys(note for decision in record.decisions for note in decision.plan.notes):
             console.print(f"note: {note}", soft_wrap=True)
+    for line in certainty_lines(record):
+        console.print(line, soft_wrap=True)
     total, localisation, cardinality = record.ospa.mean(axis=0)
     parts = f"(localisation {localisation:.2f}, cardinality {cardinality:.2f})"
     console.print(f"mean OSPA {amount(f'{total:.2f}', unit)} {parts}")

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from vedette.text import counted
+
 if TYPE_CHECKING:
     from vedette.control.explanation import Explanation, RunnerUp
 
@@ -46,7 +48,7 @@ def _of_choice(found: Explanation) -> list[str]:
     start = "" if found.baseline is None else f"; {_number(found.baseline, found.reward)} without any scan"
     lines = [f"{found.planner}: reward {with_error(found.reward, found.standard_error)}{start}"]
     bound = "" if found.bound is None else f"; {found.bound}"
-    lines.append(f"{found.evaluations} actions evaluated{bound}")
+    lines.append(f"{counted(found.evaluations, 'choice')} evaluated{bound}")
     if found.runner_up is not None:
         lines.append(f"runner-up: {margin_text(found.runner_up, found.reward)}: {found.runner_up.text}")
     return lines
