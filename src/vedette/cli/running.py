@@ -158,8 +158,8 @@ def print_run(record: RunRecord, unit: str) -> None:
     from rich.table import Table
 
     from vedette.evaluation.actions import choice_words
-    from vedette.evaluation.comparison import choices_of
     from vedette.evaluation.certainty import certainty_lines
+    from vedette.evaluation.comparison import choices_of
     from vedette.evaluation.health import health_line
 
     console = new_console()

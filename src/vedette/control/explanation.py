@@ -114,7 +114,7 @@ class Explanation:
 
         Args:
             sensor: its number, from 0.
-            action: the index among its actions; or instead
+            action: the index among its actions, where no columns are given.
             columns: the numbers of an action, as in `heading_deg=60.0`; those left out are as chosen. Degrees count up
                 to whole turns.
 

@@ -20,8 +20,8 @@ _WORDS = {"of_targets": "gain by target", "of_sensors": "shares of the sensors",
 def why_data(plan: Plan) -> dict[str, Any] | None:
     """What is shown; None for a decision that was kept without explanation.
 
-    Facts as pairs of texts; of the ten targets that matter most label and gains, of the others their number and sums; what
-    is gained by targets that were not found before; of each sensor number, action, share and the reward without it.
+    Facts as pairs of texts; of the ten targets that matter most label and gains, of the others their number and sums;
+    what is gained by targets not found before; of each sensor number, action, share and the reward without it.
     """
     why = plan.explanation
     if why is None or why.reward is None:
