@@ -50,7 +50,13 @@ BEGINNINGS: dict[str, Callable[[Path], None]] = {"docs/report.md": results_folde
 SHOWN = {
     "README.md": ["["],
     "docs/campaigns.md": ["paper-a"],
-    "docs/control.md": ["+-", "joint actions evaluated", "filter_steps"],
+    "docs/control.md": [
+        "+-",
+        "joint actions evaluated",
+        "filter_steps",
+        "runner-up: less by",
+        "sensor 1 with heading_deg 60",
+    ],
     "docs/filters.md": ["target at"],
     "docs/fusion.md": ["ParallelUpdate ", "Clmb by views "],
     "docs/metrics.md": ["True"],

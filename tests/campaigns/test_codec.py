@@ -24,7 +24,7 @@ from vedette.evaluation.metrics import decode_metrics, encode_metrics
 from vedette.platforms import Actions
 from vedette.simulation.arrow import read_table, write_table
 from vedette.simulation.kept import FORMAT_VERSION, decode_timings, encode_timings
-from vedette.simulation.tables import LAYOUTS
+from vedette.simulation.tables import LAYOUTS, OPTIONAL
 
 NUMBERS = st.floats(width=64, allow_nan=True, allow_infinity=True)
 
@@ -98,6 +98,14 @@ def test_the_layout_of_this_version_is_as_written_here():
         "decisions": "decision step time_s planner notes num_*",
         "actions": "decision step time_s sensor action chosen *",
         "rewards": "decision step time_s reward_table reward reward_se chosen action_*",
+    }
+    assert {
+        name: " ".join((*layout.fixed, *(f"{start}*" for start in layout.more))) for name, layout in OPTIONAL.items()
+    } == {
+        "explanations": "decision step time_s reward reward_se baseline undetected_gain evaluations bound bound_kind "
+        "bound_unbounded runner_up margin margin_se missing action_*",
+        "target_gains": "decision step time_s birth_step birth_site existence_gain localisation_gain",
+        "sensor_gains": "decision step time_s sensor gain without",
     }
 
 

@@ -158,6 +158,19 @@ def test_cells_of_other_dimensions_share_a_table(results):
     assert tables["decisions"]["num_others"].to_pylist() == [None, None, None, 2, None, None]
 
 
+def test_decisions_that_were_explained_have_tables_of_their_own(results):
+    """Of those runs alone; the runs that were kept without have no rows there."""
+    from simulation.test_explained import explained
+
+    first, second = results.run("jdm-rate-5.0", 0), results.run("jdm-rate-5.0", 1)
+    assert "explanations" not in tables_of_runs(results.campaign, [first, second])
+    tables = tables_of_runs(results.campaign, [first, replace(second, record=explained(second.record))])
+    assert tables["explanations"]["run"].to_pylist() == [1, 1]
+    assert tables["explanations"]["baseline"].to_pylist() == [0.0, None]
+    assert tables["target_gains"]["existence_gain"].to_pylist() == [0.5, -0.25]
+    assert tables["sensor_gains"]["sensor"].to_pylist() == [0, 1]
+
+
 def test_csv_holds_the_same(results, tables, tmp_path):
     import csv
 

@@ -217,7 +217,9 @@ def test_the_general_path_gives_the_same_rewards(kind: str, num_sensors: int) ->
     for which, fusion in ((tuple(range(num_sensors)), example.fusion), ((0,), None)):
         actions = all_joint_actions(tuple(evaluator.joint_shape()[s] for s in which))
         posteriors = [evaluator.posteriors[s] for s in which]
-        general = PlainRewards(posteriors, evaluator.prediction, fusion, evaluator.reward, SETTINGS.num_samples)
+        general = PlainRewards(
+            posteriors, evaluator.prediction, fusion, evaluator.reward, SETTINGS.num_samples, evaluator.views
+        )
         laid_out = evaluator.rewards(which, fusion)
         np.testing.assert_allclose(laid_out(actions), general(actions), rtol=1e-9, atol=1e-9)
 
@@ -250,7 +252,7 @@ def test_rewards_of_power_integrals(reward: Any, kind: str, num_sensors: int) ->
     for which, fusion in ((tuple(range(num_sensors)), example.fusion), ((0,), None)):
         actions = all_joint_actions(tuple(evaluator.joint_shape()[s] for s in which))[-4:]
         posteriors = [evaluator.posteriors[s] for s in which]
-        plain = PlainRewards(posteriors, evaluator.prediction, fusion, reward, SETTINGS.num_samples)
+        plain = PlainRewards(posteriors, evaluator.prediction, fusion, reward, SETTINGS.num_samples, evaluator.views)
         np.testing.assert_allclose(evaluator.rewards(which, fusion)(actions), plain(actions), rtol=1e-9, atol=1e-9)
     assert not evaluator.notes
 

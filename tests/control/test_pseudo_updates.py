@@ -31,7 +31,7 @@ def test_every_label_set_keeps_its_heaviest_hypothesis_beyond_the_caps() -> None
         sets, groups = label_sets(belief)
         assert set(own.sets) == set(sets)
         rng = np.random.default_rng(5)
-        (futures, *_) = draw_futures(example.fused, example.sensors, example.settings, rng=rng)
+        _, (futures, *_) = draw_futures(example.fused, example.sensors, example.settings, rng=rng)
         actions = sensor.platform.actions(pose)
         for case, (action, sample) in enumerate(np.ndindex(len(actions), SETTINGS.num_samples)):
             course = sensor.platform.course(pose, actions[action], SETTINGS.horizon_times())
@@ -70,7 +70,7 @@ def _alone(
 
 def test_all_sensors_are_told_of_the_same_targets() -> None:
     example = situation("delta", 3)
-    futures = draw_futures(example.fused, example.sensors, SETTINGS, rng=np.random.default_rng(9))
+    _, futures = draw_futures(example.fused, example.sensors, SETTINGS, rng=np.random.default_rng(9))
     samples = sample_glmb(example.fused, SETTINGS.num_samples, rng=np.random.default_rng(9))
     for one in futures:
         np.testing.assert_array_equal(one.offsets, samples.offsets)
@@ -88,11 +88,11 @@ def test_all_sensors_are_told_of_the_same_targets() -> None:
 def test_an_action_is_updated_alike_whatever_the_others_are(kind: str, mode: Any) -> None:
     settings = replace(SETTINGS, ideal_measurements=mode)
     example = situation(kind, settings=settings)
-    (futures, *_) = draw_futures(example.fused, example.sensors, settings, rng=np.random.default_rng(2))
+    labels, (futures, *_) = draw_futures(example.fused, example.sensors, settings, rng=np.random.default_rng(2))
     belief, sensor = example.beliefs[0], example.sensors[0]
     courses = options_at("platform", sensor.platform, example.poses[0], settings.horizon_times()).courses
-    together = pseudo_posteriors(belief, sensor, courses, futures, settings)
-    alone = pseudo_posteriors(belief, sensor, courses[1:2], futures, settings)
+    together = pseudo_posteriors(belief, sensor, courses, labels, futures, settings)
+    alone = pseudo_posteriors(belief, sensor, courses[1:2], labels, futures, settings)
     cases = slice(SETTINGS.num_samples, 2 * SETTINGS.num_samples)
     for name in ("log_weights", "means", "covs"):
         np.testing.assert_array_equal(getattr(together, name)[cases], getattr(alone, name))
@@ -106,8 +106,8 @@ def test_a_target_is_seen_with_or_above_its_detection_probability(mode: Any) -> 
         sensor = mobile_sensor("lmb", detection=models.constant_detection(probability))
         example = situation("lmb", settings=settings)
         certain = type(example.fused)(example.fused.tracks, np.full(example.fused.tracks.num_tracks, 40.0))
-        (futures,) = draw_futures(certain, (sensor,), settings, rng=np.random.default_rng(0))
-        own = pseudo_posteriors(example.beliefs[0], sensor, POSES[:1, np.newaxis], futures, settings)
+        labels, (futures,) = draw_futures(certain, (sensor,), settings, rng=np.random.default_rng(0))
+        own = pseudo_posteriors(example.beliefs[0], sensor, POSES[:1, np.newaxis], labels, futures, settings)
         rose = own.existence_logits > example.beliefs[0].existence_logit
         assert abs(rose.mean() - share[mode]) < 0.15
 
@@ -115,7 +115,7 @@ def test_a_target_is_seen_with_or_above_its_detection_probability(mode: Any) -> 
 @pytest.mark.parametrize("num_targets", [5, 16])
 def test_targets_may_contend_for_more_measurements_than_there_was_room_for(num_targets: int) -> None:
     example = crowded(num_targets)
-    (futures, *_) = draw_futures(example.fused, example.sensors, example.settings, rng=np.random.default_rng(5))
+    _, (futures, *_) = draw_futures(example.fused, example.sensors, example.settings, rng=np.random.default_rng(5))
     sizes = np.diff(futures.offsets)
     if num_targets > MAX_EXACT_MEASUREMENTS:
         assert sizes.min() <= MAX_EXACT_MEASUREMENTS < sizes.max()

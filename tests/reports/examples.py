@@ -30,6 +30,17 @@ def results_of(folder: Path, campaign: Campaign, *, skipped: Collection[tuple[st
     return open_results(folder)
 
 
+# Two decisions on LMBs, whose rewards are sums over targets.
+SUMS: dict[str, Any] = {
+    "filter.kind": "lmb",
+    "fusion.kind": "clmb",
+    "time.num_steps": 13,
+    "ospa.from_step": 1,
+    "ospa.to_step": 13,
+    "control.decision_steps": [10, 12],
+    "control.num_samples": 8,
+}
+
 # A bearing-only sensor that sees a sector, and a range-only one that sees as far as its range.
 MIXED_SENSORS: dict[str, Any] = {
     "sensors.0.measurement": {"kind": "bearing_only"},

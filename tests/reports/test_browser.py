@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from reports.browser import Browser, Page, chromium
-from reports.examples import MIXED_SENSORS, campaign_of, results_of
+from reports.examples import MIXED_SENSORS, SUMS, campaign_of, results_of
 from vedette.reports import write_report
 from waiting import PATIENCE
 
@@ -262,4 +262,46 @@ def test_pointing_at_a_reward_says_its_actions_and_its_value(page: Page) -> None
     first, second = text(page, "hover").splitlines()
     assert re.fullmatch(r"sensor 1 to 0°: reward \d\.\d+ ± 0\.\d+( \(chosen\))?", first)
     assert second.startswith("sensor 2 to 0°: reward ")
+    assert page.complaints() == []
+
+
+def test_the_replay_shows_why_a_decision_was_taken(browser: Browser, tmp_path: Path) -> None:
+    """Bars of targets and sensors at the decision on display; nothing before the first."""
+    write_report(
+        results_of(tmp_path / "results", campaign_of(planners=["jdm"], runs=1, set=SUMS)), tmp_path / "why.html"
+    )
+    for width in (1280, 390):
+        page = browser.open(tmp_path / "why.html", width=width)
+        assert text(page, "why-not") == "No decision yet."
+        assert page.evaluate("document.querySelector('[data-part=why]').hidden")
+        page.evaluate("document.getElementById('replay').focus()")
+        page.press("End")
+        assert text(page, "why-title") == "Why the decision at 12 s"
+        assert text(page, "why-not") == ""
+        assert not page.evaluate("document.querySelector('[data-part=why]').hidden")
+        assert "Second best" in text(page, "why-facts")
+        assert "the best of all joint actions" in text(page, "why-facts")
+        for part, names in (("targets", ["1.0", "1.1", "1.2", "1.3"]), ("sensors", ["1: ", "2: "])):
+            shown = page.evaluate(
+                f"[...document.querySelectorAll('[data-part=why-{part}] .name')].map((each) => each.textContent)"
+            )
+            assert all(any(name.startswith(each) for name in shown) for each in names), shown
+        widths = page.evaluate(
+            "[...document.querySelectorAll('.track i:not(.zero)')].map((each) => each.getBoundingClientRect().width)"
+        )
+        assert max(widths) > 30
+        assert page.evaluate("document.documentElement.scrollWidth") <= width
+        assert page.complaints() == []
+
+
+def test_a_decision_that_was_kept_without_says_so(browser: Browser, tmp_path: Path) -> None:
+    campaign = campaign_of(planners=["jdm", "random"], runs=1, set={**SUMS, "control.explain": False})
+    write_report(results_of(tmp_path / "results", campaign), tmp_path / "without.html")
+    page = browser.open(tmp_path / "without.html")
+    page.evaluate("document.getElementById('replay').focus()")
+    page.press("End")
+    assert text(page, "why-not") == "This decision was kept without why it was taken."
+    choose(page, "run", "1")
+    assert text(page, "why-not") == "This decision was not made on rewards."
+    assert page.evaluate("document.querySelector('[data-part=why]').hidden")
     assert page.complaints() == []

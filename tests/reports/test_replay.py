@@ -3,16 +3,21 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from reports.examples import MIXED_SENSORS, campaign_of, results_of
+from evaluation.synthetic import make_record
+from reports.examples import MIXED_SENSORS, SUMS, campaign_of, results_of
+from simulation.test_explained import explanation_of
+from vedette.control import TargetGains
 from vedette.errors import InputError
 from vedette.reports.groups import Strategy, gather
 from vedette.reports.replay import replay_data
+from vedette.reports.why import why_data
 from vedette.scenarios.build import build_experiment
 from vedette.scenarios.sections.sensors import Sensor
 from vedette.simulation.replay import scans_of
@@ -104,6 +109,57 @@ def test_independent_decisions_are_curves_and_fixed_ones_nothing(strategies: Map
     assert [curve["sensor"] for curve in decision["curves"]] == [0, 1]
     decision = replay_data(strategies["fixed"], strategies["fixed"].records[0], "", trust=True)["decisions"][0]
     assert (decision["map"], decision["curves"]) == (None, [])
+
+
+def test_why_a_decision_was_taken_stands_with_it(tmp_path: Path) -> None:
+    """Of sums over targets all that is told; the same numbers as in the plan's explanation, largest gains first."""
+    strategy = strategies_of(tmp_path / "results", planners=["jdm"], set=SUMS)["jdm"]
+    record = strategy.records[0]
+    data = replay_data(strategy, record, "", trust=True)
+    json.dumps(data, allow_nan=False)
+    for decision, told in zip(record.decisions, data["decisions"], strict=True):
+        found, why = told["why"], decision.plan.explain()
+        assert why.of_targets is not None
+        assert why.of_sensors is not None
+        assert why.without is not None
+        assert found["more"] is None
+        gains = [existence + localisation for _, existence, localisation in found["targets"]]
+        np.testing.assert_allclose(gains, np.sort(why.of_targets.total)[::-1], rtol=2e-3, atol=1e-3)
+        np.testing.assert_allclose([row[2] for row in found["sensors"]], why.of_sensors, rtol=1e-3)
+        np.testing.assert_allclose([row[3] for row in found["sensors"]], why.without, rtol=1e-3)
+        assert ", ".join(row[1] for row in found["sensors"]) == told["actions"]
+        facts = dict(found["facts"])
+        assert facts["Bound"] == "the best of all joint actions"
+        assert facts["Evaluated"] == "144 choices"
+        assert facts["Second best"].startswith("less by ")
+        assert facts["Second best"].count(" to ") == 2 - sum(
+            a == b for a, b in zip(why.runner_up.actions, decision.plan.chosen, strict=True)
+        )
+
+
+def test_many_targets_are_told_by_the_ten_that_matter_most() -> None:
+    plan = make_record().decisions[0].plan
+    total = np.arange(1.0, 21.0)
+    gains = TargetGains(np.stack([np.ones(20, np.int64), np.arange(20)], axis=1), 0.25 * total, 0.75 * total)
+    found = why_data(replace(plan, explanation=explanation_of(plan, of_targets=gains, runner_up=None)))
+    assert found is not None
+    assert found["targets"][0] == ("1.19", 5.0, 15.0)
+    assert len(found["targets"]) == 10
+    assert found["more"] == (10, 13.75, 41.25)
+    assert why_data(plan) is None
+
+
+def test_decisions_that_tell_less_say_why(strategies: Mapping[str, Strategy]) -> None:
+    """Case by case there is a second best; fixed actions have nothing to explain."""
+    told = {
+        name: replay_data(each, each.records[0], "", trust=True)["decisions"][0] for name, each in strategies.items()
+    }
+    for name in ("jdm", "idm"):
+        facts = dict(told[name]["why"]["facts"])
+        assert "case by case" in facts["Not known"]
+        assert "Second best" in facts
+        assert told[name]["why"]["targets"] == told[name]["why"]["sensors"] == []
+    assert told["fixed"]["why"] is None
 
 
 def test_without_the_models_there_are_no_measurements(

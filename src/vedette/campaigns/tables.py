@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import pyarrow as pa
@@ -18,13 +18,29 @@ import pyarrow as pa
 from vedette.campaigns.cells import Campaign, Cell
 from vedette.simulation.arrow import Columns, Kind, Layout, to_arrow
 from vedette.simulation.records import RunRecord
-from vedette.simulation.tables import LAYOUTS, OSPA_COLUMNS, TIMINGS, tables_of, timing_table
+from vedette.simulation.tables import (
+    LAYOUTS,
+    OPTIONAL,
+    OSPA_COLUMNS,
+    TIMINGS,
+    optional_tables_of,
+    tables_of,
+    timing_table,
+)
 
 if TYPE_CHECKING:
     from vedette.campaigns.finished import FinishedRun
 
 _UNITS = {"_m": "m", "_s": "s", "_rad": "rad"}
 _ANY = Layout({"sha256": Kind.TEXT}, {"": Kind.NUMBER})
+
+
+class _Part(NamedTuple):
+    """The table of one run among those of its name."""
+
+    cell: Cell
+    run: int
+    table: pa.Table
 
 
 def tables_of_record(record: RunRecord) -> dict[str, pa.Table]:
@@ -37,18 +53,15 @@ def tables_of_runs(campaign: Campaign, runs: Iterable[FinishedRun]) -> dict[str,
 
     Takes about as much memory as the tables: some 150 MB for 1,000 runs of 40 scans with joint decisions.
     """
-    parts: dict[str, list[pa.Table]] = {}
-    places: list[tuple[Cell, int]] = []
+    parts: dict[str, list[_Part]] = {}
     for run in runs:
-        places.append((campaign.cell(run.cell), run.record.run))
+        cell = campaign.cell(run.cell)
         measures, session = run.metrics.columns(), np.full(run.record.num_scans, run.session)
         of_run = {"runs": to_arrow(_summary(run), _ANY), **_batches(run.record, measures, {"session": session})}
         for name, table in of_run.items():
-            parts.setdefault(name, []).append(pa.Table.from_batches([table]))
+            parts.setdefault(name, []).append(_Part(cell, run.record.run, pa.Table.from_batches([table])))
     metadata = {"vedette": json.dumps({"campaign": campaign.name, "seed": campaign.seed})}
-    return {
-        name: _with_units(_joined(campaign, places, of)).replace_schema_metadata(metadata) for name, of in parts.items()
-    }
+    return {name: _with_units(_joined(campaign, of)).replace_schema_metadata(metadata) for name, of in parts.items()}
 
 
 def _batches(record: RunRecord, measures: Any = None, timed: Any = None) -> dict[str, pa.RecordBatch]:
@@ -56,7 +69,12 @@ def _batches(record: RunRecord, measures: Any = None, timed: Any = None) -> dict
     tables = tables_of(record)
     timings = {"step": np.arange(1, record.num_scans + 1), "time_s": record.times, **timing_table(record)}
     scans = to_arrow({**tables.pop("scans"), **(measures or {})}, _ANY, nan_is_null=True)
-    others = {name: to_arrow(table, LAYOUTS[name], nan_is_null=True) for name, table in tables.items()}
+    others = {
+        name: to_arrow(table, layout, nan_is_null=True)
+        for of, layouts in ((tables, LAYOUTS), (optional_tables_of(record), OPTIONAL))
+        for name, layout in layouts.items()
+        if (table := of.get(name)) is not None
+    }
     return {"scans": scans, **others, "timings": to_arrow({**timings, **(timed or {})}, TIMINGS, nan_is_null=True)}
 
 
@@ -72,12 +90,12 @@ def _summary(run: FinishedRun) -> Columns:
     }
 
 
-def _joined(campaign: Campaign, places: list[tuple[Cell, int]], tables: list[pa.Table]) -> pa.Table:
+def _joined(campaign: Campaign, parts: list[_Part]) -> pa.Table:
     """The tables of one name of all runs, cell, settings and number before each row; null for what a run lacks."""
-    rows = np.repeat(np.arange(len(tables)), [table.num_rows for table in tables])
-    settings = {axis: [setting_of(campaign, cell, axis) for cell, _ in places] for axis in campaign.axes}
-    keys = {"cell": [cell.name for cell, _ in places], **settings, "run": [run for _, run in places]}
-    table = pa.concat_tables(tables, promote_options="default")
+    rows = np.repeat(np.arange(len(parts)), [part.table.num_rows for part in parts])
+    settings = {axis: [setting_of(campaign, part.cell, axis) for part in parts] for axis in campaign.axes}
+    keys = {"cell": [part.cell.name for part in parts], **settings, "run": [part.run for part in parts]}
+    table = pa.concat_tables([part.table for part in parts], promote_options="default")
     return pa.table(
         {
             **{name: pa.array(of).take(pa.array(rows)) for name, of in keys.items()},

@@ -162,6 +162,7 @@ def print_run(record: RunRecord, unit: str) -> None:
     from rich.table import Table
 
     from vedette.evaluation.actions import choice_words
+    from vedette.evaluation.certainty import certainty_lines
     from vedette.evaluation.comparison import choices_of
     from vedette.evaluation.health import health_line
 
@@ -185,6 +186,8 @@ def print_run(record: RunRecord, unit: str) -> None:
             console.print(f"({left_out} decisions between the last two are not shown; --out keeps them all)")
         for note in dict.fromkeys(note for decision in record.decisions for note in decision.plan.notes):
             console.print(f"note: {note}", soft_wrap=True)
+    for line in certainty_lines(record):
+        console.print(line, soft_wrap=True)
     total, localisation, cardinality = record.ospa.mean(axis=0)
     parts = f"(localisation {localisation:.2f}, cardinality {cardinality:.2f})"
     console.print(f"mean OSPA {amount(f'{total:.2f}', unit)} {parts}")

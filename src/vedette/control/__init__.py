@@ -13,6 +13,7 @@ from vedette.control.constraints import (
     void_probability,
 )
 from vedette.control.evaluator import Evaluator
+from vedette.control.explanation import Explanation, Had, RunnerUp, TargetGains
 from vedette.control.plan import Bound, Plan, RewardTable, SearchCurve
 from vedette.control.planners import FixedPlanner, IndependentPlanner, JointPlanner, Planner, RandomPlanner
 from vedette.control.rewards import (
@@ -51,7 +52,9 @@ __all__ = [
     "ExhaustiveSearch",
     "ExpectedGospaReward",
     "ExpectedLossReward",
+    "Explanation",
     "FixedPlanner",
+    "Had",
     "IndependentPlanner",
     "JointPlanner",
     "JointProblem",
@@ -70,11 +73,13 @@ __all__ = [
     "RenyiReward",
     "Reward",
     "RewardTable",
+    "RunnerUp",
     "SearchCurve",
     "Separation",
     "SequentialGreedy",
     "Situation",
     "StayInside",
+    "TargetGains",
     "VoidProbability",
     "mask_of",
     "planning_limits",

@@ -114,9 +114,9 @@ class Evaluator:
             return laid
         self.notes[f"rewards were computed one by one: {laid}"] = None
         warn_slow(laid)
-        return PlainRewards(posteriors, self.prediction, fusion, self.reward, self.settings.num_samples, self._views)
+        return PlainRewards(posteriors, self.prediction, fusion, self.reward, self.settings.num_samples, self.views)
 
-    def _views(self, chosen: Sequence[int]) -> Views:
+    def views(self, chosen: Sequence[int]) -> Views:
         """What the sensors could see at the end of chosen courses, and what all their updates began with."""
         models = tuple(sensor.filter.sensor for sensor in self.sensors)
         poses = np.stack([own.courses[course, -1] for own, course in zip(self.options, chosen, strict=True)])

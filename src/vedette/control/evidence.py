@@ -109,6 +109,25 @@ class Evidence:
                 return float(means[at[0]])
         raise InputError(f"joint action: expected one that was evaluated; got {choice!r}")
 
+    @property
+    def num_evaluated(self) -> int:
+        """How many joint actions were evaluated, those of compiled ascents included."""
+        return self._evaluations[-1] if self._evaluations else 0
+
+    def best_other(self, choice: Sequence[int]) -> tuple[tuple[int, ...], float] | None:
+        """The best joint action but the choice of those that are kept, and its mean reward; None where there is none.
+
+        Of equal ones the first that was evaluated.
+        """
+        found: tuple[tuple[int, ...], float] | None = None
+        for actions, means in zip(self._actions, self._means, strict=True):
+            same = (actions == np.array(choice)).all(axis=1)
+            others = np.where(same | np.isnan(means), -math.inf, means)
+            at = int(np.argmax(others)) if len(others) else 0
+            if len(others) and others[at] > (-math.inf if found is None else found[1]):
+                found = tuple(actions[at].tolist()), float(others[at])
+        return found
+
     def curve(self) -> SearchCurve:
         """How the search went."""
         return SearchCurve(np.array(self._evaluations, np.int64), np.array(self._best))

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import NamedTuple
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from vedette.control.explanation import Explanation
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats, Ints
 from vedette.platforms import Actions
+
+if TYPE_CHECKING:
+    from vedette.control.explaining import Questions
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,6 +105,8 @@ class Plan:
         notes: what a reader must know, such as that rewards were taken one by one.
         curve: of a joint decision, how the search went; else None.
         bound: of a joint decision, how far from the best it can be; None where nothing is known of that.
+        explanation: why it is what it is, where that has been worked out to be kept; see `explain`.
+        questions: the evidence, which `explain` works on; None once it is left behind (`settled`, a pickle, a record).
     """
 
     planner: str
@@ -111,6 +117,35 @@ class Plan:
     notes: tuple[str, ...] = ()
     curve: SearchCurve | None = None
     bound: Bound | None = None
+    explanation: Explanation | None = None
+    questions: Questions | None = field(default=None, repr=False, compare=False)
+
+    def explain(self) -> Explanation:
+        """Why it is what it is: what targets and sensors contribute to its reward, and how near the next best came.
+
+        Worked out when it is first asked for. A plan that was not made on rewards has little to say, but says it.
+
+        Raises:
+            InputError: a plan that was kept or sent without its explanation, or made by a planner that gives none.
+        """
+        if self.questions is not None:
+            return self.questions.explanation
+        if self.explanation is not None:
+            return self.explanation
+        if self.tables:
+            raise InputError(
+                "plan: expected one as its planner returned it, or kept with its explanation; this one has left its "
+                "evidence behind"
+            )
+        chosen = tuple(own.text(index) for own, index in zip(self.actions, self.chosen, strict=True))
+        return Explanation.nothing(self.planner, chosen, f"{self.planner} does not choose by rewards")
+
+    def settled(self, *, explained: bool) -> Plan:
+        """The plan to be kept: without its evidence, which takes memory; with its explanation where that is wanted."""
+        kept = self.explanation
+        if explained and self.questions is not None:
+            kept = self.questions.explanation.without_evidence()
+        return replace(self, explanation=kept, questions=None)
 
     @property
     def num_sensors(self) -> int:

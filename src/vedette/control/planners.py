@@ -11,6 +11,7 @@ from vedette.control.allowed import mask_of_decision, single_mask
 from vedette.control.bounds import bound_of
 from vedette.control.constraints import Constraint, repaired
 from vedette.control.evidence import Evidence
+from vedette.control.explaining import Part, Questions
 from vedette.control.inputs import check_choice, check_poses, options_of
 from vedette.control.plan import Plan, RewardTable
 from vedette.control.preparation import AnyReward, prepare
@@ -93,7 +94,8 @@ class JointPlanner:
         actions = tuple(own.actions for own in evaluator.options)
         tables, (counts, found), bound = evidence.tables(best), evaluator.account(), bound_of(evidence, best)
         notes = (*self.notes, *(mask.notes if mask is not None else ()), *found)
-        return Plan(self.name, actions, chosen, tables, counts, notes, evidence.curve(), bound)
+        questions = Questions(self.name, (Part.together(evidence, best),), bound)
+        return Plan(self.name, actions, chosen, tables, counts, notes, evidence.curve(), bound, questions=questions)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -128,16 +130,18 @@ class IndependentPlanner:
         )
         chosen: list[int] = []
         tables: list[RewardTable] = []
+        parts: list[Part] = []
         for s, own in enumerate(evaluator.options):
             evidence = Evidence(evaluator, (s,), evaluator.alone(s))
             allowed = all_joint_actions((len(own.courses),))[single_mask(mask, s, len(own.courses))]
             best = int(allowed[first_best(evidence.evaluate(allowed)), 0])
             chosen.append(own.first_action(best))
             tables.extend(evidence.tables((best,)))
-        actions = tuple(own.actions for own in evaluator.options)
+            parts.append(Part.alone(evidence, best))
+        actions, questions = tuple(own.actions for own in evaluator.options), Questions(self.name, tuple(parts))
         counts, found = evaluator.account()
         notes = (*(mask.notes if mask is not None else ()), *found)
-        return Plan(self.name, actions, tuple(chosen), tuple(tables), counts, notes)
+        return Plan(self.name, actions, tuple(chosen), tuple(tables), counts, notes, questions=questions)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -17,6 +17,7 @@ from vedette.evaluation.comparison import Choice
 from vedette.evaluation.figures.rewards import best_over_others, best_over_pair
 from vedette.kernels.base.types import Floats
 from vedette.reports.groups import Strategy
+from vedette.reports.why import why_data
 from vedette.scenarios import Scenario
 from vedette.scenarios.build import build_scan_times, build_true_sensors
 from vedette.scenarios.names import sensor_names
@@ -214,6 +215,7 @@ def _decision(decision: Decision, choice: Choice) -> dict[str, Any]:
         "notes": plan.notes,
         "curves": _curves(plan),
         "map": _map(plan),
+        "why": why_data(plan),
     }
 
 

@@ -51,6 +51,7 @@ def build_experiment(scenario: Scenario) -> Experiment:
         ),
         estimate=model.estimator.build(scenario.folder),
         decision_steps=model.decision_steps,
+        explain=model.control.explain,
         # Where they are what the tracker takes them for, a tracker of other sensors may stand in for this one.
         true_sensors=build_true_sensors(scenario, known) if any(sensor.truth for sensor in model.sensors) else (),
         scans_at=None if times.all() else times,

@@ -34,6 +34,7 @@ class Experiment:
         decision_steps: scans (counted from 1) after which the planner is asked.
         true_sensors: the ones that scan; (): they are what the tracker takes them for.
         scans_at: (num_sensors, num_scans or more) whether each scans then; None: at every step.
+        explain: whether decisions are kept with their explanations, see `vedette.control.Plan.explain`.
 
     Raises:
         InputError: parts that do not fit together.
@@ -50,6 +51,7 @@ class Experiment:
     decision_steps: tuple[int, ...]
     true_sensors: tuple[TrueSensor, ...] = ()
     scans_at: Bools | None = None
+    explain: bool = True
 
     def __post_init__(self) -> None:
         if not isinstance(self.tracker, Tracker):

@@ -64,7 +64,8 @@ class Journal:
 
     def decide(self, plan: Plan) -> None:
         """Write down the decision after the scan at hand."""
-        self._decisions.append(Decision(self.step, self.time, self._poses[-1], plan))
+        kept = plan.settled(explained=self.experiment.explain)
+        self._decisions.append(Decision(self.step, self.time, self._poses[-1], kept))
 
     def stage(self, error: BaseException) -> str:
         """What was under way, in words."""

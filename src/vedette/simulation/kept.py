@@ -10,10 +10,22 @@ from vedette.kernels.base.types import Floats
 from vedette.reading import said
 from vedette.simulation.arrow import read_table, write_table
 from vedette.simulation.records import RunRecord
-from vedette.simulation.tables import LAYOUTS, TIMINGS, check_record, record_of, tables_of, timing_table, timings_of
+from vedette.simulation.tables import (
+    LAYOUTS,
+    OPTIONAL,
+    TIMINGS,
+    check_record,
+    optional_tables_of,
+    record_of,
+    tables_of,
+    timing_table,
+    timings_of,
+)
 from vedette.text import shown
 
-FORMAT_VERSION = 5  # of saved runs and of campaigns; another wherever a table gains, loses or renames a column
+# Of saved runs and of campaigns; another wherever a table gains, loses or renames a column. A table that may be missing
+# needs none: programs of before it was there pass it over, and what they wrote reads as it did.
+FORMAT_VERSION = 5
 _ENDING = ".arrow"
 
 
@@ -23,7 +35,9 @@ def encode_run(record: RunRecord) -> dict[str, bytes]:
     Raises `InputError` for a record that contradicts itself or holds an invalid plan.
     """
     check_record(record)
-    return {f"{name}{_ENDING}": write_table(table, LAYOUTS[name]) for name, table in tables_of(record).items()}
+    files = {f"{name}{_ENDING}": write_table(table, LAYOUTS[name]) for name, table in tables_of(record).items()}
+    optional = optional_tables_of(record)
+    return files | {f"{name}{_ENDING}": write_table(table, OPTIONAL[name]) for name, table in optional.items()}
 
 
 def decode_run(
@@ -39,6 +53,9 @@ def decode_run(
         if file not in files:
             raise InputError(f"{place}: expected a file {file}; got {shown(', '.join(files)) if files else 'none'}")
         tables[name] = read_table(files[file], layout, f"{place}/{file}")
+    for name, layout in OPTIONAL.items():
+        if (file := f"{name}{_ENDING}") in files:
+            tables[name] = read_table(files[file], layout, f"{place}/{file}")
     spent = {} if timings is None else decode_timings(timings, f"{place}/timings{_ENDING}")
     try:
         record = record_of(facts, tables, spent)

@@ -2,7 +2,7 @@
 
 `step` counts scans from 1 in every table; a row of `tracks` is one estimate at one scan, a row of `actions` one action
 that a sensor could choose at a decision, and a row of `rewards` one that was evaluated, `action_0` that of the first
-sensor. Decisions stand in `planned`.
+sensor. Decisions stand in `planned`, and why they were taken in `explained`.
 """
 
 from __future__ import annotations
@@ -17,9 +17,10 @@ from vedette.densities.estimates import Estimate
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats, Ints
 from vedette.simulation.arrow import Columns, Kind, Layout
+from vedette.simulation.explained import EXPLAINED, explained_tables, with_explanations
 from vedette.simulation.health import FUSION_COLUMNS, SENSOR_COLUMNS, Health
 from vedette.simulation.planned import PLANNED, decisions_of, planned_tables
-from vedette.simulation.records import RunRecord
+from vedette.simulation.records import Decision, RunRecord
 from vedette.simulation.truth import Truth
 
 Tables: TypeAlias = dict[str, Columns]
@@ -42,6 +43,8 @@ LAYOUTS: dict[str, Layout] = {
     ),
     **PLANNED,
 }
+# What a run may have beside those, all of them or none.
+OPTIONAL: dict[str, Layout] = EXPLAINED
 TIMINGS = Layout({"step": Kind.INTEGER}, {"": Kind.NUMBER})
 
 
@@ -74,6 +77,13 @@ def tables_of(record: RunRecord) -> Tables:
         "sensors": _sensors(record),
     }
     return {**of_scans, **planned_tables(record.decisions, record.num_sensors)}
+
+
+def optional_tables_of(record: RunRecord) -> Tables:
+    """The tables of `OPTIONAL` that the run has."""
+    if not any(decision.plan.explanation is not None for decision in record.decisions):
+        return {}
+    return explained_tables(record.decisions, record.num_sensors)
 
 
 def timing_table(record: RunRecord) -> Columns:
@@ -119,7 +129,7 @@ def record_of(
         ),
         poses=poses,
         estimates=_estimates_of(tables["tracks"], len(times)),
-        decisions=decisions_of(tables, poses),
+        decisions=_decisions_of(tables, poses),
         ospa=np.stack([scans[name] for name in OSPA_COLUMNS], axis=1),
         health=Health(
             **{name: sensors[name].reshape(len(times), -1) for name in SENSOR_COLUMNS},
@@ -128,6 +138,13 @@ def record_of(
         timings=timings,
         stopped=None if facts["stopped"] is None else str(facts["stopped"]),
     )
+
+
+def _decisions_of(tables: Mapping[str, Mapping[str, Any]], poses: Floats) -> tuple[Decision, ...]:
+    decisions = decisions_of(tables, poses)
+    if not any(name in tables for name in OPTIONAL):
+        return decisions
+    return with_explanations(decisions, tables)
 
 
 def _scans(record: RunRecord) -> Columns:

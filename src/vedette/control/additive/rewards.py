@@ -71,7 +71,7 @@ class AdditiveRewards:
 
         run_chunks(work, len(actions), self.num_threads, first_piece=8)
         found = np.array([self._found(joint) for joint in actions]) if len(self.cells.worth) else 0.0
-        return np.asarray(self._combined(sums) + np.reshape(found, (-1, 1)))
+        return np.asarray(self.of_sums(sums) + np.reshape(found, (-1, 1)))
 
     def line(self, chosen: Ints, sensor: int) -> Floats:
         """(num_courses, num_samples) rewards of all courses of one sensor, the others as chosen."""
@@ -89,7 +89,7 @@ class AdditiveRewards:
 
         run_chunks(work, last - first, self.num_threads, first_piece=8)
         start, stop = self.table.first_courses[[first, last]].tolist()
-        rewards = self._combined(sums[start:stop])
+        rewards = self.of_sums(sums[start:stop])
         if len(self.cells.worth):
             for s in range(first, last):
                 begin, end = (self.table.first_courses[s : s + 2] - start).tolist()
@@ -109,7 +109,7 @@ class AdditiveRewards:
             alone_values(self.table, self.valuation, bases, which, first, last, sums)
 
         run_chunks(work, len(which), self.num_threads, first_piece=8)
-        rewards = self._combined(sums)
+        rewards = self.of_sums(sums)
         if len(self.cells.worth):
             rewards += self._found_alone()[:, np.newaxis]
         return rewards
@@ -120,7 +120,8 @@ class AdditiveRewards:
         assert coefficients is not None
         return ascend(self.table, self.valuation, coefficients, self.cells, allowed, start, _MOST_LINES)
 
-    def _combined(self, sums: Floats) -> Floats:
+    def of_sums(self, sums: Floats) -> Floats:
+        """(...) rewards of sums over labels (..., num), cells left out."""
         return sums[..., 0] if self.reward is None else combined(self.reward, sums)
 
     def _found_alone(self) -> Floats:

@@ -83,6 +83,11 @@ class Control(Section):
     constraints: Annotated[tuple[AnyConstraint, ...], Field(strict=False)] = Field(
         default=(), description="What the sensors must not do [-]."
     )
+    explain: bool = Field(
+        default=True,
+        description="Whether decisions are kept with why they were taken: what targets and sensors contribute to their "
+        "rewards, and how near the second best came [-].",
+    )
     limits: PlanningLimits = Field(default=PlanningLimits(), description="How much it works with [-].")
 
     @check

@@ -99,6 +99,7 @@ function drawCurves(context, width, height, curves) {
     context.stroke();
     context.fillStyle = shade;
     disc(context, x(places[curve.chosen]), y(curve.mean[curve.chosen]), 4.5);
+    if (curves.length > 3) return; // no room for their names; the pointer tells them
     context.textAlign = "left";
     context.textBaseline = "middle";
     const name = `sensor ${curve.sensor + 1}: ${minus((curve.numeric ? curve.labels : curve.ticks)[curve.chosen])}`;

@@ -22,6 +22,7 @@ function startReplay(root) {
     const counts = `${truth[state.step].length} targets, ${estimates[state.step].length} estimates`;
     part("summary").textContent = `t = ${time} s: ${counts}, ${errors}`;
     part("decision").textContent = decisionText();
+    tellWhy(part, run(), decisionAt(run(), state.step));
     part("scene").setAttribute("aria-label", `${run().strategy}, run ${run().run}, ${part("summary").textContent}`);
     part("scrubber").value = state.step;
     part("scrubber").setAttribute("aria-valuetext", `step ${state.step + 1} of ${last() + 1}, ${time} s`);

@@ -1,0 +1,225 @@
+"""What is asked of a decision after it was made, answered from its evidence."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from vedette.control.additive.evaluator import AdditiveEvaluator
+from vedette.control.additive.rewards import AdditiveRewards
+from vedette.control.evidence import Evidence
+from vedette.control.explanation import Explanation, Had, RunnerUp, TargetGains
+from vedette.control.plan import Bound
+from vedette.control.shares import Shares, shares_of
+from vedette.errors import InputError
+from vedette.kernels.base.types import Floats, Ints
+from vedette.models.arguments import reject
+from vedette.platforms import Actions, Options
+
+_CASE_BY_CASE = "rewards were evaluated case by case, where every sensor scans and targets are not told apart"
+_NOT_LINEAR = "this reward is not a sum over targets"
+_NOT_FINITE = "a reward without some of the scans is no finite number"
+_ONLY_ONE = "no other joint action was evaluated"
+_SAME_NUMBER = 1e-6
+
+
+class Part(NamedTuple):
+    """A decision that is made by itself: that of all sensors together, or of one alone."""
+
+    evidence: Evidence
+    chosen: tuple[int, ...]  # courses of its sensors
+    additive: AdditiveRewards | None  # its rewards, where they are made of sums over labels
+
+    @classmethod
+    def together(cls, evidence: Evidence, chosen: Sequence[int]) -> Part:
+        """Of all sensors."""
+        evaluator = evidence.evaluator
+        return cls(evidence, tuple(chosen), evaluator.additive if isinstance(evaluator, AdditiveEvaluator) else None)
+
+    @classmethod
+    def alone(cls, evidence: Evidence, course: int) -> Part:
+        """Of the one sensor of the evidence."""
+        evaluator, (sensor,) = evidence.evaluator, evidence.which
+        additive = evaluator.additive.alone(sensor) if isinstance(evaluator, AdditiveEvaluator) else None
+        return cls(evidence, (course,), additive)
+
+
+@dataclass(frozen=True, eq=False)
+class Questions:
+    """A decision that can be questioned. Neither copied nor pickled: None is what arrives.
+
+    Attributes:
+        planner: name of the planner.
+        parts: what was decided together; the reward is the sum of theirs.
+        bound: of the plan.
+    """
+
+    planner: str
+    parts: tuple[Part, ...]
+    bound: Bound | None = field(default=None)
+
+    def __reduce__(self) -> Any:
+        return type(None), ()
+
+    @cached_property
+    def explanation(self) -> Explanation:
+        """The answer to `Plan.explain`."""
+        chosen = tuple(own.text(action) for own, action in zip(self._actions, self._chosen_actions, strict=True))
+        reward = sum(part.evidence.mean_of(part.chosen) for part in self.parts)
+        runner_up = self._runner_up()
+        missing = {} if runner_up is not None else {"runner_up": _ONLY_ONE}
+        return Explanation(
+            planner=self.planner,
+            chosen=chosen,
+            reward=float(reward),
+            standard_error=_error(np.sum(self._samples, axis=0)),
+            evaluations=sum(part.evidence.num_evaluated for part in self.parts),
+            **self._shares(missing),
+            runner_up=runner_up,
+            bound=self.bound,
+            missing=missing,
+            answer=self.had,
+        )
+
+    @property
+    def _options(self) -> tuple[Options, ...]:
+        return self.parts[0].evidence.evaluator.options
+
+    @property
+    def _actions(self) -> tuple[Actions, ...]:
+        return tuple(own.actions for own in self._options)
+
+    @property
+    def _chosen_actions(self) -> tuple[int, ...]:
+        courses = [course for part in self.parts for course in part.chosen]
+        return tuple(own.first_action(course) for own, course in zip(self._options, courses, strict=True))
+
+    @cached_property
+    def _contributions(self) -> tuple[Shares | None, ...]:
+        """Of each part; None where its rewards are evaluated case by case."""
+        return tuple(
+            None if part.additive is None else shares_of(part.additive, np.array(part.chosen)) for part in self.parts
+        )
+
+    @cached_property
+    def _samples(self) -> tuple[Floats, ...]:
+        """For each part (num_samples,) rewards of its choice."""
+        return tuple(
+            part.evidence.rewards(np.array([part.chosen]))[0] if shares is None else shares.samples
+            for part, shares in zip(self.parts, self._contributions, strict=True)
+        )
+
+    def _shares(self, missing: dict[str, str]) -> dict[str, Any]:
+        """The fields of an `Explanation` that tell who contributes; why they are None is put in `missing`."""
+        names = ("baseline", "of_targets", "of_undetected", "of_sensors", "without")
+        found: dict[str, Any] = dict.fromkeys(names)
+        each = [shares for shares in self._contributions if shares is not None]
+        if len(each) < len(self.parts):
+            missing.update(dict.fromkeys(names, _CASE_BY_CASE))
+            return found
+        if not all(_is_finite(shares) for shares in each):
+            missing.update(dict.fromkeys(names, _NOT_FINITE))
+            return found
+        last = np.concatenate([shares.last for shares in each])
+        reward = sum(part.evidence.mean_of(part.chosen) for part in self.parts)
+        found["baseline"] = sum(shares.baseline for shares in each)
+        found["of_undetected"] = sum(shares.found for shares in each)
+        found["of_sensors"] = np.concatenate([shares.sensors for shares in each])
+        found["without"] = reward - last
+        found["of_targets"] = self._targets(each)
+        if found["of_targets"] is None:
+            missing["of_targets"] = _NOT_LINEAR
+        return found
+
+    def _targets(self, each: Sequence[Shares]) -> TargetGains | None:
+        existence = [shares.existence for shares in each if shares.existence is not None]
+        localisation = [shares.localisation for shares in each if shares.localisation is not None]
+        if not existence:
+            return None
+        prediction: Any = self.parts[0].evidence.evaluator.prediction
+        return TargetGains(prediction.tracks.labels.copy(), np.sum(existence, axis=0), np.sum(localisation, axis=0))
+
+    def _runner_up(self) -> RunnerUp | None:
+        """The best other joint action: of an independent decision, one sensor's own second best."""
+        found = [
+            (part.evidence.mean_of(part.chosen) - best[1], place, best[0])
+            for place, part in enumerate(self.parts)
+            if (best := part.evidence.best_other(part.chosen)) is not None
+        ]
+        if not found:
+            return None
+        margin, place, other = min(found)
+        part = self.parts[place]
+        actions = list(self._chosen_actions)
+        words = []
+        for s, course, chosen in zip(part.evidence.which, other, part.chosen, strict=True):
+            if course != chosen:
+                actions[s] = self._options[s].first_action(course)
+                words.append(f"sensor {s + 1} with {self._actions[s].text(actions[s])}")
+        rewards = part.evidence.rewards(np.array([other]))[0]
+        return RunnerUp(tuple(actions), ", ".join(words), margin, _error(self._samples[place] - rewards))
+
+    def had(self, sensor: int, action: int | None, columns: dict[str, float]) -> Had:
+        """The answer to `Explanation.had`."""
+        num = len(self._options)
+        if isinstance(sensor, bool) or not isinstance(sensor, int | np.integer) or not 0 <= sensor < num:
+            raise reject("sensor", f"the number of one of {num} sensors, from 0", sensor)
+        index = self._index(int(sensor), action, columns)
+        place = next(place for place, part in enumerate(self.parts) if sensor in part.evidence.which)
+        part = self.parts[place]
+        other = list(part.chosen)
+        other[part.evidence.which.index(int(sensor))] = int(self._options[sensor].which[index])
+        difference = part.evidence.rewards(np.array([other]))[0] - self._samples[place]
+        off = float(difference.mean())
+        assert self.explanation.reward is not None
+        return Had(
+            int(sensor), self._actions[sensor].text(index), self.explanation.reward + off, off, _error(difference)
+        )
+
+    def _index(self, sensor: int, action: int | None, columns: dict[str, float]) -> int:
+        own, chosen = self._actions[sensor], self._chosen_actions[sensor]
+        if (action is None) == (not columns):
+            raise InputError("had: expected either the number of an action or the numbers of its columns")
+        if action is not None:
+            if isinstance(action, bool) or not isinstance(action, int | np.integer) or not 0 <= action < len(own):
+                raise reject("action", f"the number of one of {len(own)} actions, from 0", action)
+            return int(action)
+        unknown = [name for name in columns if name not in own.columns]
+        if unknown:
+            raise InputError(f"had: expected columns {', '.join(own.columns) or '(none)'}; got {unknown[0]}")
+        wanted = [columns.get(name, value) for name, value in zip(own.columns, own.values[chosen], strict=True)]
+        fits = np.flatnonzero(_same(own, np.array(wanted, np.float64)))
+        if len(fits) == 0:
+            asked = ", ".join(f"{name} {value:g}" for name, value in columns.items())
+            raise InputError(f"had: expected something that sensor {sensor + 1} could do ({_few(own)}); got {asked}")
+        return int(fits[0])
+
+
+def _same(own: Actions, wanted: Floats) -> np.ndarray[Any, np.dtype[np.bool_]]:
+    """(num_actions,) which actions have these numbers, degrees up to whole turns."""
+    off = np.abs(own.values - wanted)
+    turns = np.array([name.endswith("_deg") for name in own.columns], np.bool_)
+    off = np.where(turns, np.abs(np.remainder(off + 180.0, 360.0) - 180.0), off)
+    return np.asarray((off <= _SAME_NUMBER * np.maximum(1.0, np.abs(wanted))).all(axis=1))
+
+
+def _few(own: Actions) -> str:
+    """Some of the actions in words."""
+    words = [own.text(i) for i in range(min(len(own), 5))]
+    return "; ".join(words) + ("; ..." if len(own) > len(words) else "")
+
+
+def _error(samples: Floats) -> float | None:
+    """Standard error of a mean over samples; None with a single one."""
+    num = len(samples)
+    return float(samples.std(ddof=1) / math.sqrt(num)) if num > 1 else None
+
+
+def _is_finite(shares: Shares) -> bool:
+    values: list[Floats | Ints | float] = [shares.baseline, shares.found, shares.sensors, shares.last]
+    return all(bool(np.isfinite(value).all()) for value in values)

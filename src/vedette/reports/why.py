@@ -1,0 +1,103 @@
+"""Why a decision was taken, as the plain data that the page shows."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from vedette.control.explanation import Explanation, RunnerUp, TargetGains
+from vedette.control.plan import Plan
+from vedette.evaluation.actions import rounded, row_words
+from vedette.text import counted
+
+_MOST_TARGETS = 10
+_SAME = 1e-9
+_WORDS = {"of_targets": "gain by target", "of_sensors": "shares of the sensors", "runner_up": "second best"}
+
+
+def why_data(plan: Plan) -> dict[str, Any] | None:
+    """What is shown; None for a decision that was kept without explanation.
+
+    Facts as pairs of texts; of the ten targets that matter most label and gains, of the others their number and sums;
+    what is gained by targets not found before; of each sensor number, action, share and the reward without it.
+    """
+    why = plan.explanation
+    if why is None or why.reward is None:
+        return None
+    return {
+        "facts": _facts(plan, why, why.reward),
+        **({"targets": [], "more": None} if why.of_targets is None else _targets(why.of_targets)),
+        "undetected": _number(why.of_undetected or 0.0),
+        "sensors": _sensors(plan, why),
+    }
+
+
+def _facts(plan: Plan, why: Explanation, reward: float) -> list[tuple[str, str]]:
+    start = "" if why.baseline is None else f"; {_text(why.baseline, reward)} without any scan"
+    facts = [("Reward", f"{_with_error(reward, why.standard_error)}{start}")]
+    if why.runner_up is not None:
+        facts.append(("Second best", f"{_margin(why.runner_up, reward)}: {_others(plan, why.runner_up)}"))
+    facts.append(("Evaluated", counted(why.evaluations, "choice")))
+    if why.bound is not None:
+        facts.append(("Bound", str(why.bound)))
+    reasons: dict[str, list[str]] = {}
+    for name, reason in why.missing.items():
+        if name in _WORDS:
+            reasons.setdefault(reason, []).append(_WORDS[name])
+    return facts + [("Not known", f"{', '.join(names)}: {reason}") for reason, names in reasons.items()]
+
+
+def _margin(runner_up: RunnerUp, reward: float) -> str:
+    if abs(runner_up.margin) <= _SAME * max(1.0, abs(reward)):
+        return "as good"
+    ratio = runner_up.in_standard_errors
+    apart = "" if ratio is None or math.isinf(ratio) else f", {ratio:.2g} standard errors"
+    return f"less by {_with_error(runner_up.margin, runner_up.standard_error)}{apart}"
+
+
+def _others(plan: Plan, runner_up: RunnerUp) -> str:
+    words = (
+        f"sensor {s + 1} to {row_words(rounded(own.columns, own.values[other]))}"
+        for s, (own, chosen, other) in enumerate(zip(plan.actions, plan.chosen, runner_up.actions, strict=True))
+        if other != chosen
+    )
+    return ", ".join(words)
+
+
+def _targets(gains: TargetGains) -> dict[str, Any]:
+    order = np.argsort(-np.abs(gains.total), kind="stable")
+    most, rest = order[:_MOST_TARGETS].tolist(), order[_MOST_TARGETS:].tolist()
+    least = _SAME * float(np.abs(gains.total).max(initial=0.0))  # below, it is rounding
+
+    def gained(which: list[int]) -> tuple[float, float]:
+        existence, localisation = float(gains.existence[which].sum()), float(gains.localisation[which].sum())
+        return _number(existence, least), _number(localisation, least)
+
+    shown = [(".".join(map(str, gains.labels[i].tolist())), *gained([i])) for i in most]
+    return {"targets": shown, "more": (len(rest), *gained(rest)) if rest else None}
+
+
+def _sensors(plan: Plan, why: Explanation) -> list[tuple[int, str, float, float]]:
+    if why.of_sensors is None or why.without is None:
+        return []
+    return [
+        (s, row_words(rounded(own.columns, own.values[chosen])), _number(share), _number(without))
+        for s, (own, chosen, share, without) in enumerate(
+            zip(plan.actions, plan.chosen, why.of_sensors.tolist(), why.without.tolist(), strict=True)
+        )
+    ]
+
+
+def _with_error(value: float, error: float | None) -> str:
+    return f"{value:.4g}" + ("" if error is None else f" ± {error:.2g}")
+
+
+def _text(value: float, scale: float) -> str:
+    return "0" if abs(value) <= _SAME * abs(scale) else f"{value:.4g}"
+
+
+def _number(value: float, least: float = 0.0) -> float:
+    """Four digits of what is finite and not below the least that counts, else 0."""
+    return float(f"{value:.4g}") if math.isfinite(value) and abs(value) >= least else 0.0
