@@ -141,6 +141,24 @@ CASES = [
     ),
     (
         "decision_steps: [4, 8]",
+        "confidence: 1.0, indifference: 1, max_samples: 8, max_seconds: 0",
+        [
+            "f.yaml:22:23: control.confidence: expected a number below 1, got 1.0",
+            "f.yaml:22:42: control.indifference: expected a number below 1, got 1",
+            "f.yaml:22:58: control.max_samples: expected a number of at least 16, got 8",
+            "f.yaml:22:74: control.max_seconds: expected a number above 0, got 0",
+        ],
+    ),
+    (
+        "decision_steps: [4, 8]",
+        "indifference: 0.01, max_samples: 100",
+        [
+            "f.yaml:22:25: control.indifference: expected confidence beside it, such as 0.95, got 0.01",
+            "f.yaml:22:44: control.max_samples: expected confidence beside it, such as 0.95, got 100",
+        ],
+    ),
+    (
+        "decision_steps: [4, 8]",
         "decision_times: [3.0, 3.2, 100]",
         [
             "f.yaml:22:33: control.decision_times[1]: expected the time of a scan: 2 s and every 0.5 s after it, got 3.2",

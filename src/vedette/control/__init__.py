@@ -2,7 +2,7 @@
 
 from vedette.control.additive.evaluator import AdditiveEvaluator
 from vedette.control.evaluator import Evaluator
-from vedette.control.plan import Bound, Plan, RewardTable, SearchCurve
+from vedette.control.plan import Bound, Certainty, Plan, RewardTable, SearchCurve
 from vedette.control.planners import FixedPlanner, IndependentPlanner, JointPlanner, Planner, RandomPlanner
 from vedette.control.rewards import (
     CardinalityVarianceReward,
@@ -24,6 +24,7 @@ __all__ = [
     "Bound",
     "CardinalityVarianceReward",
     "CauchySchwarzReward",
+    "Certainty",
     "CoordinateAscent",
     "Evaluator",
     "ExhaustiveSearch",

@@ -11,9 +11,10 @@ from vedette.control.bounds import bound_of
 from vedette.control.evidence import Evidence
 from vedette.control.inputs import check_choice, check_poses, options_of
 from vedette.control.plan import Plan, RewardTable
-from vedette.control.preparation import AnyReward, prepare
+from vedette.control.preparation import AnyReward, Preparation
 from vedette.control.problem import joint_problem, note_lines
 from vedette.control.rewards import CauchySchwarzReward
+from vedette.control.rounds import Decided, decide_alone, decide_jointly
 from vedette.control.search import ExhaustiveSearch, JointSearch, all_joint_actions, first_best
 from vedette.control.settings import MobileSensor, PlanningSettings
 from vedette.fusion import Fusion
@@ -77,7 +78,10 @@ class JointPlanner:
             ModelError, NumericalError: as the filters; a reward that is not finite.
         """
         generator(rng)
-        evaluator = prepare(self.sensors, self.fusion, self.settings, self.reward, state, poses, rng=rng)
+        prepared = Preparation.of(self.sensors, self.fusion, self.settings, self.reward, state, poses)
+        if prepared.races:
+            return _plan_of(self.name, prepared, decide_jointly(prepared, self.search, rng=rng), self.notes)
+        evaluator = prepared.evaluator(self.settings.num_samples, rng=rng)
         evidence = Evidence(evaluator, tuple(range(len(self.sensors))), evaluator.joint())
         problem = joint_problem(evidence)
         best = check_choice("search", self.search.search(problem, rng=rng), evidence.shape)
@@ -86,7 +90,8 @@ class JointPlanner:
         chosen = tuple(own.first_action(course) for own, course in zip(evaluator.options, best, strict=True))
         actions = tuple(own.actions for own in evaluator.options)
         tables, (counts, found), bound = evidence.tables(best), evaluator.account(), bound_of(evidence, best)
-        return Plan(self.name, actions, chosen, tables, counts, (*self.notes, *found), evidence.curve(), bound)
+        notes, certainty = (*self.notes, *found), prepared.certainty
+        return Plan(self.name, actions, chosen, tables, counts, notes, evidence.curve(), bound, certainty)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -113,7 +118,10 @@ class IndependentPlanner:
     def plan(self, state: State, poses: Floats, *, rng: np.random.Generator) -> Plan:
         """Each sensor's action of largest mean reward; arguments, ties and errors as `JointPlanner.plan`."""
         generator(rng)
-        evaluator = prepare(self.sensors, self.fusion, self.settings, self.reward, state, poses, rng=rng)
+        prepared = Preparation.of(self.sensors, self.fusion, self.settings, self.reward, state, poses)
+        if prepared.races:
+            return _plan_of(self.name, prepared, decide_alone(prepared, rng=rng))
+        evaluator = prepared.evaluator(self.settings.num_samples, rng=rng)
         chosen: list[int] = []
         tables: list[RewardTable] = []
         for s, own in enumerate(evaluator.options):
@@ -122,7 +130,16 @@ class IndependentPlanner:
             chosen.append(own.first_action(best))
             tables.extend(evidence.tables((best,)))
         actions = tuple(own.actions for own in evaluator.options)
-        return Plan(self.name, actions, tuple(chosen), tuple(tables), *evaluator.account())
+        counts, notes = evaluator.account()
+        return Plan(self.name, actions, tuple(chosen), tuple(tables), counts, notes, certainty=prepared.certainty)
+
+
+def _plan_of(name: str, prepared: Preparation, decided: Decided, notes: tuple[str, ...] = ()) -> Plan:
+    """The plan of a decision that took as many samples as it needed, and says so."""
+    chosen = tuple(own.first_action(course) for own, course in zip(prepared.options, decided.best, strict=True))
+    actions = tuple(own.actions for own in prepared.options)
+    told, certainty = (*notes, *decided.notes, str(decided.certainty)), decided.certainty
+    return Plan(name, actions, chosen, decided.tables, decided.counts, told, decided.curve, decided.bound, certainty)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
