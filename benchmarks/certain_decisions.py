@@ -1,6 +1,7 @@
 """Decisions that take as many samples as they need, against those of 10,000 samples and of a fixed 40.
 
     python benchmarks/certain_decisions.py [--decisions 1000] [--scenes paper-a-lmb eight-mobile] [--indifference 0.01]
+                                          [--samples 10000]
 
 Beliefs and poses are recorded when decisions are due in runs under joint control. Each is decided again with
 `PlanningSettings(confidence=0.95, indifference=...)` and with the fixed number of samples of the scenario, and both
@@ -166,7 +167,7 @@ def main() -> None:
                 if plan.certainty is not None:
                     row["confidence samples"], row["certain"] = plan.certainty.samples, plan.certainty.certain
             rows.append(row)
-            if len(rows) % 25 == 0 or len(rows) == asked.decisions:
+            if len(rows) % 10 == 0 or len(rows) == asked.decisions:
                 report(rows, asked.indifference)
 
 

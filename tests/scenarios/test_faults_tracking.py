@@ -145,7 +145,7 @@ CASES = [
         [
             "f.yaml:22:23: control.confidence: expected a number below 1, got 1.0",
             "f.yaml:22:42: control.indifference: expected a number below 1, got 1",
-            "f.yaml:22:58: control.max_samples: expected a number of at least 16, got 8",
+            "f.yaml:22:58: control.max_samples: expected a number of at least 24, got 8",
             "f.yaml:22:74: control.max_seconds: expected a number above 0, got 0",
         ],
     ),

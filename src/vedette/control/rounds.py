@@ -24,7 +24,11 @@ from vedette.platforms import Actions, Options
 
 # Joint actions that race against each other where a search evaluates all there are; with more, its best ones do.
 _MOST_OF_ALL = 4096
-_MOST_OF_SEARCH = 256
+_MOST_OF_SEARCH = 64
+
+# Samples of a search that leaves joint actions out. In nine decisions of eight sensors 8 lost 0.3 % of the reward, 16
+# and 40 lost 0.1 %, and of 256 candidates no better one came than of 64.
+_SEARCHED = 2 * FIRST_ROUND
 
 # Samples are drawn at most so many at a time, to bound the memory of their pseudo-updates.
 _BLOCK = 250
@@ -133,7 +137,7 @@ def decide_jointly(preparation: Preparation, search: JointSearch, *, rng: np.ran
     """
     settings, shape = preparation.settings, tuple(len(own.courses) for own in preparation.options)
     all_at_once = math.prod(shape) <= _MOST_OF_ALL
-    size = FIRST_ROUND if all_at_once else min(settings.num_samples, settings.max_samples - FIRST_ROUND)
+    size = FIRST_ROUND if all_at_once else _SEARCHED
     rounds = Rounds.begin(preparation, size, rng=rng)
     heard = _Heard(rounds.evaluator.joint())
     evidence = Evidence(rounds.evaluator, tuple(range(len(shape))), heard)

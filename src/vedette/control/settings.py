@@ -16,8 +16,8 @@ from vedette.models.arguments import dimension, non_negative, positive, probabil
 from vedette.platforms import Platform
 from vedette.platforms.base import check_platform
 
-# Two rounds of a decision that takes as many samples as it needs (`vedette.control.racing.FIRST_ROUND`).
-_LEAST_SAMPLES = 16
+# Of a search and the first round of a race (`vedette.control.rounds`).
+_LEAST_SAMPLES = 24
 
 IDEAL_MODES = {"ideal": IDEAL, "expected": EXPECTED, "sampled": SAMPLED}
 
@@ -36,7 +36,7 @@ class PlanningSettings:
     Attributes:
         horizon_steps, horizon_period: H pseudo-updates, T seconds apart (paper: 5 and 2 s).
         num_samples: M multi-target samples, the same ones for every action and sensor (paper: 40). With `confidence`,
-            those on which a search that does not evaluate every joint action looks for candidates.
+            as many as it takes, instead.
         ideal_measurements: "ideal": noise-free, of the sampled targets whose detection probability is at least
             `detection_threshold`; "expected": noise-free, each target seen with its detection probability, so that the
             mean over samples is the expectation over detections; "sampled": seen likewise, with measurement noise.

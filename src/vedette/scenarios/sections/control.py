@@ -113,13 +113,13 @@ class Control(Section):
     num_samples: Count = Field(default=40, description="Multi-target samples of the expected reward, M [-].")
     confidence: Chance | None = Field(
         default=None,
-        description="With it, samples are added until the choice is so surely the best of its candidates, instead of "
-        "num_samples; those are then what a search that leaves joint actions out looks for candidates by [-].",
+        description="With it, samples are added until the choice is so surely the best of its candidates, whatever "
+        "num_samples says [-].",
     )
     indifference: Share = Field(
         default=0.0, description="With confidence: a reward short of the best by this share of it is good enough [-]."
     )
-    max_samples: Annotated[Count, Field(ge=16)] = Field(
+    max_samples: Annotated[Count, Field(ge=24)] = Field(
         default=2000, description="With confidence: samples after which the decision is taken as it stands [-]."
     )
     max_seconds: Positive | None = Field(
