@@ -146,14 +146,15 @@ def test_an_action_without_a_reward_is_left_out_and_told() -> None:
         def combine(self, sums: Any) -> Any:
             return sums[..., 0]
 
-    example = crowd(2)
-    free = planner_of(example, Picky(np.inf)).plan(*example.arguments, rng=np.random.default_rng(1))
+    belief, settings = lmb((A,), np.random.default_rng(2)), replace(KNOWN, num_samples=1)
+    example = replace(crowd(2), beliefs=(belief,) * 2, fused=belief)
+    free = planner_of(example, Picky(np.inf), settings).plan(*example.arguments, rng=np.random.default_rng(1))
     assert free.notes == ()
-    gains = np.sort(free.tables[0].mean, axis=None)
-    plan = planner_of(example, Picky(float(gains[-1]))).plan(*example.arguments, rng=np.random.default_rng(1))
+    most = float(free.tables[0].mean.max())
+    plan = planner_of(example, Picky(most), settings).plan(*example.arguments, rng=np.random.default_rng(1))
     assert any(note.startswith("joint actions without a finite reward were left out") for note in plan.notes)
-    assert np.isnan(plan.tables[0].mean).any()
-    assert np.isfinite(plan.expected_rewards[0][0])
+    np.testing.assert_array_equal(np.isnan(plan.tables[0].mean), free.tables[0].mean == most)
+    assert plan.expected_rewards[0][0] < most
 
 
 def test_sensors_keep_apart_and_inside() -> None:

@@ -245,8 +245,8 @@ def of_decisions(loaded: Scenario) -> Any:
 @pytest.mark.parametrize(
     ("kind", "filters", "rule", "of_decision"),
     [
-        ("clmb, by_views: true", "lmb", Clmb((0.5, 0.5), by_views=True), Clmb((0.5, 0.5))),
-        ("arithmetic_average, by_views: true", "lmb", ArithmeticAverage((0.5, 0.5), True), Clmb((0.5, 0.5))),
+        ("clmb, by_views: true", "lmb", Clmb((0.5, 0.5), by_views=True), ParallelUpdate()),
+        ("arithmetic_average, by_views: true", "lmb", ArithmeticAverage((0.5, 0.5), True), ParallelUpdate()),
         ("arithmetic_average", "m_delta_glmb", ArithmeticAverage((0.5, 0.5)), Clmb((0.5, 0.5))),
         ("clmb, matching: assignment", "lmb", Matched(Clmb((0.5, 0.5))), Clmb((0.5, 0.5))),
         (
@@ -255,10 +255,12 @@ def of_decisions(loaded: Scenario) -> Any:
             Matched(CmDeltaGlmb((0.5, 0.5))),
             CmDeltaGlmb((0.5, 0.5)),
         ),
-        ("parallel", "lmb", ParallelUpdate(), Clmb((0.5, 0.5))),
+        ("parallel", "lmb", ParallelUpdate(), ParallelUpdate()),
     ],
 )
-def test_decisions_go_by_plain_covariance_intersection(kind: str, filters: str, rule: Any, of_decision: Any) -> None:
+def test_decisions_take_scans_in_full_or_go_by_plain_covariance_intersection(
+    kind: str, filters: str, rule: Any, of_decision: Any
+) -> None:
     loaded = scenario(
         ("kind: m_delta_glmb", f"kind: {filters}"),
         ("{kind: cm_delta_glmb, weights: [0.5, 0.5]}", f"{{kind: {kind}, limits: {{merge_distance: 1.0}}}}"),
@@ -281,7 +283,7 @@ def test_decisions_go_by_plain_covariance_intersection(kind: str, filters: str, 
 CENTRAL = [
     ("delta_glmb", MultiSensorGlmbFilter, CmDeltaGlmb),
     ("m_delta_glmb", MultiSensorGlmbFilter, CmDeltaGlmb),
-    ("lmb", MultiSensorLmbFilter, Clmb),
+    ("lmb", MultiSensorLmbFilter, ParallelUpdate),
 ]
 
 
@@ -298,7 +300,7 @@ def test_one_filter_may_take_the_scans_of_all_sensors(kind: str, container: type
     assert getattr(tracker.filter, "marginalised", False) == (kind == "m_delta_glmb")
     planner: Any = build.build_planner(loaded, "jdm")
     assert isinstance(planner.fusion, fusion)
-    assert planner.fusion.weights == (0.5, 0.5)  # type: ignore[attr-defined]
+    assert getattr(planner.fusion, "weights", None) == (None if kind == "lmb" else (0.5, 0.5))
     assert {type(sensor.filter.initial()) for sensor in planner.sensors} == {type(tracker.initial().fused)}
     assert f"2 sensors, central {kind} filter, " in one_line(loaded)
     assert ("fusion", "central: one filter takes the scans of all sensors") in facts(loaded.model)
@@ -345,7 +347,7 @@ def test_named_strategies_replace_their_own_parts_alone() -> None:
     ]
     assert all(planner.settings == settings for planner in inner.values())
     searches = [planner.search for planner in inner.values() if isinstance(planner, JointPlanner)]
-    assert searches == [CoordinateAscent(0), plain.search, plain.search]
+    assert searches == [CoordinateAscent(2), plain.search, plain.search]
     assert [planner.reward for planner in inner.values()] == [plain.reward, RenyiReward(), RenyiReward(), plain.reward]
 
 

@@ -141,6 +141,24 @@ CASES = [
     ),
     (
         "decision_steps: [4, 8]",
+        "confidence: 1.0, indifference: 1, max_samples: 8, max_seconds: 0",
+        [
+            "f.yaml:22:23: control.confidence: expected a number below 1, got 1.0",
+            "f.yaml:22:42: control.indifference: expected a number below 1, got 1",
+            "f.yaml:22:58: control.max_samples: expected a number of at least 24, got 8",
+            "f.yaml:22:74: control.max_seconds: expected a number above 0, got 0",
+        ],
+    ),
+    (
+        "decision_steps: [4, 8]",
+        "indifference: 0.01, max_samples: 100",
+        [
+            "f.yaml:22:25: control.indifference: expected confidence beside it, such as 0.95, got 0.01",
+            "f.yaml:22:44: control.max_samples: expected confidence beside it, such as 0.95, got 100",
+        ],
+    ),
+    (
+        "decision_steps: [4, 8]",
         "decision_times: [3.0, 3.2, 100]",
         [
             "f.yaml:22:33: control.decision_times[1]: expected the time of a scan: 2 s and every 0.5 s after it, got 3.2",
@@ -164,7 +182,7 @@ CASES = [
         "decision_steps: [4, 8]",
         "actions_deg: [0, 90]",
         [
-            "f.yaml:22:11: control.actions_deg: expected one of constraints, decision_steps, decision_times, detection_threshold, horizon_period, horizon_steps, ideal_measurements, limits, num_samples, reward, search, got an unknown key (the platform of a sensor has it: `platform: {kind: courses, speed: 50.0, headings_deg: [0, 90]}`)"
+            "f.yaml:22:11: control.actions_deg: expected one of association, confidence, constraints, decision_steps, decision_times, detection_threshold, explain, horizon_period, horizon_steps, ideal_measurements, indifference, limits, max_samples, max_seconds, num_samples, reward, search, undetected_worth, got an unknown key (the platform of a sensor has it: `platform: {kind: courses, speed: 50.0, headings_deg: [0, 90]}`)"
         ],
     ),
     (
@@ -180,7 +198,9 @@ CASES = [
     (
         "decision_steps: [4, 8]",
         "reward: {kind: entropy}",
-        ['f.yaml:22:26: control.reward.kind: expected one of cauchy_schwarz, renyi, custom, got "entropy"'],
+        [
+            'f.yaml:22:26: control.reward.kind: expected one of cauchy_schwarz, renyi, kullback_leibler, cardinality_variance, expected_gospa, peecs, expected_loss, custom, got "entropy"'
+        ],
     ),
     (
         "decision_steps: [4, 8]",

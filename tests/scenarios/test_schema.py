@@ -34,8 +34,8 @@ from vedette.scenarios.sections import search
 from vedette.scenarios.sections.base import Section
 from vedette.scenarios.sections.control import CauchySchwarzReward as CauchySchwarzSection
 from vedette.scenarios.sections.control import Control
-from vedette.scenarios.sections.rewards import RenyiReward as RenyiSection
 from vedette.scenarios.sections.fusion import Fusion, FusionLimits
+from vedette.scenarios.sections.rewards import RenyiReward as RenyiSection
 from vedette.scenarios.sections.scoring import MarginalEstimator
 from vedette.scenarios.sections.targets import RecordedTargets
 from vedette.scenarios.sections.tracking import FilterLimits, GibbsAssignment

@@ -14,7 +14,7 @@ from vedette.control.constraints import (
 )
 from vedette.control.evaluator import Evaluator
 from vedette.control.explanation import Explanation, Had, RunnerUp, TargetGains
-from vedette.control.plan import Bound, Plan, RewardTable, SearchCurve
+from vedette.control.plan import Bound, Certainty, Plan, RewardTable, SearchCurve
 from vedette.control.planners import FixedPlanner, IndependentPlanner, JointPlanner, Planner, RandomPlanner
 from vedette.control.rewards import (
     CardinalityVarianceReward,
@@ -45,6 +45,7 @@ __all__ = [
     "Bound",
     "CardinalityVarianceReward",
     "CauchySchwarzReward",
+    "Certainty",
     "Constraint",
     "CoordinateAscent",
     "CrossEntropy",

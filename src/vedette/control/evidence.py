@@ -128,6 +128,18 @@ class Evidence:
                 found = tuple(actions[at].tolist()), float(others[at])
         return found
 
+    def foremost(self, choice: Sequence[int], most: int) -> Ints:
+        """(num, num_sensors) up to `most` joint actions of the largest means found, the choice first among equals.
+
+        In printed order, those without a finite mean left out but for the choice.
+        """
+        actions, places = np.unique(np.concatenate(self._actions), axis=0, return_index=True)
+        means = np.concatenate(self._means)[places]
+        own = (actions == np.array(choice)).all(axis=1)
+        order = np.lexsort((~own, np.where(np.isnan(means), math.inf, -means)))
+        order = order[own[order] | np.isfinite(means[order])][:most]
+        return np.ascontiguousarray(actions[np.sort(order)])
+
     def curve(self) -> SearchCurve:
         """How the search went."""
         return SearchCurve(np.array(self._evaluations, np.int64), np.array(self._best))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
@@ -83,6 +83,37 @@ class Bound:
         return f"at most {self.gap:.4g} ({100.0 * self.relative:.2g} %) below the best"
 
 
+class Certainty(NamedTuple):
+    """How a decision that takes as many samples as it needs came to its end.
+
+    A decision of several parts, one a sensor, is as certain as the least certain part.
+    """
+
+    reason: Literal["one left", "indifferent", "no samples", "max_samples", "max_seconds"]
+    # one left: all others are worse; indifferent: none that is left can be better by more than the indifference;
+    # no samples: the reward needs none; the other two: samples or time ran out before
+    confidence: float  # with which the choice is within the indifference of the best candidate
+    samples: int  # of all rounds, those of a search included
+    candidates: tuple[int, ...]  # left at the end, of each table: joint decisions have one, independent one a sensor
+    started: tuple[int, ...]  # candidates at the beginning, likewise
+
+    @property
+    def certain(self) -> bool:
+        """Whether it ended because the choice was certain."""
+        return self.reason in ("one left", "indifferent", "no samples")
+
+    def __str__(self) -> str:
+        if self.reason == "no samples":
+            return "certain: the reward needs no samples"
+        level = f"{100.0 * self.confidence:.3g} %"
+        left = f"{' + '.join(map(str, self.candidates))} of {' + '.join(map(str, self.started))} candidates left"
+        spent = f"after {self.samples} samples, {left}"
+        if self.certain:
+            return f"certain at {level} {spent}"
+        ended = {"max_samples": "samples ran out", "max_seconds": "time ran out"}[self.reason]
+        return f"not certain, {ended}: {level} {spent}"
+
+
 class SearchCurve(NamedTuple):
     """How a search went, step by step."""
 
@@ -100,11 +131,14 @@ class Plan:
         chosen: for each sensor, the index of its chosen action in `actions`.
         tables: independent decisions: one 1-D table a sensor; joint decisions: one table with one axis a sensor (where
             that would be too large to hold, one 1-D table a sensor, the others at their chosen actions);
-            random and fixed control: none.
+            random and fixed control: none. Means are over the samples that an action got: with
+            `PlanningSettings.confidence` those that were excluded early got fewer than the choice, so that the largest
+            mean need not be the choice's.
         counts: how many of each thing was evaluated.
         notes: what a reader must know, such as that rewards were taken one by one.
         curve: of a joint decision, how the search went; else None.
         bound: of a joint decision, how far from the best it can be; None where nothing is known of that.
+        certainty: how the decision ended where it takes as many samples as it needs; else None.
         explanation: why it is what it is, where that has been worked out to be kept; see `explain`.
         questions: the evidence, which `explain` works on; None once it is left behind (`settled`, a pickle, a record).
     """
@@ -117,6 +151,7 @@ class Plan:
     notes: tuple[str, ...] = ()
     curve: SearchCurve | None = None
     bound: Bound | None = None
+    certainty: Certainty | None = None
     explanation: Explanation | None = None
     questions: Questions | None = field(default=None, repr=False, compare=False)
 
@@ -132,12 +167,14 @@ class Plan:
             return self.questions.explanation
         if self.explanation is not None:
             return self.explanation
+        chosen = tuple(own.text(index) for own, index in zip(self.actions, self.chosen, strict=True))
+        if self.certainty is not None:
+            return Explanation.nothing(self.planner, chosen, f"it was decided in rounds of samples: {self.certainty}")
         if self.tables:
             raise InputError(
                 "plan: expected one as its planner returned it, or kept with its explanation; this one has left its "
                 "evidence behind"
             )
-        chosen = tuple(own.text(index) for own, index in zip(self.actions, self.chosen, strict=True))
         return Explanation.nothing(self.planner, chosen, f"{self.planner} does not choose by rewards")
 
     def settled(self, *, explained: bool) -> Plan:

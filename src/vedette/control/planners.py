@@ -14,9 +14,10 @@ from vedette.control.evidence import Evidence
 from vedette.control.explaining import Part, Questions
 from vedette.control.inputs import check_choice, check_poses, options_of
 from vedette.control.plan import Plan, RewardTable
-from vedette.control.preparation import AnyReward, prepare
+from vedette.control.preparation import AnyReward, Preparation
 from vedette.control.problem import joint_problem, note_lines
 from vedette.control.rewards import CauchySchwarzReward
+from vedette.control.rounds import Decided, decide_alone, decide_jointly
 from vedette.control.search import AutomaticSearch, JointSearch, all_joint_actions, first_best
 from vedette.control.settings import MobileSensor, PlanningSettings
 from vedette.fusion import Fusion
@@ -82,11 +83,15 @@ class JointPlanner:
             ModelError, NumericalError: as the filters; a reward that is not finite.
         """
         generator(rng)
-        evaluator = prepare(self.sensors, self.fusion, self.settings, self.reward, state, poses, rng=rng)
-        evidence = Evidence(evaluator, tuple(range(len(self.sensors))), evaluator.joint())
+        prepared = Preparation.of(self.sensors, self.fusion, self.settings, self.reward, state, poses)
         mask = mask_of_decision(
-            self.constraints, self.sensors, evaluator.options, state.fused, np.asarray(poses), self.settings
+            self.constraints, self.sensors, prepared.options, state.fused, np.asarray(poses), self.settings
         )
+        if prepared.races:
+            notes = (*self.notes, *(mask.notes if mask is not None else ()))
+            return _plan_of(self.name, prepared, decide_jointly(prepared, self.search, mask, rng=rng), notes)
+        evaluator = prepared.evaluator(self.settings.num_samples, rng=rng)
+        evidence = Evidence(evaluator, tuple(range(len(self.sensors))), evaluator.joint())
         problem = joint_problem(evidence, mask)
         best = check_choice("search", self.search.search(problem, rng=rng), evidence.shape)
         note_lines(evidence, best, mask)
@@ -94,8 +99,18 @@ class JointPlanner:
         actions = tuple(own.actions for own in evaluator.options)
         tables, (counts, found), bound = evidence.tables(best), evaluator.account(), bound_of(evidence, best)
         notes = (*self.notes, *(mask.notes if mask is not None else ()), *found)
-        questions = Questions(self.name, (Part.together(evidence, best),), bound)
-        return Plan(self.name, actions, chosen, tables, counts, notes, evidence.curve(), bound, questions=questions)
+        return Plan(
+            self.name,
+            actions,
+            chosen,
+            tables,
+            counts,
+            notes,
+            evidence.curve(),
+            bound,
+            prepared.certainty,
+            questions=Questions(self.name, (Part.together(evidence, best),), bound),
+        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -124,10 +139,13 @@ class IndependentPlanner:
     def plan(self, state: State, poses: Floats, *, rng: np.random.Generator) -> Plan:
         """Each sensor's action of largest mean reward; arguments, ties and errors as `JointPlanner.plan`."""
         generator(rng)
-        evaluator = prepare(self.sensors, self.fusion, self.settings, self.reward, state, poses, rng=rng)
+        prepared = Preparation.of(self.sensors, self.fusion, self.settings, self.reward, state, poses)
         mask = mask_of_decision(
-            self.constraints, self.sensors, evaluator.options, state.fused, np.asarray(poses), self.settings
+            self.constraints, self.sensors, prepared.options, state.fused, np.asarray(poses), self.settings
         )
+        if prepared.races:
+            return _plan_of(self.name, prepared, decide_alone(prepared, mask, rng=rng))
+        evaluator = prepared.evaluator(self.settings.num_samples, rng=rng)
         chosen: list[int] = []
         tables: list[RewardTable] = []
         parts: list[Part] = []
@@ -141,7 +159,24 @@ class IndependentPlanner:
         actions, questions = tuple(own.actions for own in evaluator.options), Questions(self.name, tuple(parts))
         counts, found = evaluator.account()
         notes = (*(mask.notes if mask is not None else ()), *found)
-        return Plan(self.name, actions, tuple(chosen), tuple(tables), counts, notes, questions=questions)
+        return Plan(
+            self.name,
+            actions,
+            tuple(chosen),
+            tuple(tables),
+            counts,
+            notes,
+            certainty=prepared.certainty,
+            questions=questions,
+        )
+
+
+def _plan_of(name: str, prepared: Preparation, decided: Decided, notes: tuple[str, ...] = ()) -> Plan:
+    """The plan of a decision that took as many samples as it needed, and says so."""
+    chosen = tuple(own.first_action(course) for own, course in zip(prepared.options, decided.best, strict=True))
+    actions = tuple(own.actions for own in prepared.options)
+    told, certainty = (*notes, *decided.notes, str(decided.certainty)), decided.certainty
+    return Plan(name, actions, chosen, decided.tables, decided.counts, told, decided.curve, decided.bound, certainty)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -11,11 +11,13 @@ import numpy as np
 from vedette.control.additive.evaluator import AdditiveEvaluator
 from vedette.control.evaluator import Evaluator
 from vedette.control.inputs import Belief, check_state, options_of
+from vedette.control.plan import Certainty
 from vedette.control.rewards.base import LabelReward, PowerReward, Reward, speaks_for
 from vedette.control.rewards.loss import ExpectedLossReward
 from vedette.control.settings import MobileSensor, PlanningSettings
 from vedette.densities import GLMB, LMB, existence_probabilities, glmb_to_lmb
 from vedette.fusion import Clmb, CmDeltaGlmb, Fusion, Linear, LinearRule, ParallelUpdate
+from vedette.platforms import Options
 from vedette.tracking import State
 
 AnyEvaluator: TypeAlias = Evaluator | AdditiveEvaluator
@@ -30,41 +32,74 @@ class _Planned(NamedTuple):
     notes: tuple[str, ...]
 
 
-def prepare(
-    sensors: Sequence[MobileSensor],
-    fusion: Fusion,
-    settings: PlanningSettings,
-    reward: AnyReward,
-    state: State,
-    poses: Any,
-    *,
-    rng: np.random.Generator,
-) -> AnyEvaluator:
-    """The evaluator of one decision.
+@dataclass(frozen=True, slots=True, eq=False)
+class Preparation:
+    """What one decision is planned on, from which evaluators on fresh samples can be had.
 
-    Raises:
-        InputError: inputs that do not fit.
-        ModelError, NumericalError: as the filters.
+    Attributes:
+        sensors, settings, reward: as in the planners.
+        state, fusion: in the form in which they are planned on.
+        options: of each sensor.
+        rule: how densities are summed; None where the decision is no sum.
+        notes: what a reader must know of the form.
     """
-    options = options_of(sensors, poses, settings)
-    check_state(sensors, state)
-    planned = _planned(len(sensors), fusion, settings, reward, state)
-    rule = _rule(len(sensors), planned.fusion, settings, reward, planned.state)
-    if rule is None:
-        assert not isinstance(reward, ExpectedLossReward)
-        evaluator: AnyEvaluator = Evaluator.prepare(
-            sensors, options, planned.fusion, settings, reward, planned.state, rng=rng
-        )
-    else:
-        fused, local = planned.state.fused, planned.state.local
-        evaluator = AdditiveEvaluator.prepare(
-            sensors, options, rule, settings, reward, fused, local, state.undetected, rng=rng
-        )
-    if settings.undetected_worth > 0.0 and (rule is None or state.undetected is None):
-        why = "the state has no intensity of them" if state.undetected is None else "rewards are no sums over labels"
-        evaluator.notes[f"targets not found yet are not looked for: {why}"] = None
-    evaluator.notes.update(dict.fromkeys(planned.notes))
-    return evaluator
+
+    sensors: tuple[MobileSensor, ...]
+    settings: PlanningSettings
+    reward: AnyReward
+    state: State
+    fusion: Fusion
+    options: tuple[Options, ...]
+    rule: LinearRule | None
+    notes: tuple[str, ...]
+
+    @classmethod
+    def of(
+        cls,
+        sensors: Sequence[MobileSensor],
+        fusion: Fusion,
+        settings: PlanningSettings,
+        reward: AnyReward,
+        state: State,
+        poses: Any,
+    ) -> Preparation:
+        """Raises `InputError` for inputs that do not fit."""
+        options = options_of(sensors, poses, settings)
+        check_state(sensors, state)
+        planned = _planned(len(sensors), fusion, settings, reward, state)
+        rule = _rule(len(sensors), planned.fusion, settings, reward, planned.state)
+        return cls(tuple(sensors), settings, reward, planned.state, planned.fusion, options, rule, planned.notes)
+
+    @property
+    def races(self) -> bool:
+        """Whether samples are added until the decision is certain; the expected loss is so without any."""
+        return self.settings.confidence is not None and not isinstance(self.reward, ExpectedLossReward)
+
+    @property
+    def certainty(self) -> Certainty | None:
+        """Of a decision that does not race."""
+        return None if self.settings.confidence is None else Certainty("no samples", 1.0, 0, (), ())
+
+    def evaluator(
+        self, num_samples: int, options: tuple[Options, ...] | None = None, *, rng: np.random.Generator
+    ) -> AnyEvaluator:
+        """The evaluator on samples drawn now; options: fewer of them. Raises as `JointPlanner.plan`."""
+        own, settings = options or self.options, replace(self.settings, num_samples=num_samples)
+        sensors, reward, state = self.sensors, self.reward, self.state
+        if self.rule is None:
+            assert not isinstance(reward, ExpectedLossReward)
+            evaluator: AnyEvaluator = Evaluator.prepare(sensors, own, self.fusion, settings, reward, state, rng=rng)
+        else:
+            fused, local = state.fused, state.local
+            evaluator = AdditiveEvaluator.prepare(
+                sensors, own, self.rule, settings, reward, fused, local, state.undetected, rng=rng
+            )
+        if settings.undetected_worth > 0.0 and (self.rule is None or state.undetected is None):
+            lacking = state.undetected is None
+            why = "the state has no intensity of them" if lacking else "rewards are no sums over labels"
+            evaluator.notes[f"targets not found yet are not looked for: {why}"] = None
+        evaluator.notes.update(dict.fromkeys(self.notes))
+        return evaluator
 
 
 def _planned(num_sensors: int, fusion: Fusion, settings: PlanningSettings, reward: AnyReward, state: State) -> _Planned:

@@ -12,9 +12,12 @@ from vedette.errors import InputError
 from vedette.filters import Filter, Limits
 from vedette.kernels.base.types import Floats
 from vedette.kernels.planning.ideal import EXPECTED, IDEAL, SAMPLED
-from vedette.models.arguments import dimension, non_negative, positive, probability, reject
+from vedette.models.arguments import dimension, non_negative, positive, probability, real, reject
 from vedette.platforms import Platform
 from vedette.platforms.base import check_platform
+
+# Of a search and the first round of a race (`vedette.control.rounds`).
+_LEAST_SAMPLES = 24
 
 IDEAL_MODES = {"ideal": IDEAL, "expected": EXPECTED, "sampled": SAMPLED}
 
@@ -32,7 +35,8 @@ class PlanningSettings:
 
     Attributes:
         horizon_steps, horizon_period: H pseudo-updates, T seconds apart (paper: 5 and 2 s).
-        num_samples: M multi-target samples, the same ones for every action and sensor (paper: 40).
+        num_samples: M multi-target samples, the same ones for every action and sensor (paper: 40). With `confidence`,
+            as many as it takes, instead.
         ideal_measurements: "ideal": noise-free, of the sampled targets whose detection probability is at least
             `detection_threshold`; "expected": noise-free, each target seen with its detection probability, so that the
             mean over samples is the expectation over detections; "sampled": seen likewise, with measurement noise.
@@ -47,6 +51,13 @@ class PlanningSettings:
         max_prior_hypotheses: heaviest hypotheses of each local posterior that enter the pseudo-updates. An LMB enters
             whole.
         max_bound_work: ways to see a target, times samples, that are tried at most for the bound of a plan.
+        confidence: with which the choice is to be the best of its candidates; samples are then added until it is, see
+            `vedette.control.racing`. None: `num_samples`, whatever they can tell.
+        indifference: with `confidence`, how much less than the best is good enough, relative to the magnitude of the
+            best mean reward: 0.01 is one per cent of it.
+        max_samples: with `confidence`, samples in all after which the decision is taken as it stands.
+        max_seconds: s after which it is taken likewise, at the end of a round of samples; the first is always made. A
+            plan then depends on how fast the machine is, not on its seed alone. None: no limit.
         limits: caps of the pseudo-updates, which are ranked, not Gibbs sampled, whatever the filter does. Every label
             set of the prior keeps its heaviest hypothesis beyond these caps, and an LMB keeps all its labels. Tracks
             that are mixtures are replaced by one Gaussian of their moments beforehand.
@@ -67,6 +78,10 @@ class PlanningSettings:
     max_prior_hypotheses: int = 10
     max_bound_work: int = 256
     undetected_worth: float = 0.0
+    confidence: float | None = None
+    indifference: float = 0.0
+    max_samples: int = 2000
+    max_seconds: float | None = None
     limits: Limits = field(default_factory=planning_limits)
     num_threads: int = 0
 
@@ -83,6 +98,7 @@ class PlanningSettings:
         non_negative("undetected_worth", self.undetected_worth)
         if self.num_threads != 0:
             dimension("num_threads", self.num_threads)
+        self._check_certainty()
         if self.ideal_measurements not in IDEAL_MODES:
             raise reject("ideal_measurements", f"one of {', '.join(IDEAL_MODES)}", self.ideal_measurements)
         own = self.limits
@@ -90,6 +106,16 @@ class PlanningSettings:
             raise InputError(
                 "limits: expected max_components 1, min_existence 0 and min_track_weight 1, as in planning_limits()"
             )
+
+    def _check_certainty(self) -> None:
+        if self.confidence is not None and not 0.0 < real("confidence", self.confidence) < 1.0:
+            raise reject("confidence", "a probability between 0 and 1, neither of them", self.confidence)
+        if non_negative("indifference", self.indifference) >= 1.0:
+            raise reject("indifference", "a share of the best reward, from 0 to less than 1", self.indifference)
+        if dimension("max_samples", self.max_samples) < _LEAST_SAMPLES:
+            raise reject("max_samples", f"a whole number of at least {_LEAST_SAMPLES}", self.max_samples)
+        if self.max_seconds is not None:
+            positive("max_seconds", self.max_seconds)
 
     def horizon_times(self) -> Floats:
         """(horizon_steps,) s from the decision to each pseudo-update."""

@@ -9,6 +9,7 @@ from vedette.scenarios.loading import Scenario
 from vedette.scenarios.sections import ScenarioModel
 from vedette.scenarios.sections.base import Section
 from vedette.scenarios.sections.birth import Birth
+from vedette.scenarios.sections.control import Control
 from vedette.scenarios.sections.fusion import OF_SCANS, AnyFusion, CustomFusion
 from vedette.scenarios.sections.sensors import Sensor
 from vedette.scenarios.sections.targets import RecordedTargets
@@ -78,7 +79,7 @@ def facts(model: ScenarioModel) -> list[tuple[str, str]]:
         ("estimate", settings(model.estimator)),
         ("decisions", _decisions(model.decision_steps)),
         ("horizon", f"{counted(control.horizon_steps, 'step')} of {control.horizon_period:g} s"),
-        ("reward", f"{settings(control.reward)}, {counted(control.num_samples, 'sample')}"),
+        ("reward", f"{settings(control.reward)}, {_samples(control)}"),
         ("search", settings(control.search)),
         *(("constraint", settings(section)) for section in control.constraints),
         ("pseudo-scans", f"{control.ideal_measurements} measurements"),
@@ -86,6 +87,14 @@ def facts(model: ScenarioModel) -> list[tuple[str, str]]:
         *((f"planner {name}", settings(section)) for name, section in model.planners.items()),
         *((f"metric {name}", settings(section)) for name, section in model.metrics.items()),
     ]
+
+
+def _samples(control: Control) -> str:
+    if control.confidence is None:
+        return counted(control.num_samples, "sample")
+    near = f", to {100.0 * control.indifference:g} %" if control.indifference else ""
+    time = "" if control.max_seconds is None else f" or {control.max_seconds:g} s"
+    return f"samples until certain at {100.0 * control.confidence:g} %{near}, at most {control.max_samples}{time}"
 
 
 def _bounds(region: RegionSection) -> str:

@@ -9,9 +9,10 @@ from vedette.models.arguments import positive
 
 @dataclass(frozen=True, slots=True)
 class ExpectedLossReward:
-    """Less the squared error that is to be expected of the targets' positions, cut off where one counts as lost.
+    """Less the squared error that is to be expected of the targets' positions, cut off where one counts as lost:
 
-    R = -sum over labels of r (q min(tr P+, c^2) + (1 - q) min(tr P, c^2)),   q = 1 - prod over sensors of (1 - P_D),
+        R = -sum over labels of r (q min(tr P+, c^2) + (1 - q) min(tr P, c^2))
+        q = 1 - prod over sensors of (1 - P_D)
 
     with the predicted existence r and covariance P of the position, the mean P_D over the predicted Gaussian, and
     P+ the covariance after the scans given that the target is detected: P+^-1 = P^-1 + sum over sensors of P_D I / q, I

@@ -108,6 +108,8 @@ def line_values(table: Table, valuation: Valuation, chosen: Ints, first: int, la
     for s in range(len(chosen)):
         if chosen[s] >= 0:
             add_course(table, s, table.first_courses[s] + chosen[s], 1.0, totals)
+    # Put back as they were after each sensor: what is subtracted and added again is not the same to the last bit.
+    full = totals.copy()
     work, values = make_value_work(valuation), np.empty((num_labels, num_samples, num))
     whole, rest, before = np.zeros((num_samples, num)), np.empty((num_samples, num)), np.empty_like(values)
     changed, seen = np.empty((num_samples, num)), np.zeros(num_labels, np.int64)
@@ -131,8 +133,8 @@ def line_values(table: Table, valuation: Valuation, chosen: Ints, first: int, la
                 label = table.labels[entry]
                 value_changed(table, valuation, s, entry, totals[label], work, changed)
                 out[course] += changed - before[label]
-        if chosen[s] >= 0:
-            add_course(table, s, begin + chosen[s], 1.0, totals)
+        for entry in range(table.offsets[begin], table.offsets[end]):
+            totals[table.labels[entry]] = full[table.labels[entry]]
 
 
 @kernel

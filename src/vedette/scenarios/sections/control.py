@@ -11,7 +11,18 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from pydantic import Field
 
 from vedette.scenarios.faults import Finding, describe
-from vedette.scenarios.sections.base import Count, Numbers, Positive, Probability, Section, Share, Steps, Whole, check
+from vedette.scenarios.sections.base import (
+    Chance,
+    Count,
+    Numbers,
+    Positive,
+    Probability,
+    Section,
+    Share,
+    Steps,
+    Whole,
+    check,
+)
 from vedette.scenarios.sections.constraints import AnyConstraint
 from vedette.scenarios.sections.rewards import AnyReward, CauchySchwarzReward
 from vedette.scenarios.sections.search import AnySearch, Automatic
@@ -58,6 +69,22 @@ class Control(Section):
     horizon_steps: Count = Field(default=5, description="Pseudo-updates over the horizon, H [-].")
     horizon_period: Positive = Field(default=2.0, description="Time between pseudo-updates, T [s].")
     num_samples: Count = Field(default=40, description="Multi-target samples of the expected reward, M [-].")
+    confidence: Chance | None = Field(
+        default=None,
+        description="With it, samples are added until the choice is so surely the best of its candidates, whatever "
+        "num_samples says [-].",
+    )
+    indifference: Share = Field(
+        default=0.0, description="With confidence: a reward short of the best by this share of it is good enough [-]."
+    )
+    max_samples: Annotated[Count, Field(ge=24)] = Field(
+        default=2000, description="With confidence: samples after which the decision is taken as it stands [-]."
+    )
+    max_seconds: Positive | None = Field(
+        default=None,
+        description="With confidence: time after which it is taken likewise; what a seed gives then depends on the "
+        "speed of the machine [s].",
+    )
     ideal_measurements: Literal["ideal", "expected", "sampled"] = Field(
         default="ideal",
         description="Pseudo-measurements of a sample, never with clutter: noise-free, of the targets whose detection "
@@ -103,6 +130,14 @@ class Control(Section):
     def _times_in_order(self) -> Iterator[Finding]:
         yield from _order("decision_times", self.decision_times or ())
 
+    @check
+    def _confidence_beside_what_belongs_to_it(self) -> Iterator[Finding]:
+        if self.confidence is None:
+            for name, default in (("indifference", 0.0), ("max_samples", 2000), ("max_seconds", None)):
+                value = getattr(self, name)
+                if value != default:
+                    yield (name,), "confidence beside it, such as 0.95", describe(value)
+
     def build(self, num_threads: int = 0) -> PlanningSettings:
         """Horizon, samples and caps of a decision."""
         from vedette.control import PlanningSettings, planning_limits
@@ -111,6 +146,10 @@ class Control(Section):
             horizon_steps=self.horizon_steps,
             horizon_period=self.horizon_period,
             num_samples=self.num_samples,
+            confidence=self.confidence,
+            indifference=self.indifference,
+            max_samples=self.max_samples,
+            max_seconds=self.max_seconds,
             ideal_measurements=self.ideal_measurements,
             detection_threshold=self.detection_threshold,
             association=self.association,

@@ -1,0 +1,147 @@
+"""Races of joint actions: samples are added in rounds, and what is worse with confidence is dropped.
+
+All candidates of a round are judged by the same samples, so that what two of them have in common cancels. After round
+k, with n samples in all, candidate a stays as long as the upper confidence bound of its mean difference to the present
+best b,
+
+    U(a) = mean(d) + t(n - 1, 1 - alpha_k / (K - 1)) std(d) / sqrt(n),    d = reward(a) - reward(b), sample by sample,
+
+is not below 0, with alpha_k = (1 - confidence) / (k (k + 1)) and K candidates at the start. The race is over when one
+is left, or when U(a) of all others is at most the indifference. The alpha_k sum to 1 - confidence over any number of
+rounds, and what can go wrong in a round is one of K - 1 comparisons with the true best (a union bound over both). So
+where Student's t is right, the choice is with `confidence` within the indifference of the best candidate, whenever the
+race is stopped. The differences need not be normal: where they are far from it (a target that is there in every sample
+of the first rounds, and not in one of a hundred), the confidence is only as good as what the samples show.
+
+See O. Maron, A. W. Moore, "The racing algorithm: model selection for lazy learners", 1997 (races, paired differences);
+S.-H. Kim, B. L. Nelson, "A fully sequential procedure for indifference-zone selection in simulation", 2001
+(indifference, common random numbers, the union over candidates); E. Even-Dar, S. Mannor, Y. Mansour, "Action
+elimination and stopping conditions for the multi-armed bandit and reinforcement learning problems", 2006 (a confidence
+that is spent over rounds).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from scipy.special import stdtr, stdtrit
+
+from vedette.control.evidence import Evidence
+from vedette.control.search import first_best
+from vedette.kernels.base.types import Bools, Floats, Ints
+
+# Samples of the first round, and by how much each round makes their number grow (docs/control.md has what it costs).
+FIRST_ROUND = 8
+_GROWTH = 1.5
+
+# Rewards nearer than this, relative to the best or to 1, are equal, as in `first_best`.
+_TIE = 1e-9
+
+
+def next_total(num_samples: int, most: int) -> int:
+    """Samples in all after the next round, when there are so many now."""
+    return min(most, FIRST_ROUND if num_samples == 0 else math.ceil(_GROWTH * num_samples))
+
+
+@dataclass(slots=True, eq=False)
+class Race:
+    """Candidates with the rewards that they got so far.
+
+    Attributes:
+        actions: (num_candidates, num_sensors) the joint actions that began, in printed order.
+        confidence, indifference: as in `PlanningSettings`.
+        left: (num_left,) rows of `actions` that are not excluded.
+        rewards: (num_left, num_samples) of those.
+        excluded: for each round, the rows that it excluded and their rewards until then.
+    """
+
+    actions: Ints
+    confidence: float
+    indifference: float
+    left: Ints = field(init=False)
+    rewards: Floats = field(init=False)
+    excluded: list[tuple[Ints, Floats]] = field(default_factory=list)
+    _round: int = 0
+    _best: int = 0
+    _doubt: float = math.inf
+    _near: bool = False
+
+    def __post_init__(self) -> None:
+        self.left, self.rewards = np.arange(len(self.actions)), np.empty((len(self.actions), 0))
+
+    @property
+    def candidates(self) -> Ints:
+        """(num_left, num_sensors) the joint actions that are not excluded, in the order of `rewards`."""
+        return np.asarray(self.actions[self.left])
+
+    @property
+    def num_samples(self) -> int:
+        """Samples of each candidate so far."""
+        return int(self.rewards.shape[1])
+
+    @property
+    def best(self) -> tuple[int, ...]:
+        """The candidate of largest mean reward."""
+        return tuple(self.candidates[self._best].tolist())
+
+    @property
+    def reached(self) -> float:
+        """The confidence with which the best is within the indifference of the best candidate, at most that wanted."""
+        return self.confidence if self.verdict else min(self.confidence, max(0.0, 1.0 - self._doubt))
+
+    @property
+    def verdict(self) -> Literal["one left", "indifferent"] | None:
+        """Why it is over; None while it is not."""
+        if len(self.left) == 1:
+            return "one left"
+        return "indifferent" if self._near else None
+
+    def add(self, rewards: Floats) -> None:
+        """One round: (num_left, num_new) rewards of the candidates on samples that are the same for all.
+
+        A candidate without a finite mean is excluded.
+        """
+        self._round += 1
+        self.rewards = np.concatenate([self.rewards, rewards], axis=1)
+        with np.errstate(invalid="ignore"):
+            means = self.rewards.mean(axis=1)
+        finite = np.isfinite(means)
+        self._best = first_best(np.where(finite, means, -math.inf))
+        self._judge(means, finite)
+
+    def note(self, evidence: Evidence) -> None:
+        """Keep what the candidates got, each on as many samples as it took part in."""
+        for rows, rewards in (*self.excluded, (self.left, self.rewards)):
+            if len(rows):
+                evidence.note(self.actions[rows], rewards)
+
+    def _judge(self, means: Floats, finite: Bools) -> None:
+        """Drop what is worse, and see how sure one can be of the best."""
+        best, num = self._best, self.rewards.shape[1]
+        with np.errstate(invalid="ignore"):
+            behind = means[best] - means
+            errors = np.std(self.rewards - self.rewards[best], axis=1, ddof=1) / math.sqrt(num)
+        # Of what may go wrong in all, each comparison of each round has one part in so many.
+        parts = max(1, len(self.actions) - 1) * self._round * (self._round + 1)
+        reach = -stdtrit(num - 1, (1.0 - self.confidence) / parts) * errors
+        tie = _TIE * max(1.0, abs(means[best]))
+        near = max(tie, self.indifference * abs(means[best]))
+        stays = finite & (behind - reach <= tie)
+        stays[best] = False  # the others
+        self._near = bool((reach - behind <= near)[stays].all())
+        self._doubt = parts * float(_chance_beyond(near + behind[stays], errors[stays], num).max(initial=0.0))
+        stays[best] = True
+        self.excluded.append((self.left[~stays], self.rewards[~stays]))
+        self._best = int(stays[:best].sum())
+        self.left, self.rewards = self.left[stays], self.rewards[stays]
+
+
+def _chance_beyond(distances: Floats, errors: Floats, num_samples: int) -> Floats:
+    """How likely a mean of so many samples is off by more than a distance, which is positive but for ties."""
+    beyond = np.where(distances >= 0.0, 0.0, 1.0)
+    sure = errors > 0.0
+    beyond[sure] = stdtr(num_samples - 1, -distances[sure] / errors[sure])
+    return beyond
