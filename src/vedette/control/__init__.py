@@ -2,6 +2,7 @@
 
 from vedette.control.additive.evaluator import AdditiveEvaluator
 from vedette.control.evaluator import Evaluator
+from vedette.control.lookahead import BeamSearch, HorizonPlanner, SequenceProblem, SequenceSearch, TreeSearch
 from vedette.control.plan import Bound, Plan, RewardTable, SearchCurve
 from vedette.control.planners import FixedPlanner, IndependentPlanner, JointPlanner, Planner, RandomPlanner
 from vedette.control.rewards import (
@@ -21,6 +22,7 @@ from vedette.control.settings import MobileSensor, PlanningSettings, planning_li
 
 __all__ = [
     "AdditiveEvaluator",
+    "BeamSearch",
     "Bound",
     "CardinalityVarianceReward",
     "CauchySchwarzReward",
@@ -30,6 +32,7 @@ __all__ = [
     "ExpectedGospaReward",
     "ExpectedLossReward",
     "FixedPlanner",
+    "HorizonPlanner",
     "IndependentPlanner",
     "JointPlanner",
     "JointProblem",
@@ -47,5 +50,8 @@ __all__ = [
     "Reward",
     "RewardTable",
     "SearchCurve",
+    "SequenceProblem",
+    "SequenceSearch",
+    "TreeSearch",
     "planning_limits",
 ]

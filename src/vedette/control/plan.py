@@ -101,6 +101,8 @@ class Plan:
         notes: what a reader must know, such as that rewards were taken one by one.
         curve: of a joint decision, how the search went; else None.
         bound: of a joint decision, how far from the best it can be; None where nothing is known of that.
+        sequence: of a decision over several periods, for each sensor the rows (num_decisions, num_columns) of all the
+            actions that were chosen, the first of which is to be taken; else empty.
     """
 
     planner: str
@@ -111,6 +113,7 @@ class Plan:
     notes: tuple[str, ...] = ()
     curve: SearchCurve | None = None
     bound: Bound | None = None
+    sequence: tuple[Floats, ...] = ()
 
     @property
     def num_sensors(self) -> int:
