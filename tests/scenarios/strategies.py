@@ -187,6 +187,8 @@ def scenarios(draw: st.DrawFn) -> Data:
         detection_threshold=probability,
         reward=section("cauchy_schwarz", unit_volume=st.just("reference") | positive)
         | section("renyi", order=positive.filter(lambda order: order != 1.0)),
+        lookahead=section(depth=counts, method=st.just("beam"), beam_width=counts, budget=counts, discount=probability)
+        | section(method=st.just("tree")),
         limits=section(max_prior_hypotheses=counts, max_hypotheses=counts),
     )
     return {

@@ -321,7 +321,9 @@ def test_actions_of_one_sensor_and_of_all() -> None:
 
 def test_an_unknown_planner() -> None:
     loaded = scenario()
-    with pytest.raises(InputError, match="planner: expected one of jdm, idm, random, fixed, still; got 'greedy'"):
+    with pytest.raises(
+        InputError, match="planner: expected one of jdm, idm, lookahead, random, fixed, still; got 'greedy'"
+    ):
         build.build_planner(loaded, "greedy")
 
 

@@ -20,6 +20,7 @@ from vedette.platforms import Actions
 from vedette.platforms.base import actions_at
 from vedette.scenarios.loading import Scenario
 from vedette.scenarios.sections.fusion import OF_SCANS, CustomFusion
+from vedette.scenarios.sections.lookahead import Lookahead
 from vedette.scenarios.sections.planners import STRATEGIES, Parts
 from vedette.scenarios.sections.tracking import Filter as FilterSection
 from vedette.simulation.experiment import Experiment
@@ -161,8 +162,9 @@ def build_targets(scenario: Scenario) -> TargetSource:
 
 
 def build_planner(scenario: Scenario, name: str, num_threads: int = 0) -> Planner | None:
-    """The planner of a strategy: `jdm` (joint), `idm` (independent), `random`, `fixed` (sensors keep their first
-    course), or one of the scenario's own; None for `still`, where the sensors are never under way.
+    """The planner of a strategy: `jdm` (joint), `idm` (independent), `lookahead` (joint, over several decisions),
+    `random`, `fixed` (sensors keep their first course), or one of the scenario's own; None for `still`, where the
+    sensors are never under way.
 
     Args:
         scenario: with the sensors that it steers.
@@ -170,7 +172,8 @@ def build_planner(scenario: Scenario, name: str, num_threads: int = 0) -> Planne
         num_threads: share a decision; 0: one a processor.
 
     Raises:
-        InputError: another name, `jdm` or `idm` with filters that have no labels, or a custom part that cannot be had.
+        InputError: another name, `jdm`, `idm` or `lookahead` with filters that have no labels, or a custom part that
+            cannot be had.
     """
     model, folder = scenario.model, scenario.folder
     if name not in (*STRATEGIES, *model.planners):
@@ -188,6 +191,7 @@ def build_planner(scenario: Scenario, name: str, num_threads: int = 0) -> Planne
         control.search.build(folder),
         _first_actions(scenario, sensors),
         _notes_of_decisions(scenario, fusion),
+        (control.lookahead or Lookahead()).build(),
     )
     if name in model.planners:
         return model.planners[name].build(name, parts, folder)

@@ -13,6 +13,7 @@ from pydantic import Field
 from vedette.scenarios.faults import Finding, describe
 from vedette.scenarios.sections.base import Count, Numbers, Positive, Probability, Section, Share, Steps, Whole, check
 from vedette.scenarios.sections.custom import Custom
+from vedette.scenarios.sections.lookahead import Lookahead
 from vedette.scenarios.sections.rewards import AnyReward, CauchySchwarzReward
 
 if TYPE_CHECKING:  # with the planners comes the compiler, which a check does without
@@ -116,6 +117,9 @@ class Control(Section):
     )
     reward: AnyReward = Field(default=CauchySchwarzReward(), description="Value of a density [-].")
     search: AnySearch = Field(default=Exhaustive(), description="Which joint actions a joint decision evaluates [-].")
+    lookahead: Lookahead | None = Field(
+        default=None, description="How the strategy lookahead decides; none: by the defaults [-]."
+    )
     limits: PlanningLimits = Field(default=PlanningLimits(), description="How much it works with [-].")
 
     @check
@@ -130,6 +134,19 @@ class Control(Section):
     @check
     def _times_in_order(self) -> Iterator[Finding]:
         yield from _order("decision_times", self.decision_times or ())
+
+    @check
+    def _period_of_lookahead(self) -> Iterator[Finding]:
+        if self.lookahead is not None and self.lookahead.period is not None:
+            steps = self.lookahead.period / self.horizon_period
+            if round(steps) < 1 or abs(steps - round(steps)) > 1e-9 * steps:
+                multiple = f"a whole multiple of horizon_period, {self.horizon_period:g}"
+                yield ("lookahead", "period"), multiple, describe(self.lookahead.period)
+
+    @check
+    def _association_of_lookahead(self) -> Iterator[Finding]:
+        if self.lookahead is not None and self.association != "known":
+            yield ("association",), "known, with a lookahead", describe(self.association)
 
     def build(self, num_threads: int = 0) -> PlanningSettings:
         """Horizon, samples and caps of a decision."""

@@ -23,7 +23,8 @@ class Parts(NamedTuple):
 
     sensors: the sensors that are steered. fusion: how their densities become one; of one sensor, of it alone. settings:
     horizon, samples, caps, threads. reward: the value of a density. search: which joint actions are evaluated.
-    first_actions: what each sensor does where nothing decides. notes: what plans are to say of the fusion.
+    first_actions: what each sensor does where nothing decides. notes: what plans are to say of the fusion. lookahead:
+    arguments of `vedette.control.HorizonPlanner` by name, about sequences of decisions.
     """
 
     sensors: tuple[MobileSensor, ...]
@@ -33,6 +34,7 @@ class Parts(NamedTuple):
     search: JointSearch
     first_actions: tuple[Actions, ...]
     notes: tuple[str, ...]
+    lookahead: dict[str, Any]
 
 
 class Strategy(NamedTuple):
@@ -46,6 +48,14 @@ def _joint(parts: Parts) -> Planner:
     from vedette.control import JointPlanner
 
     return JointPlanner(parts.sensors, parts.fusion, parts.settings, parts.reward, parts.search, notes=parts.notes)
+
+
+def _lookahead(parts: Parts) -> Planner:
+    from vedette.control import HorizonPlanner
+
+    return HorizonPlanner(
+        parts.sensors, parts.fusion, parts.settings, parts.reward, notes=parts.notes, **parts.lookahead
+    )
 
 
 def _independent(parts: Parts) -> Planner:
@@ -69,6 +79,7 @@ def _fixed(parts: Parts) -> Planner:
 STRATEGIES = {
     "jdm": Strategy(True, _joint),
     "idm": Strategy(True, _independent),
+    "lookahead": Strategy(True, _lookahead),
     "random": Strategy(False, _random),
     "fixed": Strategy(False, _fixed),
     "still": Strategy(False, lambda parts: None),
@@ -77,7 +88,7 @@ STRATEGIES = {
 
 class CustomPlanner(Custom):
     """A user's own planner; called with `sensors`, `fusion`, `settings`, `reward`, `search`, `first_actions`, `notes`,
-    of which it names those that it wants."""
+    `lookahead`, of which it names those that it wants."""
 
     kind: Literal["custom"] = Field(default="custom", description="Kind of planner [-].")
     spared: ClassVar[tuple[str, ...]] = ("name",)  # which the scenario gives
