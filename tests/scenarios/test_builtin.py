@@ -58,6 +58,7 @@ def truth_of(scenario: Scenario) -> Truth:
 
 def test_they_are_all_there_and_valid() -> None:
     assert list(list_builtin()) == [
+        "beyond-the-gap",
         "eight-mobile",
         "linear-10",
         "paper-a",
@@ -68,6 +69,7 @@ def test_they_are_all_there_and_valid() -> None:
         "solent",
         "three-positions",
         "three-radars",
+        "two-searchers",
         "two-views-1",
         "two-views-2",
     ]

@@ -103,7 +103,8 @@ def test_what_breaks_in_the_middle_of_a_run_is_named(scenario: Scenario) -> None
 
 def test_a_planner_that_nobody_has_named(scenario: Scenario) -> None:
     with pytest.raises(
-        InputError, match="planner: expected one of jdm, idm, random, fixed, still, last, third, breaks; got 'x'"
+        InputError,
+        match="planner: expected one of jdm, idm, lookahead, random, fixed, still, last, third, breaks; got 'x'",
     ):
         run_scenario(scenario, "x", seed=1)
 

@@ -91,7 +91,8 @@ def run(
         str,
         typer.Option(
             "--planner",
-            help="jdm (joint), idm (independent), random, fixed (first course), still, or the scenario's own.",
+            help="jdm (joint), idm (independent), lookahead (joint, several decisions), random, fixed (first course), "
+            "still, or the scenario's own.",
         ),
     ] = "jdm",
     seed: Annotated[int, typer.Option("--seed", min=0, help="Seed; with --run it fixes every random number.")] = 0,

@@ -14,6 +14,7 @@ from vedette.control.constraints import (
 )
 from vedette.control.evaluator import Evaluator
 from vedette.control.explanation import Explanation, Had, RunnerUp, TargetGains
+from vedette.control.lookahead import BeamSearch, HorizonPlanner, SequenceProblem, SequenceSearch, TreeSearch
 from vedette.control.plan import Bound, Certainty, Plan, RewardTable, SearchCurve
 from vedette.control.planners import FixedPlanner, IndependentPlanner, JointPlanner, Planner, RandomPlanner
 from vedette.control.rewards import (
@@ -42,6 +43,7 @@ from vedette.control.settings import MobileSensor, PlanningSettings, planning_li
 __all__ = [
     "AdditiveEvaluator",
     "AutomaticSearch",
+    "BeamSearch",
     "Bound",
     "CardinalityVarianceReward",
     "CauchySchwarzReward",
@@ -56,6 +58,7 @@ __all__ = [
     "Explanation",
     "FixedPlanner",
     "Had",
+    "HorizonPlanner",
     "IndependentPlanner",
     "JointPlanner",
     "JointProblem",
@@ -77,10 +80,13 @@ __all__ = [
     "RunnerUp",
     "SearchCurve",
     "Separation",
+    "SequenceProblem",
+    "SequenceSearch",
     "SequentialGreedy",
     "Situation",
     "StayInside",
     "TargetGains",
+    "TreeSearch",
     "VoidProbability",
     "mask_of",
     "planning_limits",

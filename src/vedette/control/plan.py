@@ -138,6 +138,8 @@ class Plan:
         notes: what a reader must know, such as that rewards were taken one by one.
         curve: of a joint decision, how the search went; else None.
         bound: of a joint decision, how far from the best it can be; None where nothing is known of that.
+        sequence: of a decision over several periods, for each sensor the rows (num_decisions, num_columns) of all the
+            actions that were chosen, the first of which is to be taken; else empty.
         certainty: how the decision ended where it takes as many samples as it needs; else None.
         explanation: why it is what it is, where that has been worked out to be kept; see `explain`.
         questions: the evidence, which `explain` works on; None once it is left behind (`settled`, a pickle, a record).
@@ -154,6 +156,7 @@ class Plan:
     certainty: Certainty | None = None
     explanation: Explanation | None = None
     questions: Questions | None = field(default=None, repr=False, compare=False)
+    sequence: tuple[Floats, ...] = ()
 
     def explain(self) -> Explanation:
         """Why it is what it is: what targets and sensors contribute to its reward, and how near the next best came.

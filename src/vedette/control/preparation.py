@@ -17,6 +17,7 @@ from vedette.control.rewards.loss import ExpectedLossReward
 from vedette.control.settings import MobileSensor, PlanningSettings
 from vedette.densities import GLMB, LMB, existence_probabilities, glmb_to_lmb
 from vedette.fusion import Clmb, CmDeltaGlmb, Fusion, Linear, LinearRule, ParallelUpdate
+from vedette.models.arguments import reject
 from vedette.platforms import Options
 from vedette.tracking import State
 
@@ -100,6 +101,42 @@ class Preparation:
             evaluator.notes[f"targets not found yet are not looked for: {why}"] = None
         evaluator.notes.update(dict.fromkeys(self.notes))
         return evaluator
+
+
+class Sums(NamedTuple):
+    """What decisions that are sums over labels are made on."""
+
+    rule: LinearRule
+    fused: LMB
+    local: tuple[LMB, ...]
+    notes: tuple[str, ...]
+
+
+def prepare_sums(
+    sensors: Sequence[MobileSensor], fusion: Fusion, settings: PlanningSettings, reward: AnyReward, state: State
+) -> Sums:
+    """For decisions that can be nothing else; GLMB beliefs are planned on as LMBs.
+
+    Raises:
+        InputError: inputs that do not fit, or settings, reward or fusion that make a decision no sum over labels.
+    """
+    check_state(sensors, state)
+    notes: tuple[str, ...] = ()
+    if _has_glmb((*state.local, state.fused)):
+        notes = ("planned on the LMBs of the GLMB beliefs: so are all sequences of decisions",)
+        state = replace(state, local=tuple(map(_as_lmb, state.local)), fused=_as_lmb(state.fused))
+        if isinstance(fusion, CmDeltaGlmb):
+            fusion = Clmb(fusion.weights)
+    planned = _planned(len(sensors), fusion, settings, reward, state)
+    rule = _rule(len(sensors), planned.fusion, settings, reward, planned.state)
+    if rule is None:
+        if settings.association != "known":
+            raise reject("settings.association", "known, for sequences of decisions", settings.association)
+        expected = "a reward and a fusion of LMBs that are sums over labels, for sequences of decisions"
+        raise reject("reward, fusion", expected, f"{type(reward).__name__}, {type(planned.fusion).__name__}")
+    fused, local = planned.state.fused, planned.state.local
+    assert isinstance(fused, LMB)
+    return Sums(rule, fused, tuple(map(_as_lmb, local)), (*notes, *planned.notes))
 
 
 def _planned(num_sensors: int, fusion: Fusion, settings: PlanningSettings, reward: AnyReward, state: State) -> _Planned:

@@ -6,6 +6,7 @@ from vedette.platforms.camera import Carried, Pointing
 from vedette.platforms.courses import PAPER_HEADINGS_DEG, Courses
 from vedette.platforms.fleet import Fleet
 from vedette.platforms.options import Options, options_at
+from vedette.platforms.sequences import Sequences
 from vedette.platforms.steps import Steps, Still, Waypoints
 
 __all__ = [
@@ -17,6 +18,7 @@ __all__ = [
     "Options",
     "Platform",
     "Pointing",
+    "Sequences",
     "Steps",
     "Still",
     "Waypoints",

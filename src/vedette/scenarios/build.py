@@ -20,6 +20,7 @@ from vedette.platforms import Actions
 from vedette.platforms.base import actions_at
 from vedette.scenarios.loading import Scenario
 from vedette.scenarios.sections.fusion import OF_SCANS, CustomFusion
+from vedette.scenarios.sections.lookahead import Lookahead
 from vedette.scenarios.sections.planners import STRATEGIES, Parts
 from vedette.scenarios.sections.tracking import Filter as FilterSection
 from vedette.simulation.experiment import Experiment
@@ -162,8 +163,9 @@ def build_targets(scenario: Scenario) -> TargetSource:
 
 
 def build_planner(scenario: Scenario, name: str, num_threads: int = 0) -> Planner | None:
-    """The planner of a strategy: `jdm` (joint), `idm` (independent), `random`, `fixed` (sensors keep their first
-    course), or one of the scenario's own; None for `still`, where the sensors are never under way.
+    """The planner of a strategy: `jdm` (joint), `idm` (independent), `lookahead` (joint, over several decisions),
+    `random`, `fixed` (sensors keep their first course), or one of the scenario's own; None for `still`, where the
+    sensors are never under way.
 
     Args:
         scenario: with the sensors that it steers.
@@ -192,6 +194,7 @@ def build_planner(scenario: Scenario, name: str, num_threads: int = 0) -> Planne
         _first_actions(scenario, sensors),
         control.build_constraints(folder),
         _notes_of_decisions(scenario, fusion),
+        (control.lookahead or Lookahead()).build(),
     )
     if name in model.planners:
         return model.planners[name].build(name, parts, folder)

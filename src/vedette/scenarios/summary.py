@@ -12,7 +12,6 @@ from vedette.scenarios.sections.birth import Birth
 from vedette.scenarios.sections.control import Control
 from vedette.scenarios.sections.fusion import OF_SCANS, AnyFusion, CustomFusion
 from vedette.scenarios.sections.sensors import Sensor
-from vedette.scenarios.sections.targets import RecordedTargets
 from vedette.scenarios.sections.tracking import AnyFilter, Filter
 from vedette.scenarios.sections.undetected import UndetectedSection
 from vedette.scenarios.sections.world import RegionSection
@@ -23,7 +22,7 @@ def one_line(scenario: Scenario) -> str:
     """The scenario on one line."""
     model = scenario.model
     targets = model.targets
-    what = "recorded targets" if isinstance(targets, RecordedTargets) else counted(len(targets.tracks), "target")
+    what = counted(len(targets.tracks), "target") if targets.kind == "scripted" else f"{targets.kind} targets"
     decisions = counted(len(model.decision_steps), "decision")
     return (
         f"ok: {model.name}, {counted(model.time.num_steps, 'scan')}, {what}, {counted(len(model.sensors), 'sensor')}, "

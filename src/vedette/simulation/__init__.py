@@ -1,5 +1,6 @@
 """The world that the program does not get to see: truth, scans; the loop, and what a run leaves behind."""
 
+from vedette.simulation.born_targets import PoissonTargets
 from vedette.simulation.experiment import Experiment
 from vedette.simulation.loop import simulate
 from vedette.simulation.records import Decision, RunRecord
@@ -12,6 +13,7 @@ __all__ = [
     "CLUTTER",
     "Decision",
     "Experiment",
+    "PoissonTargets",
     "RunRecord",
     "Scan",
     "ScriptedTargets",

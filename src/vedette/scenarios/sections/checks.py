@@ -153,6 +153,9 @@ def _covariance(path: Path, site: BirthSite, model: ScenarioModel) -> Iterator[F
 
 
 def _targets(model: ScenarioModel) -> Iterator[Finding]:
+    if model.targets.kind == "poisson":
+        for name in ("mean", "std"):
+            yield from attempt(_state_length(("targets", name), model.targets, name, model))
     if model.targets.kind != "scripted":
         return
     for i, target in enumerate(model.targets.tracks):

@@ -24,6 +24,7 @@ from vedette.scenarios.sections.base import (
     check,
 )
 from vedette.scenarios.sections.constraints import AnyConstraint
+from vedette.scenarios.sections.lookahead import Lookahead
 from vedette.scenarios.sections.rewards import AnyReward, CauchySchwarzReward
 from vedette.scenarios.sections.search import AnySearch, Automatic
 
@@ -115,6 +116,9 @@ class Control(Section):
         description="Whether decisions are kept with why they were taken: what targets and sensors contribute to their "
         "rewards, and how near the second best came [-].",
     )
+    lookahead: Lookahead | None = Field(
+        default=None, description="How the strategy lookahead decides; none: by the defaults [-]."
+    )
     limits: PlanningLimits = Field(default=PlanningLimits(), description="How much it works with [-].")
 
     @check
@@ -137,6 +141,18 @@ class Control(Section):
                 value = getattr(self, name)
                 if value != default:
                     yield (name,), "confidence beside it, such as 0.95", describe(value)
+
+    def _period_of_lookahead(self) -> Iterator[Finding]:
+        if self.lookahead is not None and self.lookahead.period is not None:
+            steps = self.lookahead.period / self.horizon_period
+            if round(steps) < 1 or abs(steps - round(steps)) > 1e-9 * steps:
+                multiple = f"a whole multiple of horizon_period, {self.horizon_period:g}"
+                yield ("lookahead", "period"), multiple, describe(self.lookahead.period)
+
+    @check
+    def _association_of_lookahead(self) -> Iterator[Finding]:
+        if self.lookahead is not None and self.association != "known":
+            yield ("association",), "known, with a lookahead", describe(self.association)
 
     def build(self, num_threads: int = 0) -> PlanningSettings:
         """Horizon, samples and caps of a decision."""

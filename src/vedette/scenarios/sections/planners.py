@@ -28,7 +28,8 @@ class Parts(NamedTuple):
     sensors: the sensors that are steered. fusion: how their densities become one; of one sensor, of it alone. settings:
     horizon, samples, caps, threads. reward: the value of a density. search: which joint actions are evaluated.
     first_actions: what each sensor does where nothing decides. constraints: what they must not do. notes: what plans
-    are to say of the fusion.
+    are to say of the fusion. lookahead: arguments of `vedette.control.HorizonPlanner` by name, about sequences of
+    decisions.
     """
 
     sensors: tuple[MobileSensor, ...]
@@ -39,6 +40,7 @@ class Parts(NamedTuple):
     first_actions: tuple[Actions, ...]
     constraints: tuple[Constraint, ...]
     notes: tuple[str, ...]
+    lookahead: dict[str, Any]
 
 
 class Strategy(NamedTuple):
@@ -59,6 +61,14 @@ def _joint(parts: Parts) -> Planner:
         parts.search,
         parts.constraints,
         parts.notes,
+    )
+
+
+def _lookahead(parts: Parts) -> Planner:
+    from vedette.control import HorizonPlanner
+
+    return HorizonPlanner(
+        parts.sensors, parts.fusion, parts.settings, parts.reward, notes=parts.notes, **parts.lookahead
     )
 
 
@@ -83,6 +93,7 @@ def _fixed(parts: Parts) -> Planner:
 STRATEGIES = {
     "jdm": Strategy(True, _joint),
     "idm": Strategy(True, _independent),
+    "lookahead": Strategy(True, _lookahead),
     "random": Strategy(False, _random),
     "fixed": Strategy(False, _fixed),
     "still": Strategy(False, lambda parts: None),
@@ -119,7 +130,7 @@ class NamedIndependent(Section):
 
 class CustomPlanner(Custom):
     """A user's own planner; called with `sensors`, `fusion`, `settings`, `reward`, `search`, `first_actions`,
-    `constraints`, `notes`, of which it names those that it wants."""
+    `constraints`, `notes`, `lookahead`, of which it names those that it wants."""
 
     kind: Literal["custom"] = Field(default="custom", description="Kind of planner [-].")
     spared: ClassVar[tuple[str, ...]] = ("name",)  # which the scenario gives

@@ -1,4 +1,4 @@
-"""Sections about the true targets: written out, or recorded."""
+"""Sections about the true targets: written out, recorded, or drawn."""
 
 from __future__ import annotations
 
@@ -10,12 +10,13 @@ import numpy as np
 from pydantic import Field
 
 from vedette.scenarios.faults import Finding, describe
-from vedette.scenarios.sections.base import Point, Positive, Section, SomeNumbers, Step, check
+from vedette.scenarios.sections.base import Point, Positive, Probability, Section, SomeNumbers, Step, check
 from vedette.scenarios.sections.world import Motion, RegionSection, Time, grouped_order
 
 if TYPE_CHECKING:  # with the models comes the compiler, which a check does without
     from vedette.models import MotionModel
     from vedette.recorded import RecordedTargets as RecordedSource
+    from vedette.simulation import PoissonTargets as PoissonSource
     from vedette.simulation import ScriptedTargets as ScriptedSource
 
 
@@ -134,4 +135,34 @@ class RecordedTargets(Section):
         return recorded_source(self, world.region, folder)
 
 
-Targets = Annotated[ScriptedTargets | RecordedTargets, Field(discriminator="kind")]
+class PoissonTargets(Section):
+    """Targets drawn anew in every run, the same for all strategies: they move under the motion model, with its noise.
+
+    What leaves the region is gone.
+    """
+
+    kind: Literal["poisson"] = Field(default="poisson", description="Kind of targets [-].")
+    expected: Positive = Field(description="Mean number of births a scan [-].")
+    mean: SomeNumbers = Field(description="Mean state of a birth [m, m/s, ...].")
+    std: SomeNumbers = Field(description="Standard deviation of each state component of a birth [m, m/s, ...].")
+    death_probability: Probability = Field(
+        default=0.0, description="Probability with which a target dies from scan to scan [-]."
+    )
+
+    @check
+    def _spreads(self) -> Iterator[Finding]:
+        for i, std in enumerate(self.std):
+            if std < 0.0:
+                yield ("std", i), "a number of at least 0", describe(std)
+
+    def build(self, world: _World, motion: MotionModel, folder: Path) -> PoissonSource:
+        """The targets, as `motion` moves them."""
+        from vedette.simulation import PoissonTargets
+
+        order = grouped_order(world.motion)
+        mean, std = np.array(self.mean)[order], np.array(self.std)[order]
+        region = world.region.build()
+        return PoissonTargets(motion, self.expected, mean, np.diag(std**2), self.death_probability, region)
+
+
+Targets = Annotated[ScriptedTargets | RecordedTargets | PoissonTargets, Field(discriminator="kind")]

@@ -1,0 +1,146 @@
+"""Decisions over several periods against single ones, on the scenes where looking ahead might pay.
+
+    python benchmarks/lookahead.py                                             # both scenes, 6 runs
+    python benchmarks/lookahead.py beyond-the-gap --runs 50 --workers 8
+    python benchmarks/lookahead.py two-searchers --only "depth 3, beam" "depth 5, beam"
+
+Runs are paired: at the same number every strategy meets the same truth, and random numbers of the same seed. OSPA and
+GOSPA (alpha = 2, under the scene's cutoff and order) are means over scans and runs, with one standard error over the
+runs; "gain" is the GOSPA of the single decision ("depth 1") less that of the strategy, paired, with its standard error,
+and "(none)" where it is less than two of these above zero. "kept" is a single decision about courses that are kept for
+as long as the deepest strategy looks ahead. Times are process CPU time of planning, a decision, in a process of one
+thread. More time cannot better the single decision: the scenes' reward needs no samples, and all its joint actions are
+evaluated.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
+from functools import partial
+from multiprocessing import get_context
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from vedette.control import Plan, Planner
+from vedette.evaluation.metrics import ospa_of_run
+from vedette.evaluation.runs import measure_run
+from vedette.kernels.base.types import Floats
+from vedette.scenarios import load_scenario, with_fields
+from vedette.scenarios.build import build_experiment, build_planner
+from vedette.simulation import simulate
+
+SCENES = ("beyond-the-gap", "two-searchers")
+STEPS = {"beyond-the-gap": 30.0, "two-searchers": 15.0}  # m, length of a step in a second
+DEEPEST = 5
+
+
+class Strategy(NamedTuple):
+    """A row of the table."""
+
+    name: str
+    planner: str
+    fields: dict[str, Any]
+
+
+class Score(NamedTuple):
+    """What came of one run."""
+
+    ospa: float
+    gospa: float
+    seconds: float
+
+
+def strategies(scene: str) -> tuple[Strategy, ...]:
+    """The rows of a scene; the first is what the others are compared with."""
+    model = load_scenario(scene).model
+    directions = model.sensors[0].platform.model_dump()["directions_deg"]
+    kept = {"kind": "courses", "speeds": [STEPS[scene], 0.0], "headings_deg": list(directions)}
+    rows = [
+        Strategy("depth 1", "jdm", {}),
+        Strategy(f"kept {DEEPEST} s", "jdm", {"sensors.*.platform": kept, "control.horizon_steps": DEEPEST}),
+    ]
+    for depth in (3, DEEPEST):
+        for method in ("beam", "tree"):
+            fields = {"control.lookahead.depth": depth, "control.lookahead.method": method}
+            rows.append(Strategy(f"depth {depth}, {method}", "lookahead", fields))
+    return tuple(rows)
+
+
+class Timed:
+    """A planner with a clock of the process's CPU time."""
+
+    def __init__(self, planner: Planner) -> None:
+        self.planner = planner
+        self.seconds: list[float] = []
+
+    @property
+    def name(self) -> str:
+        """As of the planner."""
+        return self.planner.name
+
+    def plan(self, *situation: Any, rng: np.random.Generator) -> Plan:
+        """As of the planner."""
+        begin = time.process_time()
+        plan = self.planner.plan(*situation, rng=rng)
+        self.seconds.append(time.process_time() - begin)
+        return plan
+
+
+def score(scene: str, strategy: Strategy, run: int, seed: int) -> Score:
+    """One run."""
+    scenario = with_fields(load_scenario(scene), strategy.fields)
+    planner, ospa = build_planner(scenario, strategy.planner, 1), scenario.model.ospa
+    assert planner is not None
+    timed = Timed(planner)
+    ospa_of = partial(ospa_of_run, cutoff=ospa.cutoff, order=ospa.order, components=ospa.components)
+    record = simulate(build_experiment(scenario), timed, seed=seed, run=run, score=ospa_of)
+    gospa = float(measure_run(record, scenario).gospa_m.mean())
+    return Score(float(record.ospa[:, 0].mean()), gospa, float(np.median(timed.seconds)))
+
+
+def with_error(values: Floats) -> str:
+    """Mean and standard error."""
+    error = values.std(ddof=1) / np.sqrt(len(values)) if len(values) > 1 else np.nan
+    return f"{values.mean():.2f} ± {error:.2f}"
+
+
+def table(scene: str, rows: dict[str, Floats]) -> Iterator[str]:
+    """The lines of a scene's table, of scores (num_runs, 3) by strategy."""
+    yield "| Strategy | OSPA (m) | GOSPA (m) | CPU ms a decision | GOSPA gained on depth 1 (m) |"
+    yield "| --- | ---: | ---: | ---: | ---: |"
+    single = next(iter(rows.values()))
+    for name, scores in rows.items():
+        gains = single[:, 1] - scores[:, 1]
+        error = gains.std(ddof=1) / np.sqrt(len(gains)) if len(gains) > 1 else np.inf
+        gain = "" if scores is single else with_error(gains) + ("" if gains.mean() > 2.0 * error else " (none)")
+        cells = [name, with_error(scores[:, 0]), with_error(scores[:, 1]), f"{1e3 * np.median(scores[:, 2]):.0f}", gain]
+        yield "| " + " | ".join(cells) + " |"
+    yield ""
+    yield f"{len(single)} paired runs of {scene}."
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("scenes", nargs="*", default=SCENES, help=f"of {', '.join(SCENES)}")
+    parser.add_argument("--runs", type=int, default=6, help="of each strategy")
+    parser.add_argument("--seed", type=int, default=5)
+    parser.add_argument("--only", nargs="+", default=(), help="of the strategies but the first, these")
+    parser.add_argument("--workers", type=int, default=1, help="processes")
+    given = parser.parse_args()
+    with ProcessPoolExecutor(given.workers, get_context("spawn")) as pool:
+        for scene in given.scenes:
+            tasks = {
+                strategy.name: [pool.submit(score, scene, strategy, run, given.seed) for run in range(given.runs)]
+                for place, strategy in enumerate(strategies(scene))
+                if place == 0 or not given.only or strategy.name in given.only
+            }
+            rows = {name: np.array([run.result() for run in runs]) for name, runs in tasks.items()}
+            print(f"\n## {scene}\n", *table(scene, rows), sep="\n", flush=True)
+
+
+if __name__ == "__main__":
+    main()

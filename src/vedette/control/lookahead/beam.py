@@ -1,0 +1,112 @@
+"""Beams of sequences, sensor by sensor: an ascent over the sensors, along lines that are searched by beams."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from vedette.control.lookahead.courses import Sequence
+from vedette.control.lookahead.problem import JointSequence, SequenceProblem
+from vedette.models.arguments import dimension
+
+# Values nearer than this, relative to the larger magnitude or 1, are equal.
+_TIE = 1e-9
+
+
+@dataclass(frozen=True, slots=True)
+class BeamSearch:
+    """One sensor at a time, the others held: a beam of its best beginnings grows decision by decision.
+
+    A beginning is worth what the sequence is worth that keeps to its last action until the end, so that what lies far
+    ahead is seen from the first decision on, and whatever is evaluated is a whole sequence; of equal beginnings those
+    drawn at random stay. At first each sensor joins those before it, the ones after it not scanning; then one after the
+    other is searched again until none alone does better; at last, where the budget has room, all combinations of the
+    sensors' beams are tried, and if one is better, it goes on from there.
+
+    Attributes:
+        beam_width: beginnings that are kept at each decision.
+    """
+
+    beam_width: int = 8
+
+    def __post_init__(self) -> None:
+        dimension("beam_width", self.beam_width)
+
+    def search(self, problem: SequenceProblem, *, rng: np.random.Generator) -> None:
+        """Until nothing is better, or the budget is used up."""
+        chosen: list[Sequence | None] = [None] * problem.num_sensors
+        beams: list[list[Sequence]] = [[] for _ in chosen]
+        for s in range(problem.num_sensors):
+            # Every sensor has its share of the budget, and one evaluation is left for what comes of it.
+            share = (problem.left - 1) // (problem.num_sensors - s)
+            beams[s] = self._grow(problem, chosen, s, share, rng)
+            chosen[s] = beams[s][0]
+        joint = tuple(own for own in chosen if own is not None)
+        value = problem.evaluate([joint])[0]
+        while problem.left > 0:
+            joint, value, beams = self._ascend(problem, joint, value, beams, rng)
+            if math.prod(map(len, beams)) > problem.left:
+                return
+            combined: list[JointSequence] = list(itertools.product(*beams))
+            values = problem.evaluate(combined)
+            if not _is_better(max(values), value):
+                return
+            value = max(values)
+            joint = combined[values.index(value)]
+
+    def _ascend(
+        self,
+        problem: SequenceProblem,
+        joint: JointSequence,
+        value: float,
+        beams: list[list[Sequence]],
+        rng: np.random.Generator,
+    ) -> tuple[JointSequence, float, list[list[Sequence]]]:
+        """Search the sensors in turn until none alone does better."""
+        settled, s, beams = 0, 0, list(beams)
+        while settled < problem.num_sensors and problem.left > 0:
+            beams[s] = self._grow(problem, list(joint), s, problem.left, rng)
+            other = (*joint[:s], beams[s][0], *joint[s + 1 :])
+            found, settled = problem.evaluate([other])[0], settled + 1
+            if _is_better(found, value):
+                joint, value, settled = other, found, 1
+            s = (s + 1) % problem.num_sensors
+        return joint, value, beams
+
+    def _grow(
+        self,
+        problem: SequenceProblem,
+        chosen: list[Sequence | None],
+        sensor: int,
+        most: int,
+        rng: np.random.Generator,
+    ) -> list[Sequence]:
+        """The best whole sequences of one sensor that were found with at most so many evaluations, the best first."""
+        tree = problem.trees[sensor]
+        ahead, behind = tuple(chosen[:sensor]), tuple(chosen[sensor + 1 :])
+        beam: list[Sequence] = [()]
+        for stages_left in reversed(range(problem.depth)):
+            if most < 1:
+                break
+            longer = [(*taken, k) for taken in beam for k in range(tree.size(taken))][:most]
+            values = problem.evaluate([(*ahead, tree.kept(taken), *behind) for taken in longer])
+            most -= len(longer)
+            width = self.beam_width
+            if stages_left > 0:
+                width = min(width, max(1, most // (stages_left * tree.size(()))))
+            beam = [longer[i] for i in _ranked(values, rng)[:width]]
+        return [tree.kept(taken) for taken in beam]
+
+
+def _is_better(value: float, than: float) -> bool:
+    return value > than + _TIE * max(1.0, abs(than)) if math.isfinite(than) else value > than
+
+
+def _ranked(values: list[float], rng: np.random.Generator) -> list[int]:
+    """Places of the values, the largest first; equal ones in random order."""
+    scale = _TIE * max(1.0, max(map(abs, filter(math.isfinite, values)), default=1.0))
+    order = np.lexsort((rng.random(len(values)), -np.round(np.array(values) / scale)))
+    return [int(place) for place in order]

@@ -1,0 +1,175 @@
+"""Joint decisions over several periods, of which the first actions are taken: open-loop receding horizon."""
+
+from __future__ import annotations
+
+import copy
+import itertools
+import math
+from dataclasses import dataclass, field, replace
+from functools import partial
+
+import numpy as np
+
+from vedette.control.additive.evaluator import AdditiveEvaluator
+from vedette.control.evidence import Evidence
+from vedette.control.inputs import check_poses, check_sensors
+from vedette.control.lookahead.beam import BeamSearch
+from vedette.control.lookahead.courses import CourseTree, Stages
+from vedette.control.lookahead.laid_courses import LaidCourses
+from vedette.control.lookahead.problem import Best, Part, SequenceProblem, SequenceSearch
+from vedette.control.plan import Bound, Plan
+from vedette.control.preparation import AnyReward, Sums, prepare_sums
+from vedette.control.rewards import CauchySchwarzReward
+from vedette.control.settings import MobileSensor, PlanningSettings
+from vedette.errors import NumericalError
+from vedette.fusion import Fusion
+from vedette.kernels.base.types import Floats
+from vedette.models.arguments import dimension, generator, positive, probability, reject
+from vedette.platforms import Options
+from vedette.tracking import State
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class HorizonPlanner:
+    """Joint decision making over `depth` decisions in a row: the first joint action of the best joint sequence.
+
+    The later actions are chosen without regard to what the scans before them will show (open loop), and chosen anew
+    when their time comes. Targets move, and pseudo-updates go on, up to the end of the last decision's horizon. With a
+    depth of 1 it is a `JointPlanner` on LMB beliefs.
+
+    A sequence is worth the reward of the belief at the end of that horizon over the prediction for then; or with a
+    `discount` g the sum of g^(d - 1) times the reward at the end of the horizon of decision d, which is how losses on
+    the way count. Of a reward at the end alone what is learnt late counts most, and the same decision taken again and
+    again may put off what it means to do; a divergence measures all that was learnt by then, so that its sum counts
+    what is learnt early several times.
+
+    Attributes:
+        sensors, fusion, settings, reward: as of `JointPlanner`; the horizon of the settings is that of one decision.
+            Reward and fusion are such as are sums over labels; GLMB beliefs are planned on as LMBs, and plans say so.
+        depth: number of decisions.
+        period: s from a decision to the next, a whole multiple of the settings' period; None: their horizon.
+        search: which joint sequences are evaluated, where the budget is too small for all.
+        budget: how many joint sequences are evaluated at most.
+        discount: g in [0, 1]; None: only the end counts.
+        notes: what every plan is to say.
+
+    Raises:
+        InputError: names the field, what was expected and what came.
+    """
+
+    sensors: tuple[MobileSensor, ...]
+    fusion: Fusion
+    settings: PlanningSettings = field(default_factory=PlanningSettings)
+    reward: AnyReward = field(default_factory=CauchySchwarzReward)
+    depth: int = 3
+    period: float | None = None
+    search: SequenceSearch = field(default_factory=BeamSearch)
+    budget: int = 2000
+    discount: float | None = None
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        dimension("depth", self.depth)
+        dimension("budget", self.budget)
+        if self.discount is not None:
+            probability("discount", self.discount)
+        if self.period is not None:
+            positive("period", self.period)
+            steps = self.period / self.settings.horizon_period
+            if round(steps) < 1 or abs(steps - round(steps)) > 1e-9 * steps:
+                multiple = f"a whole multiple of the horizon_period, {self.settings.horizon_period:g}"
+                raise reject("period", multiple, self.period)
+
+    @property
+    def name(self) -> str:
+        """The strategy "lookahead"."""
+        return "lookahead"
+
+    def plan(self, state: State, poses: Floats, *, rng: np.random.Generator) -> Plan:
+        """The first actions of the best joint sequence that was found; of equal ones the first in printed order.
+
+        The tables are those of the first actions, each worth the best sequence found that begins with it; the whole
+        sequence is in `Plan.sequence`, the counts of the curve are of joint sequences. Arguments as of
+        `JointPlanner.plan`; the search draws after the samples.
+
+        Raises:
+            InputError: inputs that do not fit, or a reward or fusion that is no sum over labels.
+            ModelError, NumericalError: as the filters; no sequence whose reward is a number.
+        """
+        generator(rng)
+        trees = self._trees(poses)
+        sums = prepare_sums(self.sensors, self.fusion, self.settings, self.reward, state)
+        problem, first = self._problem(trees, sums, rng)
+        num_joint = math.prod(tree.count(self.budget) for tree in trees)
+        if num_joint <= self.budget:
+            problem.evaluate(itertools.product(*(tree.all() for tree in trees)))
+        else:
+            self.search.search(problem, rng=rng)
+        return self._plan(problem, first, sums, complete=num_joint <= self.budget)
+
+    def _trees(self, poses: Floats) -> tuple[CourseTree, ...]:
+        check_sensors(self.sensors)
+        settings, at = self.settings, check_poses(poses, len(self.sensors))
+        steps = settings.horizon_steps
+        stride = steps if self.period is None else round(self.period / settings.horizon_period)
+        stages = Stages(self.depth, stride, steps, float(settings.horizon_period))
+        return tuple(
+            CourseTree(f"sensors[{s}].platform", sensor.platform, pose, stages)
+            for s, (sensor, pose) in enumerate(zip(self.sensors, at, strict=True))
+        )
+
+    def _problem(
+        self, trees: tuple[CourseTree, ...], sums: Sums, rng: np.random.Generator
+    ) -> tuple[SequenceProblem, AdditiveEvaluator]:
+        """What is searched, and an evaluator whose options are those of the first decision."""
+        options = tuple(tree.options(()) for tree in trees)
+        samples = copy.deepcopy(rng)
+        nothing = tuple(own._replace(courses=own.courses[:0]) for own in options)
+        first = replace(self._lay_out(options[0].courses.shape[1], sums, nothing, rng), options=options)
+
+        def part(weight: float, stage: int) -> Part:
+            num_steps = trees[0].stages.num_steps(stage)
+            # From one state of the random numbers, and so of the same samples.
+            lay_out = partial(self._lay_out, num_steps, sums)
+            return Part(
+                weight, LaidCourses(trees, stage, lambda own: lay_out(own, copy.deepcopy(samples)), first.counts)
+            )
+
+        if self.discount is None:
+            parts = [part(1.0, self.depth)]
+        else:
+            parts = [part(self.discount**d, d + 1) for d in range(self.depth) if self.discount > 0.0 or d == 0]
+        return SequenceProblem(trees, self.depth, tuple(parts), self.budget), first
+
+    def _lay_out(
+        self, num_steps: int, sums: Sums, options: tuple[Options, ...], rng: np.random.Generator
+    ) -> AdditiveEvaluator:
+        settings = replace(self.settings, horizon_steps=num_steps)
+        return AdditiveEvaluator.prepare(
+            self.sensors, options, sums.rule, settings, self.reward, sums.fused, sums.local, rng=rng
+        )
+
+    def _plan(self, problem: SequenceProblem, first: AdditiveEvaluator, sums: Sums, *, complete: bool) -> Plan:
+        best = _best(problem)
+        evidence = Evidence(first, tuple(range(len(self.sensors))), first.joint())
+        evidence.note(np.array(list(problem.found)), np.array([own.rewards for own in problem.found.values()]))
+        courses = tuple(own[0] for own in best.sequence)
+        chosen = tuple(own.first_action(course) for own, course in zip(first.options, courses, strict=True))
+        counts, found = first.account()
+        return Plan(
+            self.name,
+            tuple(own.actions for own in first.options),
+            chosen,
+            evidence.tables(courses),
+            counts,
+            (*self.notes, *sums.notes, *found),
+            problem.curve(),
+            Bound(best.value, best.value, "exhaustive") if complete else None,
+            sequence=tuple(tree.rows(own) for tree, own in zip(problem.trees, best.sequence, strict=True)),
+        )
+
+
+def _best(problem: SequenceProblem) -> Best:
+    if not any(math.isfinite(own.value) for own in problem.found.values()):
+        raise NumericalError("sequences of actions: expected at least one whose reward is a finite number; got none")
+    return problem.best()

@@ -1,0 +1,145 @@
+"""Monte-Carlo tree search over the joint sequences, one sensor's course at a time, decision after decision."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from vedette.control.lookahead.courses import Sequence
+from vedette.control.lookahead.problem import JointSequence, SequenceProblem
+from vedette.models.arguments import dimension, non_negative, reject
+
+# Rounds without an evaluation after which a tree that leads to what is known already is given up.
+_IDLE_ROUNDS = 50
+
+
+@dataclass(frozen=True, slots=True)
+class TreeSearch:
+    """Upper confidence bounds on trees (Kocsis, Szepesvari 2006) for one decision whose values hold no chance.
+
+    A node is a beginning: the courses of all sensors at the first decisions, and of the first sensors at the next. From
+    the root the child is taken whose mean value, scaled to the values seen so far, plus
+    exploration sqrt(ln(visits) / visits of the child) is largest, until a node has a child that was never tried; from
+    there the sequence is completed by a rollout. Branches that are known whole are not entered again.
+
+    Attributes:
+        exploration: weight of what was seldom tried.
+        rollout: "random": courses drawn at random; "kept": every sensor keeps to its last action.
+        batch: rollouts that are evaluated together, which is quicker; each counts as a visit before its value is known.
+
+    Raises:
+        InputError: an exploration below 0, another rollout, a batch below 1.
+    """
+
+    exploration: float = 0.3
+    rollout: Literal["random", "kept"] = "random"
+    batch: int = 16
+
+    def __post_init__(self) -> None:
+        non_negative("exploration", self.exploration)
+        dimension("batch", self.batch)
+        if self.rollout not in ("random", "kept"):
+            raise reject("rollout", "random or kept", self.rollout)
+
+    def search(self, problem: SequenceProblem, *, rng: np.random.Generator) -> None:
+        """Until the budget is used up, or all is known."""
+        climb, idle = _Climb(problem, self, rng), 0
+        while problem.left > 0 and not climb.root.closed and idle < _IDLE_ROUNDS:
+            before = problem.left
+            climb.round(min(self.batch, problem.left))
+            idle = idle + 1 if problem.left == before else 0
+
+
+@dataclass(slots=True, eq=False)
+class _Node:
+    untried: list[int]  # courses of the next sensor, in the order in which they will be tried
+    visits: int = 0
+    num_known: int = 0  # of the visits those whose values are known
+    total: float = 0.0  # of these values
+    closed: bool = False  # whether all below is known
+    children: dict[int, _Node] = field(default_factory=dict)
+
+
+class _Climb:
+    """A tree that grows."""
+
+    def __init__(self, problem: SequenceProblem, search: TreeSearch, rng: np.random.Generator) -> None:
+        self.problem, self.search, self.rng = problem, search, rng
+        self.lowest, self.highest = math.inf, -math.inf
+        self.root = self._node(())
+
+    def round(self, num: int) -> None:
+        """A batch of rollouts, and what came of them."""
+        paths, joints = [], []
+        for _ in range(num):
+            if self.root.closed:
+                break
+            path, courses = self._descend()
+            paths.append(path)
+            joints.append(self._completed(courses))
+        for path, value in zip(paths, self.problem.evaluate(joints), strict=True):
+            if not math.isfinite(value):
+                continue
+            self.lowest, self.highest = min(self.lowest, value), max(self.highest, value)
+            for node in path:
+                node.total += value
+                node.num_known += 1
+
+    def _descend(self) -> tuple[list[_Node], tuple[int, ...]]:
+        """The way to a node that is new, each on it visited once more; and the courses that it stands for."""
+        courses: tuple[int, ...] = ()
+        node, path = self.root, [self.root]
+        while not node.closed:
+            new = bool(node.untried)
+            course = node.untried.pop() if new else self._promising(node)
+            courses = (*courses, course)
+            if new:
+                node.children[course] = self._node(courses)
+            node = node.children[course]
+            path.append(node)
+            if new:
+                break
+        for node in reversed(path):
+            node.visits += 1
+            node.closed = node.closed or (not node.untried and all(child.closed for child in node.children.values()))
+        return path, courses
+
+    def _node(self, courses: tuple[int, ...]) -> _Node:
+        num_sensors = self.problem.num_sensors
+        stage, sensor = divmod(len(courses), num_sensors)
+        if stage == self.problem.depth:
+            return _Node([], closed=True)
+        num = self.problem.trees[sensor].size(courses[sensor::num_sensors])
+        return _Node([int(course) for course in self.rng.permutation(num)])
+
+    def _promising(self, node: _Node) -> int:
+        """The child to go on with, of those that are not known whole."""
+        spread = self.highest - self.lowest
+        log = math.log(node.visits)
+
+        def bound(item: tuple[int, _Node]) -> float:
+            child = item[1]
+            # What is not known yet counts as the worst.
+            above = child.total - child.num_known * self.lowest
+            mean = above / (child.visits * spread) if spread > 0.0 else 0.0
+            return mean + self.search.exploration * math.sqrt(log / child.visits)
+
+        return max((item for item in node.children.items() if not item[1].closed), key=bound)[0]
+
+    def _completed(self, courses: tuple[int, ...]) -> JointSequence:
+        num_sensors = self.problem.num_sensors
+        sequences = (courses[s::num_sensors] for s in range(num_sensors))
+        return tuple(self._rolled_out(s, own) for s, own in enumerate(sequences))
+
+    def _rolled_out(self, sensor: int, taken: Sequence) -> Sequence:
+        tree = self.problem.trees[sensor]
+        if self.search.rollout == "kept" and taken:
+            return tree.kept(taken)
+        while len(taken) < self.problem.depth:
+            taken = (*taken, int(self.rng.integers(tree.size(taken))))
+            if self.search.rollout == "kept":
+                return tree.kept(taken)
+        return taken

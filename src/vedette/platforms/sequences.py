@@ -1,0 +1,91 @@
+"""Sequences of actions: what a platform does over several decisions, as one action."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vedette.errors import InputError
+from vedette.kernels.base.types import Floats, Ints
+from vedette.models.arguments import dimension, positive
+from vedette.platforms.base import Platform, actions_at, check_platform, course_of
+
+# More sequences are not listed: they are a power of the number of actions.
+MAX_SEQUENCES = 1_000_000
+
+# A time this share of a period after a decision is the time of the decision: sums of periods are rounded.
+_AT_ONCE = 1e-9
+
+
+@dataclass(frozen=True, slots=True)
+class Sequences:
+    """Several actions of another platform, one after the other, as one action.
+
+    At the very moment of a later decision the platform is where, and as, the action before has taken it. After the last
+    the action goes on.
+
+    Attributes:
+        platform: whose actions they are. What it may do later is what it may do at the pose where it then is, so
+            sequences are the ways through a tree.
+        period: s, from the beginning of an action to that of the next.
+        depth: number of actions.
+
+    Raises:
+        InputError: no platform, a period that is not above 0, a depth below 1.
+    """
+
+    platform: Platform
+    period: float
+    depth: int
+
+    def __post_init__(self) -> None:
+        check_platform("platform", self.platform)
+        positive("period", self.period)
+        dimension("depth", self.depth)
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Those of the platform for each stage, counted from 1: `heading_deg_1`, `heading_deg_2`, ..."""
+        return tuple(f"{name}_{stage}" for stage in range(1, self.depth + 1) for name in self.platform.columns)
+
+    def actions(self, pose: Floats) -> Floats:
+        """(num_sequences, depth * num_columns of the platform), the last stage fastest.
+
+        Raises `InputError` for more than a million sequences, and for actions or poses that are none.
+        """
+        rows, poses = np.empty((1, 0)), pose[np.newaxis]
+        own: list[Floats] = []
+        for stage in range(self.depth):
+            if stage > 0:
+                poses = self._ends(poses, own)
+            own = [actions_at("platform", self.platform, at).values for at in poses]
+            if (num := sum(map(len, own))) > MAX_SEQUENCES:
+                raise InputError(
+                    f"depth: expected at most {MAX_SEQUENCES} sequences of actions; got {num} after {stage + 1} of "
+                    f"{self.depth} decisions"
+                )
+            rows = np.hstack([np.repeat(rows, [len(actions) for actions in own], axis=0), np.concatenate(own)])
+        return rows
+
+    def course(self, pose: Floats, action: Floats, times: Floats) -> Floats:
+        """The courses of the actions one after the other, each from where the one before ended."""
+        poses, stages, num = np.tile(pose, (len(times), 1)), self._stages(times), len(self.platform.columns)
+        at = pose
+        for stage in range(self.depth):
+            own, row = stages == stage, action[stage * num : (stage + 1) * num]
+            moments = np.append(times[own] - stage * self.period, self.period)
+            course = course_of("platform", self.platform, at, row, moments)
+            poses[own], at = course[:-1], course[-1]
+        return poses
+
+    def _ends(self, poses: Floats, actions: list[Floats]) -> Floats:
+        """Where the actions from each pose have taken it when the next one begins."""
+        end, pairs = np.array([self.period]), zip(poses, actions, strict=True)
+        ends = [course_of("platform", self.platform, at, row, end)[0] for at, own in pairs for row in own]
+        return np.array(ends)
+
+    def _stages(self, times: Floats) -> Ints:
+        """(num_times,) the action that the platform is under, counted from 0."""
+        begun = np.ceil(times / self.period - _AT_ONCE) - 1.0
+        return np.asarray(np.clip(begun, 0, self.depth - 1).astype(np.int64))

@@ -1,0 +1,88 @@
+"""Targets that are drawn anew in every run: born, moving, dying and leaving at random."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from vedette.errors import ModelError
+from vedette.kernels.base.types import Floats
+from vedette.models import MotionModel, Region
+from vedette.models.arguments import float_array, generator, non_negative, probability
+from vedette.simulation.truth import Truth, scan_times, semidefinite_factor
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PoissonTargets:
+    """At each scan a Poisson number of targets is born, each at a state drawn from one Gaussian.
+
+    From scan to scan a target dies or moves, with the motion's process noise; outside the region it is gone for good.
+
+    Attributes:
+        motion: how they move.
+        expected: mean number of births a scan.
+        mean: (state_dim,) of a birth's state.
+        cov: (state_dim, state_dim) covariance of a birth's state, positive semidefinite.
+        death_probability: that a target dies between two scans.
+        region: where targets are; None: everywhere.
+
+    Raises:
+        InputError: names the field, what was expected and what came.
+    """
+
+    motion: MotionModel
+    expected: float
+    mean: Floats
+    cov: Floats
+    death_probability: float = 0.0
+    region: Region | None = None
+
+    def __post_init__(self) -> None:
+        dim = self.motion.state_dim
+        object.__setattr__(self, "mean", float_array("PoissonTargets.mean", self.mean, (dim,)))
+        object.__setattr__(self, "cov", float_array("PoissonTargets.cov", self.cov, (dim, dim)))
+        non_negative("PoissonTargets.expected", self.expected)
+        probability("PoissonTargets.death_probability", self.death_probability)
+        semidefinite_factor(self.cov)
+
+    def truth(self, times: ArrayLike, *, rng: np.random.Generator) -> Truth:
+        """All births first, scan after scan; then each target's life.
+
+        Raises:
+            InputError: the scan times do not increase.
+            ModelError: a motion function raised, or gave a state that is not finite.
+        """
+        scans = scan_times(times)
+        generator(rng)
+        births = np.repeat(np.arange(len(scans)), rng.poisson(self.expected, len(scans)))
+        noise = rng.standard_normal((len(births), len(self.mean)))
+        starts = self.mean + noise @ semidefinite_factor(self.cov).T
+        alive = np.zeros((len(births), len(scans)), np.bool_)
+        states = np.zeros((len(births), len(scans), len(self.mean)))
+        for target, (birth, state) in enumerate(zip(births.tolist(), starts, strict=True)):
+            life = self._life(state, scans[birth:], rng)
+            alive[target, birth : birth + len(life)] = True
+            states[target, birth : birth + len(life)] = life
+        return Truth.from_arrays(scans, alive, states)
+
+    def _life(self, state: Floats, times: Floats, rng: np.random.Generator) -> Floats:
+        """(num_scans of its life, state_dim) states from its first scan on."""
+        life: list[Floats] = []
+        for scan in range(len(times)):
+            if scan > 0:
+                if rng.random() < self.death_probability:
+                    break
+                state = self._moved(state, float(times[scan] - times[scan - 1]), rng)
+            if self.region is not None and not self.region.contains(state[np.newaxis, :2])[0]:
+                break
+            life.append(state)
+        return np.array(life).reshape(-1, len(state))
+
+    def _moved(self, state: Floats, dt: float, rng: np.random.Generator) -> Floats:
+        factor = semidefinite_factor(self.motion.noise_cov(state, dt))
+        moved = self.motion.propagate(state, dt)[0] + factor @ rng.standard_normal(len(state))
+        if not np.isfinite(moved).all():
+            raise ModelError(f"motion of a target at state {state}, dt {dt}: expected a finite state; got {moved}")
+        return np.asarray(moved)

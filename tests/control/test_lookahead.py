@@ -1,0 +1,271 @@
+"""Decisions over several periods against all sequences written out, and against single decisions."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from control.examples import HEADINGS, SETTINGS, Situation, mobile_sensor, situation
+from vedette import models
+from vedette.control import (
+    BeamSearch,
+    CauchySchwarzReward,
+    ExpectedLossReward,
+    HorizonPlanner,
+    IndependentPlanner,
+    JointPlanner,
+    KullbackLeiblerReward,
+    MobileSensor,
+    Plan,
+    TreeSearch,
+)
+from vedette.densities import LMB
+from vedette.errors import InputError
+from vedette.fusion import Clmb
+from vedette.platforms import Courses, Sequences, Steps
+
+KNOWN = replace(SETTINGS, association="known")
+REWARDS = [CauchySchwarzReward(), KullbackLeiblerReward(), ExpectedLossReward()]
+SEARCHES = [BeamSearch(), BeamSearch(2), TreeSearch(), TreeSearch(rollout="kept", batch=1)]
+
+
+def lmbs(num_sensors: int = 2, **sensor: Any) -> Situation:
+    return situation("lmb", num_sensors, settings=KNOWN, **sensor)
+
+
+def planner(given: Situation, reward: Any = None, **arguments: Any) -> HorizonPlanner:
+    reward = CauchySchwarzReward() if reward is None else reward
+    return HorizonPlanner(given.sensors, given.fusion, given.settings, reward, **arguments)
+
+
+def decide(planner: Any, given: Situation, seed: int = 1) -> Plan:
+    plan: Plan = planner.plan(*given.arguments, rng=np.random.default_rng(seed))
+    plan.validate()
+    return plan
+
+
+def of_sequences(given: Situation, reward: Any, depth: int, period: float, num_steps: int) -> Plan:
+    """All joint sequences as joint actions of another platform: the oracle."""
+    sensors = tuple(MobileSensor(own.filter, Sequences(own.platform, period, depth)) for own in given.sensors)
+    settings = replace(given.settings, horizon_steps=num_steps)
+    return decide(JointPlanner(sensors, given.fusion, settings, reward), given)
+
+
+@pytest.mark.parametrize("reward", REWARDS, ids=lambda reward: type(reward).__name__)
+@pytest.mark.parametrize("mode", ["ideal", "expected", "sampled"])
+def test_one_decision_is_that_of_the_joint_planner(reward: Any, mode: Any) -> None:
+    given = lmbs()
+    given = replace(given, settings=replace(given.settings, ideal_measurements=mode))
+    joint = decide(JointPlanner(given.sensors, given.fusion, given.settings, reward), given)
+    ahead = decide(planner(given, reward, depth=1), given)
+    assert ahead.chosen == joint.chosen
+    assert ahead.counts == joint.counts
+    assert ahead.bound == joint.bound
+    for mine, other in zip(ahead.tables, joint.tables, strict=True):
+        np.testing.assert_array_equal(mine.mean, other.mean)
+        np.testing.assert_array_equal(mine.standard_error, other.standard_error)
+    assert [rows.tolist() for rows in ahead.sequence] == [[row.tolist()] for row in joint.chosen_actions]
+
+
+@pytest.mark.parametrize("reward", REWARDS, ids=lambda reward: type(reward).__name__)
+@pytest.mark.parametrize(("period", "num_steps"), [(None, 4), (4.0, 3)])
+def test_values_are_those_of_sequences_as_joint_actions(reward: Any, period: float | None, num_steps: int) -> None:
+    given = lmbs()
+    ahead = decide(planner(given, reward, depth=2, period=period), given)
+    oracle = of_sequences(given, reward, 2, period or 8.0, num_steps)
+    # Axes: first and second action of each sensor; the best second ones are left.
+    mean = oracle.tables[0].mean.reshape((3,) * 4)
+    np.testing.assert_allclose(ahead.tables[0].mean, mean.max(axis=(1, 3)), rtol=1e-12)
+    assert ahead.chosen == tuple(np.unravel_index(mean.max(axis=(1, 3)).argmax(), (3, 3)))
+    for rows, row in zip(ahead.sequence, oracle.chosen_actions, strict=True):
+        np.testing.assert_array_equal(rows.ravel(), row)
+    assert ahead.bound is not None
+    assert ahead.bound.kind == "exhaustive"
+    assert ahead.bound.upper == pytest.approx(mean.max(), rel=1e-12)
+
+
+def test_a_discount_adds_what_each_decision_gains() -> None:
+    given, reward = lmbs(), ExpectedLossReward()
+    single = decide(JointPlanner(given.sensors, given.fusion, given.settings, reward), given).tables[0].mean
+    double = of_sequences(given, reward, 2, 8.0, 4).tables[0].mean.reshape((3,) * 4)
+    total = single[:, np.newaxis, :, np.newaxis] + 0.7 * double
+    ahead = decide(planner(given, reward, depth=2, discount=0.7), given)
+    np.testing.assert_allclose(ahead.tables[0].mean, total.max(axis=(1, 3)), rtol=1e-12)
+    # Of no weight, later decisions are not looked at.
+    first = decide(planner(given, reward, depth=2, discount=0.0), given)
+    np.testing.assert_allclose(first.tables[0].mean, single, rtol=1e-12)
+
+
+@pytest.mark.parametrize("search", SEARCHES, ids=repr)
+@pytest.mark.parametrize("budget", [1, 7, 60, 400])
+def test_searches_keep_to_their_budget_and_value_as_the_oracle_does(search: Any, budget: int) -> None:
+    given = lmbs()
+    plan = decide(planner(given, depth=3, search=search, budget=budget), given)
+    assert plan.curve is not None
+    assert plan.curve.evaluations[-1] <= budget
+    assert (np.diff(plan.curve.best) >= 0.0).all()
+    mean = of_sequences(given, CauchySchwarzReward(), 3, 8.0, 6).tables[0].mean
+    place = [0, 0]
+    for s, rows in enumerate(plan.sequence):
+        for row in rows:
+            place[s] = 3 * place[s] + HEADINGS.index(float(row[0]))
+    assert plan.expected_rewards[0][0] == pytest.approx(float(mean[tuple(place)]), rel=1e-12)
+    assert plan.expected_rewards[0][0] == pytest.approx(float(plan.curve.best[-1]), rel=1e-12)
+    assert plan.bound is None
+    if budget == 400:
+        assert plan.expected_rewards[0][0] >= 0.99 * mean.max()
+
+
+@pytest.mark.parametrize("search", SEARCHES, ids=repr)
+def test_nothing_is_evaluated_twice(search: Any) -> None:
+    given = lmbs(num_sensors=1)
+    calls: list[Any] = []
+
+    class Watched:
+        def search(self, problem: Any, *, rng: np.random.Generator) -> None:
+            inner = problem.parts[0].rewards
+
+            def rewards(joints: list[Any]) -> Any:
+                calls.extend(joints)
+                return inner(joints)
+
+            rewards.stage = inner.stage  # type: ignore[attr-defined]
+            problem.parts = (problem.parts[0]._replace(rewards=rewards),)
+            search.search(problem, rng=rng)
+
+    decide(planner(given, depth=3, search=Watched(), budget=26), given)
+    assert len(calls) == len(set(calls)) <= 26
+
+
+def test_a_tree_that_is_known_whole_ends_the_search() -> None:
+    given = lmbs(num_sensors=1)
+
+    class Whole:
+        def search(self, problem: Any, *, rng: np.random.Generator) -> None:
+            problem.budget = 1000
+            TreeSearch(batch=4).search(problem, rng=rng)
+
+    plan = decide(planner(given, depth=3, search=Whole(), budget=26), given)
+    assert plan.curve is not None
+    assert plan.curve.evaluations[-1] == 27
+
+
+@pytest.mark.parametrize("search", SEARCHES, ids=repr)
+def test_what_lies_beyond_the_next_decision_is_found(search: Any) -> None:
+    """A target round a corner: east, then north, then north, where a single decision sees nothing."""
+    detection = models.limited_range(0.95, 50.0)
+    sensor = mobile_sensor("lmb", Steps(100.0, 100.0, (0.0, 90.0, 180.0, 270.0)), detection=detection)
+    belief = LMB.from_bernoullis([(0, 0)], [0.9], [[100.0, 200.0, 0.0, 0.0]], [np.diag([25.0, 25.0, 1.0, 1.0])])
+    settings = replace(KNOWN, horizon_steps=1, horizon_period=1.0)
+    given = Situation((sensor,), Clmb((1.0,)), settings, (belief,), belief, np.zeros((1, 3)))
+    myopic = decide(JointPlanner(given.sensors, given.fusion, settings), given)
+    assert np.ptp(myopic.tables[0].mean) < 1e-12
+    reward = CauchySchwarzReward("reference")
+    plan = decide(planner(given, reward, depth=3, search=search, budget=100), given)
+    assert plan.sequence[0].sum(axis=0).tolist() == [100.0, 200.0]
+    assert plan.expected_rewards[0][0] > 0.1
+
+
+def test_many_sensors_each_have_their_share_of_the_budget() -> None:
+    given = lmbs(num_sensors=3)
+    plan = decide(planner(given, depth=3, budget=100), given)
+    assert plan.curve is not None
+    assert plan.curve.evaluations[-1] <= 100
+    assert [rows.shape for rows in plan.sequence] == [(3, 1)] * 3
+
+
+def test_sensors_may_have_other_platforms() -> None:
+    given = lmbs()
+    moving = MobileSensor(given.sensors[1].filter, Steps(60.0, 30.0, (0.0, 90.0)))
+    turning = MobileSensor(given.sensors[0].filter, Courses((10.0, 30.0), (-45.0, 45.0), relative=True))
+    mixed = replace(given, sensors=(turning, moving))
+    plan = decide(planner(mixed, depth=3, budget=80), mixed)
+    assert [rows.shape for rows in plan.sequence] == [(3, 2), (3, 2)]
+    for rows, own, index in zip(plan.sequence, plan.actions, plan.chosen, strict=True):
+        np.testing.assert_array_equal(rows[0], own.values[index])
+
+
+def test_glmbs_are_planned_on_as_lmbs_and_the_plan_says_so() -> None:
+    given = situation("marginal", settings=KNOWN)
+    plan = decide(planner(given, depth=2, notes=("fused otherwise",)), given)
+    assert plan.notes == (
+        "fused otherwise",
+        "planned on the LMBs of the GLMB beliefs: so are all sequences of decisions",
+    )
+
+
+def test_a_seed_gives_one_plan() -> None:
+    given = lmbs()
+    for search in (BeamSearch(3), TreeSearch()):
+        first, second = (decide(planner(given, depth=3, search=search, budget=90), given, seed=4) for _ in range(2))
+        threads = replace(given, settings=replace(given.settings, num_threads=2))
+        third = decide(planner(threads, depth=3, search=search, budget=90), threads, seed=4)
+        for other in (second, third):
+            assert first.chosen == other.chosen
+            np.testing.assert_array_equal(first.tables[0].mean, other.tables[0].mean)
+
+
+def test_combined_beams_find_what_no_sensor_finds_alone() -> None:
+    """Of all joint sequences none is better than by combining whole beams."""
+    given = lmbs()
+    best = decide(planner(given, depth=2, budget=81), given).expected_rewards[0][0]
+    found = decide(planner(given, depth=2, budget=80, search=BeamSearch(9)), given).expected_rewards[0][0]
+    assert found == pytest.approx(best, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"depth": 0}, "depth"),
+        ({"budget": 0}, "budget"),
+        ({"discount": 1.5}, "discount"),
+        ({"period": -1.0}, "period"),
+        ({"period": 6.0}, "period: expected a whole multiple of the horizon_period, 4; got 6.0"),
+    ],
+)
+def test_bad_arguments(arguments: dict[str, Any], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        planner(lmbs(), **arguments)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"exploration": -0.1}, "exploration"),
+        ({"rollout": "greedy"}, "rollout: expected random or kept"),
+        ({"batch": 0}, "batch"),
+    ],
+)
+def test_bad_searches(arguments: dict[str, Any], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        TreeSearch(**arguments)
+
+
+def test_what_is_no_sum_over_labels_is_refused() -> None:
+    given = lmbs()
+    with pytest.raises(InputError, match=r"reward, fusion: expected .* sums over labels"):
+        decide(planner(given, reward=lambda predicted, updated: 1.0), given)
+    full = replace(given, settings=SETTINGS)
+    with pytest.raises(InputError, match="association: expected known"):
+        decide(planner(full), full)
+
+
+@pytest.mark.parametrize("other", [IndependentPlanner, JointPlanner])
+def test_random_numbers_are_used_as_by_a_single_decision(other: Any) -> None:
+    """What comes after the decision draws the same numbers."""
+    given = lmbs()
+    mine, its = np.random.default_rng(3), np.random.default_rng(3)
+    planner(given, depth=1).plan(*given.arguments, rng=mine)
+    other(given.sensors, given.fusion, given.settings).plan(*given.arguments, rng=its)
+    assert mine.random() == its.random()
+
+
+def test_all_joint_sequences_are_counted() -> None:
+    given = lmbs()
+    plan = decide(planner(given, depth=2), given)
+    assert plan.curve is not None
+    assert plan.curve.evaluations.tolist() == [len(list(itertools.product(range(9), range(9))))]

@@ -1,0 +1,111 @@
+"""Decisions over several periods in a scenario."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from vedette.control import BeamSearch, HorizonPlanner, TreeSearch
+from vedette.errors import ScenarioError
+from vedette.evaluation.runs import run_scenario
+from vedette.scenarios import Scenario, load_scenario, with_fields
+from vedette.scenarios.build import build_planner, build_targets
+
+
+@pytest.fixture(scope="module")
+def gap() -> Scenario:
+    """The first scans of the scene across a gap."""
+    return with_fields(
+        load_scenario("beyond-the-gap"), {"time.num_steps": 8, "control.decision_steps": [1, 2, 3, 4, 5]}
+    )
+
+
+@pytest.fixture(scope="module")
+def plain(gap: Scenario) -> Scenario:
+    """The same without a section of its own."""
+    return with_fields(gap, {"control.lookahead": None})
+
+
+def planner_of(scenario: Scenario, lookahead: Any) -> HorizonPlanner:
+    planner = build_planner(with_fields(scenario, {"control.lookahead": lookahead}), "lookahead")
+    assert isinstance(planner, HorizonPlanner)
+    return planner
+
+
+def test_without_a_section_the_defaults_hold(plain: Scenario) -> None:
+    planner = planner_of(plain, None)
+    assert (planner.depth, planner.period, planner.budget, planner.discount) == (3, None, 2000, None)
+    assert planner.search == BeamSearch(8)
+
+
+def test_the_section_says_how(plain: Scenario) -> None:
+    beam = planner_of(plain, {"depth": 2, "beam_width": 3, "budget": 50, "discount": 0.5, "period": 4.0})
+    assert (beam.depth, beam.period, beam.budget, beam.discount) == (2, 4.0, 50, 0.5)
+    assert beam.search == BeamSearch(3)
+    tree = planner_of(plain, {"method": "tree", "exploration": 0.1, "rollout": "kept"})
+    assert tree.search == TreeSearch(0.1, "kept")
+
+
+@pytest.mark.parametrize(
+    ("fields", "message"),
+    [
+        ({"control.lookahead": {"depth": 0}}, "control.lookahead.depth"),
+        ({"control.lookahead": {"method": "forest"}}, "control.lookahead.method"),
+        (
+            {"control.lookahead": {"method": "tree", "beam_width": 4}},
+            "control.lookahead.beam_width: expected none, as it is of method beam, got 4",
+        ),
+        (
+            {"control.lookahead": {"rollout": "kept"}},
+            'control.lookahead.rollout: expected none, as it is of method tree, got "kept"',
+        ),
+        (
+            {"control.lookahead": {"period": 1.5}},
+            "control.lookahead.period: expected a whole multiple of horizon_period, 1, got 1.5",
+        ),
+        (
+            {"control.lookahead": {}, "control.association": "full"},
+            'control.association: expected known, with a lookahead, got "full"',
+        ),
+    ],
+)
+def test_faults(plain: Scenario, fields: dict[str, Any], message: str) -> None:
+    with pytest.raises(ScenarioError) as fault:
+        with_fields(plain, fields)
+    assert message in str(fault.value)
+
+
+def test_who_looks_ahead_crosses_the_gap(gap: Scenario) -> None:
+    """The single decision has nothing to gain there, and stays among the targets that it sees."""
+    ahead, single = (run_scenario(gap, name, seed=1, num_threads=1) for name in ("lookahead", "jdm"))
+    assert {decision.plan.planner for decision in ahead.decisions} == {"lookahead"}
+    assert ahead.poses[-1, :, 0].max() > 100.0
+    assert single.poses[-1, :, 0].max() < 100.0
+    plan = ahead.decisions[0].plan
+    assert [rows.shape for rows in plan.sequence] == [(5, 2), (5, 2)]
+
+
+def test_the_searchers_targets_differ_from_run_to_run() -> None:
+    scenario = load_scenario("two-searchers")
+    times = scenario.model.time.build()
+    first, second = (build_targets(scenario).truth(times, rng=np.random.default_rng(seed)) for seed in (1, 2))
+    first.validate()
+    assert not np.array_equal(first.ids, second.ids)
+    assert (np.abs(first.states[:, :2]) <= 250.0).all()
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "message"),
+    [
+        ("targets.expected", 0.0, "targets.expected"),
+        ("targets.mean", [0.0, 0.0], "targets.mean: expected 4 numbers, as a state under motion has"),
+        ("targets.std", [1.0, 1.0, 1.0, -1.0], "targets.std[3]: expected a number of at least 0"),
+        ("targets.death_probability", 1.5, "targets.death_probability"),
+    ],
+)
+def test_faults_of_targets(field: str, value: Any, message: str) -> None:
+    with pytest.raises(ScenarioError) as fault:
+        with_fields(load_scenario("two-searchers"), {field: value})
+    assert message in str(fault.value)
