@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from vedette.control import BeamSearch, HorizonPlanner, TreeSearch
-from vedette.errors import ScenarioError
+from vedette.errors import InputError, ScenarioError
 from vedette.evaluation.runs import run_scenario
 from vedette.scenarios import Scenario, load_scenario, with_fields
 from vedette.scenarios.build import build_planner, build_targets
@@ -46,6 +46,12 @@ def test_the_section_says_how(plain: Scenario) -> None:
     assert beam.search == BeamSearch(3)
     tree = planner_of(plain, {"method": "tree", "exploration": 0.1, "rollout": "kept"})
     assert tree.search == TreeSearch(0.1, "kept")
+
+
+def test_constraints_are_not_passed_over(plain: Scenario) -> None:
+    apart = with_fields(plain, {"control.constraints": [{"kind": "separation", "distance": 5.0}]})
+    with pytest.raises(InputError, match="control.constraints: expected none"):
+        build_planner(apart, "lookahead")
 
 
 @pytest.mark.parametrize(

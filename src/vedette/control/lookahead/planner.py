@@ -155,6 +155,8 @@ class HorizonPlanner:
         evidence.note(np.array(list(problem.found)), np.array([own.rewards for own in problem.found.values()]))
         courses = tuple(own[0] for own in best.sequence)
         chosen = tuple(own.first_action(course) for own, course in zip(first.options, courses, strict=True))
+        if self.settings.undetected_worth > 0.0:
+            first.notes["targets not found yet are not looked for: sequences of decisions do not"] = None
         counts, found = first.account()
         return Plan(
             self.name,
