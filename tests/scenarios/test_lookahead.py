@@ -50,7 +50,7 @@ def test_the_section_says_how(plain: Scenario) -> None:
 
 def test_constraints_are_not_passed_over(plain: Scenario) -> None:
     apart = with_fields(plain, {"control.constraints": [{"kind": "separation", "distance": 5.0}]})
-    with pytest.raises(InputError, match="control.constraints: expected none"):
+    with pytest.raises(InputError, match=r"control\.constraints: expected none"):
         build_planner(apart, "lookahead")
 
 
