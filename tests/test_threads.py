@@ -112,7 +112,7 @@ belief = LMB.from_bernoullis(
     [(1, i) for i in range(num)], [0.9] * num,
     [[100.0 * i, 30.0, 1.0, 0.0] for i in range(num)], [100.0 * np.eye(4)] * num,
 )
-settings = PlanningSettings(num_samples=30_000, num_threads=int(sys.argv[1]))
+settings = PlanningSettings(num_samples=30_000, association="full", num_threads=int(sys.argv[1]))
 kernel, done = pseudo.pseudo_update_lmb, []
 
 def counted(prior, decision, first, last, results):

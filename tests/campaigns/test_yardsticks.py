@@ -19,6 +19,7 @@ from vedette.campaigns.scores import (
 )
 from vedette.campaigns.spec import builtin_specs
 from vedette.campaigns.yardsticks import yardstick_markdown, yardsticks
+from vedette.scenarios.sections.tracking import Filter
 
 PUBLISHED = StrategyScore("published: X", 1.734, 0.31, None, None, -0.1, None, 111.1, 10)
 
@@ -42,6 +43,7 @@ def test_they_resolve_to_decisions_after_every_scan_but_the_last(name: str) -> N
         assert model.ospa.from_step == 1
         slow = name.endswith("-slow")
         assert model.motion.model_dump()["sigma_v"] == (3.0 if slow else 15.0)
+        assert isinstance(model.filter, Filter)
         assert model.filter.limits.min_existence == (0.05 if slow else 0.25)
     assert len(campaign.groups()) == (4 if name.endswith("-slow") else 1)
 

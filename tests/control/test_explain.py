@@ -33,6 +33,7 @@ from vedette.control.rewards import (
 )
 from vedette.control.search import all_joint_actions
 from vedette.control.shares import shares_of
+from vedette.densities import LMB
 from vedette.errors import InputError
 from vedette.kernels.planning.ascent import Cells
 from vedette.platforms import Actions
@@ -84,11 +85,13 @@ def test_contributions_add_up_and_are_what_joint_actions_say(reward: Any) -> Non
     near(why.baseline, value[False, False, False], why.reward)
     near(why.of_sensors, shares, why.reward)
     near(why.without, [value[False, True, True], value[True, False, True], value[True, True, False]], why.reward)
+    assert why.of_sensors is not None
     near(why.baseline + why.of_sensors.sum(), why.reward, why.reward)
     if isinstance(reward, PeecsReward):
         assert why.of_targets is None
         assert "not a sum over targets" in why.missing["of_targets"]
     else:
+        assert why.of_targets is not None
         near(why.baseline + why.of_targets.total.sum() + why.of_undetected, why.reward, why.reward)
     text_fits(why)
 
@@ -138,6 +141,7 @@ def test_existence_in_plain_numpy() -> None:
             base = (information.copy(), constant)
             for s, course in enumerate(plan.chosen):
                 after = posteriors[s].density(course * num + sample)
+                assert isinstance(after, LMB)
                 logit += after.existence_logit[i] - prediction.existence_logit[i]
                 own = np.linalg.inv(after.tracks.covs[i])
                 off = after.tracks.means[i] - prediction.tracks.means[i]
@@ -197,12 +201,13 @@ def test_what_a_sensor_had_brought_is_the_line_through_the_choice() -> None:
         InputError, match=r"expected something that sensor 2 could do \(heading_deg -90; heading_deg 0;"
     ):
         why.had(1, heading_deg=17.0)
-    for arguments, columns, message in (
+    cases: list[tuple[Any, dict[str, Any], str]] = [
         ((3, 0), {}, "one of 3 sensors, from 0"),
         ((0, 3), {}, "one of 3 actions, from 0"),
         ((0,), {}, "either the number of an action"),
         ((0,), {"speed": 3.0}, "expected columns heading_deg; got speed"),
-    ):
+    ]
+    for arguments, columns, message in cases:
         with pytest.raises(InputError, match=message):
             why.had(*arguments, **columns)
 
@@ -219,6 +224,7 @@ def test_the_runner_up_is_the_second_of_all_joint_actions() -> None:
     near(found.margin, paired.mean(), 1.0)
     error = paired.std(ddof=1) / np.sqrt(len(paired))
     near(found.standard_error, error, 1.0)
+    assert found.in_standard_errors is not None
     np.testing.assert_allclose(found.in_standard_errors, paired.mean() / error, rtol=1e-6)
     assert plan.explain().evaluations == 27
     assert plan.explain().bound is plan.bound
@@ -232,7 +238,7 @@ def test_an_independent_decision_is_the_sum_of_the_sensors_own() -> None:
     near(why.reward, sum(reward for reward, _ in plan.expected_rewards), 1.0)
     near(why.of_sensors, alone, 1.0)
     near(why.without, why.reward - alone, 1.0)
-    near(why.baseline + why.of_targets.total.sum(), why.reward, 1.0)  # type: ignore[union-attr, operator]
+    near(why.baseline + why.of_targets.total.sum(), why.reward, 1.0)  # type: ignore[union-attr]
     margins = [np.sort(values[:3])[-1] - np.sort(values[:3])[-2] for values in own]
     assert why.runner_up is not None
     near(why.runner_up.margin, min(margins), 1.0)
@@ -273,7 +279,8 @@ def test_plans_without_rewards_say_so() -> None:
     fixed = FixedPlanner((Actions.of(heading_deg=30.0),) * 2)
     for planner in (RandomPlanner(example.sensors), fixed):
         why = planner.plan(*example.arguments, rng=np.random.default_rng(1)).explain()
-        assert why.reward is why.runner_up is None
+        assert why.reward is None
+        assert why.runner_up is None
         assert "does not choose by rewards" in str(why)
         with pytest.raises(InputError, match="does not choose by rewards"):
             why.had(0, 0)

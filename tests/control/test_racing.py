@@ -208,11 +208,12 @@ def test_threads_and_repetition_change_nothing(planner: Any, indifference: float
 def test_a_plan_says_why_it_ended() -> None:
     example = certain(situation("lmb", 2, 3), association="known")
     reasons = {}
-    for name, settings in {
+    cases: dict[str, dict[str, Any]] = {
         "indifferent": {"indifference": 0.9},
         "max_samples": {"confidence": 1.0 - 1e-15, "max_samples": 24},
         "max_seconds": {"confidence": 1.0 - 1e-15, "max_seconds": 1e-9},
-    }.items():
+    }
+    for name, settings in cases.items():
         own = replace(example, settings=replace(example.settings, **settings))
         reasons[name] = plan_of(own).certainty
     for name, certainty in reasons.items():

@@ -132,6 +132,7 @@ def test_why_a_decision_was_taken_stands_with_it(tmp_path: Path) -> None:
         assert facts["Bound"] == "the best of all joint actions"
         assert facts["Evaluated"] == "144 choices"
         assert facts["Second best"].startswith("less by ")
+        assert why.runner_up is not None
         assert facts["Second best"].count(" to ") == 2 - sum(
             a == b for a, b in zip(why.runner_up.actions, decision.plan.chosen, strict=True)
         )

@@ -336,9 +336,9 @@ def test_named_strategies_replace_their_own_parts_alone() -> None:
     named = Scenario(parse_scenario(MINIMAL + NAMED))
     plain, settings = build.build_planner(named, "jdm"), named.model.control.build()
     assert isinstance(plain, JointPlanner)
-    found = {name: build.build_planner(named, name) for name in named.model.planners}
+    found: dict[str, Any] = {name: build.build_planner(named, name) for name in named.model.planners}
     assert [planner.name for planner in found.values()] == ["ascent", "bhattacharyya", "alone", "as it is"]
-    inner = {name: planner.planner for name, planner in found.items() if isinstance(planner, Named)}
+    inner: dict[str, Any] = {name: planner.planner for name, planner in found.items() if isinstance(planner, Named)}
     assert [type(planner) for planner in inner.values()] == [
         JointPlanner,
         JointPlanner,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
@@ -24,7 +25,7 @@ def lives(truth: Truth) -> list[tuple[np.ndarray, np.ndarray]]:
 
 
 def drawn(seed: int = 0, times: np.ndarray = TIMES, **fields: object) -> Truth:
-    arguments = {"expected": 0.2, "mean": MEAN, "cov": COV, "death_probability": 0.1} | fields
+    arguments: dict[str, Any] = {"expected": 0.2, "mean": MEAN, "cov": COV, "death_probability": 0.1} | fields
     truth = PoissonTargets(MOTION, **arguments).truth(times, rng=np.random.default_rng(seed))
     truth.validate()
     return truth
