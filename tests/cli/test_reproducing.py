@@ -21,7 +21,7 @@ def short(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Yardstick:
     targets = {"kind": "scripted", "tracks": [{"state": [0.0, 296.0, 0.0, -4.0]}, {"state": [0.0, 500.0, 0.0, 0.0]}]}
     fields = {"time.num_steps": 3, "control.decision_steps": [1, 2], "control.num_samples": 1, "targets": targets}
     cut = Yardstick(
-        whole.spec.model_copy(update={"set": fields, "runs": 2}),
+        whole.spec.model_copy(update={"set": {**whole.spec.set, **fields}, "runs": 2}),
         whole.title,
         whole.source,
         whole.remark,
@@ -94,11 +94,11 @@ def test_ctrl_c_says_how_to_go_on(short: Yardstick, monkeypatch: pytest.MonkeyPa
     ("words", "status", "message"),
     [
         ((NAME, "--planners", "fixed,fixed"), 2, "expected each strategy once; got fixed,fixed"),
-        ((NAME, "--planners", "clever"), 1, "expected one of jdm, idm, random, fixed, still; got 'clever'"),
+        ((NAME, "--planners", "clever"), 1, "expected one of jdm, idm, lookahead, random, fixed, still; got 'clever'"),
         (
             ("deciding-six-camera",),
             1,
-            "expected a yardstick (deciding-six-cameras), a built-in scenario (eight-mobile, ",
+            "expected a yardstick (deciding-six-cameras), a built-in scenario (beyond-the-gap, eight-mobile, ",
         ),
         ((NAME, "--runs", "0"), 2, "--runs"),
     ],

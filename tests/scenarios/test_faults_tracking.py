@@ -182,7 +182,7 @@ CASES = [
         "decision_steps: [4, 8]",
         "actions_deg: [0, 90]",
         [
-            "f.yaml:22:11: control.actions_deg: expected one of association, confidence, constraints, decision_steps, decision_times, detection_threshold, explain, horizon_period, horizon_steps, ideal_measurements, indifference, limits, max_samples, max_seconds, num_samples, reward, search, undetected_worth, got an unknown key (the platform of a sensor has it: `platform: {kind: courses, speed: 50.0, headings_deg: [0, 90]}`)"
+            "f.yaml:22:11: control.actions_deg: expected one of association, confidence, constraints, decision_steps, decision_times, detection_threshold, explain, horizon_period, horizon_steps, ideal_measurements, indifference, limits, lookahead, max_samples, max_seconds, num_samples, reward, search, undetected_worth, got an unknown key (the platform of a sensor has it: `platform: {kind: courses, speed: 50.0, headings_deg: [0, 90]}`)"
         ],
     ),
     (

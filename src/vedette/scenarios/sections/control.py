@@ -142,6 +142,7 @@ class Control(Section):
                 if value != default:
                     yield (name,), "confidence beside it, such as 0.95", describe(value)
 
+    @check
     def _period_of_lookahead(self) -> Iterator[Finding]:
         if self.lookahead is not None and self.lookahead.period is not None:
             steps = self.lookahead.period / self.horizon_period
