@@ -28,9 +28,11 @@ from vedette.scenarios.generated import PATTERNS, VIEWS, GeneratedScene
 from vedette.scenarios.generated_text import scene_text
 
 RUNS = 50
-# What the scenes leave to the campaign. A strategy beside the built-in ones is named here: "planners": {"greedy":
-# {"kind": "joint", "search": {...}}}; the reward is "control.reward".
-SETTINGS: dict[str, Any] = {}
+# What the scenes leave to the campaign.
+SETTINGS: dict[str, Any] = {
+    "control.reward": {"kind": "expected_loss", "cutoff": 100.0},
+    "planners": {"greedy": {"kind": "joint", "search": {"kind": "sequential_greedy"}}},
+}
 
 
 def scenes(given: argparse.Namespace) -> Iterator[GeneratedScene]:
@@ -76,7 +78,7 @@ def main() -> None:
     parser.add_argument("--views", nargs="+", choices=VIEWS, default=VIEWS, help="of the sensors")
     parser.add_argument("--every", type=int, nargs="+", default=[1], help="scans between decisions")
     parser.add_argument(
-        "--planners", nargs="+", default=["jdm", "idm", "random", "fixed"], help="the first is compared to"
+        "--planners", nargs="+", default=["jdm", "greedy", "idm", "random", "fixed"], help="the first is compared to"
     )
     parser.add_argument("--samples", type=int, help="of a decision, instead of the scenes'")
     parser.add_argument("--seed", type=int, default=0, help="of the scenes")

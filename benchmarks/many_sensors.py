@@ -103,11 +103,13 @@ def figure(path: str, repeats: int) -> None:
 
     canvas, axes = plt.subplots(1, len(SWEEPS), figsize=(12.0, 3.4), sharey=True, layout="constrained")
     for axis, (size, values) in zip(axes, SWEEPS.items(), strict=True):
-        for name, reward in REWARDS.items():
+        for colour, (name, reward) in zip(("C0", "C1"), REWARDS.items(), strict=True):
             if size == "samples" and name == "expected loss":
                 continue
             taken = [seconds(repeats, reward, **{size: value})[0] for value in values]
-            axis.loglog(values, taken, "o-", markersize=4, label=name)
+            axis.loglog(values, taken, "o-", markersize=4, color=colour, label=name)
+        axis.set_xticks(values, [str(value) for value in values])
+        axis.minorticks_off()
         axis.set_xlabel(f"{size} [-]")
         axis.grid(alpha=0.3, which="both")
     axes[0].set_ylabel("CPU time of a joint decision [s]")
