@@ -83,22 +83,18 @@ class JointPlanner:
             ModelError, NumericalError: as the filters; a reward that is not finite.
         """
         generator(rng)
-        prepared = Preparation.of(self.sensors, self.fusion, self.settings, self.reward, state, poses)
-        mask = mask_of_decision(
-            self.constraints, self.sensors, prepared.options, state.fused, np.asarray(poses), self.settings
-        )
+        prepared = Preparation.of(self.sensors, self.fusion, self.settings, self.reward, state, poses, self.constraints)
         if prepared.races:
-            notes = (*self.notes, *(mask.notes if mask is not None else ()))
-            return _plan_of(self.name, prepared, decide_jointly(prepared, self.search, mask, rng=rng), notes)
+            return _plan_of(self.name, prepared, decide_jointly(prepared, self.search, rng=rng), self.notes)
         evaluator = prepared.evaluator(self.settings.num_samples, rng=rng)
         evidence = Evidence(evaluator, tuple(range(len(self.sensors))), evaluator.joint())
-        problem = joint_problem(evidence, mask)
+        problem = joint_problem(evidence, prepared.mask)
         best = check_choice("search", self.search.search(problem, rng=rng), evidence.shape)
-        note_lines(evidence, best, mask)
+        note_lines(evidence, best, prepared.mask)
         chosen = tuple(own.first_action(course) for own, course in zip(evaluator.options, best, strict=True))
         actions = tuple(own.actions for own in evaluator.options)
         tables, (counts, found), bound = evidence.tables(best), evaluator.account(), bound_of(evidence, best)
-        notes = (*self.notes, *(mask.notes if mask is not None else ()), *found)
+        notes = (*self.notes, *found)
         return Plan(
             self.name,
             actions,
@@ -139,33 +135,27 @@ class IndependentPlanner:
     def plan(self, state: State, poses: Floats, *, rng: np.random.Generator) -> Plan:
         """Each sensor's action of largest mean reward; arguments, ties and errors as `JointPlanner.plan`."""
         generator(rng)
-        prepared = Preparation.of(self.sensors, self.fusion, self.settings, self.reward, state, poses)
-        mask = mask_of_decision(
-            self.constraints, self.sensors, prepared.options, state.fused, np.asarray(poses), self.settings
-        )
+        prepared = Preparation.of(self.sensors, self.fusion, self.settings, self.reward, state, poses, self.constraints)
         if prepared.races:
-            return _plan_of(self.name, prepared, decide_alone(prepared, mask, rng=rng))
+            return _plan_of(self.name, prepared, decide_alone(prepared, rng=rng))
         evaluator = prepared.evaluator(self.settings.num_samples, rng=rng)
         chosen: list[int] = []
         tables: list[RewardTable] = []
         parts: list[Part] = []
         for s, own in enumerate(evaluator.options):
             evidence = Evidence(evaluator, (s,), evaluator.alone(s))
-            allowed = all_joint_actions((len(own.courses),))[single_mask(mask, s, len(own.courses))]
+            allowed = all_joint_actions((len(own.courses),))[single_mask(prepared.mask, s, len(own.courses))]
             best = int(allowed[first_best(evidence.evaluate(allowed)), 0])
             chosen.append(own.first_action(best))
             tables.extend(evidence.tables((best,)))
             parts.append(Part.alone(evidence, best))
         actions, questions = tuple(own.actions for own in evaluator.options), Questions(self.name, tuple(parts))
-        counts, found = evaluator.account()
-        notes = (*(mask.notes if mask is not None else ()), *found)
         return Plan(
             self.name,
             actions,
             tuple(chosen),
             tuple(tables),
-            counts,
-            notes,
+            *evaluator.account(),
             certainty=prepared.certainty,
             questions=questions,
         )

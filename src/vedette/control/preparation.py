@@ -9,6 +9,8 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 
 from vedette.control.additive.evaluator import AdditiveEvaluator
+from vedette.control.allowed import mask_of_decision
+from vedette.control.constraints import Constraint, Mask
 from vedette.control.evaluator import Evaluator
 from vedette.control.inputs import Belief, check_state, options_of
 from vedette.control.plan import Certainty
@@ -42,7 +44,8 @@ class Preparation:
         state, fusion: in the form in which they are planned on.
         options: of each sensor.
         rule: how densities are summed; None where the decision is no sum.
-        notes: what a reader must know of the form.
+        mask: what constraints allow; None: everything.
+        notes: what a reader must know of the form, and of constraints that cannot be met.
     """
 
     sensors: tuple[MobileSensor, ...]
@@ -52,6 +55,7 @@ class Preparation:
     fusion: Fusion
     options: tuple[Options, ...]
     rule: LinearRule | None
+    mask: Mask | None
     notes: tuple[str, ...]
 
     @classmethod
@@ -63,13 +67,16 @@ class Preparation:
         reward: AnyReward,
         state: State,
         poses: Any,
+        constraints: Sequence[Constraint] = (),
     ) -> Preparation:
         """Raises `InputError` for inputs that do not fit."""
         options = options_of(sensors, poses, settings)
         check_state(sensors, state)
         planned = _planned(len(sensors), fusion, settings, reward, state)
         rule = _rule(len(sensors), planned.fusion, settings, reward, planned.state)
-        return cls(tuple(sensors), settings, reward, planned.state, planned.fusion, options, rule, planned.notes)
+        mask = mask_of_decision(constraints, sensors, options, state.fused, np.asarray(poses), settings)
+        notes = (*(mask.notes if mask is not None else ()), *planned.notes)
+        return cls(tuple(sensors), settings, reward, planned.state, planned.fusion, options, rule, mask, notes)
 
     @property
     def races(self) -> bool:

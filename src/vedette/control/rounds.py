@@ -12,7 +12,6 @@ import numpy as np
 
 from vedette.control.allowed import single_mask
 from vedette.control.bounds import bound_of
-from vedette.control.constraints import Mask
 from vedette.control.evaluator import SampleRewards
 from vedette.control.evidence import Evidence
 from vedette.control.inputs import check_choice
@@ -131,9 +130,7 @@ class Rounds:
         return Certainty(stopped or over, confidence, self.num_samples, left, started)
 
 
-def decide_jointly(
-    preparation: Preparation, search: JointSearch, mask: Mask | None, *, rng: np.random.Generator
-) -> Decided:
+def decide_jointly(preparation: Preparation, search: JointSearch, *, rng: np.random.Generator) -> Decided:
     """The joint action that is best with confidence, of all or, where a search leaves some out, of its best ones.
 
     All joint actions race from the first sample on. What a search has picked is raced on fresh samples, as those that
@@ -145,9 +142,9 @@ def decide_jointly(
     rounds = Rounds.begin(preparation, size, rng=rng)
     heard = _Heard(rounds.evaluator.joint())
     evidence = Evidence(rounds.evaluator, tuple(range(len(shape))), heard)
-    found = check_choice("search", search.search(joint_problem(evidence, mask), rng=rng), shape)
-    note_lines(evidence, found, mask)
-    complete = mask is None and all_at_once and heard.num == math.prod(shape) and evidence.is_complete()
+    found = check_choice("search", search.search(joint_problem(evidence, preparation.mask), rng=rng), shape)
+    note_lines(evidence, found, preparation.mask)
+    complete = preparation.mask is None and all_at_once and heard.num == math.prod(shape) and evidence.is_complete()
     candidates = all_joint_actions(shape) if complete else evidence.foremost(found, _MOST_OF_SEARCH)
     race = Race(candidates, float(settings.confidence or 0.0), settings.indifference)
     if complete:
@@ -163,14 +160,14 @@ def decide_jointly(
     return Decided(race.best, record.tables(race.best), *rounds.evaluator.account(), certainty, curve, bound)
 
 
-def decide_alone(preparation: Preparation, mask: Mask | None, *, rng: np.random.Generator) -> Decided:
+def decide_alone(preparation: Preparation, *, rng: np.random.Generator) -> Decided:
     """For every sensor its own best course of those it may take; that all are, has the confidence asked for."""
     settings, options = preparation.settings, preparation.options
     rounds = Rounds.begin(preparation, FIRST_ROUND, rng=rng)
     each_sure = 1.0 - (1.0 - float(settings.confidence or 0.0)) / len(options)
     entrants = []
     for s, own in enumerate(options):
-        allowed = all_joint_actions((len(own.courses),))[single_mask(mask, s, len(own.courses))]
+        allowed = all_joint_actions((len(own.courses),))[single_mask(preparation.mask, s, len(own.courses))]
         race = Race(allowed, each_sure, settings.indifference)
         race.add(rounds.evaluator.alone(s)(race.actions))
         entrants.append(Entrant(race, s))

@@ -84,7 +84,6 @@ class AdditiveEvaluator:
         num_samples = samples.targets.shape[1]
         table = lay_out_changes(start, rule, num_samples, settings.threads(), sampled=sampled)
         valuation = valuation_of(reward, prediction, start.prior)
-        assert not isinstance(valuation, str)
         if undetected is None or settings.undetected_worth == 0.0:
             cells = no_cells(len(table.offsets) - 1)
         else:

@@ -7,34 +7,18 @@ import math
 import numpy as np
 from scipy.special import log_expit
 
-from vedette.control.rewards.base import LabelReward, PowerReward, Reward, speaks_for, unit_volume_of
+from vedette.control.rewards.base import LabelReward, PowerReward, unit_volume_of
+from vedette.control.rewards.label_functions import cardinality_variance_of_label
 from vedette.control.rewards.loss import ExpectedLossReward
 from vedette.densities import LMB
 from vedette.kernels.base.types import Floats
 from vedette.kernels.gaussian.linalg import LOG_2PI
 from vedette.kernels.planning.label_values import EXPECTED_LOSS, FUNCTION, POWER_INTEGRALS, Valuation
-from vedette.models.functions import ModelFunction, model_function
+from vedette.models.functions import ModelFunction
 
 
-@model_function("label_reward")
-def _nothing(
-    existence: float,
-    mean: Floats,
-    cov: Floats,
-    new_existence: float,
-    new_mean: Floats,
-    new_cov: Floats,
-    params: Floats,
-    out: Floats,
-) -> None:
-    """Fills the place of a function that is never asked."""
-    out[0] = 0.0
-
-
-def valuation_of(
-    reward: Reward | PowerReward | LabelReward | ExpectedLossReward, prediction: LMB, prior: Floats
-) -> Valuation | str:
-    """How a reward values the labels of a prediction, of one Gaussian each; or why it cannot.
+def valuation_of(reward: PowerReward | LabelReward | ExpectedLossReward, prediction: LMB, prior: Floats) -> Valuation:
+    """How a reward values the labels of a prediction, of one Gaussian each.
 
     prior: (num_labels, bernoulli_size) rows of the prediction.
     """
@@ -42,17 +26,14 @@ def valuation_of(
         covs = prediction.tracks.covs
         unseen = np.minimum(covs[:, 0, 0] + covs[:, 1, 1], reward.cutoff**2)[:, np.newaxis]
         return _valuation(EXPECTED_LOSS, 1, prediction, prior, unseen, params=np.array([reward.cutoff**2]))
-    if isinstance(reward, PowerReward) and speaks_for(reward, "combine", "__call__"):
+    if isinstance(reward, PowerReward):
         volume = unit_volume_of(reward, prediction)
         exponents = np.array([[float(a), float(b)] for a, b in reward.exponents])
         own = _of_prediction(prediction, exponents, math.log(volume), prior[:, -2])
         found = _valuation(POWER_INTEGRALS, len(exponents), prediction, prior, own, exponents=exponents)
         return found._replace(log_volume=math.log(volume))
-    if isinstance(reward, LabelReward) and speaks_for(reward, "combine", "__call__"):
-        own = np.zeros((len(prior), reward.num_terms))
-        params = np.ascontiguousarray(reward.params, np.float64)
-        return _valuation(FUNCTION, reward.num_terms, prediction, prior, own, params=params, function=reward.function)
-    return f"{getattr(reward, '__name__', type(reward).__name__)} is a function of two densities"
+    own, params = np.zeros((len(prior), reward.num_terms)), np.ascontiguousarray(reward.params, np.float64)
+    return _valuation(FUNCTION, reward.num_terms, prediction, prior, own, params=params, function=reward.function)
 
 
 def _valuation(
@@ -64,7 +45,7 @@ def _valuation(
     *,
     exponents: Floats | None = None,
     params: Floats | None = None,
-    function: ModelFunction = _nothing,
+    function: ModelFunction = cardinality_variance_of_label,  # not asked but by FUNCTION
 ) -> Valuation:
     return Valuation(
         kind,
