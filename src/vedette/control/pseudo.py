@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
 from vedette.control.inputs import Belief
 from vedette.control.priors import heaviest_hypotheses
 from vedette.control.settings import IDEAL_MODES, MobileSensor, PlanningSettings
-from vedette.densities import GLMB, LMB, sample_glmb, sample_lmb
+from vedette.densities import GLMB, LMB, MultiTargetSamples, sample_glmb, sample_lmb
 from vedette.densities.cases import LabelledCases
 from vedette.densities.checks import unchecked
-from vedette.densities.label_sets import label_sets, offsets_of, single_gaussians
+from vedette.densities.label_sets import label_sets, offsets_of, places_of, single_gaussians
 from vedette.filters import shared_targets
 from vedette.filters.inputs import model_errors
 from vedette.kernels.base.types import Floats, Ints
@@ -25,6 +26,19 @@ from vedette.models import constant_survival, kernel_motion
 from vedette.threads import run_chunks
 
 
+def draw_paths(
+    fused: Belief, sensors: Sequence[MobileSensor], settings: PlanningSettings, *, rng: np.random.Generator
+) -> tuple[MultiTargetSamples, Floats]:
+    """Samples of the fused density, and (horizon_steps, num_targets, state_dim) where they go without noise."""
+    targets = shared_targets([sensor.filter for sensor in sensors])
+    draw: Any = sample_glmb if isinstance(fused, GLMB) else sample_lmb
+    samples: MultiTargetSamples = draw(fused, settings.num_samples, rng=rng)
+    with model_errors():
+        motion = kernel_motion(targets.motion, targets.survival)
+        states = propagate_samples(motion, samples.states, float(settings.horizon_period), int(settings.horizon_steps))
+    return samples, states
+
+
 def draw_futures(
     fused: Belief, sensors: Sequence[MobileSensor], settings: PlanningSettings, *, rng: np.random.Generator
 ) -> tuple[Ints, tuple[Futures, ...]]:
@@ -33,12 +47,7 @@ def draw_futures(
     Returns the labels (num_targets, 2) of the sampled targets, and the future as each sensor meets it. The random
     numbers of detections and noise are each sensor's own, and the same for all its actions.
     """
-    targets = shared_targets([sensor.filter for sensor in sensors])
-    motion = kernel_motion(targets.motion, targets.survival)
-    num = settings.num_samples
-    samples = sample_glmb(fused, num, rng=rng) if isinstance(fused, GLMB) else sample_lmb(fused, num, rng=rng)
-    with model_errors():
-        states = propagate_samples(motion, samples.states, float(settings.horizon_period), int(settings.horizon_steps))
+    samples, states = draw_paths(fused, sensors, settings, rng=rng)
     futures = []
     for sensor in sensors:
         shape = (settings.horizon_steps, len(samples.states))
@@ -56,20 +65,7 @@ def pseudo_posteriors(
     courses: (num_courses, horizon_steps, pose_dim) poses at the pseudo-updates. labels: of the targets of `futures`.
     The belief is one of the filter's kind. Raises `ModelError` and `NumericalError` as the filter.
     """
-    horizon = Horizon(
-        courses,
-        float(settings.horizon_period),
-        IDEAL_MODES[settings.ideal_measurements],
-        float(settings.detection_threshold),
-    )
-    decision = Decision(
-        LMB.empty(belief.state_dim).to_kernel(),
-        kernel_motion(sensor.filter.targets.motion, constant_survival(1.0)),
-        sensor.filter.sensor.to_kernel(),
-        horizon,
-        futures,
-        settings.limits.truncation(sensor.filter.sensor.meas_dim),
-    )
+    decision = decision_of(sensor, courses, futures, settings)
     num_cases = len(courses) * settings.num_samples
     if isinstance(belief, GLMB):
         return _run_glmb(belief, decision, settings, num_cases)
@@ -77,13 +73,37 @@ def pseudo_posteriors(
     return _run_lmb(belief, decision, settings, num_cases, targets)
 
 
+def decision_of(
+    sensor: MobileSensor,
+    courses: Floats,
+    futures: Futures,
+    settings: PlanningSettings,
+    detection_at: str | None = None,
+) -> Decision:
+    """What the pseudo-updates of a sensor depend on besides its prior. detection_at: as of `SensorModel.to_kernel`."""
+    horizon = Horizon(
+        np.ascontiguousarray(courses),
+        float(settings.horizon_period),
+        IDEAL_MODES[settings.ideal_measurements],
+        float(settings.detection_threshold),
+    )
+    targets, own = sensor.filter.targets, sensor.filter.sensor
+    return Decision(
+        LMB.empty(targets.state_dim).to_kernel(),
+        kernel_motion(targets.motion, constant_survival(1.0)),
+        own.to_kernel(detection_at),
+        horizon,
+        futures,
+        settings.limits.truncation(own.meas_dim),
+    )
+
+
 def targets_of(table: Ints, labels: Ints, offsets: Ints) -> Ints:
     """(num_labels, num_samples) place of the target of each label of `table` in each sample, -1 where it is not there.
 
     labels: of the sampled targets, which are `offsets[i]:offsets[i + 1]` of sample i.
     """
-    place = {tuple(label): i for i, label in enumerate(table.tolist())}
-    rows = np.array([place.get(tuple(label), -1) for label in labels.tolist()], np.int64)
+    rows = places_of(labels, table)
     of_sample = np.repeat(np.arange(len(offsets) - 1), np.diff(offsets))
     targets, known = np.full((len(table), len(offsets) - 1), -1), rows >= 0
     targets[rows[known], of_sample[known]] = np.flatnonzero(known)

@@ -42,6 +42,12 @@ def offsets_of(sizes: Sequence[int] | Ints) -> Ints:
     return np.concatenate([np.zeros(1, np.int64), np.cumsum(sizes, dtype=np.int64)])
 
 
+def places_of(labels: Ints, table: Ints) -> Ints:
+    """(num_labels,) place of each label among the distinct labels of a table, -1 where it is none of them."""
+    place = {tuple(label): i for i, label in enumerate(table.tolist())}
+    return np.array([place.get(tuple(label), -1) for label in labels.tolist()], np.int64)
+
+
 def take_tracks(tracks: TrackTable, places: Ints) -> TrackTable:
     """The tracks at `places`, in that order."""
     sizes = np.diff(tracks.offsets)[places]

@@ -12,6 +12,7 @@ from scipy.special import expit, log_expit
 
 from vedette.densities import LMB, TrackTable
 from vedette.densities.checks import unchecked
+from vedette.densities.label_sets import places_of
 from vedette.errors import InputError, NumericalError
 from vedette.fusion.base import (
     FusionInfo,
@@ -147,15 +148,14 @@ def _single(belief: LMB) -> Tracks:
 
 
 def _posteriors(prediction: LMB, beliefs: Sequence[LMB], missing_existence: float) -> _Posteriors:
-    place = {tuple(label): i for i, label in enumerate(prediction.tracks.labels.tolist())}
-    shape = len(place), len(beliefs)
+    shape = prediction.tracks.num_tracks, len(beliefs)
     floor = math.log(missing_existence) - math.log1p(-missing_existence)
     logits = np.minimum(prediction.existence_logit, floor)[:, None].repeat(len(beliefs), axis=1)
     chosen, start = np.full(shape, -1), 0
     for s, belief in enumerate(beliefs):
-        own = [place.get(tuple(label), -1) for label in belief.tracks.labels.tolist()]
-        if -1 in own:
-            label = belief.tracks.labels[own.index(-1)].tolist()
+        own = places_of(belief.tracks.labels, prediction.tracks.labels)
+        if (own < 0).any():
+            label = belief.tracks.labels[int(np.argmax(own < 0))].tolist()
             raise InputError(
                 f"beliefs[{s}]: expected labels of views.prediction, from which it was updated; got {label}"
             )

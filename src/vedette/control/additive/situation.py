@@ -8,18 +8,16 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import logit
 
-from vedette.control.pseudo import targets_of
+from vedette.control.pseudo import decision_of, draw_paths, targets_of
 from vedette.control.settings import IDEAL_MODES, MobileSensor, PlanningSettings
-from vedette.densities import LMB, sample_lmb
+from vedette.densities import LMB
 from vedette.densities.checks import unchecked
-from vedette.densities.label_sets import offsets_of, single_gaussians, take_tracks
-from vedette.filters import shared_targets
+from vedette.densities.label_sets import offsets_of, places_of, single_gaussians, take_tracks
 from vedette.filters.inputs import model_errors
 from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.planning.bernoulli_rows import bernoulli_size
-from vedette.kernels.planning.ideal import EXPECTED, IDEAL, Decision, Futures, Horizon, propagate_samples
+from vedette.kernels.planning.ideal import EXPECTED, IDEAL, Decision, Futures
 from vedette.kernels.planning.known import Belief, label_radii, predict_paths, rows_without_scans
-from vedette.models import constant_survival, kernel_motion
 
 
 class Samples(NamedTuple):
@@ -34,13 +32,7 @@ class Samples(NamedTuple):
         cls, fused: LMB, sensors: Sequence[MobileSensor], settings: PlanningSettings, *, rng: np.random.Generator
     ) -> Samples:
         """`num_samples` of them, carried over the horizon without noise."""
-        num, model = settings.num_samples, shared_targets([sensor.filter for sensor in sensors])
-        drawn = sample_lmb(fused, num, rng=rng)
-        with model_errors():
-            motion = kernel_motion(model.motion, model.survival)
-            states = propagate_samples(
-                motion, drawn.states, float(settings.horizon_period), int(settings.horizon_steps)
-            )
+        drawn, states = draw_paths(fused, sensors, settings, rng=rng)
         return cls(states, drawn.offsets, targets_of(fused.tracks.labels, drawn.labels, drawn.offsets))
 
     @classmethod
@@ -135,32 +127,19 @@ def _group(
     detection_at: str | None,
     rng: np.random.Generator,
 ) -> SensorGroup:
-    local, belief = sensors[members[0]].filter, beliefs[members[0]]
-    place = {tuple(label): i for i, label in enumerate(prediction.tracks.labels.tolist())}
-    places = np.array([place.get(tuple(label), -1) for label in belief.tracks.labels.tolist()], np.int64)
+    sensor, belief = sensors[members[0]], beliefs[members[0]]
+    places = places_of(belief.tracks.labels, prediction.tracks.labels)
     own = np.flatnonzero((places >= 0) & (belief.existence_logit > -np.inf))
     prior = unchecked(LMB, single_gaussians(take_tracks(belief.tracks, own)), belief.existence_logit[own]).to_kernel()
-    horizon = Horizon(
-        np.ascontiguousarray(np.concatenate([courses[s] for s in members])),
-        float(settings.horizon_period),
-        IDEAL_MODES[settings.ideal_measurements],
-        float(settings.detection_threshold),
-    )
-    decision = Decision(
-        LMB.empty(belief.state_dim).to_kernel(),
-        kernel_motion(local.targets.motion, constant_survival(1.0)),
-        local.sensor.to_kernel(detection_at),
-        horizon,
-        samples.futures(local.sensor.meas_dim, settings, rng=rng),
-        settings.limits.truncation(local.sensor.meas_dim),
-    )
+    futures = samples.futures(sensor.filter.sensor.meas_dim, settings, rng=rng)
+    decision = decision_of(sensor, np.concatenate([courses[s] for s in members]), futures, settings, detection_at)
     paths, labels = predict_paths(prior, decision), places[own]
     ends = np.ascontiguousarray(paths.means[:, -1]), np.ascontiguousarray(paths.covs[:, -1])
     rows = rows_without_scans(*ends, prior.existence_logit, prediction.tracks.means[labels])
     targets = np.ascontiguousarray(samples.targets[labels])
     offsets = offsets_of([len(courses[s]) for s in members])
     known = Belief(prior, paths, targets, label_radii(paths, targets, samples.states))
-    return SensorGroup(members, known, labels, decision, rows, offsets, local.sensor.detection.reach)
+    return SensorGroup(members, known, labels, decision, rows, offsets, sensor.filter.sensor.detection.reach)
 
 
 def _spread(group: SensorGroup, num_labels: int, dim: int, missing_existence: float) -> Floats:

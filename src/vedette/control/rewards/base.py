@@ -9,6 +9,7 @@ from typing import Any, Literal, Protocol, TypeAlias, runtime_checkable
 import numpy as np
 
 from vedette.densities import GLMB, LMB, existence_probabilities, glmb_to_lmb, track_moments
+from vedette.densities.label_sets import places_of
 from vedette.divergence import power_integrals, reference_unit_volume
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats
@@ -114,11 +115,10 @@ def speaks_for(thing: Any, method: str, other: str) -> bool:
 def _of_labels(reward: LabelReward, predicted: GLMB | LMB, updated: GLMB | LMB) -> float:
     """The reward of two densities, GLMBs taken as their LMBs; a label that the update lacks is not there any more."""
     before, after = (density if isinstance(density, LMB) else glmb_to_lmb(density) for density in (predicted, updated))
-    place = {tuple(label): i for i, label in enumerate(after.tracks.labels.tolist())}
+    places = places_of(before.tracks.labels, after.tracks.labels)
     old, new = track_moments(before.tracks), track_moments(after.tracks)
     sums, out = np.zeros(reward.num_terms), np.empty(reward.num_terms)
-    for i, label in enumerate(before.tracks.labels.tolist()):
-        at = place.get(tuple(label), -1)
+    for i, at in enumerate(places.tolist()):
         existence, moments = (
             (0.0, (old[0][i], old[1][i])) if at < 0 else (after.existence[at], (new[0][at], new[1][at]))
         )
