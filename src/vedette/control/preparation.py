@@ -128,13 +128,7 @@ def prepare_sums(
         InputError: inputs that do not fit, or settings, reward or fusion that make a decision no sum over labels.
     """
     check_state(sensors, state)
-    notes: tuple[str, ...] = ()
-    if _has_glmb((*state.local, state.fused)):
-        notes = ("planned on the LMBs of the GLMB beliefs: so are all sequences of decisions",)
-        state = replace(state, local=tuple(map(_as_lmb, state.local)), fused=_as_lmb(state.fused))
-        if isinstance(fusion, CmDeltaGlmb):
-            fusion = Clmb(fusion.weights)
-    planned = _planned(len(sensors), fusion, settings, reward, state)
+    planned = _planned(len(sensors), fusion, settings, reward, state, why="so are all sequences of decisions")
     rule = _rule(len(sensors), planned.fusion, settings, reward, planned.state)
     if rule is None:
         if settings.association != "known":
@@ -143,13 +137,18 @@ def prepare_sums(
         raise reject("reward, fusion", expected, f"{type(reward).__name__}, {type(planned.fusion).__name__}")
     fused, local = planned.state.fused, planned.state.local
     assert isinstance(fused, LMB)
-    return Sums(rule, fused, tuple(map(_as_lmb, local)), (*notes, *planned.notes))
+    return Sums(rule, fused, tuple(map(_as_lmb, local)), planned.notes)
 
 
-def _planned(num_sensors: int, fusion: Fusion, settings: PlanningSettings, reward: AnyReward, state: State) -> _Planned:
-    """The beliefs in the form in which they are planned on."""
+def _planned(
+    num_sensors: int, fusion: Fusion, settings: PlanningSettings, reward: AnyReward, state: State, why: str = ""
+) -> _Planned:
+    """The beliefs in the form in which they are planned on. why: GLMBs are LMBs there in any case."""
     beliefs = (*state.local, state.fused)
-    why = _why_lmbs(num_sensors, fusion, settings, reward, state.fused) if _has_glmb(beliefs) else ""
+    if _has_glmb(beliefs):
+        why = why or _why_lmbs(num_sensors, fusion, settings, reward, state.fused)
+    else:
+        why = ""
     notes: tuple[str, ...] = ()
     if why:
         converted: dict[int, LMB] = {id(belief): _as_lmb(belief) for belief in beliefs}

@@ -30,15 +30,12 @@ import numpy as np
 from scipy.special import stdtr, stdtrit
 
 from vedette.control.evidence import Evidence
-from vedette.control.search import first_best
+from vedette.control.search import first_best, tie_of
 from vedette.kernels.base.types import Bools, Floats, Ints
 
 # Samples of the first round, and by how much each round makes their number grow (docs/control.md has what it costs).
 FIRST_ROUND = 8
 _GROWTH = 1.5
-
-# Rewards nearer than this, relative to the best or to 1, are equal, as in `first_best`.
-_TIE = 1e-9
 
 
 def next_total(num_samples: int, most: int) -> int:
@@ -127,7 +124,7 @@ class Race:
         # Of what may go wrong in all, each comparison of each round has one part in so many.
         parts = max(1, len(self.actions) - 1) * self._round * (self._round + 1)
         reach = -stdtrit(num - 1, (1.0 - self.confidence) / parts) * errors
-        tie = _TIE * max(1.0, abs(means[best]))
+        tie = tie_of(float(means[best]))
         near = max(tie, self.indifference * abs(means[best]))
         stays = finite & (behind - reach <= tie)
         stays[best] = False  # the others

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from multiprocessing import get_context
+from typing import Any
 
 import numpy as np
 
@@ -15,6 +16,9 @@ from vedette.scenarios.build import build_experiment, build_planner
 from vedette.simulation.experiment import Experiment
 from vedette.simulation.loop import run_stream
 from vedette.tracking import State
+
+# Of a decision that is made to be compiled.
+_QUICK: dict[str, Any] = {"num_samples": 2, "horizon_steps": 1, "num_threads": 1, "confidence": None}
 
 
 def precompile(scenario: Scenario) -> None:
@@ -53,7 +57,7 @@ def _compile_planning(scenario: Scenario) -> None:
     shared = getattr(planner.fusion, "shares_prediction", False)
     fused = beliefs[0] if shared else planner.fusion.fuse(beliefs)[0]
     experiment.estimate(fused, 1)
-    quick = replace(planner, settings=replace(planner.settings, num_samples=2, horizon_steps=1, num_threads=1))
+    quick = replace(planner, settings=replace(planner.settings, **_QUICK))
     state = State(beliefs, fused, undetected=experiment.tracker.initial().undetected)
     quick.plan(state, experiment.poses, rng=run_stream(0, 0))
 

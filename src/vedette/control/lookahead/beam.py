@@ -10,10 +10,8 @@ import numpy as np
 
 from vedette.control.lookahead.courses import Sequence
 from vedette.control.lookahead.problem import JointSequence, SequenceProblem
+from vedette.control.search import tie_of
 from vedette.models.arguments import dimension
-
-# Values nearer than this, relative to the larger magnitude or 1, are equal.
-_TIE = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,11 +100,11 @@ class BeamSearch:
 
 
 def _is_better(value: float, than: float) -> bool:
-    return value > than + _TIE * max(1.0, abs(than)) if math.isfinite(than) else value > than
+    return value > than + tie_of(than) if math.isfinite(than) else value > than
 
 
 def _ranked(values: list[float], rng: np.random.Generator) -> list[int]:
     """Places of the values, the largest first; equal ones in random order."""
-    scale = _TIE * max(1.0, max(map(abs, filter(math.isfinite, values)), default=1.0))
+    scale = tie_of(max(map(abs, filter(math.isfinite, values)), default=1.0))
     order = np.lexsort((rng.random(len(values)), -np.round(np.array(values) / scale)))
     return [int(place) for place in order]

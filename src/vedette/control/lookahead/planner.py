@@ -157,6 +157,8 @@ class HorizonPlanner:
         chosen = tuple(own.first_action(course) for own, course in zip(first.options, courses, strict=True))
         if self.settings.undetected_worth > 0.0:
             first.notes["targets not found yet are not looked for: sequences of decisions do not"] = None
+        if self.settings.confidence is not None:
+            first.notes["decided on num_samples samples, whatever the confidence: sequences are not raced"] = None
         counts, found = first.account()
         return Plan(
             self.name,

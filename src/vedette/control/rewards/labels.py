@@ -18,64 +18,56 @@ from vedette.models.arguments import positive, probability
 from vedette.models.functions import ModelFunction
 
 
+class _OneSum:
+    """A reward that is one sum over the labels, of a function without parameters unless it says which."""
+
+    __slots__ = ()
+    num_terms: ClassVar[int] = 1
+    sign: ClassVar[float] = -1.0  # of the sum in the reward
+
+    @property
+    def params(self) -> Floats:
+        """None."""
+        return np.empty(0)
+
+    @property
+    def coefficients(self) -> Floats:
+        """Of the sums."""
+        return np.array([self.sign])
+
+    def combine(self, sums: Floats) -> Floats:
+        """The sum, or less the sum where its sign is -1."""
+        return np.asarray(self.sign * sums[..., 0])
+
+
 @dataclass(frozen=True, slots=True)
-class KullbackLeiblerReward:
+class KullbackLeiblerReward(_OneSum):
     """Kullback-Leibler divergence of the update from the prediction, label by label: how much is learnt, in nats.
 
     With ideal measurements; under `ideal_measurements: sampled` its mean estimates the mutual information of targets
     and measurements.
     """
 
-    num_terms: ClassVar[int] = 1
+    sign: ClassVar[float] = 1.0
 
     @property
     def function(self) -> ModelFunction:
         """See `vedette.control.rewards.label_functions`."""
         return kullback_leibler_of_label
 
-    @property
-    def params(self) -> Floats:
-        """None."""
-        return np.empty(0)
-
-    @property
-    def coefficients(self) -> Floats:
-        """Of the sums."""
-        return np.ones(1)
-
-    def combine(self, sums: Floats) -> Floats:
-        """The sum."""
-        return np.asarray(sums[..., 0])
-
 
 @dataclass(frozen=True, slots=True)
-class CardinalityVarianceReward:
+class CardinalityVarianceReward(_OneSum):
     """Less the variance of the number of targets: sum of r (1 - r) over the labels (of a GLMB, of its LMB)."""
-
-    num_terms: ClassVar[int] = 1
 
     @property
     def function(self) -> ModelFunction:
         """See `vedette.control.rewards.label_functions`."""
         return cardinality_variance_of_label
 
-    @property
-    def params(self) -> Floats:
-        """None."""
-        return np.empty(0)
-
-    @property
-    def coefficients(self) -> Floats:
-        """Of the sums."""
-        return -np.ones(1)
-
-    def combine(self, sums: Floats) -> Floats:
-        """Less the sum."""
-        return np.asarray(-sums[..., 0])
-
 
 @dataclass(frozen=True, slots=True)
-class ExpectedGospaReward:
+class ExpectedGospaReward(_OneSum):
     """Less the mean squared GOSPA (alpha = 2, p = 2) that is to be expected of the best estimate after the update.
 
     Label by label a target is reported where that costs less:
@@ -89,7 +81,6 @@ class ExpectedGospaReward:
     """
 
     cutoff: float = 100.0
-    num_terms: ClassVar[int] = 1
 
     def __post_init__(self) -> None:
         positive("cutoff", self.cutoff)
@@ -103,15 +94,6 @@ class ExpectedGospaReward:
     def params(self) -> Floats:
         """The squared cutoff."""
         return np.array([self.cutoff**2])
-
-    @property
-    def coefficients(self) -> Floats:
-        """Of the sums."""
-        return -np.ones(1)
-
-    def combine(self, sums: Floats) -> Floats:
-        """Less the sum, m^2."""
-        return np.asarray(-sums[..., 0])
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,7 +5,7 @@ from vedette.control.search.automatic import AutomaticSearch
 from vedette.control.search.cross_entropy import CrossEntropy
 from vedette.control.search.exhaustive import ExhaustiveSearch
 from vedette.control.search.greedy import SequentialGreedy
-from vedette.control.search.problem import JointProblem, JointSearch, all_joint_actions, first_best
+from vedette.control.search.problem import JointProblem, JointSearch, all_joint_actions, first_best, tie_of
 
 __all__ = [
     "AutomaticSearch",
@@ -17,4 +17,5 @@ __all__ = [
     "SequentialGreedy",
     "all_joint_actions",
     "first_best",
+    "tie_of",
 ]

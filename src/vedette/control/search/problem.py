@@ -23,9 +23,14 @@ def first_best(rewards: Floats) -> int:
     return int(np.argmax(rewards >= least_equal(float(rewards.max()))))
 
 
+def tie_of(reward: float) -> float:
+    """Rewards that differ from one by no more than this are equal to it."""
+    return _TIE * max(1.0, abs(reward))
+
+
 def least_equal(best: float) -> float:
     """The least reward that is as good as the best."""
-    return best - _TIE * max(1.0, abs(best))
+    return best - tie_of(best)
 
 
 class JointProblem(NamedTuple):
