@@ -145,12 +145,8 @@ def _planned(
 ) -> _Planned:
     """The beliefs in the form in which they are planned on. why: GLMBs are LMBs there in any case."""
     beliefs = (*state.local, state.fused)
-    if _has_glmb(beliefs):
-        why = why or _why_lmbs(num_sensors, fusion, settings, reward, state.fused)
-    else:
-        why = ""
     notes: tuple[str, ...] = ()
-    if why:
+    if _has_glmb(beliefs) and (why := why or _why_lmbs(num_sensors, fusion, settings, reward, state.fused)):
         converted: dict[int, LMB] = {id(belief): _as_lmb(belief) for belief in beliefs}
         local = tuple(converted[id(belief)] for belief in state.local)
         state = replace(state, local=local, fused=converted[id(state.fused)])

@@ -18,10 +18,11 @@ from vedette.filters import shared_targets
 from vedette.filters.inputs import model_errors
 from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.planning.ideal import Decision, Futures, Horizon, propagate_samples
-from vedette.kernels.planning.known import Belief as KnownBelief
-from vedette.kernels.planning.known import label_radii, predict_paths, pseudo_update_known
+from vedette.kernels.planning.known import pseudo_update_known
 from vedette.kernels.planning.pseudo_glmb import GlmbResults, pseudo_update_glmb
 from vedette.kernels.planning.pseudo_lmb import LmbResults, pseudo_update_lmb
+from vedette.kernels.planning.reach import Belief as KnownBelief
+from vedette.kernels.planning.reach import label_radii, predict_paths
 from vedette.models import constant_survival, kernel_motion
 from vedette.threads import run_chunks
 

@@ -9,7 +9,6 @@ from vedette.scenarios.generated import NUM_STEPS, GeneratedScene
 
 _SENSOR_SPEED = 20.0  # m/s
 _MARGIN = 500.0  # m, of the region around the square: about as far as a target goes
-_MOST_EXHAUSTIVE = 3  # sensors: 729 joint actions
 _NUMBERS_A_LINE = 25
 
 
@@ -18,7 +17,6 @@ def scene_text(scene: GeneratedScene) -> str:
     sensors, states = scene.places()
     states_of_targets = [_row(state) for state in states]
     reach = round(0.5 * scene.side + _MARGIN)
-    few = scene.num_sensors <= _MOST_EXHAUSTIVE
     return _TEMPLATE.format(
         name=scene.name,
         command=_command(scene),
@@ -35,7 +33,6 @@ def scene_text(scene: GeneratedScene) -> str:
         sensors="\n".join(f"  - {{position: {_row(place)}}}" for place in sensors),
         decisions=_folded(range(scene.decide_every, NUM_STEPS, scene.decide_every)),
         horizon=scene.decide_every,
-        search="{kind: exhaustive}" if few else "{kind: coordinate_ascent, num_restarts: 2}",
     )
 
 
@@ -139,7 +136,6 @@ control:
   decision_steps: {decisions}
   horizon_steps: {horizon}
   horizon_period: 1.0
-  search: {search}
 
 ospa: {{cutoff: 100.0, order: 1.0}}
 

@@ -17,7 +17,8 @@ from vedette.filters.inputs import model_errors
 from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.planning.bernoulli_rows import bernoulli_size
 from vedette.kernels.planning.ideal import EXPECTED, IDEAL, Decision, Futures
-from vedette.kernels.planning.known import Belief, label_radii, predict_paths, rows_without_scans
+from vedette.kernels.planning.known import rows_without_scans
+from vedette.kernels.planning.reach import Belief, label_radii, predict_paths
 
 
 class Samples(NamedTuple):

@@ -14,7 +14,8 @@ from vedette.fusion import LinearRule
 from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.planning.bernoulli_rows import Table
 from vedette.kernels.planning.expected import fill_expected_changes
-from vedette.kernels.planning.known import Entries, fill_changes, fill_near, fill_reach
+from vedette.kernels.planning.known import Entries, fill_changes
+from vedette.kernels.planning.reach import fill_near, fill_reach
 from vedette.threads import run_chunks
 
 # A label that no sample and no prediction gives a higher probability of detection is out of reach.

@@ -47,14 +47,21 @@ def view_options(options: Options, num_rows: int, num_measurements: int) -> Opti
     )
 
 
+@inlined
+def log_clutter_at(sensor: Sensor, measurement: Floats, pose: Floats) -> float:
+    """Log clutter intensity at a measurement, -inf where clutter is impossible."""
+    level = sensor.log_clutter_intensity(measurement, pose, sensor.clutter_params)
+    if math.isnan(level) or level == math.inf:
+        raise ModelError("clutter model: log intensity is not a number below infinity")
+    return float(level)
+
+
 @borrowing
 def _log_clutter(sensor: Sensor, scan: Floats, pose: Floats, floor: float, out: Floats) -> tuple[float, int]:
     """Log clutter intensity at each measurement, raised to `floor`; returns their sum and how often that was needed."""
     total, num_raised = 0.0, 0
     for j in range(len(scan)):
-        level = sensor.log_clutter_intensity(scan[j], pose, sensor.clutter_params)
-        if math.isnan(level) or level == math.inf:
-            raise ModelError("clutter model: log intensity is not a number below infinity")
+        level = log_clutter_at(sensor, scan[j], pose)
         # Where the model says that clutter is impossible, no hypothesis could leave the measurement unexplained.
         if level < floor:
             level = floor

@@ -22,7 +22,7 @@ import numpy as np
 from vedette.errors import NumericalError
 from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Bools, Floats, Ints
-from vedette.kernels.gaussian.information import log_integral, to_information
+from vedette.kernels.gaussian.information import log_integral_of_any, to_information
 from vedette.kernels.gaussian.linalg import log_add
 from vedette.kernels.gaussian.mixtures import match_components
 
@@ -119,16 +119,6 @@ def write_rows(cases: SensorCases, places: Places, power: float, first: int, las
                 raise NumericalError("covariance of a track is not positive definite")
 
 
-@borrowing
-def _log_integral(row: Floats, dim: int) -> float:
-    # The compiler unrolls a call of constant dimension, which makes the two usual ones more than twice as fast.
-    if dim == 4:
-        return log_integral(row, 4)
-    if dim == 5:
-        return log_integral(row, 5)
-    return log_integral(row, dim)
-
-
 @inlined
 def _multiply(laid: Laid, chosen: Ints, member: int, product: Floats) -> None:
     """Row of the product of the chosen cases' powers; where some do not know the label, the others' sum to one."""
@@ -158,12 +148,12 @@ def _integrate(laid: Laid, chosen: Ints, at: int, terms: Terms, work: Work) -> t
             power = terms.powers[num_alone + e]
             for k in range(last + 1):
                 joint[k] = power * product[k] + terms.rows[e, member, k]
-            value = _log_integral(joint, terms.dim)
+            value = log_integral_of_any(joint, terms.dim)
             if math.isnan(value) and min(terms.own_powers[e], power) < 0.0:
                 value = math.inf  # a quotient of Gaussians that is not integrable
             work.crossed[e] += value
         if num_alone > 0:
-            overlap += _log_integral(product, terms.dim)
+            overlap += log_integral_of_any(product, terms.dim)
             quadratic += product[last - 1]
     return overlap, quadratic
 

@@ -38,7 +38,6 @@ class Ascent(NamedTuple):
 
     chosen: Ints  # (num_sensors,) number of the course of each sensor
     totals: Floats  # (num_labels, num_samples, bernoulli_size) joint rows
-    values: Floats  # (num_labels,) mean value of each label
     cell_totals: Floats  # (num_cells,) sums of log_miss
 
 
@@ -134,17 +133,21 @@ def _best(table: Table, allowed: Allowed, chosen: Ints, sensor: int, gains: Floa
 
 
 @kernel
-def _start(table: Table, valuation: Valuation, coefficients: Floats, cells: Cells, chosen: Ints) -> Ascent:
+def _start(
+    table: Table, valuation: Valuation, coefficients: Floats, cells: Cells, chosen: Ints
+) -> tuple[Ascent, float]:
+    """Where the ascent begins, and the mean reward there."""
     num_labels, num_samples = len(table.start), table.changes.shape[1]
-    at = Ascent(chosen.copy(), start_totals(table), np.empty(num_labels), np.zeros(len(cells.worth)))
+    at = Ascent(chosen.copy(), start_totals(table), np.zeros(len(cells.worth)))
     for s in range(len(chosen)):
         add_course(table, s, table.first_courses[s] + chosen[s], 1.0, at.totals)
         _add_cells(cells, table.first_courses[s] + chosen[s], 1.0, at.cell_totals)
     work, values = make_value_work(valuation), np.empty((num_samples, valuation.num))
+    reward = np.sum(cells.worth * -np.expm1(at.cell_totals))
     for label in range(num_labels):
         value_rows(valuation, label, at.totals[label], work, values)
-        at.values[label] = _label_mean(values, coefficients)
-    return at
+        reward += _label_mean(values, coefficients)
+    return at, reward
 
 
 @kernel
@@ -162,11 +165,10 @@ def ascend(
     coefficients: (num,) of a label's numbers in the reward. max_lines: an end, for which no ascent is known to have
     had need. Returns the joint action, its mean reward, and the trace.
     """
-    at, num_sensors = _start(table, valuation, coefficients, cells, start), len(start)
+    at, reward = _start(table, valuation, coefficients, cells, start)
     work, values = make_value_work(valuation), np.empty((table.changes.shape[1], valuation.num))
     before, gains = np.empty(len(table.start)), np.empty(np.max(np.diff(table.first_courses)))
-    found = np.sum(cells.worth * -np.expm1(at.cell_totals))
-    reward, settled, sensor, line = np.sum(at.values) + found, 0, 0, 0
+    num_sensors, settled, sensor, line = len(start), 0, 0, 0
     evaluations, best = np.ones(max_lines + 1, np.int64), np.full(max_lines + 1, reward)
     while settled < num_sensors and line < max_lines:
         first, present = table.first_courses[sensor], at.chosen[sensor]

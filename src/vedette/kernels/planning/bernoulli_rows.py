@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 from vedette.kernels.base.compile import borrowing, inlined
 from vedette.kernels.base.types import Floats, Ints
-from vedette.kernels.gaussian.information import log_integral, row_size
+from vedette.kernels.gaussian.information import row_size
 
 # Certain and impossible targets are taken as all but that: a logit whose exponential is still a number.
 ALL_BUT_CERTAIN = 700.0
@@ -59,15 +59,4 @@ def unscale(row: Floats) -> None:
             row[k] *= scale
 
 
-@inlined
-def integral_of(row: Floats, dim: int) -> float:
-    """log of the integral of the row's information part, which is used up: see `log_integral`."""
-    # The compiler unrolls a call of constant dimension.
-    if dim == 4:
-        return log_integral(row, 4)
-    if dim == 5:
-        return log_integral(row, 5)
-    return log_integral(row, dim)
-
-
-__all__ = ["ALL_BUT_CERTAIN", "Table", "bernoulli_size", "integral_of", "log_miss", "unscale"]
+__all__ = ["ALL_BUT_CERTAIN", "Table", "bernoulli_size", "log_miss", "unscale"]

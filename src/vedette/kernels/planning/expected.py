@@ -18,7 +18,8 @@ from vedette.kernels.gaussian.linalg import cholesky, inverse_from_factor
 from vedette.kernels.gaussian.prediction import predict
 from vedette.kernels.planning.bernoulli_rows import log_miss
 from vedette.kernels.planning.ideal import Decision
-from vedette.kernels.planning.known import Belief, Entries, Work, make_known_work
+from vedette.kernels.planning.known import Entries, Work, make_known_work
+from vedette.kernels.planning.reach import Belief
 
 
 @inlined

@@ -12,7 +12,8 @@ import numpy as np
 
 from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Floats, Ints
-from vedette.kernels.planning.bernoulli_rows import Table, integral_of, unscale
+from vedette.kernels.gaussian.information import log_integral_of_any
+from vedette.kernels.planning.bernoulli_rows import Table, unscale
 from vedette.kernels.planning.joint_values import values_without_scans
 from vedette.kernels.planning.label_values import Valuation, ValueWork, make_value_work, value_label
 
@@ -96,7 +97,7 @@ def _logit(row: Floats, dim: int, work: ValueWork) -> float:
     unscale(work.total)
     for k in range(size - 2):
         work.joint[k] = work.total[k]
-    return float(row[size - 2] + integral_of(work.joint, dim))
+    return float(row[size - 2] + log_integral_of_any(work.joint, dim))
 
 
 @borrowing

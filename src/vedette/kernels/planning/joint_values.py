@@ -38,9 +38,7 @@ def values_without_scans(rows: Floats, valuation: Valuation) -> Floats:
     """(num_labels, num) values of rows (num_labels, bernoulli_size)."""
     work, out = make_value_work(valuation), np.empty((len(rows), valuation.num))
     for label in range(len(rows)):
-        for k in range(rows.shape[1]):
-            work.total[k] = rows[label, k]
-        value_label(valuation, label, work, out[label])
+        value_rows(valuation, label, rows[label : label + 1], work, out[label : label + 1])
     return out
 
 

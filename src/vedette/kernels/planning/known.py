@@ -15,11 +15,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vedette.errors import ModelError, NumericalError
+from vedette.errors import NumericalError
+from vedette.kernels.association.options import log_clutter_at
 from vedette.kernels.association.predicted import log_or_minus_inf
 from vedette.kernels.base.compile import borrowing, inlined, kernel
-from vedette.kernels.base.types import Floats, Ints, Lmb
-from vedette.kernels.gaussian.detection import detection_probability
+from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.gaussian.information import move_row, to_information
 from vedette.kernels.gaussian.innovation import Innovation, expect, make_innovation, update_mean, whiten
 from vedette.kernels.gaussian.linalg import log_add
@@ -28,22 +28,7 @@ from vedette.kernels.gaussian.scratch import Scratch, make_scratch
 from vedette.kernels.planning.bernoulli_rows import ALL_BUT_CERTAIN, bernoulli_size, log_miss
 from vedette.kernels.planning.ideal import Decision, ideal_measurement
 from vedette.kernels.planning.pseudo_lmb import LmbResults
-
-
-class Paths(NamedTuple):
-    """Labels carried over the horizon without scans."""
-
-    means: Floats  # (num_labels, horizon_steps, state_dim)
-    covs: Floats  # (num_labels, horizon_steps, state_dim, state_dim)
-
-
-class Belief(NamedTuple):
-    """What a sensor believes of its labels before the decision, and where they are among those of the samples."""
-
-    prior: Lmb  # one Gaussian a label
-    paths: Paths
-    targets: Ints  # (num_labels, num_samples) place of the label's target in the samples, -1 where it is not there
-    radii: Floats  # (num_labels, horizon_steps) m, about the paths' means, within which the label is
+from vedette.kernels.planning.reach import Belief
 
 
 class Entries(NamedTuple):
@@ -96,94 +81,6 @@ def make_known_work(dim: int, meas_dim: int, num_steps: int) -> Work:
     )
 
 
-@kernel
-def predict_paths(prior: Lmb, decision: Decision) -> Paths:
-    """Every label after each step, without births, deaths or scans."""
-    num, dim = prior.tracks.means.shape
-    steps, scratch = decision.horizon.poses.shape[1], make_scratch(dim, len(decision.sensor.angular))
-    means, covs = np.empty((num, steps, dim)), np.empty((num, steps, dim, dim))
-    for i in range(num):
-        for h in range(steps):
-            mean = prior.tracks.means[i] if h == 0 else means[i, h - 1]
-            cov = prior.tracks.covs[i] if h == 0 else covs[i, h - 1]
-            predict(decision.motion, decision.horizon.dt, mean, cov, means[i, h], covs[i, h], scratch)
-    return Paths(means, covs)
-
-
-@kernel
-def label_radii(paths: Paths, targets: Ints, states: Floats) -> Floats:
-    """(num_labels, horizon_steps) distance from a label's predicted mean beyond which none of its samples is.
-
-    At least 5.3 standard deviations of its position along its longest axis, beyond which is less than 1e-6 of its
-    Gaussian. states: (horizon_steps, num_targets, state_dim) of the samples.
-    """
-    num_labels, num_steps = paths.means.shape[:2]
-    radii = np.empty((num_labels, num_steps))
-    for label in range(num_labels):
-        for h in range(num_steps):
-            cov, square = paths.covs[label, h], 0.0
-            for sample in range(targets.shape[1]):
-                if targets[label, sample] >= 0:
-                    at, mean = states[h, targets[label, sample]], paths.means[label, h]
-                    square = max(square, (at[0] - mean[0]) ** 2 + (at[1] - mean[1]) ** 2)
-            mean_variance, skew = 0.5 * (cov[0, 0] + cov[1, 1]), 0.5 * (cov[0, 0] - cov[1, 1])
-            longest = mean_variance + math.sqrt(skew * skew + cov[1, 0] * cov[1, 0])
-            radii[label, h] = math.sqrt(max(square, 5.3 * 5.3 * longest))
-    return radii
-
-
-@inlined
-def _beyond(belief: Belief, decision: Decision, course: int, label: int, step: int, reach: float) -> bool:
-    """Whether a label is, at a step of a course, where a sensor of this reach detects nothing."""
-    pose, mean = decision.horizon.poses[course, step], belief.paths.means[label, step]
-    return math.hypot(mean[0] - pose[0], mean[1] - pose[1]) > reach + belief.radii[label, step]
-
-
-@borrowing
-def _in_reach(
-    belief: Belief, decision: Decision, course: int, label: int, least: float, reach: float, state: Floats
-) -> bool:
-    sensor, paths = decision.sensor, belief.paths
-    for h in range(decision.horizon.poses.shape[1]):
-        if _beyond(belief, decision, course, label, h, reach):
-            continue
-        pose, mean = decision.horizon.poses[course, h], paths.means[label, h]
-        if detection_probability(sensor, pose, mean, paths.covs[label, h], state) >= least:
-            return True
-        for sample in range(belief.targets.shape[1]):
-            target = belief.targets[label, sample]
-            if target >= 0:
-                at = decision.futures.states[h, target]
-                if sensor.prob_detection(at, pose, sensor.detection_params) >= least:
-                    return True
-    return False
-
-
-@kernel
-def fill_reach(
-    belief: Belief, decision: Decision, least: float, reach: float, first: int, last: int, out: Ints
-) -> None:
-    """Set out[course, label] to 1 where a course may detect a label with probability `least` or more, else to 0.
-
-    Judged by the samples and by the prediction, at every step. reach: m, beyond which the sensor detects nothing.
-    """
-    state = np.empty(belief.prior.tracks.means.shape[1])
-    for course in range(first, last):
-        for label in range(out.shape[1]):
-            out[course, label] = 1 if _in_reach(belief, decision, course, label, least, reach, state) else 0
-
-
-@kernel
-def fill_near(belief: Belief, decision: Decision, reach: float, first: int, last: int, out: Ints) -> None:
-    """As `fill_reach`, by distance alone: of all that are not farther than `reach` at every step."""
-    for course in range(first, last):
-        for label in range(out.shape[1]):
-            out[course, label] = 0
-            for h in range(decision.horizon.poses.shape[1]):
-                if not _beyond(belief, decision, course, label, h, reach):
-                    out[course, label] = 1
-
-
 @borrowing
 def expect_unseen(belief: Belief, decision: Decision, course: int, label: int, work: Work) -> None:
     """What the label's scans over the course look like until it is measured, the same for all samples."""
@@ -194,22 +91,14 @@ def expect_unseen(belief: Belief, decision: Decision, course: int, label: int, w
 
 
 @inlined
-def _log_clutter(decision: Decision, measurement: Floats, pose: Floats) -> float:
-    sensor = decision.sensor
-    level = sensor.log_clutter_intensity(measurement, pose, sensor.clutter_params)
-    if math.isnan(level) or level == math.inf:
-        raise ModelError("clutter model: log intensity is not a number below infinity")
-    return float(max(level, decision.truncation.log_clutter_floor))
-
-
-@inlined
 def _take(innovation: Innovation, at: int, decision: Decision, pose: Floats, mean: Floats, work: Work) -> float:
     """Update by the measurement in `work`, into its mean and covariance; returns the log factor on the odds."""
     distance = whiten(innovation, at, work.measurement, decision.sensor.angular, math.inf, work.whitened)
     update_mean(innovation, at, work.whitened, mean, work.mean)
     _copy_matrix(innovation.covs[at], work.cov)
     detection = innovation.prob_detection[at]
-    likelihood = innovation.log_norm[at] - 0.5 * distance - _log_clutter(decision, work.measurement, pose)
+    clutter = max(log_clutter_at(decision.sensor, work.measurement, pose), decision.truncation.log_clutter_floor)
+    likelihood = innovation.log_norm[at] - 0.5 * distance - clutter
     return log_add(log_miss(detection), log_or_minus_inf(detection) + likelihood)
 
 

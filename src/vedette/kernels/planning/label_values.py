@@ -18,9 +18,9 @@ import numpy as np
 from vedette.kernels.base.bundle_types import typed_by_fields
 from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Floats
-from vedette.kernels.gaussian.information import to_moments
+from vedette.kernels.gaussian.information import log_integral_of_any, to_moments
 from vedette.kernels.gaussian.linalg import cholesky, log_add
-from vedette.kernels.planning.bernoulli_rows import integral_of, unscale
+from vedette.kernels.planning.bernoulli_rows import unscale
 
 POWER_INTEGRALS = 0
 EXPECTED_LOSS = 1
@@ -66,7 +66,7 @@ def _power_integrals(valuation: Valuation, label: int, work: ValueWork, out: Flo
     logit, prior_logit = total[size - 2], prior[size - 2]
     for k in range(size - 2):
         joint[k] = total[k]
-    alone = integral_of(joint, dim)
+    alone = log_integral_of_any(joint, dim)
     quadratic = joint[size - 4]  # s - y'Y^-1 y, which the elimination leaves
     for e in range(valuation.num):
         a, b = valuation.exponents[e, 0], valuation.exponents[e, 1]
@@ -79,7 +79,7 @@ def _power_integrals(valuation: Valuation, label: int, work: ValueWork, out: Flo
         else:
             for k in range(size - 2):
                 joint[k] = a * prior[k] + b * total[k]
-            integral = integral_of(joint, dim)
+            integral = log_integral_of_any(joint, dim)
         out[e] += log_add(0.0, integral + a * prior_logit + b * logit + (a + b - 1.0) * valuation.log_volume)
 
 
@@ -122,7 +122,7 @@ def _of_function(valuation: Valuation, label: int, work: ValueWork, out: Floats)
     total, size, dim = work.total, work.total.shape[0], valuation.references.shape[1]
     for k in range(size - 2):
         work.joint[k] = total[k]
-    logit = total[size - 2] + integral_of(work.joint, dim)
+    logit = total[size - 2] + log_integral_of_any(work.joint, dim)
     if not to_moments(total, valuation.references[label], work.mean, work.cov, work.factor):
         for e in range(valuation.num):
             out[e] = math.nan
