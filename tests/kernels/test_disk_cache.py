@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import os
 import subprocess
 import sys
@@ -28,7 +29,7 @@ while not Path(sys.argv[1], "go").exists():
     time.sleep(0.001)
 for name in sys.argv[2:]:
     assert abs(log_sum(np.array([1, 2, 3]).astype(name)) - 3.4076059644443806) < 1e-6, name
-stats = log_sum.stats
+stats = log_sum._outer.stats  # as it was called from here
 print(sum(stats.cache_hits.values()), sum(stats.cache_misses.values()))
 """
 KERNELS = Path(disk_cache.__file__).parents[1]
@@ -103,3 +104,42 @@ def test_a_stamp_covers_every_kernel_file_that_is_reached() -> None:
     reached = {path.relative_to(KERNELS).as_posix() for path in disk_cache._source_closure(KERNELS / "steps/lmb.py")}
     assert {"steps/lmb.py", "association/search.py", "gaussian/linalg.py", "base/types.py"} <= reached
     assert not any(name.startswith("planning/") for name in reached)
+    assert "base/compile.py" in reached
+    assert "base/disk_cache.py" not in reached
+
+
+IMPORTS = """
+from vedette.kernels.gaussian.linalg import cholesky
+from vedette.kernels.planning.known import (  # a comment
+    Entries,
+    fill_changes,
+)
+from vedette.kernels.labelled import gci
+
+def late():
+    from vedette.kernels.steps.lmb import step_lmb
+"""
+
+
+def test_every_way_to_import_a_kernel_is_found(tmp_path: Path) -> None:
+    (tmp_path / "own.py").write_text(IMPORTS, encoding="utf-8")
+    found = {path.relative_to(KERNELS).as_posix() for path in disk_cache._kernel_imports(tmp_path / "own.py")}
+    assert found == {"gaussian/linalg.py", "planning/known.py", "labelled/gci.py", "steps/lmb.py"}
+
+
+def test_imports_are_found_as_a_parser_finds_them() -> None:
+    for path in sorted(KERNELS.rglob("*.py")):
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        named = [node for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) and node.module]
+        names = {f"{node.module}.{alias.name}" for node in named for alias in node.names}
+        names |= {node.module for node in named if node.module}
+        modules = {KERNELS.parent.joinpath(*name.split(".")[1:]).with_suffix(".py") for name in names}
+        expected = {module for module in modules if module.is_relative_to(KERNELS) and module.is_file()}
+        assert disk_cache._kernel_imports(path) >= expected, path
+
+
+def test_a_stamp_is_that_of_the_file_that_was_imported(tmp_path: Path) -> None:
+    """Edited before its first call, a kernel must not be kept as what was compiled of the edited file."""
+    stamps = [disk_cache._stamp_of_file(str(KERNELS / "steps/lmb.py")) for _ in range(2)]
+    assert stamps[0] == stamps[1] == disk_cache._source_stamp(KERNELS / "steps/lmb.py")
+    assert disk_cache._stamp_of_file(str(tmp_path / "own.py")) == ""

@@ -17,9 +17,12 @@ from typing import Any
 import numba
 import numpy as np
 import pytest
+from numba.core.registry import CPUDispatcher
 
-from vedette.kernels.base.compile import JIT_ENABLED, SIGNATURES, kernel
-from vedette.models import constant_survival
+from vedette.kernels.base.compile import JIT_ENABLED, SIGNATURES, borrowing, kernel
+from vedette.kernels.base.types import Motion
+from vedette.models import constant_survival, constant_velocity
+from vedette.models.motion import kernel_motion
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -44,8 +47,6 @@ def survival() -> Any:
 
 
 def test_core_registry_cpu_dispatcher() -> None:
-    from numba.core.registry import CPUDispatcher
-
     assert isinstance(_doubled, CPUDispatcher)
     assert isinstance(survival(), CPUDispatcher)
     for name in ("compile", "disable_compile", "get_compile_result"):
@@ -53,12 +54,28 @@ def test_core_registry_cpu_dispatcher() -> None:
 
 
 def test_dispatcher_cache_attribute() -> None:
-    assert {"_cache_file", "_cache_path", "_impl"} <= vars(_doubled._cache).keys()
+    """What stands there is asked for three things; the cache behind it is Numba's own, set up when it is asked."""
+    for method in (CPUDispatcher.compile, CPUDispatcher.stats.fget):
+        asked = set(re.findall(r"_cache\.(\w+)", inspect.getsource(method)))
+        assert asked <= {"load_overload", "save_overload", "cache_path"} <= vars(type(_doubled._cache)).keys()
+    assert {"_cache_file", "_cache_path", "_impl"} <= vars(_doubled._cache.own).keys()
+
+
+def test_dispatcher_typeof_pyval() -> None:
+    """Asked for the types of arguments that the quick way does not know."""
+    asked = []
+
+    class Asked(CPUDispatcher):
+        def typeof_pyval(self, val: Any) -> Any:
+            asked.append(type(val))
+            return super().typeof_pyval(val)
+
+    bundle = kernel_motion(constant_velocity(1.0), constant_survival(0.9))
+    assert Asked(lambda motion: motion.method, targetoptions={"nopython": True})(bundle) == bundle.method
+    assert set(asked) == {Motion}
 
 
 def test_dispatcher_reduce_states_and_rebuild() -> None:
-    from numba.core.registry import CPUDispatcher
-
     states = ["uuid", "py_func", "locals", "targetoptions", "can_compile", "sigs"]
     assert sorted(_doubled._reduce_states()) == sorted(states)
     assert takes(CPUDispatcher._rebuild, *states)
@@ -100,7 +117,7 @@ def test_core_caching_compile_result_cache_impl_and_function_cache() -> None:
     assert takes(IndexDataCacheFile.save, "self", "key", "data")
     assert takes(IndexDataCacheFile.load, "self", "key")
     assert takes(IndexDataCacheFile.flush, "self")
-    assert isinstance(_doubled._cache._impl.filename_base, str)
+    assert isinstance(_doubled._cache.own._impl.filename_base, str)
 
 
 def test_core_caching_locator_protocol() -> None:
@@ -129,6 +146,19 @@ def test_core_options_nrt_and_forceinline() -> None:
 
     assert DefaultOptions._nrt.flag_name == "nrt"
     assert DefaultOptions.forceinline.flag_name == "forceinline"
+    assert DefaultOptions.no_cpython_wrapper.flag_name == "no_cpython_wrapper"
+    assert DefaultOptions.no_cfunc_wrapper.flag_name == "no_cfunc_wrapper"
+
+
+def test_a_kernel_for_kernels_can_be_called_from_python_too() -> None:
+    """Compiled anew for that; and what is kept on disk of the two is told apart."""
+    inner: Any = borrowing(_double)
+    assert inner(np.array([2.0])) == 4.0
+    assert not inner.overloads
+    outer: Any = kernel(lambda values: inner(values))
+    assert outer(np.array([2.0])) == 4.0
+    assert len(inner.overloads) == 1
+    assert inner._cache.own._cache_file._base != _doubled._cache.own._cache_file._base
 
 
 def test_experimental_function_type_function_model() -> None:

@@ -69,7 +69,8 @@ class GLMB:
     @classmethod
     def empty(cls, state_dim: int) -> GLMB:
         """The density that is certain of no target."""
-        return cls(TrackTable.empty(state_dim), np.zeros(2, np.int64), np.empty(0, np.int64), np.zeros(1))
+        none = TrackTable.empty(state_dim)
+        return checks.unchecked(cls, none, np.zeros(2, np.int64), np.empty(0, np.int64), np.zeros(1))
 
     @classmethod
     def from_hypotheses(cls, tracks: TrackTable, hypotheses: Sequence[Sequence[int]], weights: Any) -> GLMB:

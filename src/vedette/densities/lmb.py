@@ -60,7 +60,7 @@ class LMB:
     @classmethod
     def empty(cls, state_dim: int) -> LMB:
         """The density that is certain of no target."""
-        return cls(TrackTable.empty(state_dim), np.empty(0))
+        return checks.unchecked(cls, TrackTable.empty(state_dim), np.empty(0))
 
     @classmethod
     def from_bernoullis(cls, labels: Any, existence: Any, means: Any, covs: Any) -> LMB:

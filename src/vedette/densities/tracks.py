@@ -62,7 +62,8 @@ class TrackTable:
     @classmethod
     def empty(cls, state_dim: int) -> TrackTable:
         """A table without tracks."""
-        return cls(
+        return checks.unchecked(
+            cls,
             np.empty((0, 2), np.int64),
             np.zeros(1, np.int64),
             np.empty(0),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import lru_cache
 from typing import Any, TypeVar
 
 import numpy as np
@@ -45,6 +46,9 @@ def check_scan(scan: Any, measurement: MeasurementModel) -> tuple[Floats, int]:
         raise InputError(f"scan: expected finite numbers; got {array[bad[0]].tolist()} in row {bad[0]}")
     if measurement.angular.any():
         array = _in_one_turn(array, measurement.angular)
+    column = np.sort(array[:, 0])
+    if (column[1:] != column[:-1]).all():  # most scans
+        return array, 0
     _, first = np.unique(array, axis=0, return_index=True)
     if len(first) == len(array):
         return array, 0
@@ -94,8 +98,18 @@ def births_at(birth: BirthModel, step: int) -> LMB:
     """The LMB of the targets that may be born at `step`, labelled (step, site)."""
     if not birth.is_active(step):
         return LMB.empty(birth.state_dim)
-    sites = np.arange(birth.num_sites)
-    labels = np.column_stack([np.full_like(sites, step), sites])
+    born = _births_of(birth)
+    labels = born.tracks.labels.copy()
+    labels[:, 0] = step
+    tracks = born.tracks
+    same = (tracks.offsets, tracks.log_weights, tracks.means, tracks.covs)
+    return unchecked(LMB, unchecked(TrackTable, labels, *same), born.existence_logit)
+
+
+@lru_cache(maxsize=1000)
+def _births_of(birth: BirthModel) -> LMB:
+    """Those of no step, laid out once a model."""
+    labels = np.column_stack([np.zeros(birth.num_sites, np.int64), np.arange(birth.num_sites)])
     tracks = unchecked(
         TrackTable, labels, np.arange(birth.num_sites + 1), np.zeros(birth.num_sites), birth.means, birth.covs
     )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import TypeVar
 
 import numpy as np
@@ -105,13 +106,7 @@ class Limits:
 
     def truncation(self, meas_dim: int) -> Truncation:
         """The fields that bound hypotheses, as kernels take them."""
-        log_gap = -math.log(self.min_relative_weight) if self.min_relative_weight > 0.0 else math.inf
-        return Truncation(
-            SearchCaps(int(self.max_hypotheses), log_gap, int(self.max_search_nodes)),
-            2.0 * float(gammaincinv(0.5 * meas_dim, self.gate_probability)),  # the quantile of chi-squared
-            float(self.min_log_clutter),
-            -math.log(self.min_track_weight) if self.min_track_weight > 0.0 else math.inf,
-        )
+        return _truncation(self, meas_dim)
 
     def track_caps(self) -> MixtureCaps:
         """The fields that bound the mixture of a track, as kernels take them."""
@@ -124,7 +119,7 @@ class Limits:
 
     def reduction(self) -> Reduction:
         """The fields that bound tracks and labels, as kernels take them."""
-        return Reduction(self.track_caps(), float(logit(self.min_existence)), int(self.max_labels))
+        return _reduction(self)
 
     def without_spread(self, belief: _Labelled) -> tuple[_Labelled, float]:
         """The belief without the labels that `max_position_std` drops, and their summed existence."""
@@ -147,6 +142,22 @@ class Limits:
     def max_existence_logit(self) -> float:
         """Log-odds of `max_existence`."""
         return float(logit(self.max_existence))
+
+
+@lru_cache(maxsize=1000)
+def _truncation(limits: Limits, meas_dim: int) -> Truncation:
+    log_gap = -math.log(limits.min_relative_weight) if limits.min_relative_weight > 0.0 else math.inf
+    return Truncation(
+        SearchCaps(int(limits.max_hypotheses), log_gap, int(limits.max_search_nodes)),
+        2.0 * float(gammaincinv(0.5 * meas_dim, limits.gate_probability)),  # the quantile of chi-squared
+        float(limits.min_log_clutter),
+        -math.log(limits.min_track_weight) if limits.min_track_weight > 0.0 else math.inf,
+    )
+
+
+@lru_cache(maxsize=1000)
+def _reduction(limits: Limits) -> Reduction:
+    return Reduction(limits.track_caps(), float(logit(limits.min_existence)), int(limits.max_labels))
 
 
 def _spread_labels(belief: GLMB | LMB, max_position_std: float) -> Ints:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -139,8 +140,9 @@ class SurvivalModel:
             probe_probability(self.function, (state, dt, self.params))
 
 
+@lru_cache(maxsize=1000)
 def kernel_motion(motion: MotionModel, survival: SurvivalModel) -> Motion:
-    """The bundle of functions and parameters that prediction kernels take."""
+    """The bundle of functions and parameters that prediction kernels take; one for the two."""
     jacobian = motion.transition_jacobian
     return Motion(
         motion.transition,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -87,25 +88,7 @@ class SensorModel:
 
     def to_kernel(self, detection_at: str | None = None) -> Sensor:
         """The bundle of functions and parameters that kernels take. detection_at: instead of the sensor's own."""
-        over_gaussian = (self.detection_at if detection_at is None else detection_at) == "mean"
-        jacobian, mean = self.measurement.jacobian, self.detection.mean_function
-        rule = AT_CENTRE if not over_gaussian else BY_NODES if mean is None else CLOSED_FORM
-        return Sensor(
-            self.measurement.function,
-            _no_measurement_jacobian if jacobian is None else jacobian,
-            self.noise.function,
-            self.detection.function,
-            _no_mean_detection if mean is None else mean,
-            self.clutter.log_intensity,
-            self.measurement.params,
-            self.noise.params,
-            self.detection.params,
-            self.clutter.params,
-            self.measurement.angular,
-            resolve_method("SensorModel.method", self.method, jacobian is not None),
-            rule,
-            _NODES if rule == BY_NODES else _NO_NODES,
-        )
+        return _bundle_of(self, (self.detection_at if detection_at is None else detection_at) == "mean")
 
     def mean_detection(self, means: ArrayLike, covs: ArrayLike, pose: ArrayLike) -> Floats:
         """(n,) mean probability of detection over each of n Gaussians, whatever `detection_at` says.
@@ -139,3 +122,26 @@ class SensorModel:
         self.detection.check(table, at)
         measured = self.measurement.measure(table, at)
         self.clutter.check(measured, at, self.measurement, state_dim=table.shape[1])
+
+
+@lru_cache(maxsize=1000)
+def _bundle_of(model: SensorModel, over_gaussian: bool) -> Sensor:
+    """Made once a model, as kernels know a bundle that they have met."""
+    jacobian, mean = model.measurement.jacobian, model.detection.mean_function
+    rule = AT_CENTRE if not over_gaussian else BY_NODES if mean is None else CLOSED_FORM
+    return Sensor(
+        model.measurement.function,
+        _no_measurement_jacobian if jacobian is None else jacobian,
+        model.noise.function,
+        model.detection.function,
+        _no_mean_detection if mean is None else mean,
+        model.clutter.log_intensity,
+        model.measurement.params,
+        model.noise.params,
+        model.detection.params,
+        model.clutter.params,
+        model.measurement.angular,
+        resolve_method("SensorModel.method", model.method, jacobian is not None),
+        rule,
+        _NODES if rule == BY_NODES else _NO_NODES,
+    )

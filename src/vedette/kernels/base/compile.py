@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
-from typing import Any, TypeVar, cast
+from typing import Any, Self, TypeVar, cast
 
 import numba
 from numba import types
@@ -17,7 +17,8 @@ from numba.core.registry import CPUDispatcher
 from numba.experimental.function_type import FunctionModel
 from numba.extending import NativeValue, register_model, typeof_impl, unbox
 
-from vedette.kernels.base.disk_cache import attach_cache
+from vedette.kernels.base.bundle_types import TYPED_BY_FIELDS, type_of_bundle
+from vedette.kernels.base.disk_cache import OnDemand
 
 _F = TypeVar("_F", bound=Callable[..., Any])
 JIT_ENABLED = not config.DISABLE_JIT
@@ -25,6 +26,7 @@ JIT_ENABLED = not config.DISABLE_JIT
 # No fastmath: -inf is a legal log weight. NumPy's error model: division by zero is inf, not an exception branch.
 _OPTIONS: dict[str, Any] = {"nopython": True, "nogil": True, "error_model": "numpy"}
 _BORROWING: dict[str, Any] = {**_OPTIONS, "_nrt": False}
+_ONLY_CALLED_BY_KERNELS: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 
 
 def kernel(function: _F) -> _F:
@@ -39,7 +41,7 @@ def borrowing(function: _F) -> _F:
     matrices. Such a kernel may return arrays (views of its arguments) only to another such kernel, and may call only
     such kernels and model functions.
     """
-    return _compiled(function, _BORROWING)
+    return _compiled_inner(function, _BORROWING)
 
 
 def inlined(function: _F) -> _F:
@@ -47,15 +49,53 @@ def inlined(function: _F) -> _F:
 
     A bundle of arrays is passed as dozens of words, which costs more than a small kernel's own work.
     """
-    return _compiled(function, {**_BORROWING, "forceinline": True})
+    return _compiled_inner(function, {**_BORROWING, "forceinline": True})
 
 
 def _compiled(function: _F, options: dict[str, Any]) -> _F:
-    if not JIT_ENABLED:
-        return function
-    dispatcher = numba.njit(**{k: v for k, v in options.items() if k != "nopython"})(function)
-    attach_cache(dispatcher)
-    return cast(_F, dispatcher)
+    return cast(_F, Kernel.kept(function, options)) if JIT_ENABLED else function
+
+
+def _compiled_inner(function: _F, options: dict[str, Any]) -> _F:
+    return cast(_F, InnerKernel.kept(function, options | _ONLY_CALLED_BY_KERNELS)) if JIT_ENABLED else function
+
+
+class Kernel(CPUDispatcher):  # type: ignore[misc]
+    """A compiled function of arrays and bundles."""
+
+    variant = ""
+
+    @classmethod
+    def kept(cls, function: Callable[..., Any], options: dict[str, Any]) -> Self:
+        """One whose code is kept on disk."""
+        made = cls(function, targetoptions=dict(options))
+        made._cache = OnDemand(function, cls.variant)
+        return made
+
+    def typeof_pyval(self, value: Any) -> Any:
+        """The type of an argument that Numba's quick way does not know; asked for by its dispatcher.
+
+        Numba's own way notes a bundle's type as in use, for which the types of all its fields are hashed.
+        """
+        if type(value) in TYPED_BY_FIELDS:
+            return type_of_bundle(value)
+        return super().typeof_pyval(value)
+
+
+class InnerKernel(Kernel):
+    """One that other kernels call, compiled without what Python needs to call it: a seventh of the time.
+
+    Called from Python all the same, it is compiled once more.
+    """
+
+    variant = "-inner"
+    _outer: Kernel | None = None
+
+    def __call__(self, *args: Any) -> Any:
+        if self._outer is None:
+            options = {k: v for k, v in self.targetoptions.items() if k not in _ONLY_CALLED_BY_KERNELS}
+            self._outer = Kernel.kept(self.py_func, options)
+        return self._outer(*args)
 
 
 _VECTOR = types.float64[::1]
@@ -187,7 +227,7 @@ def compile_model_function(function: Callable[..., Any], kind: str) -> Any:
         return function
     dispatcher = ModelFunction(function, targetoptions=dict(_OPTIONS))
     dispatcher.kind = kind
-    attach_cache(dispatcher)
+    dispatcher._cache = OnDemand(function)
     if function.__module__.startswith("vedette."):
         return dispatcher
     try:

@@ -7,21 +7,21 @@ where nobody else can have written it, see `vedette.kernels.base.private_files`.
 
 from __future__ import annotations
 
-import ast
 import contextlib
 import hashlib
 import os
 import pickle
+import re
 import uuid
 import warnings
 from collections.abc import Callable
-from functools import cache
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Any, ClassVar
 
 import numba
 from numba.core import config
-from numba.core.caching import CompileResultCacheImpl, FunctionCache
+from numba.core.caching import CompileResultCacheImpl, FunctionCache, NullCache
 from numba.core.serialize import dumps
 
 from vedette.kernels.base.private_files import fault_of_folder, make_private_folder, read_private, write_private
@@ -44,25 +44,46 @@ def _checkout_directory() -> Path:
     return cache_directory() / hashlib.sha256(str(_PACKAGE_ROOT).encode()).hexdigest()[:12]
 
 
-def _kernel_imports(source: str) -> set[str]:
-    names: set[str] = set()
-    for node in ast.walk(ast.parse(source)):
-        if isinstance(node, ast.ImportFrom) and node.module and node.module.startswith("vedette.kernels"):
-            names.add(node.module)
-            names.update(f"{node.module}.{alias.name}" for alias in node.names)
-    return names
+@cache
+def _modules() -> dict[str, Path]:
+    """The files of all kernel modules, by the names that imports give them."""
+    files = (_PACKAGE_ROOT / "kernels").rglob("*.py")
+    return {".".join(("vedette", *file.relative_to(_PACKAGE_ROOT).with_suffix("").parts)): file for file in files}
+
+
+# Found by a pattern: to parse all kernels took longer than all else that a start does.
+_IMPORT = re.compile(r"^[ \t]*from (vedette\.kernels[\w.]*) import (\([^)]*\)|.*)$", re.MULTILINE)
+
+
+@cache
+def _content(path: Path) -> bytes:
+    return path.read_bytes()
+
+
+@cache
+def _kernel_imports(path: Path) -> frozenset[Path]:
+    """Kernel modules that a file names in its imports; one too many would do no harm."""
+    found: set[Path] = set()
+    for module, names in _IMPORT.findall(_content(path).decode()):
+        named = (module, *(f"{module}.{name}" for name in re.findall(r"\w+", names)))
+        found.update(_modules()[name] for name in named if name in _modules())
+    return frozenset(found)
+
+
+# They decide how code is kept and called, not what is compiled.
+_APART = frozenset(
+    _PACKAGE_ROOT / "kernels/base" / name for name in ("bundle_types.py", "disk_cache.py", "private_files.py")
+)
 
 
 @cache
 def _source_closure(path: Path) -> frozenset[Path]:
-    """The file and every kernel module that it reaches by imports."""
+    """The file and every kernel module that it reaches by imports, as far as they decide what is compiled."""
     found, pending = {path}, [path]
     while pending:
-        for name in _kernel_imports(pending.pop().read_text(encoding="utf-8")):
-            candidate = _PACKAGE_ROOT.joinpath(*name.split(".")[1:]).with_suffix(".py")
-            if candidate.is_file() and candidate not in found:
-                found.add(candidate)
-                pending.append(candidate)
+        new = _kernel_imports(pending.pop()) - found - _APART
+        found |= new
+        pending.extend(new)
     return frozenset(found)
 
 
@@ -70,8 +91,15 @@ def _source_closure(path: Path) -> frozenset[Path]:
 def _source_stamp(path: Path) -> str:
     digest = hashlib.sha256(f"{numba.__version__} {bool(config.BOUNDSCHECK)}".encode())
     for file in sorted(_source_closure(path)):
-        digest.update(file.read_bytes())
+        digest.update(_content(file))
     return digest.hexdigest()
+
+
+@cache
+def _stamp_of_file(name: str) -> str:
+    """The stamp of a file of this package, taken when it is imported: it may be edited before anything is compiled."""
+    path = Path(name).resolve()
+    return _source_stamp(path) if path.is_relative_to(_PACKAGE_ROOT) else ""
 
 
 class _PackageLocator:
@@ -162,28 +190,56 @@ class _CacheImpl(CompileResultCacheImpl):  # type: ignore[misc]
 class _Cache(FunctionCache):  # type: ignore[misc]
     _impl_class = _CacheImpl
 
-    def __init__(self, function: Callable[..., Any]) -> None:
+    def __init__(self, function: Callable[..., Any], variant: str) -> None:
         super().__init__(function)
         self.folder = Path(self._cache_path).resolve()
         self.source = Path(function.__code__.co_filename).resolve()
         stamp = self._impl.locator.get_source_stamp()
-        self._cache_file = _EntryFile(self.folder, self._impl.filename_base, stamp, self.source)
+        self._cache_file = _EntryFile(self.folder, self._impl.filename_base + variant, stamp, self.source)
 
 
-def attach_cache(dispatcher: Any) -> None:
-    """Cache on disk where that is possible and safe; elsewhere a function is compiled each time, in memory.
+class OnDemand:
+    """What a dispatcher keeps its code in, set up when it first looks there: most kernels are only called by others.
 
-    A function typed at a prompt has no file. Warns once of a folder that others can write.
+    Nothing is kept where that is impossible or not safe: a function typed at a prompt has no file. Warns once of a
+    folder that others can write.
+
+    variant: told apart from the same function compiled otherwise.
     """
-    try:
-        found = _Cache(dispatcher.py_func)
-        fault = fault_of_folder(found.folder, found.source)
-    except (RuntimeError, OSError):
-        return
-    if fault is None:
-        dispatcher._cache = found
-    else:
+
+    def __init__(self, function: Callable[..., Any], variant: str = "") -> None:
+        self._function, self._variant = function, variant
+        _stamp_of_file(function.__code__.co_filename)
+
+    @cached_property
+    def own(self) -> Any:
+        """The cache of the function."""
+        try:
+            found = _Cache(self._function, self._variant)
+            fault = _fault_of(found.folder, found.source)
+        except (RuntimeError, OSError):
+            return NullCache()
+        if fault is None:
+            return found
         _warn_of(fault)
+        return NullCache()
+
+    @property
+    def cache_path(self) -> Any:
+        """Where it keeps things."""
+        return self.own.cache_path
+
+    def load_overload(self, signature: Any, target_context: Any) -> Any:
+        """What was compiled for these types, or None."""
+        return self.own.load_overload(signature, target_context)
+
+    def save_overload(self, signature: Any, data: Any) -> None:
+        """Keep what was compiled."""
+        self.own.save_overload(signature, data)
+
+
+# A process finds out once a file, not once a function.
+_fault_of = cache(fault_of_folder)
 
 
 @cache  # once a process, not once a function

@@ -7,7 +7,6 @@ import math
 import numpy as np
 
 from vedette.errors import ModelError
-from vedette.kernels.base import bundle_types as _bundle_types  # noqa: F401
 from vedette.kernels.base.compile import inlined, kernel
 from vedette.kernels.base.types import Floats, Sensor
 

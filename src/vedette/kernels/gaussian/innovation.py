@@ -7,7 +7,6 @@ from typing import NamedTuple
 import numpy as np
 
 from vedette.errors import ModelError
-from vedette.kernels.base import bundle_types as _bundle_types  # noqa: F401
 from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Bools, Floats, Sensor
 from vedette.kernels.gaussian.detection import detection_probability

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 from vedette.errors import ModelError
-from vedette.kernels.base import bundle_types as _bundle_types  # noqa: F401
 from vedette.kernels.base.compile import borrowing, inlined
 from vedette.kernels.base.types import Floats, Motion
 from vedette.kernels.gaussian.linalg import sandwich
