@@ -7,18 +7,20 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
-from typing import Any, Self, TypeVar, cast
+from typing import Any, TypeVar, cast
 
 import numba
 from numba import types
 from numba.core import cgutils, config
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import CPUDispatcher
+from numba.core.sigutils import normalize_signature
 from numba.experimental.function_type import FunctionModel
 from numba.extending import NativeValue, register_model, typeof_impl, unbox
 
 from vedette.kernels.base.bundle_types import TYPED_BY_FIELDS, type_of_bundle
 from vedette.kernels.base.disk_cache import OnDemand
+from vedette.kernels.base.libraries import PartLibrary, WholeLibrary, made_as
 
 _F = TypeVar("_F", bound=Callable[..., Any])
 JIT_ENABLED = not config.DISABLE_JIT
@@ -26,7 +28,7 @@ JIT_ENABLED = not config.DISABLE_JIT
 # No fastmath: -inf is a legal log weight. NumPy's error model: division by zero is inf, not an exception branch.
 _OPTIONS: dict[str, Any] = {"nopython": True, "nogil": True, "error_model": "numpy"}
 _BORROWING: dict[str, Any] = {**_OPTIONS, "_nrt": False}
-_ONLY_CALLED_BY_KERNELS: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+_AS_PART: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 
 
 def kernel(function: _F) -> _F:
@@ -41,7 +43,7 @@ def borrowing(function: _F) -> _F:
     matrices. Such a kernel may return arrays (views of its arguments) only to another such kernel, and may call only
     such kernels and model functions.
     """
-    return _compiled_inner(function, _BORROWING)
+    return _compiled(function, _BORROWING)
 
 
 def inlined(function: _F) -> _F:
@@ -49,28 +51,49 @@ def inlined(function: _F) -> _F:
 
     A bundle of arrays is passed as dozens of words, which costs more than a small kernel's own work.
     """
-    return _compiled_inner(function, {**_BORROWING, "forceinline": True})
+    return _compiled(function, {**_BORROWING, "forceinline": True})
 
 
 def _compiled(function: _F, options: dict[str, Any]) -> _F:
-    return cast(_F, Kernel.kept(function, options)) if JIT_ENABLED else function
-
-
-def _compiled_inner(function: _F, options: dict[str, Any]) -> _F:
-    return cast(_F, InnerKernel.kept(function, options | _ONLY_CALLED_BY_KERNELS)) if JIT_ENABLED else function
+    return cast(_F, Kernel(function, targetoptions=options | _AS_PART)) if JIT_ENABLED else function
 
 
 class Kernel(CPUDispatcher):  # type: ignore[misc]
-    """A compiled function of arrays and bundles."""
+    """A function of kernels: part of those that call it, and compiled as a whole where Python calls it."""
 
-    variant = ""
+    _whole: WholeKernel | None = None
 
-    @classmethod
-    def kept(cls, function: Callable[..., Any], options: dict[str, Any]) -> Self:
-        """One whose code is kept on disk."""
-        made = cls(function, targetoptions=dict(options))
-        made._cache = OnDemand(function, cls.variant)
-        return made
+    def __call__(self, *args: Any) -> Any:
+        return (self._whole or self.whole)(*args)
+
+    @property
+    def whole(self) -> WholeKernel:
+        """What Python calls; any number of threads may ask."""
+        with global_compiler_lock:
+            if self._whole is None:
+                options = {k: v for k, v in self.targetoptions.items() if k not in _AS_PART}
+                self._whole = WholeKernel(self.py_func, targetoptions=options)
+                self._whole._cache = OnDemand(self.py_func)
+        return self._whole
+
+    def compile(self, sig: Any) -> Any:
+        """As a part."""
+        with made_as(PartLibrary, self.targetctx.codegen()):
+            return super().compile(sig)
+
+
+class WholeKernel(CPUDispatcher):  # type: ignore[misc]
+    """A function with all that it reaches, as Python calls it; kept on disk."""
+
+    def compile(self, sig: Any) -> Any:
+        """As a whole."""
+        codegen = self.targetctx.codegen()
+        with made_as(WholeLibrary, codegen):
+            entry = super().compile(sig)
+            # Those of the parts, too, as when it is read from disk.
+            for environment in self.overloads[tuple(normalize_signature(sig)[0])]._find_referenced_environments():
+                codegen.set_env(environment.env_name, environment)
+        return entry
 
     def typeof_pyval(self, value: Any) -> Any:
         """The type of an argument that Numba's quick way does not know; asked for by its dispatcher.
@@ -80,22 +103,6 @@ class Kernel(CPUDispatcher):  # type: ignore[misc]
         if type(value) in TYPED_BY_FIELDS:
             return type_of_bundle(value)
         return super().typeof_pyval(value)
-
-
-class InnerKernel(Kernel):
-    """One that other kernels call, compiled without what Python needs to call it: a seventh of the time.
-
-    Called from Python all the same, it is compiled once more.
-    """
-
-    variant = "-inner"
-    _outer: Kernel | None = None
-
-    def __call__(self, *args: Any) -> Any:
-        if self._outer is None:
-            options = {k: v for k, v in self.targetoptions.items() if k not in _ONLY_CALLED_BY_KERNELS}
-            self._outer = Kernel.kept(self.py_func, options)
-        return self._outer(*args)
 
 
 _VECTOR = types.float64[::1]
@@ -123,7 +130,7 @@ SIGNATURES: dict[str, tuple[tuple[str, ...], Any]] = {
 }
 
 
-class ModelFunction(CPUDispatcher):  # type: ignore[misc]
+class ModelFunction(WholeKernel):
     """A user's or built-in model function, compiled to the one signature of its kind.
 
     Kernels receive it as a first-class function, so one compiled kernel serves every model, and an exception that the
