@@ -65,6 +65,12 @@ class Ahead:
         """The tables of pairs of sensors i < j of which something is forbidden; raises `InputError` as `mask_of`."""
         return pairs_allowed(self.constraints, self._situation(stage, places))
 
+    def moment(self, stage: int) -> int:
+        """What is equal for decisions at which the same courses are allowed as far as constraints tell."""
+        if all(getattr(constraint, "timeless", False) for constraint in self.constraints):
+            return -len(self.stages.times(stage))
+        return stage
+
     def _situation(self, stage: int, places: Mapping[int, Place]) -> Situation:
         done, num = (stage - 1) * self.stages.stride, len(self.stages.times(stage))
         if stage not in self._beliefs:

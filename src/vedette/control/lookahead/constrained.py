@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from vedette.control.lookahead.ahead import Place
+from vedette.control.lookahead.ahead import Ahead, Place
 from vedette.control.lookahead.courses import CourseTree, Sequence, place_of
 from vedette.kernels.base.types import Bools
 
@@ -26,26 +25,30 @@ class ConstrainedTree(CourseTree):
 
     Attributes:
         name, platform, pose, stages: as of `CourseTree`.
-        judge: (num_courses,) which courses are allowed at a decision, counted from 1; perhaps none.
-        now: (num_courses,) the same of the first decision, where at least one is allowed.
+        ahead: the constraints.
+        sensor: whose courses they are.
+        now: (num_courses,) which courses are allowed at the first decision, at least one.
         far_sighted: whether dead ends are left out.
     """
 
-    judge: Callable[[int, Place], Bools] = field(kw_only=True)
+    ahead: Ahead = field(kw_only=True)
+    sensor: int = field(kw_only=True)
     now: Bools = field(kw_only=True)
     far_sighted: bool = field(kw_only=True, default=True)
+    _places: dict[Sequence, bytes] = field(default_factory=dict)
     _allowed: dict[tuple[bytes, int], Sequence] = field(default_factory=dict)
     _open: dict[tuple[bytes, int], Sequence] = field(default_factory=dict)
     _blocked: dict[tuple[bytes, int], int] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, tree: CourseTree, judge: Callable[[int, Place], Bools], now: Bools) -> ConstrainedTree:
+    def of(cls, tree: CourseTree, ahead: Ahead, sensor: int, now: Bools) -> ConstrainedTree:
         """The tree without constraints, with some."""
-        return cls(tree.name, tree.platform, tree.pose, tree.stages, tree._found, tree._at_poses, judge=judge, now=now)
+        given = tree.name, tree.platform, tree.pose, tree.stages, tree._found, tree._at_poses
+        return cls(*given, ahead=ahead, sensor=sensor, now=now)
 
     def allowed(self, taken: Sequence) -> Sequence:
         """Those that meet the constraints and lead to no dead end; at least one."""
-        key = self._key(taken)
+        key = self.place(taken), len(taken)
         if key not in self._allowed:
             found = self._open_after(taken) or self.different(taken)
             if self.far_sighted and len(found) > 1 and len(taken) + 1 < self.stages.depth:
@@ -62,15 +65,23 @@ class ConstrainedTree(CourseTree):
         """The decisions of a sequence but the first, counted from 1, at which no course is allowed."""
         return [k + 1 for k in range(1, len(sequence)) if not self._open_after(sequence[:k])]
 
-    def _key(self, taken: Sequence) -> tuple[bytes, int]:
-        # At one decision, of sensors at one place the same is asked.
-        return place_of(self.pose_after(taken)), len(taken)
+    def place(self, taken: Sequence) -> bytes:
+        """What is equal where it decides at one place: there it may do the same."""
+        if taken not in self._places:
+            self._places[taken] = place_of(self.pose_after(taken))
+        return self._places[taken]
+
+    def _moment(self, taken: Sequence) -> tuple[bytes, int]:
+        """What is equal where constraints allow the same."""
+        return self.place(taken), self.ahead.moment(len(taken) + 1)
 
     def _open_after(self, taken: Sequence) -> Sequence:
         """The courses that meet the constraints, perhaps none."""
-        key = self._key(taken)
+        if not taken:
+            return tuple(np.flatnonzero(self.now).tolist())
+        key = self._moment(taken)
         if key not in self._open:
-            allowed = self.judge(len(taken) + 1, Place.after(self, taken)) if taken else self.now
+            allowed = self.ahead.courses(self.sensor, len(taken) + 1, Place.after(self, taken))
             self._open[key] = tuple(np.flatnonzero(allowed).tolist())
         return self._open[key]
 
@@ -78,15 +89,19 @@ class ConstrainedTree(CourseTree):
         """The least number of decisions from here on at which no course is allowed."""
         if len(taken) == self.stages.depth:
             return 0
-        key = self._key(taken)
+        key = self.place(taken), len(taken)
         if key not in self._blocked:
             if len(self._blocked) >= _MOST_PLACES:
                 return 0
             self._blocked[key] = 0  # counted among the places from now on
             found = self._open_after(taken)
+            ways = [(*taken, course) for course in found or self.different(taken)]
+            if len(taken) + 1 < self.stages.depth:
+                # One way out is enough: first those to places that are known.
+                ways.sort(key=lambda way: self._moment(way) not in self._open)
             least = self.stages.depth
-            for course in found or self.different(taken):
-                least = min(least, self._least_blocked((*taken, course)))
+            for way in ways:
+                least = min(least, self._least_blocked(way))
                 if least == 0:
                     break
             self._blocked[key] = least + (not found)

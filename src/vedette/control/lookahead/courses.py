@@ -133,7 +133,7 @@ class CourseTree:
 
 def place_of(pose: Floats) -> bytes:
     """What is equal for poses that are one."""
-    return np.round(pose, _SAME_DIGITS).tobytes()
+    return (np.round(pose, _SAME_DIGITS) + 0.0).tobytes()  # -0 is 0
 
 
 def _apart(columns: tuple[str, ...], values: Floats, last: Floats) -> Floats:

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence as Several
 from dataclasses import dataclass, field
-from functools import partial
 from itertools import combinations
 
 from vedette.control.constraints import Mask
 from vedette.control.lookahead.ahead import Ahead, Place
 from vedette.control.lookahead.constrained import ConstrainedTree
-from vedette.control.lookahead.courses import CourseTree, Sequence, place_of
+from vedette.control.lookahead.courses import CourseTree, Sequence
 from vedette.control.lookahead.start import furthest
 from vedette.kernels.base.types import Bools
 
@@ -48,7 +47,7 @@ class Rules:
         see `notes`. Raises `InputError` as `mask_of`.
         """
         mask = ahead.mask({s: Place.after(tree, ()) for s, tree in enumerate(trees)})
-        own = tuple(ConstrainedTree.of(tree, partial(ahead.courses, s), mask.single[s]) for s, tree in enumerate(trees))
+        own = tuple(ConstrainedTree.of(tree, ahead, s, mask.single[s]) for s, tree in enumerate(trees))
         found = furthest(own, ahead, mask)
         if not found[0]:
             own = tuple(tree.short_sighted() for tree in own)
@@ -134,7 +133,7 @@ class Rules:
         if stage == 1:
             return self.mask.together.get((first, second))
         mine, its = self.trees[first], self.trees[second]
-        key = (first, second, place_of(mine.pose_after(one)), place_of(its.pose_after(other)), stage)
+        key = (first, second, mine.place(one), its.place(other), self.ahead.moment(stage))
         if key not in self._tables:
             places = {first: Place.after(mine, one), second: Place.after(its, other)}
             self._tables[key] = self.ahead.pairs(stage, places).get((first, second))
