@@ -21,7 +21,7 @@ from vedette.control.lookahead.laid_courses import LaidCourses
 from vedette.control.lookahead.problem import Best, Part, SequenceProblem, SequenceSearch
 from vedette.control.lookahead.rules import Rules
 from vedette.control.plan import Bound, Plan
-from vedette.control.preparation import AnyReward, Sums, prepare_sums
+from vedette.control.preparation import AnyReward, Sums, prepare_sums, unsought
 from vedette.control.rewards import CauchySchwarzReward
 from vedette.control.settings import MobileSensor, PlanningSettings
 from vedette.errors import NumericalError
@@ -44,7 +44,8 @@ class HorizonPlanner:
     `discount` g the sum of g^(d - 1) times the reward at the end of the horizon of decision d, which is how losses on
     the way count. Of a reward at the end alone what is learnt late counts most, and the same decision taken again and
     again may put off what it means to do; a divergence measures all that was learnt by then, so that its sum counts
-    what is learnt early several times.
+    what is learnt early several times. Targets not found yet (`PlanningSettings.undetected_worth`) are taken to stay
+    where they may be, and count with the expected number that all scans up to then find.
 
     Attributes:
         sensors, fusion, settings, reward: as of `JointPlanner`; the horizon of the settings is that of one decision.
@@ -163,7 +164,7 @@ class HorizonPlanner:
     ) -> AdditiveEvaluator:
         settings = replace(self.settings, horizon_steps=num_steps)
         return AdditiveEvaluator.prepare(
-            self.sensors, options, sums.rule, settings, self.reward, sums.fused, sums.local, rng=rng
+            self.sensors, options, sums.rule, settings, self.reward, sums.fused, sums.local, sums.undetected, rng=rng
         )
 
     def _plan(self, problem: SequenceProblem, first: AdditiveEvaluator, sums: Sums, *, complete: bool) -> Plan:
@@ -172,8 +173,6 @@ class HorizonPlanner:
         evidence.note(np.array(list(problem.found)), np.array([own.rewards for own in problem.found.values()]))
         courses = tuple(own[0] for own in best.sequence)
         chosen = tuple(own.first_action(course) for own, course in zip(first.options, courses, strict=True))
-        if self.settings.undetected_worth > 0.0:
-            first.notes["targets not found yet are not looked for: sequences of decisions do not"] = None
         if self.settings.confidence is not None:
             first.notes["decided on num_samples samples, whatever the confidence: sequences are not raced"] = None
         constrained = () if problem.rules is None else problem.rules.notes(best.sequence)
@@ -184,7 +183,7 @@ class HorizonPlanner:
             chosen,
             evidence.tables(courses),
             counts,
-            (*self.notes, *constrained, *sums.notes, *found),
+            (*self.notes, *unsought(self.settings, sums.undetected, sums=True), *constrained, *sums.notes, *found),
             problem.curve(),
             Bound(best.value, best.value, "exhaustive") if complete else None,
             sequence=tuple(tree.rows(own) for tree, own in zip(problem.trees, best.sequence, strict=True)),
