@@ -88,8 +88,8 @@ def test_one_decision_is_that_of_the_joint_planner(reward: Any) -> None:
     assert (made[1].tables[0].mean > without.tables[0].mean).all()
 
 
-def single_decision(*arguments: Any) -> HorizonPlanner:
-    return HorizonPlanner(*arguments, depth=1)
+def single_decision(sensors: Any, fusion: Any, settings: Any, reward: Any) -> HorizonPlanner:
+    return HorizonPlanner(sensors, fusion, settings, reward, depth=1)
 
 
 @pytest.mark.parametrize(("depth", "discount"), [(1, None), (2, None), (2, 0.7), (3, None), (3, 0.9)])

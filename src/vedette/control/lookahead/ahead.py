@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
@@ -39,6 +40,7 @@ class Ahead:
         fused: the fused belief now.
         poses: (num_sensors, pose_dim) where the sensors are now.
         stages: the decisions.
+        on_pairs: whether any constraint has to do with pairs of sensors.
     """
 
     constraints: tuple[Constraint, ...]
@@ -47,7 +49,15 @@ class Ahead:
     fused: Belief
     poses: Floats
     stages: Stages
+    on_pairs: bool = field(init=False)
+    _timeless: bool = field(init=False)
     _beliefs: dict[int, tuple[Belief, ...]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        reaches = [getattr(constraint, "reach", math.inf) for constraint in self.constraints]
+        object.__setattr__(self, "on_pairs", max(reaches) > 0.0)
+        timeless = all(getattr(constraint, "timeless", False) for constraint in self.constraints)
+        object.__setattr__(self, "_timeless", timeless)
 
     def mask(self, places: Mapping[int, Place]) -> Mask:
         """Of the first decision, of all sensors; opened where it has to be. Raises `InputError` as `mask_of`."""
@@ -67,9 +77,7 @@ class Ahead:
 
     def moment(self, stage: int) -> int:
         """What is equal for decisions at which the same courses are allowed as far as constraints tell."""
-        if all(getattr(constraint, "timeless", False) for constraint in self.constraints):
-            return -len(self.stages.times(stage))
-        return stage
+        return -len(self.stages.times(stage)) if self._timeless else stage
 
     def _situation(self, stage: int, places: Mapping[int, Place]) -> Situation:
         done, num = (stage - 1) * self.stages.stride, len(self.stages.times(stage))

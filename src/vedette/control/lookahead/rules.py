@@ -58,9 +58,8 @@ class Rules:
     def allows(self, joint: Several[Sequence | None]) -> bool:
         """Whether sequences that sensors take together are allowed; None: what a sensor does is not asked."""
         known = [(s, own) for s, own in enumerate(joint) if own is not None]
-        return all(self._alone(*each) for each in known) and all(
-            self._beside(*first, *second) for first, second in combinations(known, 2)
-        )
+        pairs = combinations(known, 2) if self.ahead.on_pairs else ()
+        return all(self._alone(*each) for each in known) and all(self._beside(*one, *two) for one, two in pairs)
 
     def after(self, sensor: int, taken: Sequence, others: Several[Sequence | None]) -> Sequence:
         """The courses of one sensor after those taken that are allowed beside the others' at that decision, maybe none.
@@ -125,7 +124,7 @@ class Rules:
     def _table(self, first: int, one: Sequence, second: int, other: Sequence) -> Bools | None:
         """(num_courses of the first, of the second) which go together after courses taken; None: all."""
         stage = len(one) + 1
-        if stage > self.until:
+        if stage > self.until or not self.ahead.on_pairs:
             return None
         if first > second:
             table = self._table(second, other, first, one)
