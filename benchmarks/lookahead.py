@@ -6,15 +6,15 @@
 
 Runs are paired: at the same number every strategy meets the same truth, and random numbers of the same seed. OSPA and
 GOSPA (alpha = 2, under the scene's cutoff and order) are means over scans and runs, with one standard error over the
-runs; "gain" is the GOSPA of the single decision ("depth 1") less that of the strategy, paired, with its standard error,
-and "(none)" where it is less than two of these above zero. Times are process CPU time of planning, the median of a
-run's decisions and then of the runs, in a process of one thread. With `--out` each run is written as it ends, and what
-is there is not run again.
+runs; "gained" is the GOSPA of the single decision ("depth 1", or another strategy: `--against`) less that of the
+strategy, paired, with its standard error, and "(none)" where it is less than two of these above zero. Times are process
+CPU time of planning, the median of a run's decisions and then of the runs, in a process of one thread. With `--out`
+each run is written as it ends, and what is there is not run again.
 
 A single decision is given the time of longer plans in two ways, as more samples cannot better it (the scenes' reward
-needs none, and all its joint actions are evaluated): "fine" has more directions to choose from, and "kept" is about
-courses that are kept for as long as the deepest plan looks ahead, in as many directions. Budgets and depths of trees
-are those of the program of arXiv 2511.01045.
+needs none, and all its joint actions are evaluated): it has more directions to choose from, and "kept" is about courses
+that are kept for as long as the deepest plan looks ahead. Budgets and depths of trees are those of the program of arXiv
+2511.01045.
 """
 
 from __future__ import annotations
@@ -73,7 +73,7 @@ def strategies(scene: str) -> tuple[Strategy, ...]:
     for num in FINE:
         many = {"kind": "steps", "length": STEPS[scene], "speed": STEPS[scene], "directions_deg": around(num)}
         rows.append(Strategy(f"depth 1, {num} directions", "jdm", {"sensors.*.platform": many}))
-    for headings in (directions, around(FINE[0])):
+    for headings in (directions, *map(around, FINE)):
         kept = {"kind": "courses", "speeds": [STEPS[scene], 0.0], "headings_deg": list(headings)}
         fields = {"sensors.*.platform": kept, "control.horizon_steps": DEEPEST}
         rows.append(Strategy(f"kept {DEEPEST} s, {len(headings)} directions", "jdm", fields))
@@ -133,11 +133,11 @@ def with_error(values: Floats) -> str:
     return f"{values.mean():.2f} ± {error:.2f}"
 
 
-def table(scene: str, rows: dict[str, Floats]) -> Iterator[str]:
+def table(scene: str, rows: dict[str, Floats], against: str) -> Iterator[str]:
     """The lines of a scene's table, of scores (num_runs, 3) by strategy."""
-    yield "| Strategy | OSPA (m) | GOSPA (m) | CPU ms a decision | GOSPA gained on depth 1 (m) |"
+    yield f"| Strategy | OSPA (m) | GOSPA (m) | CPU ms a decision | GOSPA gained on {against} (m) |"
     yield "| --- | ---: | ---: | ---: | ---: |"
-    single = next(iter(rows.values()))
+    single = rows[against]
     for name, scores in rows.items():
         gains = single[:, 1] - scores[:, 1]
         error = gains.std(ddof=1) / np.sqrt(len(gains)) if len(gains) > 1 else np.inf
@@ -171,6 +171,7 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=0, help="number of the first run")
     parser.add_argument("--seed", type=int, default=5)
     parser.add_argument("--only", nargs="+", default=(), help="of the strategies but the first, these")
+    parser.add_argument("--against", default="depth 1", help="the strategy on which gains are measured")
     parser.add_argument("--workers", type=int, default=1, help="processes")
     parser.add_argument("--out", type=Path, help="file of results, which is gone on with")
     given = parser.parse_args()
@@ -180,7 +181,7 @@ def main() -> None:
             wanted = [
                 strategy
                 for place, strategy in enumerate(strategies(scene))
-                if place == 0 or not given.only or strategy.name in given.only
+                if place == 0 or not given.only or strategy.name in (*given.only, given.against)
             ]
             tasks = {
                 pool.submit(score, scene, strategy, run, given.seed): (scene, given.seed, strategy.name, run)
@@ -191,7 +192,7 @@ def main() -> None:
             for task in as_completed(tasks):
                 store.add(tasks[task], task.result())
             rows = {own.name: [store.scores[scene, given.seed, own.name, run] for run in runs] for own in wanted}
-            lines = table(scene, {name: np.array(own) for name, own in rows.items()})
+            lines = table(scene, {name: np.array(own) for name, own in rows.items()}, given.against)
             print(f"\n## {scene}\n", *lines, sep="\n", flush=True)
 
 
