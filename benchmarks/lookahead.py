@@ -1,27 +1,33 @@
 """Decisions over several periods against single ones, on the scenes where looking ahead might pay.
 
     python benchmarks/lookahead.py                                             # both scenes, 6 runs
-    python benchmarks/lookahead.py beyond-the-gap --runs 50 --workers 8
-    python benchmarks/lookahead.py two-searchers --only "depth 3, beam" "depth 5, beam"
+    python benchmarks/lookahead.py beyond-the-gap --runs 50 --out lookahead.jsonl
+    python benchmarks/lookahead.py two-searchers --only "depth 3, beam" "depth 5, tree 49"
 
 Runs are paired: at the same number every strategy meets the same truth, and random numbers of the same seed. OSPA and
 GOSPA (alpha = 2, under the scene's cutoff and order) are means over scans and runs, with one standard error over the
-runs; "gain" is the GOSPA of the single decision ("depth 1") less that of the strategy, paired, with its standard error,
-and "(none)" where it is less than two of these above zero. "kept" is a single decision about courses that are kept for
-as long as the deepest strategy looks ahead. Times are process CPU time of planning, a decision, in a process of one
-thread. More time cannot better the single decision: the scenes' reward needs no samples, and all its joint actions are
-evaluated.
+runs; "gained" is the GOSPA of the single decision ("depth 1", or another strategy: `--against`) less that of the
+strategy, paired, with its standard error, and "(none)" where it is less than two of these above zero. Times are process
+CPU time of planning, the median of a run's decisions and then of the runs, in a process of one thread. With `--out`
+each run is written as it ends, and what is there is not run again.
+
+A single decision is given the time of longer plans in two ways, as more samples cannot better it (the scenes' reward
+needs none, and all its joint actions are evaluated): it has more directions to choose from, and "kept" is about courses
+that are kept for as long as the deepest plan looks ahead. Budgets and depths of trees are those of the program of arXiv
+2511.01045.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import time
 from collections.abc import Iterator
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import ProcessPoolExecutor, as_completed
 from functools import partial
 from multiprocessing import get_context
-from typing import Any, NamedTuple
+from pathlib import Path
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -36,6 +42,8 @@ from vedette.simulation import simulate
 SCENES = ("beyond-the-gap", "two-searchers")
 STEPS = {"beyond-the-gap": 30.0, "two-searchers": 15.0}  # m, length of a step in a second
 DEEPEST = 5
+FINE = (48, 96)  # directions
+TREES = ((5, 49), (10, 49), (5, 200), (10, 200))  # depth, budget
 
 
 class Strategy(NamedTuple):
@@ -44,6 +52,10 @@ class Strategy(NamedTuple):
     name: str
     planner: str
     fields: dict[str, Any]
+
+
+# Scene, seed, strategy, run.
+Key: TypeAlias = tuple[str, int, str, int]
 
 
 class Score(NamedTuple):
@@ -56,18 +68,31 @@ class Score(NamedTuple):
 
 def strategies(scene: str) -> tuple[Strategy, ...]:
     """The rows of a scene; the first is what the others are compared with."""
-    model = load_scenario(scene).model
-    directions = model.sensors[0].platform.model_dump()["directions_deg"]
-    kept = {"kind": "courses", "speeds": [STEPS[scene], 0.0], "headings_deg": list(directions)}
-    rows = [
-        Strategy("depth 1", "jdm", {}),
-        Strategy(f"kept {DEEPEST} s", "jdm", {"sensors.*.platform": kept, "control.horizon_steps": DEEPEST}),
-    ]
-    for depth in (3, DEEPEST):
-        for method in ("beam", "tree"):
-            fields = {"control.lookahead.depth": depth, "control.lookahead.method": method}
-            rows.append(Strategy(f"depth {depth}, {method}", "lookahead", fields))
+    directions = load_scenario(scene).model.sensors[0].platform.model_dump()["directions_deg"]
+    rows = [Strategy("depth 1", "jdm", {})]
+    for num in FINE:
+        many = {"kind": "steps", "length": STEPS[scene], "speed": STEPS[scene], "directions_deg": around(num)}
+        rows.append(Strategy(f"depth 1, {num} directions", "jdm", {"sensors.*.platform": many}))
+    for headings in (directions, *map(around, FINE)):
+        kept = {"kind": "courses", "speeds": [STEPS[scene], 0.0], "headings_deg": list(headings)}
+        fields = {"sensors.*.platform": kept, "control.horizon_steps": DEEPEST}
+        rows.append(Strategy(f"kept {DEEPEST} s, {len(headings)} directions", "jdm", fields))
+    for depth in (2, 3, 4):
+        fields = {"control.lookahead.depth": depth, "control.lookahead.method": "beam"}
+        rows.append(Strategy(f"depth {depth}, beam", "lookahead", fields))
+    for depth, budget in TREES:
+        fields = {
+            "control.lookahead.depth": depth,
+            "control.lookahead.method": "tree",
+            "control.lookahead.budget": budget,
+        }
+        rows.append(Strategy(f"depth {depth}, tree {budget}", "lookahead", fields))
     return tuple(rows)
+
+
+def around(num: int) -> list[float]:
+    """So many directions, in degrees."""
+    return [360.0 * i / num for i in range(num)]
 
 
 class Timed:
@@ -108,11 +133,11 @@ def with_error(values: Floats) -> str:
     return f"{values.mean():.2f} ± {error:.2f}"
 
 
-def table(scene: str, rows: dict[str, Floats]) -> Iterator[str]:
+def table(scene: str, rows: dict[str, Floats], against: str) -> Iterator[str]:
     """The lines of a scene's table, of scores (num_runs, 3) by strategy."""
-    yield "| Strategy | OSPA (m) | GOSPA (m) | CPU ms a decision | GOSPA gained on depth 1 (m) |"
+    yield f"| Strategy | OSPA (m) | GOSPA (m) | CPU ms a decision | GOSPA gained on {against} (m) |"
     yield "| --- | ---: | ---: | ---: | ---: |"
-    single = next(iter(rows.values()))
+    single = rows[against]
     for name, scores in rows.items():
         gains = single[:, 1] - scores[:, 1]
         error = gains.std(ddof=1) / np.sqrt(len(gains)) if len(gains) > 1 else np.inf
@@ -123,23 +148,52 @@ def table(scene: str, rows: dict[str, Floats]) -> Iterator[str]:
     yield f"{len(single)} paired runs of {scene}."
 
 
+class Store:
+    """Scores by scene, seed, strategy and run; in a file, where there is one."""
+
+    def __init__(self, file: Path | None) -> None:
+        self.file = file
+        lines = file.read_text().splitlines() if file is not None and file.exists() else []
+        self.scores = {tuple(key): Score(*own) for key, own in map(json.loads, lines)}
+
+    def add(self, key: Key, score: Score) -> None:
+        """Keep one."""
+        self.scores[key] = score
+        if self.file is not None:
+            with self.file.open("a") as out:
+                out.write(json.dumps([key, score]) + "\n")
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("scenes", nargs="*", default=SCENES, help=f"of {', '.join(SCENES)}")
     parser.add_argument("--runs", type=int, default=6, help="of each strategy")
+    parser.add_argument("--first", type=int, default=0, help="number of the first run")
     parser.add_argument("--seed", type=int, default=5)
     parser.add_argument("--only", nargs="+", default=(), help="of the strategies but the first, these")
+    parser.add_argument("--against", default="depth 1", help="the strategy on which gains are measured")
     parser.add_argument("--workers", type=int, default=1, help="processes")
+    parser.add_argument("--out", type=Path, help="file of results, which is gone on with")
     given = parser.parse_args()
+    store, runs = Store(given.out), range(given.first, given.first + given.runs)
     with ProcessPoolExecutor(given.workers, get_context("spawn")) as pool:
         for scene in given.scenes:
-            tasks = {
-                strategy.name: [pool.submit(score, scene, strategy, run, given.seed) for run in range(given.runs)]
+            wanted = [
+                strategy
                 for place, strategy in enumerate(strategies(scene))
-                if place == 0 or not given.only or strategy.name in given.only
+                if place == 0 or not given.only or strategy.name in (*given.only, given.against)
+            ]
+            tasks = {
+                pool.submit(score, scene, strategy, run, given.seed): (scene, given.seed, strategy.name, run)
+                for run in runs
+                for strategy in wanted
+                if (scene, given.seed, strategy.name, run) not in store.scores
             }
-            rows = {name: np.array([run.result() for run in runs]) for name, runs in tasks.items()}
-            print(f"\n## {scene}\n", *table(scene, rows), sep="\n", flush=True)
+            for task in as_completed(tasks):
+                store.add(tasks[task], task.result())
+            rows = {own.name: [store.scores[scene, given.seed, own.name, run] for run in runs] for own in wanted}
+            lines = table(scene, {name: np.array(own) for name, own in rows.items()}, given.against)
+            print(f"\n## {scene}\n", *lines, sep="\n", flush=True)
 
 
 if __name__ == "__main__":

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from vedette.control import BeamSearch, HorizonPlanner, TreeSearch
-from vedette.errors import InputError, ScenarioError
+from vedette.errors import ScenarioError
 from vedette.evaluation.runs import run_scenario
 from vedette.scenarios import Scenario, load_scenario, with_fields
 from vedette.scenarios.build import build_planner, build_targets
@@ -48,10 +48,19 @@ def test_the_section_says_how(plain: Scenario) -> None:
     assert tree.search == TreeSearch(0.1, "kept")
 
 
-def test_constraints_are_not_passed_over(plain: Scenario) -> None:
-    apart = with_fields(plain, {"control.constraints": [{"kind": "separation", "distance": 5.0}]})
-    with pytest.raises(InputError, match=r"control\.constraints: expected none"):
-        build_planner(apart, "lookahead")
+def test_constraints_are_those_of_all_strategies(gap: Scenario) -> None:
+    """A wall across the gap is gone round, or not passed."""
+    wall = {"kind": "keep_out", "region": {"x_min": 70.0, "x_max": 80.0, "y_min": -290.0, "y_max": 5.0}}
+    apart = {"kind": "separation", "distance": 12.0}
+    walled = with_fields(gap, {"control.constraints": [wall, apart]})
+    record = run_scenario(walled, "lookahead", seed=1, num_threads=1)
+    first, second = record.poses[:, 0, :2], record.poses[:, 1, :2]
+    assert first[:, 0].max() > 100.0 or second[:, 0].max() > 100.0
+    legs = np.concatenate([np.linspace(own[:-1], own[1:], 101).reshape(-1, 2) for own in (first, second)])
+    inside = (legs[:, 0] >= 70.0) & (legs[:, 0] <= 80.0) & (legs[:, 1] <= 5.0)
+    assert not inside.any()
+    between = np.linspace(first[:-1] - second[:-1], first[1:] - second[1:], 101)
+    assert np.sqrt((between**2).sum(axis=2)).min() >= 12.0
 
 
 @pytest.mark.parametrize(

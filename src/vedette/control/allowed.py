@@ -34,13 +34,24 @@ def mask_of_decision(
     """
     if not constraints:
         return None
-    beliefs: tuple[Belief, ...] = ()
-    if fused is not None and any(constraint.needs_beliefs for constraint in constraints):
-        motion = shared_targets([sensor.filter for sensor in sensors]).motion
-        steps = range(1, settings.horizon_steps + 1)
-        beliefs = tuple(predicted(fused, motion, step, settings.horizon_period) for step in steps)
+    beliefs = beliefs_ahead(constraints, sensors, fused, settings, 1, settings.horizon_steps)
     situation = Situation(tuple(own.courses for own in options), settings.horizon_times(), beliefs, poses)
     return mask_of(constraints, situation)
+
+
+def beliefs_ahead(
+    constraints: Sequence[Constraint],
+    sensors: Sequence[MobileSensor],
+    fused: Belief | None,
+    settings: PlanningSettings,
+    first: int,
+    last: int,
+) -> tuple[Belief, ...]:
+    """The fused belief predicted by `first` to `last` steps of the horizon; none where no constraint looks at it."""
+    if fused is None or not any(constraint.needs_beliefs for constraint in constraints):
+        return ()
+    motion = shared_targets([sensor.filter for sensor in sensors]).motion
+    return tuple(predicted(fused, motion, step, settings.horizon_period) for step in range(first, last + 1))
 
 
 def single_mask(mask: Mask | None, sensor: int, num_courses: int) -> np.ndarray:

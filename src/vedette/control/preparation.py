@@ -17,7 +17,7 @@ from vedette.control.plan import Certainty
 from vedette.control.rewards.base import LabelReward, PowerReward, Reward, speaks_for
 from vedette.control.rewards.loss import ExpectedLossReward
 from vedette.control.settings import MobileSensor, PlanningSettings
-from vedette.densities import GLMB, LMB, existence_probabilities, glmb_to_lmb
+from vedette.densities import GLMB, LMB, UndetectedIntensity, existence_probabilities, glmb_to_lmb
 from vedette.fusion import Clmb, CmDeltaGlmb, Fusion, Linear, LinearRule, ParallelUpdate
 from vedette.models.arguments import reject
 from vedette.platforms import Options
@@ -102,12 +102,20 @@ class Preparation:
             evaluator = AdditiveEvaluator.prepare(
                 sensors, own, self.rule, settings, reward, fused, local, state.undetected, rng=rng
             )
-        if settings.undetected_worth > 0.0 and (self.rule is None or state.undetected is None):
-            lacking = state.undetected is None
-            why = "the state has no intensity of them" if lacking else "rewards are no sums over labels"
-            evaluator.notes[f"targets not found yet are not looked for: {why}"] = None
+        evaluator.notes.update(dict.fromkeys(unsought(settings, state.undetected, sums=self.rule is not None)))
         evaluator.notes.update(dict.fromkeys(self.notes))
         return evaluator
+
+
+def unsought(settings: PlanningSettings, undetected: UndetectedIntensity | None, *, sums: bool) -> tuple[str, ...]:
+    """Why targets that were not found yet are not looked for, though they should be; none where they are.
+
+    sums: whether rewards are sums over labels.
+    """
+    if settings.undetected_worth == 0.0 or (sums and undetected is not None):
+        return ()
+    why = "the state has no intensity of them" if undetected is None else "rewards are no sums over labels"
+    return (f"targets not found yet are not looked for: {why}",)
 
 
 class Sums(NamedTuple):
@@ -116,6 +124,7 @@ class Sums(NamedTuple):
     rule: LinearRule
     fused: LMB
     local: tuple[LMB, ...]
+    undetected: UndetectedIntensity | None
     notes: tuple[str, ...]
 
 
@@ -137,7 +146,7 @@ def prepare_sums(
         raise reject("reward, fusion", expected, f"{type(reward).__name__}, {type(planned.fusion).__name__}")
     fused, local = planned.state.fused, planned.state.local
     assert isinstance(fused, LMB)
-    return Sums(rule, fused, tuple(map(_as_lmb, local)), planned.notes)
+    return Sums(rule, fused, tuple(map(_as_lmb, local)), state.undetected, planned.notes)
 
 
 def _planned(

@@ -40,8 +40,8 @@ def cells_of(start: Start, undetected: UndetectedIntensity, worth: float, first_
                 found[course] = (cells[own], np.maximum(log_miss[own], _LEAST_LOG_MISS))
     return Cells(
         offsets_of([len(cells) for cells, _ in found]),
-        np.concatenate([cells for cells, _ in found]),
-        np.concatenate([log_miss for _, log_miss in found]),
+        np.concatenate([np.empty(0, np.int64), *(cells for cells, _ in found)]),
+        np.concatenate([np.empty(0), *(log_miss for _, log_miss in found)]),
         worth * undetected.expected,
     )
 

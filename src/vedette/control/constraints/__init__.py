@@ -2,7 +2,7 @@
 
 from vedette.control.constraints.feasible import opened, repaired
 from vedette.control.constraints.mask import Mask
-from vedette.control.constraints.masks import mask_of
+from vedette.control.constraints.masks import courses_allowed, mask_of, pairs_allowed
 from vedette.control.constraints.protocol import Constraint, Situation
 from vedette.control.constraints.regions import KeepOut, StayInside
 from vedette.control.constraints.separation import Separation
@@ -16,8 +16,10 @@ __all__ = [
     "Situation",
     "StayInside",
     "VoidProbability",
+    "courses_allowed",
     "mask_of",
     "opened",
+    "pairs_allowed",
     "repaired",
     "void_probability",
 ]

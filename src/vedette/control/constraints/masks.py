@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -29,11 +28,23 @@ def mask_of(constraints: Sequence[Constraint], situation: Situation) -> Mask:
         if constraint.needs_beliefs and len(situation.beliefs) != len(situation.times):
             wanted = f"{len(situation.times)} predicted beliefs, one a time"
             raise InputError(f"constraint {constraint.name}: expected {wanted}; got {len(situation.beliefs)}")
-    single, notes = _single(constraints, situation)
-    return opened(Mask(single, _together(constraints, situation), notes))[0]
+    single = courses_allowed(constraints, situation)
+    blocked = [s for s, own in enumerate(single) if not own.any()]
+    for s in blocked:
+        single[s][:] = True
+    notes = tuple(
+        f"sensor {s + 1}: no course meets its constraints ({names_of(constraints)}); it may take any" for s in blocked
+    )
+    return opened(Mask(single, pairs_allowed(constraints, situation), notes))[0]
 
 
-def _single(constraints: Sequence[Constraint], situation: Situation) -> tuple[tuple[Bools, ...], tuple[str, ...]]:
+def names_of(constraints: Sequence[Constraint]) -> str:
+    """As notes name them."""
+    return ", ".join(constraint.name for constraint in constraints)
+
+
+def courses_allowed(constraints: Sequence[Constraint], situation: Situation) -> tuple[Bools, ...]:
+    """(num_courses,) which courses of each sensor all constraints allow; perhaps none. Raises as `mask_of`."""
     shape = [len(own) for own in situation.courses]
     allowed = [np.ones(num, bool) for num in shape]
     for constraint in constraints:
@@ -44,16 +55,14 @@ def _single(constraints: Sequence[Constraint], situation: Situation) -> tuple[tu
             )
         for s, own in enumerate(answer):
             allowed[s] &= _checked(constraint, own, (shape[s],))
-    names = ", ".join(constraint.name for constraint in constraints)
-    blocked = [s for s, own in enumerate(allowed) if not own.any()]
-    for s in blocked:
-        allowed[s][:] = True
-    notes = (f"sensor {s + 1}: no course meets its constraints ({names}); it may take any" for s in blocked)
-    return tuple(allowed), tuple(notes)
+    return tuple(allowed)
 
 
-def _together(constraints: Sequence[Constraint], situation: Situation) -> dict[tuple[int, int], Bools]:
-    """The tables of the pairs of sensors of which something is forbidden."""
+def pairs_allowed(constraints: Sequence[Constraint], situation: Situation) -> dict[tuple[int, int], Bools]:
+    """(num_courses of i, of j) the tables of the pairs of sensors i < j of which something is forbidden.
+
+    Sensors without courses are not asked about. Raises as `mask_of`.
+    """
     gaps = _least_distances(situation)
     found: dict[tuple[int, int], Bools] = {}
     for constraint in constraints:
@@ -69,18 +78,20 @@ def _together(constraints: Sequence[Constraint], situation: Situation) -> dict[t
 
 def _near(gaps: Floats, reach: float) -> Iterator[tuple[int, int]]:
     """Pairs of sensors that may come nearer to each other than `reach`."""
-    if math.isinf(reach):
-        return combinations(range(len(gaps)), 2)
     return iter([(first, second) for first, second in np.argwhere(np.triu(gaps < reach, 1)).tolist()])
 
 
 def _least_distances(situation: Situation) -> Floats:
-    """(num_sensors, num_sensors) no more than the distance that sensors keep: of the circles around all their ways."""
+    """(num_sensors, num_sensors) no more than the distance that sensors keep: of the circles around all their ways.
+
+    inf: one of them has no courses.
+    """
     ways = [situation.ways(s).reshape(-1, 2) for s in range(len(situation.courses))]
-    centres = np.array([(own.min(axis=0) + own.max(axis=0)) / 2.0 for own in ways]).reshape(-1, 2)
-    radii = np.array(
-        [np.sqrt(((own - centre) ** 2).sum(axis=1).max()) for own, centre in zip(ways, centres, strict=True)]
-    )
+    centres, radii = np.zeros((len(ways), 2)), np.full(len(ways), -math.inf)
+    for s, own in enumerate(ways):
+        if len(own):
+            centres[s] = (own.min(axis=0) + own.max(axis=0)) / 2.0
+            radii[s] = np.sqrt(((own - centres[s]) ** 2).sum(axis=1).max())
     apart = np.sqrt(((centres[:, np.newaxis] - centres) ** 2).sum(axis=2))
     return np.asarray(apart - radii[:, np.newaxis] - radii)
 

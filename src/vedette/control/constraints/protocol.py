@@ -41,8 +41,12 @@ class Situation(NamedTuple):
 class Constraint(Protocol):
     """Says which courses a sensor may take, and which courses of two sensors go together.
 
-    A constraint may have one more member, `reach`: `pairs` is then asked only about sensors of which some two courses
-    might come nearer to each other than so many metres; 0: about none. Without it, about all.
+    A constraint may have two more members. `reach`: `pairs` is then asked only about sensors of which some two courses
+    might come nearer to each other than so many metres; 0: about none. Without it, about all. `timeless`: true where
+    the answers hang on poses and courses alone, neither on times nor on beliefs; of decisions over several periods it
+    is then asked once about each place.
+
+    Such decisions show it one sensor, or two, at a time: the others have no courses then.
     """
 
     @property

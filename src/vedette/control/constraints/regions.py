@@ -25,6 +25,7 @@ class StayInside(Alone):
     """
 
     region: Region
+    timeless = True
 
     def __post_init__(self) -> None:
         if not isinstance(self.region, Region):
@@ -61,6 +62,7 @@ class KeepOut(Alone):
     """
 
     area: Region | Floats
+    timeless = True
 
     def __post_init__(self) -> None:
         corners = float_array("area", _corners(self.area), (None, 2))

@@ -25,6 +25,7 @@ class Separation:
     """
 
     distance: float
+    timeless = True
 
     def __post_init__(self) -> None:
         positive("distance", self.distance)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import dataclass
+from itertools import islice
 
 import numpy as np
 
@@ -35,14 +36,18 @@ class BeamSearch:
 
     def search(self, problem: SequenceProblem, *, rng: np.random.Generator) -> None:
         """Until nothing is better, or the budget is used up."""
-        chosen: list[Sequence | None] = [None] * problem.num_sensors
-        beams: list[list[Sequence]] = [[] for _ in chosen]
+        scanning: list[Sequence | None] = [None] * problem.num_sensors
+        # Who does not scan yet is in the way of others all the same.
+        beside: list[Sequence | None] = [None] * problem.num_sensors
+        if problem.rules is not None:
+            beside[:] = problem.rules.start
+        beams: list[list[Sequence]] = [[] for _ in scanning]
         for s in range(problem.num_sensors):
             # Every sensor has its share of the budget, and one evaluation is left for what comes of it.
             share = (problem.left - 1) // (problem.num_sensors - s)
-            beams[s] = self._grow(problem, chosen, s, share, rng)
-            chosen[s] = beams[s][0]
-        joint = tuple(own for own in chosen if own is not None)
+            beams[s] = self._grow(problem, scanning, beside, s, share, rng)
+            scanning[s] = beside[s] = beams[s][0]
+        joint = tuple(own for own in scanning if own is not None)
         value = problem.evaluate([joint])[0]
         while problem.left > 0:
             joint, value, beams = self._ascend(problem, joint, value, beams, rng)
@@ -66,7 +71,7 @@ class BeamSearch:
         """Search the sensors in turn until none alone does better."""
         settled, s, beams = 0, 0, list(beams)
         while settled < problem.num_sensors and problem.left > 0:
-            beams[s] = self._grow(problem, list(joint), s, problem.left, rng)
+            beams[s] = self._grow(problem, list(joint), list(joint), s, problem.left, rng)
             other = (*joint[:s], beams[s][0], *joint[s + 1 :])
             found, settled = problem.evaluate([other])[0], settled + 1
             if _is_better(found, value):
@@ -77,26 +82,35 @@ class BeamSearch:
     def _grow(
         self,
         problem: SequenceProblem,
-        chosen: list[Sequence | None],
+        scanning: list[Sequence | None],
+        beside: list[Sequence | None],
         sensor: int,
         most: int,
         rng: np.random.Generator,
     ) -> list[Sequence]:
-        """The best whole sequences of one sensor that were found with at most so many evaluations, the best first."""
-        tree = problem.trees[sensor]
-        ahead, behind = tuple(chosen[:sensor]), tuple(chosen[sensor + 1 :])
+        """The best whole sequences of one sensor that were found with at most so many evaluations, the best first.
+
+        scanning: what the others do, None where they do not scan. beside: what they do for the constraints, and what
+        the sensor itself does where nothing else is found.
+        """
+        others = tuple(beside)
+        ahead, behind = tuple(scanning[:sensor]), tuple(scanning[sensor + 1 :])
+        num_first = len(problem.trees[sensor].allowed(()))
         beam: list[Sequence] = [()]
         for stages_left in reversed(range(problem.depth)):
-            if most < 1:
+            longer = ((*taken, k) for taken in beam for k in problem.after(sensor, taken, others))
+            whole = ((taken, own) for taken in longer if (own := problem.kept(sensor, taken, others)) is not None)
+            found = list(islice(whole, max(0, most)))
+            if not found:
                 break
-            longer = [(*taken, k) for taken in beam for k in range(tree.size(taken))][:most]
-            values = problem.evaluate([(*ahead, tree.kept(taken), *behind) for taken in longer])
-            most -= len(longer)
+            values = problem.evaluate([(*ahead, own, *behind) for _, own in found])
+            most -= len(found)
             width = self.beam_width
             if stages_left > 0:
-                width = min(width, max(1, most // (stages_left * tree.size(()))))
-            beam = [longer[i] for i in _ranked(values, rng)[:width]]
-        return [tree.kept(taken) for taken in beam]
+                width = min(width, max(1, most // (stages_left * num_first)))
+            beam = [found[i][0] for i in _ranked(values, rng)[:width]]
+        kept = (problem.kept(sensor, taken, others) for taken in beam)
+        return [own for own in kept if own is not None] or [own for own in [beside[sensor]] if own is not None]
 
 
 def _is_better(value: float, than: float) -> bool:

@@ -11,14 +11,17 @@ from functools import partial
 import numpy as np
 
 from vedette.control.additive.evaluator import AdditiveEvaluator
+from vedette.control.constraints import Constraint
 from vedette.control.evidence import Evidence
 from vedette.control.inputs import check_poses, check_sensors
+from vedette.control.lookahead.ahead import Ahead
 from vedette.control.lookahead.beam import BeamSearch
 from vedette.control.lookahead.courses import CourseTree, Stages
 from vedette.control.lookahead.laid_courses import LaidCourses
 from vedette.control.lookahead.problem import Best, Part, SequenceProblem, SequenceSearch
+from vedette.control.lookahead.rules import Rules
 from vedette.control.plan import Bound, Plan
-from vedette.control.preparation import AnyReward, Sums, prepare_sums
+from vedette.control.preparation import AnyReward, Sums, prepare_sums, unsought
 from vedette.control.rewards import CauchySchwarzReward
 from vedette.control.settings import MobileSensor, PlanningSettings
 from vedette.errors import NumericalError
@@ -41,7 +44,8 @@ class HorizonPlanner:
     `discount` g the sum of g^(d - 1) times the reward at the end of the horizon of decision d, which is how losses on
     the way count. Of a reward at the end alone what is learnt late counts most, and the same decision taken again and
     again may put off what it means to do; a divergence measures all that was learnt by then, so that its sum counts
-    what is learnt early several times.
+    what is learnt early several times. Targets not found yet (`PlanningSettings.undetected_worth`) are taken to stay
+    where they may be, and count with the expected number that all scans up to then find.
 
     Attributes:
         sensors, fusion, settings, reward: as of `JointPlanner`; the horizon of the settings is that of one decision.
@@ -51,6 +55,8 @@ class HorizonPlanner:
         search: which joint sequences are evaluated, where the budget is too small for all.
         budget: how many joint sequences are evaluated at most.
         discount: g in [0, 1]; None: only the end counts.
+        constraints: what the sensors must not do, tested at every decision of a sequence: from where its courses begin
+            to the end of its horizon, or to the next decision where that is later.
         notes: what every plan is to say.
 
     Raises:
@@ -66,6 +72,7 @@ class HorizonPlanner:
     search: SequenceSearch = field(default_factory=BeamSearch)
     budget: int = 2000
     discount: float | None = None
+    constraints: tuple[Constraint, ...] = ()
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
@@ -88,7 +95,9 @@ class HorizonPlanner:
     def plan(self, state: State, poses: Floats, *, rng: np.random.Generator) -> Plan:
         """The first actions of the best joint sequence that was found; of equal ones the first in printed order.
 
-        The tables are those of the first actions, each worth the best sequence found that begins with it; the whole
+        Where constraints allow no course of a sensor at some decision, all are kept, and where no joint sequence is
+        found on which all pairs of sensors are as they must be, that is given up from some decision on; the notes say
+        so. The tables are those of the first actions, each worth the best sequence found that begins with it; the whole
         sequence is in `Plan.sequence`, the counts of the curve are of joint sequences. Arguments as of
         `JointPlanner.plan`; the search draws after the samples.
 
@@ -99,11 +108,14 @@ class HorizonPlanner:
         generator(rng)
         trees = self._trees(poses)
         sums = prepare_sums(self.sensors, self.fusion, self.settings, self.reward, state)
-        problem, first = self._problem(trees, sums, rng)
-        num_joint = math.prod(tree.count(self.budget) for tree in trees)
+        rules = self._rules(trees, state)
+        problem, first = self._problem(trees if rules is None else rules.trees, rules, sums, rng)
+        num_joint = math.prod(tree.count(self.budget) for tree in problem.trees)
         if num_joint <= self.budget:
-            problem.evaluate(itertools.product(*(tree.all() for tree in trees)))
+            problem.evaluate(itertools.product(*(tree.all() for tree in problem.trees)))
         else:
+            if rules is not None:
+                problem.evaluate([rules.start])
             self.search.search(problem, rng=rng)
         return self._plan(problem, first, sums, complete=num_joint <= self.budget)
 
@@ -118,8 +130,14 @@ class HorizonPlanner:
             for s, (sensor, pose) in enumerate(zip(self.sensors, at, strict=True))
         )
 
+    def _rules(self, trees: tuple[CourseTree, ...], state: State) -> Rules | None:
+        if not self.constraints:
+            return None
+        poses, stages = np.array([tree.pose for tree in trees]), trees[0].stages
+        return Rules.of(trees, Ahead(self.constraints, self.sensors, self.settings, state.fused, poses, stages))
+
     def _problem(
-        self, trees: tuple[CourseTree, ...], sums: Sums, rng: np.random.Generator
+        self, trees: tuple[CourseTree, ...], rules: Rules | None, sums: Sums, rng: np.random.Generator
     ) -> tuple[SequenceProblem, AdditiveEvaluator]:
         """What is searched, and an evaluator whose options are those of the first decision."""
         options = tuple(tree.options(()) for tree in trees)
@@ -139,14 +157,14 @@ class HorizonPlanner:
             parts = [part(1.0, self.depth)]
         else:
             parts = [part(self.discount**d, d + 1) for d in range(self.depth) if self.discount > 0.0 or d == 0]
-        return SequenceProblem(trees, self.depth, tuple(parts), self.budget), first
+        return SequenceProblem(trees, self.depth, tuple(parts), self.budget, rules), first
 
     def _lay_out(
         self, num_steps: int, sums: Sums, options: tuple[Options, ...], rng: np.random.Generator
     ) -> AdditiveEvaluator:
         settings = replace(self.settings, horizon_steps=num_steps)
         return AdditiveEvaluator.prepare(
-            self.sensors, options, sums.rule, settings, self.reward, sums.fused, sums.local, rng=rng
+            self.sensors, options, sums.rule, settings, self.reward, sums.fused, sums.local, sums.undetected, rng=rng
         )
 
     def _plan(self, problem: SequenceProblem, first: AdditiveEvaluator, sums: Sums, *, complete: bool) -> Plan:
@@ -155,10 +173,9 @@ class HorizonPlanner:
         evidence.note(np.array(list(problem.found)), np.array([own.rewards for own in problem.found.values()]))
         courses = tuple(own[0] for own in best.sequence)
         chosen = tuple(own.first_action(course) for own, course in zip(first.options, courses, strict=True))
-        if self.settings.undetected_worth > 0.0:
-            first.notes["targets not found yet are not looked for: sequences of decisions do not"] = None
         if self.settings.confidence is not None:
             first.notes["decided on num_samples samples, whatever the confidence: sequences are not raced"] = None
+        constrained = () if problem.rules is None else problem.rules.notes(best.sequence)
         counts, found = first.account()
         return Plan(
             self.name,
@@ -166,7 +183,7 @@ class HorizonPlanner:
             chosen,
             evidence.tables(courses),
             counts,
-            (*self.notes, *sums.notes, *found),
+            (*self.notes, *unsought(self.settings, sums.undetected, sums=True), *constrained, *sums.notes, *found),
             problem.curve(),
             Bound(best.value, best.value, "exhaustive") if complete else None,
             sequence=tuple(tree.rows(own) for tree, own in zip(problem.trees, best.sequence, strict=True)),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -11,6 +12,7 @@ import numpy as np
 
 from vedette.control.lookahead.courses import CourseTree, Sequence
 from vedette.control.lookahead.laid_courses import LaidCourses, Taken
+from vedette.control.lookahead.rules import Rules
 from vedette.control.plan import SearchCurve
 from vedette.control.search import first_best
 from vedette.kernels.base.types import Floats
@@ -43,6 +45,7 @@ class SequenceProblem:
         depth: number of decisions.
         parts: of which values are sums.
         budget: how many joint sequences are evaluated at most.
+        rules: what constraints allow; None: everything.
         found: for each joint first action (numbers of courses) of what was evaluated, the best that begins with it.
     """
 
@@ -50,6 +53,7 @@ class SequenceProblem:
     depth: int
     parts: tuple[Part, ...]
     budget: int
+    rules: Rules | None = None
     found: dict[tuple[int, ...], Best] = field(default_factory=dict)
     _values: dict[Taken, float] = field(default_factory=dict)
     _evaluations: list[int] = field(default_factory=list)
@@ -65,13 +69,33 @@ class SequenceProblem:
         """How many joint sequences may still be evaluated."""
         return max(0, self.budget - len(self._values))
 
+    def allows(self, joint: Taken) -> bool:
+        """Whether constraints allow sequences that sensors take together; None: what a sensor does is not asked."""
+        return self.rules is None or self.rules.allows(joint)
+
+    def after(self, sensor: int, taken: Sequence, others: Taken) -> Sequence:
+        """The courses that one sensor may take after those taken, beside what others take then; perhaps none.
+
+        others: of each sensor; those that are None, or do not reach so far, are not asked about.
+        """
+        if self.rules is None:
+            return self.trees[sensor].allowed(taken)
+        return self.rules.after(sensor, taken, others)
+
+    def kept(self, sensor: int, taken: Sequence, others: Taken) -> Sequence | None:
+        """The whole sequence of one sensor that keeps to its last action, or to the one nearest to it that it may take
+        beside the others; None: none was found."""
+        return self.trees[sensor].kept(taken) if self.rules is None else self.rules.kept(sensor, taken, others)
+
     def evaluate(self, joints: Iterable[Taken]) -> list[float]:
         """Values of joint sequences, none evaluated twice; -inf for those that the budget has no room for.
 
-        A sensor without a sequence (None) does not scan. A value that is no number is -inf.
+        A sensor without a sequence (None) does not scan. A value that is no number is -inf, and so is that of what
+        constraints forbid, which is not evaluated.
         """
         wanted = list(joints)
-        new = [joint for joint in dict.fromkeys(wanted) if joint not in self._values][: self.left]
+        unknown = [joint for joint in dict.fromkeys(wanted) if joint not in self._values]
+        new = list(itertools.islice(filter(self.allows, unknown), self.left))
         if new:
             rewards = self._rewards(new)
             values = rewards.mean(axis=1)

@@ -80,7 +80,9 @@ class _Climb:
             path, courses = self._descend()
             paths.append(path)
             joints.append(self._completed(courses))
-        for path, value in zip(paths, self.problem.evaluate(joints), strict=True):
+        values = iter(self.problem.evaluate([joint for joint in joints if joint is not None]))
+        for path, joint in zip(paths, joints, strict=True):
+            value = -math.inf if joint is None else next(values)
             if not math.isfinite(value):
                 continue
             self.lowest, self.highest = min(self.lowest, value), max(self.highest, value)
@@ -112,8 +114,9 @@ class _Climb:
         stage, sensor = divmod(len(courses), num_sensors)
         if stage == self.problem.depth:
             return _Node([], closed=True)
-        num = self.problem.trees[sensor].size(courses[sensor::num_sensors])
-        return _Node([int(course) for course in self.rng.permutation(num)])
+        taken = tuple(courses[s::num_sensors] for s in range(num_sensors))
+        allowed = self.problem.after(sensor, taken[sensor], taken)
+        return _Node([allowed[place] for place in self.rng.permutation(len(allowed))])
 
     def _promising(self, node: _Node) -> int:
         """The child to go on with, of those that are not known whole."""
@@ -129,17 +132,26 @@ class _Climb:
 
         return max((item for item in node.children.items() if not item[1].closed), key=bound)[0]
 
-    def _completed(self, courses: tuple[int, ...]) -> JointSequence:
+    def _completed(self, courses: tuple[int, ...]) -> JointSequence | None:
+        """A whole joint sequence that begins so; None where none was found that is allowed."""
         num_sensors = self.problem.num_sensors
-        sequences = (courses[s::num_sensors] for s in range(num_sensors))
-        return tuple(self._rolled_out(s, own) for s, own in enumerate(sequences))
+        taken = [courses[s::num_sensors] for s in range(num_sensors)]
+        for s in range(num_sensors):
+            whole = self._rolled_out(s, tuple(taken))
+            if whole is None:
+                return None
+            taken[s] = whole
+        return tuple(taken)
 
-    def _rolled_out(self, sensor: int, taken: Sequence) -> Sequence:
-        tree = self.problem.trees[sensor]
+    def _rolled_out(self, sensor: int, joint: JointSequence) -> Sequence | None:
+        problem, taken = self.problem, joint[sensor]
         if self.search.rollout == "kept" and taken:
-            return tree.kept(taken)
-        while len(taken) < self.problem.depth:
-            taken = (*taken, int(self.rng.integers(tree.size(taken))))
+            return problem.kept(sensor, taken, joint)
+        while len(taken) < problem.depth:
+            allowed = problem.after(sensor, taken, joint)
+            if not allowed:  # by chance into a dead end
+                return problem.kept(sensor, joint[sensor], joint)
+            taken = (*taken, allowed[int(self.rng.integers(len(allowed)))])
             if self.search.rollout == "kept":
-                return tree.kept(taken)
+                return problem.kept(sensor, taken, joint)
         return taken

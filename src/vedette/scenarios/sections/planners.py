@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, NamedTuple
 import numpy as np
 from pydantic import Field
 
-from vedette.errors import InputError
 from vedette.scenarios.sections.base import Section
 from vedette.scenarios.sections.custom import Custom
 from vedette.scenarios.sections.rewards import AnyReward
@@ -68,10 +67,14 @@ def _joint(parts: Parts) -> Planner:
 def _lookahead(parts: Parts) -> Planner:
     from vedette.control import HorizonPlanner
 
-    if parts.constraints:
-        raise InputError("control.constraints: expected none, as the strategy lookahead keeps to none; got some")
     return HorizonPlanner(
-        parts.sensors, parts.fusion, parts.settings, parts.reward, notes=parts.notes, **parts.lookahead
+        parts.sensors,
+        parts.fusion,
+        parts.settings,
+        parts.reward,
+        constraints=parts.constraints,
+        notes=parts.notes,
+        **parts.lookahead,
     )
 
 

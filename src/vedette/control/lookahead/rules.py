@@ -1,0 +1,139 @@
+"""Which joint sequences constraints allow, pairs of sensors included, and one that they do."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence as Several
+from dataclasses import dataclass, field
+from itertools import combinations
+
+from vedette.control.constraints import Mask
+from vedette.control.lookahead.ahead import Ahead, Place
+from vedette.control.lookahead.constrained import ConstrainedTree
+from vedette.control.lookahead.courses import CourseTree, Sequence
+from vedette.control.lookahead.start import furthest
+from vedette.kernels.base.types import Bools
+
+# Beginnings that are tried for a sequence of one sensor that is allowed beside those of the others.
+_MOST_TRIES = 10_000
+
+
+@dataclass(slots=True, eq=False)
+class Rules:
+    """What is allowed.
+
+    Attributes:
+        trees: what each sensor may do by itself.
+        ahead: what pairs of sensors are judged by.
+        mask: of the first decision.
+        until: number of decisions at which pairs of sensors are judged.
+        start: a joint sequence that is allowed.
+    """
+
+    trees: tuple[ConstrainedTree, ...]
+    ahead: Ahead
+    mask: Mask
+    until: int
+    start: tuple[Sequence, ...]
+    _tables: dict[tuple[int, int, bytes, bytes, int], Bools | None] = field(default_factory=dict)
+    _together: dict[tuple[int, int, Sequence, Sequence], bool] = field(default_factory=dict)
+    _single: dict[tuple[int, Sequence], bool] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, trees: tuple[CourseTree, ...], ahead: Ahead) -> Rules:
+        """Of trees without constraints.
+
+        Dead ends are left out, unless these leave pairs of sensors no way at the first decision. Where no joint
+        sequence is found on which all pairs are as they must be, that holds for as many decisions as one was found for;
+        see `notes`. Raises `InputError` as `mask_of`.
+        """
+        mask = ahead.mask({s: Place.after(tree, ()) for s, tree in enumerate(trees)})
+        own = tuple(ConstrainedTree.of(tree, ahead, s, mask.single[s]) for s, tree in enumerate(trees))
+        found = furthest(own, ahead, mask)
+        if not found[0]:
+            own = tuple(tree.short_sighted() for tree in own)
+            found = furthest(own, ahead, mask)
+        start = tuple(tree.kept(taken) for tree, taken in zip(own, found, strict=True))
+        return cls(own, ahead, mask, len(found[0]), start)
+
+    def allows(self, joint: Several[Sequence | None]) -> bool:
+        """Whether sequences that sensors take together are allowed; None: what a sensor does is not asked."""
+        known = [(s, own) for s, own in enumerate(joint) if own is not None]
+        pairs = combinations(known, 2) if self.ahead.on_pairs else ()
+        return all(self._alone(*each) for each in known) and all(self._beside(*one, *two) for one, two in pairs)
+
+    def after(self, sensor: int, taken: Sequence, others: Several[Sequence | None]) -> Sequence:
+        """The courses of one sensor after those taken that are allowed beside the others' at that decision, maybe none.
+
+        others: of each sensor what it takes; those that are None, too short, or the sensor's own are not asked about.
+        """
+        found, stage = self.trees[sensor].allowed(taken), len(taken) + 1
+        for other, own in enumerate(others):
+            if other == sensor or own is None or len(own) < stage:
+                continue
+            table = self._table(sensor, taken, other, own[: stage - 1])
+            if table is not None:
+                found = tuple(course for course in found if table[course, own[stage - 1]])
+        return found
+
+    def kept(self, sensor: int, taken: Sequence, others: Several[Sequence | None]) -> Sequence | None:
+        """The whole sequence that keeps as near to the last action as is allowed beside the others; None: none found.
+
+        At once from decision to decision, back where there is no way on.
+        """
+        tree, waiting = self.trees[sensor], [iter([taken])]
+        for _ in range(_MOST_TRIES):
+            while (own := next(waiting[-1], None)) is None:
+                waiting.pop()
+                if not waiting:
+                    return None
+            if len(own) == tree.stages.depth:
+                return own
+            waiting.append(iter([(*own, k) for k in tree.nearest(own, self.after(sensor, own, others))]))
+        return None
+
+    def notes(self, sequence: Several[Sequence]) -> tuple[str, ...]:
+        """What a reader of a decision for a joint sequence must know."""
+        names = ", ".join(constraint.name for constraint in self.ahead.constraints)
+        found = [
+            f"sensor {s + 1}, decision {k} of the sequence: no course meets its constraints ({names}); it may take any"
+            for s, (tree, own) in enumerate(zip(self.trees, sequence, strict=True))
+            for k in tree.blocked(own)
+        ]
+        if self.until < self.trees[0].stages.depth:
+            found.append(
+                f"no joint sequence was found on which the sensors go together after decision {self.until}; from there "
+                "on that is given up"
+            )
+        return *self.mask.notes, *found
+
+    def _alone(self, sensor: int, sequence: Sequence) -> bool:
+        key = (sensor, sequence)
+        if key not in self._single:
+            tree = self.trees[sensor]
+            self._single[key] = all(course in tree.allowed(sequence[:k]) for k, course in enumerate(sequence))
+        return self._single[key]
+
+    def _beside(self, first: int, one: Sequence, second: int, other: Sequence) -> bool:
+        key = (first, second, one, other)
+        if key not in self._together:
+            stages = range(min(len(one), len(other)))
+            tables = ((k, self._table(first, one[:k], second, other[:k])) for k in stages)
+            self._together[key] = all(table is None or table[one[k], other[k]] for k, table in tables)
+        return self._together[key]
+
+    def _table(self, first: int, one: Sequence, second: int, other: Sequence) -> Bools | None:
+        """(num_courses of the first, of the second) which go together after courses taken; None: all."""
+        stage = len(one) + 1
+        if stage > self.until or not self.ahead.on_pairs:
+            return None
+        if first > second:
+            table = self._table(second, other, first, one)
+            return None if table is None else table.T
+        if stage == 1:
+            return self.mask.together.get((first, second))
+        mine, its = self.trees[first], self.trees[second]
+        key = (first, second, mine.place(one), its.place(other), self.ahead.moment(stage))
+        if key not in self._tables:
+            places = {first: Place.after(mine, one), second: Place.after(its, other)}
+            self._tables[key] = self.ahead.pairs(stage, places).get((first, second))
+        return self._tables[key]
