@@ -18,6 +18,7 @@ class MarginalWork(NamedTuple):
     """Arrays in which the clusters of a scan are found and summed; made once, grown when a cluster needs more."""
 
     leaders: Ints  # (num_rows,) a row of the same cluster, not after this one; the first of a cluster leads itself
+    followers: Ints  # (num_rows,) the next row of the same cluster, -1 for none
     members: Ints  # (num_rows,) rows of the cluster at hand
     owners: Ints  # (num_measurements,) the first row that each measurement is gated by, or -1
     bits: Ints  # (num_measurements,) number of each measurement within its cluster, or -1
@@ -33,6 +34,7 @@ class MarginalWork(NamedTuple):
 def make_marginal_work(num_rows: int, num_measurements: int) -> MarginalWork:
     """Room for the clusters of so many rows and measurements, and for a small exact sum."""
     return MarginalWork(
+        np.empty(num_rows, np.int64),
         np.empty(num_rows, np.int64),
         np.empty(num_rows, np.int64),
         np.empty(num_measurements, np.int64),
@@ -51,6 +53,7 @@ def grown_marginal_work(work: MarginalWork) -> MarginalWork:
     """Room for what the last cluster has asked for."""
     return MarginalWork(
         work.leaders,
+        work.followers,
         work.members,
         work.owners,
         work.bits,
@@ -64,12 +67,12 @@ def grown_marginal_work(work: MarginalWork) -> MarginalWork:
 
 
 @borrowing
-def find_clusters(options: Options, leaders: Ints, owners: Ints) -> bool:
+def find_clusters(options: Options, work: MarginalWork) -> bool:
     """Lead the rows that share a gated measurement, directly or not, to the first of them; false where none does.
 
-    leaders, owners: as in `MarginalWork`, to be written (union-find, the lesser root leads).
+    Leaders, followers and owners are written (union-find, the lesser root leads).
     """
-    shared = False
+    leaders, owners, shared = work.leaders, work.owners, False
     for column in range(options.num_measurements):
         owners[column] = -1
     for row in range(len(options.offsets) - 1):
@@ -85,12 +88,27 @@ def find_clusters(options: Options, leaders: Ints, owners: Ints) -> bool:
                 shared = True
                 a, b = _root(leaders, owners[column]), _root(leaders, row)
                 leaders[max(a, b)] = min(a, b)
+    if shared:
+        _link_followers(leaders, work.followers, len(options.offsets) - 1)
     return shared
+
+
+@inlined
+def _link_followers(leaders: Ints, followers: Ints, num_rows: int) -> None:
+    for row in range(num_rows):
+        followers[row] = -1
+    # From behind, each right after its leader: they come to stand in order.
+    for row in range(num_rows - 1, -1, -1):
+        leader = _root(leaders, row)
+        if leader != row:
+            followers[row] = followers[leader]
+            followers[leader] = row
 
 
 @inlined
 def _root(leaders: Ints, row: int) -> int:
     while leaders[row] != row:
+        leaders[row] = leaders[leaders[row]]  # halves the way for the next
         row = leaders[row]
     return row
 
@@ -98,11 +116,8 @@ def _root(leaders: Ints, row: int) -> int:
 @inlined
 def gather_cluster(options: Options, leader: int, work: MarginalWork) -> tuple[int, int]:
     """Write the rows of a cluster and number its measurements; how many there are of both."""
-    count, num_bits = 0, 0
-    for row in range(leader, len(options.offsets) - 1):
-        # Members come after their leader, so that rows before it need not be looked at.
-        if _root(work.leaders, row) != leader:
-            continue
+    count, num_bits, row = 0, 0, leader
+    while row >= 0:
         work.members[count] = row
         count += 1
         for option in range(options.offsets[row], options.offsets[row + 1]):
@@ -110,4 +125,5 @@ def gather_cluster(options: Options, leader: int, work: MarginalWork) -> tuple[i
             if column >= 0 and work.bits[column] < 0:
                 work.bits[column] = num_bits
                 num_bits += 1
+        row = work.followers[row]
     return count, num_bits

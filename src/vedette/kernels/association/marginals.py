@@ -167,7 +167,7 @@ def fill_marginals(options: Options, caps: SearchCaps, work: MarginalWork, out: 
     Inlined because `work` is a large bundle, of which the usual small clusters need little.
     """
     log_total, num_ranked, log_kept = 0.0, 0, 0.0
-    if not find_clusters(options, work.leaders, work.owners):
+    if not find_clusters(options, work):
         for row in range(len(options.offsets) - 1):
             log_total += _single_row(options, row, out)
         return MarginalSums(log_total, num_ranked, log_kept), True

@@ -11,6 +11,7 @@ import numpy as np
 
 from vedette.errors import ModelError
 from vedette.kernels.association.assignment import ABSENT, MISSED, Options
+from vedette.kernels.association.near import Near, near_measurements
 from vedette.kernels.association.predicted import Rows, log_or_minus_inf
 from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.compile import borrowing, inlined, kernel
@@ -22,6 +23,11 @@ from vedette.kernels.gaussian.innovation import whiten
 def make_options(num_rows: int, num_components: int, num_measurements: int, meas_dim: int) -> Options:
     """Room for every option that there can be."""
     most_options, most_entries = num_rows * (num_measurements + 2), num_components * (num_measurements + 1)
+    return _room(num_rows, most_options, most_entries, num_measurements, meas_dim)
+
+
+@kernel
+def _room(num_rows: int, most_options: int, most_entries: int, num_measurements: int, meas_dim: int) -> Options:
     return Options(
         np.zeros(num_rows + 1, np.int64),
         np.empty(most_options, np.int64),
@@ -31,6 +37,15 @@ def make_options(num_rows: int, num_components: int, num_measurements: int, meas
         np.empty((most_entries, meas_dim)),
         num_measurements,
     )
+
+
+@kernel
+def _room_for(rows: Rows, near: Near, num_measurements: int, meas_dim: int) -> Options:
+    """Room for the options of rows with the measurements near them."""
+    num, most_entries = len(rows.log_absent), 0
+    for row in range(num):
+        most_entries += (rows.offsets[row + 1] - rows.offsets[row]) * (near.offsets[row + 1] - near.offsets[row] + 1)
+    return _room(num, near.offsets[num] + 2 * num, most_entries, num_measurements, meas_dim)
 
 
 @inlined
@@ -119,9 +134,11 @@ def _total_from_peak(values: Floats, start: int, count: int, peak: float) -> flo
 
 
 @borrowing
-def _fill_options(rows: Rows, scan: Floats, log_clutter: Floats, angular: Bools, gate: float, out: Options) -> None:
+def _fill_options(
+    rows: Rows, near: Near, scan: Floats, log_clutter: Floats, angular: Bools, gate: float, out: Options
+) -> None:
     """Options of every row, heaviest first; options of weight zero are left out."""
-    filled, entry = 0, 0
+    filled, entry, every = 0, 0, len(near.offsets) == 0
     out.offsets[0] = 0
     for row in range(len(rows.log_absent)):
         start = filled
@@ -140,7 +157,9 @@ def _fill_options(rows: Rows, scan: Floats, log_clutter: Floats, angular: Bools,
             out.columns[filled], out.log_weights[filled], out.entries[filled] = MISSED, total, entry
             filled += 1
             entry += count
-        for j in range(len(scan)):
+        begin, end = (0, len(scan)) if every else (near.offsets[row], near.offsets[row + 1])
+        for at in range(begin, end):
+            j = at if every else near.measurements[at]
             weight = _detection_option(rows, row, scan[j], log_clutter[j], angular, gate, entry, out)
             # Outside the gate nothing is kept: the next option writes over the entries.
             if weight > -math.inf:
@@ -154,22 +173,22 @@ def _fill_options(rows: Rows, scan: Floats, log_clutter: Floats, angular: Bools,
 
 @inlined
 def weigh_options(
-    rows: Rows, scan: ScanInput, sensor: Sensor, caps: Truncation, log_clutter: Floats, out: Options
+    rows: Rows, near: Near, scan: ScanInput, sensor: Sensor, caps: Truncation, log_clutter: Floats, out: Options
 ) -> tuple[float, int]:
     """Write the options of every row, their weights relative to clutter, heaviest first.
 
-    log_clutter: (>= num_measurements,) the log clutter intensity at each measurement is written there. Returns the sum
-    of these, and how many of them were raised to the floor.
+    near: the measurements that are looked at. log_clutter: (>= num_measurements,) the log clutter intensity at each
+    measurement is written there. Returns the sum of these, and how many of them were raised to the floor.
     """
     total, num_raised = _log_clutter(sensor, scan.measurements, scan.pose, caps.log_clutter_floor, log_clutter)
-    _fill_options(rows, scan.measurements, log_clutter, sensor.angular, caps.gate, out)
+    _fill_options(rows, near, scan.measurements, log_clutter, sensor.angular, caps.gate, out)
     return total, num_raised
 
 
 @kernel
 def weighed_options(rows: Rows, scan: ScanInput, sensor: Sensor, caps: Truncation) -> tuple[Options, float, int]:
     """As `weigh_options`, into arrays made for it."""
-    num = len(scan.measurements)
-    options = make_options(len(rows.log_absent), len(rows.log_weights), num, len(sensor.angular))
-    log_clutter, num_raised = weigh_options(rows, scan, sensor, caps, np.empty(num), options)
+    num, near = len(scan.measurements), near_measurements(rows, scan.measurements, sensor.angular, caps.gate)
+    options = _room_for(rows, near, num, len(sensor.angular))
+    log_clutter, num_raised = weigh_options(rows, near, scan, sensor, caps, np.empty(num), options)
     return options, log_clutter, num_raised

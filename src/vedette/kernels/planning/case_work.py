@@ -12,6 +12,7 @@ import numpy as np
 
 from vedette.kernels.association.assignment import Options
 from vedette.kernels.association.children import Children, Parents, grown_children, make_children
+from vedette.kernels.association.near import Near, all_measurements
 from vedette.kernels.association.options import make_options
 from vedette.kernels.association.predicted import Rows, make_rows
 from vedette.kernels.association.search import WIDEST, Search, grown_search, make_search
@@ -39,6 +40,7 @@ class GlmbWork(NamedTuple):
     log_clutter: Floats  # (most_measurements,)
     first_rows: Rows  # of the prior, for all samples of an action
     rows: Rows  # of a later belief
+    near: Near  # every measurement to every row: ideal scans are small
     options: Options
     search: Search
     children: Children
@@ -107,6 +109,7 @@ def grown_work(work: GlmbWork) -> GlmbWork:
         work.log_clutter,
         work.first_rows,
         rows,
+        work.near,
         options,
         grown_search(work.search),
         children,
@@ -133,6 +136,7 @@ def make_work(num_tracks: int, num_sets: int, dim: int, meas_dim: int, most_meas
         np.empty(most_measurements),
         make_rows(num_tracks, num_tracks, dim, meas_dim),
         make_rows(0, 0, dim, meas_dim),
+        all_measurements(),
         make_options(0, 0, most_measurements, meas_dim),
         make_search(0),
         make_children(64, 512),

@@ -83,7 +83,7 @@ def _update_cases(
                 predict_rows(belief.tracks, scan, decision.motion, sensor, rows, work.scratch)
             prepared = action
             options = view_options(work.options, num_tracks, num)
-            weigh_options(rows, scan, sensor, caps, work.log_clutter, options)
+            weigh_options(rows, work.near, scan, sensor, caps, work.log_clutter, options)
             if not _find_children(options, belief, caps.search, work):
                 return case
             if work.children.filled[0] == 0:

@@ -16,6 +16,7 @@ from vedette.errors import NumericalError
 from vedette.kernels.association.assignment import Options
 from vedette.kernels.association.clusters import MarginalWork, grown_marginal_work, make_marginal_work
 from vedette.kernels.association.marginals import fill_marginals
+from vedette.kernels.association.near import Near, all_measurements
 from vedette.kernels.association.options import make_options, view_options, weigh_options
 from vedette.kernels.association.predicted import Rows, make_rows, predict_rows
 from vedette.kernels.base.arrays import counted_ints
@@ -44,6 +45,7 @@ class LmbWork(NamedTuple):
     log_clutter: Floats  # (most_measurements,)
     first_rows: Rows  # of the prior, for all samples of an action
     rows: Rows  # of a later belief
+    near: Near  # every measurement to every row: ideal scans are small
     options: Options
     marginals: Floats  # (num_options,)
     clusters: MarginalWork
@@ -64,6 +66,7 @@ def _make_work(prior: Lmb, meas_dim: int, most_measurements: int) -> LmbWork:
         np.empty(most_measurements),
         make_rows(num, num, dim, meas_dim),
         make_rows(num, num, dim, meas_dim),
+        all_measurements(),
         options,
         np.empty(len(options.columns)),
         make_marginal_work(num, most_measurements),
@@ -81,6 +84,7 @@ def _grown_work(work: LmbWork) -> LmbWork:
         work.log_clutter,
         work.first_rows,
         work.rows,
+        work.near,
         work.options,
         work.marginals,
         grown_marginal_work(work.clusters),
@@ -107,7 +111,7 @@ def _update_cases(prior: Lmb, decision: Decision, first: int, last: int, results
                 weigh_by_existence(current.existence_logit, rows)
             prepared = action
             options = view_options(work.options, len(rows.log_absent), num)
-            weigh_options(rows, scan, sensor, caps, work.log_clutter, options)
+            weigh_options(rows, work.near, scan, sensor, caps, work.log_clutter, options)
             sums, has_room = fill_marginals(options, caps.search, work.clusters, work.marginals)
             if not has_room:
                 return case

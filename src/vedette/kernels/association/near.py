@@ -1,0 +1,156 @@
+"""Which measurements can be in the gate of which row, found without meeting every measurement with every row.
+
+A gate is an ellipsoid of squared Mahalanobis distance g about the expected measurement, with the innovation covariance
+S: along each axis a it reaches sqrt(g S_aa). Measurements are sorted along the axis on which gates are smallest for the
+spread of the scan; a row looks at those between the ends of its gates there, and compares the other axes.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from vedette.kernels.association.predicted import Rows
+from vedette.kernels.base.arrays import grown_ints
+from vedette.kernels.base.compile import borrowing, inlined, kernel
+from vedette.kernels.base.types import Bools, Floats, Ints
+from vedette.kernels.gaussian.mixtures import descending_order
+from vedette.kernels.gaussian.scratch import wrap_angle
+
+# The ends of gates, and a little more for what rounding does to a distance.
+_SLACK = 1.0 + 1e-9
+
+
+class Near(NamedTuple):
+    """The measurements that each row is weighed with."""
+
+    offsets: Ints  # (num_rows + 1,) into these; (0,) where every row is weighed with all
+    measurements: Ints  # of each row in increasing order
+
+
+@kernel
+def all_measurements() -> Near:
+    """Every row is weighed with every measurement."""
+    return Near(np.empty(0, np.int64), np.empty(0, np.int64))
+
+
+@kernel
+def _gate_reaches(rows: Rows, gate: float) -> Floats:
+    """(num_components, meas_dim) how far from its expected measurement the gate of a component reaches."""
+    factor = rows.innovation.factor
+    num, dim = rows.innovation.predicted.shape
+    out = np.empty((num, dim))
+    for c in range(num):
+        for a in range(dim):
+            variance = 0.0
+            for k in range(a + 1):
+                variance += factor[c, a, k] * factor[c, a, k]
+            out[c, a] = _SLACK * math.sqrt(gate * variance)
+    return out
+
+
+@borrowing
+def _finest_axis(scan: Floats, reaches: Floats) -> int:
+    """The axis along which the scan spreads over most gates."""
+    best, most = 0, -1.0
+    for a in range(scan.shape[1]):
+        low, high, reach = math.inf, -math.inf, 0.0
+        for j in range(scan.shape[0]):
+            low, high = min(low, scan[j, a]), max(high, scan[j, a])
+        for c in range(reaches.shape[0]):
+            reach += reaches[c, a]
+        if reach > 0.0 and (high - low) / reach > most:
+            best, most = a, (high - low) / reach
+    return best
+
+
+@inlined
+def _first_from(values: Floats, least: float) -> int:
+    """Place of the first of increasing values that is not below `least`."""
+    low, high = 0, values.shape[0]
+    while low < high:
+        middle = (low + high) // 2
+        if values[middle] < least:
+            low = middle + 1
+        else:
+            high = middle
+    return low
+
+
+@inlined
+def _may_be_gated(rows: Rows, row: int, measurement: Floats, angular: Bools, reaches: Floats) -> bool:
+    """Whether a measurement is within the gate of some component of the row along every axis."""
+    for c in range(rows.offsets[row], rows.offsets[row + 1]):
+        inside = True
+        for a in range(measurement.shape[0]):
+            off = measurement[a] - rows.innovation.predicted[c, a]
+            if angular[a]:
+                off = wrap_angle(off)
+            if not abs(off) <= reaches[c, a]:
+                inside = False
+                break
+        if inside:
+            return True
+    return False
+
+
+@inlined
+def _sort(values: Ints, first: int, last: int) -> None:
+    for i in range(first + 1, last):
+        value, slot = values[i], i
+        while slot > first and values[slot - 1] > value:
+            values[slot] = values[slot - 1]
+            slot -= 1
+        values[slot] = value
+
+
+@inlined
+def _ends(rows: Rows, row: int, axis: int, angular: Bools, reaches: Floats) -> tuple[float, float]:
+    """Between which values on the axis the gates of a row lie; of an angle all where they may go round."""
+    low, high = math.inf, -math.inf
+    for c in range(rows.offsets[row], rows.offsets[row + 1]):
+        low = min(low, rows.innovation.predicted[c, axis] - reaches[c, axis])
+        high = max(high, rows.innovation.predicted[c, axis] + reaches[c, axis])
+    if angular[axis] and (low < -math.pi or high > math.pi):
+        return -math.inf, math.inf
+    return low, high
+
+
+@kernel
+def _increasing(scan: Floats, axis: int) -> tuple[Ints, Floats]:
+    """The measurements in increasing order along an axis, and their values there."""
+    values = np.empty(len(scan))
+    for j in range(len(scan)):
+        values[j] = -scan[j, axis]
+    order = descending_order(values)
+    for j in range(len(scan)):
+        values[j] = scan[order[j], axis]
+    return order, values
+
+
+@kernel
+def near_measurements(rows: Rows, scan: Floats, angular: Bools, gate: float) -> Near:
+    """The measurements that may be in the gates of each row: all that are, and few others."""
+    num, num_rows = len(scan), len(rows.log_absent)
+    reaches = _gate_reaches(rows, gate)
+    axis = _finest_axis(scan, reaches)
+    order, values = _increasing(scan, axis)
+    offsets, found, filled = np.zeros(num_rows + 1, np.int64), np.empty(4 * num_rows + num, np.int64), 0
+    for row in range(num_rows):
+        low, high = _ends(rows, row, axis, angular, reaches)
+        if filled + num > len(found):
+            found = grown_ints(found, filled + num)
+        at = _first_from(values, low)
+        while at < num and values[at] <= high:
+            if _may_be_gated(rows, row, scan[order[at]], angular, reaches):
+                found[filled] = order[at]
+                filled += 1
+            at += 1
+        _sort(found, offsets[row], filled)
+        offsets[row + 1] = filled
+    return Near(offsets, found)
+
+
+__all__ = ["Near", "all_measurements", "near_measurements"]
