@@ -6,8 +6,11 @@ A version of Numba that changes one fails here, by name, before something strang
 from __future__ import annotations
 
 import inspect
+import os
 import pickle
 import re
+import subprocess
+import sys
 import threading
 import tomllib
 from collections.abc import Callable
@@ -20,6 +23,7 @@ import pytest
 from numba.core.registry import CPUDispatcher
 
 from vedette.kernels.base.compile import JIT_ENABLED, SIGNATURES, borrowing, kernel
+from vedette.kernels.base.libraries import PartLibrary, WholeLibrary
 from vedette.kernels.base.types import Motion
 from vedette.models import constant_survival, constant_velocity
 from vedette.models.motion import kernel_motion
@@ -33,7 +37,12 @@ def _double(values: np.ndarray) -> float:
     return float(2.0 * values[0])
 
 
-_doubled: Any = kernel(_double)
+def _triple(values: np.ndarray) -> float:
+    return float(3.0 * values[0])
+
+
+_kernel: Any = kernel(_double)
+_doubled: Any = _kernel.whole if JIT_ENABLED else _double
 
 
 def takes(function: Callable[..., Any], *names: str) -> bool:
@@ -150,15 +159,69 @@ def test_core_options_nrt_and_forceinline() -> None:
     assert DefaultOptions.no_cfunc_wrapper.flag_name == "no_cfunc_wrapper"
 
 
-def test_a_kernel_for_kernels_can_be_called_from_python_too() -> None:
-    """Compiled anew for that; and what is kept on disk of the two is told apart."""
-    inner: Any = borrowing(_double)
-    assert inner(np.array([2.0])) == 4.0
-    assert not inner.overloads
-    outer: Any = kernel(lambda values: inner(values))
-    assert outer(np.array([2.0])) == 4.0
-    assert len(inner.overloads) == 1
-    assert inner._cache.own._cache_file._base != _doubled._cache.own._cache_file._base
+def test_core_codegen_libraries() -> None:
+    """What only kernels call is a part without machine code; what Python calls is made of all parts that it reaches."""
+    from numba.core.codegen import JITCodeLibrary, JITCPUCodegen
+
+    inner: Any = kernel(_double)
+    tripled: Any = borrowing(_triple)
+    middle: Any = kernel(lambda values: inner(values) + tripled(values))
+    outer: Any = kernel(lambda values: middle(values) + tripled(values))
+    assert outer(np.array([2.0])) == 16.0
+    for part in (inner, tripled, middle):
+        (compiled,) = part.overloads.values()
+        assert isinstance(compiled.library, PartLibrary)
+        assert compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name) == 0
+    (whole,) = outer.whole.overloads.values()
+    assert isinstance(whole.library, WholeLibrary)
+    assert len(whole.library._linking_libraries) >= 3
+    assert JITCPUCodegen._library_class is JITCodeLibrary
+
+
+def test_a_function_of_ones_own_may_call_a_kernel() -> None:
+    first: Any = kernel(_double)
+    second: Any = kernel(lambda values: first(values) + 1.0)
+    own = numba.njit(lambda values: second(values))
+    assert own(np.array([2.0])) == 5.0
+
+
+def test_an_exception_of_a_part_reaches_python_from_disk_too(tmp_path: Path) -> None:
+    """The environments of all parts are told to what they are part of."""
+    (tmp_path / "own.py").write_text(RAISES, encoding="utf-8")
+    environment = {**os.environ, "VEDETTE_CACHE_DIR": str(tmp_path)}
+    for _ in range(2):
+        command = [sys.executable, "own.py"]
+        result = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=600)
+        assert result.stdout.split() == ["ModelError", "ValueError", "4.0"], result.stderr
+
+
+RAISES = """
+import numpy as np
+from vedette.errors import ModelError
+from vedette.kernels.base.compile import inlined, kernel
+
+@inlined
+def inner(values):
+    if values[0] > 2.0:
+        raise ValueError("too large")
+    return 2.0 * values[0]
+
+@kernel
+def middle(values):
+    if values[0] < 0.0:
+        raise ModelError("negative")
+    return inner(values)
+
+@kernel
+def outer(values):
+    return middle(values)
+
+for first in (-1.0, 3.0, 2.0):
+    try:
+        print(outer(np.array([first])))
+    except Exception as error:
+        print(type(error).__name__)
+"""
 
 
 def test_experimental_function_type_function_model() -> None:
