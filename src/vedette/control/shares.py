@@ -39,7 +39,7 @@ def shares_of(additive: AdditiveRewards, chosen: Ints) -> Shares:
     """
     parts = _value_parts(additive, chosen)
     found = _found(additive, chosen)
-    base = np.broadcast_to(parts.unseen.sum(axis=0), parts.ahead.shape[1:])
+    base = np.broadcast_to(parts.unseen.sum(axis=0)[:, np.newaxis], parts.ahead.shape[1:])
     whole = parts.labels.sum(axis=0)
     ahead = _means(additive, base + np.cumsum(parts.ahead, axis=0)) + found.ahead
     behind = (_means(additive, base + np.cumsum(parts.behind[::-1], axis=0)) + found.behind[::-1])[::-1]
@@ -50,8 +50,8 @@ def shares_of(additive: AdditiveRewards, chosen: Ints) -> Shares:
     coefficients = additive.coefficients
     existence = localisation = None
     if coefficients is not None:
-        existence = (parts.existence.mean(axis=1) - parts.unseen) @ coefficients
-        localisation = (parts.labels.mean(axis=1) - parts.unseen) @ coefficients - existence
+        existence = (parts.existence.mean(axis=2) - parts.unseen) @ coefficients
+        localisation = (parts.labels.mean(axis=2) - parts.unseen) @ coefficients - existence
     return Shares(start, existence, localisation, total, 0.5 * (first + last), end - without, samples)
 
 
@@ -104,5 +104,5 @@ def _found(additive: AdditiveRewards, chosen: Ints) -> _Found:
 
 
 def _means(additive: AdditiveRewards, sums: Floats) -> Floats:
-    """Mean rewards (...) of sums (..., num_samples, num)."""
+    """Mean rewards (...) of sums (..., num, num_samples)."""
     return np.asarray(additive.of_sums(sums).mean(axis=-1))

@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from vedette.kernels.base.compile import kernel
+from vedette.kernels.base.compile import inlined, kernel
 from vedette.kernels.base.types import Floats
 from vedette.models.arguments import non_negative, reject
 from vedette.models.functions import model_function
@@ -20,7 +20,7 @@ from vedette.models.motion import MotionModel
 _SERIES_ANGLE = 0.1
 
 
-@kernel
+@inlined
 def _acceleration_cov(dt: float, sigma_v: float, out: Floats) -> None:
     """Covariance of positions and velocities under an acceleration that is constant within the step; zero elsewhere."""
     variance = sigma_v * sigma_v
@@ -34,7 +34,7 @@ def _acceleration_cov(dt: float, sigma_v: float, out: Floats) -> None:
         out[axis + 2, axis + 2] = dt**2 * variance
 
 
-@kernel
+@inlined
 def _identity(out: Floats) -> None:
     for i in range(out.shape[0]):
         for j in range(out.shape[1]):

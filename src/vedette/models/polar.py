@@ -11,13 +11,13 @@ import math
 
 import numpy as np
 
-from vedette.kernels.base.compile import kernel
+from vedette.kernels.base.compile import inlined
 from vedette.kernels.base.types import Floats
 from vedette.models.functions import model_function
 from vedette.models.measurement import MeasurementModel
 
 
-@kernel
+@inlined
 def _bearing_row(state: Floats, pose: Floats, out: Floats, row: int) -> None:
     dx, dy = state[0] - pose[0], state[1] - pose[1]
     square = dx * dx + dy * dy
@@ -28,7 +28,7 @@ def _bearing_row(state: Floats, pose: Floats, out: Floats, row: int) -> None:
         out[row, 1] = dx / square
 
 
-@kernel
+@inlined
 def _range_row(state: Floats, pose: Floats, out: Floats, row: int) -> None:
     dx, dy = state[0] - pose[0], state[1] - pose[1]
     distance = math.sqrt(dx * dx + dy * dy)

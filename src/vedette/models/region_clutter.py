@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vedette.kernels.base.compile import kernel
+from vedette.kernels.base.compile import inlined, kernel
 from vedette.kernels.base.types import Floats
 from vedette.models.arguments import non_negative, reject
 from vedette.models.clutter import ClutterModel, log_or_minus_infinity
@@ -22,7 +22,7 @@ from vedette.models.region import Region
 # params of every function here: log(rate / area), x_min, x_max, y_min, y_max
 
 
-@kernel
+@inlined
 def _inside(x: float, y: float, params: Floats) -> bool:
     return bool(params[1] <= x <= params[2] and params[3] <= y <= params[4])
 

@@ -42,7 +42,7 @@ class AdditiveRewards:
     @property
     def num_samples(self) -> int:
         """Samples of each reward."""
-        return int(self.table.changes.shape[1])
+        return int(self.table.changes.shape[2])
 
     @property
     def coefficients(self) -> Floats | None:
@@ -64,7 +64,7 @@ class AdditiveRewards:
 
     def __call__(self, actions: Ints) -> Floats:
         """(num_joint, num_samples) rewards of joint actions (num_joint, num_sensors); -1: the sensor does not scan."""
-        sums = np.empty((len(actions), self.num_samples, self.valuation.num))
+        sums = np.empty((len(actions), self.valuation.num, self.num_samples))
 
         def work(first: int, last: int) -> None:
             joint_values(self.table, self.valuation, actions, first, last, sums)
@@ -82,7 +82,7 @@ class AdditiveRewards:
         return self._lines(chosen, 0, len(chosen))
 
     def _lines(self, chosen: Ints, first: int, last: int) -> Floats:
-        sums = np.empty((len(self.table.offsets) - 1, self.num_samples, self.valuation.num))
+        sums = np.empty((len(self.table.offsets) - 1, self.valuation.num, self.num_samples))
 
         def work(begin: int, end: int) -> None:
             line_values(self.table, self.valuation, chosen, first + begin, first + end, sums)
@@ -103,7 +103,7 @@ class AdditiveRewards:
         distinct = {id(base): base for base in self.bases}
         bases, places = np.stack(list(distinct.values())), {key: place for place, key in enumerate(distinct)}
         which = np.array([places[id(base)] for base in self.bases])
-        sums = np.empty((len(self.table.offsets) - 1, self.num_samples, self.valuation.num))
+        sums = np.empty((len(self.table.offsets) - 1, self.valuation.num, self.num_samples))
 
         def work(first: int, last: int) -> None:
             alone_values(self.table, self.valuation, bases, which, first, last, sums)
@@ -121,7 +121,8 @@ class AdditiveRewards:
         return ascend(self.table, self.valuation, coefficients, self.cells, allowed, start, _MOST_LINES)
 
     def of_sums(self, sums: Floats) -> Floats:
-        """(...) rewards of sums over labels (..., num), cells left out."""
+        """(..., num_samples) rewards of sums over labels (..., num, num_samples), cells left out."""
+        sums = np.moveaxis(sums, -2, -1)
         return sums[..., 0] if self.reward is None else combined(self.reward, sums)
 
     def _found_alone(self) -> Floats:

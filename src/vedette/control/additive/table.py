@@ -45,7 +45,7 @@ def lay_out_changes(start: Start, rule: LinearRule, num_samples: int, num_thread
             f"decision: expected at most {_MOST_BYTES / 1e9:g} GB of what scans may say; got {offsets[-1]} pairs of an "
             f"action and a target in its reach, x {num_samples} samples; take fewer samples or a shorter reach"
         )
-    labels, changes = np.empty(offsets[-1], np.int64), np.empty((int(offsets[-1]), num_samples, size))
+    labels, changes = np.empty(offsets[-1], np.int64), np.empty((int(offsets[-1]), size, num_samples))
     own = np.empty(len(labels), np.int64)
     with model_errors():
         for group, reach in zip(start.groups, reached, strict=True):
@@ -65,7 +65,7 @@ def lay_out_changes(start: Start, rule: LinearRule, num_samples: int, num_thread
 
 def _seen(table: Table) -> Table:
     """Without the entries that say nothing."""
-    kept = table.changes[:, 0, -1] < 0.0
+    kept = table.changes[:, -1, 0] < 0.0
     course = np.repeat(np.arange(len(table.offsets) - 1), np.diff(table.offsets))
     offsets = offsets_of(np.bincount(course[kept], minlength=len(table.offsets) - 1))
     return table._replace(offsets=offsets, labels=table.labels[kept], changes=table.changes[kept])

@@ -37,7 +37,7 @@ class Ascent(NamedTuple):
     """Where an ascent is; written as it goes."""
 
     chosen: Ints  # (num_sensors,) number of the course of each sensor
-    totals: Floats  # (num_labels, num_samples, bernoulli_size) joint rows
+    totals: Floats  # (num_labels, bernoulli_size, num_samples) joint rows
     cell_totals: Floats  # (num_cells,) sums of log_miss
 
 
@@ -49,12 +49,15 @@ class Trace(NamedTuple):
 
 
 @borrowing
-def _label_mean(values: Floats, coefficients: Floats) -> float:
+def label_mean(values: Floats, coefficients: Floats) -> float:
+    """Mean over samples of the weighted sum of values (num, num_samples)."""
     total = 0.0
-    for sample in range(values.shape[0]):
-        for e in range(values.shape[1]):
-            total += coefficients[e] * values[sample, e]
-    return total / values.shape[0]
+    for sample in range(values.shape[1]):
+        weighted = 0.0
+        for e in range(values.shape[0]):
+            weighted += coefficients[e] * values[e, sample]
+        total += weighted
+    return total / values.shape[1]
 
 
 @inlined
@@ -107,9 +110,9 @@ def _line(
             label = table.labels[entry]
             if before[label] == math.inf:
                 value_rows(valuation, label, at.totals[label], work, values)
-                before[label] = _label_mean(values, coefficients)
+                before[label] = label_mean(values, coefficients)
             value_changed(table, valuation, sensor, entry, at.totals[label], work, values)
-            gain += _label_mean(values, coefficients) - before[label]
+            gain += label_mean(values, coefficients) - before[label]
         gains[course - first] = gain
 
 
@@ -137,16 +140,16 @@ def _start(
     table: Table, valuation: Valuation, coefficients: Floats, cells: Cells, chosen: Ints
 ) -> tuple[Ascent, float]:
     """Where the ascent begins, and the mean reward there."""
-    num_labels, num_samples = len(table.start), table.changes.shape[1]
+    num_labels, num_samples = len(table.start), table.changes.shape[2]
     at = Ascent(chosen.copy(), start_totals(table), np.zeros(len(cells.worth)))
     for s in range(len(chosen)):
         add_course(table, s, table.first_courses[s] + chosen[s], 1.0, at.totals)
         _add_cells(cells, table.first_courses[s] + chosen[s], 1.0, at.cell_totals)
-    work, values = make_value_work(valuation), np.empty((num_samples, valuation.num))
+    work, values = make_value_work(valuation, num_samples), np.empty((valuation.num, num_samples))
     reward = np.sum(cells.worth * -np.expm1(at.cell_totals))
     for label in range(num_labels):
         value_rows(valuation, label, at.totals[label], work, values)
-        reward += _label_mean(values, coefficients)
+        reward += label_mean(values, coefficients)
     return at, reward
 
 
@@ -166,7 +169,8 @@ def ascend(
     had need. Returns the joint action, its mean reward, and the trace.
     """
     at, reward = _start(table, valuation, coefficients, cells, start)
-    work, values = make_value_work(valuation), np.empty((table.changes.shape[1], valuation.num))
+    num_samples = table.changes.shape[2]
+    work, values = make_value_work(valuation, num_samples), np.empty((valuation.num, num_samples))
     before, gains = np.empty(len(table.start)), np.empty(np.max(np.diff(table.first_courses)))
     num_sensors, settled, sensor, line = len(start), 0, 0, 0
     evaluations, best = np.ones(max_lines + 1, np.int64), np.full(max_lines + 1, reward)

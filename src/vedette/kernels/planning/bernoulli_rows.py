@@ -32,7 +32,7 @@ class Table(NamedTuple):
     first_courses: Ints  # (num_sensors + 1,) into the courses of all sensors
     offsets: Ints  # (num_courses + 1,) into the entries
     labels: Ints  # (num_entries,) increasing within a course
-    changes: Floats  # (num_entries, num_samples, bernoulli_size)
+    changes: Floats  # (num_entries, bernoulli_size, num_samples): samples side by side
     start: Floats  # (num_labels, bernoulli_size) rows of the joint density without any scan
     powers: Floats  # (num_sensors,) to which the sensors' densities are raised
 
@@ -50,13 +50,18 @@ def log_miss(detection: float) -> float:
 
 
 @inlined
-def unscale(row: Floats) -> None:
-    """Where powers do not sum to one, as some sensors do not know the label, the others' are made to."""
-    power = row[row.shape[0] - 3]
-    if abs(power - 1.0) > _SAME_POWER and power > 0.0:
-        scale = 1.0 / power
-        for k in range(row.shape[0] - 2):
-            row[k] *= scale
+def unscale(rows: Floats) -> None:
+    """Where powers do not sum to one, as some sensors do not know the label, the others' are made to.
+
+    rows: (bernoulli_size, num_samples).
+    """
+    powers = rows[rows.shape[0] - 3]
+    for sample in range(rows.shape[1]):
+        power = powers[sample]
+        if abs(power - 1.0) > _SAME_POWER and power > 0.0:
+            scale = 1.0 / power
+            for k in range(rows.shape[0] - 2):
+                rows[k, sample] *= scale
 
 
 __all__ = ["ALL_BUT_CERTAIN", "Table", "bernoulli_size", "log_miss", "unscale"]

@@ -20,8 +20,9 @@ from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.gaussian.eigen import diagonalise
 from vedette.kernels.gaussian.linalg import cholesky, solve_lower
+from vedette.kernels.planning.ascent import label_mean
 from vedette.kernels.planning.bernoulli_rows import Table
-from vedette.kernels.planning.joint_values import value_rows
+from vedette.kernels.planning.joint_values import add_rows, spread_row, value_rows
 from vedette.kernels.planning.label_values import Valuation, make_value_work
 
 
@@ -34,16 +35,6 @@ class Choices(NamedTuple):
     entries: Ints  # of the table that differ; -1 for courses of the sensor that do not reach the label
 
 
-@borrowing
-def _add(table: Table, sensor: int, entry: int, before: Floats, after: Floats) -> None:
-    """after = before, and what an entry changes."""
-    power = table.powers[sensor]
-    for sample in range(before.shape[0]):
-        for k in range(before.shape[1]):
-            change = power * table.changes[entry, sample, k] if entry >= 0 else 0.0
-            after[sample, k] = before[sample, k] + change
-
-
 @kernel
 def best_of_labels(
     table: Table, valuation: Valuation, coefficients: Floats, choices: Choices, first: int, last: int, out: Floats
@@ -52,35 +43,30 @@ def best_of_labels(
 
     Each label's sensors choose for it alone. Labels of which `out` is NaN beforehand are left so.
     """
-    num_samples, size = table.changes.shape[1], table.start.shape[1]
+    num_samples, size = table.changes.shape[2], table.start.shape[1]
     most = np.max(np.diff(choices.label_offsets))
-    rows, at = np.empty((most + 1, num_samples, size)), np.empty(most + 1, np.int64)
-    work, values = make_value_work(valuation), np.empty((num_samples, valuation.num))
+    rows, at = np.empty((most + 1, size, num_samples)), np.empty(most + 1, np.int64)
+    work, values = make_value_work(valuation, num_samples), np.empty((valuation.num, num_samples))
     for label in range(first, last):
         if math.isnan(out[label]):
             continue
         begin, depth = choices.label_offsets[label], choices.label_offsets[label + 1] - choices.label_offsets[label]
-        for sample in range(num_samples):
-            for k in range(size):
-                rows[0, sample, k] = table.start[label, k]
+        spread_row(table.start[label], rows[0])
         level, best = 0, -math.inf
         at[0] = choices.entry_offsets[begin] if depth > 0 else 0
         # Depth first over the sensors' choices; the rows of a level are the sums over the sensors above it.
         while level >= 0:
             if level == depth:
                 value_rows(valuation, label, rows[level], work, values)
-                total = 0.0
-                for sample in range(num_samples):
-                    for e in range(valuation.num):
-                        total += coefficients[e] * values[sample, e]
-                best = max(best, total / num_samples)
+                best = max(best, label_mean(values, coefficients))
                 level -= 1
             elif at[level] == choices.entry_offsets[begin + level + 1]:
                 level -= 1
             else:
                 entry = choices.entries[at[level]]
                 at[level] += 1
-                _add(table, choices.sensors[begin + level], entry, rows[level], rows[level + 1])
+                power = table.powers[choices.sensors[begin + level]] if entry >= 0 else 0.0
+                add_rows(rows[level], power, table.changes[max(entry, 0)], rows[level + 1])
                 level += 1
                 if level < depth:
                     at[level] = choices.entry_offsets[begin + level]
@@ -147,12 +133,12 @@ def _join(join: _Join) -> bool:
 @borrowing
 def _read_entry(table: Table, entry: int, join: _Join) -> float:
     """Write the whitened information of an entry, given detection, into `own`; returns log (1 - q) of it."""
-    row, at, n = table.changes[entry, 0], 0, join.own.shape[0]
-    missed = row[row.shape[0] - 1]
+    row, at, n = table.changes[entry], 0, join.own.shape[0]
+    missed = row[row.shape[0] - 1, 0]
     scale = -1.0 / math.expm1(missed)
     for i in range(n):
         for j in range(i + 1):
-            join.rotated[i, j] = scale * row[at]
+            join.rotated[i, j] = scale * row[at, 0]
             join.rotated[j, i] = join.rotated[i, j]
             at += 1
     _whiten(join.factor, join.rotated, join.solved, join.own)
@@ -195,7 +181,7 @@ def losses_at_least(table: Table, valuation: Valuation, choices: Choices, out: F
             least, first = 0.0, True
             for place in range(choices.entry_offsets[choice], choices.entry_offsets[choice + 1]):
                 entry = choices.entries[place]
-                if entry < 0 or not table.changes[entry, 0, last - 1] < 0.0:
+                if entry < 0 or not table.changes[entry, last - 1, 0] < 0.0:
                     continue
                 least = min(least, _read_entry(table, entry, join))
                 if first:

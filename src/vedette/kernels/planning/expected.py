@@ -79,7 +79,7 @@ def fill_expected_changes(
     last: int,
     changes: Floats,
 ) -> None:
-    """Changes (num_entries, 1, bernoulli_size) for courses `first:last` of a sensor; see `known.fill_changes`.
+    """Changes (num_entries, bernoulli_size, 1) for courses `first:last` of a sensor; see `known.fill_changes`.
 
     Zeros for a label that is detected with a probability below `least` at every step. P_D is that of the prediction,
     also where earlier scans of the horizon are expected to have narrowed it.
@@ -89,7 +89,7 @@ def fill_expected_changes(
     cov, information, detections = np.empty((dim, dim)), np.empty((dim, dim)), np.empty(belief.paths.means.shape[1])
     for course in range(first, last):
         for entry in range(entries.first[course], entries.last[course]):
-            label, row, at = entries.own[entry], changes[entry, 0], 0
+            label, row, at = entries.own[entry], changes[entry, :, 0], 0
             for k in range(size):
                 row[k] = 0.0
             if not _is_seen(belief, decision, course, label, least, work, detections):

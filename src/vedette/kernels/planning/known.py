@@ -167,14 +167,14 @@ def fill_changes(
     last: int,
     changes: Floats,
 ) -> None:
-    """Changes (num_entries, num_samples, bernoulli_size) of the Bernoulli rows, for courses `first:last` of a sensor.
+    """Changes (num_entries, bernoulli_size, num_samples) of the Bernoulli rows, for courses `first:last` of a sensor.
 
     references: (num_labels, state_dim) about which the rows are taken. bases: (num_labels, bernoulli_size) the sensor's
     rows without scans. Both in the order of the sensor's own labels.
     """
     dim, num_samples, steps = references.shape[1], belief.targets.shape[1], decision.horizon.poses.shape[1]
     work, size = make_known_work(dim, len(decision.sensor.angular), steps), bases.shape[1]
-    at_end = np.empty(size)
+    at_end, row = np.empty(size), np.empty(size)
     for course in range(first, last):
         for entry in range(entries.first[course], entries.last[course]):
             label = entries.own[entry]
@@ -183,7 +183,7 @@ def fill_changes(
                 belief.paths.means[label, steps - 1], work.unseen.covs[steps - 1], references[label], at_end, work
             )
             for sample in range(num_samples):
-                found, row = follow(belief, decision, course, label, sample, work), changes[entry, sample]
+                found = follow(belief, decision, course, label, sample, work)
                 if not found.measured:
                     row[:] = 0.0
                 else:
@@ -194,6 +194,8 @@ def fill_changes(
                     for k in range(size - 2):
                         row[k] -= bases[label, k]
                 row[size - 2], row[size - 1] = found.log_odds, found.log_miss
+                for k in range(size):
+                    changes[entry, k, sample] = row[k]
 
 
 @kernel

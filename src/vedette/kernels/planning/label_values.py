@@ -18,8 +18,9 @@ import numpy as np
 from vedette.kernels.base.bundle_types import typed_by_fields
 from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Floats
-from vedette.kernels.gaussian.information import log_integral_of_any, to_moments
-from vedette.kernels.gaussian.linalg import cholesky, log_add
+from vedette.kernels.gaussian.information import to_moments
+from vedette.kernels.gaussian.integrals import Integrals, integrate_rows, logs_of_one_and_integrals, make_integrals
+from vedette.kernels.gaussian.linalg import cholesky
 from vedette.kernels.planning.bernoulli_rows import unscale
 
 POWER_INTEGRALS = 0
@@ -44,115 +45,151 @@ class Valuation(NamedTuple):
 
 
 class ValueWork(NamedTuple):
-    """Working arrays of one label."""
+    """Working arrays of one label and all samples, which are side by side."""
 
-    total: Floats  # (bernoulli_size,)
-    joint: Floats  # (bernoulli_size,)
+    total: Floats  # (bernoulli_size, num_samples)
+    joint: Floats  # (bernoulli_size, num_samples)
+    integrals: Integrals  # of the samples
+    row: Floats  # (bernoulli_size,)
+    values: Floats  # (num,)
     mean: Floats  # (state_dim,)
     cov: Floats  # (state_dim, state_dim)
     factor: Floats  # (state_dim, state_dim)
 
 
 @kernel
-def make_value_work(valuation: Valuation) -> ValueWork:
+def make_value_work(valuation: Valuation, num_samples: int) -> ValueWork:
     size, dim = valuation.prior.shape[1], valuation.references.shape[1]
-    return ValueWork(np.empty(size), np.empty(size), np.empty(dim), np.empty((dim, dim)), np.empty((dim, dim)))
+    return ValueWork(
+        np.empty((size, num_samples)),
+        np.empty((size, num_samples)),
+        make_integrals(num_samples),
+        np.empty(size),
+        np.empty(valuation.num),
+        np.empty(dim),
+        np.empty((dim, dim)),
+        np.empty((dim, dim)),
+    )
 
 
-@inlined
-def _power_integrals(valuation: Valuation, label: int, work: ValueWork, out: Floats) -> None:
+@borrowing
+def _power_integral(valuation: Valuation, label: int, e: int, work: ValueWork, out: Floats) -> None:
+    """out (num_samples,) of one pair of exponents."""
     total, joint, prior, dim = work.total, work.joint, valuation.prior[label], valuation.references.shape[1]
-    size = total.shape[0]
-    logit, prior_logit = total[size - 2], prior[size - 2]
-    for k in range(size - 2):
-        joint[k] = total[k]
-    alone = log_integral_of_any(joint, dim)
-    quadratic = joint[size - 4]  # s - y'Y^-1 y, which the elimination leaves
-    for e in range(valuation.num):
-        a, b = valuation.exponents[e, 0], valuation.exponents[e, 1]
-        out[e] = valuation.own[label, e]
-        if b == 0.0:
-            continue
-        if a == 0.0:
-            # b times the row: log integral q^b = log integral q - (b - 1) quadratic / 2 - d log(b) / 2.
-            integral = alone - 0.5 * ((b - 1.0) * quadratic + dim * math.log(b))
-        else:
-            for k in range(size - 2):
-                joint[k] = a * prior[k] + b * total[k]
-            integral = log_integral_of_any(joint, dim)
-        out[e] += log_add(0.0, integral + a * prior_logit + b * logit + (a + b - 1.0) * valuation.log_volume)
+    size, num_samples = total.shape
+    a, b, own = valuation.exponents[e, 0], valuation.exponents[e, 1], valuation.own[label, e]
+    if b == 0.0:
+        for s in range(num_samples):
+            out[s] = own
+        return
+    # Of q alone the row is taken as it is, of which log integral q^b = log integral q - (b - 1) rest / 2 - d log(b) / 2
+    # with the rest s - y'Y^-1 y that the elimination leaves.
+    power = 1.0 if a == 0.0 else b
+    for k in range(size - 3):
+        entries, given = joint[k], total[k]
+        for s in range(num_samples):
+            entries[s] = a * prior[k] + power * given[s]
+    integrate_rows(joint, dim, work.integrals)
+    exponents, rest, logits = (
+        work.integrals.exponents,
+        joint[size - 4],
+        total[size - 2],
+    )
+    constant = a * prior[size - 2] + (a + b - 1.0) * valuation.log_volume - 0.5 * dim * math.log(b / power)
+    for s in range(num_samples):
+        exponents[s] += constant + b * logits[s] - 0.5 * (b - power) * rest[s]
+    logs_of_one_and_integrals(work.integrals, out)
+    for s in range(num_samples):
+        out[s] += own
 
 
 @inlined
-def _position_trace(row: Floats, prior: Floats, share: float, work: ValueWork) -> float:
-    """Trace of the position's covariance where the information is that of `prior` and `share` times what row adds."""
+def _position_trace(total: Floats, sample: int, prior: Floats, share: float, work: ValueWork) -> float:
+    """Trace of the position's covariance where the information is that of `prior` and `share` times what is added."""
     n, at = work.cov.shape[0], 0
     for i in range(n):
         for j in range(i + 1):
-            work.cov[i, j] = prior[at] + share * (row[at] - prior[at])
+            work.cov[i, j] = prior[at] + share * (total[at, sample] - prior[at])
             at += 1
     if not cholesky(work.cov, work.factor):
         return math.nan
     trace = 0.0
     for axis in range(2):
         for i in range(axis, n):
-            total = 1.0 if i == axis else 0.0
+            entry = 1.0 if i == axis else 0.0
             for k in range(axis, i):
-                total -= work.factor[i, k] * work.mean[k]
-            work.mean[i] = total / work.factor[i, i]
+                entry -= work.factor[i, k] * work.mean[k]
+            work.mean[i] = entry / work.factor[i, i]
             trace += work.mean[i] * work.mean[i]
     return trace
 
 
 @inlined
-def _expected_loss(valuation: Valuation, label: int, work: ValueWork, out: Floats) -> None:
+def _expected_loss(valuation: Valuation, label: int, sample: int, work: ValueWork) -> float:
     """Less r (q min(tr P+, c^2) + (1 - q) min(tr P, c^2))."""
     size, unseen = work.total.shape[0], valuation.own[label, 0]
     prior = valuation.prior[label]
     existence = 1.0 / (1.0 + math.exp(-prior[size - 2]))
-    detected = -math.expm1(work.total[size - 1])
+    detected = -math.expm1(work.total[size - 1, sample])
     seen = unseen
     if detected > 0.0:
-        seen = min(_position_trace(work.total, prior, 1.0 / detected, work), valuation.params[0])
-    out[0] = -existence * (detected * seen + (1.0 - detected) * unseen)
+        seen = min(_position_trace(work.total, sample, prior, 1.0 / detected, work), valuation.params[0])
+    return float(-existence * (detected * seen + (1.0 - detected) * unseen))
 
 
-@inlined
-def _of_function(valuation: Valuation, label: int, work: ValueWork, out: Floats) -> None:
-    total, size, dim = work.total, work.total.shape[0], valuation.references.shape[1]
+@borrowing
+def _of_functions(valuation: Valuation, label: int, work: ValueWork, out: Floats) -> None:
+    """out (num, num_samples) as the model function says."""
+    total, joint, row, dim = work.total, work.joint, work.row, valuation.references.shape[1]
+    size, num_samples = total.shape
     for k in range(size - 2):
-        work.joint[k] = total[k]
-    logit = total[size - 2] + log_integral_of_any(work.joint, dim)
-    if not to_moments(total, valuation.references[label], work.mean, work.cov, work.factor):
+        for sample in range(num_samples):
+            joint[k, sample] = total[k, sample]
+    integrate_rows(joint, dim, work.integrals)
+    existence = 1.0 / (1.0 + math.exp(-valuation.prior[label, size - 2]))
+    for sample in range(num_samples):
+        for k in range(size):
+            row[k] = total[k, sample]
+        known = row[size - 3] > 0.0
+        if known and to_moments(row, valuation.references[label], work.mean, work.cov, work.factor):
+            logit = row[size - 2] + work.integrals.exponents[sample] + math.log(work.integrals.factors[sample])
+            valuation.function(
+                existence,
+                valuation.references[label],
+                valuation.covs[label],
+                1.0 / (1.0 + math.exp(-logit)),
+                work.mean,
+                work.cov,
+                valuation.params,
+                work.values,
+            )
+        else:
+            for e in range(valuation.num):
+                work.values[e] = math.nan
         for e in range(valuation.num):
-            out[e] = math.nan
-        return
-    valuation.function(
-        1.0 / (1.0 + math.exp(-valuation.prior[label, size - 2])),
-        valuation.references[label],
-        valuation.covs[label],
-        1.0 / (1.0 + math.exp(-logit)),
-        work.mean,
-        work.cov,
-        valuation.params,
-        out,
-    )
+            out[e, sample] = work.values[e]
 
 
 @borrowing
 def value_label(valuation: Valuation, label: int, work: ValueWork, out: Floats) -> None:
-    """Write the numbers of a label whose joint row stands in `work.total`, which is used up; NaN where it is none."""
-    if not work.total[work.total.shape[0] - 3] > 0.0:
-        for e in range(valuation.num):
-            out[e] = 0.0  # nobody who counts knows the label
-        return
+    """Write the numbers (num, num_samples) of a label whose joint rows stand in `work.total`, which are used up.
+
+    NaN where a joint row is none.
+    """
     unscale(work.total)
     if valuation.kind == POWER_INTEGRALS:
-        _power_integrals(valuation, label, work, out)
+        for e in range(valuation.num):
+            _power_integral(valuation, label, e, work, out[e])
     elif valuation.kind == EXPECTED_LOSS:
-        _expected_loss(valuation, label, work, out)
+        for sample in range(out.shape[1]):
+            out[0, sample] = _expected_loss(valuation, label, sample, work)
     else:
-        _of_function(valuation, label, work, out)
+        _of_functions(valuation, label, work, out)
+    powers = work.total[work.total.shape[0] - 3]
+    for sample in range(out.shape[1]):
+        if not powers[sample] > 0.0:
+            for e in range(valuation.num):
+                out[e, sample] = 0.0  # nobody who counts knows the label
 
 
 __all__ = ["EXPECTED_LOSS", "FUNCTION", "POWER_INTEGRALS", "Valuation", "ValueWork", "make_value_work", "value_label"]

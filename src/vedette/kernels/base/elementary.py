@@ -1,0 +1,102 @@
+"""Exponentials and logarithms of many numbers at once: polynomials in loops that the compiler vectorises.
+
+Within two units in the last place of the exact values. A call of the system's function for each number would keep the
+whole loop from wide registers.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from vedette.kernels.base.compile import borrowing, kernel
+from vedette.kernels.base.types import Floats, Ints
+
+# Added to a number below 2^51 it leaves the nearest integer in the last bits.
+_ROUNDER = 1.5 * 2.0**52
+_ROUNDER_BITS = int(np.float64(_ROUNDER).view(np.int64))
+_ONE_BITS = int(np.float64(1.0).view(np.int64))
+_ROOT_HALF_BITS = int(np.float64(math.sqrt(0.5)).view(np.int64))
+_MANTISSA_BITS = 52
+
+_PER_LOG_2 = 1.0 / math.log(2.0)
+# log 2 in two parts, of which products of the first with exponents are exact.
+_LOG_2_HIGH = 6.93147180369123816490e-01
+_LOG_2_LOW = 1.90821492927058770002e-10
+
+# Of factorials.
+_INVERSE_9, _INVERSE_10, _INVERSE_11 = 1.0 / 362880.0, 1.0 / 3628800.0, 1.0 / 39916800.0
+_INVERSE_12, _INVERSE_13 = 1.0 / 479001600.0, 1.0 / 6227020800.0
+
+LARGEST_EXPONENT = 700.0
+
+
+class Bits(NamedTuple):
+    """Working arrays of `num` numbers, and the same memory as integers."""
+
+    numbers: Floats  # (num,)
+    bits: Ints  # (num,)
+
+
+@kernel
+def make_bits(num: int) -> Bits:
+    numbers = np.empty(num)
+    return Bits(numbers, numbers.view(np.int64))
+
+
+@borrowing
+def exponentials(values: Floats, work: Bits) -> None:
+    """values = exp(values), which are at most `LARGEST_EXPONENT` from zero, or NaN."""
+    numbers, bits, num = work.numbers, work.bits, values.shape[0]
+    # exp x = 2^k exp r with the integer k nearest to x / log 2, and |r| <= log(2) / 2.
+    for s in range(num):
+        numbers[s] = values[s] * _PER_LOG_2 + _ROUNDER
+    for s in range(num):
+        k = numbers[s] - _ROUNDER
+        r = (values[s] - k * _LOG_2_HIGH) - k * _LOG_2_LOW
+        # Taylor's series, odd and even terms apart; the first term left out is below 1e-17.
+        z = r * r
+        odd = 1.0 / 6.0 + z * (
+            1.0 / 120.0 + z * (1.0 / 5040.0 + z * (_INVERSE_9 + z * (_INVERSE_11 + z * _INVERSE_13)))
+        )
+        even = 0.5 + z * (1.0 / 24.0 + z * (1.0 / 720.0 + z * (1.0 / 40320.0 + z * (_INVERSE_10 + z * _INVERSE_12))))
+        values[s] = 1.0 + (r + z * (even + r * odd))
+    for s in range(num):
+        bits[s] = (bits[s] << _MANTISSA_BITS) + _ONE_BITS
+    for s in range(num):
+        values[s] *= numbers[s]
+
+
+@borrowing
+def logs_of_one_and(values: Floats, work: Bits, more: Bits) -> None:
+    """values = log(1 + values), which are finite and not below zero, or NaN."""
+    numbers, bits, num = work.numbers, work.bits, values.shape[0]
+    for s in range(num):
+        numbers[s] = 1.0 + values[s]
+    # 1 + x = 2^k m with m between sqrt(1/2) and sqrt(2).
+    for s in range(num):
+        k = (bits[s] - _ROOT_HALF_BITS) >> _MANTISSA_BITS
+        more.bits[s] = k + _ROUNDER_BITS
+        bits[s] -= k << _MANTISSA_BITS
+    for s in range(num):
+        x, k = values[s], more.numbers[s] - _ROUNDER
+        whole = 1.0 + x
+        lost = (x - (whole - 1.0)) / whole  # what the sum 1 + x has lost, in the logarithm
+        f = numbers[s] - 1.0
+        # log(1 + f) = 2 artanh(f / (2 + f)), its series with the coefficients of fdlibm (e_log.c).
+        root = f / (2.0 + f)
+        z = root * root
+        w = z * z
+        odd = z * (
+            6.666666666666735130e-01
+            + w * (2.857142874366239149e-01 + w * (1.818357216161805012e-01 + w * 1.479819860511658591e-01))
+        )
+        even = w * (3.999999999940941908e-01 + w * (2.222219843214978396e-01 + w * 1.531383769920937332e-01))
+        half = 0.5 * f * f
+        log = f - (half - root * (half + odd + even))
+        values[s] = k * _LOG_2_HIGH + (log + (k * _LOG_2_LOW + lost))
+
+
+__all__ = ["LARGEST_EXPONENT", "Bits", "exponentials", "logs_of_one_and", "make_bits"]
