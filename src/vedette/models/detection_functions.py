@@ -92,12 +92,15 @@ def soft_sector(state: Floats, pose: Floats, params: Floats) -> float:
     distance = math.sqrt(dx * dx + dy * dy)
     if params[5] > 0.0 and distance > params[1]:
         return 0.0
-    off = abs(wrap_angle(math.atan2(dy, dx) - pose[2])) if distance > 0.0 else 0.0
-    beyond = distance - params[1], off - params[2]
-    if (params[5] > 0.0 or params[4] == 0.0) and beyond[1] > 0.0:
+    in_range = params[0] * _logistic(params[3] * (distance - params[1]))
+    if distance == 0.0 or (params[2] >= math.pi and params[4] == 0.0):  # no edge that an angle could be beyond
+        off = 0.0
+    else:
+        off = abs(wrap_angle(math.atan2(dy, dx) - pose[2]))
+    beyond = off - params[2]
+    if (params[5] > 0.0 or params[4] == 0.0) and beyond > 0.0:
         return 0.0
-    angular = _logistic(params[4] * beyond[1]) if params[4] > 0.0 else 1.0
-    return params[0] * _logistic(params[3] * beyond[0]) * angular  # type: ignore[no-any-return]
+    return in_range * (_logistic(params[4] * beyond) if params[4] > 0.0 else 1.0)  # type: ignore[no-any-return]
 
 
 @kernel
