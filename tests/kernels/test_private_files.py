@@ -23,7 +23,7 @@ PROGRAM = """
 import numpy as np
 from vedette.kernels.gaussian.linalg import log_sum
 assert log_sum(np.zeros(1)) == 0.0
-print(sum(log_sum.whole.stats.cache_hits.values()), sum(log_sum.stats.cache_misses.values()))
+print(sum(log_sum.whole.stats.cache_hits.values()), sum(log_sum.whole.stats.cache_misses.values()))
 """
 
 
