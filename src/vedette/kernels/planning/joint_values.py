@@ -100,7 +100,7 @@ def joint_values(table: Table, valuation: Valuation, actions: Ints, first: int, 
                     out[joint, e, sample] += values[e, sample] if touched[label] == 1 else unseen[label, e]
 
 
-@borrowing
+@inlined
 def value_changed(
     table: Table, valuation: Valuation, sensor: int, entry: int, rows: Floats, work: ValueWork, out: Floats
 ) -> None:

@@ -170,7 +170,7 @@ def _of_functions(valuation: Valuation, label: int, work: ValueWork, out: Floats
             out[e, sample] = work.values[e]
 
 
-@borrowing
+@inlined
 def value_label(valuation: Valuation, label: int, work: ValueWork, out: Floats) -> None:
     """Write the numbers (num, num_samples) of a label whose joint rows stand in `work.total`, which are used up.
 
