@@ -143,3 +143,35 @@ def test_a_stamp_is_that_of_the_file_that_was_imported(tmp_path: Path) -> None:
     stamps = [disk_cache._stamp_of_file(str(KERNELS / "steps/lmb.py")) for _ in range(2)]
     assert stamps[0] == stamps[1] == disk_cache._source_stamp(KERNELS / "steps/lmb.py")
     assert disk_cache._stamp_of_file(str(tmp_path / "own.py")) == ""
+
+
+OWN = """
+import numpy as np
+from vedette.kernels.base.compile import kernel
+
+@kernel
+def at(values, place):
+    return values[place]
+
+at.whole.compile("(float64[::1], int64)")
+print(sum(at.whole.stats.cache_misses.values()))
+try:
+    at(np.zeros(1), 1)
+except IndexError:
+    print("checked")
+"""
+
+
+def test_a_function_of_ones_own_is_not_taken_for_one_that_checks_bounds(tmp_path: Path) -> None:
+    (tmp_path / "own.py").write_text(OWN, encoding="utf-8")
+    for checks, expected in (("1", ["1", "checked"]), ("0", ["1"]), ("0", ["0"]), ("1", ["1", "checked"])):
+        result = subprocess.run(
+            [sys.executable, "own.py"],
+            cwd=tmp_path,
+            env={**os.environ, "NUMBA_BOUNDSCHECK": checks},
+            capture_output=True,
+            text=True,
+            timeout=PATIENCE,
+            check=True,
+        )
+        assert result.stdout.split() == expected

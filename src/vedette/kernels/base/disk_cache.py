@@ -87,9 +87,13 @@ def _source_closure(path: Path) -> frozenset[Path]:
     return frozenset(found)
 
 
+def _compiler() -> str:
+    return f"{numba.__version__} {bool(config.BOUNDSCHECK)}"
+
+
 @cache
 def _source_stamp(path: Path) -> str:
-    digest = hashlib.sha256(f"{numba.__version__} {bool(config.BOUNDSCHECK)}".encode())
+    digest = hashlib.sha256(_compiler().encode())
     for file in sorted(_source_closure(path)):
         digest.update(_content(file))
     return digest.hexdigest()
@@ -190,12 +194,14 @@ class _CacheImpl(CompileResultCacheImpl):  # type: ignore[misc]
 class _Cache(FunctionCache):  # type: ignore[misc]
     _impl_class = _CacheImpl
 
-    def __init__(self, function: Callable[..., Any], variant: str) -> None:
+    def __init__(self, function: Callable[..., Any]) -> None:
         super().__init__(function)
         self.folder = Path(self._cache_path).resolve()
         self.source = Path(function.__code__.co_filename).resolve()
         stamp = self._impl.locator.get_source_stamp()
-        self._cache_file = _EntryFile(self.folder, self._impl.filename_base + variant, stamp, self.source)
+        if not isinstance(self._impl.locator, _PackageLocator):
+            stamp = f"{_compiler()} {stamp}"
+        self._cache_file = _EntryFile(self.folder, self._impl.filename_base, stamp, self.source)
 
 
 class OnDemand:
@@ -203,19 +209,17 @@ class OnDemand:
 
     Nothing is kept where that is impossible or not safe: a function typed at a prompt has no file. Warns once of a
     folder that others can write.
-
-    variant: told apart from the same function compiled otherwise.
     """
 
-    def __init__(self, function: Callable[..., Any], variant: str = "") -> None:
-        self._function, self._variant = function, variant
+    def __init__(self, function: Callable[..., Any]) -> None:
+        self._function = function
         _stamp_of_file(function.__code__.co_filename)
 
     @cached_property
     def own(self) -> Any:
         """The cache of the function."""
         try:
-            found = _Cache(self._function, self._variant)
+            found = _Cache(self._function)
             fault = _fault_of(found.folder, found.source)
         except (RuntimeError, OSError):
             return NullCache()
