@@ -29,7 +29,7 @@ def test_version() -> None:
 def test_help_names_every_command() -> None:
     result = vedette("--help")
     assert result.exit_code == 0
-    for command in ("list", "init", "generate", "check", "show", "schema"):
+    for command in ("list", "init", "generate", "crowd", "check", "show", "schema"):
         assert f"  {command} " in result.stdout
 
 
@@ -112,6 +112,36 @@ def test_generate_names_the_file_after_the_scene(tmp_path: Path, monkeypatch: py
 def test_generate_says_what_cannot_be(words: tuple[str, ...], status: int, message: str, tmp_path: Path) -> None:
     result = vedette("generate", str(tmp_path / "new"), *words)
     assert result.exit_code == status
+    assert message in " ".join(result.stderr.split())
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_crowd_writes_a_commented_file_that_passes_check(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    result = vedette("crowd", "--targets", "10000", "--density", "4")
+    assert (result.exit_code, result.stderr) == (0, "")
+    assert vedette("crowd", "scenes", "--measured", "bearing_range", "--clutter", "1", "--steps", "5").exit_code == 0
+    files = [Path("crowd-10000-density-4.yaml"), Path("scenes/crowd-100-clutter-1-bearing-range-steps-5.yaml")]
+    assert (
+        files[0].read_text(encoding="utf-8").startswith("# yaml-language-server: $schema=vedette.schema.json\n# A cro")
+    )
+    checked = vedette("check", *map(str, files))
+    assert (checked.exit_code, checked.stderr) == (0, "")
+    assert checked.stdout.startswith(f"{files[0]}: ok: crowd-10000-density-4, ")
+    assert vedette("crowd", "--targets", "10000", "--density", "4").exit_code == 1
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("--measured", "range"), "expected one of position, bearing_range; got range"),
+        (("--targets", "0"), "Invalid value for '--targets'"),
+        (("--density", "0"), "Invalid value for '--density'"),
+    ],
+)
+def test_crowd_says_what_cannot_be(words: tuple[str, ...], message: str, tmp_path: Path) -> None:
+    result = vedette("crowd", str(tmp_path / "new"), *words)
+    assert result.exit_code == 2
     assert message in " ".join(result.stderr.split())
     assert list(tmp_path.iterdir()) == []
 

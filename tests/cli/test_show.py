@@ -89,7 +89,9 @@ def test_the_picture_has_every_track_sensor_and_site(name: str) -> None:
 def test_an_unknown_scenario_is_told_without_a_traceback() -> None:
     result = show("paper-b")
     assert (result.exit_code, result.stdout) == (1, "")
-    assert result.stderr.startswith("scenario: expected a YAML file or one of beyond-the-gap, eight-mobile, linear-10")
+    assert result.stderr.startswith(
+        "scenario: expected a YAML file or one of beyond-the-gap, crowd, eight-mobile, linear-10"
+    )
 
 
 def test_a_faulty_scenario_is_told_without_a_traceback(tmp_path: Path) -> None:

@@ -145,3 +145,20 @@ def test_invalid_estimates_are_found(field, value):
     parts = {name: getattr(good, name) for name in ("labels", "means", "covs", "existence")} | {field: value}
     with pytest.raises((InputError, NumericalError), match=field):
         Estimate(**parts).validate()
+
+
+def test_the_first_of_the_heaviest_components_stands_for_a_track() -> None:
+    rng = np.random.default_rng(5)
+    sizes = rng.integers(1, 5, 300)
+    mixtures = [
+        (weights / weights.sum(), rng.normal(size=(len(weights), 4)), np.tile(np.eye(4), (len(weights), 1, 1)))
+        for weights in (rng.integers(1, 3, size).astype(float) for size in sizes)  # many are equally heavy
+    ]
+    tracks = TrackTable.from_mixtures(np.column_stack([np.ones(300, int), np.arange(300)]), mixtures)
+    logits = rng.normal(size=300)
+    found = marginal_estimate(LMB(tracks, logits), 0.5)
+    chosen = np.flatnonzero(logits > 0.0)
+    heaviest = [mixtures[i][1][int(np.argmax(np.log(mixtures[i][0])))] for i in chosen]
+    np.testing.assert_array_equal(found.means, heaviest)
+    np.testing.assert_array_equal(found.labels[:, 1], chosen)
+    assert marginal_estimate(LMB(tracks, np.full(300, -1.0)), 0.5).means.shape == (0, 4)

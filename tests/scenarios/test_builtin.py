@@ -59,6 +59,7 @@ def truth_of(scenario: Scenario) -> Truth:
 def test_they_are_all_there_and_valid() -> None:
     assert list(list_builtin()) == [
         "beyond-the-gap",
+        "crowd",
         "eight-mobile",
         "linear-10",
         "paper-a",

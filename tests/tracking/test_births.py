@@ -17,7 +17,7 @@ from vedette.fusion import Clmb, Matched
 from vedette.fusion.matching import OWN_LABELS
 from vedette.models import BirthModel, MeasurementBirth
 from vedette.tracking import Central, Distributed, State
-from vedette.tracking.births import births_due, births_from_scans
+from vedette.tracking.births import Unexplained, _pool, births_due, births_from_scans
 
 STD = np.array([10.0, 10.0, 5.0, 5.0])
 MEASURED = MeasurementBirth(expected=0.4, max_existence=0.3, std=STD)
@@ -62,6 +62,41 @@ def test_what_two_sensors_measure_of_one_target_is_one_birth() -> None:
     # The order in which they were measured does not matter but for the labels.
     again = born(NOBODY, [here[::-1], there])
     np.testing.assert_allclose(np.sort(again.tracks.means[:, 0]), np.sort(made.tracks.means[:, 0]))
+
+
+def pooled_one_by_one(found: Unexplained) -> tuple[list[np.ndarray], list[float]]:
+    """Every measurement meets every group: the definition."""
+    places: list[np.ndarray] = []
+    probabilities: list[float] = []
+    members: list[list[int]] = []
+    for i in np.argsort(-found.probabilities, kind="stable"):
+        free = [g for g in range(len(places)) if found.sensors[i] not in members[g]]
+        apart = [(((places[g] - found.positions[i]) / STD[:2]) ** 2).sum() for g in free]
+        if apart and min(apart) <= 9.21:
+            group = free[int(np.argmin(apart))]
+            members[group].append(int(found.sensors[i]))
+            places[group] = places[group] + (found.positions[i] - places[group]) / len(members[group])
+        else:
+            places.append(found.positions[i])
+            probabilities.append(float(found.probabilities[i]))
+            members.append([int(found.sensors[i])])
+    return places, probabilities
+
+
+@pytest.mark.parametrize("num_sensors", [1, 2, 5])
+@pytest.mark.parametrize("side", [30.0, 300.0, 3000.0])
+def test_pools_are_the_same_to_the_bit_as_where_every_measurement_meets_every_group(
+    num_sensors: int, side: float
+) -> None:
+    rng = np.random.default_rng(round(side) + num_sensors)
+    for num in (0, 1, 200):
+        positions = rng.uniform(-side, side, (num, 2)).round(0)  # whole metres: distances that are equal
+        probabilities = rng.choice([0.2, 0.5, 0.9, 1.0], num)
+        found = Unexplained(positions, probabilities, rng.integers(0, num_sensors, num))
+        made = _pool(found, MEASURED)
+        places, least = pooled_one_by_one(found)
+        np.testing.assert_array_equal(made.positions, np.reshape(places, (-1, 2)))
+        np.testing.assert_array_equal(made.probabilities, least)
 
 
 def test_labels_follow_the_sites_or_are_a_sensors_own() -> None:

@@ -13,7 +13,7 @@ from vedette.cli.reporting import report
 from vedette.cli.reproducing import reproduce
 from vedette.cli.results import results
 from vedette.cli.running import run
-from vedette.cli.scenario_files import check, generate, init, list_, schema
+from vedette.cli.scenario_files import check, crowd, generate, init, list_, schema
 from vedette.cli.show import show
 
 app = typer.Typer(
@@ -44,6 +44,7 @@ def main(
 app.command("list")(list_)
 app.command()(init)
 app.command()(generate)
+app.command()(crowd)
 app.command()(check)
 app.command()(show)
 app.command()(schema)

@@ -1,4 +1,4 @@
-"""Commands about scenario files: list, init, generate, check, schema."""
+"""Commands about scenario files: list, init, generate, crowd, check, schema."""
 
 from __future__ import annotations
 
@@ -81,9 +81,42 @@ def generate(
     scene = GeneratedScene(
         num_sensors=sensors, pattern=pattern, view=view, num_targets=targets, decide_every=decide_every, seed=seed
     )
-    target = Path(f"{scene.name}.yaml") if path is None else path
-    target = target if target.suffix in (".yaml", ".yml") else target / f"{scene.name}.yaml"
-    _write_start({target: _with_schema(scene_text(scene))}, target, force)
+    _write_generated(path, scene.name, scene_text(scene), force)
+
+
+def crowd(
+    path: Annotated[
+        Path | None, typer.Argument(help="File to write, or a folder; none: a file named after the crowd.")
+    ] = None,
+    targets: Annotated[int, typer.Option("--targets", min=1, max=100_000, help="Number of targets.")] = 100,
+    density: Annotated[float, typer.Option("--density", min=1e-3, max=1e6, help="Targets a square kilometre.")] = 25.0,
+    clutter: Annotated[
+        float, typer.Option("--clutter", min=0.0, max=100.0, help="False measurements a target and scan.")
+    ] = 0.3,
+    measured: Annotated[
+        str, typer.Option("--measured", metavar="NAME", help="position, or bearing_range from outside.")
+    ] = "position",
+    steps: Annotated[int, typer.Option("--steps", min=1, max=10_000, help="Number of scans.")] = 40,
+    force: Annotated[bool, typer.Option("--force", help="Overwrite what is there.")] = False,
+) -> None:
+    """Write a scene of any number of targets before one sensor.
+
+    A square whose area grows with their number, so that crowds of few and of many targets compare.
+    """
+    from vedette.scenarios.generated_crowd import MEASURED, GeneratedCrowd
+    from vedette.scenarios.generated_crowd_text import crowd_text
+
+    if measured not in MEASURED:
+        raise usage_error(f"expected one of {', '.join(MEASURED)}; got {measured}", "--measured")
+    made = GeneratedCrowd(num_targets=targets, density=density, clutter=clutter, measured=measured, num_steps=steps)
+    _write_generated(path, made.name, crowd_text(made), force)
+
+
+def _write_generated(path: Path | None, name: str, text: str, force: bool) -> None:
+    """Write a scene to `path`, or into that folder, or beside us, under its name."""
+    target = Path(f"{name}.yaml") if path is None else path
+    target = target if target.suffix in (".yaml", ".yml") else target / f"{name}.yaml"
+    _write_start({target: _with_schema(text)}, target, force)
 
 
 def _write_start(files: dict[Path, str], target: Path, force: bool) -> None:

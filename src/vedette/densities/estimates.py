@@ -131,10 +131,17 @@ def _peaks(tracks: TrackTable, chosen: Ints, existence: Floats) -> Estimate:
     return Estimate(tracks.labels[chosen], tracks.means[heaviest], tracks.covs[heaviest], existence)
 
 
-def _heaviest(mixtures: TrackTable | MultiBernoulli, chosen: Ints) -> list[int]:
-    """The heaviest component of each chosen mixture."""
-    starts, stops = mixtures.offsets[chosen], mixtures.offsets[chosen + 1]
-    return [int(low + np.argmax(mixtures.log_weights[low:high])) for low, high in zip(starts, stops, strict=True)]
+def _heaviest(mixtures: TrackTable | MultiBernoulli, chosen: Ints) -> Ints:
+    """(len(chosen),) the heaviest component of each chosen mixture, the first of several."""
+    starts, sizes = mixtures.offsets[chosen], np.diff(mixtures.offsets)[chosen]
+    ends = np.cumsum(sizes)
+    if len(chosen) == 0:
+        return starts
+    components = np.repeat(starts - ends + sizes, sizes) + np.arange(ends[-1])
+    log_weights = mixtures.log_weights[components]
+    peaks = np.maximum.reduceat(log_weights, ends - sizes)
+    at_peak = np.flatnonzero(log_weights == np.repeat(peaks, sizes))
+    return np.asarray(components[at_peak[np.searchsorted(at_peak, ends - sizes)]])
 
 
 def unlabelled_estimate(density: Poisson | IidCluster | MultiBernoulli, step: int) -> Estimate:
@@ -150,7 +157,7 @@ def unlabelled_estimate(density: Poisson | IidCluster | MultiBernoulli, step: in
     if isinstance(density, MultiBernoulli):
         number = int(np.argmax(cardinality_distribution(density)))
         chosen = np.argsort(-density.existence_logit, kind="stable")[:number]
-        components, existence = np.array(_heaviest(density, chosen), np.int64), density.existence[chosen]
+        components, existence = _heaviest(density, chosen), density.existence[chosen]
     elif isinstance(density, IidCluster):
         number = int(np.argmax(density.log_cardinality))
         components, existence = _by_units(density.expected_number * np.exp(density.log_weights), number)

@@ -39,6 +39,7 @@ class MeasurementBirth:
         if len(std) < 2 or (std <= 0.0).any():
             raise reject("MeasurementBirth.std", "a standard deviation above 0 of each state component", std.tolist())
         object.__setattr__(self, "std", std)
+        positive_definite("MeasurementBirth.cov", self.cov)
 
     @property
     def cov(self) -> Floats:

@@ -78,22 +78,26 @@ class MotionModel:
         Raises:
             ModelError: the transition function raised.
         """
-        table = state_table("states", states, self.state_dim)
+        table, dt = state_table("states", states, self.state_dim), real("dt", dt)
         out = np.empty_like(table)
         for state, moved in zip(table, out, strict=True):
-            call(self.transition, state, real("dt", dt), self.transition_params, moved)
+            call(self.transition, state, dt, self.transition_params, moved)
         return out
 
     def noise_cov(self, state: ArrayLike, dt: float) -> Floats:
         """(state_dim, state_dim) process noise covariance over `dt` seconds from `state`."""
-        out = np.empty((self.state_dim, self.state_dim))
-        call(
-            self.process_noise_cov,
-            state_table("state", state, self.state_dim)[0],
-            real("dt", dt),
-            self.noise_params,
-            out,
-        )
+        return np.asarray(self.noise_covs(state_table("state", state, self.state_dim)[:1], dt)[0])
+
+    def noise_covs(self, states: ArrayLike, dt: float) -> Floats:
+        """(n, state_dim, state_dim) process noise covariances over `dt` seconds from each of (n, state_dim) states.
+
+        Raises:
+            ModelError: the noise function raised.
+        """
+        table, dt = state_table("states", states, self.state_dim), real("dt", dt)
+        out = np.empty((len(table), self.state_dim, self.state_dim))
+        for state, cov in zip(table, out, strict=True):
+            call(self.process_noise_cov, state, dt, self.noise_params, cov)
         return out
 
     def check(self, states: ArrayLike, dt: float = 1.0) -> None:

@@ -4,13 +4,17 @@ What is built of them is in `vedette.scenarios.build`.
 """
 
 from vedette.scenarios.generated import GeneratedScene
+from vedette.scenarios.generated_crowd import GeneratedCrowd
+from vedette.scenarios.generated_crowd_text import crowd_text
 from vedette.scenarios.generated_text import scene_text
 from vedette.scenarios.loading import Scenario, json_schema, list_builtin, load_scenario, parse_scenario
 from vedette.scenarios.overrides import with_fields
 
 __all__ = [
+    "GeneratedCrowd",
     "GeneratedScene",
     "Scenario",
+    "crowd_text",
     "json_schema",
     "list_builtin",
     "load_scenario",

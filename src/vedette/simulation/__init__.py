@@ -1,6 +1,7 @@
 """The world that the program does not get to see: truth, scans; the loop, and what a run leaves behind."""
 
 from vedette.simulation.born_targets import PoissonTargets
+from vedette.simulation.crowds import CrowdTargets
 from vedette.simulation.experiment import Experiment
 from vedette.simulation.loop import simulate
 from vedette.simulation.records import Decision, RunRecord
@@ -11,6 +12,7 @@ from vedette.simulation.truth import ScriptedTargets, TargetSource, Truth
 
 __all__ = [
     "CLUTTER",
+    "CrowdTargets",
     "Decision",
     "Experiment",
     "PoissonTargets",

@@ -129,11 +129,10 @@ def _detected_at(sensor: TrueSensor, states: Floats, pose: Floats, measured: Flo
 
 def _probabilities(sensor: SensorModel, states: Floats, pose: Floats) -> Floats:
     probabilities = sensor.detection.prob(states, pose)
-    for state, probability in zip(states, probabilities, strict=True):
-        if not 0.0 <= probability <= 1.0:
-            raise ModelError(
-                f"detection model at state {state}, pose {pose}: expected a probability; got {probability}"
-            )
+    bad = np.flatnonzero(~((probabilities >= 0.0) & (probabilities <= 1.0)))
+    if len(bad):
+        state, got = states[bad[0]], probabilities[bad[0]]
+        raise ModelError(f"detection model at state {state}, pose {pose}: expected a probability; got {got}")
     return probabilities
 
 
@@ -141,11 +140,10 @@ def _noisy_measurements(sensor: SensorModel, states: Floats, pose: Floats, norma
     factors = _noise_factors(sensor, states, pose)
     noise = (factors @ normals[:, :, np.newaxis])[:, :, 0]
     measured = sensor.measurement.measure(states, pose) + noise
-    for state, measurement in zip(states, measured, strict=True):
-        if not np.isfinite(measurement).all():
-            raise ModelError(
-                f"sensor model at state {state}, pose {pose}: expected a finite measurement; got {measurement}"
-            )
+    bad = np.flatnonzero(~np.isfinite(measured).all(axis=1))
+    if len(bad):
+        state, got = states[bad[0]], measured[bad[0]]
+        raise ModelError(f"sensor model at state {state}, pose {pose}: expected a finite measurement; got {got}")
     return wrap_angular(measured, sensor.measurement.angular)
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections import defaultdict
 from collections.abc import Sequence
 from functools import cache
 from typing import Any, NamedTuple
@@ -134,19 +136,54 @@ def _pool(found: Unexplained, model: MeasurementBirth) -> Unexplained:
     A group has at most one measurement of a sensor; it lies at their mean and is as unexplained as the least explained.
     """
     order = np.argsort(-found.probabilities, kind="stable")
+    if (found.sensors == found.sensors[:1]).all():  # every measurement by itself
+        return Unexplained(found.positions[order], found.probabilities[order], np.empty(0, np.int64))
     places, totals = np.empty((len(order), 2)), np.zeros(len(order))
     probabilities, members = np.empty(len(order)), np.zeros((len(order), int(found.sensors.max(initial=0)) + 1), bool)
-    num = 0
+    cells, num = _Cells(model.std[:2] * math.sqrt(_SAME_TARGET)), 0
     for i in order.tolist():
-        offsets = (places[:num] - found.positions[i]) / model.std[:2]
-        distances = np.where(members[:num, found.sensors[i]], np.inf, (offsets**2).sum(axis=1))
-        group = int(distances.argmin()) if num and distances.min() <= _SAME_TARGET else num
-        if group == num:
+        near = cells.near(found.positions[i])
+        near = near[~members[near, found.sensors[i]]]
+        distances = (((places[near] - found.positions[i]) / model.std[:2]) ** 2).sum(axis=1)
+        nearest = int(distances.argmin()) if len(near) else -1
+        if len(near) and distances[nearest] <= _SAME_TARGET:
+            group = int(near[nearest])
+            cells.remove(group, places[group])
+        else:
+            group = num
             places[num], probabilities[num], num = found.positions[i], found.probabilities[i], num + 1
         totals[group] += 1.0
         places[group] += (found.positions[i] - places[group]) / totals[group]
         members[group, found.sensors[i]] = True
+        cells.add(group, places[group])
     return Unexplained(places[:num], probabilities[:num], np.empty(0, np.int64))
+
+
+class _Cells:
+    """Which groups lie where, so that each measurement meets those near it alone."""
+
+    def __init__(self, reach: Floats) -> None:
+        """reach: (2,) m, along each axis; what is nearer along both is found."""
+        self._size = reach * (1.0 + 1e-9)  # and a little more for what rounding does
+        self._groups: defaultdict[tuple[float, float], set[int]] = defaultdict(set)
+
+    def near(self, position: Floats) -> Ints:
+        """(num,) groups that may lie within reach of a position, in increasing order."""
+        x, y = self._cell(position)
+        around = [self._groups.get((x + i, y + j), ()) for i in (-1.0, 0.0, 1.0) for j in (-1.0, 0.0, 1.0)]
+        return np.array(sorted({group for groups in around for group in groups}), np.int64)
+
+    def add(self, group: int, place: Floats) -> None:
+        """Note that a group lies at a place."""
+        self._groups[self._cell(place)].add(group)
+
+    def remove(self, group: int, place: Floats) -> None:
+        """Forget a group that was noted at this place."""
+        self._groups[self._cell(place)].remove(group)
+
+    def _cell(self, place: Floats) -> tuple[float, float]:
+        x, y = np.floor(place / self._size).tolist()
+        return x, y
 
 
 def _born(found: Unexplained, model: MeasurementBirth, step: int, first_index: int) -> LMB:
@@ -158,4 +195,6 @@ def _born(found: Unexplained, model: MeasurementBirth, step: int, first_index: i
     means[:, :2] = found.positions
     shares = model.expected * found.probabilities / found.probabilities.sum()
     existence = np.minimum(model.max_existence, shares)
-    return LMB.from_bernoullis(labels, existence, means, np.tile(model.cov, (num, 1, 1)))
+    tracks = unchecked(TrackTable, labels, np.arange(num + 1), np.zeros(num), means, np.tile(model.cov, (num, 1, 1)))
+    with np.errstate(divide="ignore"):  # a share may be too small for a number
+        return unchecked(LMB, tracks, np.log(existence) - np.log1p(-existence))

@@ -7,12 +7,17 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import linear_sum_assignment
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import KDTree
 
 from vedette.errors import InputError
 from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.models.arguments import as_array
 
 _HIGH_ORDER = 30.0
+# Distances up to which all of them are laid out; of more, those below the cutoff.
+_MOST_DISTANCES = 1_000_000
 
 
 def check_parameters(cutoff: float, order: float, *, finite: bool = False) -> None:
@@ -76,6 +81,40 @@ def assign(distances: Floats, order: float) -> tuple[Ints, Ints]:
         return _pairs(distances > 0.0)
     with np.errstate(over="ignore", under="ignore"):  # an infinite cost only says: never this pair
         return _pairs((distances / scale) ** order)
+
+
+def assign_points(first: Floats, second: Floats, cutoff: float, order: float) -> tuple[Ints, Ints, Floats]:
+    """Rows of the two sets, each used at most once, that pair them at the least cost, and the distances of the pairs.
+
+    As `assign` of `cut_distances`; but of sets of more than a million distances only the pairs nearer than the cutoff
+    are given, as who is that near to nobody costs the cutoff whatever it is paired with. These are found among those
+    that share neighbours, so that time and memory grow with the number of points and not with its square.
+    """
+    if len(first) * len(second) <= _MOST_DISTANCES or math.isinf(cutoff) or math.isinf(order):
+        apart = cut_distances(first, second, cutoff)
+        rows, columns = assign(apart, order)
+        return rows, columns, apart[rows, columns]
+    near = KDTree(first).sparse_distance_matrix(KDTree(second), cutoff, output_type="coo_matrix")
+    edges = coo_array(
+        (np.ones(len(near.row)), (near.row, near.col + len(first))), shape=(total := len(first) + len(second), total)
+    )
+    _, groups = connected_components(edges, directed=False)
+    # Of each group the points of the first set stand before those of the second, both in order.
+    members = np.argsort(groups, kind="stable")
+    pairs = []
+    for group in np.split(members, np.flatnonzero(np.diff(groups[members])) + 1):
+        split = int(np.searchsorted(group, len(first)))
+        if 0 < split < len(group):
+            own, other = group[:split], group[split:] - len(first)
+            apart = cut_distances(first[own], second[other], cutoff)
+            rows, columns = assign(apart, order)
+            pairs.append((own[rows], other[columns], apart[rows, columns]))
+    if not pairs:
+        return np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0)
+    rows, columns, distances = (np.concatenate(parts) for parts in zip(*pairs, strict=True))
+    order_of = np.argsort(rows, kind="stable")
+    order_of = order_of[distances[order_of] < cutoff]
+    return rows[order_of], columns[order_of], distances[order_of]
 
 
 def power_mean(values: Floats, number: float, order: float) -> float:

@@ -9,7 +9,7 @@ import numpy as np
 
 from vedette.densities.estimates import Estimate
 from vedette.errors import InputError
-from vedette.evaluation.metrics.assignment import assign, check_parameters, cut_distances, point_set
+from vedette.evaluation.metrics.assignment import assign_points, check_parameters, point_set
 from vedette.evaluation.metrics.point_ospa import check_scans
 from vedette.kernels.base.types import Floats, Ints
 from vedette.simulation.truth import Truth
@@ -96,12 +96,13 @@ def match_run(truth: Truth, estimates: Sequence[Estimate], *, cutoff: float, ord
     scans, rows, truth_rows, distances = [], [], [], []
     for scan in range(truth.num_scans):
         start, offset = starts[scan], offsets[scan]
-        apart = cut_distances(found[start : starts[scan + 1]], true[offset : offsets[scan + 1]], cutoff)
-        first, second = assign(apart, order)
+        first, second, apart = assign_points(
+            found[start : starts[scan + 1]], true[offset : offsets[scan + 1]], cutoff, order
+        )
         scans.append(np.full(len(first), scan))
         rows.append(first + start)
         truth_rows.append(second + offset)
-        distances.append(apart[first, second])
+        distances.append(apart)
     near = np.concatenate(distances) < cutoff
     row = np.concatenate(rows)[near]
     return Matching(

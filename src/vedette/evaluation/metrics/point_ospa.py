@@ -16,9 +16,9 @@ from vedette.densities.estimates import Estimate
 from vedette.errors import InputError
 from vedette.evaluation.metrics.assignment import (
     assign,
+    assign_points,
     check_parameters,
     combine,
-    cut_distances,
     point_set,
     point_sets,
     power_mean,
@@ -63,7 +63,7 @@ def ospa(estimates: ArrayLike, truths: ArrayLike, *, cutoff: float, order: float
     """
     check_parameters(cutoff, order)
     first, second = point_sets(estimates, truths)
-    return ospa_of_distances(cut_distances(first, second, cutoff), cutoff, order)
+    return _ospa_of_points(first, second, cutoff, order)
 
 
 def ospa_of_run(
@@ -93,10 +93,9 @@ def ospa_of_run(
         found, true = estimate.means[:, :counted], states[:, :counted]
         if len(found) and len(true) and found.shape[1] != true.shape[1]:
             raise reject("components", _ALIKE.format(true.shape[1], found.shape[1]), components)
-        distances = cut_distances(
-            point_set(found, f"estimates[{scan}]"), point_set(true, f"truth at scan {scan}"), cutoff
+        result = _ospa_of_points(
+            point_set(found, f"estimates[{scan}]"), point_set(true, f"truth at scan {scan}"), cutoff, order
         )
-        result = ospa_of_distances(distances, cutoff, order)
         parts[scan] = result.total, result.localisation, result.cardinality
     return parts
 
@@ -115,10 +114,21 @@ def ospa_of_distances(distances: Floats, cutoff: float, order: float) -> OspaRes
         cutoff: c > 0, in the unit of the distances.
         order: exponent p >= 1.
     """
-    smaller, larger = sorted(distances.shape)
+    return _ospa_of_pairs(distances[assign(distances, order)], distances.shape, cutoff, order)
+
+
+def _ospa_of_points(first: Floats, second: Floats, cutoff: float, order: float) -> OspaResult:
+    _, _, distances = assign_points(first, second, cutoff, order)
+    beyond = np.full(min(len(first), len(second)) - len(distances), cutoff)
+    return _ospa_of_pairs(np.concatenate([distances, beyond]), (len(first), len(second)), cutoff, order)
+
+
+def _ospa_of_pairs(distances: Floats, numbers: tuple[int, ...], cutoff: float, order: float) -> OspaResult:
+    """Of the (min(numbers),) distances of pairs between sets of these numbers."""
+    smaller, larger = sorted(numbers)
     if larger == 0:
         return OspaResult(0.0, 0.0, 0.0)
-    localisation = power_mean(distances[assign(distances, order)], larger, order)
+    localisation = power_mean(distances, larger, order)
     # An infinite order makes the share's root 1.
     cardinality = cutoff * ((larger - smaller) / larger) ** (1.0 / order) if larger > smaller else 0.0
     return OspaResult(combine(localisation, cardinality, order), localisation, cardinality)

@@ -166,6 +166,11 @@ def _reduced_tracks(kept: Ints, rows: Rows, options: Options, marginals: Floats,
 @kernel
 def append_reduced(wide: Mixture, width: int, caps: MixtureCaps, out: Mixture, filled: int) -> int:
     """Append the first `width` components, reduced and their weights normalised to one; returns the new end."""
+    if width == 1 and wide.log_weights[0] > -math.inf:
+        # Of one there is nothing to reduce: most births, which nothing was measured of.
+        out.log_weights[filled] = 0.0
+        copy_component(wide.means, wide.covs, 0, out.means, out.covs, filled)
+        return filled + 1
     few_weights, few_means, few_covs = reduce_mixture(
         wide.log_weights[:width], wide.means[:width], wide.covs[:width], caps
     )

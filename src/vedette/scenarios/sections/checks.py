@@ -156,6 +156,9 @@ def _targets(model: ScenarioModel) -> Iterator[Finding]:
     if model.targets.kind == "poisson":
         for name in ("mean", "std"):
             yield from attempt(_state_length(("targets", name), model.targets, name, model))
+    if model.targets.kind == "crowd" and len(model.targets.std) != (rest := model.motion.state_dim - 2):
+        wanted = f"{rest} numbers, as a state under motion has but the position"
+        yield ("targets", "std"), wanted, describe(model.targets.std)
     if model.targets.kind != "scripted":
         return
     for i, target in enumerate(model.targets.tracks):

@@ -16,6 +16,7 @@ from vedette.scenarios.sections.world import Motion, RegionSection, Time, groupe
 if TYPE_CHECKING:  # with the models comes the compiler, which a check does without
     from vedette.models import MotionModel
     from vedette.recorded import RecordedTargets as RecordedSource
+    from vedette.simulation import CrowdTargets as CrowdSource
     from vedette.simulation import PoissonTargets as PoissonSource
     from vedette.simulation import ScriptedTargets as ScriptedSource
 
@@ -165,4 +166,35 @@ class PoissonTargets(Section):
         return PoissonTargets(motion, self.expected, mean, np.diag(std**2), self.death_probability, region)
 
 
-Targets = Annotated[ScriptedTargets | RecordedTargets | PoissonTargets, Field(discriminator="kind")]
+class CrowdTargets(Section):
+    """A steady crowd, drawn anew in every run: uniform over the region at the first scan and ever after.
+
+    Births make up for deaths; where a target leaves the region another enters at the opposite edge.
+    """
+
+    kind: Literal["crowd"] = Field(default="crowd", description="Kind of targets [-].")
+    number: Annotated[int, Field(ge=1, le=1_000_000)] = Field(
+        description="Number of targets at the first scan, and on average later [-]."
+    )
+    std: SomeNumbers = Field(
+        description="Standard deviation around 0 of each component of a first state but the position [m/s, ...]."
+    )
+    death_probability: Probability = Field(
+        default=0.0, description="Probability with which a target dies from scan to scan [-]."
+    )
+
+    @check
+    def _spreads(self) -> Iterator[Finding]:
+        for i, std in enumerate(self.std):
+            if std < 0.0:
+                yield ("std", i), "a number of at least 0", describe(std)
+
+    def build(self, world: _World, motion: MotionModel, folder: Path) -> CrowdSource:
+        """The targets, as `motion` moves them."""
+        from vedette.simulation import CrowdTargets
+
+        # In either order of a file the components but the position follow each other as in the library.
+        return CrowdTargets(motion, self.number, world.region.build(), np.array(self.std), self.death_probability)
+
+
+Targets = Annotated[ScriptedTargets | RecordedTargets | PoissonTargets | CrowdTargets, Field(discriminator="kind")]

@@ -1,0 +1,101 @@
+"""Crowds: as many targets as one likes, spread evenly over the region at all times while each comes and goes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from vedette.errors import ModelError
+from vedette.kernels.base.types import Bools, Floats, Ints
+from vedette.models import MotionModel, Region
+from vedette.models.arguments import dimension, float_array, generator, probability, reject
+from vedette.simulation.truth import Truth, scan_times, semidefinite_factor
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CrowdTargets:
+    """A steady crowd: `number` targets at the first scan, and on average ever after, uniform over the region.
+
+    From scan to scan a target dies or moves, with the motion's process noise; a Poisson number is born, of the mean
+    number of deaths. Where one leaves the region another enters at the opposite edge, as fast: without that a crowd
+    would thin out towards the edges, the more the smaller it is.
+
+    Attributes:
+        motion: how they move.
+        number: of targets at the first scan.
+        region: where they are.
+        std: (state_dim - 2,) standard deviation of the components of a first state but the position, around 0.
+        death_probability: that a target dies between two scans.
+
+    Raises:
+        InputError: names the field, what was expected and what came.
+    """
+
+    motion: MotionModel
+    number: int
+    region: Region
+    std: Floats
+    death_probability: float = 0.0
+
+    def __post_init__(self) -> None:
+        dimension("CrowdTargets.number", self.number)
+        if not isinstance(self.region, Region):
+            raise reject("CrowdTargets.region", "a Region", self.region)
+        std = float_array("CrowdTargets.std", self.std, (self.motion.state_dim - 2,))
+        if (std < 0.0).any():
+            raise reject("CrowdTargets.std", "numbers of at least 0", std.tolist())
+        object.__setattr__(self, "std", std)
+        probability("CrowdTargets.death_probability", self.death_probability)
+
+    def truth(self, times: ArrayLike, *, rng: np.random.Generator) -> Truth:
+        """Scan after scan: who dies, how the others move, who is born.
+
+        Raises:
+            InputError: the scan times do not increase.
+            ModelError: a motion function raised, or gave a state that is not finite.
+        """
+        scans = scan_times(times)
+        generator(rng)
+        states = self._born(self.number, rng)
+        ids, num_ids = np.arange(self.number), self.number
+        all_ids, all_states = [ids], [states]
+        for dt in np.diff(scans).tolist():
+            alive = rng.random(len(ids)) >= self.death_probability
+            moved, stays = self._moved(states[alive], dt, rng)
+            born = self._born(int(rng.poisson(self.number * self.death_probability)), rng)
+            # Who stays keeps the name; who enters stands after, so that names increase.
+            states = np.concatenate([moved[stays], moved[~stays], born])
+            num_new = len(states) - int(stays.sum())
+            ids = np.concatenate([ids[alive][stays], num_ids + np.arange(num_new)])
+            num_ids += num_new
+            all_ids.append(ids)
+            all_states.append(states)
+        offsets: Ints = np.concatenate([[0], np.cumsum([len(ids) for ids in all_ids])]).astype(np.int64)
+        return Truth(scans, offsets, np.concatenate(all_ids), np.concatenate(all_states))
+
+    def _born(self, num: int, rng: np.random.Generator) -> Floats:
+        """(num, state_dim) first states."""
+        return np.hstack([self.region.sample(num, rng=rng), self.std * rng.standard_normal((num, len(self.std)))])
+
+    def _moved(self, states: Floats, dt: float, rng: np.random.Generator) -> tuple[Floats, Bools]:
+        """(num, state_dim) states `dt` seconds later, taken round the edges; (num,) who did not cross one."""
+        moved = self.motion.propagate(states, dt) + self._noise(states, dt, rng)
+        bad = np.flatnonzero(~np.isfinite(moved).all(axis=1))
+        if len(bad):
+            place, got = states[bad[0]], moved[bad[0]]
+            raise ModelError(f"motion of a target at state {place}, dt {dt}: expected a finite state; got {got}")
+        stays = self.region.contains(moved[:, :2])
+        low, high = self.region.bounds[::2], self.region.bounds[1::2]
+        moved[~stays, :2] = low + (moved[~stays, :2] - low) % (high - low)
+        return moved, stays
+
+    def _noise(self, states: Floats, dt: float, rng: np.random.Generator) -> Floats:
+        """(num, state_dim) process noise."""
+        normals = rng.standard_normal(states.shape)
+        covs = self.motion.noise_covs(states, dt)
+        if (covs == covs[:1]).all():  # of most motions: the same everywhere
+            return normals @ semidefinite_factor(covs[0]).T if len(covs) else normals
+        factors = np.array([semidefinite_factor(cov) for cov in covs])
+        return np.asarray((factors @ normals[:, :, np.newaxis])[:, :, 0])

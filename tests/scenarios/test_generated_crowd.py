@@ -1,0 +1,96 @@
+"""Generated crowds: valid, the same from the same settings, of equal density whatever their number."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from vedette.errors import InputError, ScenarioError
+from vedette.evaluation import run_scenario
+from vedette.scenarios import GeneratedCrowd, Scenario, crowd_text, list_builtin, parse_scenario, with_fields
+from vedette.scenarios.build import build_targets
+from vedette.scenarios.cautions import cautions
+from vedette.scenarios.generated_crowd import MEASURED
+from vedette.scenarios.sections.clutter import RegionClutter
+from vedette.scenarios.sections.tracking import Filter
+
+
+def scenario(**settings: Any) -> Scenario:
+    return Scenario(parse_scenario(crowd_text(GeneratedCrowd(**settings))))
+
+
+@pytest.mark.parametrize("num_targets", [1, 10, 1000, 100_000])
+@pytest.mark.parametrize("measured", MEASURED)
+def test_crowds_of_any_size_are_valid_and_short(num_targets: int, measured: str) -> None:
+    text = crowd_text(GeneratedCrowd(num_targets=num_targets, measured=measured))
+    found = Scenario(parse_scenario(text))
+    assert cautions(found) == ()
+    assert len(text) < 3000
+    model = found.model
+    region = model.region.build()
+    assert region.area == pytest.approx(num_targets / 25.0 * 1e6, rel=1e-4)
+    assert isinstance(model.sensors[0].clutter, RegionClutter)
+    assert model.sensors[0].clutter.rate == pytest.approx(0.3 * num_targets)
+    assert isinstance(model.filter, Filter)
+    assert model.filter.limits.max_labels >= 4 * num_targets
+
+
+def test_equal_settings_give_equal_files_and_seeds_equal_targets() -> None:
+    assert crowd_text(GeneratedCrowd(num_targets=30)) == crowd_text(GeneratedCrowd(num_targets=30))
+    found = scenario(num_targets=30)
+    first, second, other = (
+        build_targets(found).truth(found.model.time.build(), rng=np.random.default_rng(seed)) for seed in (0, 0, 1)
+    )
+    np.testing.assert_array_equal(first.states, second.states)
+    assert not np.array_equal(first.at(0)[1], other.at(0)[1])
+    assert len(first.at(0)[0]) == 30
+
+
+def test_a_crowd_says_the_settings_that_differ_from_the_usual() -> None:
+    crowd = GeneratedCrowd(num_targets=7, density=3.5, clutter=0.0, measured="bearing_range", num_steps=9)
+    assert crowd.name == "crowd-7-density-3.5-clutter-0-bearing-range-steps-9"
+    command = "#   vedette crowd --targets 7 --density 3.5 --clutter 0 --measured bearing_range --steps 9\n"
+    assert command in crowd_text(crowd)
+    assert GeneratedCrowd().name == "crowd-100"
+
+
+def test_the_built_in_crowd_is_the_usual_one() -> None:
+    text = list_builtin()["crowd"].read_text(encoding="utf-8")
+    assert text == crowd_text(GeneratedCrowd()).replace("name: crowd-100", "name: crowd")
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"num_targets": 0}, "num_targets: expected a whole number from 1 to 100000; got 0"),
+        ({"num_targets": 2.0}, "num_targets: expected a whole number from 1 to 100000; got 2.0"),
+        ({"num_steps": True}, "num_steps: expected a whole number from 1 to 10000; got True"),
+        ({"density": 0}, "density: expected a number from 0.001 to 1e\\+06; got 0"),
+        ({"density": float("nan")}, "density: expected a number from 0.001 to 1e\\+06; got nan"),
+        ({"clutter": -1.0}, "clutter: expected a number from 0 to 100; got -1.0"),
+        ({"measured": "range"}, "measured: expected one of position, bearing_range; got 'range'"),
+    ],
+)
+def test_settings_that_cannot_be(settings: dict[str, Any], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        GeneratedCrowd(**settings)
+
+
+def test_components_that_do_not_fit_the_motion() -> None:
+    text = crowd_text(GeneratedCrowd())
+    with pytest.raises(ScenarioError, match=r"targets.std: expected 2 numbers, as a state under motion has but the"):
+        parse_scenario(text.replace("std: [3.0, 3.0],", "std: [3.0],"))
+    with pytest.raises(ScenarioError, match=r"targets.std.1.: expected a number of at least 0, got -3"):
+        parse_scenario(text.replace("std: [3.0, 3.0],", "std: [3.0, -3.0],"))
+
+
+@pytest.mark.parametrize("measured", MEASURED)
+@pytest.mark.parametrize("num_targets", [10, 1000])
+def test_crowds_are_tracked_from_a_few_scans_on(num_targets: int, measured: str) -> None:
+    short = with_fields(scenario(num_targets=num_targets, measured=measured), {"time.num_steps": 8})
+    record = run_scenario(short, "still", seed=0, run=0)
+    assert record.ospa[-1, 0] < 0.4 * 25.0
+    numbers = np.array([estimate.num_targets for estimate in record.estimates])
+    assert abs(numbers[-1] - len(record.truth.at(7)[0])) <= 1 + 0.05 * num_targets
