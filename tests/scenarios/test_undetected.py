@@ -98,6 +98,16 @@ def test_what_makes_no_grid_is_refused(undetected: str, message: str) -> None:
     assert fault.endswith(message), fault
 
 
+def test_worth_without_anything_to_find_is_refused() -> None:
+    text = changed(("control: {", "control: {undetected_worth: 3.0, "))
+    with pytest.raises(ScenarioError) as raised:
+        parse_scenario(text, "f.yaml")
+    (fault,) = raised.value.faults
+    wanted = "expected 0, or a section `undetected`, which says where such targets may be, got 3.0"
+    assert fault.endswith(f"control.undetected_worth: {wanted}"), fault
+    parse_scenario(f"{text}undetected: {WHOLE}\n", "f.yaml")
+
+
 def test_as_many_cells_as_are_allowed() -> None:
     model = scenario("{cell: 0.285, expected: 1.0, speed: 1.0}").model
     assert model.undetected is not None

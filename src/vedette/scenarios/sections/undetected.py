@@ -49,9 +49,13 @@ class UndetectedSection(Section):
 
 
 def cells_of_undetected(model: ScenarioModel) -> Iterator[Finding]:
-    """The region is cut into a number of cells that can be held and worked on."""
+    """The region is cut into a number of cells that can be held and worked on; what is worth finding may be there."""
     section = model.undetected
     if section is None:
+        worth = model.control.undetected_worth
+        if worth > 0.0:
+            wanted = "0, or a section `undetected`, which says where such targets may be"
+            yield ("control", "undetected_worth"), wanted, describe(worth)
         return
     region = section.region or model.region
     width, height = region.x_max - region.x_min, region.y_max - region.y_min
