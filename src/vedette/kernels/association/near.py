@@ -61,7 +61,7 @@ def _finest_axis(scan: Floats, reaches: Floats) -> int:
             low, high = min(low, scan[j, a]), max(high, scan[j, a])
         for c in range(reaches.shape[0]):
             reach += reaches[c, a]
-        if reach > 0.0 and (high - low) / reach > most:
+        if low <= high and 0.0 < reach < math.inf and (high - low) / reach > most:
             best, most = a, (high - low) / reach
     return best
 
