@@ -182,10 +182,11 @@ class Evidence:
         options = [self.evaluator.options[s] for s in sensors]
         spread = np.ix_(*(own.which for own in options))
         filled = []
+        shape = tuple(len(own.courses) for own in options)
         # The first evaluation holds: a later one, along a line, may differ from it in the last digit.
-        distinct, first = np.unique(actions, axis=0, return_index=True)
+        places, first = np.unique(np.ravel_multi_index(tuple(actions.T), shape), return_index=True)
         for values in (means, errors):
-            table = np.full([len(own.courses) for own in options], math.nan)
-            table[tuple(distinct.T)] = values[first]
+            table = np.full(shape, math.nan)
+            table.flat[places] = values[first]
             filled.append(table[spread])
         return RewardTable(sensors, *filled)

@@ -92,7 +92,6 @@ def soft_sector(state: Floats, pose: Floats, params: Floats) -> float:
     distance = math.sqrt(dx * dx + dy * dy)
     if params[5] > 0.0 and distance > params[1]:
         return 0.0
-    in_range = params[0] * _logistic(params[3] * (distance - params[1]))
     if distance == 0.0 or (params[2] >= math.pi and params[4] == 0.0):  # no edge that an angle could be beyond
         off = 0.0
     else:
@@ -100,7 +99,8 @@ def soft_sector(state: Floats, pose: Floats, params: Floats) -> float:
     beyond = off - params[2]
     if (params[5] > 0.0 or params[4] == 0.0) and beyond > 0.0:
         return 0.0
-    return in_range * (_logistic(params[4] * beyond) if params[4] > 0.0 else 1.0)  # type: ignore[no-any-return]
+    angular = _logistic(params[4] * beyond) if params[4] > 0.0 else 1.0
+    return params[0] * _logistic(params[3] * (distance - params[1])) * angular  # type: ignore[no-any-return]
 
 
 @kernel

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from vedette.scenarios.generated_crowd import GeneratedCrowd
+from vedette.scenarios.generated_text import WORLD
 
 _STD = 5.0  # m, of a measurement
 _DEATHS = 0.01  # a target and scan
@@ -64,7 +65,8 @@ _BEARING_RANGE = """\
     measurement: {{kind: bearing_range}}
     noise: {{kind: constant, std: [{bearing}, {std}]}}    # rad, m; as far across as along in the middle"""
 
-_TEMPLATE = """\
+_TEMPLATE = (
+    """\
 # {summary}
 #
 #   {command}
@@ -72,21 +74,9 @@ _TEMPLATE = """\
 # What a scan costs where targets are many, and alike in number to an area whatever their number: a square whose side
 # grows with it. Nothing here moves but the targets, and there is nothing to decide.
 #
-# Units: metres, seconds, m/s; angles in degrees where a key ends in _deg, else radians; x to the east, y to the north,
-# headings counter-clockwise from east. `vedette schema` describes every key; a key left out has its default.
-
-format: 1
-name: {name}
-description: >-
-  {summary}
-
-time: {{num_steps: {num_steps}, step_period: 1.0, start: 1.0}}   # scans, s, s
-
-region:               # m
-  {{x_min: {low}, x_max: {high}, y_min: {low}, y_max: {high}}}
-
-motion: {{kind: constant_velocity, sigma_v: 0.3}}    # m/s^2, of filters and targets
-
+"""
+    + WORLD
+    + """
 survival: {{kind: constant, probability: {survival}}}
 
 birth:                # where a measurement is that no track explains: as few or many as there are
@@ -110,3 +100,4 @@ estimator: {{kind: marginal, threshold: 0.5}}
 
 ospa: {{cutoff: 25.0, order: 1.0}}    # m
 """
+)

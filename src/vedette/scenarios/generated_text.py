@@ -75,14 +75,8 @@ _SENSING = {
   clutter: {kind: around_sensor, rate: 1.0, radius: 300.0}""",
 }
 
-_TEMPLATE = """\
-# {summary}
-#
-#   {command}
-#
-# A square of 500 m a sensor. Where targets start is drawn anew in each run around the states below, and their motion is
-# disturbed; the filters know how much of both.
-#
+# What all generated scenes have in common.
+WORLD = """\
 # Units: metres, seconds, m/s; angles in degrees where a key ends in _deg, else radians; x to the east, y to the north,
 # headings counter-clockwise from east. `vedette schema` describes every key; a key left out has its default.
 
@@ -97,7 +91,20 @@ region:               # m
   {{x_min: {low}, x_max: {high}, y_min: {low}, y_max: {high}}}
 
 motion: {{kind: constant_velocity, sigma_v: 0.3}}    # m/s^2, of filters and targets
+"""
 
+_TEMPLATE = (
+    """\
+# {summary}
+#
+#   {command}
+#
+# A square of 500 m a sensor. Where targets start is drawn anew in each run around the states below, and their motion is
+# disturbed; the filters know how much of both.
+#
+"""
+    + WORLD
+    + """
 survival: {{kind: constant, probability: 0.99}}
 
 birth:                # [px, py, vx, vy], at the first scan
@@ -142,3 +149,4 @@ ospa: {{cutoff: 100.0, order: 1.0}}
 metrics:
   tracked_of_all: {{kind: tracked_share, min_detection: 0.0}}   # of all targets, seen or not
 """
+)

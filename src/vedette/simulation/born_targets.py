@@ -7,11 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vedette.errors import ModelError
 from vedette.kernels.base.types import Floats
 from vedette.models import MotionModel, Region
 from vedette.models.arguments import float_array, generator, non_negative, probability
-from vedette.simulation.truth import Truth, scan_times, semidefinite_factor
+from vedette.simulation.truth import Truth, moved_state, scan_times, semidefinite_factor
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -74,15 +73,8 @@ class PoissonTargets:
             if scan > 0:
                 if rng.random() < self.death_probability:
                     break
-                state = self._moved(state, float(times[scan] - times[scan - 1]), rng)
+                state = moved_state(self.motion, state, float(times[scan] - times[scan - 1]), rng)
             if self.region is not None and not self.region.contains(state[np.newaxis, :2])[0]:
                 break
             life.append(state)
         return np.array(life).reshape(-1, len(state))
-
-    def _moved(self, state: Floats, dt: float, rng: np.random.Generator) -> Floats:
-        factor = semidefinite_factor(self.motion.noise_cov(state, dt))
-        moved = self.motion.propagate(state, dt)[0] + factor @ rng.standard_normal(len(state))
-        if not np.isfinite(moved).all():
-            raise ModelError(f"motion of a target at state {state}, dt {dt}: expected a finite state; got {moved}")
-        return np.asarray(moved)

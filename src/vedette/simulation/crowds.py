@@ -7,11 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vedette.errors import ModelError
 from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.models import MotionModel, Region
 from vedette.models.arguments import dimension, float_array, generator, probability, reject
-from vedette.simulation.truth import Truth, scan_times, semidefinite_factor
+from vedette.simulation.truth import Truth, check_moved, scan_times, semidefinite_factor
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -82,10 +81,7 @@ class CrowdTargets:
     def _moved(self, states: Floats, dt: float, rng: np.random.Generator) -> tuple[Floats, Bools]:
         """(num, state_dim) states `dt` seconds later, taken round the edges; (num,) who did not cross one."""
         moved = self.motion.propagate(states, dt) + self._noise(states, dt, rng)
-        bad = np.flatnonzero(~np.isfinite(moved).all(axis=1))
-        if len(bad):
-            place, got = states[bad[0]], moved[bad[0]]
-            raise ModelError(f"motion of a target at state {place}, dt {dt}: expected a finite state; got {got}")
+        check_moved(states, moved, dt)
         stays = self.region.contains(moved[:, :2])
         low, high = self.region.bounds[::2], self.region.bounds[1::2]
         moved[~stays, :2] = low + (moved[~stays, :2] - low) % (high - low)

@@ -161,18 +161,27 @@ class ScriptedTargets:
             for scan in np.flatnonzero(alive[target]):
                 dt = float(scans[scan]) - time
                 if dt > TIME_TOLERANCE:
-                    state, time = self._step(state, dt, bool(noisy[target]), rng), float(scans[scan])
+                    state = moved_state(self.motion, state, dt, rng if noisy[target] else None)
+                    time = float(scans[scan])
                 states[target, scan] = state
         return Truth.from_arrays(scans, alive, states)
 
-    def _step(self, state: Floats, dt: float, noisy: bool, rng: np.random.Generator) -> Floats:
-        moved = self.motion.propagate(state, dt)[0]
-        if noisy:
-            factor = semidefinite_factor(self.motion.noise_cov(state, dt))
-            moved = moved + factor @ rng.standard_normal(len(moved))
-        if not np.isfinite(moved).all():
-            raise ModelError(f"motion of a target at state {state}, dt {dt}: expected a finite state; got {moved}")
-        return np.asarray(moved)
+
+def moved_state(motion: MotionModel, state: Floats, dt: float, rng: np.random.Generator | None) -> Floats:
+    """(state_dim,) the state `dt` seconds later, with process noise if a generator is given; raises `ModelError`."""
+    moved = motion.propagate(state, dt)[0]
+    if rng is not None:
+        moved = moved + semidefinite_factor(motion.noise_cov(state, dt)) @ rng.standard_normal(len(moved))
+    check_moved(state[np.newaxis], moved[np.newaxis], dt)
+    return np.asarray(moved)
+
+
+def check_moved(states: Floats, moved: Floats, dt: float) -> None:
+    """`ModelError` unless all states (num, state_dim) that others have moved to are finite."""
+    bad = np.flatnonzero(~np.isfinite(moved).all(axis=1))
+    if len(bad):
+        place, got = states[bad[0]], moved[bad[0]]
+        raise ModelError(f"motion of a target at state {place}, dt {dt}: expected a finite state; got {got}")
 
 
 def semidefinite_factor(cov: Floats) -> Floats:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import dataclass
-from itertools import islice
 
 import numpy as np
 
@@ -100,7 +99,7 @@ class BeamSearch:
         for stages_left in reversed(range(problem.depth)):
             longer = ((*taken, k) for taken in beam for k in problem.after(sensor, taken, others))
             whole = ((taken, own) for taken in longer if (own := problem.kept(sensor, taken, others)) is not None)
-            found = list(islice(whole, max(0, most)))
+            found = list(itertools.islice(whole, max(0, most)))
             if not found:
                 break
             values = problem.evaluate([(*ahead, own, *behind) for _, own in found])

@@ -7,9 +7,6 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import linear_sum_assignment
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import KDTree
 
 from vedette.errors import InputError
 from vedette.kernels.base.types import Bools, Floats, Ints
@@ -94,6 +91,11 @@ def assign_points(first: Floats, second: Floats, cutoff: float, order: float) ->
         apart = cut_distances(first, second, cutoff)
         rows, columns = assign(apart, order)
         return rows, columns, apart[rows, columns]
+    # Here, as large sets are rare and these take as long to import as all else here.
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+    from scipy.spatial import KDTree
+
     near = KDTree(first).sparse_distance_matrix(KDTree(second), cutoff, output_type="coo_matrix")
     edges = coo_array(
         (np.ones(len(near.row)), (near.row, near.col + len(first))), shape=(total := len(first) + len(second), total)

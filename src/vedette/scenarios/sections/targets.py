@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal, Protocol
 
@@ -19,6 +19,12 @@ if TYPE_CHECKING:  # with the models comes the compiler, which a check does with
     from vedette.simulation import CrowdTargets as CrowdSource
     from vedette.simulation import PoissonTargets as PoissonSource
     from vedette.simulation import ScriptedTargets as ScriptedSource
+
+
+def _negative_stds(stds: Sequence[float]) -> Iterator[Finding]:
+    for i, std in enumerate(stds):
+        if std < 0.0:
+            yield ("std", i), "a number of at least 0", describe(std)
 
 
 class _World(Protocol):
@@ -47,9 +53,7 @@ class ScriptedTarget(Section):
 
     @check
     def _not_negative(self) -> Iterator[Finding]:
-        for j, std in enumerate(self.std or ()):
-            if std < 0.0:
-                yield ("std", j), "a number of at least 0", describe(std)
+        yield from _negative_stds(self.std or ())
 
     @check
     def _lifetime(self) -> Iterator[Finding]:
@@ -152,9 +156,7 @@ class PoissonTargets(Section):
 
     @check
     def _spreads(self) -> Iterator[Finding]:
-        for i, std in enumerate(self.std):
-            if std < 0.0:
-                yield ("std", i), "a number of at least 0", describe(std)
+        yield from _negative_stds(self.std)
 
     def build(self, world: _World, motion: MotionModel, folder: Path) -> PoissonSource:
         """The targets, as `motion` moves them."""
@@ -185,9 +187,7 @@ class CrowdTargets(Section):
 
     @check
     def _spreads(self) -> Iterator[Finding]:
-        for i, std in enumerate(self.std):
-            if std < 0.0:
-                yield ("std", i), "a number of at least 0", describe(std)
+        yield from _negative_stds(self.std)
 
     def build(self, world: _World, motion: MotionModel, folder: Path) -> CrowdSource:
         """The targets, as `motion` moves them."""
