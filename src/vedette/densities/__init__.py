@@ -10,6 +10,7 @@ from vedette.densities.estimates import (
     track_histories,
     unlabelled_estimate,
 )
+from vedette.densities.factored import FactoredGLMB
 from vedette.densities.files import load_density, save_density
 from vedette.densities.glmb import GLMB
 from vedette.densities.iid_cluster import IidCluster
@@ -38,6 +39,7 @@ __all__ = [
     "LMB",
     "Estimate",
     "Estimator",
+    "FactoredGLMB",
     "IidCluster",
     "MultiBernoulli",
     "MultiTargetSamples",

@@ -49,6 +49,17 @@ class Lmb(NamedTuple):
     existence_logit: Floats  # (num_tracks,) log r - log (1 - r)
 
 
+class FactoredGlmb(NamedTuple):
+    """Product of independent GLMBs over disjoint labels (factors), one after the other in shared arrays."""
+
+    tracks: Tracks  # those of a factor together
+    track_offsets: Ints  # (num_factors + 1,) into `tracks`
+    hyp_offsets: Ints  # (num_hyps + 1,) into hyp_tracks; hypotheses of a factor together
+    hyp_tracks: Ints  # indices into `tracks`; those of one hypothesis in label order
+    hyp_log_weights: Floats  # (num_hyps,) normalised within each factor
+    factor_offsets: Ints  # (num_factors + 1,) into the hypotheses
+
+
 class Motion(NamedTuple):
     """Motion and survival functions with their parameter vectors."""
 

@@ -1,0 +1,198 @@
+"""Factored labelled density: a product of independent GLMBs over disjoint labels."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from vedette.densities import checks
+from vedette.densities.glmb import GLMB
+from vedette.densities.label_sets import offsets_of
+from vedette.densities.lmb import LMB
+from vedette.densities.tracks import TrackTable
+from vedette.errors import InputError, NumericalError, VedetteError
+from vedette.kernels.base import types as kt
+from vedette.kernels.base.types import Floats, Ints
+
+
+@dataclass(frozen=True, slots=True)
+class FactoredGLMB:
+    """Product of independent GLMBs (factors), no two of which share a label.
+
+    A GLMB is one factor, an LMB one factor a label. What one factor says of its targets does not depend on another's:
+    the probability of a label set is the product of those of its parts, so that a list of a few hypotheses a factor
+    stands for all their combinations.
+
+    Attributes:
+        tracks: track table of all factors; those of a factor together.
+        track_offsets: (num_factors + 1,) tracks of factor `f` are `track_offsets[f]:track_offsets[f + 1]`.
+        hyp_offsets: (num_hyps + 1,) tracks of hypothesis `h` are `hyp_tracks[hyp_offsets[h]:hyp_offsets[h + 1]]`.
+        hyp_tracks: indices into `tracks`, in increasing label order within a hypothesis.
+        hyp_log_weights: (num_hyps,) log weights, normalised within each factor.
+        factor_offsets: (num_factors + 1,) hypotheses of factor `f` are `factor_offsets[f]:factor_offsets[f + 1]`.
+
+    The arrays are held, not copied, and checked once, here: who changes one later must call `validate` before its use.
+
+    Raises:
+        InputError: as `validate`.
+    """
+
+    tracks: TrackTable
+    track_offsets: Ints
+    hyp_offsets: Ints
+    hyp_tracks: Ints
+    hyp_log_weights: Floats
+    factor_offsets: Ints
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.tracks, TrackTable):
+            raise InputError(f"tracks: expected a TrackTable; got {type(self.tracks).__name__}")
+        self._validate_factors(InputError)
+
+    @property
+    def num_factors(self) -> int:
+        """Number of factors."""
+        return len(self.factor_offsets) - 1
+
+    @property
+    def num_hyps(self) -> int:
+        """Number of hypotheses, of all factors together."""
+        return len(self.hyp_log_weights)
+
+    @property
+    def state_dim(self) -> int:
+        """Length of a target's state."""
+        return self.tracks.state_dim
+
+    def factor(self, index: int) -> GLMB:
+        """One factor, as a GLMB whose arrays are views or copies of these."""
+        low, high = self.track_offsets[index], self.track_offsets[index + 1]
+        first, last = self.factor_offsets[index], self.factor_offsets[index + 1]
+        table, begin, end = self.tracks, self.hyp_offsets[first], self.hyp_offsets[last]
+        start, stop = table.offsets[low], table.offsets[high]
+        tracks = checks.unchecked(
+            TrackTable,
+            table.labels[low:high],
+            table.offsets[low : high + 1] - start,
+            table.log_weights[start:stop],
+            table.means[start:stop],
+            table.covs[start:stop],
+        )
+        offsets = self.hyp_offsets[first : last + 1] - begin
+        return checks.unchecked(
+            GLMB, tracks, offsets, self.hyp_tracks[begin:end] - low, self.hyp_log_weights[first:last]
+        )
+
+    @property
+    def factors(self) -> tuple[GLMB, ...]:
+        """All factors, in their order."""
+        return tuple(self.factor(index) for index in range(self.num_factors))
+
+    def to_kernel(self) -> kt.FactoredGlmb:
+        """The same arrays as the bundle that kernels take."""
+        return kt.FactoredGlmb(
+            self.tracks.to_kernel(),
+            self.track_offsets,
+            self.hyp_offsets,
+            self.hyp_tracks,
+            self.hyp_log_weights,
+            self.factor_offsets,
+        )
+
+    @classmethod
+    def from_kernel(cls, density: kt.FactoredGlmb) -> FactoredGLMB:
+        """The arrays of a bundle as they are; a kernel's own need no check."""
+        return checks.unchecked(cls, TrackTable.from_kernel(density.tracks), *density[1:])
+
+    @classmethod
+    def empty(cls, state_dim: int) -> FactoredGLMB:
+        """The density that is certain of no target: no factor."""
+        zero, none = np.zeros(1, np.int64), np.empty(0, np.int64)
+        return checks.unchecked(
+            cls, TrackTable.empty(state_dim), zero, zero.copy(), none, np.empty(0), np.zeros(1, np.int64)
+        )
+
+    @classmethod
+    def from_factors(cls, factors: Sequence[GLMB], state_dim: int) -> FactoredGLMB:
+        """The product of GLMBs of which no two share a label.
+
+        Raises `InputError` for a label in two factors, or a factor of another state dimension.
+        """
+        for index, factor in enumerate(factors):
+            if not isinstance(factor, GLMB) or factor.state_dim != state_dim:
+                got = f"{type(factor).__name__} of {getattr(factor, 'state_dim', 'no')} dimensions"
+                raise InputError(f"factors[{index}]: expected a GLMB of states of dimension {state_dim}; got {got}")
+        tables = [factor.tracks for factor in factors] or [TrackTable.empty(state_dim)]
+        track_offsets = offsets_of([factor.tracks.num_tracks for factor in factors])
+        tracks = checks.unchecked(
+            TrackTable,
+            np.concatenate([table.labels for table in tables]),
+            offsets_of(np.concatenate([np.diff(table.offsets) for table in tables])),
+            np.concatenate([table.log_weights for table in tables]),
+            np.concatenate([table.means for table in tables]),
+            np.concatenate([table.covs for table in tables]),
+        )
+        none, sizes = np.empty(0, np.int64), [np.diff(factor.hyp_offsets) for factor in factors]
+        members = [factor.hyp_tracks + low for factor, low in zip(factors, track_offsets, strict=False)]
+        made: FactoredGLMB = checks.unchecked(
+            cls,
+            tracks,
+            track_offsets,
+            offsets_of(np.concatenate([none, *sizes])),
+            np.concatenate([none, *members]),
+            np.concatenate([np.empty(0), *(factor.hyp_log_weights for factor in factors)]),
+            offsets_of([factor.num_hyps for factor in factors]),
+        )
+        made._validate_labels()
+        return made
+
+    @classmethod
+    def from_lmb(cls, lmb: LMB) -> FactoredGLMB:
+        """The same density: a factor a label, with the hypotheses that it is absent and that it is there."""
+        num = lmb.tracks.num_tracks
+        log_weights = np.empty((num, 2))
+        log_weights[:, 0] = -np.logaddexp(0.0, lmb.existence_logit)
+        log_weights[:, 1] = -np.logaddexp(0.0, -lmb.existence_logit)
+        ends = np.repeat(np.arange(num + 1), 2)
+        return checks.unchecked(
+            cls, lmb.tracks, np.arange(num + 1), ends[1:], np.arange(num), log_weights.ravel(), 2 * np.arange(num + 1)
+        )
+
+    def validate(self, *, error: type[VedetteError] = NumericalError) -> None:
+        """Raise unless these are normalised GLMBs over tracks of their own, no label in two of them.
+
+        `InputError` for faults of form; `error` for values that are not finite, not normalised to 1e-9 or covariances
+        that are not symmetric positive definite.
+        """
+        self.tracks.validate(error=error)
+        self._validate_factors(error)
+
+    def _validate_factors(self, error: type[VedetteError]) -> None:
+        checks.check_array("hyp_log_weights", self.hyp_log_weights, np.float64, (None,))
+        checks.check_array("hyp_tracks", self.hyp_tracks, np.int64, (None,))
+        checks.check_array("factor_offsets", self.factor_offsets, np.int64, (None,))
+        num, num_tracks = max(self.num_factors, 0), self.tracks.num_tracks
+        checks.check_offsets("factor_offsets", self.factor_offsets, num, self.num_hyps, empty_allowed=False)
+        checks.check_offsets("track_offsets", self.track_offsets, num, num_tracks, empty_allowed=True)
+        checks.check_offsets("hyp_offsets", self.hyp_offsets, self.num_hyps, len(self.hyp_tracks), empty_allowed=True)
+        for index in range(num):
+            try:
+                self.factor(index)._validate_hypotheses(error)
+            except VedetteError as fault:
+                raise type(fault)(f"factor {index}: {fault}") from None
+        self._validate_labels()
+
+    def _validate_labels(self) -> None:
+        """Raise `InputError` where two factors share a label."""
+        factor_of = np.repeat(np.arange(self.num_factors), np.diff(self.track_offsets))
+        labels = self.tracks.labels
+        order = np.lexsort((factor_of, labels[:, 1], labels[:, 0]))
+        same = (labels[order[1:]] == labels[order[:-1]]).all(axis=1) & (factor_of[order[1:]] != factor_of[order[:-1]])
+        if same.any():
+            place = int(np.flatnonzero(same)[0])
+            pair = [int(factor_of[order[place]]), int(factor_of[order[place + 1]])]
+            raise InputError(
+                f"tracks.labels: expected each label in one factor; got {labels[order[place]].tolist()} in {pair}"
+            )
