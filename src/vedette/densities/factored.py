@@ -157,7 +157,13 @@ class FactoredGLMB:
         log_weights[:, 1] = -np.logaddexp(0.0, -lmb.existence_logit)
         ends = np.repeat(np.arange(num + 1), 2)
         return checks.unchecked(
-            cls, lmb.tracks, np.arange(num + 1), ends[1:], np.arange(num), log_weights.ravel(), 2 * np.arange(num + 1)
+            cls,
+            lmb.tracks,
+            np.arange(num + 1),
+            ends[:-1].copy(),
+            np.arange(num),
+            log_weights.ravel(),
+            2 * np.arange(num + 1),
         )
 
     def validate(self, *, error: type[VedetteError] = NumericalError) -> None:

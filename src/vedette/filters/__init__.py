@@ -6,6 +6,7 @@ from vedette.densities import GLMB, LMB, IidCluster, MultiBernoulli, Poisson
 from vedette.filters.base import Filter, TwoStepFilter, labels_targets, shared_targets
 from vedette.filters.cbmember import CbMemberFilter
 from vedette.filters.cphd import CphdFilter
+from vedette.filters.factored import FactoredGlmbFilter
 from vedette.filters.glmb import DeltaGlmbFilter
 from vedette.filters.info import FilterInfo
 from vedette.filters.limits import Limits
@@ -22,6 +23,7 @@ __all__ = [
     "CbMemberFilter",
     "CphdFilter",
     "DeltaGlmbFilter",
+    "FactoredGlmbFilter",
     "Filter",
     "FilterInfo",
     "Limits",

@@ -8,7 +8,7 @@ from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
-from vedette.densities import GLMB, LMB
+from vedette.densities import GLMB, LMB, FactoredGLMB
 from vedette.errors import InputError
 from vedette.filters.info import FilterInfo
 from vedette.filters.inputs import births_for, check_scan
@@ -83,7 +83,7 @@ class TwoStepFilter(Filter, Protocol):
 
 def labels_targets(tracker: Filter) -> bool:
     """Whether the filter's belief is a `GLMB` or an `LMB`."""
-    return isinstance(tracker.initial(), GLMB | LMB)
+    return isinstance(tracker.initial(), GLMB | LMB | FactoredGLMB)
 
 
 def shared_targets(filters: Sequence[Filter]) -> TargetModel:
@@ -119,7 +119,13 @@ class SingleSensorFilter:
                 raise InputError(f"{name}: expected a {kind.__name__}; got {type(value).__name__}")
 
     def _arguments(
-        self, scan: Floats, pose: Any, dt: Any, step: Any, prior: GLMB | LMB | None = None, births: LMB | None = None
+        self,
+        scan: Floats,
+        pose: Any,
+        dt: Any,
+        step: Any,
+        prior: GLMB | LMB | FactoredGLMB | None = None,
+        births: LMB | None = None,
     ) -> StepArguments:
         """Scan, models and truncation as the kernels take them, in their order.
 

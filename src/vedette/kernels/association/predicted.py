@@ -14,7 +14,7 @@ import numpy as np
 from vedette.errors import ModelError
 from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Floats, Ints, Lmb, Motion, ScanInput, Sensor, Tracks
-from vedette.kernels.gaussian.innovation import Innovation, expect, make_innovation
+from vedette.kernels.gaussian.innovation import Innovation, copy_innovation, expect, make_innovation
 from vedette.kernels.gaussian.linalg import log_add
 from vedette.kernels.gaussian.mixtures import copy_component
 from vedette.kernels.gaussian.prediction import predict
@@ -147,3 +147,24 @@ def standing_rows(tracks: Tracks, meas_dim: int) -> Rows:
         rows.log_weights[c] = tracks.log_weights[c]
         copy_component(tracks.means, tracks.covs, c, rows.means, rows.covs, c)
     return rows
+
+
+@kernel
+def taken_rows(rows: Rows, members: Ints) -> Rows:
+    """Some of the rows, in the order given."""
+    num_components = 0
+    for row in members:
+        num_components += rows.offsets[row + 1] - rows.offsets[row]
+    meas_dim, state_dim = rows.innovation.whitened_cross.shape[1:]
+    out, end = make_rows(len(members), num_components, state_dim, meas_dim), 0
+    for i in range(len(members)):
+        row = members[i]
+        out.labels[i, 0], out.labels[i, 1] = rows.labels[row, 0], rows.labels[row, 1]
+        out.log_absent[i] = rows.log_absent[row]
+        for c in range(rows.offsets[row], rows.offsets[row + 1]):
+            out.log_weights[end] = rows.log_weights[c]
+            copy_component(rows.means, rows.covs, c, out.means, out.covs, end)
+            copy_innovation(rows.innovation, c, out.innovation, end)
+            end += 1
+        out.offsets[i + 1] = end
+    return out

@@ -171,12 +171,25 @@ def run_search(options: Options, parents: Parents, caps: SearchCaps, search: Sea
     return True
 
 
+@borrowing
+def _most_children(options: Options, parents: Parents) -> int:
+    """How many joint choices there are, collisions included, or `_MOST_CHILDREN` where there are more."""
+    total = 0
+    for parent in range(len(parents.log_weights)):
+        count = 1
+        for i in range(parents.offsets[parent], parents.offsets[parent + 1]):
+            row = parents.rows[i]
+            count = min(count * (options.offsets[row + 1] - options.offsets[row]), _MOST_CHILDREN)
+        total = min(total + count, _MOST_CHILDREN)
+    return total
+
+
 @kernel
 def rank_children(options: Options, parents: Parents, caps: SearchCaps) -> tuple[Children, bool]:
     """The heaviest joint choices of all parents in descending order, in arrays made for them; the flag tells that the
     search stopped at `max_nodes` before it had found all within the other caps.
     """
-    num, widest = min(caps.max_hypotheses, _MOST_CHILDREN), widest_parent(parents)
+    num, widest = min(caps.max_hypotheses, _most_children(options, parents)), widest_parent(parents)
     # Made as large as they are likely to become: growing them took a third of the search.
     search = make_search(_NODES_A_CHILD * num + len(parents.log_weights) + 2 * widest + 4)
     children = make_children(num, num * widest)

@@ -46,6 +46,23 @@ def make_innovation(num: int, state_dim: int, meas_dim: int) -> Innovation:
     )
 
 
+@inlined
+def copy_innovation(innovation: Innovation, source: int, out: Innovation, target: int) -> None:
+    """Copy the entry of one component into another bundle."""
+    m, n = innovation.whitened_cross.shape[1:]
+    for a in range(m):
+        out.predicted[target, a] = innovation.predicted[source, a]
+        for b in range(m):
+            out.factor[target, a, b] = innovation.factor[source, a, b]
+        for j in range(n):
+            out.whitened_cross[target, a, j] = innovation.whitened_cross[source, a, j]
+    for i in range(n):
+        for j in range(n):
+            out.covs[target, i, j] = innovation.covs[source, i, j]
+    out.log_norm[target] = innovation.log_norm[source]
+    out.prob_detection[target] = innovation.prob_detection[source]
+
+
 @borrowing
 def _expect_sigma_points(
     sensor: Sensor, pose: Floats, mean: Floats, cov: Floats, predicted: Floats, cross: Floats, scratch: Scratch

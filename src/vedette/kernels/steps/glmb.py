@@ -27,7 +27,7 @@ from vedette.kernels.association.ranked import rank_children
 from vedette.kernels.association.truncation import Truncation, heaviest_first, keep_heaviest, merge_equal
 from vedette.kernels.base.arrays import filled_ints
 from vedette.kernels.base.compile import kernel
-from vedette.kernels.base.types import Glmb, Motion, ScanInput, Sensor
+from vedette.kernels.base.types import Glmb, Ints, Motion, ScanInput, Sensor
 from vedette.kernels.gaussian.linalg import log_sum
 from vedette.kernels.gaussian.mixtures import require_gaussians
 from vedette.kernels.gaussian.scratch import make_scratch
@@ -94,10 +94,13 @@ def _log_total_bound(options: Options, parents: Parents) -> float:
 
 
 @kernel
-def _conclude(
-    found: Associated, children: Children, truncation: Truncation, cut: bool, is_covered: bool
-) -> tuple[Glmb, StepReport]:
-    """Truncate and assemble. is_covered: nothing that `max_track_gap` would keep has been left out."""
+def kept_children(
+    found: Associated, children: Children, truncation: Truncation, is_covered: bool
+) -> tuple[Children, Ints]:
+    """The children, each hypothesis once, with the best of every association; and those to keep, heaviest first.
+
+    is_covered: nothing that `max_track_gap` would keep has been left out.
+    """
     rows, options, parents, caps = found.rows, found.options, found.parents, truncation.search
     covering = truncation.max_track_gap > 0.0 and not is_covered
     associations = Associations(np.empty(0, np.int64), 0)
@@ -111,10 +114,18 @@ def _conclude(
         half = caps.max_hypotheses // 2
         num_safe = caps.max_hypotheses - half
         mark_heaviest(children, order, associations, num_safe, half, truncation.max_track_gap, needed)
-    kept = keep_heaviest(children, order, needed, caps)
-    posterior, log_total = assemble(children, kept, parents, rows, options)
+    return children, keep_heaviest(children, order, needed, caps)
+
+
+@kernel
+def _conclude(
+    found: Associated, children: Children, truncation: Truncation, cut: bool, is_covered: bool
+) -> tuple[Glmb, StepReport]:
+    """Truncate and assemble; is_covered as of `kept_children`."""
+    children, kept = kept_children(found, children, truncation, is_covered)
+    posterior, log_total = assemble(children, kept, found.parents, found.rows, found.options)
     require_gaussians(posterior.tracks.means, posterior.tracks.covs)
-    bound = _log_total_bound(options, parents)
+    bound = _log_total_bound(found.options, found.parents)
     return posterior, StepReport(log_total, bound, found.log_clutter, found.num_raised, cut)
 
 

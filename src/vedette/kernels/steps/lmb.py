@@ -134,6 +134,26 @@ def _matched_tracks(kept: Ints, rows: Rows, options: Options, marginals: Floats)
 
 
 @kernel
+def write_mixture(row: int, rows: Rows, options: Options, marginals: Floats, wide: Mixture) -> int:
+    """Write a row's components over all its options but absence, weighed by their log probabilities; their number."""
+    width = 0
+    for option in range(options.offsets[row], options.offsets[row + 1]):
+        if options.columns[option] == ABSENT or marginals[option] == -math.inf:
+            continue
+        end = write_updated(row, option, rows, options, width, wide)
+        for c in range(width, end):
+            wide.log_weights[c] += marginals[option] - options.log_weights[option]
+        width = end
+    if width == 0:
+        # Existence 0: any density will do, as long as it is one.
+        for c in range(rows.offsets[row], rows.offsets[row + 1]):
+            copy_component(rows.means, rows.covs, c, wide.means, wide.covs, width)
+            wide.log_weights[width] = 0.0
+            width += 1
+    return width
+
+
+@kernel
 def _reduced_tracks(kept: Ints, rows: Rows, options: Options, marginals: Floats, caps: MixtureCaps) -> Tracks:
     """Each kept row's mixture over its options, reduced."""
     dim = rows.means.shape[1]
@@ -144,20 +164,7 @@ def _reduced_tracks(kept: Ints, rows: Rows, options: Options, marginals: Floats,
     for i in range(len(kept)):
         row = kept[i]
         labels[i, 0], labels[i, 1] = rows.labels[row, 0], rows.labels[row, 1]
-        width = 0
-        for option in range(options.offsets[row], options.offsets[row + 1]):
-            if options.columns[option] == ABSENT or marginals[option] == -math.inf:
-                continue
-            end = write_updated(row, option, rows, options, width, wide)
-            for c in range(width, end):
-                wide.log_weights[c] += marginals[option] - options.log_weights[option]
-            width = end
-        if width == 0:
-            # Existence 0: any density will do, as long as it is one.
-            for c in range(rows.offsets[row], rows.offsets[row + 1]):
-                copy_component(rows.means, rows.covs, c, wide.means, wide.covs, width)
-                wide.log_weights[width] = 0.0
-                width += 1
+        width = write_mixture(row, rows, options, marginals, wide)
         filled = append_reduced(wide, width, caps, out, filled)
         offsets[i + 1] = filled
     return Tracks(labels, offsets, out.log_weights[:filled], out.means[:filled], out.covs[:filled])

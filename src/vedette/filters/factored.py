@@ -1,0 +1,134 @@
+"""The factored GLMB filter: labels that contend are tracked together, all others apart."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from vedette.densities import GLMB, LMB, FactoredGLMB
+from vedette.errors import InputError, NumericalError
+from vedette.filters.base import SingleSensorFilter
+from vedette.filters.blind import NO_POSE, NO_SCAN, blind_sensor
+from vedette.filters.info import FilterInfo
+from vedette.filters.inputs import check_belief, model_errors
+from vedette.kernels.base.types import FactoredGlmb
+from vedette.kernels.steps.factored import FactoredReport, Factoring, step_factored, update_factored
+from vedette.models.arguments import dimension, non_negative
+
+# Of the error that a split may make, the share that one pair of claims to a measurement may.
+_SHARE_OF_A_LINK = 0.01
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FactoredGlmbFilter(SingleSensorFilter):
+    """delta-GLMB filter of one sensor whose density is a product of independent factors.
+
+    At a scan, factors that lay claim to the same measurements are multiplied out and updated together, exactly as a
+    delta-GLMB; all others apart. Then each splits into the smallest factors that are independent within
+    `max_split_error`. So a list of `limits.max_hypotheses` is shared by a few targets that contend, not by all: what is
+    known of a far target does not depend on how long the list is, and the cost grows with the number of targets, not
+    with that of their combinations. With a `max_split_error` of 2 every label is a factor of its own, as in an LMB
+    filter; with 0, and `max_group_labels` as large as the number of targets, none is split that depends on another, as
+    in a delta-GLMB filter.
+
+    Attributes:
+        targets: how targets move, live on and appear.
+        sensor: what the sensor sees of them.
+        limits: caps and thresholds; those on hypotheses hold for each factor.
+        max_split_error: L1 error, of densities that each integrate to 1, up to which the labels of a factor are split;
+            0 to 2. Two factors are taken together where both take a measurement with a probability above a hundredth
+            of half of this, if they were independent.
+        max_group_labels: labels that are taken together at most; where more contend, those that do so least are taken
+            as independent. What all this leaves out is in `FilterInfo.factoring_error`.
+
+    Raises:
+        InputError: a part of another kind, or a field out of range.
+    """
+
+    max_split_error: float = 0.01
+    max_group_labels: int = 10
+
+    def __post_init__(self) -> None:
+        SingleSensorFilter.__post_init__(self)  # slots replace the class that super() looks for
+        if non_negative("max_split_error", self.max_split_error) > 2.0:
+            raise InputError(f"max_split_error: expected at most 2; got {self.max_split_error!r}")
+        dimension("max_group_labels", self.max_group_labels)
+
+    def initial(self) -> FactoredGLMB:
+        """The belief before the first scan: no target."""
+        return FactoredGLMB.empty(self.targets.state_dim)
+
+    def step(
+        self,
+        belief: FactoredGLMB | GLMB | LMB,
+        scan: Any,
+        pose: Any,
+        dt: float,
+        step: int,
+        *,
+        rng: np.random.Generator,
+        births: LMB | None = None,
+    ) -> tuple[FactoredGLMB, FilterInfo]:
+        """Predict over `dt` seconds and update with a scan; arguments, results and errors as `DeltaGlmbFilter.step`.
+
+        Nothing is drawn from `rng`; it is taken so that filters are interchangeable.
+        """
+        measurements, num_duplicates = self._check_scan(scan, rng)
+        prior = check_belief(belief, FactoredGLMB, self.targets.state_dim)
+        arguments = self._arguments(measurements, pose, dt, step, prior, births)
+        with model_errors():
+            posterior, report = step_factored(prior.to_kernel(), *arguments, self.limits.reduction(), self._factoring())
+        return self._concluded(posterior, report, num_duplicates, f"step {step}: ")
+
+    def predict(
+        self, belief: FactoredGLMB | GLMB | LMB, dt: float, step: int, *, births: LMB | None = None
+    ) -> tuple[FactoredGLMB, FilterInfo]:
+        """The belief `dt` seconds later, births included; as `DeltaGlmbFilter.predict`, factor by factor."""
+        prior = check_belief(belief, FactoredGLMB, self.targets.state_dim)
+        limits = self.limits.keeping_labels()
+        blind = FactoredGlmbFilter(self.targets, blind_sensor(), limits, self.max_split_error, self.max_group_labels)
+        arguments = blind._arguments(NO_SCAN, NO_POSE, dt, step, prior, births)
+        with model_errors():
+            posterior, report = step_factored(prior.to_kernel(), *arguments, limits.reduction(), self._factoring())
+        return blind._concluded(posterior, report, 0, f"step {step}: ")
+
+    def update(
+        self, belief: FactoredGLMB | GLMB | LMB, scan: Any, pose: Any, *, rng: np.random.Generator
+    ) -> tuple[FactoredGLMB, FilterInfo]:
+        """The belief after a scan of its own time; as `DeltaGlmbFilter.update`."""
+        measurements, num_duplicates = self._check_scan(scan, rng)
+        prior = check_belief(belief, FactoredGLMB, self.targets.state_dim)
+        arguments = self._update_arguments(measurements, pose)
+        with model_errors():
+            posterior, report = update_factored(
+                prior.to_kernel(), *arguments, self.limits.reduction(), self._factoring()
+            )
+        return self._concluded(posterior, report, num_duplicates, "")
+
+    def _factoring(self) -> Factoring:
+        error = float(self.max_split_error)
+        return Factoring(error, 0.5 * _SHARE_OF_A_LINK * error, int(self.max_group_labels))
+
+    def _concluded(
+        self, posterior: FactoredGlmb, report: FactoredReport, num_duplicates: int, place: str
+    ) -> tuple[FactoredGLMB, FilterInfo]:
+        if report.log_total == -math.inf:
+            raise NumericalError(f"{place}no hypothesis has positive weight; do the models forbid this scan?")
+        found = FactoredGLMB.from_kernel(posterior)
+        discarded = max(0.0, -math.expm1(report.log_kept))
+        return found, FilterInfo(
+            log_likelihood=report.log_total + report.log_clutter - self.sensor.clutter.rate,
+            num_hypotheses=found.num_hyps,
+            num_tracks=found.tracks.num_tracks,
+            discarded_weight_bound=discarded,
+            dropped_existence=float(report.dropped_existence),
+            num_clutter_raised=int(report.num_raised),
+            num_duplicates=num_duplicates,
+            num_inexact_clusters=0,
+            search_cut=bool(report.cut),
+            cap_met=False,
+            factoring_error=min(2.0, float(report.split_error + 2.0 * report.taken_twice)),
+        )

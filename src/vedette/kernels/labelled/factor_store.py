@@ -1,0 +1,184 @@
+"""A factored density while it is written, factor by factor."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from vedette.kernels.base.arrays import filled_ints, grown_floats, grown_ints
+from vedette.kernels.base.compile import inlined, kernel
+from vedette.kernels.base.types import FactoredGlmb, Floats, Glmb, Ints, Mixture, Tracks
+from vedette.kernels.gaussian.linalg import log_add, log_sum
+from vedette.kernels.gaussian.mixtures import copy_component, descending_order
+from vedette.kernels.labelled.splitting import Choices, group_choices
+
+# Places in `FactorStore.filled`.
+_TRACKS, _COMPONENTS, _HYPS, _ENTRIES, _FACTORS = range(5)
+
+
+class FactorStore(NamedTuple):
+    """Factors so far, and room for more."""
+
+    filled: Ints  # (5,) numbers of tracks, components, hypotheses, entries of `hyp_tracks`, and factors
+    labels: Ints  # flat, two numbers a track
+    offsets: Ints
+    components: Mixture
+    track_offsets: Ints
+    hyp_offsets: Ints
+    hyp_tracks: Ints
+    hyp_log_weights: Floats
+    factor_offsets: Ints
+
+
+@kernel
+def make_store(num_tracks: int, num_components: int, state_dim: int) -> FactorStore:
+    """Nothing yet; room for so many tracks, each a factor."""
+    return FactorStore(
+        np.zeros(5, np.int64),
+        np.empty(2 * num_tracks, np.int64),
+        np.zeros(num_tracks + 1, np.int64),
+        Mixture(
+            np.empty(num_components),
+            np.empty((num_components, state_dim)),
+            np.empty((num_components, state_dim, state_dim)),
+        ),
+        np.zeros(num_tracks + 1, np.int64),
+        np.zeros(2 * num_tracks + 1, np.int64),
+        np.empty(num_tracks, np.int64),
+        np.empty(2 * num_tracks),
+        np.zeros(num_tracks + 1, np.int64),
+    )
+
+
+@kernel
+def _grown_mixture(mixture: Mixture, filled: int, needed: int) -> Mixture:
+    if needed <= len(mixture.log_weights):
+        return mixture
+    num, dim = max(needed, 2 * len(mixture.log_weights)), mixture.means.shape[1]
+    longer = Mixture(np.empty(num), np.empty((num, dim)), np.empty((num, dim, dim)))
+    for c in range(filled):
+        longer.log_weights[c] = mixture.log_weights[c]
+        copy_component(mixture.means, mixture.covs, c, longer.means, longer.covs, c)
+    return longer
+
+
+@kernel
+def with_room(store: FactorStore, tracks: int, components: int, hyps: int, entries: int) -> FactorStore:
+    """The same factors with room for so much more, in one factor."""
+    filled = store.filled
+    return FactorStore(
+        filled,
+        grown_ints(store.labels, 2 * (filled[_TRACKS] + tracks)),
+        grown_ints(store.offsets, filled[_TRACKS] + tracks + 1),
+        _grown_mixture(store.components, filled[_COMPONENTS], filled[_COMPONENTS] + components),
+        grown_ints(store.track_offsets, filled[_FACTORS] + 2),
+        grown_ints(store.hyp_offsets, filled[_HYPS] + hyps + 1),
+        grown_ints(store.hyp_tracks, filled[_ENTRIES] + entries),
+        grown_floats(store.hyp_log_weights, filled[_HYPS] + hyps),
+        grown_ints(store.factor_offsets, filled[_FACTORS] + 2),
+    )
+
+
+@inlined
+def next_component(store: FactorStore) -> int:
+    """Where the components of the next track are to be written."""
+    return int(store.filled[_COMPONENTS])
+
+
+@inlined
+def _close_track(store: FactorStore, step: int, index: int, end: int) -> None:
+    filled = store.filled
+    num = filled[_TRACKS]
+    store.labels[2 * num], store.labels[2 * num + 1] = step, index
+    filled[_TRACKS], filled[_COMPONENTS] = num + 1, end
+    store.offsets[num + 1] = end
+
+
+@inlined
+def _close_factor(store: FactorStore) -> None:
+    filled = store.filled
+    filled[_FACTORS] += 1
+    store.track_offsets[filled[_FACTORS]] = filled[_TRACKS]
+    store.factor_offsets[filled[_FACTORS]] = filled[_HYPS]
+
+
+@inlined
+def append_single(store: FactorStore, step: int, index: int, end: int, logit: float) -> None:
+    """Enter a factor of one label, absent or there; its components are written already, up to `end`."""
+    filled = store.filled
+    hyp, entry = filled[_HYPS], filled[_ENTRIES]
+    store.hyp_log_weights[hyp], store.hyp_log_weights[hyp + 1] = -log_add(0.0, logit), -log_add(0.0, -logit)
+    store.hyp_tracks[entry] = filled[_TRACKS]
+    store.hyp_offsets[hyp + 1], store.hyp_offsets[hyp + 2] = entry, entry + 1
+    filled[_HYPS], filled[_ENTRIES] = hyp + 2, entry + 1
+    _close_track(store, step, index, end)
+    _close_factor(store)
+
+
+@kernel
+def append_part(store: FactorStore, glmb: Glmb, choices: Choices, part_of: Ints, part: int) -> FactorStore:
+    """Enter the marginal of a GLMB over the labels of a part as a factor, heaviest hypothesis first."""
+    num, groups = len(glmb.hyp_log_weights), np.empty(len(glmb.hyp_log_weights), np.int64)
+    firsts = group_choices(choices.symbols, part_of, part, groups)
+    log_weights = np.empty(len(firsts))
+    for g in range(len(firsts)):
+        log_weights[g] = -math.inf
+    for h in range(num):
+        log_weights[groups[h]] = log_add(log_weights[groups[h]], glmb.hyp_log_weights[h])
+    log_total, number = log_sum(log_weights), filled_ints(len(glmb.tracks.labels), -1)
+    store = with_room(
+        store, len(glmb.tracks.labels), len(glmb.tracks.log_weights), len(firsts), len(firsts) * len(part_of)
+    )
+    for g in descending_order(log_weights):
+        for k in range(len(part_of)):
+            track = choices.symbols[firsts[g], k]
+            if part_of[k] != part or track < 0:
+                continue
+            if number[track] < 0:
+                number[track] = store.filled[_TRACKS]
+                _append_track(store, glmb.tracks, track)
+            store.hyp_tracks[store.filled[_ENTRIES]] = number[track]
+            store.filled[_ENTRIES] += 1
+        hyp = store.filled[_HYPS]
+        store.hyp_log_weights[hyp] = log_weights[g] - log_total
+        store.filled[_HYPS] = hyp + 1
+        store.hyp_offsets[hyp + 1] = store.filled[_ENTRIES]
+    _close_factor(store)
+    return store
+
+
+@kernel
+def _append_track(store: FactorStore, tracks: Tracks, track: int) -> None:
+    end, out = next_component(store), store.components
+    for c in range(tracks.offsets[track], tracks.offsets[track + 1]):
+        out.log_weights[end] = tracks.log_weights[c]
+        copy_component(tracks.means, tracks.covs, c, out.means, out.covs, end)
+        end += 1
+    _close_track(store, tracks.labels[track, 0], tracks.labels[track, 1], end)
+
+
+@kernel
+def stored(store: FactorStore) -> FactoredGlmb:
+    """The factors as a density, without the room that is left."""
+    filled, out = store.filled, store.components
+    num, end = filled[_TRACKS], filled[_COMPONENTS]
+    tracks = Tracks(
+        store.labels[: 2 * num].copy().reshape((num, 2)),
+        store.offsets[: num + 1].copy(),
+        out.log_weights[:end].copy(),
+        out.means[:end].copy(),
+        out.covs[:end].copy(),
+    )
+    return FactoredGlmb(
+        tracks,
+        store.track_offsets[: filled[_FACTORS] + 1].copy(),
+        store.hyp_offsets[: filled[_HYPS] + 1].copy(),
+        store.hyp_tracks[: filled[_ENTRIES]].copy(),
+        store.hyp_log_weights[: filled[_HYPS]].copy(),
+        store.factor_offsets[: filled[_FACTORS] + 1].copy(),
+    )
+
+
+__all__ = ["FactorStore", "append_part", "append_single", "make_store", "next_component", "stored", "with_room"]

@@ -1,0 +1,162 @@
+"""Splitting a GLMB into independent factors, at a stated L1 error.
+
+Of the hypotheses of a GLMB, each a choice of one symbol a label (a track, or absence) with weight w, the product of the
+marginals of some parts of the labels has the weights pi = prod over parts of w_part. It differs from the GLMB by
+
+    sum over choices |w - pi| = sum over hypotheses |w - pi| + 1 - sum over hypotheses pi,
+
+as the choices that are no hypothesis have w = 0, and all pi sum to 1. That bounds the L1 distance of the densities.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from vedette.kernels.base.arrays import counted_ints, filled_ints, hashed
+from vedette.kernels.base.compile import kernel
+from vedette.kernels.base.types import Floats, Glmb, Ints
+from vedette.kernels.gaussian.mixtures import descending_order
+from vedette.kernels.labelled.labels import increasing_labels, label_place
+
+# Rounding leaves a product this far from what it is equal to.
+_EQUAL = 1e-13
+
+
+class Choices(NamedTuple):
+    """The hypotheses of a GLMB as choices of one symbol a label."""
+
+    labels: Ints  # (num_labels, 2) increasing
+    symbols: Ints  # (num_hyps, num_labels) the label's track, -1 where it is absent
+    weights: Floats  # (num_hyps,) linear
+
+
+@kernel
+def choices_of(glmb: Glmb) -> Choices:
+    """The hypotheses of a normalised GLMB."""
+    labels = increasing_labels(glmb)
+    num, num_labels = len(glmb.hyp_log_weights), len(labels)
+    symbols, weights = np.empty((num, num_labels), np.int64), np.empty(num)
+    for h in range(num):
+        weights[h] = math.exp(glmb.hyp_log_weights[h])
+        for k in range(num_labels):
+            symbols[h, k] = -1
+        for e in range(glmb.hyp_offsets[h], glmb.hyp_offsets[h + 1]):
+            track = glmb.hyp_tracks[e]
+            place = label_place(labels, num_labels, glmb.tracks.labels[track, 0], glmb.tracks.labels[track, 1])
+            symbols[h, place] = track
+    return Choices(labels, symbols, weights)
+
+
+@kernel
+def group_choices(symbols: Ints, part_of: Ints, part: int, groups: Ints) -> Ints:
+    """Number the choices of the labels of a part by first occurrence: (num_hyps,) into `groups`; the first of each."""
+    num, size = len(symbols), 4
+    while size < 2 * num:
+        size *= 2
+    table, firsts, count = filled_ints(size, -1), np.empty(num, np.int64), 0
+    for h in range(num):
+        key = 0
+        for k in range(len(part_of)):
+            if part_of[k] == part:
+                key = hashed(key, symbols[h, k] + 1)
+        slot = key & (size - 1)
+        while table[slot] >= 0 and not _same_choice(symbols, firsts[table[slot]], h, part_of, part):
+            slot = (slot + 1) & (size - 1)
+        if table[slot] < 0:
+            table[slot] = count
+            firsts[count] = h
+            count += 1
+        groups[h] = table[slot]
+    return firsts[:count]
+
+
+@kernel
+def _same_choice(symbols: Ints, a: int, b: int, part_of: Ints, part: int) -> bool:
+    same = True
+    for k in range(len(part_of)):
+        same = same and (part_of[k] != part or symbols[a, k] == symbols[b, k])
+    return same
+
+
+@kernel
+def _product_error(choices: Choices, part_of: Ints, pairwise: Ints) -> float:
+    """L1 distance of the product of the parts from the choices; of the labels with `pairwise` 1 alone.
+
+    Where labels are left out, hypotheses that differ in them alone are one.
+    """
+    num, num_labels = choices.symbols.shape
+    groups, products, own = np.empty(num, np.int64), np.empty(num), np.empty(num)
+    for h in range(num):
+        products[h], own[h] = 1.0, choices.weights[h]
+    everything = group_choices(choices.symbols, pairwise, 1, groups)
+    sums = np.zeros(len(everything))
+    for h in range(num):
+        sums[groups[h]] += choices.weights[h]
+    for g in range(len(everything)):
+        own[everything[g]] = sums[g]
+    for part in range(num_labels):
+        if part_of[part] != part or pairwise[part] == 0:
+            continue
+        firsts = group_choices(choices.symbols, part_of, part, groups)
+        sums = np.zeros(len(firsts))
+        for h in range(num):
+            sums[groups[h]] += choices.weights[h]
+        for h in everything:
+            products[h] *= sums[groups[h]]
+    error, left = 0.0, 1.0
+    for h in everything:
+        error += abs(own[h] - products[h])
+        left -= products[h]
+    return error + max(0.0, left)
+
+
+@kernel
+def _dependences(choices: Choices) -> tuple[Ints, Ints, Floats]:
+    """Every two labels, and the L1 distance of their joint choices from those of independent ones."""
+    num = len(choices.labels)
+    most = num * (num - 1) // 2
+    firsts, seconds, errors = np.empty(most, np.int64), np.empty(most, np.int64), np.empty(most)
+    alone, marked, filled = counted_ints(num), np.zeros(num, np.int64), 0
+    for a in range(num):
+        for b in range(a):
+            marked[a] = marked[b] = 1
+            firsts[filled], seconds[filled], errors[filled] = b, a, _product_error(choices, alone, marked)
+            marked[a] = marked[b] = 0
+            filled += 1
+    return firsts, seconds, errors
+
+
+@kernel
+def independent_parts(choices: Choices, max_error: float) -> tuple[Ints, float]:
+    """(num_labels,) the first label of the part that each is in, and the L1 error of their product.
+
+    The parts are as small as an error of at most `max_error` allows, labels that depend on each other most joined
+    first; one part, without error, where nothing smaller is within it.
+    """
+    num = len(choices.labels)
+    part_of, everything = counted_ints(num), filled_ints(num, 1)
+    if num < 2:
+        return part_of, 0.0
+    error = _product_error(choices, part_of, everything)
+    if error <= max(max_error, _EQUAL):
+        return part_of, error
+    firsts, seconds, errors = _dependences(choices)
+    num_parts = num
+    for pair in descending_order(errors):
+        a, b = part_of[firsts[pair]], part_of[seconds[pair]]
+        if a == b:
+            continue
+        for k in range(num):
+            if part_of[k] == max(a, b):
+                part_of[k] = min(a, b)
+        num_parts -= 1
+        error = _product_error(choices, part_of, everything) if num_parts > 1 else 0.0
+        if error <= max(max_error, _EQUAL):
+            break
+    return part_of, error
+
+
+__all__ = ["Choices", "choices_of", "group_choices", "independent_parts"]

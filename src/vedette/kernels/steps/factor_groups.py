@@ -1,0 +1,236 @@
+"""The factors of a belief that a scan links, as one small GLMB of their own: rows, options and prior hypotheses."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from vedette.kernels.association.assignment import Options
+from vedette.kernels.association.children import Children, Parents
+from vedette.kernels.association.predicted import Rows, taken_rows
+from vedette.kernels.association.products import product_of
+from vedette.kernels.association.search import SearchCaps
+from vedette.kernels.base.compile import borrowing, inlined, kernel
+from vedette.kernels.base.types import FactoredGlmb, Floats, Ints
+from vedette.kernels.gaussian.linalg import log_add, log_sum
+from vedette.kernels.gaussian.mixtures import descending_order
+
+
+class Factors(NamedTuple):
+    """The factors of a scan: those of the prior, then every birth site as one of its own."""
+
+    prior: FactoredGlmb
+    row_offsets: Ints  # (num_factors + 1,) rows of each
+    num_labels: Ints  # (num_factors,)
+
+
+class Group(NamedTuple):
+    """Factors that a scan is taken by together. Rows are in label order, and columns numbered within the group."""
+
+    rows: Rows
+    options: Options
+    parents: Parents  # products of the factors' hypotheses, heaviest first
+    measurements: Ints  # (num_columns,) of the scan
+    log_bound: float  # log total weight of all joint choices if rows could share measurements, cut parents included
+
+
+@inlined
+def is_single(factors: Factors, factor: int) -> bool:
+    """Whether the factor is one row: one track that is there or not."""
+    return bool(factors.row_offsets[factor + 1] - factors.row_offsets[factor] == 1)
+
+
+@kernel
+def factors_of(prior: FactoredGlmb, num_births: int) -> Factors:
+    """The factors of a scan, with their rows in the order of `predicted_rows`."""
+    num_prior = len(prior.factor_offsets) - 1
+    row_offsets, num_labels = np.zeros(num_prior + num_births + 1, np.int64), np.empty(num_prior + num_births, np.int64)
+    for factor in range(num_prior):
+        row_offsets[factor + 1] = prior.track_offsets[factor + 1]
+        num_labels[factor] = _count_labels(prior.tracks.labels, row_offsets[factor], row_offsets[factor + 1])
+    for birth in range(num_births):
+        row_offsets[num_prior + birth + 1] = row_offsets[num_prior + birth] + 1
+        num_labels[num_prior + birth] = 1
+    return Factors(prior, row_offsets, num_labels)
+
+
+@borrowing
+def _count_labels(labels: Ints, first: int, last: int) -> int:
+    count = 0
+    for i in range(first, last):
+        is_new = 1
+        for j in range(first, i):
+            if labels[j, 0] == labels[i, 0] and labels[j, 1] == labels[i, 1]:
+                is_new = 0
+                break
+        count += is_new
+    return count
+
+
+@borrowing
+def weigh_singles(factors: Factors, rows: Rows) -> None:
+    """Make the rows of single tracks, predicted as if certain, uncertain by the hypotheses of their factors."""
+    prior = factors.prior
+    for factor in range(len(prior.factor_offsets) - 1):
+        if not is_single(factors, factor):
+            continue
+        log_absent, log_present = -math.inf, -math.inf
+        for h in range(prior.factor_offsets[factor], prior.factor_offsets[factor + 1]):
+            if prior.hyp_offsets[h + 1] > prior.hyp_offsets[h]:
+                log_present = log_add(log_present, prior.hyp_log_weights[h])
+            else:
+                log_absent = log_add(log_absent, prior.hyp_log_weights[h])
+        row = factors.row_offsets[factor]
+        # Absent: never there, or there and died.
+        rows.log_absent[row] = log_add(log_absent, log_present + rows.log_absent[row])
+        for c in range(rows.offsets[row], rows.offsets[row + 1]):
+            rows.log_weights[c] += log_present
+
+
+@kernel
+def _members(factors: Factors, group: Ints, labels: Ints) -> Ints:
+    """The rows of a group's factors in label order, versions of a track in the order of the rows."""
+    num = 0
+    for factor in group:
+        num += factors.row_offsets[factor + 1] - factors.row_offsets[factor]
+    members, filled = np.empty(num, np.int64), 0
+    for factor in group:
+        for row in range(factors.row_offsets[factor], factors.row_offsets[factor + 1]):
+            slot = filled
+            while slot > 0 and (
+                labels[members[slot - 1], 0] > labels[row, 0]
+                or (labels[members[slot - 1], 0] == labels[row, 0] and labels[members[slot - 1], 1] > labels[row, 1])
+            ):
+                members[slot] = members[slot - 1]
+                slot -= 1
+            members[slot] = row
+            filled += 1
+    return members
+
+
+@kernel
+def _taken_options(options: Options, members: Ints, columns: Ints) -> tuple[Options, Ints]:
+    """The options of some rows, with columns of their own, and which measurement each column is.
+
+    columns: (num_measurements,) all -1, and so again afterwards. Component entries stay those of all rows.
+    """
+    num = 0
+    for row in members:
+        num += options.offsets[row + 1] - options.offsets[row]
+    offsets, own = np.zeros(len(members) + 1, np.int64), np.empty(num, np.int64)
+    log_weights, entries, measurements = np.empty(num), np.empty(num, np.int64), np.empty(num, np.int64)
+    filled, num_columns = 0, 0
+    for i in range(len(members)):
+        for option in range(options.offsets[members[i]], options.offsets[members[i] + 1]):
+            column = options.columns[option]
+            if column >= 0 and columns[column] < 0:
+                columns[column], measurements[num_columns] = num_columns, column
+                num_columns += 1
+            own[filled] = columns[column] if column >= 0 else column
+            log_weights[filled], entries[filled] = options.log_weights[option], options.entries[option]
+            filled += 1
+        offsets[i + 1] = filled
+    for k in range(num_columns):
+        columns[measurements[k]] = -1
+    taken = Options(offsets, own, log_weights, entries, options.component_log_weights, options.whitened, num_columns)
+    return taken, measurements[:num_columns]
+
+
+@kernel
+def _parents_of(factors: Factors, factor: int, place: Ints) -> Parents:
+    """The hypotheses of one factor over the rows of its group, heaviest first. place: of each row in the group."""
+    if is_single(factors, factor):
+        # Whether the track is there is in its row's weights: both hypotheses are one.
+        rows = np.empty(1, np.int64)
+        rows[0] = place[factors.row_offsets[factor]]
+        offsets = np.zeros(2, np.int64)
+        offsets[1] = 1
+        return Parents(offsets, rows, np.zeros(1))
+    prior = factors.prior
+    first, last = prior.factor_offsets[factor], prior.factor_offsets[factor + 1]
+    order, filled = descending_order(prior.hyp_log_weights[first:last]), 0
+    offsets = np.zeros(last - first + 1, np.int64)
+    rows = np.empty(prior.hyp_offsets[last] - prior.hyp_offsets[first], np.int64)
+    log_weights = np.empty(last - first)
+    for h in range(last - first):
+        hyp = first + order[h]
+        for e in range(prior.hyp_offsets[hyp], prior.hyp_offsets[hyp + 1]):
+            rows[filled] = place[prior.hyp_tracks[e]]
+            filled += 1
+        offsets[h + 1], log_weights[h] = filled, prior.hyp_log_weights[hyp]
+    return Parents(offsets, rows, log_weights)
+
+
+@kernel
+def _log_bound(parents: Parents, log_totals: Floats) -> float:
+    """Log total weight of the choices of these hypotheses if rows could share measurements."""
+    bounds = np.empty(len(parents.log_weights))
+    for parent in range(len(bounds)):
+        bounds[parent] = parents.log_weights[parent]
+        for i in range(parents.offsets[parent], parents.offsets[parent + 1]):
+            bounds[parent] += log_totals[parents.rows[i]]
+    return log_sum(bounds)
+
+
+@kernel
+def _log_row_totals(options: Options) -> Floats:
+    totals = np.empty(len(options.offsets) - 1)
+    for row in range(len(totals)):
+        totals[row] = log_sum(options.log_weights[options.offsets[row] : options.offsets[row + 1]])
+    return totals
+
+
+@kernel
+def gathered_group(
+    factors: Factors, members_of: Ints, rows: Rows, options: Options, caps: SearchCaps, place: Ints, columns: Ints
+) -> Group:
+    """The factors `members_of` as a problem of their own.
+
+    place: (num_rows,) to work in. columns: (num_measurements,) all -1, and so again afterwards.
+    """
+    members = _members(factors, members_of, rows.labels)
+    for i in range(len(members)):
+        place[members[i]] = i
+    own, measurements = _taken_options(options, members, columns)
+    log_totals = _log_row_totals(own)
+    parents = _parents_of(factors, members_of[0], place)
+    log_bound = _log_bound(parents, log_totals)
+    for k in range(1, len(members_of)):
+        other = _parents_of(factors, members_of[k], place)
+        log_bound += _log_bound(other, log_totals)
+        parents = product_of(parents, other, caps)
+    return Group(taken_rows(rows, members), own, parents, measurements, log_bound)
+
+
+@kernel
+def left_out_of(group: Group, children: Children, caps: SearchCaps) -> float:
+    """Upper bound on the weight of the joint choices that ranking has not found, relative to the heaviest.
+
+    children: as ranked, heaviest first, at least one. Of each parent no more is left than its bound less what was
+    found, nor than the number of its choices times the heaviest that may be left; of parents cut before, their bound.
+    """
+    options, parents, num = group.options, group.parents, children.filled[0]
+    best, log_totals = children.log_weights[0], _log_row_totals(options)
+    log_next = best - caps.max_log_gap
+    if num >= caps.max_hypotheses:
+        log_next = max(log_next, children.log_weights[num - 1])
+    found, all_parents, left = np.zeros(len(parents.log_weights)), 0.0, 0.0
+    for child in range(num):
+        found[children.parents[child]] += math.exp(children.log_weights[child] - best)
+    for parent in range(len(found)):
+        log_all, log_count = parents.log_weights[parent], 0.0
+        for i in range(parents.offsets[parent], parents.offsets[parent + 1]):
+            row = parents.rows[i]
+            log_all += log_totals[row]
+            log_count += math.log(max(1, options.offsets[row + 1] - options.offsets[row]))
+        total = math.exp(log_all - best)
+        all_parents += total
+        left += max(0.0, min(total - found[parent], math.exp(log_count + log_next - best)))
+    cut = math.exp(group.log_bound - best) - all_parents
+    # What rounding leaves of nothing is nothing.
+    return left + (cut if cut > 1e-12 * all_parents else 0.0)
+
+
+__all__ = ["Factors", "Group", "factors_of", "gathered_group", "is_single", "left_out_of", "weigh_singles"]
