@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from vedette.densities import GLMB, LMB, IidCluster, MultiBernoulli, Poisson, TrackTable
+from vedette.densities import GLMB, LMB, FactoredGLMB, IidCluster, Labelled, MultiBernoulli, Poisson, TrackTable
 from vedette.densities.checks import unchecked
 from vedette.errors import InputError, ModelError, VedetteError
 from vedette.kernels.base.types import Bools, Floats
@@ -18,7 +18,7 @@ from vedette.models import BirthModel
 from vedette.models.arguments import as_array, reject, step_number
 from vedette.models.measurement import MeasurementModel, wrap_angular
 
-_Density = TypeVar("_Density", GLMB, LMB, Poisson, IidCluster, MultiBernoulli)
+_Density = TypeVar("_Density", GLMB, LMB, FactoredGLMB, Poisson, IidCluster, MultiBernoulli)
 
 
 def check_scan(scan: Any, measurement: MeasurementModel) -> tuple[Floats, int]:
@@ -77,7 +77,7 @@ def check_belief(belief: object, kind: type[_Density], state_dim: int, name: str
     return belief
 
 
-def births_for(birth: BirthModel, step: Any, belief: GLMB | LMB | None = None, births: LMB | None = None) -> LMB:
+def births_for(birth: BirthModel, step: Any, belief: Labelled | None = None, births: LMB | None = None) -> LMB:
     """Who may be born at a step: `births`, or the sites of the model where that is None.
 
     Raises:
