@@ -9,17 +9,21 @@ import numpy as np
 from vedette.kernels.base.compile import kernel
 from vedette.kernels.base.types import Floats, Ints
 
+# Probabilities below are 0: far below what sums to one can show, and numbers smaller yet are slow.
+_LEAST = 1e-280
+
 
 @kernel
 def convolved(probabilities: Floats, offsets: Ints) -> Floats:
     """Distribution of the sum of independent numbers.
 
     Number `i` is n with probability `probabilities[offsets[i] + n]`, n from 0 up to the run's end.
+    Probabilities below 1e-280 become 0.
     """
     num = len(offsets) - 1
     found, last = np.zeros(offsets[num] - num + 1), np.zeros(offsets[num] - num + 1)
     found[0] = 1.0
-    # Places outside `low:high` hold zeros, as do all that a vanishing probability has left there.
+    # Places outside `low:high` hold zeros.
     low, high = 0, 1
     for i in range(num):
         width = offsets[i + 1] - offsets[i]
@@ -32,10 +36,12 @@ def convolved(probabilities: Floats, offsets: Ints) -> Floats:
                 for n in range(low, high):
                     found[n + k] += share * last[n]
         high += width - 1
-        while found[low] == 0.0 and low + 1 < high:
+        while found[low] < _LEAST and low + 1 < high:
+            found[low] = 0.0
             low += 1
-        while found[high - 1] == 0.0 and low + 1 < high:
+        while found[high - 1] < _LEAST and low + 1 < high:
             high -= 1
+            found[high] = 0.0
     return found
 
 
