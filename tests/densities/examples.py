@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from hypothesis import strategies as st
 
 import reference
-from vedette.densities import GLMB, LMB, Poisson, TrackTable
+from vedette.densities import GLMB, LMB, FactoredGLMB, Poisson, TrackTable
 
 STATE_DIM = 2
 
@@ -51,6 +52,30 @@ def random_lmb(rng: np.random.Generator, num_labels: int) -> LMB:
     )
 
 
+def random_factor(rng: np.random.Generator, labels: Any, max_components: int = 1, num_hyps: int = 4) -> GLMB:
+    """A delta-GLMB of these labels; of one label as an LMB lays it out: absent, then there, and one track."""
+    if len(labels) == 1:
+        mixture = random_mixture(rng, int(rng.integers(1, max_components + 1)))
+        existence = float(rng.random())
+        return GLMB.from_hypotheses(TrackTable.from_mixtures(labels, [mixture]), [[], [0]], [1 - existence, existence])
+    versions = np.repeat(labels, 2, axis=0)
+    sizes = rng.integers(1, max_components + 1, len(versions))
+    tracks = TrackTable.from_mixtures(versions, [random_mixture(rng, int(size)) for size in sizes])
+    members = rng.random((num_hyps, len(labels))) < 0.6
+    hypotheses = [(2 * np.flatnonzero(row) + rng.integers(2, size=row.sum())).tolist() for row in members]
+    return GLMB.from_hypotheses(tracks, hypotheses, -np.sort(-rng.dirichlet(np.ones(num_hyps))))
+
+
+def random_factored(
+    rng: np.random.Generator, sizes: Sequence[int], max_components: int = 1, num_hyps: int = 4, labels: Any = None
+) -> FactoredGLMB:
+    """A product of GLMBs of so many labels each, which are mixed over the factors."""
+    drawn = random_labels(rng, sum(sizes)) if labels is None else np.array(labels)
+    ends = np.cumsum(sizes)
+    parts = [drawn[end - size : end] for end, size in zip(ends, sizes, strict=True)]
+    return FactoredGLMB.from_factors([random_factor(rng, own, max_components, num_hyps) for own in parts], STATE_DIM)
+
+
 def random_poisson(rng: np.random.Generator, num: int) -> Poisson:
     return Poisson.from_gaussians(rng.random(num), rng.normal(size=(num, STATE_DIM)), random_covs(rng, num))
 
@@ -64,6 +89,11 @@ def glmbs(max_components: int = 3) -> st.SearchStrategy[GLMB]:
 
 def lmbs() -> st.SearchStrategy[LMB]:
     return st.builds(random_lmb, _SEEDS, st.integers(0, 6))
+
+
+def factoreds(max_components: int = 1) -> st.SearchStrategy[FactoredGLMB]:
+    sizes = st.lists(st.sampled_from([1, 1, 1, 2, 3]), max_size=4)
+    return st.builds(random_factored, _SEEDS, sizes, st.just(max_components))
 
 
 def poissons() -> st.SearchStrategy[Poisson]:
@@ -86,6 +116,16 @@ def plain_glmb(glmb: GLMB) -> reference.Glmb:
         tracks = {label_of(glmb.tracks, t): plain_mixture(glmb.tracks, t) for t in chosen}
         plain.append((float(np.exp(glmb.hyp_log_weights[h])), tracks))
     return plain
+
+
+def plain_product(density: FactoredGLMB) -> reference.Glmb:
+    """All products of one hypothesis of each factor."""
+    products: reference.Glmb = [(1.0, {})]
+    for factor in density.factors:
+        products = [
+            (weight * own, {**tracks, **more}) for weight, tracks in products for own, more in plain_glmb(factor)
+        ]
+    return products
 
 
 def plain_lmb(lmb: LMB) -> reference.Lmb:

@@ -10,17 +10,25 @@ import numpy as np
 import pytest
 
 from vedette import models
-from vedette.densities import GLMB, LMB, TrackTable, existence_probabilities
+from vedette.densities import GLMB, LMB, FactoredGLMB, TrackTable, existence_probabilities
 from vedette.densities.checks import unchecked
 from vedette.errors import InputError, ModelError, NumericalError
-from vedette.filters import CbMemberFilter, CphdFilter, DeltaGlmbFilter, Limits, LmbFilter, PhdFilter
+from vedette.filters import (
+    CbMemberFilter,
+    CphdFilter,
+    DeltaGlmbFilter,
+    FactoredGlmbFilter,
+    Limits,
+    LmbFilter,
+    PhdFilter,
+)
 
 pytestmark = pytest.mark.lanes
 
 POSE = np.zeros(3)
 REGION = models.Region(-100.0, 100.0, -100.0, 100.0)
 NEAR = [[10.0, 10.0]]
-KINDS = [DeltaGlmbFilter, LmbFilter]
+KINDS = [DeltaGlmbFilter, LmbFilter, FactoredGlmbFilter]
 each_kind = pytest.mark.parametrize("kind", KINDS)
 every_kind = pytest.mark.parametrize("kind", [*KINDS, PhdFilter, CphdFilter, CbMemberFilter])
 
@@ -160,7 +168,7 @@ def test_scans_of_other_types_are_converted(kind: Any) -> None:
 def test_beliefs(kind: Any) -> None:
     tracker = make(kind)
     other = LMB if kind is DeltaGlmbFilter else GLMB
-    name = "GLMB" if kind is DeltaGlmbFilter else "LMB"
+    name = type(tracker.initial()).__name__
     with pytest.raises(InputError, match=f"belief: expected a {name}; got {other.__name__}"):
         step(tracker, belief=other.empty(4))
     with pytest.raises(InputError, match=f"belief: expected a {name}; got str"):
@@ -286,7 +294,8 @@ def test_a_belief_that_is_no_density(kind: Any) -> None:
     covs = -np.eye(4)[None]
     tracks = unchecked(TrackTable, np.zeros((1, 2), np.int64), np.arange(2), np.zeros(1), np.zeros((1, 4)), covs)
     glmb = unchecked(GLMB, tracks, np.arange(2), np.zeros(1, np.int64), np.zeros(1))
-    belief = glmb if kind is DeltaGlmbFilter else unchecked(LMB, tracks, np.zeros(1))
+    lmb = unchecked(LMB, tracks, np.zeros(1))
+    belief = {DeltaGlmbFilter: glmb, LmbFilter: lmb, FactoredGlmbFilter: FactoredGLMB.from_lmb(lmb)}[kind]
     tracker = make(kind, motion=models.constant_velocity(1.0, method="ukf"))
     with pytest.raises(NumericalError, match="covariance of a track is not positive definite"):
         step(tracker, belief=belief, number=2)
@@ -363,7 +372,8 @@ def test_models_that_forbid_the_scan(kind: Any) -> None:
     )
     mean, cov = np.full((1, 4), 10.0), np.eye(4)[None]
     certain = LMB.from_bernoullis([[0, 0]], [1.0], mean, cov)
-    prior = certain if kind is LmbFilter else GLMB.from_hypotheses(certain.tracks, [[0]], [1.0])
+    glmb, factored = GLMB.from_hypotheses(certain.tracks, [[0]], [1.0]), FactoredGLMB.from_lmb(certain)
+    prior = {DeltaGlmbFilter: glmb, LmbFilter: certain, FactoredGlmbFilter: factored}[kind]
     with pytest.raises(NumericalError, match=r"step 4: no .* has positive weight; do the models forbid this scan"):
         step(tracker, [], prior, number=4)
 
@@ -375,7 +385,7 @@ def test_more_targets_than_caps(kind: Any) -> None:
     scan = sites.means[:, :2]
     belief, info = step(make(kind, limits, birth=sites), scan)
     belief.validate()
-    if kind is LmbFilter:
+    if kind is not DeltaGlmbFilter:
         assert belief.tracks.num_tracks == 3
         assert 4.0 < info.dropped_existence <= 5.0
     else:

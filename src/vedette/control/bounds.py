@@ -11,7 +11,7 @@ from vedette.control.additive.evaluator import AdditiveEvaluator
 from vedette.control.additive.rewards import AdditiveRewards
 from vedette.control.evidence import Evidence
 from vedette.control.plan import Bound
-from vedette.densities.label_sets import offsets_of
+from vedette.densities.checks import offsets_of
 from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.planning.bernoulli_rows import Table
 from vedette.kernels.planning.bounds import Choices, best_of_labels, losses_at_least

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vedette.control.additive.rewards import AdditiveRewards
-from vedette.densities.label_sets import offsets_of
+from vedette.densities.checks import offsets_of
 from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.planning.explained import Reached, ValueParts, fill_value_parts, no_value_parts
 from vedette.threads import run_chunks

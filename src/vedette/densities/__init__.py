@@ -1,6 +1,13 @@
 """What is believed about the targets: labelled and unlabelled multi-target densities with Gaussian-mixture tracks."""
 
-from vedette.densities.conversions import glmb_to_lmb, lmb_to_glmb, marginalise
+from vedette.densities.conversions import (
+    as_lmb,
+    factored_to_glmb,
+    factored_to_lmb,
+    glmb_to_lmb,
+    lmb_to_glmb,
+    marginalise,
+)
 from vedette.densities.estimates import (
     Estimate,
     Estimator,
@@ -10,7 +17,7 @@ from vedette.densities.estimates import (
     track_histories,
     unlabelled_estimate,
 )
-from vedette.densities.factored import FactoredGLMB
+from vedette.densities.factored import FactoredGLMB, Labelled
 from vedette.densities.files import load_density, save_density
 from vedette.densities.glmb import GLMB
 from vedette.densities.iid_cluster import IidCluster
@@ -41,14 +48,18 @@ __all__ = [
     "Estimator",
     "FactoredGLMB",
     "IidCluster",
+    "Labelled",
     "MultiBernoulli",
     "MultiTargetSamples",
     "Poisson",
     "TrackHistory",
     "TrackTable",
     "UndetectedIntensity",
+    "as_lmb",
     "cardinality_distribution",
     "existence_probabilities",
+    "factored_to_glmb",
+    "factored_to_lmb",
     "glmb_to_lmb",
     "lmb_to_glmb",
     "load_density",

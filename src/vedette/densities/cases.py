@@ -9,9 +9,9 @@ from typing import TypeAlias
 import numpy as np
 from scipy.special import log_expit
 
-from vedette.densities.checks import unchecked
+from vedette.densities.checks import offsets_of, unchecked
 from vedette.densities.glmb import GLMB
-from vedette.densities.label_sets import Label, LabelSet, label_sets, offsets_of, single_gaussians, take_hypotheses
+from vedette.densities.label_sets import Label, LabelSet, label_sets, single_gaussians, take_hypotheses
 from vedette.densities.lmb import LMB
 from vedette.densities.tracks import TrackTable
 from vedette.kernels.base.types import Bools, Floats, Ints

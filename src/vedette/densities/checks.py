@@ -89,6 +89,27 @@ def check_offsets(field: str, offsets: Any, count: int, total: int, *, empty_all
         raise InputError(f"{field}[{place + 1}]: expected {expected}; got {offsets[place + 1]} after {offsets[place]}")
 
 
+def offsets_of(sizes: Sequence[int] | Ints) -> Ints:
+    """(len(sizes) + 1,) offsets of runs of these sizes."""
+    return np.concatenate([np.zeros(1, np.int64), np.cumsum(sizes, dtype=np.int64)])
+
+
+def take_runs(offsets: Ints, places: Ints) -> tuple[Ints, Ints]:
+    """Offsets of the runs at `places` when they are put one after another, and the entries that they then have."""
+    taken = offsets_of(np.diff(offsets)[places])
+    return taken, np.repeat(offsets[places] - taken[:-1], np.diff(taken)) + np.arange(taken[-1])
+
+
+def distinct_labels(labels: Ints) -> tuple[Ints, Ints]:
+    """(num_distinct, 2) the distinct ones of (num, 2) labels in increasing order, and (num,) the place of each."""
+    order = np.lexsort(labels.T[::-1])
+    ordered, place = labels[order], np.empty(len(labels), np.int64)
+    new = np.ones(len(labels), np.bool_)
+    new[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)
+    place[order] = np.cumsum(new) - 1
+    return ordered[new], place
+
+
 def run_log_sums(log_weights: Floats, offsets: Ints) -> Floats:
     """log-sum-exp of each run of `log_weights`; runs are not empty."""
     if len(offsets) == 1:

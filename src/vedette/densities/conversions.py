@@ -4,16 +4,24 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import TypeVar
 
 import numpy as np
 from scipy.special import log_expit
 
-from vedette.densities.checks import unchecked
+from vedette.densities.checks import distinct_labels, unchecked
+from vedette.densities.factored import FactoredGLMB, Labelled
 from vedette.densities.glmb import GLMB
+from vedette.densities.label_sets import take_factors
 from vedette.densities.lmb import LMB
+from vedette.densities.tracks import TrackTable
 from vedette.errors import InputError
+from vedette.kernels.base.types import Lmb
 from vedette.kernels.gaussian.mixtures import MixtureCaps
+from vedette.kernels.gaussian.pooling import pooled_tracks
 from vedette.kernels.labelled import conversions as kernels
+
+_Glmb = TypeVar("_Glmb", GLMB, FactoredGLMB)
 
 DEFAULT_LOG_MIN_WEIGHT = math.log(1e-5)
 DEFAULT_MERGE_DISTANCE = 2.0
@@ -30,12 +38,12 @@ def _checked_caps(max_components: int, log_min_weight: float, merge_distance: fl
 
 
 def marginalise(
-    glmb: GLMB,
+    glmb: _Glmb,
     *,
     max_components: int = 1,
     log_min_weight: float = DEFAULT_LOG_MIN_WEIGHT,
     merge_distance: float = DEFAULT_MERGE_DISTANCE,
-) -> GLMB:
+) -> _Glmb:
     """Marginalised delta-GLMB of a delta-GLMB: one hypothesis a label set (paper eq. 10; Fantacci and Vo 2015).
 
     Keeps the probability of every label set, and so the cardinality distribution and the existence probabilities. Each
@@ -44,11 +52,60 @@ def marginalise(
     `log_min_weight` (log, relative to the track) are dropped, those within the Mahalanobis distance `merge_distance`
     are merged, and the heaviest `max_components` stay; a `merge_distance` of 0 merges nothing.
 
-    Hypotheses come out by descending weight, equal weights in the order of their first occurrence.
+    Hypotheses come out by descending weight, equal weights in the order of their first occurrence. A product of GLMBs
+    is marginalised factor by factor, in their order; factors of one label keep the order of their hypotheses.
     Raises `InputError` for a limit outside its range.
     """
     caps = _checked_caps(max_components, log_min_weight, merge_distance)
+    if isinstance(glmb, FactoredGLMB):
+        return marginalised_factors(glmb, caps)
     return GLMB.from_kernel(kernels.marginalise(glmb.to_kernel(), caps))
+
+
+def marginalised_factors(density: FactoredGLMB, caps: MixtureCaps) -> FactoredGLMB:
+    """The density with every factor marginalised, in their order; those laid out as `from_lmb` does stay so."""
+    bernoulli = density.is_bernoulli
+    singles, several = np.flatnonzero(bernoulli), np.flatnonzero(~bernoulli)
+    alone = take_factors(density, singles)
+    num = len(singles)
+    if len(alone.tracks.log_weights) > num:
+        each = np.arange(num + 1)
+        tracks = pooled_tracks(
+            alone.tracks.to_kernel(), alone.tracks.labels, each, each[:-1].copy(), np.ones(num), caps
+        )
+        alone = unchecked(FactoredGLMB, TrackTable.from_kernel(tracks), *alone.to_kernel()[1:])
+    factors = (density.factor(index).to_kernel() for index in several.tolist())
+    parts = [FactoredGLMB.from_glmb(GLMB.from_kernel(kernels.marginalise(factor, caps))) for factor in factors]
+    order = np.argsort(np.concatenate([singles, several]))
+    return take_factors(FactoredGLMB.product([alone, *parts], density.state_dim), order)
+
+
+def as_lmb(
+    density: Labelled,
+    *,
+    max_components: int = 1,
+    log_min_weight: float = DEFAULT_LOG_MIN_WEIGHT,
+    merge_distance: float = DEFAULT_MERGE_DISTANCE,
+) -> LMB:
+    """An LMB as it is; the LMB of GLMBs, see `glmb_to_lmb` and `factored_to_lmb`."""
+    if isinstance(density, LMB):
+        return density
+    caps = _checked_caps(max_components, log_min_weight, merge_distance)
+    return LMB.from_kernel(reduced_lmb(density, caps))
+
+
+def reduced_lmb(density: GLMB | FactoredGLMB, caps: MixtureCaps) -> Lmb:
+    """The LMB of a GLMB or of a product of them, its mixtures reduced."""
+    if isinstance(density, GLMB):
+        return kernels.glmb_to_lmb(density.to_kernel(), caps)
+    all_labels, place = distinct_labels(density.tracks.labels)
+    place_of_entry = place[density.hyp_tracks]
+    used = np.bincount(place_of_entry, minlength=len(all_labels)) > 0  # a table may have more
+    factor = np.empty(len(all_labels), np.int64)
+    factor[place] = np.repeat(np.arange(density.num_factors), np.diff(density.track_offsets))
+    firsts, ends = density.factor_offsets[factor[used]], density.factor_offsets[factor[used] + 1]
+    label_of = (np.cumsum(used) - 1)[place_of_entry]
+    return kernels.factors_to_lmb(density.as_hypotheses(), all_labels[used], label_of, firsts, ends, caps)
 
 
 def glmb_to_lmb(
@@ -64,7 +121,19 @@ def glmb_to_lmb(
     by `marginalise`. Raises `InputError` for a limit outside its range.
     """
     caps = _checked_caps(max_components, log_min_weight, merge_distance)
-    return LMB.from_kernel(kernels.glmb_to_lmb(glmb.to_kernel(), caps))
+    return LMB.from_kernel(reduced_lmb(glmb, caps))
+
+
+def factored_to_lmb(
+    density: FactoredGLMB,
+    *,
+    max_components: int = 1,
+    log_min_weight: float = DEFAULT_LOG_MIN_WEIGHT,
+    merge_distance: float = DEFAULT_MERGE_DISTANCE,
+) -> LMB:
+    """As `glmb_to_lmb`, of a product of GLMBs, all its factors at once."""
+    caps = _checked_caps(max_components, log_min_weight, merge_distance)
+    return LMB.from_kernel(reduced_lmb(density, caps))
 
 
 def lmb_to_glmb(lmb: LMB, *, max_hypotheses: int) -> tuple[GLMB, float]:
@@ -73,13 +142,26 @@ def lmb_to_glmb(lmb: LMB, *, max_hypotheses: int) -> tuple[GLMB, float]:
     The GLMB shares the LMB's track table, and its weights are normalised over the subsets kept, which come by
     descending weight. Subsets of probability zero are not listed. Raises `InputError` for a `max_hypotheses` below 1.
     """
-    if max_hypotheses < 1:
-        raise InputError(f"max_hypotheses: expected at least 1; got {max_hypotheses}")
-    glmb, discarded_weight = kernels.lmb_to_glmb(lmb.to_kernel(), int(max_hypotheses))
+    glmb, discarded_weight = kernels.lmb_to_glmb(lmb.to_kernel(), _at_least_one(max_hypotheses))
     return GLMB.from_kernel(glmb), float(discarded_weight)
 
 
-__all__ = ["DEFAULT_LOG_MIN_WEIGHT", "DEFAULT_MERGE_DISTANCE", "glmb_to_lmb", "lmb_to_glmb", "marginalise"]
+def factored_to_glmb(density: FactoredGLMB, *, max_hypotheses: int) -> tuple[GLMB, float]:
+    """GLMB of the `max_hypotheses` heaviest products of one hypothesis of each factor, and the weight of the others.
+
+    The GLMB shares the track table, and its weights are normalised over what is kept, which comes by descending weight.
+    Products of weight zero are not listed. Raises `InputError` for a `max_hypotheses` below 1.
+    """
+    labels, label_of = distinct_labels(density.tracks.labels)
+    most = _at_least_one(max_hypotheses)
+    glmb, discarded_weight = kernels.factored_to_glmb(density.to_kernel(), label_of, len(labels), most)
+    return GLMB.from_kernel(glmb), float(discarded_weight)
+
+
+def _at_least_one(max_hypotheses: int) -> int:
+    if max_hypotheses < 1:
+        raise InputError(f"max_hypotheses: expected at least 1; got {max_hypotheses}")
+    return int(max_hypotheses)
 
 
 def lmb_on_label_sets(lmb: LMB, sets: Sequence[Sequence[tuple[int, ...]]]) -> GLMB:
@@ -93,3 +175,18 @@ def lmb_on_label_sets(lmb: LMB, sets: Sequence[Sequence[tuple[int, ...]]]) -> GL
     offsets = np.cumsum([0, *(len(hyp) for hyp in hyps)])
     members = np.array([track for hyp in hyps for track in hyp], np.int64)
     return unchecked(GLMB, lmb.tracks, offsets, members, log_weights)
+
+
+__all__ = [
+    "DEFAULT_LOG_MIN_WEIGHT",
+    "DEFAULT_MERGE_DISTANCE",
+    "as_lmb",
+    "factored_to_glmb",
+    "factored_to_lmb",
+    "glmb_to_lmb",
+    "lmb_on_label_sets",
+    "lmb_to_glmb",
+    "marginalise",
+    "marginalised_factors",
+    "reduced_lmb",
+]

@@ -10,13 +10,16 @@ from typing import Any, Protocol
 import numpy as np
 
 from vedette.densities import checks
-from vedette.densities.conversions import glmb_to_lmb
+from vedette.densities.checks import distinct_labels
+from vedette.densities.conversions import as_lmb
+from vedette.densities.factored import LABELLED, FactoredGLMB, Labelled
 from vedette.densities.glmb import GLMB
 from vedette.densities.iid_cluster import IidCluster
 from vedette.densities.lmb import LMB
 from vedette.densities.multi_bernoulli import MultiBernoulli
 from vedette.densities.poisson import Poisson
-from vedette.densities.statistics import cardinality_distribution
+from vedette.densities.sharing import heaviest_tracks
+from vedette.densities.statistics import cardinality_distribution, existence_probabilities
 from vedette.densities.tracks import TrackTable
 from vedette.errors import InputError, NumericalError, VedetteError
 from vedette.kernels.base.types import Floats, Ints
@@ -77,11 +80,12 @@ class Estimator(Protocol):
         ...
 
 
-def map_estimate(density: GLMB | LMB) -> Estimate:
+def map_estimate(density: Labelled) -> Estimate:
     """The most probable number of targets, then the most probable targets of that number (paper, Algorithm 1).
 
-    GLMB: the heaviest hypothesis of that cardinality. LMB: that many labels of highest existence. Ties: the smaller
-    number; the earlier hypothesis; the smaller label. A track that is a mixture is estimated by its heaviest component,
+    GLMB: the heaviest hypothesis of that cardinality. LMB: that many labels of highest existence. Product of GLMBs: the
+    heaviest hypothesis of that cardinality among all products of one of each factor. Ties: the smaller number; the
+    earlier hypothesis; the smaller label. A track that is a mixture is estimated by its heaviest component,
     as the mean of two rival components may lie where the target cannot be.
     """
     if isinstance(density, GLMB):
@@ -90,7 +94,9 @@ def map_estimate(density: GLMB | LMB) -> Estimate:
         number = int(np.argmax(cardinality_distribution(density)))
         chosen = np.sort(np.argsort(-density.existence_logit, kind="stable")[:number])
         return _peaks(density.tracks, chosen, density.existence[chosen])
-    raise InputError(f"density: expected a GLMB or an LMB, which have labels; got {type(density).__name__}")
+    if isinstance(density, FactoredGLMB):
+        return _map_of_factors(density)
+    raise InputError(f"density: expected {LABELLED}, which have labels; got {type(density).__name__}")
 
 
 def _map_of_glmb(density: GLMB) -> Estimate:
@@ -107,22 +113,29 @@ def _map_of_glmb(density: GLMB) -> Estimate:
     return _peaks(density.tracks, chosen, np.minimum(track_weights @ same, 1.0))
 
 
-def marginal_estimate(density: GLMB | LMB, threshold: float = 0.5) -> Estimate:
+def _map_of_factors(density: FactoredGLMB) -> Estimate:
+    chosen = heaviest_tracks(density, int(np.argmax(cardinality_distribution(density))))
+    labels, existence = existence_probabilities(density)
+    # Both come in increasing label order, and every chosen label is one of those.
+    _, place = distinct_labels(np.concatenate([labels, density.tracks.labels[chosen]]))
+    return _peaks(density.tracks, chosen, existence[place[len(labels) :]])
+
+
+def marginal_estimate(density: Labelled, threshold: float = 0.5) -> Estimate:
     """Every label whose probability of existence exceeds `threshold`, each estimated by the heaviest component of its
     marginal density.
 
     Not by the mean of that density: targets born close together may have swapped labels, and the mean then lies halfway
-    between the two. For a GLMB, near components (Mahalanobis distance 2) are merged before they are weighed.
+    between the two. For GLMBs, near components (Mahalanobis distance 2) are merged before they are weighed.
     Raises `InputError` for a threshold outside [0, 1).
     """
     if not 0.0 <= threshold < 1.0:
         raise InputError(f"threshold: expected a probability below 1; got {threshold}")
-    if isinstance(density, GLMB):
-        density = glmb_to_lmb(density, max_components=_MARGINAL_COMPONENTS)
-    if not isinstance(density, LMB):
-        raise InputError(f"density: expected a GLMB or an LMB, which have labels; got {type(density).__name__}")
-    chosen = np.flatnonzero(density.existence > threshold)
-    return _peaks(density.tracks, chosen, density.existence[chosen])
+    if not isinstance(density, Labelled):
+        raise InputError(f"density: expected {LABELLED}, which have labels; got {type(density).__name__}")
+    lmb = as_lmb(density, max_components=_MARGINAL_COMPONENTS)
+    chosen = np.flatnonzero(lmb.existence > threshold)
+    return _peaks(lmb.tracks, chosen, lmb.existence[chosen])
 
 
 def _peaks(tracks: TrackTable, chosen: Ints, existence: Floats) -> Estimate:

@@ -4,17 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 
 from vedette.densities import checks
 from vedette.densities.glmb import GLMB
-from vedette.densities.label_sets import offsets_of
 from vedette.densities.lmb import LMB
 from vedette.densities.tracks import TrackTable
 from vedette.errors import InputError, NumericalError, VedetteError
 from vedette.kernels.base import types as kt
-from vedette.kernels.base.types import Floats, Ints
+from vedette.kernels.base.types import Bools, Floats, Ints
+from vedette.kernels.labelled.stacking import join_offsets, stack_glmbs
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,6 +56,15 @@ class FactoredGLMB:
     def num_factors(self) -> int:
         """Number of factors."""
         return len(self.factor_offsets) - 1
+
+    @property
+    def is_bernoulli(self) -> Bools:
+        """(num_factors,) which factors are of one label and laid out as by `from_lmb`: absent, then there."""
+        hyps, first = np.diff(self.factor_offsets), self.factor_offsets[:-1]
+        found = (np.diff(self.track_offsets) == 1) & (hyps == 2)
+        sizes = np.diff(self.hyp_offsets)
+        found[found] = (sizes[first[found]] == 0) & (sizes[first[found] + 1] == 1)
+        return np.asarray(found)
 
     @property
     def num_hyps(self) -> int:
@@ -101,6 +111,10 @@ class FactoredGLMB:
             self.factor_offsets,
         )
 
+    def as_hypotheses(self) -> kt.Glmb:
+        """The hypotheses of all factors as one list, which is no density: its weights sum to the number of factors."""
+        return kt.Glmb(self.tracks.to_kernel(), self.hyp_offsets, self.hyp_tracks, self.hyp_log_weights)
+
     @classmethod
     def from_kernel(cls, density: kt.FactoredGlmb) -> FactoredGLMB:
         """The arrays of a bundle as they are; a kernel's own need no check."""
@@ -124,26 +138,31 @@ class FactoredGLMB:
             if not isinstance(factor, GLMB) or factor.state_dim != state_dim:
                 got = f"{type(factor).__name__} of {getattr(factor, 'state_dim', 'no')} dimensions"
                 raise InputError(f"factors[{index}]: expected a GLMB of states of dimension {state_dim}; got {got}")
-        tables = [factor.tracks for factor in factors] or [TrackTable.empty(state_dim)]
-        track_offsets = offsets_of([factor.tracks.num_tracks for factor in factors])
-        tracks = checks.unchecked(
-            TrackTable,
-            np.concatenate([table.labels for table in tables]),
-            offsets_of(np.concatenate([np.diff(table.offsets) for table in tables])),
-            np.concatenate([table.log_weights for table in tables]),
-            np.concatenate([table.means for table in tables]),
-            np.concatenate([table.covs for table in tables]),
+        return cls.product([cls.from_glmb(factor) for factor in factors], state_dim)
+
+    @classmethod
+    def from_glmb(cls, glmb: GLMB) -> FactoredGLMB:
+        """The same density, as one factor."""
+        ends = np.array([0, glmb.tracks.num_tracks]), np.array([0, glmb.num_hyps])
+        return checks.unchecked(
+            cls, glmb.tracks, ends[0], glmb.hyp_offsets, glmb.hyp_tracks, glmb.hyp_log_weights, ends[1]
         )
-        none, sizes = np.empty(0, np.int64), [np.diff(factor.hyp_offsets) for factor in factors]
-        members = [factor.hyp_tracks + low for factor, low in zip(factors, track_offsets, strict=False)]
+
+    @classmethod
+    def product(cls, parts: Sequence[FactoredGLMB], state_dim: int) -> FactoredGLMB:
+        """The product of densities of which no two share a label: their factors, one density's after another's.
+
+        state_dim: of all of them. Raises `InputError` for a label in two of them.
+        """
+        if not parts:
+            return cls.empty(state_dim)
+        stack = stack_glmbs([part.as_hypotheses() for part in parts])
         made: FactoredGLMB = checks.unchecked(
             cls,
-            tracks,
-            track_offsets,
-            offsets_of(np.concatenate([none, *sizes])),
-            np.concatenate([none, *members]),
-            np.concatenate([np.empty(0), *(factor.hyp_log_weights for factor in factors)]),
-            offsets_of([factor.num_hyps for factor in factors]),
+            TrackTable.from_kernel(stack.tracks),
+            join_offsets([part.track_offsets for part in parts]),
+            *stack[1:],
+            join_offsets([part.factor_offsets for part in parts]),
         )
         made._validate_labels()
         return made
@@ -157,13 +176,7 @@ class FactoredGLMB:
         log_weights[:, 1] = -np.logaddexp(0.0, -lmb.existence_logit)
         ends = np.repeat(np.arange(num + 1), 2)
         return checks.unchecked(
-            cls,
-            lmb.tracks,
-            np.arange(num + 1),
-            ends[:-1].copy(),
-            np.arange(num),
-            log_weights.ravel(),
-            2 * np.arange(num + 1),
+            cls, lmb.tracks, np.arange(num + 1), ends[:-1], np.arange(num), log_weights.ravel(), 2 * np.arange(num + 1)
         )
 
     def validate(self, *, error: type[VedetteError] = NumericalError) -> None:
@@ -183,12 +196,31 @@ class FactoredGLMB:
         checks.check_offsets("factor_offsets", self.factor_offsets, num, self.num_hyps, empty_allowed=False)
         checks.check_offsets("track_offsets", self.track_offsets, num, num_tracks, empty_allowed=True)
         checks.check_offsets("hyp_offsets", self.hyp_offsets, self.num_hyps, len(self.hyp_tracks), empty_allowed=True)
+        if self._factors_fit():
+            num = 0  # there is no fault to be named
         for index in range(num):
             try:
                 self.factor(index)._validate_hypotheses(error)
             except VedetteError as fault:
                 raise type(fault)(f"factor {index}: {fault}") from None
         self._validate_labels()
+
+    def _factors_fit(self) -> bool:
+        """Whether each factor by itself is a normalised GLMB; all at once, for there may be thousands."""
+        factor = np.repeat(np.arange(self.num_factors), np.diff(self.factor_offsets))
+        owner = np.repeat(factor, np.diff(self.hyp_offsets))
+        if not (
+            (self.track_offsets[owner] <= self.hyp_tracks) & (self.hyp_tracks < self.track_offsets[owner + 1])
+        ).all():
+            return False
+        in_order = checks.label_step_up(self.tracks.labels[self.hyp_tracks])
+        starts = self.hyp_offsets[(self.hyp_offsets > 0) & (self.hyp_offsets < len(self.hyp_tracks))]
+        in_order[starts - 1] = True
+        weights = self.hyp_log_weights
+        if not in_order.all() or np.isnan(weights).any() or (weights == np.inf).any():
+            return False
+        sums = checks.run_log_sums(weights, self.factor_offsets)
+        return bool((np.abs(sums) <= checks.NORMALISATION_TOLERANCE).all())
 
     def _validate_labels(self) -> None:
         """Raise `InputError` where two factors share a label."""
@@ -202,3 +234,8 @@ class FactoredGLMB:
             raise InputError(
                 f"tracks.labels: expected each label in one factor; got {labels[order[place]].tolist()} in {pair}"
             )
+
+
+# A density that names its targets, and how messages call it.
+Labelled: TypeAlias = GLMB | LMB | FactoredGLMB
+LABELLED = "a GLMB, an LMB or a FactoredGLMB"

@@ -9,6 +9,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+from vedette.densities.factored import FactoredGLMB, Labelled
 from vedette.densities.glmb import GLMB
 from vedette.densities.iid_cluster import IidCluster
 from vedette.densities.lmb import LMB
@@ -27,15 +28,17 @@ _TRACK_FIELDS = ("labels", "offsets", "log_weights", "means", "covs")
 _OWN_FIELDS: dict[str, tuple[str, ...]] = {
     "glmb": ("hyp_offsets", "hyp_tracks", "hyp_log_weights"),
     "lmb": ("existence_logit",),
+    "factored_glmb": ("track_offsets", "hyp_offsets", "hyp_tracks", "hyp_log_weights", "factor_offsets"),
     "poisson": ("log_weights", "means", "covs"),
     "iid_cluster": ("log_cardinality", "log_weights", "means", "covs"),
     "multi_bernoulli": ("existence_logit", "offsets", "log_weights", "means", "covs"),
 }
 
-Density: TypeAlias = GLMB | LMB | Poisson | IidCluster | MultiBernoulli
+Density: TypeAlias = Labelled | Poisson | IidCluster | MultiBernoulli
 _KINDS: dict[str, type[Density]] = {
     "glmb": GLMB,
     "lmb": LMB,
+    "factored_glmb": FactoredGLMB,
     "poisson": Poisson,
     "iid_cluster": IidCluster,
     "multi_bernoulli": MultiBernoulli,
@@ -51,7 +54,7 @@ def save_density(path: str | os.PathLike[str], density: Density) -> None:
     if kind is None:
         raise InputError(f"density: expected a multi-target density; got {type(density).__name__}")
     arrays: dict[str, Any] = {"format": FORMAT_NAME, "version": FORMAT_VERSION, "kind": kind}
-    if isinstance(density, GLMB | LMB):
+    if isinstance(density, Labelled):
         arrays |= {f"tracks.{name}": getattr(density.tracks, name) for name in _TRACK_FIELDS}
     arrays |= {name: getattr(density, name) for name in _OWN_FIELDS[kind]}
     target = Path(path)
@@ -97,7 +100,7 @@ def _kind_of(source: Path, arrays: Mapping[str, Any]) -> str:
 def _build(kind: str, arrays: Mapping[str, Any]) -> Density:
     own = [arrays[name] for name in _OWN_FIELDS[kind]]
     container: Callable[..., Density] = _KINDS[kind]
-    if kind not in ("glmb", "lmb"):
+    if kind not in ("glmb", "lmb", "factored_glmb"):
         return container(*own)
     return container(TrackTable(*(arrays[f"tracks.{name}"] for name in _TRACK_FIELDS)), *own)
 

@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
 from typing import NamedTuple, TypeAlias, TypeVar
 
 import numpy as np
 
-from vedette.densities.checks import unchecked
+from vedette.densities.checks import distinct_labels, offsets_of, take_runs, unchecked
+from vedette.densities.factored import FactoredGLMB
 from vedette.densities.glmb import GLMB
 from vedette.densities.lmb import LMB
 from vedette.densities.statistics import existence_probabilities, track_moments
 from vedette.densities.tracks import TrackTable
-from vedette.kernels.base.types import Ints
+from vedette.kernels.base.types import Bools, Ints
+from vedette.kernels.gaussian.mixtures import MixtureCaps
+from vedette.kernels.labelled.conversions import glmb_to_lmb
 from vedette.kernels.labelled.labels import group_by_label_set
 
 Label: TypeAlias = tuple[int, ...]
 LabelSet: TypeAlias = tuple[Label, ...]
-_Labelled = TypeVar("_Labelled", GLMB, LMB)
+_Labelled = TypeVar("_Labelled", GLMB, LMB, FactoredGLMB)
+_WHOLE = MixtureCaps(-math.inf, 0.0, 2**62)  # which leave mixtures as they are
 
 
 class LabelSets(NamedTuple):
@@ -37,11 +41,6 @@ def label_sets(belief: GLMB) -> LabelSets:
     return LabelSets(sets, groups)
 
 
-def offsets_of(sizes: Sequence[int] | Ints) -> Ints:
-    """(len(sizes) + 1,) offsets of runs of these sizes."""
-    return np.concatenate([np.zeros(1, np.int64), np.cumsum(sizes, dtype=np.int64)])
-
-
 def places_of(labels: Ints, table: Ints) -> Ints:
     """(num_labels,) place of each label among the distinct labels of a table, -1 where it is none of them."""
     place = {tuple(label): i for i, label in enumerate(table.tolist())}
@@ -50,9 +49,7 @@ def places_of(labels: Ints, table: Ints) -> Ints:
 
 def take_tracks(tracks: TrackTable, places: Ints) -> TrackTable:
     """The tracks at `places`, in that order."""
-    sizes = np.diff(tracks.offsets)[places]
-    offsets = offsets_of(sizes)
-    components = np.repeat(tracks.offsets[places] - offsets[:-1], sizes) + np.arange(offsets[-1])
+    offsets, components = take_runs(tracks.offsets, places)
     return unchecked(
         TrackTable,
         tracks.labels[places],
@@ -65,9 +62,7 @@ def take_tracks(tracks: TrackTable, places: Ints) -> TrackTable:
 
 def take_hypotheses(belief: GLMB, places: Ints) -> GLMB:
     """The hypotheses at `places`, in that order, with their tracks only; their weights are not normalised."""
-    sizes = np.diff(belief.hyp_offsets)[places]
-    offsets = offsets_of(sizes)
-    entries = np.repeat(belief.hyp_offsets[places] - offsets[:-1], sizes) + np.arange(offsets[-1])
+    offsets, entries = take_runs(belief.hyp_offsets, places)
     used, renumbered = np.unique(belief.hyp_tracks[entries], return_inverse=True)
     return unchecked(
         GLMB,
@@ -86,22 +81,71 @@ def single_gaussians(tracks: TrackTable) -> TrackTable:
     return unchecked(TrackTable, tracks.labels, np.arange(num + 1), np.zeros(num), *track_moments(tracks))
 
 
+def take_factors(density: FactoredGLMB, places: Ints) -> FactoredGLMB:
+    """The factors at `places`, in that order."""
+    track_offsets, tracks = take_runs(density.track_offsets, places)
+    factor_offsets, hyps = take_runs(density.factor_offsets, places)
+    hyp_offsets, entries = take_runs(density.hyp_offsets, hyps)
+    moved = track_offsets[:-1] - density.track_offsets[places]
+    members = np.repeat(moved, hyp_offsets[factor_offsets[1:]] - hyp_offsets[factor_offsets[:-1]])
+    return unchecked(
+        FactoredGLMB,
+        take_tracks(density.tracks, tracks),
+        track_offsets,
+        hyp_offsets,
+        density.hyp_tracks[entries] + members,
+        density.hyp_log_weights[hyps],
+        factor_offsets,
+    )
+
+
+def laid_out(glmb: GLMB) -> FactoredGLMB:
+    """A GLMB as one factor; of one label, as `FactoredGLMB.from_lmb` lays it out, of none, no factor at all.
+
+    Nothing is lost: the tracks of one label become one mixture of all their components.
+    """
+    labels, _ = distinct_labels(glmb.tracks.labels[glmb.hyp_tracks])
+    if len(labels) > 1:
+        return FactoredGLMB.from_glmb(glmb)
+    return FactoredGLMB.from_lmb(LMB.from_kernel(glmb_to_lmb(glmb.to_kernel(), _WHOLE)))
+
+
 def without_labels(belief: _Labelled, labels: Ints) -> tuple[_Labelled, float]:
     """The belief of the targets that have none of (num, 2) `labels`, and the summed existence of those that do.
 
-    Hypotheses of a GLMB that then hold the same tracks become one.
+    Hypotheses of a GLMB that then hold the same tracks become one. Factors of which no label is left go.
     """
     if len(labels) == 0:
         return belief, 0.0
-    gone = {tuple(label) for label in labels.tolist()}
     known, existence = existence_probabilities(belief)
-    dropped = float(
-        sum(chance for label, chance in zip(known.tolist(), existence, strict=True) if tuple(label) in gone)
-    )
-    kept = np.array([tuple(label) not in gone for label in belief.tracks.labels.tolist()], np.bool_)
+    dropped = float(existence[_are_among(known, labels)].sum())
+    kept = ~_are_among(belief.tracks.labels, labels)
     if isinstance(belief, LMB):
         places = np.flatnonzero(kept)
         return unchecked(LMB, take_tracks(belief.tracks, places), belief.existence_logit[places]), dropped
+    if isinstance(belief, FactoredGLMB):
+        return _factors_without(belief, kept), dropped
+    return _glmb_without(belief, kept), dropped
+
+
+def _are_among(labels: Ints, table: Ints) -> Bools:
+    """(num_labels,) whether each label is in a table."""
+    distinct, place = distinct_labels(np.concatenate([table, labels]))
+    known = np.zeros(len(distinct), np.bool_)
+    known[place[: len(table)]] = True
+    return known[place[len(table) :]]
+
+
+def _factors_without(belief: FactoredGLMB, kept: Bools) -> FactoredGLMB:
+    counts = np.diff(offsets_of(kept.astype(np.int64))[belief.track_offsets])
+    whole, parted = counts == np.diff(belief.track_offsets), []
+    for index in np.flatnonzero(~whole & (counts > 0)).tolist():
+        tracks = kept[belief.track_offsets[index] : belief.track_offsets[index + 1]]
+        parted.append(laid_out(_glmb_without(belief.factor(index), tracks)))
+    return FactoredGLMB.product([take_factors(belief, np.flatnonzero(whole)), *parted], belief.state_dim)
+
+
+def _glmb_without(belief: GLMB, kept: Bools) -> GLMB:
     weights: dict[tuple[int, ...], float] = {}
     for hyp, log_weight in enumerate(belief.hyp_log_weights.tolist()):
         tracks = belief.hyp_tracks[belief.hyp_offsets[hyp] : belief.hyp_offsets[hyp + 1]]
@@ -115,4 +159,4 @@ def without_labels(belief: _Labelled, labels: Ints) -> tuple[_Labelled, float]:
         offsets_of([len(members) for members in order]),
         np.array([renumbered[track] for members in order for track in members], np.int64),
         np.array([weights[members] for members in order]),
-    ), dropped
+    )

@@ -10,7 +10,8 @@ from typing import NamedTuple
 import numpy as np
 
 from vedette.densities.cases import LabelledCases
-from vedette.densities.label_sets import Label, offsets_of
+from vedette.densities.checks import offsets_of
+from vedette.densities.label_sets import Label
 from vedette.errors import InputError
 from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.kernels.gaussian.information import row_size

@@ -7,7 +7,8 @@ import math
 import numpy as np
 from scipy.special import expit, gammaln
 
-from vedette.densities.checks import run_log_sums
+from vedette.densities.checks import distinct_labels, offsets_of, run_log_sums
+from vedette.densities.factored import LABELLED, FactoredGLMB, Labelled
 from vedette.densities.glmb import GLMB
 from vedette.densities.iid_cluster import IidCluster
 from vedette.densities.lmb import LMB
@@ -16,18 +17,21 @@ from vedette.densities.poisson import Poisson
 from vedette.densities.tracks import TrackTable
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats, Ints
+from vedette.kernels.labelled.cardinality import convolved
 
 
-def cardinality_distribution(density: GLMB | LMB | Poisson | IidCluster | MultiBernoulli) -> Floats:
+def cardinality_distribution(density: Labelled | Poisson | IidCluster | MultiBernoulli) -> Floats:
     """Probabilities of 0, 1, ..., n targets; they sum to one.
 
-    n is the size of the largest hypothesis of a GLMB, the number of labels of an LMB and of Bernoullis of a
-    multi-Bernoulli, and the largest number that an iid cluster holds. A Poisson density has no largest number: n is one
-    beyond which less than 1e-20 remains.
+    n is the size of the largest hypothesis of a GLMB (of a product of GLMBs, the sum of theirs), the number of labels
+    of an LMB and of Bernoullis of a multi-Bernoulli, and the largest number that an iid cluster holds. A Poisson
+    density has no largest number: n is one beyond which less than 1e-20 remains.
     """
     if isinstance(density, GLMB):
         sizes = np.diff(density.hyp_offsets)
         return np.asarray(np.bincount(sizes, weights=np.exp(density.hyp_log_weights)), np.float64)
+    if isinstance(density, FactoredGLMB):
+        return _of_factors(density)
     if isinstance(density, LMB | MultiBernoulli):
         return _poisson_binomial(density.existence_logit)
     if isinstance(density, IidCluster):
@@ -43,27 +47,33 @@ def _log(value: float) -> float:
     return math.log(value) if value > 0.0 else -math.inf
 
 
+def _of_factors(density: FactoredGLMB) -> Floats:
+    """The distributions of all factors, convolved."""
+    sizes, factor = (
+        np.diff(density.hyp_offsets),
+        np.repeat(np.arange(density.num_factors), np.diff(density.factor_offsets)),
+    )
+    largest = np.maximum.reduceat(sizes, density.factor_offsets[:-1]) if density.num_factors else sizes
+    offsets = offsets_of(largest + 1)
+    chances = np.bincount(offsets[factor] + sizes, np.exp(density.hyp_log_weights), minlength=offsets[-1])
+    return convolved(np.asarray(chances, np.float64), offsets)
+
+
 def _poisson_binomial(existence_logit: Floats) -> Floats:
-    distribution = np.ones(1)
-    for present, absent in zip(expit(existence_logit), expit(-existence_logit), strict=True):
-        longer = np.zeros(len(distribution) + 1)
-        longer[:-1] = absent * distribution
-        longer[1:] += present * distribution
-        distribution = longer
-    return distribution
+    chances = np.stack([expit(-existence_logit), expit(existence_logit)], axis=1)
+    return convolved(chances.ravel(), 2 * np.arange(len(chances) + 1))
 
 
-def existence_probabilities(density: GLMB | LMB) -> tuple[Ints, Floats]:
+def existence_probabilities(density: Labelled) -> tuple[Ints, Floats]:
     """(num_labels, 2) labels in increasing order and (num_labels,) the probability that each one's target exists."""
     if isinstance(density, LMB):
         return density.tracks.labels, density.existence
-    if isinstance(density, GLMB):
-        entry_labels = density.tracks.labels[density.hyp_tracks]
-        labels, label_of = np.unique(entry_labels, axis=0, return_inverse=True)
+    if isinstance(density, GLMB | FactoredGLMB):
+        labels, label_of = distinct_labels(density.tracks.labels[density.hyp_tracks])
         weights = np.repeat(np.exp(density.hyp_log_weights), np.diff(density.hyp_offsets))
-        existence = np.bincount(label_of.reshape(-1), weights=weights, minlength=len(labels))
+        existence = np.bincount(label_of, weights=weights, minlength=len(labels))
         return labels, np.minimum(existence, 1.0)
-    raise InputError(f"density: expected a GLMB or an LMB, which have labels; got {type(density).__name__}")
+    raise InputError(f"density: expected {LABELLED}, which have labels; got {type(density).__name__}")
 
 
 def mixture_moments(log_weights: Floats, means: Floats, covs: Floats) -> tuple[Floats, Floats]:

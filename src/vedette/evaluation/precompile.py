@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from vedette.control import JointPlanner
-from vedette.densities import GLMB, LMB
+from vedette.densities import GLMB, LMB, FactoredGLMB, Labelled
 from vedette.evaluation.runs import children_ignore_interrupts
 from vedette.scenarios import Scenario
 from vedette.scenarios.build import build_experiment, build_planner
@@ -28,7 +28,7 @@ def precompile(scenario: Scenario) -> None:
     forbidden, or fail) is compiled where it is first used; no result depends on it.
     """
     experiment = build_experiment(scenario)
-    if not isinstance(experiment.tracker.initial().fused, GLMB | LMB):
+    if not isinstance(experiment.tracker.initial().fused, Labelled):
         _compile_tracker(experiment)  # there is no fusion nor planning without labels
         return
     other = get_context("spawn").Process(target=_compile_planning, args=(scenario,), daemon=True)
@@ -62,11 +62,14 @@ def _compile_planning(scenario: Scenario) -> None:
     quick.plan(state, experiment.poses, rng=run_stream(0, 0))
 
 
-def _belief(experiment: Experiment, num_targets: int) -> GLMB | LMB:
+def _belief(experiment: Experiment, num_targets: int) -> Labelled:
     """One target at each of the first birth sites, in the kind of density that the filter keeps."""
     birth, labels = experiment.tracker.targets.birth, [(1, site) for site in range(num_targets)]
     sites = slice(num_targets)
     belief = LMB.from_bernoullis(labels, birth.existence[sites], birth.means[sites], birth.covs[sites])
-    if isinstance(experiment.tracker.initial().fused, LMB):
+    initial = experiment.tracker.initial().fused
+    if isinstance(initial, LMB):
         return belief
+    if isinstance(initial, FactoredGLMB):
+        return FactoredGLMB.from_lmb(belief)
     return GLMB.from_hypotheses(belief.tracks, [list(range(num_targets))], [1.0])

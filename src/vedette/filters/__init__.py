@@ -2,7 +2,7 @@
 
 from typing import TypeAlias
 
-from vedette.densities import GLMB, LMB, IidCluster, MultiBernoulli, Poisson
+from vedette.densities import IidCluster, Labelled, MultiBernoulli, Poisson
 from vedette.filters.base import Filter, TwoStepFilter, labels_targets, shared_targets
 from vedette.filters.cbmember import CbMemberFilter
 from vedette.filters.cphd import CphdFilter
@@ -16,7 +16,7 @@ from vedette.filters.multi_sensor_lmb import MultiSensorLmbFilter
 from vedette.filters.phd import PhdFilter
 from vedette.filters.sequential_lmb import SequentialLmbFilter
 
-Belief: TypeAlias = GLMB | LMB | Poisson | IidCluster | MultiBernoulli
+Belief: TypeAlias = Labelled | Poisson | IidCluster | MultiBernoulli
 
 __all__ = [
     "Belief",

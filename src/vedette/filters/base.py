@@ -8,7 +8,7 @@ from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
-from vedette.densities import GLMB, LMB, FactoredGLMB
+from vedette.densities import LMB, Labelled
 from vedette.errors import InputError
 from vedette.filters.info import FilterInfo
 from vedette.filters.inputs import births_for, check_scan
@@ -26,7 +26,7 @@ class Filter(Protocol):
     """How one sensor's belief meets time and a scan; one of your own is as good as those that are here.
 
     What it believes may be anything that the fusion and the estimator after it take. A filter labels its targets if
-    that is a `GLMB` or an `LMB`; decisions need one that does.
+    that is a `GLMB`, an `LMB` or a `FactoredGLMB`; decisions need one that does.
     """
 
     @property
@@ -82,8 +82,8 @@ class TwoStepFilter(Filter, Protocol):
 
 
 def labels_targets(tracker: Filter) -> bool:
-    """Whether the filter's belief is a `GLMB` or an `LMB`."""
-    return isinstance(tracker.initial(), GLMB | LMB | FactoredGLMB)
+    """Whether the filter's belief is a `GLMB`, an `LMB` or a `FactoredGLMB`."""
+    return isinstance(tracker.initial(), Labelled)
 
 
 def shared_targets(filters: Sequence[Filter]) -> TargetModel:
@@ -119,13 +119,7 @@ class SingleSensorFilter:
                 raise InputError(f"{name}: expected a {kind.__name__}; got {type(value).__name__}")
 
     def _arguments(
-        self,
-        scan: Floats,
-        pose: Any,
-        dt: Any,
-        step: Any,
-        prior: GLMB | LMB | FactoredGLMB | None = None,
-        births: LMB | None = None,
+        self, scan: Floats, pose: Any, dt: Any, step: Any, prior: Labelled | None = None, births: LMB | None = None
     ) -> StepArguments:
         """Scan, models and truncation as the kernels take them, in their order.
 

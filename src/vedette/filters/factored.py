@@ -117,18 +117,17 @@ class FactoredGlmbFilter(SingleSensorFilter):
     ) -> tuple[FactoredGLMB, FilterInfo]:
         if report.log_total == -math.inf:
             raise NumericalError(f"{place}no hypothesis has positive weight; do the models forbid this scan?")
-        found = FactoredGLMB.from_kernel(posterior)
-        discarded = max(0.0, -math.expm1(report.log_kept))
+        found, dropped = self.limits.without_excess(FactoredGLMB.from_kernel(posterior))
         return found, FilterInfo(
             log_likelihood=report.log_total + report.log_clutter - self.sensor.clutter.rate,
             num_hypotheses=found.num_hyps,
             num_tracks=found.tracks.num_tracks,
-            discarded_weight_bound=discarded,
-            dropped_existence=float(report.dropped_existence),
+            discarded_weight_bound=max(0.0, -math.expm1(report.log_kept)),
+            dropped_existence=float(report.dropped_existence) + dropped,
             num_clutter_raised=int(report.num_raised),
             num_duplicates=num_duplicates,
             num_inexact_clusters=0,
             search_cut=bool(report.cut),
-            cap_met=False,
+            cap_met=bool(report.full) or found.tracks.num_tracks >= self.limits.max_labels,
             factoring_error=min(2.0, float(report.split_error + 2.0 * report.taken_twice)),
         )

@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from vedette.densities import GLMB, LMB, FactoredGLMB, IidCluster, MultiBernoulli, Poisson, TrackTable
+from vedette.densities import GLMB, LMB, FactoredGLMB, IidCluster, Labelled, MultiBernoulli, Poisson, TrackTable
 from vedette.densities.checks import unchecked
 from vedette.errors import InputError, ModelError, VedetteError
 from vedette.kernels.base.types import Bools, Floats
@@ -77,9 +77,7 @@ def check_belief(belief: object, kind: type[_Density], state_dim: int, name: str
     return belief
 
 
-def births_for(
-    birth: BirthModel, step: Any, belief: GLMB | LMB | FactoredGLMB | None = None, births: LMB | None = None
-) -> LMB:
+def births_for(birth: BirthModel, step: Any, belief: Labelled | None = None, births: LMB | None = None) -> LMB:
     """Who may be born at a step: `births`, or the sites of the model where that is None.
 
     Raises:

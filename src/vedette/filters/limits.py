@@ -10,7 +10,7 @@ from typing import TypeVar
 import numpy as np
 from scipy.special import gammaincinv, logit
 
-from vedette.densities import GLMB, LMB, glmb_to_lmb, track_moments
+from vedette.densities import GLMB, LMB, FactoredGLMB, Labelled, as_lmb, existence_probabilities, track_moments
 from vedette.densities.label_sets import without_labels
 from vedette.kernels.association.search import SearchCaps
 from vedette.kernels.association.truncation import Truncation
@@ -19,7 +19,7 @@ from vedette.kernels.gaussian.mixtures import MixtureCaps
 from vedette.kernels.steps.lmb import Reduction
 from vedette.models.arguments import dimension, non_negative, positive, probability, real, reject
 
-_Labelled = TypeVar("_Labelled", GLMB, LMB)
+_Labelled = TypeVar("_Labelled", GLMB, LMB, FactoredGLMB)
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,7 +27,8 @@ class Limits:
     """Caps and thresholds of the filters. `Limits.none()` switches them all off (for small exact problems).
 
     Attributes:
-        max_hypotheses: hypotheses kept; for an LMB, joint choices summed in a cluster too large for the exact sum.
+        max_hypotheses: hypotheses kept, of a factored density in each factor; for an LMB, joint choices summed in a
+            cluster too large for the exact sum.
         min_relative_weight: hypotheses lighter than this times the heaviest are dropped; in a CPHD filter the large
             numbers of targets less probable than this times the most probable.
         min_track_weight: for every label and what the scan may have done to it (missed, or detected as this
@@ -42,8 +43,8 @@ class Limits:
             or CPHD filter, are dropped.
         merge_distance: Mahalanobis distance within which components of a track are merged; 0 merges none.
         max_components: components a track; 1 keeps one moment-matched Gaussian.
-        min_existence: labels of an LMB, or Bernoullis, less probable than this are dropped.
-        max_labels: labels of an LMB, or Bernoullis of a multi-Bernoulli, kept.
+        min_existence: labels of an LMB or alone in their factor, or Bernoullis, less probable than this are dropped.
+        max_labels: labels of an LMB or a factored density, or Bernoullis of a multi-Bernoulli, kept.
         max_position_std: m; labels whose position is less certain than this along both axes are dropped after the scan:
             targets that nobody has seen for long. Infinite: none is.
         max_intensity_components: components of the intensity of a PHD or CPHD filter, all targets together.
@@ -131,6 +132,16 @@ class Limits:
         """The same, but that no label is dropped."""
         return replace(self, min_existence=0.0, max_labels=2**62, max_position_std=math.inf)
 
+    def without_excess(self, belief: FactoredGLMB) -> tuple[FactoredGLMB, float]:
+        """The belief without the least probable labels beyond `max_labels`, and without those of `without_spread`."""
+        excess = np.empty((0, 2), np.int64)
+        if belief.tracks.num_tracks > self.max_labels:
+            labels, existence = existence_probabilities(belief)
+            excess = labels[np.argsort(-existence, kind="stable")[self.max_labels :]]
+        fewer, dropped = without_labels(belief, excess)
+        kept, spread = self.without_spread(fewer)
+        return kept, dropped + spread
+
     def kept(self, belief: LMB) -> LMB:
         """The belief without the labels that `min_existence`, `max_labels` and `max_position_std` drop."""
         least, logits = float(logit(self.min_existence)), belief.existence_logit
@@ -160,9 +171,9 @@ def _reduction(limits: Limits) -> Reduction:
     return Reduction(limits.track_caps(), float(logit(limits.min_existence)), int(limits.max_labels))
 
 
-def _spread_labels(belief: GLMB | LMB, max_position_std: float) -> Ints:
+def _spread_labels(belief: Labelled, max_position_std: float) -> Ints:
     """(num, 2) labels whose position has more than this standard deviation along both axes."""
-    lmb = glmb_to_lmb(belief) if isinstance(belief, GLMB) else belief
+    lmb = as_lmb(belief)
     variances = np.diagonal(track_moments(lmb.tracks)[1], axis1=1, axis2=2)[:, :2]
     wide: Bools = variances.min(axis=1, initial=np.inf) > max_position_std**2
     return np.ascontiguousarray(lmb.tracks.labels[wide])

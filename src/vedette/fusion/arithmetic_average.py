@@ -9,8 +9,7 @@ import numpy as np
 from scipy.special import expit
 
 from vedette.densities import GLMB, LMB, TrackTable
-from vedette.densities.checks import unchecked
-from vedette.densities.label_sets import offsets_of
+from vedette.densities.checks import offsets_of, unchecked
 from vedette.fusion.base import (
     FusionInfo,
     FusionLimits,

@@ -6,7 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vedette.densities import GLMB, LMB, TrackTable
+from vedette.densities import Labelled, TrackTable
+from vedette.densities.factored import LABELLED
 from vedette.kernels.base.types import Floats
 from vedette.models import SensorModel
 from vedette.models.arguments import float_array, reject
@@ -30,7 +31,7 @@ class Views:
     sensors: tuple[SensorModel, ...]
     poses: Floats
     scanned: tuple[bool, ...]
-    prediction: GLMB | LMB | None = None
+    prediction: Labelled | None = None
 
     def __post_init__(self) -> None:
         num = len(self.sensors)
@@ -39,8 +40,8 @@ class Views:
         object.__setattr__(self, "poses", float_array("views.poses", self.poses, (num, None)))
         if len(self.scanned) != num:
             raise reject("views.scanned", f"{num}, one a sensor", len(self.scanned))
-        if not isinstance(self.prediction, GLMB | LMB | None):
-            raise reject("views.prediction", "a GLMB, an LMB or None", type(self.prediction).__name__)
+        if not isinstance(self.prediction, Labelled | None):
+            raise reject("views.prediction", f"{LABELLED}, or None", type(self.prediction).__name__)
 
     def if_all_scanned(self) -> Views:
         """What the sensors would see if each had scanned."""

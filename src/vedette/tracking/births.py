@@ -10,8 +10,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vedette.densities import GLMB, LMB, TrackTable, glmb_to_lmb
+from vedette.densities import LMB, Labelled, TrackTable, as_lmb
 from vedette.densities.checks import unchecked
+from vedette.densities.factored import LABELLED
 from vedette.errors import InputError
 from vedette.filters import Limits
 from vedette.filters.inputs import births_at, model_errors
@@ -54,7 +55,7 @@ def births_due(birth: BirthModel, step: int, measured: LMB | None) -> LMB | None
 
 def births_from_scans(
     birth: BirthModel,
-    belief: GLMB | LMB,
+    belief: Labelled,
     sensors: Sequence[SensorModel],
     scans: Sequence[Any],
     poses: Any,
@@ -77,13 +78,11 @@ def births_from_scans(
     model = birth.from_measurements
     if model is None:
         return None
-    if not isinstance(belief, GLMB | LMB):
-        raise InputError(f"belief: expected a GLMB or an LMB for births from measurements; got {type(belief).__name__}")
-    lmb = glmb_to_lmb(belief) if isinstance(belief, GLMB) else belief
+    if not isinstance(belief, Labelled):
+        raise InputError(f"belief: expected {LABELLED} for births from measurements; got {type(belief).__name__}")
+    lmb = as_lmb(belief).to_kernel()
     found = [
-        _unexplained(lmb.to_kernel(), sensor, scans[s], poses[s], s)
-        for s, sensor in enumerate(sensors)
-        if scans[s] is not None
+        _unexplained(lmb, sensor, scans[s], poses[s], s) for s, sensor in enumerate(sensors) if scans[s] is not None
     ]
     if not found:
         return LMB.empty(birth.state_dim)
@@ -94,7 +93,7 @@ def births_from_scans(
 
 def births_heard(
     birth: BirthModel,
-    belief: GLMB | LMB,
+    belief: Labelled,
     sensors: Sequence[SensorModel],
     scans: Sequence[Any],
     poses: Any,

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from vedette.densities import GLMB, LMB
+from vedette.densities import LMB, FactoredGLMB, Labelled
 
 _NUMBER = 8
 
@@ -17,10 +17,14 @@ def bytes_of_scan(scan: Any, pose: Any) -> int:
 
 
 def bytes_of_belief(belief: Any) -> int:
-    """Labels, existences or hypotheses, and the components of all tracks; 0 of a density that is no GLMB or LMB."""
-    if not isinstance(belief, GLMB | LMB):
+    """Labels, existences or hypotheses, and the components of all tracks; 0 of a density without labels."""
+    if not isinstance(belief, Labelled):
         return 0
     tracks, dim = belief.tracks, belief.state_dim
     numbers = 2 * tracks.num_tracks + len(tracks.log_weights) * (1 + dim + dim * (dim + 1) // 2)
-    own = tracks.num_tracks if isinstance(belief, LMB) else belief.num_hyps + len(belief.hyp_tracks)
+    if isinstance(belief, LMB):
+        return _NUMBER * (numbers + tracks.num_tracks)
+    own = belief.num_hyps + len(belief.hyp_tracks)
+    if isinstance(belief, FactoredGLMB):
+        own -= 2 * int(np.count_nonzero(belief.is_bernoulli))  # of which an existence says all
     return _NUMBER * (numbers + own)

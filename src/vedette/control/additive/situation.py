@@ -11,8 +11,8 @@ from scipy.special import logit
 from vedette.control.pseudo import decision_of, draw_paths, targets_of
 from vedette.control.settings import IDEAL_MODES, MobileSensor, PlanningSettings
 from vedette.densities import LMB
-from vedette.densities.checks import unchecked
-from vedette.densities.label_sets import offsets_of, places_of, single_gaussians, take_tracks
+from vedette.densities.checks import offsets_of, unchecked
+from vedette.densities.label_sets import places_of, single_gaussians, take_tracks
 from vedette.filters.inputs import model_errors
 from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.planning.bernoulli_rows import bernoulli_size

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from vedette.control.additive.situation import SensorGroup, Start
-from vedette.densities.label_sets import offsets_of
+from vedette.densities.checks import offsets_of
 from vedette.errors import InputError
 from vedette.filters.inputs import model_errors
 from vedette.fusion import LinearRule

@@ -7,7 +7,7 @@ import numpy as np
 from vedette.control.additive.situation import SensorGroup, Start
 from vedette.control.additive.table import LEAST_DETECTION, places_of_courses
 from vedette.densities import UndetectedIntensity
-from vedette.densities.label_sets import offsets_of
+from vedette.densities.checks import offsets_of
 from vedette.filters.inputs import model_errors
 from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.planning.ascent import Cells

@@ -1,4 +1,4 @@
-"""Conversions between labelled densities: delta-GLMB to marginalised GLMB and to LMB, LMB to GLMB."""
+"""Conversions between labelled densities: delta-GLMB to marginalised GLMB and to LMB, LMB and products to GLMB."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from vedette.kernels.base.compile import kernel
-from vedette.kernels.base.types import Floats, Glmb, Ints, Lmb
+from vedette.kernels.base.types import FactoredGlmb, Floats, Glmb, Ints, Lmb
 from vedette.kernels.gaussian.linalg import log_sum
 from vedette.kernels.gaussian.mixtures import MixtureCaps, descending_order
 from vedette.kernels.gaussian.pooling import add_to_pool, pooled_tracks
@@ -72,15 +72,15 @@ def marginalise(glmb: Glmb, caps: MixtureCaps) -> Glmb:
 
 
 @kernel
-def _log_sum_where(log_weights: Floats, mark: Ints, value: int, equal: bool) -> float:
-    """log-sum-exp over the places whose mark is `value`, or over those where it is not."""
+def _log_sum_where(log_weights: Floats, mark: Ints, low: int, high: int, value: int, equal: bool) -> float:
+    """log-sum-exp over the places of `low:high` whose mark is `value`, or over those where it is not."""
     peak, total = -math.inf, 0.0
-    for h in range(len(log_weights)):
+    for h in range(low, high):
         if (mark[h] == value) == equal:
             peak = max(peak, log_weights[h])
     if peak == -math.inf:
         return peak
-    for h in range(len(log_weights)):
+    for h in range(low, high):
         if (mark[h] == value) == equal:
             total += math.exp(log_weights[h] - peak)
     return peak + math.log(total)
@@ -95,13 +95,26 @@ def glmb_to_lmb(glmb: Glmb, caps: MixtureCaps) -> Lmb:
     whose hypotheses have weight zero keeps logit -inf and the plain mean of its tracks.
     """
     labels, num_entries = increasing_labels(glmb), len(glmb.hyp_tracks)
-    num_labels, log_weights = len(labels), glmb.hyp_log_weights
-    hyp_of, label_of = np.empty(num_entries, np.int64), np.empty(num_entries, np.int64)
+    num_labels, label_of = len(labels), np.empty(num_entries, np.int64)
+    for e in range(num_entries):
+        step, index = glmb.tracks.labels[glmb.hyp_tracks[e], 0], glmb.tracks.labels[glmb.hyp_tracks[e], 1]
+        label_of[e] = label_place(labels, num_labels, step, index)
+    firsts, ends = np.zeros(num_labels, np.int64), np.full(num_labels, len(glmb.hyp_log_weights))
+    return factors_to_lmb(glmb, labels, label_of, firsts, ends, caps)
+
+
+@kernel
+def factors_to_lmb(glmb: Glmb, labels: Ints, label_of: Ints, firsts: Ints, ends: Ints, caps: MixtureCaps) -> Lmb:
+    """As `glmb_to_lmb`, of densities over disjoint labels, whose hypotheses come one density's after another's.
+
+    labels: (num_labels, 2) that occur in them, increasing. label_of: place of the label of each entry of `hyp_tracks`.
+    firsts, ends: (num_labels,) the hypotheses of the density that has the label.
+    """
+    num_labels, num_entries, log_weights = len(labels), len(glmb.hyp_tracks), glmb.hyp_log_weights
+    hyp_of = np.empty(num_entries, np.int64)
     for h in range(len(log_weights)):
         for e in range(glmb.hyp_offsets[h], glmb.hyp_offsets[h + 1]):
-            track = glmb.hyp_tracks[e]
             hyp_of[e] = h
-            label_of[e] = label_place(labels, num_labels, glmb.tracks.labels[track, 0], glmb.tracks.labels[track, 1])
     entry_offsets, entries = group_members(label_of, num_labels)
     pool_offsets, existence_logit = np.zeros(num_labels + 1, np.int64), np.empty(num_labels)
     pool, weights = np.empty(num_entries, np.int64), np.empty(num_entries)
@@ -110,8 +123,8 @@ def glmb_to_lmb(glmb: Glmb, caps: MixtureCaps) -> Lmb:
         low, high, end = entry_offsets[i], entry_offsets[i + 1], pool_offsets[i]
         for m in range(low, high):
             mark[hyp_of[entries[m]]] = i
-        log_with = _log_sum_where(log_weights, mark, i, True)
-        existence_logit[i] = log_with - _log_sum_where(log_weights, mark, i, False)
+        log_with = _log_sum_where(log_weights, mark, firsts[i], ends[i], i, True)
+        existence_logit[i] = log_with - _log_sum_where(log_weights, mark, firsts[i], ends[i], i, False)
         for m in range(low, high):
             relative = 0.0 if log_with == -math.inf else math.exp(log_weights[hyp_of[entries[m]]] - log_with)
             end = add_to_pool(glmb.hyp_tracks[entries[m]], relative, slot_of, pool, weights, end)
@@ -133,11 +146,13 @@ def lmb_to_glmb(lmb: Lmb, max_hypotheses: int) -> tuple[Glmb, float]:
     in which the search finds them, which is the same every time.
     """
     num = len(lmb.existence_logit)
-    costs, base = np.empty(num), 0.0
+    costs, offsets, base = np.zeros(2 * num), np.empty(num + 1, np.int64), 0.0
     for i in range(num):
-        costs[i] = abs(lmb.existence_logit[i])
-        base -= math.log1p(math.exp(-costs[i]))
-    flips, previous, order, complete = smallest_sums(costs, max_hypotheses)
+        costs[2 * i + 1] = abs(lmb.existence_logit[i])
+        base -= math.log1p(math.exp(-costs[2 * i + 1]))
+        offsets[i] = 2 * i
+    offsets[num] = 2 * num
+    flips, _, previous, order, complete = smallest_sums(costs, offsets, max_hypotheses)
     num_hyps = len(order)
     hyp_offsets, hyp_log_weights = np.zeros(num_hyps + 1, np.int64), np.empty(num_hyps)
     hyp_tracks, flipped = np.empty(num_hyps * num, np.int64), np.zeros(num, np.int64)
@@ -147,7 +162,7 @@ def lmb_to_glmb(lmb: Lmb, max_hypotheses: int) -> tuple[Glmb, float]:
         node = order[h]
         while node > 0:
             flipped[flips[node]] = h + 1
-            hyp_log_weights[h] -= costs[flips[node]]
+            hyp_log_weights[h] -= costs[2 * flips[node] + 1]
             node = previous[node]
         for i in range(num):
             # The likeliest subset has every label that is likelier there than not; others flip some of them.
@@ -155,11 +170,60 @@ def lmb_to_glmb(lmb: Lmb, max_hypotheses: int) -> tuple[Glmb, float]:
                 hyp_tracks[end] = i
                 end += 1
         hyp_offsets[h + 1] = end
-    log_kept = log_sum(hyp_log_weights)
-    for h in range(num_hyps):
-        hyp_log_weights[h] -= log_kept
-    discarded = 0.0 if complete else max(0.0, -math.expm1(log_kept))
+    discarded = _normalise_kept(hyp_log_weights, complete)
     return Glmb(lmb.tracks, hyp_offsets, hyp_tracks[:end].copy(), hyp_log_weights), discarded
 
 
-__all__ = ["glmb_to_lmb", "lmb_to_glmb", "marginalise"]
+@kernel
+def _normalise_kept(log_weights: Floats, complete: bool) -> float:
+    """Normalise the log weights of the hypotheses kept; the weight of those left out, 0 if all are there."""
+    log_kept = log_sum(log_weights)
+    for h in range(len(log_weights)):
+        log_weights[h] -= log_kept
+    return 0.0 if complete else max(0.0, -math.expm1(log_kept))
+
+
+@kernel
+def factored_to_glmb(density: FactoredGlmb, label_of: Ints, num_labels: int, max_hypotheses: int) -> tuple[Glmb, float]:
+    """GLMB of the `max_hypotheses` heaviest products of one hypothesis of each factor, and the weight left out.
+
+    As `lmb_to_glmb`. label_of: (num_tracks,) place of the label of each track among all labels, `num_labels`.
+    """
+    num, sorted_hyps = len(density.factor_offsets) - 1, np.empty(len(density.hyp_log_weights), np.int64)
+    costs, base = np.empty(len(sorted_hyps)), 0.0
+    for f in range(num):
+        low, high = density.factor_offsets[f], density.factor_offsets[f + 1]
+        order = descending_order(density.hyp_log_weights[low:high])
+        best = density.hyp_log_weights[low + order[0]]
+        base += best
+        for k in range(high - low):
+            sorted_hyps[low + k] = low + order[k]
+            costs[low + k] = best - density.hyp_log_weights[low + order[k]]
+    lists, places, previous, order, complete = smallest_sums(costs, density.factor_offsets, max_hypotheses)
+    num_hyps, chosen = len(order), np.empty(num, np.int64)
+    hyp_offsets, hyp_log_weights = np.zeros(num_hyps + 1, np.int64), np.empty(num_hyps)
+    hyp_tracks, track_of, end = np.empty(num_hyps * num_labels, np.int64), np.full(num_labels, -1, np.int64), 0
+    for h in range(num_hyps):
+        for f in range(num):
+            chosen[f] = density.factor_offsets[f]
+        hyp_log_weights[h] = base
+        node = order[h]
+        while node > 0:
+            chosen[lists[node]] = density.factor_offsets[lists[node]] + places[node]
+            hyp_log_weights[h] -= costs[chosen[lists[node]]]
+            node = previous[node]
+        for f in range(num):
+            hyp = sorted_hyps[chosen[f]]
+            for e in range(density.hyp_offsets[hyp], density.hyp_offsets[hyp + 1]):
+                track_of[label_of[density.hyp_tracks[e]]] = density.hyp_tracks[e]
+        for i in range(num_labels):
+            if track_of[i] >= 0:
+                hyp_tracks[end] = track_of[i]
+                track_of[i] = -1
+                end += 1
+        hyp_offsets[h + 1] = end
+    discarded = _normalise_kept(hyp_log_weights, complete)
+    return Glmb(density.tracks, hyp_offsets, hyp_tracks[:end].copy(), hyp_log_weights), discarded
+
+
+__all__ = ["factored_to_glmb", "factors_to_lmb", "glmb_to_lmb", "lmb_to_glmb", "marginalise"]

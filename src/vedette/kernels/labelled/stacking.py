@@ -9,7 +9,7 @@ import numpy as np
 from vedette.kernels.base.types import Glmb, Ints, Tracks
 
 
-def _join_offsets(offsets: Sequence[Ints]) -> Ints:
+def join_offsets(offsets: Sequence[Ints]) -> Ints:
     """Offsets of the concatenation of ragged arrays."""
     return np.concatenate([np.zeros(1, np.int64), np.cumsum(np.concatenate([np.diff(item) for item in offsets]))])
 
@@ -18,7 +18,7 @@ def stack_tracks(tables: Sequence[Tracks]) -> Tracks:
     """One track table of all the tracks, in the order given."""
     return Tracks(
         np.concatenate([table.labels for table in tables]),
-        _join_offsets([table.offsets for table in tables]),
+        join_offsets([table.offsets for table in tables]),
         np.concatenate([table.log_weights for table in tables]),
         np.concatenate([table.means for table in tables]),
         np.concatenate([table.covs for table in tables]),
@@ -30,10 +30,10 @@ def stack_glmbs(glmbs: Sequence[Glmb]) -> Glmb:
     starts = np.cumsum([0] + [len(glmb.tracks.labels) for glmb in glmbs])
     return Glmb(
         stack_tracks([glmb.tracks for glmb in glmbs]),
-        _join_offsets([glmb.hyp_offsets for glmb in glmbs]),
+        join_offsets([glmb.hyp_offsets for glmb in glmbs]),
         np.concatenate([glmb.hyp_tracks + start for glmb, start in zip(glmbs, starts, strict=False)]),
         np.concatenate([glmb.hyp_log_weights for glmb in glmbs]),
     )
 
 
-__all__ = ["stack_glmbs", "stack_tracks"]
+__all__ = ["join_offsets", "stack_glmbs", "stack_tracks"]

@@ -1,4 +1,4 @@
-"""Subsets of a few non-negative costs in order of their sum, by best-first search."""
+"""Choices of one cost of each of several lists in order of their sum, by best-first search."""
 
 from __future__ import annotations
 
@@ -42,27 +42,37 @@ def _sift_down(heap: Ints, sums: Floats, size: int) -> None:
 
 
 @kernel
-def smallest_sums(costs: Floats, max_subsets: int) -> tuple[Ints, Ints, Ints, bool]:
-    """The `max_subsets` subsets of smallest sum of costs, the smallest (the empty one) first.
+def smallest_sums(costs: Floats, offsets: Ints, max_sums: int) -> tuple[Ints, Ints, Ints, Ints, bool]:
+    """The `max_sums` smallest sums of one cost of each of several lists, the smallest first.
 
-    costs: (num,) non-negative; items of infinite cost are in no subset. Returns chains of nodes: subset `k` has the
-    items `items[node]` for node = order[k], previous[node], previous[previous[node]], ... down to node 0, which is the
-    empty subset; and whether all subsets of the items of finite cost are listed.
+    costs, offsets: list `i` is `costs[offsets[i]:offsets[i + 1]]`, from 0 up; an infinite cost is never taken. Returns
+    chains of nodes: choice `k` takes place `places[node]` of list `lists[node]` for node = order[k], previous[node],
+    previous[previous[node]], ... down to node 0, and the first of every other list; and whether all choices of finite
+    costs are listed.
     """
-    by_cost = descending_order(-costs)
+    num_lists = len(offsets) - 1
+    dearer, sizes, total = np.empty(num_lists), np.empty(num_lists, np.int64), 1
+    for i in range(num_lists):
+        size = 1
+        while size < offsets[i + 1] - offsets[i] and costs[offsets[i] + size] < math.inf:
+            size += 1
+        sizes[i] = size
+        dearer[i] = costs[offsets[i] + 1] if size > 1 else math.inf
+        # A product beyond this is more than anyone lists.
+        total = min(total * min(size, 1 << 31), 1 << 31)
+    by_cost = descending_order(-dearer)
     num = 0
-    while num < len(costs) and costs[by_cost[num]] < math.inf:
+    while num < num_lists and dearer[by_cost[num]] < math.inf:
         num += 1
-    limit = max(max_subsets, 1)
-    if num < 62:
-        limit = min(limit, 1 << num)
-    room = 2 * limit + 2
-    items, previous, ranks = np.zeros(room, np.int64), np.zeros(room, np.int64), np.zeros(room, np.int64)
-    sums, heap, order = np.zeros(room), np.empty(limit + 2, np.int64), np.empty(limit, np.int64)
+    limit = min(max(max_sums, 1), total)
+    room = 3 * limit + 2
+    lists, places = np.zeros(room, np.int64), np.zeros(room, np.int64)
+    previous, ranks = np.zeros(room, np.int64), np.zeros(room, np.int64)
+    sums, heap, order = np.zeros(room), np.empty(2 * limit + 2, np.int64), np.empty(limit, np.int64)
     order[0] = 0
     listed, nodes, size = 1, 1, 0
     if num > 0 and limit > 1:
-        items[1], sums[1], heap[0] = by_cost[0], costs[by_cost[0]], 1
+        lists[1], places[1], sums[1], heap[0] = by_cost[0], 1, dearer[by_cost[0]], 1
         nodes, size = 2, 1
     while listed < limit:
         node = heap[0]
@@ -71,18 +81,23 @@ def smallest_sums(costs: Floats, max_subsets: int) -> tuple[Ints, Ints, Ints, bo
         size -= 1
         heap[0] = heap[size]
         _sift_down(heap, sums, size)
-        rank = ranks[node] + 1
-        if rank == num:
-            continue
-        # Each other subset is reached once: by adding the next dearer item, or by exchanging the dearest for it.
-        for before in (node, previous[node]):
-            items[nodes], previous[nodes], ranks[nodes] = by_cost[rank], before, rank
-            sums[nodes] = sums[before] + costs[by_cost[rank]]
+        # Each other choice is reached once: by a step in the next dearer list besides that in the dearest so far, or
+        # instead of it where that is its first; or by one more step in the dearest.
+        for way in range(3):
+            rank = ranks[node] + (1 if way < 2 else 0)
+            if rank == num or (way == 1 and places[node] > 1):
+                continue
+            base = node if way == 0 else previous[node]
+            place = places[node] + 1 if way == 2 else 1
+            if place >= sizes[by_cost[rank]]:
+                continue
+            lists[nodes], places[nodes], previous[nodes], ranks[nodes] = by_cost[rank], place, base, rank
+            sums[nodes] = sums[base] + costs[offsets[by_cost[rank]] + place]
             heap[size] = nodes
             nodes += 1
             size += 1
             _sift_up(heap, sums, size)
-    return items, previous, order, num < 62 and listed == 1 << num
+    return lists, places, previous, order, listed == total < 1 << 31
 
 
 __all__ = ["smallest_sums"]

@@ -52,8 +52,8 @@ from vedette.kernels.steps.glmb import Associated, kept_children
 from vedette.kernels.steps.lmb import Reduction, append_reduced, write_mixture
 
 # Places in the sums of a scan.
-_TOTAL, _KEPT, _TWICE, _SPLIT, _DROPPED, _CUT = range(6)
-_NUM_SUMS = 6
+_TOTAL, _KEPT, _TWICE, _SPLIT, _DROPPED, _CUT, _FULL = range(7)
+_NUM_SUMS = 7
 
 # What rounding leaves of nothing, as a share of a weight.
 _ROUNDING = 1e-13
@@ -75,6 +75,7 @@ class FactoredReport(NamedTuple):
     log_clutter: float  # sum of the log clutter intensities of the scan
     num_raised: int  # measurements whose clutter intensity was raised to the floor
     cut: bool  # a ranking stopped at its bound on nodes
+    full: bool  # a group has as many hypotheses as it may
     taken_twice: float  # upper bound on the probability that factors of two groups take one measurement
     split_error: float  # summed L1 error of the splits
     dropped_existence: float  # summed existence of dropped labels
@@ -187,6 +188,7 @@ def _update_group(group: Group, truncation: Truncation, work: _Work) -> Glmb:
     gone = possible + left - total
     sums[_KEPT] -= math.log1p(gone / total) if gone > _ROUNDING * total else 0.0
     sums[_CUT] += 1.0 if cut else 0.0
+    sums[_FULL] += 1.0 if len(kept) >= truncation.search.max_hypotheses else 0.0
     return posterior
 
 
@@ -267,9 +269,17 @@ def _finish(
             store = _append_parts(store, posterior, factoring.max_error, reduction, work.sums)
     sums, density = work.sums, stored(store)
     require_gaussians(density.tracks.means, density.tracks.covs)
-    cut, twice = sums[_CUT] > 0.0, min(sums[_TWICE], 1.0)
     return density, FactoredReport(
-        sums[_TOTAL], sums[_KEPT], log_clutter, num_raised, cut, twice, sums[_SPLIT], sums[_DROPPED], most_labels
+        sums[_TOTAL],
+        sums[_KEPT],
+        log_clutter,
+        num_raised,
+        sums[_CUT] > 0.0,
+        sums[_FULL] > 0.0,
+        min(sums[_TWICE], 1.0),
+        sums[_SPLIT],
+        sums[_DROPPED],
+        most_labels,
     )
 
 

@@ -25,10 +25,10 @@ class MapEstimator(Section):
 
     def build(self, folder: Path) -> Estimator:
         """How estimates are read off a density after a scan, given its number, by which unlabelled ones are named."""
-        from vedette.densities import GLMB, LMB, map_estimate, unlabelled_estimate
+        from vedette.densities import Labelled, map_estimate, unlabelled_estimate
 
         def estimate(density: Belief, step: int) -> Estimate:
-            return map_estimate(density) if isinstance(density, GLMB | LMB) else unlabelled_estimate(density, step)
+            return map_estimate(density) if isinstance(density, Labelled) else unlabelled_estimate(density, step)
 
         return estimate
 
@@ -41,10 +41,10 @@ class MarginalEstimator(Section):
 
     def build(self, folder: Path) -> Estimator:
         """How estimates are read off a density after a scan, given its number."""
-        from vedette.densities import GLMB, LMB, marginal_estimate, unlabelled_estimate
+        from vedette.densities import Labelled, marginal_estimate, unlabelled_estimate
 
         def estimate(density: Belief, step: int) -> Estimate:
-            if not isinstance(density, GLMB | LMB):
+            if not isinstance(density, Labelled):
                 return unlabelled_estimate(density, step)
             return marginal_estimate(density, self.threshold)
 
