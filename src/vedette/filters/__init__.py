@@ -14,6 +14,7 @@ from vedette.filters.lmb import LmbFilter
 from vedette.filters.multi_sensor_glmb import MultiSensorGlmbFilter
 from vedette.filters.multi_sensor_lmb import MultiSensorLmbFilter
 from vedette.filters.phd import PhdFilter
+from vedette.filters.sequential_factored import SequentialFactoredFilter
 from vedette.filters.sequential_lmb import SequentialLmbFilter
 
 Belief: TypeAlias = Labelled | Poisson | IidCluster | MultiBernoulli
@@ -31,6 +32,7 @@ __all__ = [
     "MultiSensorGlmbFilter",
     "MultiSensorLmbFilter",
     "PhdFilter",
+    "SequentialFactoredFilter",
     "SequentialLmbFilter",
     "TwoStepFilter",
     "labels_targets",

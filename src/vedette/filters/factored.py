@@ -8,12 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from vedette.densities import GLMB, LMB, FactoredGLMB
+from vedette.densities import LMB, FactoredGLMB, Labelled
 from vedette.errors import InputError, NumericalError
 from vedette.filters.base import SingleSensorFilter
 from vedette.filters.blind import NO_POSE, NO_SCAN, blind_sensor
 from vedette.filters.info import FilterInfo
 from vedette.filters.inputs import check_belief, model_errors
+from vedette.filters.posteriors import factored_posterior
 from vedette.kernels.base.types import FactoredGlmb
 from vedette.kernels.steps.factored import FactoredReport, Factoring, step_factored, update_factored
 from vedette.models.arguments import dimension, non_negative
@@ -53,9 +54,7 @@ class FactoredGlmbFilter(SingleSensorFilter):
 
     def __post_init__(self) -> None:
         SingleSensorFilter.__post_init__(self)  # slots replace the class that super() looks for
-        if non_negative("max_split_error", self.max_split_error) > 2.0:
-            raise InputError(f"max_split_error: expected at most 2; got {self.max_split_error!r}")
-        dimension("max_group_labels", self.max_group_labels)
+        check_factoring(self.max_split_error, self.max_group_labels)
 
     def initial(self) -> FactoredGLMB:
         """The belief before the first scan: no target."""
@@ -63,7 +62,7 @@ class FactoredGlmbFilter(SingleSensorFilter):
 
     def step(
         self,
-        belief: FactoredGLMB | GLMB | LMB,
+        belief: Labelled,
         scan: Any,
         pose: Any,
         dt: float,
@@ -80,11 +79,16 @@ class FactoredGlmbFilter(SingleSensorFilter):
         prior = check_belief(belief, FactoredGLMB, self.targets.state_dim)
         arguments = self._arguments(measurements, pose, dt, step, prior, births)
         with model_errors():
-            posterior, report = step_factored(prior.to_kernel(), *arguments, self.limits.reduction(), self._factoring())
+            posterior, report = step_factored(
+                prior.to_kernel(),
+                *arguments,
+                self.limits.reduction(),
+                factoring_of(self.max_split_error, self.max_group_labels),
+            )
         return self._concluded(posterior, report, num_duplicates, f"step {step}: ")
 
     def predict(
-        self, belief: FactoredGLMB | GLMB | LMB, dt: float, step: int, *, births: LMB | None = None
+        self, belief: Labelled, dt: float, step: int, *, births: LMB | None = None
     ) -> tuple[FactoredGLMB, FilterInfo]:
         """The belief `dt` seconds later, births included; as `DeltaGlmbFilter.predict`, factor by factor."""
         prior = check_belief(belief, FactoredGLMB, self.targets.state_dim)
@@ -92,11 +96,16 @@ class FactoredGlmbFilter(SingleSensorFilter):
         blind = FactoredGlmbFilter(self.targets, blind_sensor(), limits, self.max_split_error, self.max_group_labels)
         arguments = blind._arguments(NO_SCAN, NO_POSE, dt, step, prior, births)
         with model_errors():
-            posterior, report = step_factored(prior.to_kernel(), *arguments, limits.reduction(), self._factoring())
+            posterior, report = step_factored(
+                prior.to_kernel(),
+                *arguments,
+                limits.reduction(),
+                factoring_of(self.max_split_error, self.max_group_labels),
+            )
         return blind._concluded(posterior, report, 0, f"step {step}: ")
 
     def update(
-        self, belief: FactoredGLMB | GLMB | LMB, scan: Any, pose: Any, *, rng: np.random.Generator
+        self, belief: Labelled, scan: Any, pose: Any, *, rng: np.random.Generator
     ) -> tuple[FactoredGLMB, FilterInfo]:
         """The belief after a scan of its own time; as `DeltaGlmbFilter.update`."""
         measurements, num_duplicates = self._check_scan(scan, rng)
@@ -104,30 +113,35 @@ class FactoredGlmbFilter(SingleSensorFilter):
         arguments = self._update_arguments(measurements, pose)
         with model_errors():
             posterior, report = update_factored(
-                prior.to_kernel(), *arguments, self.limits.reduction(), self._factoring()
+                prior.to_kernel(),
+                *arguments,
+                self.limits.reduction(),
+                factoring_of(self.max_split_error, self.max_group_labels),
             )
         return self._concluded(posterior, report, num_duplicates, "")
 
     def _factoring(self) -> Factoring:
-        error = float(self.max_split_error)
-        return Factoring(error, 0.5 * _SHARE_OF_A_LINK * error, int(self.max_group_labels))
+        return factoring_of(self.max_split_error, self.max_group_labels)
 
     def _concluded(
         self, posterior: FactoredGlmb, report: FactoredReport, num_duplicates: int, place: str
     ) -> tuple[FactoredGLMB, FilterInfo]:
         if report.log_total == -math.inf:
             raise NumericalError(f"{place}no hypothesis has positive weight; do the models forbid this scan?")
-        found, dropped = self.limits.without_excess(FactoredGLMB.from_kernel(posterior))
-        return found, FilterInfo(
-            log_likelihood=report.log_total + report.log_clutter - self.sensor.clutter.rate,
-            num_hypotheses=found.num_hyps,
-            num_tracks=found.tracks.num_tracks,
-            discarded_weight_bound=max(0.0, -math.expm1(report.log_kept)),
-            dropped_existence=float(report.dropped_existence) + dropped,
-            num_clutter_raised=int(report.num_raised),
-            num_duplicates=num_duplicates,
-            num_inexact_clusters=0,
-            search_cut=bool(report.cut),
-            cap_met=bool(report.full) or found.tracks.num_tracks >= self.limits.max_labels,
-            factoring_error=min(2.0, float(report.split_error + 2.0 * report.taken_twice)),
+        log_likelihood = report.log_total + report.log_clutter - self.sensor.clutter.rate
+        return factored_posterior(
+            posterior, [report], self.limits, log_likelihood=log_likelihood, num_duplicates=num_duplicates
         )
+
+
+def check_factoring(max_split_error: Any, max_group_labels: Any) -> None:
+    """`InputError` for a field out of its range."""
+    if non_negative("max_split_error", max_split_error) > 2.0:
+        raise InputError(f"max_split_error: expected at most 2; got {max_split_error!r}")
+    dimension("max_group_labels", max_group_labels)
+
+
+def factoring_of(max_split_error: float, max_group_labels: int) -> Factoring:
+    """The fields of a filter as kernels take them."""
+    error = float(max_split_error)
+    return Factoring(error, 0.5 * _SHARE_OF_A_LINK * error, int(max_group_labels))

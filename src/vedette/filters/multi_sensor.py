@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
-from vedette.densities import GLMB, LMB
+from vedette.densities import GLMB, LMB, FactoredGLMB, Labelled
 from vedette.errors import InputError
 from vedette.filters.blind import NO_POSE, NO_SCAN, blind_sensor
 from vedette.filters.info import FilterInfo
@@ -19,7 +19,7 @@ from vedette.kernels.base.types import Floats, ScanInput
 from vedette.models import SensorModel, TargetModel
 from vedette.models.arguments import generator, pose_vector, positive
 
-_Belief = TypeVar("_Belief", GLMB, LMB)
+_Belief = TypeVar("_Belief", GLMB, LMB, FactoredGLMB)
 
 
 class Looks(NamedTuple):
@@ -64,7 +64,7 @@ class MultiSensorFilter(ABC, Generic[_Belief]):
     targets: TargetModel
     sensors: tuple[SensorModel, ...]
     limits: Limits = field(default_factory=Limits)
-    kind: ClassVar[type[GLMB] | type[LMB]]  # of the belief
+    kind: ClassVar[type[GLMB] | type[LMB] | type[FactoredGLMB]]  # of the belief
 
     def __post_init__(self) -> None:
         for name, kind in (("targets", TargetModel), ("limits", Limits)):
@@ -84,7 +84,7 @@ class MultiSensorFilter(ABC, Generic[_Belief]):
 
     def step(
         self,
-        belief: GLMB | LMB,
+        belief: Labelled,
         scans: Any,
         poses: Any,
         dt: float,

@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from vedette.densities import GLMB, LMB
+from vedette.densities import GLMB, LMB, FactoredGLMB
 from vedette.filters.info import FilterInfo
 from vedette.filters.limits import Limits
-from vedette.kernels.base.types import Glmb, Lmb
+from vedette.kernels.base.types import FactoredGlmb, Glmb, Lmb
 from vedette.kernels.labelled.conversions import marginalise
+from vedette.kernels.steps.factored import FactoredReport
 from vedette.kernels.steps.glmb import StepReport
 from vedette.kernels.steps.lmb import LmbReport
 
@@ -65,4 +66,29 @@ def glmb_posterior(
         num_inexact_clusters=0,
         search_cut=any(bool(report.cut) for report in reports),
         cap_met=cap_met,
+    )
+
+
+def factored_posterior(
+    posterior: FactoredGlmb,
+    reports: Sequence[FactoredReport],
+    limits: Limits,
+    *,
+    log_likelihood: float,
+    num_duplicates: int,
+) -> tuple[FactoredGLMB, FilterInfo]:
+    """A factored density after updates, one report each; see `FilterInfo` for what is not of them."""
+    found, dropped = limits.without_excess(FactoredGLMB.from_kernel(posterior))
+    return found, FilterInfo(
+        log_likelihood=log_likelihood,
+        num_hypotheses=found.num_hyps,
+        num_tracks=found.tracks.num_tracks,
+        discarded_weight_bound=max(0.0, -math.expm1(sum(report.log_kept for report in reports))),
+        dropped_existence=sum(float(report.dropped_existence) for report in reports) + dropped,
+        num_clutter_raised=sum(int(report.num_raised) for report in reports),
+        num_duplicates=num_duplicates,
+        num_inexact_clusters=0,
+        search_cut=any(bool(report.cut) for report in reports),
+        cap_met=any(bool(report.full) for report in reports) or found.tracks.num_tracks >= limits.max_labels,
+        factoring_error=min(2.0, sum(float(report.split_error + 2.0 * report.taken_twice) for report in reports)),
     )

@@ -182,7 +182,7 @@ def build_planner(scenario: Scenario, name: str, num_threads: int = 0) -> Planne
     sensors = build_sensors(scenario)
     strategy = model.planners[name] if name in model.planners else STRATEGIES[name]
     if strategy.needs_labels and not labels_targets(sensors[0].filter):
-        kinds = "delta_glmb, m_delta_glmb or lmb"
+        kinds = "delta_glmb, m_delta_glmb, lmb or factored_glmb"
         raise InputError(f"filter.kind: expected {kinds}, as planner {name} needs labels; got {model.filter.kind}")
     control, fusion = model.control, _fusion_of_decisions(scenario, sensors[0].filter)
     parts = Parts(

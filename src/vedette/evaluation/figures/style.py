@@ -115,6 +115,7 @@ _LABELS = {
     "still": "Not moving",
     "delta_glmb": "delta-GLMB",
     "m_delta_glmb": "M-delta-GLMB",
+    "factored_glmb": "factored GLMB",
     "lmb": "LMB",
     "phd": "PHD",
     "cphd": "CPHD",

@@ -103,6 +103,8 @@ def _central(model: ScenarioModel) -> Iterator[Finding]:
         return
     if model.filter.kind == "custom":
         yield ("fusion", "kind"), "a fusion, as each sensor has a filter of your own", '"central"'
+    elif model.filter.kind == "factored_glmb":
+        yield ("fusion", "kind"), "sequential, as factored_glmb filters take scans in turn", '"central"'
     elif model.filter.assignment.kind == "gibbs":
         yield ("filter", "assignment", "kind"), "ranked, as one filter takes the scans of all sensors", '"gibbs"'
 

@@ -49,7 +49,9 @@ Assignment = Annotated[RankedAssignment | GibbsAssignment, Field(discriminator="
 class FilterLimits(Section):
     """Caps and thresholds of a filter: what it throws away, and so what it costs."""
 
-    max_hypotheses: Count = Field(default=300, description="Most hypotheses kept after a scan [-].")
+    max_hypotheses: Count = Field(
+        default=300, description="Most hypotheses kept after a scan; of a factored_glmb, in each factor [-]."
+    )
     min_relative_weight: Share = Field(
         default=1e-6,
         description="Hypotheses (of a cphd: large numbers of targets) lighter than this times the heaviest are dropped "
@@ -74,9 +76,12 @@ class FilterLimits(Section):
     )
     max_components: Count = Field(default=10, description="Most Gaussian components of a track [-].")
     min_existence: Share = Field(
-        default=1e-4, description="LMB tracks and Bernoullis less probable than this are dropped [-]."
+        default=1e-4,
+        description="LMB tracks, tracks alone in their factor and Bernoullis less probable than this are dropped [-].",
     )
-    max_labels: Count = Field(default=200, description="Most tracks of an LMB, Bernoullis of a cb_member [-].")
+    max_labels: Count = Field(
+        default=200, description="Most tracks of an LMB or factored_glmb, Bernoullis of a cb_member [-]."
+    )
     max_position_std: Positive | None = Field(
         default=None,
         description="Labels whose position is less certain than this along both axes are dropped; none: never [m].",
@@ -103,11 +108,20 @@ UNLABELLED = ("phd", "cphd", "cb_member")
 class Filter(Section):
     """The filter that every sensor runs on its own scans."""
 
-    kind: Literal["delta_glmb", "m_delta_glmb", "lmb", "phd", "cphd", "cb_member"] = Field(
+    kind: Literal["delta_glmb", "m_delta_glmb", "lmb", "factored_glmb", "phd", "cphd", "cb_member"] = Field(
         default="m_delta_glmb",
-        description="delta-GLMB; delta-GLMB marginalised after each scan (one component a label set); LMB; or, without "
-        "labels and for a single sensor that nobody steers by its density: PHD, CPHD, cardinality-balanced "
-        "multi-Bernoulli [-].",
+        description="delta-GLMB; delta-GLMB marginalised after each scan (one component a label set); LMB; product of "
+        "delta-GLMBs, each of the labels that contend with each other, for any number of targets; or, without labels "
+        "and for a single sensor that nobody steers by its density: PHD, CPHD, cardinality-balanced multi-Bernoulli "
+        "[-].",
+    )
+    max_split_error: Annotated[float, Field(ge=0.0, le=2.0)] = Field(
+        default=0.01,
+        description="Of a factored_glmb: L1 error up to which labels that contended are taken as independent again; 2: "
+        "always, as an LMB; 0: where they are [-].",
+    )
+    max_group_labels: Count = Field(
+        default=10, description="Of a factored_glmb: most labels that take a scan together [-]."
     )
     gaussian_method: GaussianMethod = Field(
         default="auto", description="Extended, unscented or cubature Kalman; auto: extended where Jacobians exist [-]."
@@ -122,17 +136,26 @@ class Filter(Section):
 
     @check
     def _assignment_fits(self) -> Iterator[Finding]:
-        if self.kind in ("lmb", *UNLABELLED) and self.assignment.kind == "gibbs":
+        if self.kind in ("lmb", "factored_glmb", *UNLABELLED) and self.assignment.kind == "gibbs":
             yield ("assignment", "kind"), f"ranked, as the filter is {self.kind}", '"gibbs"'
 
     def build(self, targets: TargetModel, sensor: SensorModel, folder: Path) -> LocalFilter:
         """The filter of one sensor."""
-        from vedette.filters import CbMemberFilter, CphdFilter, DeltaGlmbFilter, LmbFilter, PhdFilter
+        from vedette.filters import (
+            CbMemberFilter,
+            CphdFilter,
+            DeltaGlmbFilter,
+            FactoredGlmbFilter,
+            LmbFilter,
+            PhdFilter,
+        )
 
         limits = self.limits.build()
         match self.kind:
             case "lmb":
                 return LmbFilter(targets, sensor, limits)
+            case "factored_glmb":
+                return FactoredGlmbFilter(targets, sensor, limits, self.max_split_error, self.max_group_labels)
             case "phd":
                 return PhdFilter(targets, sensor, limits)
             case "cphd":
@@ -151,9 +174,16 @@ class Filter(Section):
 
     def build_central(self, targets: TargetModel, sensors: tuple[SensorModel, ...], *, in_turn: bool) -> CentralFilter:
         """The filter of all sensors' scans; in_turn: whether they are taken one after the other, else jointly."""
-        from vedette.filters import MultiSensorGlmbFilter, MultiSensorLmbFilter, SequentialLmbFilter
+        from vedette.filters import (
+            MultiSensorGlmbFilter,
+            MultiSensorLmbFilter,
+            SequentialFactoredFilter,
+            SequentialLmbFilter,
+        )
 
         limits = self.limits.build()
+        if self.kind == "factored_glmb":
+            return SequentialFactoredFilter(targets, sensors, limits, self.max_split_error, self.max_group_labels)
         if self.kind == "lmb":
             return (SequentialLmbFilter if in_turn else MultiSensorLmbFilter)(targets, sensors, limits)
         return MultiSensorGlmbFilter(targets, sensors, limits, marginalised=self.kind == "m_delta_glmb")

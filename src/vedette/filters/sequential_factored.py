@@ -1,0 +1,67 @@
+"""The sequential factored filter: one prediction, then an update by each sensor's scan in turn."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+from vedette.densities import LMB, FactoredGLMB
+from vedette.errors import NumericalError
+from vedette.filters.factored import check_factoring, factoring_of
+from vedette.filters.info import FilterInfo
+from vedette.filters.inputs import model_errors
+from vedette.filters.multi_sensor import Looks, MultiSensorFilter
+from vedette.filters.posteriors import factored_posterior
+from vedette.kernels.steps.factored import FactoredReport, step_factored, update_factored
+from vedette.models import kernel_motion
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SequentialFactoredFilter(MultiSensorFilter[FactoredGLMB]):
+    """Factored GLMB filter of several sensors that takes their scans in turn.
+
+    As `SequentialLmbFilter`, with the density of `FactoredGlmbFilter`: which of contending labels is which stays open
+    from one sensor to the next. Of one sensor it is the `FactoredGlmbFilter`.
+
+    Attributes and errors: as `MultiSensorGlmbFilter`, and `max_split_error` and `max_group_labels` as of
+    `FactoredGlmbFilter`.
+    """
+
+    max_split_error: float = 0.01
+    max_group_labels: int = 10
+    kind: ClassVar[type[FactoredGLMB]] = FactoredGLMB
+
+    def __post_init__(self) -> None:
+        MultiSensorFilter.__post_init__(self)  # slots replace the class that super() looks for
+        check_factoring(self.max_split_error, self.max_group_labels)
+
+    def _updated(
+        self, prior: FactoredGLMB, born: LMB, looks: Looks, dt: float, place: str
+    ) -> tuple[FactoredGLMB, FilterInfo]:
+        motion, posterior = kernel_motion(self.targets.motion, self.targets.survival), prior.to_kernel()
+        keeping, reports = self.limits.keeping_labels(), list[FactoredReport]()
+        factoring = factoring_of(self.max_split_error, self.max_group_labels)
+        given = zip(looks.names, looks.sensors, looks.inputs_in_turn(born, dt), strict=True)
+        for s, (name, sensor, scan) in enumerate(given):
+            limits = self.limits if s == len(looks.names) - 1 else keeping
+            kernel_sensor, truncation = sensor.to_kernel(), limits.truncation(sensor.meas_dim)
+            own = (kernel_sensor, truncation, limits.reduction(), factoring)
+            with model_errors():
+                if s == 0:
+                    posterior, report = step_factored(posterior, scan, motion, *own)
+                else:
+                    posterior, report = update_factored(posterior, scan, *own)
+            if not math.isfinite(report.log_total):
+                raise NumericalError(
+                    f"{place}, {name}: no hypothesis has positive weight; do the models forbid these scans?"
+                )
+            reports.append(report)
+        log_total = sum(report.log_total for report in reports)
+        return factored_posterior(
+            posterior,
+            reports,
+            self.limits,
+            log_likelihood=looks.log_likelihood(log_total, [report.log_clutter for report in reports]),
+            num_duplicates=looks.num_duplicates,
+        )
