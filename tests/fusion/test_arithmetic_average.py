@@ -77,7 +77,7 @@ def test_nothing_at_all_and_what_is_refused() -> None:
     assert (fused.tracks.num_tracks, info.empty_intersection) == (0, False)
     assert expit(fused.existence_logit).size == 0
     unlabelled = Poisson(np.zeros(0), np.zeros((0, 4)), np.zeros((0, 4, 4)))
-    with pytest.raises(InputError, match=r"beliefs\[1\]: expected LMB or GLMB; got Poisson"):
+    with pytest.raises(InputError, match=r"beliefs\[1\]: expected LMB, GLMB or FactoredGLMB; got Poisson"):
         ArithmeticAverage((0.5, 0.5)).fuse([LMB.empty(4), unlabelled])  # type: ignore[list-item]
     with pytest.raises(InputError, match="sum to 1"):
         ArithmeticAverage((0.5, 0.4))

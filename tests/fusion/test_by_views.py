@@ -153,5 +153,7 @@ def test_views_that_are_missing_or_do_not_fit() -> None:
         Views((model,), np.zeros((2, 3)), (True,))
     with pytest.raises(InputError, match=r"views.scanned: expected 1, one a sensor; got 2"):
         Views((model,), np.zeros((1, 3)), (True, False))
-    with pytest.raises(InputError, match=r"views.prediction: expected a GLMB, an LMB or None; got int"):
+    with pytest.raises(
+        InputError, match=r"views.prediction: expected a GLMB, an LMB or a FactoredGLMB, or None; got int"
+    ):
         Views((model,), np.zeros((1, 3)), (True,), 3)  # type: ignore[arg-type]

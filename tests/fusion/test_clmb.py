@@ -120,7 +120,7 @@ def test_bad_input():
     belief = lmb((A,), (0.9,), rng)
     with pytest.raises(InputError, match="missing_existence"):
         Clmb(HALVES, missing_existence=0.0)
-    with pytest.raises(InputError, match=r"beliefs\[1\]: expected LMB or GLMB; got Poisson"):
+    with pytest.raises(InputError, match=r"beliefs\[1\]: expected LMB, GLMB or FactoredGLMB; got Poisson"):
         Clmb(HALVES).fuse([belief, Poisson(np.zeros(0), np.zeros((0, 1)), np.zeros((0, 1, 1)))])  # type: ignore[list-item]
     with pytest.raises(InputError, match="sum to 1"):
         Clmb((0.5, 0.4))

@@ -210,8 +210,8 @@ def test_beliefs_that_cannot_be_fused():
     one, two = glmb({(A,): 1.0}, rng, 1), glmb({(A,): 1.0}, rng, 2)
     with pytest.raises(InputError, match="state dimension"):
         CmDeltaGlmb(HALVES).fuse([one, two])
-    with pytest.raises(InputError, match=r"beliefs\[1\]: expected GLMB; got LMB"):
-        CmDeltaGlmb(HALVES).fuse([one, LMB.empty(1)])  # type: ignore[list-item]
+    with pytest.raises(InputError, match=r"beliefs\[1\]: expected GLMB or FactoredGLMB; got LMB"):
+        CmDeltaGlmb(HALVES).fuse([one, LMB.empty(1)])  # type: ignore[type-var]
     with pytest.raises(InputError, match="expected 2, one for each fusion weight; got 1"):
         CmDeltaGlmb(HALVES).fuse([one])
     bad = unchecked(TrackTable, *one.tracks.to_kernel()[:4], -one.tracks.covs)

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from densities.examples import random_glmb, random_lmb
 from fusion.sights import assert_same_bits
-from vedette.densities import GLMB, LMB, Poisson, glmb_to_lmb
+from vedette.densities import GLMB, LMB, Poisson, as_lmb
 from vedette.errors import InputError
 from vedette.fusion import Clmb, CmDeltaGlmb, Matched, match_labels
 
@@ -104,7 +104,7 @@ def test_densities_stay_what_they_are_and_labels_distinct(seed: int, labelled_se
     again = match_labels(matched)
     for before, after, twice in zip(beliefs, matched, again, strict=True):
         after.validate(error=InputError)
-        lmb, other = (glmb_to_lmb(b) if isinstance(b, GLMB) else b for b in (before, after))
+        lmb, other = as_lmb(before), as_lmb(after)
         assert len({tuple(label) for label in other.tracks.labels.tolist()}) == lmb.tracks.num_tracks
         np.testing.assert_allclose(np.sort(lmb.existence), np.sort(other.existence), rtol=1e-9, atol=1e-12)
         if isinstance(before, GLMB):
@@ -141,7 +141,7 @@ def test_nothing_to_match_and_what_is_refused() -> None:
     nothing = LMB.empty(4)
     assert match_labels([nothing, nothing])[1] is nothing
     assert match_labels([nothing, GLMB.empty(4)])[1].state_dim == 4
-    with pytest.raises(InputError, match=r"beliefs\[1\]: expected GLMB or LMB; got Poisson"):
+    with pytest.raises(InputError, match=r"beliefs\[1\]: expected GLMB, LMB or FactoredGLMB; got Poisson"):
         match_labels([nothing, Poisson(np.zeros(0), np.zeros((0, 4)), np.zeros((0, 4, 4)))])  # type: ignore[list-item]
     with pytest.raises(InputError, match="one state dimension"):
         match_labels([nothing, LMB.empty(2)])

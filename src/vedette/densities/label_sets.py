@@ -99,6 +99,14 @@ def take_factors(density: FactoredGLMB, places: Ints) -> FactoredGLMB:
     )
 
 
+def in_label_order(density: FactoredGLMB) -> FactoredGLMB:
+    """The factors, each of at least one track, in increasing order of their first labels."""
+    if density.num_factors == 0:
+        return density
+    _, place = distinct_labels(density.tracks.labels)
+    return take_factors(density, np.argsort(np.minimum.reduceat(place, density.track_offsets[:-1])))
+
+
 def laid_out(glmb: GLMB) -> FactoredGLMB:
     """A GLMB as one factor; of one label, as `FactoredGLMB.from_lmb` lays it out, of none, no factor at all.
 

@@ -8,8 +8,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.special import expit
 
-from vedette.densities import GLMB, LMB, TrackTable
+from vedette.densities import GLMB, LMB, FactoredGLMB, Labelled, TrackTable
 from vedette.densities.checks import offsets_of, unchecked
+from vedette.densities.conversions import reduced_lmb
 from vedette.fusion.base import (
     FusionInfo,
     FusionLimits,
@@ -25,7 +26,6 @@ from vedette.fusion.views import Views
 from vedette.kernels.base.types import Bools, Floats, Lmb
 from vedette.kernels.gaussian.mixtures import MixtureCaps
 from vedette.kernels.gaussian.pooling import pooled_tracks
-from vedette.kernels.labelled.conversions import glmb_to_lmb
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,14 +56,14 @@ class ArithmeticAverage:
         object.__setattr__(self, "weights", check_weights(self.weights))
         check_power("moment_matched", self.limits, len(self.weights))
 
-    def fuse(self, beliefs: Sequence[LMB | GLMB], views: Views | None = None) -> tuple[LMB, FusionInfo]:
-        """Fused LMB of the sensors' LMBs (a GLMB is first converted), in increasing label order, and what was done.
+    def fuse(self, beliefs: Sequence[Labelled], views: Views | None = None) -> tuple[LMB, FusionInfo]:
+        """Fused LMB of the sensors' LMBs (others are first converted), in increasing label order, and what was done.
 
         views: what the sensors could see; not used with plain weights. Labels that no sensor with a say has are left
         out. Raises `InputError` for another number or kind of beliefs, for state dimensions that differ, a density that
         is not valid or views that are missing.
         """
-        check_beliefs(beliefs, (LMB, GLMB), len(self.weights))
+        check_beliefs(beliefs, (LMB, GLMB, FactoredGLMB), len(self.weights))
         seen = require_views(self.by_views, views, len(self.weights))
         caps = power_rule("component_wise", self.limits, beliefs[0].state_dim).caps
         active = [i for i, weight in enumerate(self.weights) if weight > 0.0]
@@ -91,8 +91,8 @@ class ArithmeticAverage:
         )
 
 
-def _as_lmb(belief: LMB | GLMB, caps: MixtureCaps) -> Lmb:
-    return glmb_to_lmb(belief.to_kernel(), caps) if isinstance(belief, GLMB) else belief.to_kernel()
+def _as_lmb(belief: Labelled, caps: MixtureCaps) -> Lmb:
+    return belief.to_kernel() if isinstance(belief, LMB) else reduced_lmb(belief, caps)
 
 
 def _pooled(aligned: AlignedLmbs, kept: Bools, present: Floats, caps: MixtureCaps) -> TrackTable:

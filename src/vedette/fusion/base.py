@@ -173,7 +173,8 @@ def check_kinds(given: Sequence[type], kinds: tuple[type, ...], num_sensors: int
     """Raise `InputError` unless one belief a sensor is given, all of the kinds expected."""
     if len(given) != num_sensors:
         raise InputError(f"beliefs: expected {num_sensors}, one for each fusion weight; got {len(given)}")
-    expected = " or ".join(kind.__name__ for kind in kinds)
+    names = [kind.__name__ for kind in kinds]
+    expected = " or ".join([", ".join(names[:-1]), names[-1]] if names[1:] else names)
     for i, kind in enumerate(given):
         if not issubclass(kind, kinds):
             raise InputError(f"beliefs[{i}]: expected {expected}; got {kind.__name__}")

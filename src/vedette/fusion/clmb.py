@@ -10,9 +10,10 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import expit, log_expit, logit
 
-from vedette.densities import GLMB, LMB
+from vedette.densities import GLMB, LMB, FactoredGLMB, Labelled
 from vedette.densities.cases import LabelledCases, lmb_cases
 from vedette.densities.checks import unchecked
+from vedette.densities.conversions import reduced_lmb
 from vedette.densities.products import PowerProducts, Share, lay_out_products
 from vedette.fusion.base import (
     FusionInfo,
@@ -33,7 +34,6 @@ from vedette.fusion.lmbs import AlignedLmbs, align_lmbs, require_views, sum_over
 from vedette.fusion.tracks import fused_tracks, reduced_tracks
 from vedette.fusion.views import Views
 from vedette.kernels.base.types import Bools, Floats, Ints, Lmb
-from vedette.kernels.labelled.conversions import glmb_to_lmb
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,14 +78,14 @@ class Clmb:
         check_power(self.mixture_power, self.limits, len(self.weights))
         check_floor("missing_existence", math.log(self.missing_existence) if self.missing_existence > 0 else -math.inf)
 
-    def fuse(self, beliefs: Sequence[LMB | GLMB], views: Views | None = None) -> tuple[LMB, FusionInfo]:
-        """Fused LMB of the sensors' LMBs (a GLMB is first converted), in increasing label order, and what was done.
+    def fuse(self, beliefs: Sequence[Labelled], views: Views | None = None) -> tuple[LMB, FusionInfo]:
+        """Fused LMB of the sensors' LMBs (others are first converted), in increasing label order, and what was done.
 
         views: what the sensors could see; not used with plain weights. Raises `InputError` for another number or kind
         of beliefs, for state dimensions that differ, a density that is not valid or views that are missing, and
         `NumericalError` where a product of track densities cannot be integrated.
         """
-        check_beliefs(beliefs, (LMB, GLMB), len(self.weights))
+        check_beliefs(beliefs, (LMB, GLMB, FactoredGLMB), len(self.weights))
         seen = require_views(self.by_views, views, len(self.weights))
         rule = power_rule(self.mixture_power, self.limits, beliefs[0].state_dim)
         active = [i for i, weight in enumerate(self.weights) if weight > 0.0]
@@ -164,8 +164,8 @@ class _Powers(NamedTuple):
         return sum_over_sensors(self.of_labels * np.where(self.taking_part, values, 0.0))
 
 
-def as_lmb(belief: LMB | GLMB, rule: PowerRule) -> Lmb:
+def as_lmb(belief: Labelled, rule: PowerRule) -> Lmb:
     """An LMB with reduced mixtures."""
-    if isinstance(belief, GLMB):
-        return glmb_to_lmb(belief.to_kernel(), rule.caps)
+    if not isinstance(belief, LMB):
+        return reduced_lmb(belief, rule.caps)
     return Lmb(reduced_tracks(belief.tracks.to_kernel(), rule), belief.existence_logit)

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import Any, TypeVar
 
 import numpy as np
 from scipy.special import expit
 
-from vedette.densities import GLMB, LMB, TrackTable
+from vedette.densities import GLMB, LMB, FactoredGLMB, TrackTable
 from vedette.densities.cases import LabelledCases
 from vedette.densities.checks import unchecked
+from vedette.densities.joining import as_factored
 from vedette.densities.label_sets import take_tracks
 from vedette.densities.products import PowerProducts, Share
 from vedette.errors import NumericalError
@@ -30,12 +32,15 @@ from vedette.fusion.base import (
     count_lost,
     power_rule,
 )
+from vedette.fusion.factors import fuse_factors
 from vedette.fusion.laid_out import lay_out_glmbs
 from vedette.fusion.tracks import fused_tracks
 from vedette.fusion.views import Views
 from vedette.kernels.base.types import Floats, Glmb
 from vedette.kernels.gaussian.linalg import log_sum
 from vedette.kernels.labelled.conversions import marginalise
+
+_Glmb = TypeVar("_Glmb", GLMB, FactoredGLMB)
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,18 +81,36 @@ class CmDeltaGlmb:
         check_power(self.mixture_power, self.limits, len(self.weights))
         check_floor("missing_log_weight", self.missing_log_weight)
 
-    def fuse(self, beliefs: Sequence[GLMB], views: Views | None = None) -> tuple[GLMB, FusionInfo]:
+    def fuse(self, beliefs: Sequence[_Glmb], views: Views | None = None) -> tuple[_Glmb, FusionInfo]:
         """Fused marginalised GLMB of the sensors' GLMBs (delta or marginalised), heaviest set first, and what was done.
 
-        Label sets of equal weight come in the order of their first occurrence. views: not used. Raises `InputError` for
-        another number or kind of beliefs, for state dimensions that differ or a density that is not valid, and
-        `NumericalError` where a product of track densities cannot be integrated.
+        Label sets of equal weight come in the order of their first occurrence. Of products of GLMBs, where a GLMB is
+        one of a single factor, the product of the fusions of what belongs together: the smallest groups of labels of
+        which no sensor's factor spans two. A sensor without a label of a group is there certain that it is absent.
+        The caps are for each group, those of `max_hypotheses` also for each sensor's products of factors in it.
+        views: not used. Raises `InputError` for another number or kind of beliefs, for state dimensions that differ or
+        a density that is not valid, and `NumericalError` where a product of track densities cannot be integrated.
         """
-        check_beliefs(beliefs, (GLMB,), len(self.weights))
+        check_beliefs(beliefs, (GLMB, FactoredGLMB), len(self.weights))
         rule = power_rule(self.mixture_power, self.limits, beliefs[0].state_dim)
         active = [i for i, weight in enumerate(self.weights) if weight > 0.0]
         weights = np.array([self.weights[i] for i in active])
-        aligned = align([_marginalised(beliefs[i], rule) for i in active], self.missing_log_weight, rule)
+        fused: Any
+        given: Sequence[GLMB | FactoredGLMB] = beliefs
+        glmbs = [belief for belief in given if isinstance(belief, GLMB)]
+        if len(glmbs) == len(beliefs):
+            fused, info = self._fused([_marginalised(glmbs[i], rule) for i in active], weights, rule)
+        else:
+            factored = [as_factored(given[i]) for i in active]
+            own = (weights, self.missing_log_weight, rule, self.limits)
+            fused, info = fuse_factors(factored, *own, lambda sensors: self._fused(sensors, weights, rule))
+        missing_sets = by_sensor(np.array(info.missing_sets), active, len(beliefs))
+        missing_labels = by_sensor(np.array(info.missing_labels), active, len(beliefs))
+        return fused, replace(info, missing_sets=missing_sets, missing_labels=missing_labels)
+
+    def _fused(self, sensors: Sequence[Glmb], weights: Floats, rule: PowerRule) -> tuple[GLMB, FusionInfo]:
+        """The fusion of marginalised GLMBs without hypotheses of weight zero, and the report of these sensors alone."""
+        aligned = align(sensors, self.missing_log_weight, rule)
         tracks, log_overlaps = fused_tracks(aligned.labels, aligned.chosen, weights, aligned.tracks, rule)
         log_weights = aligned.log_weights @ weights
         log_weights = log_weights + np.bincount(aligned.set_of_member, log_overlaps, len(log_weights))
@@ -96,8 +119,8 @@ class CmDeltaGlmb:
         of_sensors = aligned.existence(np.where(aligned.held, aligned.log_weights, -math.inf))
         of_fused = aligned.existence((log_weights - log_normaliser)[:, None])[:, 0]
         return fused, FusionInfo(
-            missing_sets=by_sensor(np.count_nonzero(~aligned.held, axis=0), active, len(beliefs)),
-            missing_labels=by_sensor(aligned.num_missing_labels, active, len(beliefs)),
+            missing_sets=tuple(np.count_nonzero(~aligned.held, axis=0).tolist()),
+            missing_labels=tuple(aligned.num_missing_labels.tolist()),
             num_sets=len(aligned.held),
             num_lost_labels=count_lost(of_sensors, of_fused),
             empty_intersection=not bool(aligned.held.all(axis=1).any()),

@@ -9,7 +9,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from scipy.special import gammaincinv
 
-from vedette.densities import GLMB, LMB, TrackTable, glmb_to_lmb
+from vedette.densities import GLMB, LMB, FactoredGLMB, Labelled, TrackTable, as_lmb
 from vedette.densities.cases import LabelledCases
 from vedette.densities.checks import unchecked
 from vedette.densities.label_sets import Label, single_gaussians, take_tracks
@@ -26,7 +26,7 @@ OWN_LABELS = 1_000_000
 _TIE = 1e-6  # between costs, in favour of equal labels
 
 
-class _Labelled(NamedTuple):
+class _Targets(NamedTuple):
     """The labels of a belief with one Gaussian each."""
 
     labels: list[Label]
@@ -35,13 +35,13 @@ class _Labelled(NamedTuple):
     covs: Floats  # (num_labels, dim, dim)
 
     @classmethod
-    def of(cls, belief: GLMB | LMB) -> _Labelled:
-        lmb = glmb_to_lmb(belief) if isinstance(belief, GLMB) else belief
+    def of(cls, belief: Labelled) -> _Targets:
+        lmb = as_lmb(belief)
         tracks = single_gaussians(lmb.tracks)
         return cls([tuple(label) for label in tracks.labels.tolist()], lmb.existence, tracks.means, tracks.covs)
 
 
-def match_labels(beliefs: Sequence[GLMB | LMB], *, gate_probability: float = GATE_PROBABILITY) -> list[GLMB | LMB]:
+def match_labels(beliefs: Sequence[Labelled], *, gate_probability: float = GATE_PROBABILITY) -> list[Labelled]:
     """The sensors' beliefs with one label for what is one target by its place.
 
     The first sensor's labels stay as they are. Each further sensor's labels are assigned to those found so far, at the
@@ -56,24 +56,24 @@ def match_labels(beliefs: Sequence[GLMB | LMB], *, gate_probability: float = GAT
 
     gate_probability: that two independent estimates of one target are within the gate.
 
-    Raises `InputError` for something other than GLMBs and LMBs of one state dimension, a density that is not valid, or
-    a probability outside (0, 1).
+    Raises `InputError` for something other than labelled densities of one state dimension, a density that is not valid,
+    or a probability outside (0, 1).
     """
     names = common_names(beliefs, gate_probability=gate_probability)
     return [relabelled(belief, own) for belief, own in zip(beliefs, names, strict=True)]
 
 
 def common_names(
-    beliefs: Sequence[GLMB | LMB], *, gate_probability: float = GATE_PROBABILITY
+    beliefs: Sequence[Labelled], *, gate_probability: float = GATE_PROBABILITY
 ) -> list[dict[Label, Label]]:
     """For each sensor, the label that `match_labels` gives to each of its labels. Raises as that."""
-    check_beliefs(beliefs, (GLMB, LMB), len(beliefs))
+    check_beliefs(beliefs, (GLMB, LMB, FactoredGLMB), len(beliefs))
     if not 0.0 < gate_probability < 1.0:
         raise InputError(f"gate_probability: expected a number between 0 and 1; got {gate_probability}")
     if not beliefs:
         return []
     gate = 2.0 * float(gammaincinv(0.5 * beliefs[0].state_dim, gate_probability))  # chi-squared
-    owns = [_Labelled.of(belief) for belief in beliefs]
+    owns = [_Targets.of(belief) for belief in beliefs]
     found, common = owns[0], [{label: label for label in owns[0].labels}]
     for sensor in range(1, len(beliefs)):
         own = owns[sensor]
@@ -83,7 +83,7 @@ def common_names(
     return common
 
 
-def _pairs(own: _Labelled, found: _Labelled, gate: float) -> dict[int, int]:
+def _pairs(own: _Targets, found: _Targets, gate: float) -> dict[int, int]:
     """Place in `found` of those of a sensor's labels that are assigned."""
     squares, log_dets = pair_distances(own.means, own.covs, found.means, found.covs)
     place = {label: i for i, label in enumerate(found.labels)}
@@ -118,7 +118,7 @@ def _assign(costs: Floats, allowed: Bools, rows: Ints, columns: Ints, pairs: dic
             pairs[int(rows[row])] = int(columns[column])
 
 
-def _names(own: _Labelled, found: _Labelled, pairs: dict[int, int], sensor: int) -> list[Label]:
+def _names(own: _Targets, found: _Targets, pairs: dict[int, int], sensor: int) -> list[Label]:
     """The new label of each of a sensor's labels."""
     taken = set(found.labels)
     names: dict[int, Label] = {i: found.labels[place] for i, place in pairs.items()}
@@ -138,7 +138,7 @@ def _names(own: _Labelled, found: _Labelled, pairs: dict[int, int], sensor: int)
     return [names[i] for i in range(len(own.labels))]
 
 
-def _joined(found: _Labelled, own: _Labelled) -> _Labelled:
+def _joined(found: _Targets, own: _Targets) -> _Targets:
     """All labels so far, each with the density of the sensor that is surest of it; of equals the first."""
     place = {label: i for i, label in enumerate(found.labels)}
     new = [i for i, label in enumerate(own.labels) if label not in place]
@@ -149,10 +149,10 @@ def _joined(found: _Labelled, own: _Labelled) -> _Labelled:
         at = place.get(label)
         if at is not None and own.existence[i] > existence[at]:
             existence[at], means[at], covs[at] = own.existence[i], own.means[i], own.covs[i]
-    return _Labelled([*found.labels, *(own.labels[i] for i in new)], existence, means, covs)
+    return _Targets([*found.labels, *(own.labels[i] for i in new)], existence, means, covs)
 
 
-def relabelled(belief: GLMB | LMB, names: dict[Label, Label]) -> GLMB | LMB:
+def relabelled(belief: Labelled, names: dict[Label, Label]) -> Labelled:
     """The belief under other labels, of which no two are the same; labels without a new name keep theirs."""
     if all(old == new for old, new in names.items()):
         return belief
@@ -166,7 +166,11 @@ def relabelled(belief: GLMB | LMB, names: dict[Label, Label]) -> GLMB | LMB:
     members = labels[belief.hyp_tracks]
     hyps = np.repeat(np.arange(belief.num_hyps), np.diff(belief.hyp_offsets))
     order = np.lexsort((members[:, 1], members[:, 0], hyps))
-    return unchecked(GLMB, named, belief.hyp_offsets, belief.hyp_tracks[order], belief.hyp_log_weights)
+    members = belief.hyp_tracks[order]
+    if isinstance(belief, FactoredGLMB):
+        own = (belief.hyp_offsets, members, belief.hyp_log_weights, belief.factor_offsets)
+        return unchecked(FactoredGLMB, named, belief.track_offsets, *own)
+    return unchecked(GLMB, named, belief.hyp_offsets, members, belief.hyp_log_weights)
 
 
 @dataclass(frozen=True, slots=True)
@@ -192,11 +196,11 @@ class Matched:
         if not 0.0 < self.gate_probability < 1.0:
             raise InputError(f"gate_probability: expected a number between 0 and 1; got {self.gate_probability}")
 
-    def match(self, beliefs: Sequence[GLMB | LMB]) -> list[GLMB | LMB]:
+    def match(self, beliefs: Sequence[Labelled]) -> list[Labelled]:
         """The beliefs under common labels."""
         return match_labels(beliefs, gate_probability=self.gate_probability)
 
-    def fuse(self, beliefs: Sequence[GLMB | LMB], views: Views | None = None) -> tuple[Any, FusionInfo]:
+    def fuse(self, beliefs: Sequence[Labelled], views: Views | None = None) -> tuple[Any, FusionInfo]:
         """The fusion of the beliefs under common labels; see the rule's. Raises as `match_labels` and the rule."""
         return self.rule.fuse(self.match(beliefs), views)
 
