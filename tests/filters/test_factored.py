@@ -214,8 +214,8 @@ def test_faults_are_named():
     scene, rng = linear_scene(), np.random.default_rng(0)
     with pytest.raises(InputError, match="max_split_error: expected at most 2"):
         FactoredGlmbFilter(scene.targets, scene.sensor, max_split_error=3.0)
-    with pytest.raises(InputError, match="max_group_labels"):
-        FactoredGlmbFilter(scene.targets, scene.sensor, max_group_labels=0)
+    with pytest.raises(InputError, match="max_factor_labels"):
+        FactoredGlmbFilter(scene.targets, scene.sensor, max_factor_labels=0)
     tracker = FactoredGlmbFilter(scene.targets, scene.sensor)
     with pytest.raises(InputError, match="belief: expected a FactoredGLMB"):
         tracker.step(GLMB.empty(4), scene.scans[0], scene.pose, DT, 1, rng=rng)

@@ -22,6 +22,9 @@ from vedette.models.arguments import dimension, non_negative
 # Of the error that a split may make, the share that one pair of claims to a measurement may.
 _SHARE_OF_A_LINK = 0.01
 
+# Of the largest factors, how many may take a scan together.
+_FACTORS_TOGETHER = 4
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FactoredGlmbFilter(SingleSensorFilter):
@@ -32,7 +35,7 @@ class FactoredGlmbFilter(SingleSensorFilter):
     `max_split_error`. So a list of `limits.max_hypotheses` is shared by a few targets that contend, not by all: what is
     known of a far target does not depend on how long the list is, and the cost grows with the number of targets, not
     with that of their combinations. With a `max_split_error` of 2 every label is a factor of its own, as in an LMB
-    filter; with 0, and `max_group_labels` as large as the number of targets, none is split that depends on another, as
+    filter; with 0, and `max_factor_labels` as large as the number of targets, none is split that depends on another, as
     in a delta-GLMB filter.
 
     Attributes:
@@ -42,19 +45,20 @@ class FactoredGlmbFilter(SingleSensorFilter):
         max_split_error: L1 error, of densities that each integrate to 1, up to which the labels of a factor are split;
             0 to 2. Two factors are taken together where both take a measurement with a probability above a hundredth
             of half of this, if they were independent.
-        max_group_labels: labels that are taken together at most; where more contend, those that do so least are taken
-            as independent. What all this leaves out is in `FilterInfo.factoring_error`.
+        max_factor_labels: labels of a factor at most, and a quarter of those that take a scan together; where more
+            contend, those that do so least are taken as independent. What all this leaves out is in
+            `FilterInfo.factoring_error`.
 
     Raises:
         InputError: a part of another kind, or a field out of range.
     """
 
-    max_split_error: float = 0.01
-    max_group_labels: int = 10
+    max_split_error: float = 0.1
+    max_factor_labels: int = 10
 
     def __post_init__(self) -> None:
         SingleSensorFilter.__post_init__(self)  # slots replace the class that super() looks for
-        check_factoring(self.max_split_error, self.max_group_labels)
+        check_factoring(self.max_split_error, self.max_factor_labels)
 
     def initial(self) -> FactoredGLMB:
         """The belief before the first scan: no target."""
@@ -83,7 +87,7 @@ class FactoredGlmbFilter(SingleSensorFilter):
                 prior.to_kernel(),
                 *arguments,
                 self.limits.reduction(),
-                factoring_of(self.max_split_error, self.max_group_labels),
+                factoring_of(self.max_split_error, self.max_factor_labels),
             )
         return self._concluded(posterior, report, num_duplicates, f"step {step}: ")
 
@@ -93,14 +97,14 @@ class FactoredGlmbFilter(SingleSensorFilter):
         """The belief `dt` seconds later, births included; as `DeltaGlmbFilter.predict`, factor by factor."""
         prior = check_belief(belief, FactoredGLMB, self.targets.state_dim)
         limits = self.limits.keeping_labels()
-        blind = FactoredGlmbFilter(self.targets, blind_sensor(), limits, self.max_split_error, self.max_group_labels)
+        blind = FactoredGlmbFilter(self.targets, blind_sensor(), limits, self.max_split_error, self.max_factor_labels)
         arguments = blind._arguments(NO_SCAN, NO_POSE, dt, step, prior, births)
         with model_errors():
             posterior, report = step_factored(
                 prior.to_kernel(),
                 *arguments,
                 limits.reduction(),
-                factoring_of(self.max_split_error, self.max_group_labels),
+                factoring_of(self.max_split_error, self.max_factor_labels),
             )
         return blind._concluded(posterior, report, 0, f"step {step}: ")
 
@@ -116,12 +120,12 @@ class FactoredGlmbFilter(SingleSensorFilter):
                 prior.to_kernel(),
                 *arguments,
                 self.limits.reduction(),
-                factoring_of(self.max_split_error, self.max_group_labels),
+                factoring_of(self.max_split_error, self.max_factor_labels),
             )
         return self._concluded(posterior, report, num_duplicates, "")
 
     def _factoring(self) -> Factoring:
-        return factoring_of(self.max_split_error, self.max_group_labels)
+        return factoring_of(self.max_split_error, self.max_factor_labels)
 
     def _concluded(
         self, posterior: FactoredGlmb, report: FactoredReport, num_duplicates: int, place: str
@@ -134,14 +138,15 @@ class FactoredGlmbFilter(SingleSensorFilter):
         )
 
 
-def check_factoring(max_split_error: Any, max_group_labels: Any) -> None:
+def check_factoring(max_split_error: Any, max_factor_labels: Any) -> None:
     """`InputError` for a field out of its range."""
     if non_negative("max_split_error", max_split_error) > 2.0:
         raise InputError(f"max_split_error: expected at most 2; got {max_split_error!r}")
-    dimension("max_group_labels", max_group_labels)
+    dimension("max_factor_labels", max_factor_labels)
 
 
-def factoring_of(max_split_error: float, max_group_labels: int) -> Factoring:
+def factoring_of(max_split_error: float, max_factor_labels: int) -> Factoring:
     """The fields of a filter as kernels take them."""
     error = float(max_split_error)
-    return Factoring(error, 0.5 * _SHARE_OF_A_LINK * error, int(max_group_labels))
+    most = int(max_factor_labels)
+    return Factoring(error, 0.5 * _SHARE_OF_A_LINK * error, most, _FACTORS_TOGETHER * most)

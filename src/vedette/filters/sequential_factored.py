@@ -24,24 +24,24 @@ class SequentialFactoredFilter(MultiSensorFilter[FactoredGLMB]):
     As `SequentialLmbFilter`, with the density of `FactoredGlmbFilter`: which of contending labels is which stays open
     from one sensor to the next. Of one sensor it is the `FactoredGlmbFilter`.
 
-    Attributes and errors: as `MultiSensorGlmbFilter`, and `max_split_error` and `max_group_labels` as of
+    Attributes and errors: as `MultiSensorGlmbFilter`, and `max_split_error` and `max_factor_labels` as of
     `FactoredGlmbFilter`.
     """
 
-    max_split_error: float = 0.01
-    max_group_labels: int = 10
+    max_split_error: float = 0.1
+    max_factor_labels: int = 10
     kind: ClassVar[type[FactoredGLMB]] = FactoredGLMB
 
     def __post_init__(self) -> None:
         MultiSensorFilter.__post_init__(self)  # slots replace the class that super() looks for
-        check_factoring(self.max_split_error, self.max_group_labels)
+        check_factoring(self.max_split_error, self.max_factor_labels)
 
     def _updated(
         self, prior: FactoredGLMB, born: LMB, looks: Looks, dt: float, place: str
     ) -> tuple[FactoredGLMB, FilterInfo]:
         motion, posterior = kernel_motion(self.targets.motion, self.targets.survival), prior.to_kernel()
         keeping, reports = self.limits.keeping_labels(), list[FactoredReport]()
-        factoring = factoring_of(self.max_split_error, self.max_group_labels)
+        factoring = factoring_of(self.max_split_error, self.max_factor_labels)
         given = zip(looks.names, looks.sensors, looks.inputs_in_turn(born, dt), strict=True)
         for s, (name, sensor, scan) in enumerate(given):
             limits = self.limits if s == len(looks.names) - 1 else keeping

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from vedette.kernels.association.children import Parents
-from vedette.kernels.association.search import SearchCaps
 from vedette.kernels.base.arrays import grown_floats, grown_ints
 from vedette.kernels.base.compile import borrowing, kernel
 from vedette.kernels.base.types import Ints
@@ -24,32 +23,32 @@ def _merge_rows(rows: Ints, first: int, middle: int, last: int) -> None:
 
 
 @kernel
-def product_of(first: Parents, second: Parents, caps: SearchCaps) -> Parents:
-    """The products of the hypotheses of two factors, heaviest first, at most `max_hypotheses` and none more than
-    `max_log_gap` under the heaviest. Both factors have their heaviest first, and rows in increasing order.
+def product_of(first: Parents, second: Parents, max_hypotheses: int) -> Parents:
+    """The products of the hypotheses of two factors, heaviest first. Both have theirs so, and rows in increasing order.
+
+    A pair of which `max_hypotheses` others are surely heavier is left out, but never one with the heaviest hypothesis
+    of the other factor: a hypothesis that a factor has kept for the sake of one track is not lost before the scan.
     """
+    most = max(max_hypotheses, len(first.log_weights), len(second.log_weights))
     room = max(len(first.log_weights), len(second.log_weights))
     lefts, rights, log_weights, num = np.empty(room, np.int64), np.empty(room, np.int64), np.empty(room), 0
-    best = first.log_weights[0] + second.log_weights[0]
     for a in range(len(first.log_weights)):
         for b in range(len(second.log_weights)):
             # (a + 1) (b + 1) pairs are at least as heavy as this one.
-            if (a + 1) * (b + 1) > caps.max_hypotheses:
-                break
-            log_weight = first.log_weights[a] + second.log_weights[b]
-            if best - log_weight > caps.max_log_gap:
+            if (a + 1) * (b + 1) > most:
                 break
             lefts, rights = grown_ints(lefts, num + 1), grown_ints(rights, num + 1)
             log_weights = grown_floats(log_weights, num + 1)
-            lefts[num], rights[num], log_weights[num] = a, b, log_weight
+            lefts[num], rights[num] = a, b
+            log_weights[num] = first.log_weights[a] + second.log_weights[b]
             num += 1
-    order = descending_order(log_weights[:num])[: min(num, caps.max_hypotheses)]
-    offsets, most = np.zeros(len(order) + 1, np.int64), 0
+    order = descending_order(log_weights[:num])
+    offsets, size = np.zeros(num + 1, np.int64), 0
     for pair in order:
-        most += first.offsets[lefts[pair] + 1] - first.offsets[lefts[pair]]
-        most += second.offsets[rights[pair] + 1] - second.offsets[rights[pair]]
-    rows, kept, filled = np.empty(most, np.int64), np.empty(len(order)), 0
-    for h in range(len(order)):
+        size += first.offsets[lefts[pair] + 1] - first.offsets[lefts[pair]]
+        size += second.offsets[rights[pair] + 1] - second.offsets[rights[pair]]
+    rows, sorted_weights, filled = np.empty(size, np.int64), np.empty(num), 0
+    for h in range(num):
         left, right = lefts[order[h]], rights[order[h]]
         for i in range(first.offsets[left], first.offsets[left + 1]):
             rows[filled] = first.rows[i]
@@ -59,8 +58,8 @@ def product_of(first: Parents, second: Parents, caps: SearchCaps) -> Parents:
             rows[filled] = second.rows[i]
             filled += 1
         _merge_rows(rows, offsets[h], middle, filled)
-        offsets[h + 1], kept[h] = filled, log_weights[order[h]]
-    return Parents(offsets, rows, kept)
+        offsets[h + 1], sorted_weights[h] = filled, log_weights[order[h]]
+    return Parents(offsets, rows, sorted_weights)
 
 
 __all__ = ["product_of"]

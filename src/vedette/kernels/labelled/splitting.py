@@ -130,28 +130,42 @@ def _dependences(choices: Choices) -> tuple[Ints, Ints, Floats]:
 
 
 @kernel
-def independent_parts(choices: Choices, max_error: float) -> tuple[Ints, float]:
+def _existences(choices: Choices) -> Floats:
+    existences = np.zeros(len(choices.labels))
+    for h in range(len(choices.weights)):
+        for k in range(len(existences)):
+            if choices.symbols[h, k] >= 0:
+                existences[k] += choices.weights[h]
+    return existences
+
+
+@kernel
+def independent_parts(choices: Choices, max_error: float, max_labels: int, min_existence: float) -> tuple[Ints, float]:
     """(num_labels,) the first label of the part that each is in, and the L1 error of their product.
 
     The parts are as small as an error of at most `max_error` allows, labels that depend on each other most joined
-    first; one part, without error, where nothing smaller is within it.
+    first, but none is made larger than `max_labels`, and labels less probable than `min_existence` stay alone, whatever
+    the error then is.
     """
     num = len(choices.labels)
-    part_of, everything = counted_ints(num), filled_ints(num, 1)
+    part_of, sizes, everything = counted_ints(num), filled_ints(num, 1), filled_ints(num, 1)
     if num < 2:
         return part_of, 0.0
     error = _product_error(choices, part_of, everything)
     if error <= max(max_error, _EQUAL):
         return part_of, error
+    existences, num_parts = _existences(choices), num
     firsts, seconds, errors = _dependences(choices)
-    num_parts = num
     for pair in descending_order(errors):
         a, b = part_of[firsts[pair]], part_of[seconds[pair]]
-        if a == b:
+        improbable = existences[firsts[pair]] < min_existence or existences[seconds[pair]] < min_existence
+        if a == b or improbable or sizes[a] + sizes[b] > max_labels:
             continue
+        first, last = min(a, b), max(a, b)
         for k in range(num):
-            if part_of[k] == max(a, b):
-                part_of[k] = min(a, b)
+            if part_of[k] == last:
+                part_of[k] = first
+        sizes[first] += sizes[last]
         num_parts -= 1
         error = _product_error(choices, part_of, everything) if num_parts > 1 else 0.0
         if error <= max(max_error, _EQUAL):

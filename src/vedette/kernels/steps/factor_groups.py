@@ -184,7 +184,7 @@ def _log_row_totals(options: Options) -> Floats:
 
 @kernel
 def gathered_group(
-    factors: Factors, members_of: Ints, rows: Rows, options: Options, caps: SearchCaps, place: Ints, columns: Ints
+    factors: Factors, members_of: Ints, rows: Rows, options: Options, max_hypotheses: int, place: Ints, columns: Ints
 ) -> Group:
     """The factors `members_of` as a problem of their own.
 
@@ -200,7 +200,7 @@ def gathered_group(
     for k in range(1, len(members_of)):
         other = _parents_of(factors, members_of[k], place)
         log_bound += _log_bound(other, log_totals)
-        parents = product_of(parents, other, caps)
+        parents = product_of(parents, other, max_hypotheses)
     return Group(taken_rows(rows, members), own, parents, measurements, log_bound)
 
 

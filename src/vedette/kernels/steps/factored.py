@@ -64,7 +64,8 @@ class Factoring(NamedTuple):
 
     max_error: float  # L1 error of one group's split
     least_link: float  # product of two claims to a measurement, up to which they are taken as independent
-    max_labels: int  # of a group
+    max_labels: int  # of a factor, after a scan
+    max_together: int  # labels of the factors that take a scan together
 
 
 class FactoredReport(NamedTuple):
@@ -220,11 +221,14 @@ def _append_label(
 
 
 @kernel
-def _append_parts(store: FactorStore, glmb: Glmb, max_error: float, reduction: Reduction, sums: Floats) -> FactorStore:
+def _append_parts(
+    store: FactorStore, glmb: Glmb, factoring: Factoring, reduction: Reduction, sums: Floats
+) -> FactorStore:
     """Split the posterior of a group and enter its parts."""
     glmb = merge_versions(glmb, reduction.mixture)
     choices = choices_of(glmb)
-    part_of, error = independent_parts(choices, max_error)
+    min_existence = 1.0 / (1.0 + math.exp(-reduction.min_existence_logit))
+    part_of, error = independent_parts(choices, factoring.max_error, factoring.max_labels, min_existence)
     sums[_SPLIT] += error
     for part in range(len(part_of)):
         size = 0
@@ -251,7 +255,7 @@ def _finish(
     weigh_singles(factors, rows)
     options, log_clutter, num_raised = weighed_options(rows, scan, sensor, truncation)
     sizes = factors.num_labels.copy()
-    leaders = linked_factors(options, factors.row_offsets, sizes, factoring.least_link, factoring.max_labels)
+    leaders = linked_factors(options, factors.row_offsets, sizes, factoring.least_link, factoring.max_together)
     offsets, members = group_members(leaders, len(leaders))
     work, most_labels = _make_work(rows, options), 0
     store = make_store(len(rows.log_absent), 2 * len(rows.log_weights), rows.means.shape[1])
@@ -263,10 +267,11 @@ def _finish(
         if len(together) == 1 and is_single(factors, leader):
             store = _update_alone(factors.row_offsets[leader], rows, options, reduction, store, work)
             continue
-        group = gathered_group(factors, together, rows, options, truncation.search, work.place, work.columns)
+        most = truncation.search.max_hypotheses
+        group = gathered_group(factors, together, rows, options, most, work.place, work.columns)
         posterior = _update_group(group, truncation, work)
         if len(posterior.hyp_log_weights) > 0:
-            store = _append_parts(store, posterior, factoring.max_error, reduction, work.sums)
+            store = _append_parts(store, posterior, factoring, reduction, work.sums)
     sums, density = work.sums, stored(store)
     require_gaussians(density.tracks.means, density.tracks.covs)
     return density, FactoredReport(

@@ -116,13 +116,11 @@ class Filter(Section):
         "[-].",
     )
     max_split_error: Annotated[float, Field(ge=0.0, le=2.0)] = Field(
-        default=0.01,
+        default=0.1,
         description="Of a factored_glmb: L1 error up to which labels that contended are taken as independent again; 2: "
         "always, as an LMB; 0: where they are [-].",
     )
-    max_group_labels: Count = Field(
-        default=10, description="Of a factored_glmb: most labels that take a scan together [-]."
-    )
+    max_factor_labels: Count = Field(default=10, description="Of a factored_glmb: most labels of a factor [-].")
     gaussian_method: GaussianMethod = Field(
         default="auto", description="Extended, unscented or cubature Kalman; auto: extended where Jacobians exist [-]."
     )
@@ -155,7 +153,7 @@ class Filter(Section):
             case "lmb":
                 return LmbFilter(targets, sensor, limits)
             case "factored_glmb":
-                return FactoredGlmbFilter(targets, sensor, limits, self.max_split_error, self.max_group_labels)
+                return FactoredGlmbFilter(targets, sensor, limits, self.max_split_error, self.max_factor_labels)
             case "phd":
                 return PhdFilter(targets, sensor, limits)
             case "cphd":
@@ -183,7 +181,7 @@ class Filter(Section):
 
         limits = self.limits.build()
         if self.kind == "factored_glmb":
-            return SequentialFactoredFilter(targets, sensors, limits, self.max_split_error, self.max_group_labels)
+            return SequentialFactoredFilter(targets, sensors, limits, self.max_split_error, self.max_factor_labels)
         if self.kind == "lmb":
             return (SequentialLmbFilter if in_turn else MultiSensorLmbFilter)(targets, sensors, limits)
         return MultiSensorGlmbFilter(targets, sensors, limits, marginalised=self.kind == "m_delta_glmb")
