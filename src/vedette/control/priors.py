@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from typing import overload
+
 import numpy as np
 
 from vedette.control.inputs import Belief
-from vedette.densities import GLMB, LMB, TrackTable, marginalise, track_moments
+from vedette.densities import GLMB, LMB, FactoredGLMB, Labelled, TrackTable, marginalise, track_moments
 from vedette.densities.checks import unchecked
 from vedette.densities.label_sets import take_hypotheses
 from vedette.filters.inputs import model_errors
@@ -22,14 +24,20 @@ def heaviest_hypotheses(belief: GLMB, most: int) -> GLMB:
     return unchecked(GLMB, taken.tracks, taken.hyp_offsets, taken.hyp_tracks, log_weights)
 
 
-def predicted(fused: Belief, motion: MotionModel, num_steps: int, period: float) -> Belief:
+@overload
+def predicted(fused: FactoredGLMB, motion: MotionModel, num_steps: int, period: float) -> FactoredGLMB: ...
+@overload
+def predicted(fused: Belief, motion: MotionModel, num_steps: int, period: float) -> Belief: ...
+def predicted(fused: Labelled, motion: MotionModel, num_steps: int, period: float) -> Labelled:
     """The fused density at the end of the horizon, without birth or death (paper, "pseudo-prediction").
 
-    Tracks are first collapsed to one Gaussian each (a GLMB is marginalised), as those of the pseudo-updates are. Label
+    Tracks are first collapsed to one Gaussian each (GLMBs are marginalised), as those of the pseudo-updates are. Label
     sets of weight zero are left out.
     """
-    single = fused
-    if isinstance(fused, GLMB):
+    single: Labelled = fused
+    if isinstance(fused, FactoredGLMB):
+        single = marginalise(fused, max_components=1)
+    elif isinstance(fused, GLMB):
         marginal = marginalise(fused, max_components=1)
         single = take_hypotheses(marginal, np.flatnonzero(marginal.hyp_log_weights > -np.inf))
     means, covs = track_moments(single.tracks)
@@ -41,4 +49,6 @@ def predicted(fused: Belief, motion: MotionModel, num_steps: int, period: float)
     tracks = unchecked(TrackTable, single.tracks.labels, np.arange(num + 1), np.zeros(num), means, covs)
     if isinstance(single, LMB):
         return unchecked(LMB, tracks, single.existence_logit)
+    if isinstance(single, FactoredGLMB):
+        return unchecked(FactoredGLMB, tracks, *single.to_kernel()[1:])
     return unchecked(GLMB, tracks, single.hyp_offsets, single.hyp_tracks, single.hyp_log_weights)
