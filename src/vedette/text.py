@@ -32,6 +32,11 @@ def counted(number: int, thing: str) -> str:
     return f"{number} {thing}" if number == 1 else f"{number} {thing}s"
 
 
+def either(names: Sequence[str]) -> str:
+    """Alternatives in words: "a", "a or b", "a, b or c"."""
+    return " or ".join([", ".join(names[:-1]), names[-1]] if names[1:] else names)
+
+
 def named_in(name: str, unit: str) -> str:
     """`OSPA (m)`; of a quantity without a unit its name alone."""
     return f"{name} ({unit})" if unit else name

@@ -146,8 +146,14 @@ def test_kinds_of_beliefs(planner: Any) -> None:
     assert refused(mixed, planner) == "state.local[1]: expected GLMB; got LMB"
     assert refused(replace(other, beliefs=example.beliefs), planner) == "state.local[0]: expected LMB; got GLMB"
     unlabelled = Poisson.from_gaussians([1.0], np.zeros((1, 4)), np.eye(4)[np.newaxis])
-    assert refused(replace(example, fused=unlabelled), planner) == "state.fused: expected GLMB or LMB; got Poisson"
-    assert refused(replace(example, fused=None), planner) == "state.fused: expected GLMB or LMB; got NoneType"
+    assert (
+        refused(replace(example, fused=unlabelled), planner)
+        == "state.fused: expected GLMB, LMB or FactoredGLMB; got Poisson"
+    )
+    assert (
+        refused(replace(example, fused=None), planner)
+        == "state.fused: expected GLMB, LMB or FactoredGLMB; got NoneType"
+    )
 
 
 @pytest.mark.parametrize("planner", PLANNERS)

@@ -15,7 +15,7 @@ from scipy.special import ndtr
 from control.examples import A, B, C, glmb, lmb
 from vedette.control import Situation, VoidProbability, mask_of, void_probability
 from vedette.control.constraints.discs import disc_probabilities, near_pairs
-from vedette.densities import GLMB, LMB
+from vedette.densities import GLMB, LMB, FactoredGLMB, factored_to_glmb
 from vedette.errors import InputError
 
 
@@ -132,6 +132,18 @@ def test_of_a_glmb_it_is_a_sum_over_hypotheses(num_components: int, monkeypatch:
         assert value == pytest.approx(total, abs=1e-10)
     monkeypatch.setattr("vedette.control.constraints.void._BLOCK", 1)
     np.testing.assert_allclose(void_probability(belief, CENTRES, 80.0), found, rtol=1e-14)
+
+
+def test_of_a_product_of_glmbs_it_is_that_of_all_combinations() -> None:
+    draw = np.random.default_rng(6)
+    factors = [glmb(((A, B), (), (A,), (A, B)), draw, 2), glmb(((C,), ()), draw, 2)]
+    belief = FactoredGLMB.from_factors(factors, 4)
+    found = void_probability(belief, CENTRES, 80.0)
+    expected = void_probability(factors[0], CENTRES, 80.0) * void_probability(factors[1], CENTRES, 80.0)
+    np.testing.assert_allclose(found, expected, rtol=1e-13)
+    whole, _ = factored_to_glmb(belief, max_hypotheses=100)
+    np.testing.assert_allclose(found, void_probability(whole, CENTRES, 80.0), rtol=1e-12)
+    np.testing.assert_array_equal(void_probability(FactoredGLMB.empty(4), CENTRES, 80.0), 1.0)
 
 
 def test_against_samples() -> None:

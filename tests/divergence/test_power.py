@@ -153,5 +153,5 @@ def test_what_is_refused() -> None:
         with pytest.raises(InputError, match="order: expected a finite number above 0 other than 1"):
             renyi(lmb, lmb, order)
     poisson = Poisson(np.zeros(1), np.zeros((1, 2)), np.eye(2)[None])
-    with pytest.raises(InputError, match="expected labelled densities, GLMB or LMB; got two Poisson densities"):
+    with pytest.raises(InputError, match="expected labelled densities; got two Poisson densities"):
         power_integral(poisson, poisson, 1.0, 1.0)  # type: ignore[arg-type]

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from vedette.control.constraints import Constraint, Mask, Situation, mask_of
-from vedette.control.inputs import Belief
 from vedette.control.priors import predicted
 from vedette.control.settings import MobileSensor, PlanningSettings
+from vedette.densities import Labelled
 from vedette.filters import shared_targets
 from vedette.kernels.base.types import Floats
 from vedette.kernels.planning.ascent import Allowed
@@ -23,7 +23,7 @@ def mask_of_decision(
     constraints: Sequence[Constraint],
     sensors: Sequence[MobileSensor],
     options: Sequence[Options],
-    fused: Belief | None,
+    fused: Labelled | None,
     poses: Floats,
     settings: PlanningSettings,
 ) -> Mask | None:
@@ -42,11 +42,11 @@ def mask_of_decision(
 def beliefs_ahead(
     constraints: Sequence[Constraint],
     sensors: Sequence[MobileSensor],
-    fused: Belief | None,
+    fused: Labelled | None,
     settings: PlanningSettings,
     first: int,
     last: int,
-) -> tuple[Belief, ...]:
+) -> tuple[Labelled, ...]:
     """The fused belief predicted by `first` to `last` steps of the horizon; none where no constraint looks at it."""
     if fused is None or not any(constraint.needs_beliefs for constraint in constraints):
         return ()

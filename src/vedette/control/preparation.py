@@ -12,12 +12,20 @@ from vedette.control.additive.evaluator import AdditiveEvaluator
 from vedette.control.allowed import mask_of_decision
 from vedette.control.constraints import Constraint, Mask
 from vedette.control.evaluator import Evaluator
-from vedette.control.inputs import Belief, check_state, options_of
+from vedette.control.inputs import check_state, options_of
 from vedette.control.plan import Certainty
 from vedette.control.rewards.base import LabelReward, PowerReward, Reward, speaks_for
 from vedette.control.rewards.loss import ExpectedLossReward
 from vedette.control.settings import MobileSensor, PlanningSettings
-from vedette.densities import GLMB, LMB, UndetectedIntensity, existence_probabilities, glmb_to_lmb
+from vedette.densities import (
+    GLMB,
+    LMB,
+    FactoredGLMB,
+    Labelled,
+    UndetectedIntensity,
+    as_lmb,
+    existence_probabilities,
+)
 from vedette.fusion import Clmb, CmDeltaGlmb, Fusion, Linear, LinearRule, ParallelUpdate
 from vedette.models.arguments import reject
 from vedette.platforms import Options
@@ -146,7 +154,7 @@ def prepare_sums(
         raise reject("reward, fusion", expected, f"{type(reward).__name__}, {type(planned.fusion).__name__}")
     fused, local = planned.state.fused, planned.state.local
     assert isinstance(fused, LMB)
-    return Sums(rule, fused, tuple(map(_as_lmb, local)), state.undetected, planned.notes)
+    return Sums(rule, fused, tuple(map(as_lmb, local)), state.undetected, planned.notes)
 
 
 def _planned(
@@ -155,8 +163,8 @@ def _planned(
     """The beliefs in the form in which they are planned on. why: GLMBs are LMBs there in any case."""
     beliefs = (*state.local, state.fused)
     notes: tuple[str, ...] = ()
-    if _has_glmb(beliefs) and (why := why or _why_lmbs(num_sensors, fusion, settings, reward, state.fused)):
-        converted: dict[int, LMB] = {id(belief): _as_lmb(belief) for belief in beliefs}
+    if _has_glmb(beliefs) and (why := why or _why_lmbs(num_sensors, fusion, settings, reward, beliefs)):
+        converted: dict[int, LMB] = {id(belief): as_lmb(belief) for belief in beliefs}
         local = tuple(converted[id(belief)] for belief in state.local)
         state = replace(state, local=local, fused=converted[id(state.fused)])
         notes = (f"planned on the LMBs of the GLMB beliefs: {why}",)
@@ -168,21 +176,21 @@ def _planned(
     return _Planned(state, fusion, notes)
 
 
-def _has_glmb(beliefs: Sequence[Belief]) -> bool:
-    return any(isinstance(belief, GLMB) for belief in beliefs)
+def _has_glmb(beliefs: Sequence[Labelled]) -> bool:
+    return any(isinstance(belief, GLMB | FactoredGLMB) for belief in beliefs)
 
 
-def _as_lmb(belief: Belief) -> LMB:
-    return belief if isinstance(belief, LMB) else glmb_to_lmb(belief)
-
-
-def _why_lmbs(num_sensors: int, fusion: Fusion, settings: PlanningSettings, reward: AnyReward, fused: Belief) -> str:
-    """Why GLMBs are planned on their LMBs; empty where they are not."""
+def _why_lmbs(
+    num_sensors: int, fusion: Fusion, settings: PlanningSettings, reward: AnyReward, beliefs: Sequence[Labelled]
+) -> str:
+    """Why GLMBs are planned on their LMBs; empty where they are not. beliefs: the fused one last."""
     if isinstance(reward, ExpectedLossReward):
         return "the expected loss asks for no more"
     if getattr(fusion, "shares_prediction", False):
         return f"{type(fusion).__name__} fuses LMBs"
-    expected = float(existence_probabilities(fused)[1].sum())
+    if any(isinstance(belief, FactoredGLMB) for belief in beliefs):
+        return "products of GLMBs always are"
+    expected = float(existence_probabilities(beliefs[-1])[1].sum())
     if num_sensors > settings.max_glmb_sensors:
         return f"{num_sensors} sensors, of at most {settings.max_glmb_sensors}"
     if expected > settings.max_glmb_targets:

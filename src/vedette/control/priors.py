@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from typing import Any, TypeVar
+
 import numpy as np
 
-from vedette.control.inputs import Belief
-from vedette.densities import GLMB, LMB, TrackTable, marginalise, track_moments
+from vedette.densities import GLMB, LMB, Labelled, TrackTable, marginalise, track_moments
 from vedette.densities.checks import unchecked
 from vedette.densities.label_sets import take_hypotheses
 from vedette.filters.inputs import model_errors
 from vedette.kernels.gaussian.linalg import log_sum
 from vedette.kernels.planning.prediction import predict_tracks
 from vedette.models import MotionModel, constant_survival, kernel_motion
+
+_Labelled = TypeVar("_Labelled", bound=Labelled)
 
 
 def heaviest_hypotheses(belief: GLMB, most: int) -> GLMB:
@@ -22,16 +25,17 @@ def heaviest_hypotheses(belief: GLMB, most: int) -> GLMB:
     return unchecked(GLMB, taken.tracks, taken.hyp_offsets, taken.hyp_tracks, log_weights)
 
 
-def predicted(fused: Belief, motion: MotionModel, num_steps: int, period: float) -> Belief:
+def predicted(fused: _Labelled, motion: MotionModel, num_steps: int, period: float) -> _Labelled:
     """The fused density at the end of the horizon, without birth or death (paper, "pseudo-prediction").
 
-    Tracks are first collapsed to one Gaussian each (a GLMB is marginalised), as those of the pseudo-updates are. Label
-    sets of weight zero are left out.
+    Tracks are first collapsed to one Gaussian each (GLMBs are marginalised), as those of the pseudo-updates are. Label
+    sets of weight zero are left out of a GLMB.
     """
-    single = fused
-    if isinstance(fused, GLMB):
-        marginal = marginalise(fused, max_components=1)
-        single = take_hypotheses(marginal, np.flatnonzero(marginal.hyp_log_weights > -np.inf))
+    single: Any = fused
+    if not isinstance(fused, LMB):
+        single = marginalise(single, max_components=1)
+    if isinstance(single, GLMB):
+        single = take_hypotheses(single, np.flatnonzero(single.hyp_log_weights > -np.inf))
     means, covs = track_moments(single.tracks)
     with model_errors():
         means, covs = predict_tracks(
@@ -39,6 +43,4 @@ def predicted(fused: Belief, motion: MotionModel, num_steps: int, period: float)
         )
     num = single.tracks.num_tracks
     tracks = unchecked(TrackTable, single.tracks.labels, np.arange(num + 1), np.zeros(num), means, covs)
-    if isinstance(single, LMB):
-        return unchecked(LMB, tracks, single.existence_logit)
-    return unchecked(GLMB, tracks, single.hyp_offsets, single.hyp_tracks, single.hyp_log_weights)
+    return unchecked(type(fused), tracks, *single.to_kernel()[1:])

@@ -7,15 +7,17 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
-from vedette.densities import GLMB, LMB, Poisson
+from vedette.densities import GLMB, LMB, Labelled, Poisson
 from vedette.densities.conversions import lmb_on_label_sets
+from vedette.densities.factored import LABELLED
 from vedette.densities.label_sets import label_sets
+from vedette.divergence.parts import Part, paired_parts
 from vedette.errors import InputError, NumericalError
 from vedette.kernels.base.types import Glmb, Tracks
 from vedette.kernels.labelled.inner_products import log_glmbs, log_lmbs, log_tracks
 from vedette.kernels.labelled.stacking import stack_glmbs, stack_tracks
 
-Density: TypeAlias = GLMB | LMB | Poisson
+Density: TypeAlias = Labelled | Poisson
 Support = Literal["full", "common"]
 
 # Of the magnitude of the logs: rounding of sums over a million pairs of hypotheses stays below.
@@ -27,14 +29,17 @@ def cauchy_schwarz(a: Density, b: Density, *, unit_volume: float = 1.0, support:
 
     GLMB (Beard et al. 2017, "Void probabilities and Cauchy-Schwarz divergence for generalized labeled multi-Bernoulli
     models"): all pairs of hypotheses that share a label set. LMB: the sum over labels of the Bernoulli divergences.
-    An LMB and a GLMB: the LMB is taken on the GLMB's label sets. Two Poisson densities (Hoang et al. 2015): K / 2
+    An LMB and a GLMB: the LMB is taken on the GLMB's label sets. Products of GLMBs: the sum over the smallest groups of
+    labels of which neither density has a factor that spans two; labels that are alone in both are compared as LMBs, the
+    others on all products of their factors. Two Poisson densities (Hoang et al. 2015): K / 2
     times the squared L2 distance of the intensities.
 
     unit_volume: K, the unit of hyper-volume of a state (units of the state multiplied), which weighs cardinalities
         against each other; see `reference_unit_volume`.
     support: "full" as in the paper. "common" leaves out, in all three terms, the label sets that one of the densities
-        lacks (two LMBs: the labels), because a set that was only cut off by a cap is no difference of belief; with
-        it, the divergence is 0 too for densities that are proportional on what they share.
+        lacks (two LMBs, and labels that are alone in both: the labels), because a set that was only cut off by a cap is
+        no difference of belief; with it, the divergence is 0 too for densities that are proportional on what they
+        share.
 
     Infinite where the densities have no label set in common. A result below 0 by rounding (1e-11 of the logs'
     magnitude) is 0. Raises `InputError` for densities that cannot be compared (labelled with unlabelled, other state
@@ -47,6 +52,8 @@ def cauchy_schwarz(a: Density, b: Density, *, unit_volume: float = 1.0, support:
         if support == "common":
             raise InputError("support: 'common' is for densities with label sets; got two Poisson densities")
         return _poisson(a, b, log_unit_volume)
+    assert not isinstance(a, Poisson)
+    assert not isinstance(b, Poisson)
     cross, own_a, own_b = log_inner_products(a, b, log_unit_volume, support == "common", self_terms=True)
     if support == "common" and -math.inf in (own_a, own_b):
         raise InputError("support: 'common' is for densities that share a label set; got two that share none")
@@ -64,6 +71,8 @@ def log_inner_product(a: Density, b: Density, *, unit_volume: float = 1.0) -> fl
     if isinstance(a, Poisson) and isinstance(b, Poisson):
         shared = math.exp(log_unit_volume + log_tracks(_intensities(a, b), 0, 1))
         return shared - a.expected_number - b.expected_number
+    assert not isinstance(a, Poisson)
+    assert not isinstance(b, Poisson)
     return log_inner_products(a, b, log_unit_volume, False, self_terms=False)[0]
 
 
@@ -72,8 +81,8 @@ def check_densities(densities: dict[str, Density], unit_volume: float) -> float:
     if not 0.0 < unit_volume < math.inf:
         raise InputError(f"unit_volume: expected a finite number above 0; got {unit_volume}")
     for name, density in densities.items():
-        if not isinstance(density, GLMB | LMB | Poisson):
-            raise InputError(f"{name}: expected a GLMB, an LMB or a Poisson; got {type(density).__name__}")
+        if not isinstance(density, Density):
+            raise InputError(f"{name}: expected {LABELLED} or a Poisson; got {type(density).__name__}")
         try:
             density.validate(error=InputError)
         except InputError as fault:
@@ -94,15 +103,21 @@ def check_support(support: str) -> None:
 
 
 def log_inner_products(
-    a: Density, b: Density, log_unit_volume: float, common: bool, *, self_terms: bool
+    a: Labelled, b: Labelled, log_unit_volume: float, common: bool, *, self_terms: bool
 ) -> tuple[float, float, float]:
     """log zeta(a, b), zeta(a, a), zeta(b, b) of labelled densities; the last two may be -inf unless `self_terms`."""
+    parts = [_of_parts(p, q, log_unit_volume, common, self_terms) for p, q in paired_parts(a, b)]
+    cross, own_a, own_b = (sum(logs) for logs in zip((0.0, 0.0, 0.0), *parts, strict=True))
+    return cross, own_a, own_b
+
+
+def _of_parts(a: Part, b: Part, log_unit_volume: float, common: bool, self_terms: bool) -> tuple[float, float, float]:
     if isinstance(a, GLMB) and isinstance(b, GLMB):
         return _glmbs(a.to_kernel(), b.to_kernel(), log_unit_volume, common, self_terms)
     if isinstance(a, LMB) and isinstance(b, LMB):
         return _lmbs(a, b, log_unit_volume, common)
     if isinstance(a, LMB) and isinstance(b, GLMB):
-        cross, own_b, own_a = log_inner_products(b, a, log_unit_volume, common, self_terms=self_terms)
+        cross, own_b, own_a = _of_parts(b, a, log_unit_volume, common, self_terms)
         return cross, own_a, own_b
     assert isinstance(a, GLMB)
     assert isinstance(b, LMB)

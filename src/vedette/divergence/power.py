@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TypeAlias
 
 import numpy as np
 
-from vedette.densities import GLMB, LMB, marginalise
+from vedette.densities import GLMB, LMB, Labelled, marginalise
 from vedette.densities.cases import LabelledCases
 from vedette.densities.checks import unchecked
 from vedette.densities.conversions import lmb_on_label_sets
@@ -21,10 +20,9 @@ from vedette.divergence.closed_form import (
     check_support,
     log_inner_products,
 )
+from vedette.divergence.parts import Part, paired_parts
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats
-
-Labelled: TypeAlias = GLMB | LMB
 
 # Of mixtures, too: the inner products are in closed form, the other two are sums of weights.
 _INNER_PRODUCTS = {(1.0, 1.0): 0, (2.0, 0.0): 1, (0.0, 2.0): 2}
@@ -40,10 +38,12 @@ def power_integral(
     order (Z(order, 1 - order) - order Z(1, 0) - (1 - order) Z(0, 1)) / (order - 1).
 
     Args:
-        p, q: GLMBs or LMBs. With an LMB and a GLMB, the LMB is taken on the GLMB's label sets.
+        p, q: GLMBs, LMBs or products of GLMBs. With an LMB and a GLMB, the LMB is taken on the GLMB's label sets; with
+            products, Z is the sum over groups of labels, as in `cauchy_schwarz`.
         a, b: exponents; one of them may be negative, or 0 where the other is above 0. A density to the power of 0 is 1.
         unit_volume: K, as of `cauchy_schwarz`.
-        support: "full", or "common": only the label sets (two LMBs: the labels) that both densities have.
+        support: "full", or "common": only the label sets that both densities have (two LMBs, and labels that are alone
+            in products: the labels).
 
     It is -inf where nothing is shared, and inf where a negative power makes the integral infinite.
 
@@ -64,11 +64,18 @@ def power_integrals(
     support: Support = "full",
 ) -> Floats:
     """(num_exponents,) `power_integral` of each pair (a, b)."""
-    log_unit_volume = check_densities({"p": p, "q": q}, unit_volume)
+    check_densities({"p": p, "q": q}, unit_volume)
     check_support(support)
-    if not isinstance(p, GLMB | LMB):
-        raise InputError("p, q: expected labelled densities, GLMB or LMB; got two Poisson densities")
+    if not isinstance(p, Labelled):
+        raise InputError("p, q: expected labelled densities; got two Poisson densities")
     pairs = [(float(a), float(b)) for a, b in check_exponents(exponents).tolist()]
+    found = np.zeros(len(pairs))
+    for own_p, own_q in paired_parts(p, q):
+        found += _of_parts(own_p, own_q, pairs, unit_volume, support)
+    return found
+
+
+def _of_parts(p: Part, q: Part, pairs: Sequence[tuple[float, float]], unit_volume: float, support: Support) -> Floats:
     mixed = not (_is_single(p) and _is_single(q))
     if not mixed:
         return _of_singles(p, q, pairs, unit_volume, support)
@@ -78,7 +85,7 @@ def power_integrals(
                 f"p, q: expected one Gaussian a track and one hypothesis a label set for the exponents {pair}; got "
                 "mixtures"
             )
-    products = log_inner_products(p, q, log_unit_volume, support == "common", self_terms=True)
+    products = log_inner_products(p, q, math.log(unit_volume), support == "common", self_terms=True)
     masses = dict(zip(_MASSES, _of_singles(_single(p), _single(q), _MASSES, 1.0, support), strict=True))
     return np.array([products[_INNER_PRODUCTS[pair]] if pair in _INNER_PRODUCTS else masses[pair] for pair in pairs])
 
@@ -91,7 +98,7 @@ def renyi(p: Labelled, q: Labelled, order: float, *, support: Support = "full") 
     Above 1 it is infinite where p is not small enough against q, as for a p much wider than q.
 
     Args:
-        p, q: GLMBs or LMBs of single Gaussians, as of `power_integral`.
+        p, q: GLMBs, LMBs or products of GLMBs, of single Gaussians, as of `power_integral`.
         order: above 0 and not 1.
         support: "full"; or "common", and then both are normalised on the label sets (labels) that both have.
 
@@ -107,21 +114,19 @@ def renyi(p: Labelled, q: Labelled, order: float, *, support: Support = "full") 
     return at_least_zero(divergence, max(abs(z), abs(log_p), abs(log_q)), "Renyi")
 
 
-def _is_single(density: Labelled) -> bool:
+def _is_single(density: Part) -> bool:
     single = len(density.tracks.log_weights) == density.tracks.num_tracks
     return single and (isinstance(density, LMB) or density.is_marginalised)
 
 
-def _single(density: Labelled) -> Labelled:
+def _single(density: Part) -> Part:
     """The density with the same weights and one Gaussian for each mixture."""
     if isinstance(density, GLMB):
         return marginalise(density, max_components=1)
     return unchecked(LMB, single_gaussians(density.tracks), density.existence_logit)
 
 
-def _of_singles(
-    p: Labelled, q: Labelled, pairs: Sequence[tuple[float, float]], unit_volume: float, support: Support
-) -> Floats:
+def _of_singles(p: Part, q: Part, pairs: Sequence[tuple[float, float]], unit_volume: float, support: Support) -> Floats:
     if isinstance(p, GLMB) == isinstance(q, GLMB):
         return _of_one_kind(LabelledCases.of(p), LabelledCases.of(q), pairs, unit_volume, support)
     if isinstance(p, GLMB):
@@ -178,4 +183,4 @@ def _extended(own: LabelledCases, other: LabelledCases) -> LabelledCases:
     return LabelledCases.of_glmbs((*own.sets, *(other.sets[i] for i in lacking)), log_weights, means, covs)
 
 
-__all__ = ["Labelled", "power_integral", "power_integrals", "renyi"]
+__all__ = ["power_integral", "power_integrals", "renyi"]

@@ -6,12 +6,13 @@ import math
 
 import numpy as np
 
-from vedette.densities import GLMB, LMB, Poisson, track_moments
+from vedette.densities import LMB, Labelled, Poisson, track_moments
+from vedette.densities.factored import LABELLED
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats
 
 
-def reference_unit_volume(density: GLMB | LMB | Poisson) -> float:
+def reference_unit_volume(density: Labelled | Poisson) -> float:
     """(4 pi)^(d / 2) sqrt(det P_ref): the K under which K <p, p> is 1 for a Gaussian p of covariance P_ref.
 
     P_ref is the arithmetic mean of the track covariances (of a mixture's moments), each weighted by the probability
@@ -22,8 +23,8 @@ def reference_unit_volume(density: GLMB | LMB | Poisson) -> float:
 
     Raises `InputError` for a density that is not valid or expects no target.
     """
-    if not isinstance(density, GLMB | LMB | Poisson):
-        raise InputError(f"density: expected a GLMB, an LMB or a Poisson; got {type(density).__name__}")
+    if not isinstance(density, Labelled | Poisson):
+        raise InputError(f"density: expected {LABELLED} or a Poisson; got {type(density).__name__}")
     density.validate(error=InputError)
     weights, covs = _weighted_covariances(density)
     total = float(weights.sum())
@@ -33,7 +34,7 @@ def reference_unit_volume(density: GLMB | LMB | Poisson) -> float:
     return float(math.exp(0.5 * (density.state_dim * math.log(4.0 * math.pi) + np.linalg.slogdet(mean_cov)[1])))
 
 
-def _weighted_covariances(density: GLMB | LMB | Poisson) -> tuple[Floats, Floats]:
+def _weighted_covariances(density: Labelled | Poisson) -> tuple[Floats, Floats]:
     if isinstance(density, Poisson):
         return np.exp(density.log_weights), density.covs
     covs = track_moments(density.tracks)[1]

@@ -15,6 +15,7 @@ from vedette.fusion.validity import all_valid
 from vedette.fusion.views import Views
 from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.gaussian.mixtures import MixtureCaps
+from vedette.text import either
 
 MixturePower = Literal["moment_matched", "component_wise", "quadrature"]
 MIXTURE_POWERS: tuple[MixturePower, ...] = ("moment_matched", "component_wise", "quadrature")
@@ -173,8 +174,7 @@ def check_kinds(given: Sequence[type], kinds: tuple[type, ...], num_sensors: int
     """Raise `InputError` unless one belief a sensor is given, all of the kinds expected."""
     if len(given) != num_sensors:
         raise InputError(f"beliefs: expected {num_sensors}, one for each fusion weight; got {len(given)}")
-    names = [kind.__name__ for kind in kinds]
-    expected = " or ".join([", ".join(names[:-1]), names[-1]] if names[1:] else names)
+    expected = either([kind.__name__ for kind in kinds])
     for i, kind in enumerate(given):
         if not issubclass(kind, kinds):
             raise InputError(f"beliefs[{i}]: expected {expected}; got {kind.__name__}")

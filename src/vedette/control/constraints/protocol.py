@@ -7,7 +7,7 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from vedette.densities import GLMB, LMB
+from vedette.densities import Labelled
 from vedette.kernels.base.types import Bools, Floats
 
 
@@ -23,7 +23,7 @@ class Situation(NamedTuple):
 
     courses: tuple[Floats, ...]
     times: Floats
-    beliefs: tuple[LMB | GLMB, ...] = ()
+    beliefs: tuple[Labelled, ...] = ()
     poses: Floats | None = None
 
     def ways(self, sensor: int) -> Floats:

@@ -9,7 +9,7 @@ from scipy.special import expit
 
 from vedette.control.constraints.discs import disc_probabilities, near_pairs
 from vedette.control.constraints.protocol import Alone, Situation
-from vedette.densities import GLMB, LMB, TrackTable
+from vedette.densities import GLMB, LMB, FactoredGLMB, Labelled, TrackTable
 from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.models.arguments import float_array, positive, probability
 
@@ -58,11 +58,12 @@ class VoidProbability(Alone):
         return situation.split(allowed)
 
 
-def void_probability(belief: LMB | GLMB, centres: Floats, radius: float) -> Floats:
+def void_probability(belief: Labelled, centres: Floats, radius: float) -> Floats:
     """(num,) probability that no target is within `radius`, m, of `centres` (num, 2).
 
     With P_l the probability of the disc under a track: the product over l of 1 - r_l P_l for an LMB; for a GLMB the sum
-    over hypotheses of weight times the product over their tracks of 1 - P_l (Beard et al., as in `VoidProbability`).
+    over hypotheses of weight times the product over their tracks of 1 - P_l (Beard et al., as in `VoidProbability`);
+    for a product of GLMBs the product of theirs.
     Tracks with less than 1.3e-14 in the disc are passed over. Raises `InputError` for centres that are no positions, or
     a radius that is not above 0.
     """
@@ -75,7 +76,8 @@ def void_probability(belief: LMB | GLMB, centres: Floats, radius: float) -> Floa
         return np.asarray(np.exp(np.bincount(disc, log_void, minlength=len(places))))
     outside = np.ones((len(places), belief.tracks.num_tracks))
     outside[disc, track] = 1.0 - inside
-    return _over_hypotheses(belief, outside)
+    ends = np.array([0, belief.num_hyps]) if isinstance(belief, GLMB) else belief.factor_offsets
+    return _over_hypotheses(belief, ends, outside)
 
 
 def _inside(tracks: TrackTable, centres: Floats, radius: float) -> tuple[Ints, Ints, Floats]:
@@ -91,18 +93,21 @@ def _inside(tracks: TrackTable, centres: Floats, radius: float) -> tuple[Ints, I
     return disc[new], track[new], np.minimum(total, 1.0)
 
 
-def _over_hypotheses(belief: GLMB, outside: Floats) -> Floats:
-    """(num,) mean over hypotheses of the products of their tracks' columns of (num, num_tracks)."""
-    found = np.zeros(len(outside))
+def _over_hypotheses(belief: GLMB | FactoredGLMB, factor_offsets: Ints, outside: Floats) -> Floats:
+    """(num,) product over factors of the mean over hypotheses of the products of their tracks' columns of `outside`.
+
+    outside: (num, num_tracks).
+    """
+    found = np.ones(len(outside))
     weights, sizes = np.exp(belief.hyp_log_weights), np.diff(belief.hyp_offsets)
-    found += weights[sizes == 0].sum()
     filled = np.flatnonzero(sizes)
     if len(filled) == 0:
         return found
     rows = max(1, _BLOCK // len(belief.hyp_tracks))
     for begun in range(0, len(outside), rows):
-        factors = outside[begun : begun + rows, belief.hyp_tracks]
+        columns = outside[begun : begun + rows, belief.hyp_tracks]
+        terms = np.tile(weights, (len(columns), 1))
         # Between the starts of hypotheses with tracks there are no others' tracks.
-        products = np.multiply.reduceat(factors, belief.hyp_offsets[filled], axis=1)
-        found[begun : begun + rows] += products @ weights[filled]
+        terms[:, filled] *= np.multiply.reduceat(columns, belief.hyp_offsets[filled], axis=1)
+        found[begun : begun + rows] = np.add.reduceat(terms, factor_offsets[:-1], axis=1).prod(axis=1)
     return found

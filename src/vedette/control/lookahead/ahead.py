@@ -11,9 +11,9 @@ import numpy as np
 
 from vedette.control.allowed import beliefs_ahead
 from vedette.control.constraints import Constraint, Mask, Situation, courses_allowed, mask_of, pairs_allowed
-from vedette.control.inputs import Belief
 from vedette.control.lookahead.courses import CourseTree, Sequence, Stages
 from vedette.control.settings import MobileSensor, PlanningSettings
+from vedette.densities import Labelled
 from vedette.kernels.base.types import Bools, Floats
 
 
@@ -46,12 +46,12 @@ class Ahead:
     constraints: tuple[Constraint, ...]
     sensors: tuple[MobileSensor, ...]
     settings: PlanningSettings
-    fused: Belief
+    fused: Labelled
     poses: Floats
     stages: Stages
     on_pairs: bool = field(init=False)
     _timeless: bool = field(init=False)
-    _beliefs: dict[int, tuple[Belief, ...]] = field(default_factory=dict)
+    _beliefs: dict[int, tuple[Labelled, ...]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         reaches = [getattr(constraint, "reach", math.inf) for constraint in self.constraints]
