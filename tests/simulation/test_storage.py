@@ -201,15 +201,15 @@ def test_altered_and_truncated_files_are_named(saved: Path, file: str) -> None:
         ("{", "cut short or altered"),
         ("[]", "got another file"),
         ('{"format": "photo album"}', "got another file"),
-        ('{"format": "vedette-run", "format_version": 99}', "format 5; got 99, written by another version"),
+        ('{"format": "vedette-run", "format_version": 99}', "format 6; got 99, written by another version"),
         (
             '{"format": "vedette-run", "format_version": 3, "versions": {"vedette": "0.1"}}',
-            "expected format 5; got 3, written by an earlier version of this program: run it again, or read it with "
+            "expected format 6; got 3, written by an earlier version of this program: run it again, or read it with "
             "vedette 0.1",
         ),
-        ('{"format": "vedette-run", "format_version": 5}', "fields files and run"),
-        ('{"format": "vedette-run", "format_version": 5, "run": {}, "files": {"../x": ""}}', "plain file names"),
-        ('{"format": "vedette-run", "format_version": 5, "run": {}, "files": {}}', "expected a file timings"),
+        ('{"format": "vedette-run", "format_version": 6}', "fields files and run"),
+        ('{"format": "vedette-run", "format_version": 6, "run": {}, "files": {"../x": ""}}', "plain file names"),
+        ('{"format": "vedette-run", "format_version": 6, "run": {}, "files": {}}', "expected a file timings"),
     ],
 )
 def test_a_broken_manifest_is_named(saved: Path, manifest: str, message: str) -> None:

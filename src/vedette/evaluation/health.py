@@ -42,6 +42,8 @@ class HealthSummary:
     inexact: float
     mean_discarded: float
     worst_discarded: float
+    mean_factoring: float
+    worst_factoring: float
     worst_dropped: float
     duplicates: int
     clutter_raised: int
@@ -74,6 +76,8 @@ def summarise_health(records: Sequence[RunRecord]) -> HealthSummary:
         inexact=share(joined("num_inexact_clusters") > 0),
         mean_discarded=float(known.mean()) if len(known) else np.nan,
         worst_discarded=float(known.max()) if len(known) else np.nan,
+        mean_factoring=float(joined("factoring_error").mean()),
+        worst_factoring=float(joined("factoring_error").max()),
         worst_dropped=float(joined("dropped_existence").max()),
         duplicates=int(joined("num_duplicates").sum()),
         clutter_raised=int(joined("num_clutter_raised").sum()),
@@ -150,6 +154,13 @@ def _of_filters(health: HealthSummary, scans: Callable[[float], str]) -> Iterato
         yield cap, True
     elif np.isnan(worst):
         yield "how much weight was cut off is not known", False
+    if health.worst_factoring:
+        mean = health.mean_factoring
+        yield (
+            f"taking labels as independent moved up to {percent(health.worst_factoring / 2.0)} of a filter's weight at "
+            f"a scan ({percent(mean / 2.0)} on average)",
+            mean > 10.0 * _MUCH,
+        )
     if health.worst_dropped:
         yield (
             f"up to {health.worst_dropped:.2g} targets were dropped with their labels at a scan",

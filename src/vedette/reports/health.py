@@ -46,6 +46,12 @@ _ROWS = (
     ),
     _Row("Weight cut off, worst", "the same at the worst scan", lambda h: _weight(h.worst_discarded)),
     _Row(
+        "Taken as independent, mean",
+        "upper bound on the share of a factored filter's weight that was moved by it, mean over scans and sensors",
+        lambda h: _weight(h.mean_factoring / 2.0),
+    ),
+    _Row("Taken as independent, worst", "the same at the worst scan", lambda h: _weight(h.worst_factoring / 2.0)),
+    _Row(
         "Targets dropped, worst",
         "expected number of targets in labels that a filter dropped at a scan",
         lambda h: f"{h.worst_dropped:.2g}",

@@ -35,6 +35,7 @@ class Health:
         num_inexact_clusters: clusters of an LMB not summed exactly.
         search_cut: whether the ranking search stopped early.
         cap_met: whether the posterior was as large as it may be.
+        factoring_error: upper bound on the L1 error of taking labels as independent, of factored densities.
         num_missing_sets: label sets that another sensor has and this one does not (for CLMB, labels).
         num_missing_labels: labels that this sensor does not know at all.
         bytes_sent: that this sensor sent over its radio, or to where beliefs are fused; 0 where it is not counted.
@@ -55,6 +56,7 @@ class Health:
     num_inexact_clusters: Ints
     search_cut: Ints
     cap_met: Ints
+    factoring_error: Floats
     num_missing_sets: Ints
     num_missing_labels: Ints
     bytes_sent: Ints

@@ -25,7 +25,7 @@ from vedette.text import shown
 
 # Of saved runs and of campaigns; another wherever a table gains, loses or renames a column. A table that may be missing
 # needs none: programs of before it was there pass it over, and what they wrote reads as it did.
-FORMAT_VERSION = 5
+FORMAT_VERSION = 6
 _ENDING = ".arrow"
 
 

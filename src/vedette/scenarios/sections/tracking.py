@@ -109,7 +109,7 @@ class Filter(Section):
     """The filter that every sensor runs on its own scans."""
 
     kind: Literal["delta_glmb", "m_delta_glmb", "lmb", "factored_glmb", "phd", "cphd", "cb_member"] = Field(
-        default="m_delta_glmb",
+        default="factored_glmb",
         description="delta-GLMB; delta-GLMB marginalised after each scan (one component a label set); LMB; product of "
         "delta-GLMBs, each of the labels that contend with each other, for any number of targets; or, without labels "
         "and for a single sensor that nobody steers by its density: PHD, CPHD, cardinality-balanced multi-Bernoulli "
