@@ -30,8 +30,8 @@ from typing import Any
 from timing import Figures, Measure
 
 MODULES = (
-    "filter_scan", "planning", "many_sensors", "crowd", "central_scan", "fusion_rules", "peers", "store", "whole_run",
-    "start", "campaign",
+    "filter_scan", "planning", "many_sensors", "crowd", "central_scan", "fusion_rules", "eight_sensors", "store",
+    "whole_run", "start", "campaign",
 )  # fmt: skip
 HERE = Path(__file__).resolve().parent
 BEGIN, END = "<!-- from benchmarks/all.py -->", "<!-- to here -->"

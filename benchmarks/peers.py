@@ -7,10 +7,9 @@ anything else: where one is not installed a line says so, and its rows are left 
 Python, whose path `--peers-python` or the variable `PEERS_PYTHON` gives; see `benchmarks/peer_filters.py`.
 
 Crowds are those of `benchmarks/crowd.py`. Births are made of what was measured one scan before, for all alike: ours
-are part of our time, for the peers they are made outside of theirs. Of eight sensors each object is seen by all: 50
-objects bounce off the walls of a square of 200 m, positions measured to 1 m with detection 0.98 and one false
-measurement a scan; a new object may be anywhere on a grid of 16 places, of existence 0.01 and 50 m. CPU time of a step,
-median; OSPA with c = 25 m (crowd) or 5 m and p = 1, mean from the sixth scan on.
+are part of our time, for the peers they are made outside of theirs. The eight sensors are those of
+`benchmarks/eight_sensors.py`. CPU time of a step, median; OSPA with c = 25 m (crowd) or 5 m and p = 1, mean from the
+sixth scan on.
 """
 
 from __future__ import annotations
@@ -21,29 +20,19 @@ import os
 import subprocess
 import sys
 import tempfile
-import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from crowd import CUTOFF, FROM_STEP, NAMES, prepared, tracked
-from timing import Measure, Once
+from eight_sensors import RULES, SIDE, box_run, box_scene
 
-from vedette import models
-from vedette.densities import LMB, Estimate, map_estimate
 from vedette.evaluation import ospa
-from vedette.filters import Limits, LmbFilter
-from vedette.fusion import Clmb
 from vedette.scenarios import GeneratedCrowd
-from vedette.tracking import Distributed
 
-SIDE, NUM_SENSORS, DETECTION, SURVIVAL, ACCELERATION = 100.0, 8, 0.98, 0.99, 3.0
-POSE = np.zeros(3)
 # Steps that take longer end a peer's run; and sizes beyond are not tried.
-PATIENCE = 20.0
+PATIENCE = 10.0
 
 
 @dataclass(frozen=True)
@@ -57,96 +46,16 @@ class Row:
     ospa: float
 
 
-# Eight sensors
-
-
-def box_scene(num_objects: int, num_steps: int, seed: int = 42) -> tuple[list[np.ndarray], list[list[np.ndarray]]]:
-    """The true positions at each step, and the scans of each sensor at each step."""
-    rng = np.random.default_rng(seed)
-    states = np.column_stack([rng.uniform(-SIDE, SIDE, (num_objects, 2)), rng.normal(0.0, 3.0, (num_objects, 2))])
-    truth, scans = [], []
-    for _ in range(num_steps):
-        states[:, :2] += states[:, 2:]
-        outside = np.abs(states[:, :2]) > SIDE
-        states[:, 2:][outside] *= -1.0
-        states[:, :2] = np.clip(states[:, :2], -SIDE, SIDE)
-        truth.append(states[:, :2].copy())
-        scans.append([_scan(states[:, :2], rng) for _ in range(NUM_SENSORS)])
-    return truth, scans
-
-
-def _scan(positions: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    seen = positions[rng.random(len(positions)) < DETECTION]
-    clutter = rng.uniform(-SIDE, SIDE, (rng.poisson(1.0), 2))
-    return rng.permutation(np.concatenate([seen + rng.normal(size=seen.shape), clutter]))
-
-
-def box_filter() -> LmbFilter:
-    """As every sensor has it."""
-    grid = np.array([(x, y, 0.0, 0.0) for x in (-75.0, -25.0, 25.0, 75.0) for y in (-75.0, -25.0, 25.0, 75.0)])
-    covs = np.tile(np.diag([2500.0, 2500.0, 100.0, 100.0]), (len(grid), 1, 1))
-    births = models.BirthModel(np.full(len(grid), 0.01), grid, covs)
-    targets = models.TargetModel(models.constant_velocity(ACCELERATION), models.constant_survival(SURVIVAL), births)
-    clutter = models.measurement_space_clutter(1.0, [-SIDE, -SIDE], [SIDE, SIDE])
-    sensor = models.SensorModel(
-        models.position(), models.constant_noise([1.0, 1.0]), models.constant_detection(DETECTION), clutter
-    )
-    return LmbFilter(targets, sensor, Limits(min_existence=1e-3, max_hypotheses=100))
-
-
-Stepper = Callable[[Any, list[np.ndarray], int], tuple[Any, LMB]]
-
-
-def by_gci() -> tuple[Any, Stepper]:
-    """A filter at each sensor, all going on from the fusion of what they believe."""
-    tracker = Distributed((box_filter(),) * NUM_SENSORS, Clmb((1.0 / NUM_SENSORS,) * NUM_SENSORS), feedback=True)
-    rngs, poses = [np.random.default_rng(0)] * NUM_SENSORS, np.zeros((NUM_SENSORS, 3))
-
-    def step(state: Any, scans: list[np.ndarray], number: int) -> tuple[Any, LMB]:
-        state, _ = tracker.step(state, scans, poses, float(number), rngs=rngs)
-        return state, state.fused
-
-    return tracker.initial(), step
-
-
-def one_after_another() -> tuple[Any, Stepper]:
-    """One belief, updated with the scan of each sensor in turn."""
-    one, rng = box_filter(), np.random.default_rng(0)
-
-    def step(belief: Any, scans: list[np.ndarray], number: int) -> tuple[Any, LMB]:
-        belief, _ = one.predict(belief, 1.0, number)
-        for scan in scans:
-            belief, _ = one.update(belief, scan, POSE, rng=rng)
-        return belief, belief
-
-    return one.initial(), step
-
-
-BOX: dict[str, Callable[[], tuple[Any, Stepper]]] = {"GCI": by_gci, "sequential": one_after_another}
-
-
-def box_run(rule: str, scans: Sequence[list[np.ndarray]]) -> tuple[list[float], list[Estimate]]:
-    """CPU seconds and estimate of each step."""
-    belief, step = BOX[rule]()
-    seconds, estimates = [], []
-    for number, of_all in enumerate(scans, 1):
-        start = time.process_time()
-        belief, told = step(belief, of_all, number)
-        seconds.append(time.process_time() - start)
-        estimates.append(map_estimate(told))
-    return seconds, estimates
+# Ours
 
 
 def our_box(num_objects: int, num_steps: int) -> Iterator[Row]:
     truth, scans = box_scene(num_objects, num_steps)
-    for rule in BOX:
+    for rule in RULES:
         box_run(rule, scans[:3])
         seconds, estimates = box_run(rule, scans)
         found = [estimate.means[:, :2] for estimate in estimates]
         yield scored("8 sensors", f"ours, {rule}", truth, seconds, found, cutoff=5.0)
-
-
-# A crowd
 
 
 def our_crowd(num_targets: int, num_steps: int) -> Iterator[Row]:
@@ -280,18 +189,6 @@ def draw(rows: Sequence[Row], path: Path) -> None:
     axes[0].legend(frameon=False)
     figure.savefig(path, dpi=110)
     print(f"wrote {path}")
-
-
-def prepared_box(rule: str) -> Once:
-    _, scans = box_scene(50, 20)
-    box_run(rule, scans[:3])
-    return lambda: 1e3 * float(np.median(box_run(rule, scans)[0][FROM_STEP - 1 :]))
-
-
-def measures() -> Iterator[Measure]:
-    """Ours on the scene that a peer publishes figures of."""
-    for rule in BOX:
-        yield Measure("8 sensors", f"50 objects, {rule}", partial(prepared_box, rule))
 
 
 def main() -> None:
