@@ -11,13 +11,17 @@ commands of the program, each in a process of its own, with kernels that are com
 from __future__ import annotations
 
 import argparse
+import os
 import statistics
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
+
+from timing import Measure, Once, wall_seconds
 
 from vedette.campaigns import CampaignSpec, open_results, resolve, run_campaign
 from vedette.evaluation.runs import run_scenario
@@ -50,23 +54,43 @@ def _spent(work: Callable[[], object]) -> tuple[float, float]:
     return time.process_time() - cpu, time.perf_counter() - wall
 
 
+def program(*arguments: object) -> None:
+    """Run `vedette` as another process, with the library that this one has."""
+    given = [sys.executable, "-c", "from vedette.cli import app; app()", *map(str, arguments)]
+    subprocess.run(given, check=True, stdout=sys.stderr, env=os.environ)
+
+
+def prepared(num_runs: int) -> Once:
+    """What gives the wall seconds of so many runs of each strategy with two workers."""
+
+    def once() -> float:
+        with tempfile.TemporaryDirectory() as place:
+            spec = Path(place) / "full.toml"
+            spec.write_text(_FULL.replace("runs = 100", f"runs = {num_runs}"))
+            return wall_seconds(lambda: program("campaign", spec, "--out", Path(place) / "results", "--workers", 2))
+
+    return once
+
+
+def measures() -> Iterator[Measure]:
+    """The campaign that is spoken of, and one that is over as soon as it has begun."""
+    for num_runs, rounds in ((2, 2), (100, 1)):
+        name = f"paper-a, {num_runs} runs x 3 strategies, two workers"
+        yield Measure("campaign", name, partial(prepared, num_runs), unit="s", rounds=rounds, long=True)
+
+
 def full(workers: int) -> None:
     """Print the wall time of the whole campaign by the command line, and of its report."""
-    program = str(Path(sys.executable).with_name("vedette"))
     with tempfile.TemporaryDirectory() as place:
         spec, results, page = Path(place) / "full.toml", Path(place) / "results", Path(place) / "report.html"
         spec.write_text(_FULL)
-        start = time.perf_counter()
-        subprocess.run([program, "campaign", spec, "--out", results, "--workers", str(workers)], check=True)
-        wall = time.perf_counter() - start
+        wall = wall_seconds(lambda: program("campaign", spec, "--out", results, "--workers", workers))
         opened = open_results(results)
         spent = sum(float(sum(stage.sum() for stage in run.record.timings.values())) for run in opened.runs())
         print(f"100 runs x 3 strategies of paper-a, {workers} workers: {wall:.1f} s of wall time")
         print(f"  of the workers' time in runs: {spent / (workers * wall):.0%}")
-        start = time.perf_counter()
-        subprocess.run([program, "report", results, "--out", page], check=True)
-        size = page.stat().st_size / 1e6
-        print(f"report: {time.perf_counter() - start:.1f} s of wall time, {size:.1f} MB")
+        wall = wall_seconds(lambda: program("report", results, "--out", page))
+        print(f"report: {wall:.1f} s of wall time, {page.stat().st_size / 1e6:.1f} MB")
 
 
 def main() -> None:

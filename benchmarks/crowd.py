@@ -16,12 +16,14 @@ import argparse
 import multiprocessing
 import resource
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from timing import Measure, Once
 
 from vedette.densities import Estimate
 from vedette.evaluation import ospa
@@ -135,6 +137,23 @@ def measured(crowd: GeneratedCrowd, kind: str, repeats: int) -> Row:
         float(np.mean([abs(e.num_targets / len(states) - 1.0) for e, states in zip(estimates, true, strict=True)])),
         (after - before) / 1024.0,
     )
+
+
+def passes(num_targets: int, kind: str) -> Once:
+    """What gives the median milliseconds of a scan of the filter over a run."""
+    experiment, _, scans = prepared(GeneratedCrowd(num_targets=num_targets, num_steps=FROM_STEP + 6), kind)
+    tracked(experiment, scans)
+    return lambda: 1e3 * float(np.median(tracked(experiment, scans)[0][FROM_STEP - 1 :]))
+
+
+def measures() -> Iterator[Measure]:
+    """A scan of each filter that is made for crowds; `NAMES` with `MOST` says which."""
+    for kind in NAMES:
+        for number in (num for num in (100, 1000, 10_000) if num <= MOST[kind]):
+            slow = number > 1000 or (kind == "delta_glmb" and number > 100)
+            yield Measure(
+                "crowd", f"{number:,} targets, {NAMES[kind]}", partial(passes, number, kind), rounds=5, long=slow
+            )
 
 
 def _ospa(estimate: Estimate, states: np.ndarray) -> float:

@@ -11,14 +11,18 @@ from __future__ import annotations
 
 import argparse
 import time
+from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
+from timing import Measure, Once
 
 from vedette.densities import GLMB, LMB, map_estimate, unlabelled_estimate
 from vedette.evaluation import ospa_of_run
 from vedette.filters import CbMemberFilter, CphdFilter, DeltaGlmbFilter, Filter, LmbFilter, PhdFilter
+from vedette.models import SensorModel, TargetModel
 from vedette.scenarios import load_scenario
 from vedette.scenarios.build import build_experiment, build_sensors
 from vedette.simulation import Truth, simulate_scan
@@ -48,10 +52,32 @@ def variants(tracker: DeltaGlmbFilter) -> dict[str, Filter]:
         "delta-GLMB, Gibbs": replace(tracker, assignment="gibbs", marginalised=False),
         "M-delta-GLMB, ranked": replace(tracker, assignment="ranked", marginalised=True),
         "LMB": LmbFilter(*parts),
+        "LMB, UKF": LmbFilter(*_unscented(tracker), tracker.limits),
         "PHD": PhdFilter(*parts),
         "CPHD": CphdFilter(*parts),
         "CB-MeMBer": CbMemberFilter(*parts),
     }
+
+
+def _unscented(tracker: DeltaGlmbFilter) -> tuple[TargetModel, SensorModel]:
+    motion = replace(tracker.targets.motion, method="ukf")
+    return replace(tracker.targets, motion=motion), replace(tracker.sensor, method="ukf")
+
+
+def prepared(scenario: str, variant: str) -> Once:
+    """What gives the median milliseconds of a scan over a run."""
+    tracker, pose, times, ((_, scans),) = simulated(scenario, 1)
+    own = variants(tracker)[variant]
+    measure(own, pose, times, scans)
+    return lambda: 1e3 * float(np.median(measure(own, pose, times, scans)[0]))
+
+
+def measures() -> Iterator[Measure]:
+    """A scan of each filter that decides with labels."""
+    for name in ("LMB", "delta-GLMB, ranked", "M-delta-GLMB, ranked", "LMB, UKF"):
+        yield Measure("scan", f"linear-10, {name.removesuffix(', ranked')}", partial(prepared, "linear-10", name))
+    for name in ("LMB", "LMB, UKF"):
+        yield Measure("scan", f"polar-10, {name}", partial(prepared, "polar-10", name))
 
 
 def measure(tracker: Any, pose: Any, times: Any, scans: Any) -> tuple[list[float], list[Any]]:

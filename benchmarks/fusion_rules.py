@@ -9,10 +9,11 @@ one Gaussian a label, updated from one prediction.
 from __future__ import annotations
 
 import argparse
-import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from functools import partial
 
 import numpy as np
+from timing import Measure, Once, milliseconds_of, repeated
 
 from vedette.densities import LMB
 from vedette.fusion import ArithmeticAverage, Clmb, ParallelUpdate, Views, match_labels
@@ -21,20 +22,8 @@ from vedette.models import SensorModel, constant_noise, gaussian_detection, meas
 NUM_LABELS, NUM_SENSORS = 20, 8
 
 
-def median_seconds(work: Callable[[], object], repeats: int) -> float:
-    work()
-    seconds = []
-    for _ in range(repeats):
-        start = time.process_time()
-        work()
-        seconds.append(time.process_time() - start)
-    return float(np.median(seconds))
-
-
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--repeats", type=int, default=101)
-    repeats = parser.parse_args().repeats
+def rules() -> dict[str, Callable[[], object]]:
+    """What is to be timed, by its name."""
     rng = np.random.default_rng(0)
     labels = [(1, i) for i in range(NUM_LABELS)]
     means = np.concatenate([rng.uniform(0.0, 1000.0, (NUM_LABELS, 2)), rng.normal(size=(NUM_LABELS, 2))], axis=1)
@@ -56,7 +45,7 @@ def main() -> None:
     poses = np.concatenate([rng.uniform(0.0, 1000.0, (NUM_SENSORS, 2)), np.zeros((NUM_SENSORS, 1))], axis=1)
     views = Views((model,) * NUM_SENSORS, poses, (True,) * NUM_SENSORS, prediction)
     equal = np.full(NUM_SENSORS, 1.0 / NUM_SENSORS)
-    rules: dict[str, Callable[[], object]] = {
+    return {
         "parallel update": lambda: ParallelUpdate().fuse(posteriors, views),
         "GCI": lambda: Clmb(equal).fuse(posteriors, views),
         "GCI by views": lambda: Clmb(equal, by_views=True).fuse(posteriors, views),
@@ -64,8 +53,25 @@ def main() -> None:
         "arithmetic average by views": lambda: ArithmeticAverage(equal, by_views=True).fuse(posteriors, views),
         "matching of labels": lambda: match_labels(others),
     }
-    for name, work in rules.items():
-        print(f"{name:<28} {1e3 * median_seconds(work, repeats):6.2f} ms")
+
+
+def prepared(name: str) -> Once:
+    """What gives the CPU milliseconds of a fusion."""
+    return milliseconds_of(rules()[name], calls=20)
+
+
+def measures() -> Iterator[Measure]:
+    """A fusion by each rule."""
+    for name in ("parallel update", "GCI", "GCI by views", "arithmetic average"):
+        yield Measure("fusion", f"8 sensors, 20 targets, {name}", partial(prepared, name))
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--repeats", type=int, default=101)
+    repeats = parser.parse_args().repeats
+    for name, work in rules().items():
+        print(f"{name:<28} {1e3 * repeated(work, repeats).median:6.2f} ms")
 
 
 if __name__ == "__main__":

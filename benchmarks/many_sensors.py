@@ -12,11 +12,13 @@ from __future__ import annotations
 
 import argparse
 import math
-import statistics
-import time
+from collections.abc import Iterator
+from functools import partial
+from itertools import count
 from typing import Any
 
 import numpy as np
+from timing import Figures, Measure, Once, cpu_seconds
 
 from vedette import models
 from vedette.control import (
@@ -68,13 +70,29 @@ def decision(sensors: int, targets: int, actions: int, samples: int, steps: int,
 def seconds(repeats: int, reward: Any, reach: float = 400.0, **sizes: int) -> tuple[float, Plan]:
     """Median CPU seconds of a decision, and the last plan."""
     planner, state, poses = decision(**{**BASE, **sizes}, reward=reward, reach=reach)
+    plans = [planner.plan(state, poses, rng=np.random.default_rng(0))]
+
+    def once(repeat: int) -> None:
+        plans[0] = planner.plan(state, poses, rng=np.random.default_rng(repeat))
+
+    taken = Figures.of([cpu_seconds(partial(once, repeat)) for repeat in range(repeats)])
+    return taken.median, plans[0]
+
+
+def prepared(reward: Any, reach: float = 400.0, **sizes: int) -> Once:
+    """What gives the CPU milliseconds of a decision."""
+    planner, state, poses = decision(**{**BASE, **sizes}, reward=reward, reach=reach)
+    numbers = count(1)
     planner.plan(state, poses, rng=np.random.default_rng(0))
-    taken = []
-    for repeat in range(repeats):
-        start = time.process_time()
-        plan = planner.plan(state, poses, rng=np.random.default_rng(repeat))
-        taken.append(time.process_time() - start)
-    return statistics.median(taken), plan
+    return lambda: 1e3 * cpu_seconds(lambda: planner.plan(state, poses, rng=np.random.default_rng(next(numbers))))
+
+
+def measures() -> Iterator[Measure]:
+    """Decisions for 20 and for 100 sensors."""
+    for name, reward in REWARDS.items():
+        yield Measure("many sensors", f"20 sensors, 20 targets, {name}", partial(prepared, reward))
+        hundred = partial(prepared, reward, sensors=100, targets=100)
+        yield Measure("many sensors", f"100 sensors, 100 targets, {name}", hundred, rounds=3, long=True)
 
 
 def table(repeats: int) -> None:

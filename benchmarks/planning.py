@@ -10,13 +10,15 @@ Medians over repeated decisions from the same beliefs after ten scans. An indepe
 from __future__ import annotations
 
 import argparse
-import statistics
-import time
 import warnings
+from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
+from itertools import count
 from typing import Any
 
 import numpy as np
+from timing import Figures, Measure, Once, cpu_seconds, repeated
 
 from vedette.control import CauchySchwarzReward
 from vedette.errors import SlowRewardWarning
@@ -59,9 +61,30 @@ def after_ten_scans(scenario: Scenario):  # type: ignore[no-untyped-def]
     return state, poses
 
 
+def prepared(kind: str, name: str) -> Once:
+    """What gives the CPU milliseconds of a decision, each time of other samples."""
+    scenario = variant(kind)
+    state, poses = after_ten_scans(scenario)
+    planner: Any = build_planner(scenario, name, num_threads=1)
+    numbers = count(1)
+    planner.plan(state, poses, rng=np.random.default_rng(0))
+    return lambda: 1e3 * cpu_seconds(lambda: planner.plan(state, poses, rng=np.random.default_rng(next(numbers))))
+
+
+def measures() -> Iterator[Measure]:
+    """A decision of each kind of belief."""
+    for kind in KINDS:
+        for name in ("jdm", "idm"):
+            yield Measure("decision", f"paper-a, {kind}, {name}", partial(prepared, kind, name), rounds=9)
+
+
 def as_a_function(predicted: Any, updated: Any) -> float:
     """Cauchy-Schwarz, in a form that cannot be laid out."""
     return CauchySchwarzReward()(predicted, updated)
+
+
+def _planned(planner: Any, state: Any, poses: Any) -> None:
+    planner.plan(state, poses, rng=np.random.default_rng(0))
 
 
 def one_by_one() -> None:
@@ -75,10 +98,7 @@ def one_by_one() -> None:
             few = replace(planner, settings=replace(planner.settings, num_samples=8))
             seconds = []
             for each in (few, replace(few, reward=as_a_function)):
-                each.plan(state, poses, rng=np.random.default_rng(0))
-                start = time.process_time()
-                each.plan(state, poses, rng=np.random.default_rng(0))
-                seconds.append(time.process_time() - start)
+                seconds.append(repeated(partial(_planned, each, state, poses), 1).least)
             print(f"{kind:12s} {name}: {seconds[1] / seconds[0]:5.1f} times as long")
 
 
@@ -90,20 +110,11 @@ def main() -> None:
     if asked.one_by_one:
         one_by_one()
         return
-    repeats = asked.repeats
     for kind in KINDS:
-        scenario = variant(kind)
-        state, poses = after_ten_scans(scenario)
         for name in ("jdm", "idm"):
-            planner = build_planner(scenario, name, num_threads=1)
-            assert planner is not None
-            seconds = []
-            for repeat in range(repeats + 1):
-                start = time.process_time()
-                planner.plan(state, poses, rng=np.random.default_rng(repeat))
-                seconds.append(time.process_time() - start)
-            median, least = statistics.median(seconds[1:]), min(seconds[1:])
-            print(f"{kind:12s} {name}: median {1e3 * median:6.1f} ms of CPU, least {1e3 * least:6.1f} ms")
+            once = prepared(kind, name)
+            least, median = Figures.of([once() for _ in range(asked.repeats)])
+            print(f"{kind:12s} {name}: median {median:6.1f} ms of CPU, least {least:6.1f} ms")
 
 
 if __name__ == "__main__":

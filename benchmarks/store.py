@@ -19,12 +19,14 @@ import statistics
 import tempfile
 import time
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import pyarrow as pa
 from pyarrow import parquet
+from timing import Measure, Once, cpu_seconds, milliseconds_of
 
 from vedette.campaigns.cells import resolve
 from vedette.campaigns.codec import decode, encode
@@ -122,6 +124,41 @@ def print_codec(record: RunRecord, metrics: RunMetrics, repeats: int = 200) -> N
         print(f"{name}: {1e3 * statistics.median(seconds):.2f} ms, {len(payload) + len(measures)} bytes")
 
 
+def finished_run() -> tuple[RunRecord, RunMetrics]:
+    """That all here is about."""
+    record = run_scenario(load_scenario("paper-a"), "jdm", seed=0, num_threads=1)
+    return record, measure(record, cutoff=100.0, order=1.0, window=10)
+
+
+def prepared(what: str) -> Once:
+    """What gives the CPU milliseconds to encode a run, to read it back, to measure it, or to land it in a store."""
+    record, metrics = finished_run()
+    payload, measures = encode(record), encode_metrics(metrics)
+    if what == "encode":
+        return milliseconds_of(lambda: (encode(record), encode_metrics(metrics)), calls=20)
+    if what == "decode":
+        return milliseconds_of(lambda: _read(payload, measures), calls=20)
+    if what == "measure":
+        return milliseconds_of(lambda: measure(record, cutoff=100.0, order=1.0, window=10), calls=10)
+    spec = {"name": "bench", "scenarios": ["paper-a"], "planners": ["jdm"], "runs": 10}
+    campaign, timings = resolve(spec_from_data(spec)), encode_timings(record)
+
+    def land() -> float:
+        with tempfile.TemporaryDirectory() as place, Store.open(Path(place) / "results", campaign) as store:
+            seconds = [
+                cpu_seconds(lambda run=run: store.add("jdm", run, payload, timings, measures)) for run in range(10)
+            ]
+        return 1e3 * sum(seconds) / 10
+
+    return land
+
+
+def measures() -> Iterator[Measure]:
+    """What a run costs beside its scans and decisions."""
+    for what, name in (("encode", "encoded"), ("decode", "read back"), ("measure", "measured"), ("land", "landed")):
+        yield Measure("store", f"a run of paper-a, {name}", partial(prepared, what))
+
+
 def measured(way: Way, folder: Path, num_runs: int) -> str:
     land, read = way
     seconds = []
@@ -164,9 +201,7 @@ def main() -> None:
     parser.add_argument("--runs", type=int, default=300)
     parser.add_argument("--folder", type=Path, default=None, help="where to write; the system's temporary folder")
     options = parser.parse_args()
-    scenario = load_scenario("paper-a")
-    record = run_scenario(scenario, "jdm", seed=0, num_threads=1)
-    metrics = measure(record, cutoff=100.0, order=1.0, window=10)
+    record, metrics = finished_run()
     print_codec(record, metrics)
     print(f"{options.runs} runs              ms a run   99th ms   read all s        MiB    files")
     for journal in ("delete", "truncate", "persist", "wal", "parquet"):

@@ -10,11 +10,14 @@ from __future__ import annotations
 
 import argparse
 import os
-import statistics
 import subprocess
 import sys
 import tempfile
-import time
+from collections.abc import Iterator
+from functools import partial
+from itertools import count
+
+from timing import Figures, Measure, Once, cpu_seconds, wall_seconds
 
 from vedette.evaluation.runs import run_scenario
 from vedette.scenarios import load_scenario
@@ -31,26 +34,29 @@ _FIRST_SCAN = (
 )
 
 
-def cpu_of_runs(planner: str, repeats: int) -> float:
-    """Median CPU seconds of a run in this process, after one that warms up."""
-    scenario = load_scenario("paper-a")
-    seconds = []
-    for run in range(repeats + 1):
-        start = time.process_time()
-        run_scenario(scenario, planner, seed=1, run=run, num_threads=1)
-        seconds.append(time.process_time() - start)
-    return statistics.median(seconds[1:])
+def prepared(planner: str) -> Once:
+    """What gives the CPU milliseconds of a run of paper-a in this process, each time of another one."""
+    scenario, numbers = load_scenario("paper-a"), count()
+
+    def once() -> float:
+        run = next(numbers)
+        return 1e3 * cpu_seconds(lambda: run_scenario(scenario, planner, seed=1, run=run, num_threads=1))
+
+    once()
+    return once
+
+
+def measures() -> Iterator[Measure]:
+    """A run of each strategy."""
+    for planner in ("jdm", "idm", "random"):
+        yield Measure("whole run", f"paper-a, {planner}", partial(prepared, planner), rounds=5)
 
 
 def wall_of_start(code: str, repeats: int, cache: str | None = None) -> float:
     """Median wall seconds of a fresh interpreter that runs `code`."""
     environment = os.environ | ({"VEDETTE_CACHE_DIR": cache} if cache else {})
-    seconds = []
-    for _ in range(repeats):
-        start = time.perf_counter()
-        subprocess.run([sys.executable, "-c", code], check=True, env=environment)
-        seconds.append(time.perf_counter() - start)
-    return statistics.median(seconds)
+    start = partial(subprocess.run, [sys.executable, "-c", code], check=True, env=environment)
+    return Figures.of([wall_seconds(start) for _ in range(repeats)]).median
 
 
 def main() -> None:
@@ -59,7 +65,9 @@ def main() -> None:
     parser.add_argument("--repeats", type=int, default=9)
     options = parser.parse_args()
     for planner in ("jdm", "idm", "random"):
-        print(f"whole run of paper-a, {planner:6s}: {cpu_of_runs(planner, options.repeats):6.3f} s of CPU")
+        once = prepared(planner)
+        median = Figures.of([once() for _ in range(options.repeats)]).median
+        print(f"whole run of paper-a, {planner:6s}: {median / 1e3:6.3f} s of CPU")
     print(f"warm start to the first scan  : {wall_of_start(_FIRST_SCAN, 5):6.2f} s of wall time")
     if options.cold:
         whole = "from vedette.cli import app; app(['run', 'paper-a', '--planner', 'jdm'])"

@@ -11,7 +11,7 @@ from densities.examples import random_glmb, random_lmb
 from vedette.densities import LMB, TrackTable
 from vedette.densities.checks import unchecked
 from vedette.errors import InputError
-from vedette.fusion import Clmb
+from vedette.fusion import Clmb, CmDeltaGlmb, ValidBeliefs
 from vedette.fusion.validity import all_valid
 
 
@@ -77,3 +77,24 @@ def test_valid_ones_pass_and_other_kinds_are_left_to_their_own_check() -> None:
     assert not all_valid([random_glmb(rng, 3, 10, 2)])
     assert not all_valid([LMB.empty(4), LMB.empty(2)])
     assert not all_valid([])
+
+
+def test_beliefs_that_need_no_check_are_fused_to_the_same_bytes() -> None:
+    rng = np.random.default_rng(2)
+    for _ in range(10):
+        glmbs = [random_glmb(rng, 4, 10, 2) for _ in range(2)]
+        lmbs = [random_lmb(rng, 4) for _ in range(2)]
+        cases: list[tuple[Any, list[Any]]] = [(CmDeltaGlmb((0.4, 0.6)), glmbs), (Clmb((0.4, 0.6)), lmbs)]
+        for rule, beliefs in (*cases, (Clmb((0.4, 0.6)), glmbs)):
+            checked, report = rule.fuse(beliefs)
+            taken, same = rule.fuse(ValidBeliefs(beliefs))
+            assert report == same
+            for mine, other in zip(checked.to_kernel(), taken.to_kernel(), strict=True):
+                np.testing.assert_equal(mine, other)
+
+
+def test_their_kinds_are_checked_all_the_same() -> None:
+    with pytest.raises(InputError, match=r"beliefs\[1\]: expected GLMB; got LMB"):
+        CmDeltaGlmb((0.5, 0.5)).fuse(ValidBeliefs([random_glmb(np.random.default_rng(0), 2, 3, 2), LMB.empty(2)]))
+    with pytest.raises(InputError, match="one state dimension"):
+        Clmb((0.5, 0.5)).fuse(ValidBeliefs([LMB.empty(4), LMB.empty(2)]))

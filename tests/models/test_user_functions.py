@@ -356,6 +356,22 @@ def test_every_evaluation_names_a_function_that_raises():
         models.MeasurementModel(2, raises).measure(STATES, POSE)
 
 
+@models.model_function("prob_detection")
+def blind_in_the_west(state, pose, params):
+    if state[0] < 0.0:
+        raise ValueError("no beam there")
+    return 0.9
+
+
+def test_of_many_states_the_one_is_named_at_which_a_function_raises():
+    detection, states = models.DetectionModel(blind_in_the_west), np.abs(STATES)
+    np.testing.assert_array_equal(detection.prob(states, POSE), np.full(len(states), 0.9))
+    assert len(detection.prob(states[:0], POSE)) == 0
+    states[7, 0] = -123.5
+    with pytest.raises(ModelError, match=r"'blind_in_the_west' at state \[-123.5 .*: raised ValueError: no beam there"):
+        detection.prob(states, POSE)
+
+
 @pytest.mark.parametrize(
     ("states", "pose", "message"),
     [

@@ -30,7 +30,7 @@ _ADDRESS = re.compile(r"(tcp|tls)://[^\s/]+:[0-9]+")
 
 @contextmanager
 def local_workers(num_workers: int) -> Iterator[Client]:
-    """As many worker processes on this machine; one that dies is replaced.
+    """As many worker processes on this machine, being started (see `wait_for_worker`); one that dies is replaced.
 
     They talk over the loopback device, where any process of the machine can knock, and whoever is let in can have them
     run code: so with credentials that are made here, for this once, and are in no file.
@@ -85,13 +85,22 @@ def _make_room_for_files(num_workers: int) -> None:
 
 
 def _start(cluster: LocalCluster, num_workers: int) -> None:
-    """Start the processes, and wait for the first; Ctrl-C is kept from them from their first moment."""
+    """Start the processes; Ctrl-C is kept from them from their first moment."""
     begin = time.monotonic()
     with children_ignore_interrupts():
         cluster.scale(num_workers)
         while len(active_children()) < num_workers and time.monotonic() - begin < _SPAWN_SECONDS:
             time.sleep(_POLL_SECONDS)
-    while not cluster.scheduler_info["workers"]:
+
+
+def wait_for_worker(client: Client) -> None:
+    """Wait until one of the workers that `local_workers` starts is there.
+
+    Raises:
+        VedetteError: they end while they start, or take far too long.
+    """
+    begin = time.monotonic()
+    while not client.cluster.scheduler_info["workers"]:
         if not active_children() or time.monotonic() - begin > _START_SECONDS:
             raise VedetteError(
                 "the worker processes ended while they started; in a script of your own, put the call that runs the "

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Generator
-from contextlib import closing
+from contextlib import closing, nullcontext
 from dataclasses import dataclass
 from multiprocessing import current_process
 from pathlib import Path
 from typing import Protocol
 
 from vedette.campaigns.cells import Campaign
-from vedette.campaigns.clients import local_workers, remote_workers
+from vedette.campaigns.clients import local_workers, remote_workers, wait_for_worker
 from vedette.campaigns.engine import in_process, on_workers
 from vedette.campaigns.export import export_tables
 from vedette.campaigns.journal import DATABASE
@@ -173,9 +173,11 @@ def _results(queue: TaskQueue, num_workers: int, scheduler: str | None, watch: W
         with remote_workers(scheduler) as client:
             yield from on_workers(client, queue, watch.note, first=list(queue.warm_up()))
         return
-    # Here first, so that kernels are compiled once and not once a worker.
-    for task in queue.warm_up():
-        yield from perform(task)
-    if len(queue):
-        with local_workers(min(num_workers, len(queue))) as client:
+    # Here first, so that kernels are compiled once and not once a worker; meanwhile the workers start.
+    first = list(queue.warm_up())
+    with local_workers(min(num_workers, len(queue))) if len(queue) else nullcontext() as client:
+        for task in first:
+            yield from perform(task)
+        if client is not None:
+            wait_for_worker(client)
             yield from on_workers(client, queue, watch.note)

@@ -7,6 +7,7 @@ from vedette.fusion.cm_delta_glmb import CmDeltaGlmb
 from vedette.fusion.laid_out import LaidOut, LaysOut, lay_out_alone
 from vedette.fusion.matching import Matched, match_labels
 from vedette.fusion.parallel import ParallelUpdate
+from vedette.fusion.validity import ValidBeliefs
 from vedette.fusion.views import Views
 
 __all__ = [
@@ -24,6 +25,7 @@ __all__ = [
     "Matched",
     "MixturePower",
     "ParallelUpdate",
+    "ValidBeliefs",
     "Views",
     "lay_out_alone",
     "match_labels",

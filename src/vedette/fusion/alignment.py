@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vedette.densities.checks import label_step_up
 from vedette.fusion.base import PowerRule
 from vedette.kernels.base.types import Bools, Floats, Glmb, Ints, Tracks
 from vedette.kernels.labelled.conversions import glmb_to_lmb
@@ -34,9 +35,12 @@ class Aligned(NamedTuple):
 
     def existence(self, log_weights: Floats) -> Floats:
         """(num_labels, n) existence of each label, in increasing order, under (num_sets, n) weights of the sets."""
-        distinct, place = np.unique(self.labels, axis=0, return_inverse=True)
-        existence = np.zeros((len(distinct), log_weights.shape[1]))
-        np.add.at(existence, place.ravel(), np.exp(log_weights)[self.set_of_member])
+        order = np.lexsort(self.labels.T[::-1])
+        is_next = label_step_up(self.labels[order])
+        place = np.zeros(len(order), np.int64)
+        place[order[1:]] = np.cumsum(is_next)
+        existence = np.zeros((np.count_nonzero(is_next) + min(len(order), 1), log_weights.shape[1]))
+        np.add.at(existence, place, np.exp(log_weights)[self.set_of_member])
         return existence
 
 

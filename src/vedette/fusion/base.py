@@ -11,7 +11,7 @@ import numpy as np
 
 from vedette.errors import InputError
 from vedette.fusion.cubature import MAX_DIM, fifth_degree_rule
-from vedette.fusion.validity import all_valid
+from vedette.fusion.validity import ValidBeliefs, all_valid
 from vedette.fusion.views import Views
 from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.gaussian.mixtures import MixtureCaps
@@ -181,12 +181,15 @@ def check_kinds(given: Sequence[type], kinds: tuple[type, ...], num_sensors: int
 
 
 def check_beliefs(beliefs: Sequence[Any], kinds: tuple[type, ...], num_sensors: int) -> None:
-    """Raise `InputError` unless there is one belief a sensor, all of the given kinds and of one state dimension."""
+    """Raise `InputError` unless there is one belief a sensor, all valid, of the given kinds and of one state dimension.
+
+    `ValidBeliefs` are taken to be what they say.
+    """
     check_kinds([type(belief) for belief in beliefs], kinds, num_sensors)
     dims = [belief.state_dim for belief in beliefs]
     if len(set(dims)) > 1:
         raise InputError(f"beliefs: expected one state dimension at all sensors; got {dims}")
-    if all_valid(beliefs):
+    if isinstance(beliefs, ValidBeliefs) or all_valid(beliefs):
         return
     for i, belief in enumerate(beliefs):
         try:

@@ -116,13 +116,13 @@ class CmDeltaGlmb:
         log_weights = log_weights + np.bincount(aligned.set_of_member, log_overlaps, len(log_weights))
         fused, discarded_weight = _heaviest(aligned, tracks, log_weights, self.limits.max_hypotheses)
         log_normaliser = float(log_sum(log_weights))
-        of_sensors = aligned.existence(np.where(aligned.held, aligned.log_weights, -math.inf))
-        of_fused = aligned.existence((log_weights - log_normaliser)[:, None])[:, 0]
+        of_sensors = np.where(aligned.held, aligned.log_weights, -math.inf)
+        existence = aligned.existence(np.column_stack([of_sensors, log_weights - log_normaliser]))
         return fused, FusionInfo(
             missing_sets=tuple(np.count_nonzero(~aligned.held, axis=0).tolist()),
             missing_labels=tuple(aligned.num_missing_labels.tolist()),
             num_sets=len(aligned.held),
-            num_lost_labels=count_lost(of_sensors, of_fused),
+            num_lost_labels=count_lost(existence[:, :-1], existence[:, -1]),
             empty_intersection=not bool(aligned.held.all(axis=1).any()),
             log_normaliser=log_normaliser,
             discarded_weight=discarded_weight,

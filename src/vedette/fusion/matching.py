@@ -15,6 +15,7 @@ from vedette.densities.checks import unchecked
 from vedette.densities.label_sets import Label, single_gaussians, take_tracks
 from vedette.errors import InputError
 from vedette.fusion.base import Fusion, FusionInfo, check_beliefs
+from vedette.fusion.validity import ValidBeliefs
 from vedette.fusion.views import Views
 from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.kernels.gaussian.distances import pair_distances
@@ -202,7 +203,7 @@ class Matched:
 
     def fuse(self, beliefs: Sequence[Labelled], views: Views | None = None) -> tuple[Any, FusionInfo]:
         """The fusion of the beliefs under common labels; see the rule's. Raises as `match_labels` and the rule."""
-        return self.rule.fuse(self.match(beliefs), views)
+        return self.rule.fuse(ValidBeliefs(self.match(beliefs)), views)
 
     def lay_out(self, cases: Sequence[LabelledCases], prediction: GLMB | LMB) -> None:
         """None: which labels match differs from case to case. Of matched beliefs, ask the rule."""

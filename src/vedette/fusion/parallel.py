@@ -26,6 +26,7 @@ from vedette.fusion.base import (
 )
 from vedette.fusion.lmbs import sum_over_sensors
 from vedette.fusion.tracks import reduced_tracks
+from vedette.fusion.validity import ValidBeliefs
 from vedette.fusion.views import Views
 from vedette.kernels.base.types import Floats, Ints, Tracks
 from vedette.kernels.labelled.parallel import update_in_parallel
@@ -85,7 +86,7 @@ class ParallelUpdate:
         dimensions that differ, a density that is not valid or a label that the prediction lacks, and `NumericalError`
         where a label is certain at one sensor and impossible at another, or a product cannot be integrated.
         """
-        prediction = _prediction_of(views)
+        prediction = _prediction_of(views, check=not isinstance(beliefs, ValidBeliefs))
         num_sensors = len(beliefs) if self.weights is None else len(self.weights)
         check_beliefs(beliefs, (LMB,), num_sensors)
         if any(belief.state_dim != prediction.state_dim for belief in beliefs):
@@ -127,13 +128,15 @@ class _Posteriors(NamedTuple):
     logits: Floats  # (num_labels, num_sensors)
 
 
-def _prediction_of(views: Views | None) -> LMB:
+def _prediction_of(views: Views | None, *, check: bool) -> LMB:
     prediction = None if views is None else views.prediction
     if not isinstance(prediction, LMB):
         raise InputError(
             "views.prediction: expected the LMB that all beliefs were updated from, each by its sensor's own scan "
             f"alone, which a parallel update divides by; got {type(prediction).__name__}"
         )
+    if not check:
+        return prediction
     try:
         prediction.validate(error=InputError)
     except InputError as fault:

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from vedette.errors import InputError, ModelError
 from vedette.kernels.base.types import Bools, Floats
 from vedette.models.arguments import dimension, float_array, generator, non_negative, params_vector, pose_vector, reject
-from vedette.models.functions import ModelFunction, call, describe, model_function, require_kind
+from vedette.models.functions import ModelFunction, describe, model_function, numbers_at, require_kind
 from vedette.models.measurement import MeasurementModel, angular_flags, wrap_angular
 from vedette.models.probe import probe_log_intensity
 
@@ -67,7 +67,7 @@ class ClutterModel:
     def log_intensity_at(self, measurements: ArrayLike, pose: ArrayLike) -> Floats:
         """(n,) log intensities at (n, meas_dim) measurements."""
         table, at = float_array("measurements", measurements, (None, self.meas_dim)), pose_vector("pose", pose)
-        return np.array([call(self.log_intensity, row, at, self.params) for row in table], dtype=np.float64)
+        return numbers_at(self.log_intensity, table, at, self.params)
 
     def sample(
         self, pose: ArrayLike, measurement: MeasurementModel, *, state_dim: int, rng: np.random.Generator

@@ -13,7 +13,7 @@ from vedette.kernels.base.types import Floats
 from vedette.models import detection_functions as functions
 from vedette.models.arguments import params_vector, pose_vector, positive, probability, reject, state_table
 from vedette.models.detection_functions import MAX_PROB_DETECTION
-from vedette.models.functions import ModelFunction, call, describe, require_kind
+from vedette.models.functions import ModelFunction, describe, numbers_at, require_kind
 from vedette.models.probe import probe_probability
 
 
@@ -46,7 +46,7 @@ class DetectionModel:
     def prob(self, states: ArrayLike, pose: ArrayLike) -> Floats:
         """(n,) detection probabilities of (n, state_dim) states."""
         table, at = state_table("states", states), pose_vector("pose", pose)
-        return np.array([call(self.function, state, at, self.params) for state in table], dtype=np.float64)
+        return numbers_at(self.function, table, at, self.params)
 
     def check(self, states: ArrayLike, pose: ArrayLike) -> None:
         """Try the functions at each state (the mean: variances of 1).

@@ -27,8 +27,12 @@ import inspect
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
+
 from vedette.errors import InputError, ModelError
 from vedette.kernels.base.compile import SIGNATURES, check_arguments, compile_model_function
+from vedette.kernels.base.rows import FunctionOfStates, fill_rows, numbers_of_rows
+from vedette.kernels.base.types import Floats
 from vedette.models.arguments import reject
 
 ModelFunction = Callable[..., Any]
@@ -85,3 +89,23 @@ def call(function: ModelFunction, *args: Any) -> Any:
         return function(*args)
     except Exception as error:
         raise ModelError(f"{describe(function, *args)}: raised {type(error).__name__}: {error}") from error
+
+
+def write_rows(function: ModelFunction, states: Floats, at: Floats | float, params: Floats, out: Floats) -> None:
+    """Call a model function that writes a result at each of (n, state_dim) states; `out` (n, ...) has one a row.
+
+    at: a pose, or a period in seconds. Raises `ModelError` as `call`.
+    """
+    try:
+        fill_rows(FunctionOfStates(function, at, params), states, out)
+    except Exception:  # which state it was is found by asking one after the other
+        for state, row in zip(states, out, strict=True):
+            call(function, state, at, params, row)
+
+
+def numbers_at(function: ModelFunction, states: Floats, at: Floats | float, params: Floats) -> Floats:
+    """(n,) numbers that a model function returns at (n, state_dim) states; `at` and errors as of `write_rows`."""
+    try:
+        return numbers_of_rows(FunctionOfStates(function, at, params), states)
+    except Exception:
+        return np.array([call(function, state, at, params) for state in states], dtype=np.float64)

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from vedette.errors import ModelError
 from vedette.kernels.base.types import Bools, Floats
 from vedette.models.arguments import dimension, float_array, params_vector, pose_vector, reject, state_table
-from vedette.models.functions import ModelFunction, call, require_kind
+from vedette.models.functions import ModelFunction, require_kind, write_rows
 from vedette.models.probe import probe_array, probe_covariance, probe_jacobian
 
 
@@ -80,8 +80,7 @@ class MeasurementModel:
         """
         table, at = state_table("states", states), pose_vector("pose", pose)
         out = np.empty((len(table), self.meas_dim))
-        for state, measurement in zip(table, out, strict=True):
-            call(self.function, state, at, self.params, measurement)
+        write_rows(self.function, table, at, self.params, out)
         return out
 
     def positions(self, measurements: Floats, pose: ArrayLike) -> Floats:
@@ -133,8 +132,7 @@ class NoiseModel:
         """(n, meas_dim, meas_dim) noise covariances at (n, state_dim) states."""
         table, at = state_table("states", states), pose_vector("pose", pose)
         out = np.empty((len(table), meas_dim, meas_dim))
-        for state, cov in zip(table, out, strict=True):
-            call(self.function, state, at, self.params, cov)
+        write_rows(self.function, table, at, self.params, out)
         return out
 
     def check(self, states: ArrayLike, pose: ArrayLike, meas_dim: int) -> None:

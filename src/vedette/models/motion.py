@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from vedette.kernels.base.types import Floats, Motion
 from vedette.kernels.gaussian.sigma_points import CUBATURE, LINEARISED, UNSCENTED
 from vedette.models.arguments import dimension, params_vector, positive, probability, real, reject, state_table
-from vedette.models.functions import ModelFunction, call, model_function, require_kind
+from vedette.models.functions import ModelFunction, model_function, numbers_at, require_kind, write_rows
 from vedette.models.probe import probe_array, probe_covariance, probe_jacobian, probe_probability
 
 METHODS = {"ekf": LINEARISED, "ukf": UNSCENTED, "ckf": CUBATURE}
@@ -80,8 +80,7 @@ class MotionModel:
         """
         table, dt = state_table("states", states, self.state_dim), real("dt", dt)
         out = np.empty_like(table)
-        for state, moved in zip(table, out, strict=True):
-            call(self.transition, state, dt, self.transition_params, moved)
+        write_rows(self.transition, table, dt, self.transition_params, out)
         return out
 
     def noise_cov(self, state: ArrayLike, dt: float) -> Floats:
@@ -96,8 +95,7 @@ class MotionModel:
         """
         table, dt = state_table("states", states, self.state_dim), real("dt", dt)
         out = np.empty((len(table), self.state_dim, self.state_dim))
-        for state, cov in zip(table, out, strict=True):
-            call(self.process_noise_cov, state, dt, self.noise_params, cov)
+        write_rows(self.process_noise_cov, table, dt, self.noise_params, out)
         return out
 
     def check(self, states: ArrayLike, dt: float = 1.0) -> None:
@@ -135,7 +133,7 @@ class SurvivalModel:
     def prob(self, states: ArrayLike, dt: float) -> Floats:
         """(n,) survival probabilities over `dt` seconds."""
         table = state_table("states", states)
-        return np.array([call(self.function, state, real("dt", dt), self.params) for state in table])
+        return numbers_at(self.function, table, real("dt", dt), self.params)
 
     def check(self, states: ArrayLike, dt: float = 1.0) -> None:
         """Try the function at each state; `ModelError` unless it gives a probability."""

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from vedette.kernels.base.types import Floats
 from vedette.models import MotionModel, Region
 from vedette.models.arguments import float_array, generator, non_negative, probability
-from vedette.simulation.truth import Truth, moved_state, scan_times, semidefinite_factor
+from vedette.simulation.truth import Truth, moved_states, scan_times, semidefinite_factor
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -73,7 +73,8 @@ class PoissonTargets:
             if scan > 0:
                 if rng.random() < self.death_probability:
                     break
-                state = moved_state(self.motion, state, float(times[scan] - times[scan - 1]), rng)
+                dt, normals = float(times[scan] - times[scan - 1]), rng.standard_normal((1, len(state)))
+                state = moved_states(self.motion, state[np.newaxis], dt, normals, np.ones(1, np.bool_))[0]
             if self.region is not None and not self.region.contains(state[np.newaxis, :2])[0]:
                 break
             life.append(state)

@@ -156,24 +156,45 @@ class ScriptedTargets:
         first = self.initial_states
         if self.initial_stds is not None:
             first = first + self.initial_stds * rng.standard_normal(first.shape)
-        for target in range(num):
-            state, time = first[target], float(starts[target])
-            for scan in np.flatnonzero(alive[target]):
-                dt = float(scans[scan]) - time
-                if dt > TIME_TOLERANCE:
-                    state = moved_state(self.motion, state, dt, rng if noisy[target] else None)
-                    time = float(scans[scan])
-                states[target, scan] = state
+        elapsed = _elapsed(scans, np.asarray(starts), alive)
+        normals = np.zeros_like(states)
+        # One target after the other, each of its moves in turn, so that its luck does not depend on the others' lives.
+        moves = (elapsed > 0.0) & noisy[:, None]
+        normals[moves] = rng.standard_normal((np.count_nonzero(moves), self.motion.state_dim))
+        state = np.array(first)
+        for scan in range(len(scans)):
+            for dt in set(elapsed[elapsed[:, scan] > 0.0, scan].tolist()):
+                going = np.flatnonzero(elapsed[:, scan] == dt)
+                state[going] = moved_states(self.motion, state[going], dt, normals[going, scan], noisy[going])
+            states[alive[:, scan], scan] = state[alive[:, scan]]
         return Truth.from_arrays(scans, alive, states)
 
 
-def moved_state(motion: MotionModel, state: Floats, dt: float, rng: np.random.Generator | None) -> Floats:
-    """(state_dim,) the state `dt` seconds later, with process noise if a generator is given; raises `ModelError`."""
-    moved = motion.propagate(state, dt)[0]
-    if rng is not None:
-        moved = moved + semidefinite_factor(motion.noise_cov(state, dt)) @ rng.standard_normal(len(moved))
-    check_moved(state[np.newaxis], moved[np.newaxis], dt)
-    return np.asarray(moved)
+def _elapsed(scans: Floats, starts: Floats, alive: Bools) -> Floats:
+    """(num_targets, num_scans) s since its scan before (or its start) that a target is moved by; 0 where it is not."""
+    elapsed, since = np.zeros(alive.shape), starts.copy()
+    for scan, time in enumerate(scans.tolist()):
+        moved = alive[:, scan] & (time - since > TIME_TOLERANCE)
+        elapsed[moved, scan] = time - since[moved]
+        since[moved] = time
+    return elapsed
+
+
+def moved_states(motion: MotionModel, states: Floats, dt: float, normals: Floats, noisy: Bools) -> Floats:
+    """(num, state_dim) states `dt` seconds later, disturbed by process noise where `noisy`; raises `ModelError`.
+
+    normals: (num, state_dim) standard normal deviates, read where `noisy`.
+    """
+    moved, disturbed = motion.propagate(states, dt), np.flatnonzero(noisy)
+    if len(disturbed):
+        factors: dict[bytes, Floats] = {}
+        for i, cov in zip(disturbed.tolist(), motion.noise_covs(states[disturbed], dt), strict=True):
+            key = cov.tobytes()  # of most motions the same for all
+            if key not in factors:
+                factors[key] = semidefinite_factor(cov)
+            moved[i] += factors[key] @ normals[i]
+    check_moved(states, moved, dt)
+    return moved
 
 
 def check_moved(states: Floats, moved: Floats, dt: float) -> None:

@@ -101,7 +101,7 @@ class BeliefNetwork(LocalFilters):
         waiting = (*state.memory.sent, sent)
         with stages.timing("fusion"):
             fused, reports = self._fused(waiting, hops)
-            whole, report = merged(self.merging, fused, range(num), views)
+            whole, report = merged(self.merging, self._for_fusion(fused), range(num), views)
         with stages.timing("births"):
             births = self._births(fused, scans, at, sent)
         longest = self.network.longest_delay(num)
@@ -164,8 +164,10 @@ class BeliefNetwork(LocalFilters):
         seen = views_of([sent.views for sent in messages], heard)
         if not shares_prediction(self.fusion):
             now = max(messages, key=lambda sent: sent.step)
-            own = [self._current(sent, now, j) for sent, j in zip(messages, heard, strict=True)]
-            return (own[0], None) if len(own) == 1 else with_weights(self.fusion, weights.tolist()).fuse(own, seen)
+            current = [self._current(sent, now, j) for sent, j in zip(messages, heard, strict=True)]
+            if len(current) == 1:
+                return current[0], None
+            return with_weights(self.fusion, weights.tolist()).fuse(self._for_fusion(current), seen)
         predictions = [sent.predictions[j] for sent, j in zip(messages, heard, strict=True)]
         posteriors = [sent.beliefs[j] for sent, j in zip(messages, heard, strict=True)]
         base = predictions[0]
@@ -175,7 +177,7 @@ class BeliefNetwork(LocalFilters):
                 predictions = list(map(relabelled, predictions, names))
                 posteriors = list(map(relabelled, posteriors, names))
             merging = with_weights(self.merging, (weights / weights.sum()).tolist())
-            base, _ = merging.fuse(predictions, seen.if_all_scanned())
+            base, _ = merging.fuse(self._for_fusion(predictions), seen.if_all_scanned())
             for prediction in predictions:
                 base = with_labels_of(base, prediction)
         posteriors = [rebased(*own, base) for own in zip(posteriors, predictions, strict=True)]

@@ -80,10 +80,12 @@ class Distributed(LocalFilters):
             scanned = tuple(scan is not None or not self.feedback for scan in scans)
             views, rule = Views(self.sensors, at, scanned, prediction), self.fusion
             with stages.timing("fusion"):
+                made = self._for_fusion(local)
                 if isinstance(rule, Matched):
                     # Labels then outlast the sensor that led them, and are those that decisions need.
-                    local, rule = list(rule.match(local)), rule.rule
-                fused, report = rule.fuse(local, views)
+                    local, rule = rule.match(made), rule.rule
+                    made = self._for_fusion(local)
+                fused, report = rule.fuse(made, views)
         if prediction is not None:
             fused = self._kept(fused)
         if self.feedback:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -10,7 +11,9 @@ import numpy as np
 from vedette.densities import LMB
 from vedette.errors import InputError
 from vedette.filters import Filter, FilterInfo, LmbFilter, TwoStepFilter, shared_targets
+from vedette.filters.base import SingleSensorFilter
 from vedette.filters.blind import NO_POSE, NO_SCAN, blind_sensor
+from vedette.fusion import ValidBeliefs
 from vedette.models import SensorModel, TargetModel
 from vedette.models.arguments import reject
 
@@ -90,6 +93,11 @@ class LocalFilters:
         own = self.filters[0]
         assert isinstance(own, LmbFilter)
         return own.limits.kept(belief)
+
+    def _for_fusion(self, beliefs: Sequence[Any]) -> Sequence[Any]:
+        """What was made of the filters' beliefs at this step, to be fused: checked where a filter is the user's own."""
+        own = all(isinstance(local, SingleSensorFilter) for local in self.filters)
+        return ValidBeliefs(beliefs) if own else beliefs
 
     def _two_step(self, s: int, why: str) -> TwoStepFilter:
         own = self.filters[s]

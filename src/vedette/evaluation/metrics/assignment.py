@@ -130,6 +130,8 @@ def power_mean(values: Floats, number: float, order: float) -> float:
     scale = float(values.max()) if len(values) else 0.0
     if scale == 0.0 or math.isinf(scale) or math.isinf(order):
         return scale
+    if order == 1.0:  # the same numbers, without the powers
+        return float(scale * (float((values / scale).sum()) / number))
     with np.errstate(under="ignore"):
         total = float(((values / scale) ** order).sum())
     return float(scale * (total / number) ** (1.0 / order))
@@ -137,6 +139,9 @@ def power_mean(values: Floats, number: float, order: float) -> float:
 
 def combine(first: float, second: float, order: float) -> float:
     """(first ** order + second ** order) ** (1 / order) without overflow; the larger for an infinite order."""
+    scale = max(first, second)
+    if order == 1.0 and 0.0 < scale < math.inf:
+        return scale * (first / scale + second / scale)
     return power_mean(np.array([first, second]), 1.0, order)
 
 

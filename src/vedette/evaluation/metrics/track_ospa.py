@@ -19,6 +19,9 @@ from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.models.arguments import dimension
 from vedette.simulation.truth import Truth
 
+# Pairs of tracks times scans of a window, up to which distances are found once for several windows.
+_MOST_AT_ONCE = 2**18
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TrackSet:
@@ -103,11 +106,18 @@ def ospa2(estimates: TrackSet, truths: TrackSet, *, cutoff: float, order: float,
     if estimates.num_scans != truths.num_scans:
         raise InputError(f"estimates: expected {truths.num_scans} scans; got {estimates.num_scans}")
     parts = np.empty((truths.num_scans, 3))
-    for scan in range(truths.num_scans):
-        start, stop = max(0, scan + 1 - window), scan + 1
-        distances = track_distances(estimates.within(start, stop), truths.within(start, stop), cutoff)
-        result = ospa_of_distances(distances, cutoff, order)
-        parts[scan] = result.total, result.localisation, result.cardinality
+    few = len(estimates.alive) * len(truths.alive) * window <= _MOST_AT_ONCE
+    block = window if few else 1
+    for first in range(0, truths.num_scans, block):
+        start, stop = max(0, first + 1 - window), min(first + block, truths.num_scans)
+        mine, true = estimates.within(start, stop), truths.within(start, stop)
+        costs, either = _costs(mine, true, cutoff)
+        for scan in range(first, stop):
+            seen = slice(max(0, scan + 1 - window) - start, scan + 1 - start)
+            there = np.ix_(mine.alive[:, seen].any(axis=1), true.alive[:, seen].any(axis=1))
+            distances = _averages(costs[:, :, seen], either[:, :, seen])[there]
+            result = ospa_of_distances(distances, cutoff, order)
+            parts[scan] = result.total, result.localisation, result.cardinality
     return parts
 
 
@@ -119,8 +129,17 @@ def ospa2_of_run(truth: Truth, estimates: Sequence[Estimate], *, cutoff: float, 
 
 def track_distances(first: TrackSet, second: TrackSet, cutoff: float) -> Floats:
     """(num_first, num_second) time-averaged cut-off distances between tracks; of two that never exist, 0."""
+    return _averages(*_costs(first, second, cutoff))
+
+
+def _costs(first: TrackSet, second: TrackSet, cutoff: float) -> tuple[Floats, Bools]:
+    """(num_first, num_second, num_scans) cut-off distances, 0 where neither exists, and whether either does."""
     either = first.alive[:, None] | second.alive[None]
     both = first.alive[:, None] & second.alive[None]
     apart = np.sqrt(((first.positions[:, None] - second.positions[None]) ** 2).sum(axis=3))
-    costs = np.where(both, np.minimum(apart, cutoff), cutoff)
-    return np.asarray((costs * either).sum(axis=2) / np.maximum(either.sum(axis=2), 1))
+    return np.where(both, np.minimum(apart, cutoff), cutoff) * either, either
+
+
+def _averages(costs: Floats, either: Bools) -> Floats:
+    """Over the scans at which either exists, of what `_costs` gives."""
+    return np.asarray(costs.sum(axis=2) / np.maximum(either.sum(axis=2), 1))

@@ -10,8 +10,12 @@ from vedette.kernels.base.types import Glmb, Ints, Tracks
 
 
 def join_offsets(offsets: Sequence[Ints]) -> Ints:
-    """Offsets of the concatenation of ragged arrays."""
-    return np.concatenate([np.zeros(1, np.int64), np.cumsum(np.concatenate([np.diff(item) for item in offsets]))])
+    """Offsets of the concatenation of ragged arrays, each with offsets from 0 on."""
+    joined, end = [np.zeros(1, np.int64)], 0
+    for item in offsets:
+        joined.append(item[1:] + end)
+        end += int(item[-1])
+    return np.concatenate(joined)
 
 
 def stack_tracks(tables: Sequence[Tracks]) -> Tracks:
