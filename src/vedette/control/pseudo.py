@@ -10,6 +10,7 @@ import numpy as np
 from vedette.control.inputs import Belief
 from vedette.control.priors import heaviest_hypotheses
 from vedette.control.settings import IDEAL_MODES, MobileSensor, PlanningSettings
+from vedette.control.versions import share_versions
 from vedette.densities import GLMB, LMB, MultiTargetSamples, sample_glmb, sample_lmb
 from vedette.densities.cases import LabelledCases
 from vedette.densities.checks import offsets_of, unchecked
@@ -113,7 +114,8 @@ def targets_of(table: Ints, labels: Ints, offsets: Ints) -> Ints:
 
 def _run_glmb(belief: GLMB, decision: Decision, settings: PlanningSettings, num_cases: int) -> LabelledCases:
     heaviest = heaviest_hypotheses(belief, settings.max_prior_hypotheses)
-    prior = unchecked(GLMB, single_gaussians(heaviest.tracks), *heaviest.to_kernel()[1:])
+    single = unchecked(GLMB, single_gaussians(heaviest.tracks), *heaviest.to_kernel()[1:])
+    prior = share_versions(single, settings.max_version_divergence)
     found, dim = label_sets(prior), prior.tracks.state_dim
     set_offsets = offsets_of([len(labels) for labels in found.sets])
     results = GlmbResults(

@@ -50,6 +50,8 @@ class PlanningSettings:
             0: nobody is looked for. Targets not found are taken to stay where they are over the horizon.
         max_prior_hypotheses: heaviest hypotheses of each local posterior that enter the pseudo-updates. An LMB enters
             whole.
+        max_version_divergence: nats within which a label's densities under two of these hypotheses are taken as one,
+            the heavier hypothesis's; 0: none are.
         max_bound_work: ways to see a target, times samples, that are tried at most for the bound of a plan.
         confidence: with which the choice is to be the best of its candidates; samples are then added until it is, see
             `vedette.control.racing`. None: `num_samples`, whatever they can tell.
@@ -76,6 +78,7 @@ class PlanningSettings:
     max_glmb_sensors: int = 4
     max_glmb_targets: int = 10
     max_prior_hypotheses: int = 10
+    max_version_divergence: float = 1e-3
     max_bound_work: int = 256
     undetected_worth: float = 0.0
     confidence: float | None = None
@@ -96,6 +99,7 @@ class PlanningSettings:
         positive("horizon_period", self.horizon_period)
         probability("detection_threshold", self.detection_threshold)
         non_negative("undetected_worth", self.undetected_worth)
+        non_negative("max_version_divergence", self.max_version_divergence)
         if self.num_threads != 0:
             dimension("num_threads", self.num_threads)
         self._check_certainty()

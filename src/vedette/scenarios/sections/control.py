@@ -36,6 +36,11 @@ class PlanningLimits(Section):
     """How much of the density the planner works with."""
 
     max_prior_hypotheses: Count = Field(default=10, description="Most hypotheses at the start of the horizon [-].")
+    max_version_divergence: Annotated[float, Field(ge=0.0)] = Field(
+        default=1e-3,
+        description="Densities of one label within so many nats of each other are taken as one at the start of the "
+        "horizon; 0: none are [nats].",
+    )
     max_hypotheses: Count = Field(default=40, description="Most hypotheses after each step of the horizon [-].")
     max_glmb_sensors: Annotated[Whole, Field(ge=0)] = Field(
         default=4, description="With more sensors GLMB beliefs are planned on as LMBs, which plans then say [-]."
@@ -175,6 +180,7 @@ class Control(Section):
             undetected_worth=self.undetected_worth,
             max_bound_work=self.limits.max_bound_work,
             max_prior_hypotheses=self.limits.max_prior_hypotheses,
+            max_version_divergence=self.limits.max_version_divergence,
             limits=replace(
                 planning_limits(),
                 max_hypotheses=self.limits.max_hypotheses,
