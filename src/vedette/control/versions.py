@@ -11,8 +11,8 @@ from __future__ import annotations
 import numpy as np
 
 from vedette.densities import GLMB
-from vedette.densities.checks import unchecked
-from vedette.densities.label_sets import offsets_of, take_tracks
+from vedette.densities.checks import offsets_of, unchecked
+from vedette.densities.label_sets import take_tracks
 from vedette.kernels.base.types import Floats, Ints
 
 
