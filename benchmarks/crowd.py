@@ -6,8 +6,9 @@ Prints a Markdown table. Of each filter and size, all scans of one run, from the
 there at first are found: the median CPU time of a scan of the filter, and of the tracker with births from measurements
 and all checks, over up to `--repeats` passes of which each scan's least counts (none begins after 20 s); OSPA
 (c = 25 m, p = 1, an average over targets) and the error of the number; and how much memory the process needs more than
-before its first scan, at most, in a process of its own and with the estimates of all scans. The LMB filter is measured
-up to 100,000 targets, the delta-GLMB filter up to 1,000. `--figure` draws time and OSPA against the number.
+before its first scan, at most, in a process of its own and with the estimates of all scans. The LMB and the factored
+GLMB filter are measured up to 100,000 targets, the delta-GLMB filter up to 1,000. `--figure` draws time and OSPA
+against the number.
 """
 
 from __future__ import annotations
@@ -27,15 +28,15 @@ from timing import Measure, Once
 
 from vedette.densities import Estimate
 from vedette.evaluation import ospa
-from vedette.filters import DeltaGlmbFilter, LmbFilter
+from vedette.filters import TwoStepFilter
 from vedette.models import SensorModel, TargetModel
 from vedette.scenarios import GeneratedCrowd, Scenario, crowd_text, parse_scenario, with_fields
 from vedette.scenarios.build import build_experiment
 from vedette.simulation import Experiment, Truth, simulate_scan
 
 SIZES = (10, 30, 100, 300, 1000, 3000, 10_000)
-MOST = {"lmb": 100_000, "delta_glmb": 1000}
-NAMES = {"lmb": "LMB", "delta_glmb": "delta-GLMB"}
+MOST = {"lmb": 100_000, "factored_glmb": 100_000, "delta_glmb": 1000}
+NAMES = {"lmb": "LMB", "factored_glmb": "factored GLMB", "delta_glmb": "delta-GLMB"}
 FROM_STEP, CUTOFF = 6, 25.0
 _NO_MORE_AFTER = 20.0  # s
 
@@ -73,7 +74,7 @@ def prepared(crowd: GeneratedCrowd, kind: str) -> tuple[Experiment, Truth, list[
 class TimedFilter:
     """A filter that notes the CPU seconds of its steps."""
 
-    inner: LmbFilter | DeltaGlmbFilter
+    inner: TwoStepFilter
     seconds: list[float]
 
     @property
@@ -182,7 +183,7 @@ def draw(rows: Sequence[Row], density: float, path: Path) -> None:
     from matplotlib import pyplot as plt
 
     figure, (above, below) = plt.subplots(2, 1, sharex=True, figsize=(7.0, 6.0), layout="constrained")
-    for kind, marker in (("lmb", "o"), ("delta_glmb", "s")):
+    for kind, marker in zip(NAMES, "o^s", strict=True):
         own = [row for row in rows if row.filter == kind]
         numbers = [row.num_targets for row in own]
         above.plot(numbers, [row.microseconds for row in own], marker=marker, label=NAMES[kind])

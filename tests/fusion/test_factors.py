@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from densities.examples import random_covs, random_factored
-from fusion.examples import assert_same_glmb
+from densities.examples import random_covs, random_factor, random_factored
+from fusion.examples import assert_same_glmb, by_label_set
 from vedette.densities import GLMB, LMB, FactoredGLMB, TrackTable, factored_to_glmb, factored_to_lmb
 from vedette.errors import InputError, NumericalError
 from vedette.fusion import ArithmeticAverage, Clmb, CmDeltaGlmb, FusionLimits, Matched, match_labels
@@ -117,6 +117,36 @@ def test_labels_that_are_alone_are_fused_as_one_by_one(seed, mixture_power):
         assert getattr(info, name) == tuple(np.sum([getattr(own, name) for _, own in expected], axis=0).tolist())
     assert info.num_lost_labels == sum(own.num_lost_labels for _, own in expected)
     assert info.empty_intersection == any(own.empty_intersection for _, own in expected)
+
+
+@given(st.integers(0, 2**32 - 1), st.sampled_from([2, 1000]))
+def test_groups_with_missing_sets_are_fused_as_one_by_one(seed, most):
+    """Each sensor's factors have other label sets, or all but one label of a group."""
+    rng = np.random.default_rng(seed)
+    groups = [[A, B], [C, D], [E]]
+    own = [[random_factor(rng, labels if rng.random() < 0.8 else labels[:1]) for labels in groups] for _ in THIRDS]
+    beliefs = [FactoredGLMB.from_factors([factors[i] for i in rng.permutation(3)], 2) for factors in own]
+    rule = CmDeltaGlmb((0.47, 0.32, 0.21), missing_log_weight=math.log(0.01), limits=FusionLimits(max_hypotheses=most))
+    fused, info = rule.fuse(beliefs)
+    fused.validate()
+    expected = [rule.fuse([factors[g] for factors in own]) for g in range(3)]
+    found = {tuple(one.tracks.labels.min(axis=0).tolist()): one for one in fused.factors}
+    for one, _ in expected:
+        if one.tracks.num_tracks:
+            got = found.pop(tuple(one.tracks.labels.min(axis=0).tolist()))
+            there = {key: value for key, value in by_label_set(got).items() if value[0] > 0.0}
+            assert {key: value[0] for key, value in there.items()} == pytest.approx(
+                {key: value[0] for key, value in by_label_set(one).items()}, abs=1e-12
+            )
+    assert not found
+    for name in ("missing_sets", "missing_labels"):
+        assert getattr(info, name) == tuple(np.sum([getattr(one, name) for _, one in expected], axis=0).tolist())
+    assert info.num_sets == sum(one.num_sets for _, one in expected)
+    assert info.num_lost_labels == sum(one.num_lost_labels for _, one in expected)
+    assert info.empty_intersection == any(one.empty_intersection for _, one in expected)
+    assert info.log_normaliser == pytest.approx(sum(one.log_normaliser for _, one in expected), abs=1e-10)
+    kept = np.prod([1.0 - one.discarded_weight for _, one in expected])
+    assert info.discarded_weight == pytest.approx(1.0 - kept, abs=1e-12)
 
 
 def test_a_cap_of_one_takes_the_likelier_for_each_label():

@@ -120,17 +120,57 @@ def one_case(rng: np.random.Generator) -> None:
         made.validate()
 
 
+def one_product(rng: np.random.Generator) -> None:
+    """The same of a product of GLMBs."""
+    from vedette import densities as d
+    from vedette.densities.label_sets import without_labels
+    from vedette.divergence import cauchy_schwarz
+    from vedette.fusion import CmDeltaGlmb
+
+    covs, means = np.tile(100.0 * np.eye(4), (6, 1, 1)), rng.normal(0.0, 50.0, (6, 4))
+    tracks = d.TrackTable.from_gaussians([(1, 0), (1, 1), (1, 1), (2, 0)], means[:4], covs[:4])
+    several = d.GLMB.from_hypotheses(tracks, [[0, 1], [2, 3], [0], []], [0.4, 0.3, 0.2, 0.1])
+    alone = d.LMB.from_bernoullis([(1, 5), (3, 0)], [0.9, 0.2], means[4:], covs[4:])
+    belief = d.FactoredGLMB.product([d.FactoredGLMB.from_lmb(alone), d.FactoredGLMB.from_glmb(several)], 4)
+    try:
+        if rng.random() < 0.3:
+            made = d.TrackTable(**spoil(fields_of(belief.tracks), rng))
+            spoilt = d.FactoredGLMB(**{**fields_of(belief), "tracks": made})
+        else:
+            spoilt = d.FactoredGLMB(**spoil(fields_of(belief), rng))
+    except InputError:
+        return
+    with contextlib.suppress(VedetteError):
+        assert cauchy_schwarz(spoilt, belief) >= 0.0
+    uses: list[Any] = [
+        lambda: d.map_estimate(spoilt),
+        lambda: d.marginal_estimate(spoilt),
+        lambda: d.factored_to_lmb(spoilt),
+        lambda: d.factored_to_glmb(spoilt, max_hypotheses=5)[0],
+        lambda: d.marginalise(spoilt),
+        lambda: without_labels(spoilt, np.array([[1, 1], [3, 0]]))[0],
+        lambda: CmDeltaGlmb((0.5, 0.5)).fuse([spoilt, belief])[0],
+    ]
+    for use in uses:
+        try:
+            made = use()
+        except VedetteError:
+            continue
+        made.validate()
+
+
 PROGRAM = """
 import sys
 import numpy as np
 import pytest
 sys.path.insert(0, sys.argv[1])
-from fuzz.test_beliefs import one_case
+from fuzz.test_beliefs import one_case, one_product
 
 seed, first, last = (int(value) for value in sys.argv[2:])
 for number in range(first, last):
     print(number, flush=True)
     one_case(np.random.default_rng([seed, number]))
+    one_product(np.random.default_rng([seed, number, 1]))
 """
 
 

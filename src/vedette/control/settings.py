@@ -139,7 +139,7 @@ class MobileSensor:
 
     Attributes:
         filter: its local filter, with the models of the targets and of the sensor. The joint and the independent
-            planner need one that labels its targets: that believes in a `GLMB` or an `LMB`.
+            planner need one that labels its targets: that believes in a `GLMB`, an `LMB` or a `FactoredGLMB`.
         platform: what it may do, and where that takes it.
 
     Raises:

@@ -9,10 +9,10 @@ from typing import TypeVar
 import numpy as np
 from scipy.special import log_expit
 
-from vedette.densities.checks import distinct_labels, unchecked
+from vedette.densities.checks import distinct_labels, offsets_of, take_runs, unchecked
 from vedette.densities.factored import FactoredGLMB, Labelled
 from vedette.densities.glmb import GLMB
-from vedette.densities.label_sets import take_factors
+from vedette.densities.label_sets import sets_of_factors, take_factors, take_tracks
 from vedette.densities.lmb import LMB
 from vedette.densities.tracks import TrackTable
 from vedette.errors import InputError
@@ -65,19 +65,39 @@ def marginalise(
 def marginalised_factors(density: FactoredGLMB, caps: MixtureCaps) -> FactoredGLMB:
     """The density with every factor marginalised, in their order; those laid out as `from_lmb` does stay so."""
     bernoulli = density.is_bernoulli
+    if bernoulli.all() and len(density.tracks.log_weights) == density.num_factors:
+        return density
     singles, several = np.flatnonzero(bernoulli), np.flatnonzero(~bernoulli)
-    alone = take_factors(density, singles)
-    num = len(singles)
+    alone, num = take_factors(density, singles), len(singles)
     if len(alone.tracks.log_weights) > num:
         each = np.arange(num + 1)
-        tracks = pooled_tracks(
-            alone.tracks.to_kernel(), alone.tracks.labels, each, each[:-1].copy(), np.ones(num), caps
-        )
+        own = alone.tracks.to_kernel()
+        tracks = pooled_tracks(own, own.labels, each, each[:-1].copy(), np.ones(num), caps)
         alone = unchecked(FactoredGLMB, TrackTable.from_kernel(tracks), *alone.to_kernel()[1:])
-    factors = (density.factor(index).to_kernel() for index in several.tolist())
-    parts = [FactoredGLMB.from_glmb(GLMB.from_kernel(kernels.marginalise(factor, caps))) for factor in factors]
+    others = _marginalised_glmbs(take_factors(density, several), caps)
     order = np.argsort(np.concatenate([singles, several]))
-    return take_factors(FactoredGLMB.product([alone, *parts], density.state_dim), order)
+    return take_factors(FactoredGLMB.product([alone, others], density.state_dim), order)
+
+
+def _marginalised_glmbs(density: FactoredGLMB, caps: MixtureCaps) -> FactoredGLMB:
+    """All factors marginalised at once, each one's hypotheses by descending weight."""
+    num, hypotheses = density.num_factors, density.as_hypotheses()
+    factor_of = np.repeat(np.arange(num), np.diff(density.factor_offsets))
+    set_of, first = sets_of_factors(hypotheses, factor_of)
+    marginal, number = kernels.marginalise_sets(hypotheses, set_of, first, caps)
+    factor = factor_of[first][number]
+    order = np.argsort(factor, kind="stable")
+    hyp_offsets, tracks = take_runs(marginal.hyp_offsets, order)
+    factor_offsets = offsets_of(np.bincount(factor, minlength=num))
+    return unchecked(
+        FactoredGLMB,
+        take_tracks(TrackTable.from_kernel(marginal.tracks), tracks),
+        hyp_offsets[factor_offsets],
+        hyp_offsets,
+        np.arange(len(tracks)),
+        marginal.hyp_log_weights[order],
+        factor_offsets,
+    )
 
 
 def as_lmb(

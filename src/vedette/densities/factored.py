@@ -154,8 +154,9 @@ class FactoredGLMB:
 
         state_dim: of all of them. Raises `InputError` for a label in two of them.
         """
-        if not parts:
-            return cls.empty(state_dim)
+        parts = [part for part in parts if part.num_factors > 0]
+        if len(parts) < 2:
+            return parts[0] if parts else cls.empty(state_dim)
         stack = stack_glmbs([part.as_hypotheses() for part in parts])
         made: FactoredGLMB = checks.unchecked(
             cls,

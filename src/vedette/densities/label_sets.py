@@ -13,7 +13,7 @@ from vedette.densities.glmb import GLMB
 from vedette.densities.lmb import LMB
 from vedette.densities.statistics import existence_probabilities, track_moments
 from vedette.densities.tracks import TrackTable
-from vedette.kernels.base.types import Bools, Ints
+from vedette.kernels.base.types import Bools, Glmb, Ints
 from vedette.kernels.gaussian.mixtures import MixtureCaps
 from vedette.kernels.labelled.conversions import glmb_to_lmb
 from vedette.kernels.labelled.labels import group_by_label_set
@@ -79,6 +79,17 @@ def single_gaussians(tracks: TrackTable) -> TrackTable:
     if len(tracks.log_weights) == num:
         return tracks
     return unchecked(TrackTable, tracks.labels, np.arange(num + 1), np.zeros(num), *track_moments(tracks))
+
+
+def sets_of_factors(hypotheses: Glmb, factor_of: Ints) -> tuple[Ints, Ints]:
+    """As `group_by_label_set`, where hypotheses of different factors (num_hyps,) have different sets."""
+    set_of, first = group_by_label_set(hypotheses)
+    if (factor_of == factor_of[:1]).all():
+        return set_of, first
+    numbers = set_of * (factor_of.max() + 1) + factor_of
+    _, first, place = np.unique(numbers, return_index=True, return_inverse=True)
+    order = np.argsort(first)
+    return np.argsort(order)[place], first[order]
 
 
 def take_factors(density: FactoredGLMB, places: Ints) -> FactoredGLMB:

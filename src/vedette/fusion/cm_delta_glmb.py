@@ -12,7 +12,8 @@ from scipy.special import expit
 
 from vedette.densities import GLMB, LMB, FactoredGLMB, TrackTable
 from vedette.densities.cases import LabelledCases
-from vedette.densities.checks import unchecked
+from vedette.densities.checks import offsets_of, take_runs, unchecked
+from vedette.densities.conversions import marginalised_factors
 from vedette.densities.joining import as_factored
 from vedette.densities.label_sets import take_tracks
 from vedette.densities.products import PowerProducts, Share
@@ -32,13 +33,13 @@ from vedette.fusion.base import (
     count_lost,
     power_rule,
 )
-from vedette.fusion.factors import fuse_factors
+from vedette.fusion.factors import side_by_side, tidied
 from vedette.fusion.laid_out import lay_out_glmbs
 from vedette.fusion.tracks import fused_tracks
 from vedette.fusion.views import Views
 from vedette.kernels.base.types import Floats, Glmb
-from vedette.kernels.gaussian.linalg import log_sum
 from vedette.kernels.labelled.conversions import marginalise
+from vedette.kernels.labelled.groups import group_log_sums
 
 _Glmb = TypeVar("_Glmb", GLMB, FactoredGLMB)
 
@@ -95,37 +96,48 @@ class CmDeltaGlmb:
         rule = power_rule(self.mixture_power, self.limits, beliefs[0].state_dim)
         active = [i for i, weight in enumerate(self.weights) if weight > 0.0]
         weights = np.array([self.weights[i] for i in active])
-        fused: Any
         given: Sequence[GLMB | FactoredGLMB] = beliefs
         glmbs = [belief for belief in given if isinstance(belief, GLMB)]
+        fused: Any
         if len(glmbs) == len(beliefs):
-            fused, info = self._fused([_marginalised(glmbs[i], rule) for i in active], weights, rule)
+            sensors = [FactoredGLMB.from_glmb(_marginalised(glmbs[i], rule)) for i in active]
+            whole, info = self._fused(sensors, np.zeros(1), weights, rule)
+            fused = whole.factor(0)
         else:
-            factored = [as_factored(given[i]) for i in active]
-            own = (weights, self.missing_log_weight, rule, self.limits)
-            fused, info = fuse_factors(factored, *own, lambda sensors: self._fused(sensors, weights, rule))
+            factored = [marginalised_factors(as_factored(given[i]), rule.caps) for i in active]
+            sensors, log_kept = side_by_side(factored, self.limits.max_hypotheses)
+            whole, info = self._fused(sensors, log_kept, weights, rule)
+            fused = tidied(whole)
         missing_sets = by_sensor(np.array(info.missing_sets), active, len(beliefs))
         missing_labels = by_sensor(np.array(info.missing_labels), active, len(beliefs))
         return fused, replace(info, missing_sets=missing_sets, missing_labels=missing_labels)
 
-    def _fused(self, sensors: Sequence[Glmb], weights: Floats, rule: PowerRule) -> tuple[GLMB, FusionInfo]:
-        """The fusion of marginalised GLMBs without hypotheses of weight zero, and the report of these sensors alone."""
+    def _fused(
+        self, sensors: Sequence[FactoredGLMB], log_kept: Floats, weights: Floats, rule: PowerRule
+    ) -> tuple[FactoredGLMB, FusionInfo]:
+        """The fusion of marginalised GLMBs, factor g with factor g, and the report of these sensors alone.
+
+        log_kept: (num_groups,) log of the weight that was left of the sensors' factors.
+        """
         aligned = align(sensors, self.missing_log_weight, rule)
         tracks, log_overlaps = fused_tracks(aligned.labels, aligned.chosen, weights, aligned.tracks, rule)
         log_weights = aligned.log_weights @ weights
         log_weights = log_weights + np.bincount(aligned.set_of_member, log_overlaps, len(log_weights))
-        fused, discarded_weight = _heaviest(aligned, tracks, log_weights, self.limits.max_hypotheses)
-        log_normaliser = float(log_sum(log_weights))
+        fused, discarded = _heaviest(aligned, tracks, log_weights, self.limits.max_hypotheses)
+        log_normalisers = group_log_sums(log_weights, aligned.groups, aligned.num_groups)
         of_sensors = np.where(aligned.held, aligned.log_weights, -math.inf)
-        existence = aligned.existence(np.column_stack([of_sensors, log_weights - log_normaliser]))
+        existence = aligned.existence(np.column_stack([of_sensors, log_weights - log_normalisers[aligned.groups]]))
+        in_common = np.bincount(aligned.groups[aligned.held.all(axis=1)], minlength=aligned.num_groups)
+        with np.errstate(divide="ignore"):
+            left = float((np.log1p(-discarded) + log_kept).sum())
         return fused, FusionInfo(
             missing_sets=tuple(np.count_nonzero(~aligned.held, axis=0).tolist()),
             missing_labels=tuple(aligned.num_missing_labels.tolist()),
             num_sets=len(aligned.held),
             num_lost_labels=count_lost(existence[:, :-1], existence[:, -1]),
-            empty_intersection=not bool(aligned.held.all(axis=1).any()),
-            log_normaliser=log_normaliser,
-            discarded_weight=discarded_weight,
+            empty_intersection=not bool(in_common.all()),
+            log_normaliser=float(log_normalisers.sum()),
+            discarded_weight=-math.expm1(left) + 0.0,  # no -0
         )
 
     def lay_out(self, cases: Sequence[LabelledCases], prediction: GLMB | LMB) -> PowerProducts | None:
@@ -155,32 +167,46 @@ class CmDeltaGlmb:
         return Share(own, weight, held, least[:, None])
 
 
-def _marginalised(belief: GLMB, rule: PowerRule) -> Glmb:
+def _marginalised(belief: GLMB, rule: PowerRule) -> GLMB:
     """One hypothesis a label set, of positive weight, with reduced mixtures."""
     glmb = marginalise(belief.to_kernel(), rule.caps)
     held = int(np.count_nonzero(glmb.hyp_log_weights > -math.inf))
     # They come by descending weight, so those of weight zero are the last.
-    return Glmb(
-        glmb.tracks,
-        glmb.hyp_offsets[: held + 1],
-        glmb.hyp_tracks[: glmb.hyp_offsets[held]],
-        glmb.hyp_log_weights[:held],
+    return GLMB.from_kernel(
+        Glmb(
+            glmb.tracks,
+            glmb.hyp_offsets[: held + 1],
+            glmb.hyp_tracks[: glmb.hyp_offsets[held]],
+            glmb.hyp_log_weights[:held],
+        )
     )
 
 
-def _heaviest(aligned: Aligned, tracks: TrackTable, log_weights: Floats, max_hypotheses: int) -> tuple[GLMB, float]:
-    """Normalised GLMB of the `max_hypotheses` heaviest label sets, and the weight of the others."""
-    order = np.argsort(-log_weights, kind="stable")
-    kept, cut = order[:max_hypotheses], order[max_hypotheses:]
-    peak = log_weights[order[0]]
-    if peak == -math.inf:
+def _heaviest(
+    aligned: Aligned, tracks: TrackTable, log_weights: Floats, max_hypotheses: int
+) -> tuple[FactoredGLMB, Floats]:
+    """Normalised GLMBs of the `max_hypotheses` heaviest label sets of each group, and the weights of the others."""
+    groups, num = aligned.groups, aligned.num_groups
+    order = np.lexsort((-log_weights, groups))
+    starts = offsets_of(np.bincount(groups, minlength=num))
+    rank = np.arange(len(order)) - starts[groups[order]]
+    kept, cut = order[rank < max_hypotheses], order[rank >= max_hypotheses]
+    peaks = log_weights[order[starts[:-1]]]
+    if (peaks == -math.inf).any():
         raise NumericalError("fusion: expected a label set of positive weight; the sensors' densities share no place")
     # From the heaviest on: logs of -1e12 keep their differences.
-    relative = log_weights[kept] - peak
-    log_kept = log_sum(relative)
-    sizes = np.diff(aligned.set_offsets)[kept]
-    hyp_offsets = np.concatenate([np.zeros(1, np.int64), np.cumsum(sizes)])
-    members = np.repeat(aligned.set_offsets[kept] - hyp_offsets[:-1], sizes) + np.arange(hyp_offsets[-1])
-    own = take_tracks(tracks, members)
-    fused = unchecked(GLMB, own, hyp_offsets, np.arange(len(members)), relative - log_kept)
-    return fused, float(expit(log_sum(log_weights[cut] - peak) - log_kept))
+    relative = log_weights[kept] - peaks[groups[kept]]
+    log_kept = group_log_sums(relative, groups[kept], num)
+    hyp_offsets, members = take_runs(aligned.set_offsets, kept)
+    factor_offsets = offsets_of(np.bincount(groups[kept], minlength=num))
+    fused = unchecked(
+        FactoredGLMB,
+        take_tracks(tracks, members),
+        hyp_offsets[factor_offsets],
+        hyp_offsets,
+        np.arange(len(members)),
+        relative - log_kept[groups[kept]],
+        factor_offsets,
+    )
+    log_cut = group_log_sums(log_weights[cut] - peaks[groups[cut]], groups[cut], num)
+    return fused, np.asarray(expit(log_cut - log_kept))

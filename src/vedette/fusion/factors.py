@@ -1,119 +1,100 @@
-"""Generalized covariance intersection of products of GLMBs, factor by factor."""
+"""Products of GLMBs side by side, for fusions that take them group by group."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
 
 import numpy as np
-from scipy.special import expit
 
-from vedette.densities import GLMB, LMB, FactoredGLMB
-from vedette.densities.checks import offsets_of, unchecked
-from vedette.densities.conversions import factored_to_glmb, marginalised_factors
-from vedette.densities.joining import JoinedFactors, join_factors
-from vedette.densities.label_sets import in_label_order, laid_out, take_hypotheses
-from vedette.errors import NumericalError
-from vedette.fusion.base import FusionInfo, FusionLimits, PowerRule, count_lost
-from vedette.fusion.tracks import fused_tracks
-from vedette.kernels.base.types import Floats, Glmb
-from vedette.kernels.labelled.stacking import stack_tracks
-
-FuseGlmbs = Callable[[Sequence[Glmb]], tuple[GLMB, FusionInfo]]
+from vedette.densities import LMB, FactoredGLMB, TrackTable
+from vedette.densities.checks import offsets_of, take_runs, unchecked
+from vedette.densities.conversions import factored_to_glmb
+from vedette.densities.joining import join_factors
+from vedette.densities.label_sets import in_label_order, take_factors, take_tracks
+from vedette.kernels.base.types import Floats, Ints
 
 
-def fuse_factors(
-    beliefs: Sequence[FactoredGLMB],
-    weights: Floats,
-    missing_log_weight: float,
-    rule: PowerRule,
-    limits: FusionLimits,
-    fuse_glmbs: FuseGlmbs,
-) -> tuple[FactoredGLMB, FusionInfo]:
-    """The fusion of the beliefs of sensors of positive weight, a factor for each group of labels that they join.
+def side_by_side(beliefs: Sequence[FactoredGLMB], max_products: int) -> tuple[list[FactoredGLMB], Floats]:
+    """The beliefs with one factor for each of the smallest groups of labels of which no factor spans two.
 
-    fuse_glmbs: fuses marginalised GLMBs, one a sensor, without hypotheses of weight zero. It is called for each group
-    in which some sensor has more than a label that is absent or there; the others are fused by the same rule all at
-    once. A sensor without a factor in a group is certain that its targets do not exist. Raises `NumericalError` where a
-    product of track densities cannot be integrated.
+    Factor g of each has labels of group g alone; where a belief has none of them it is certain that nobody is there.
+    Several factors become the heaviest `max_products` of their products. Hypotheses of weight zero are left out. Also
+    returns (num_groups,) the log of the product of the weights that were kept.
     """
-    joined = join_factors([marginalised_factors(belief, rule.caps) for belief in beliefs])
-    if limits.max_hypotheses < 2:
-        joined = joined._replace(alone=np.zeros_like(joined.alone))  # the cap may leave one of two hypotheses
-    fused, info = _fuse_alone(joined, weights, missing_log_weight, rule)
-    parts, infos = [fused], [info]
-    for group in np.flatnonzero(~joined.alone).tolist():
-        products = [_product(part, limits.max_hypotheses) for part in joined.parts(group)]
-        own, info = fuse_glmbs([glmb.to_kernel() for glmb, _ in products])
-        parts.append(laid_out(own))
-        log_kept = sum(math.log1p(-lost) for lost in (info.discarded_weight, *(lost for _, lost in products)))
-        infos.append(replace(info, discarded_weight=-math.expm1(log_kept)))
-    return in_label_order(FactoredGLMB.product(parts, beliefs[0].state_dim)), _summed(infos)
+    joined = join_factors(beliefs)
+    log_kept, regrouped = np.zeros(len(joined.alone)), []
+    for belief, groups in zip(beliefs, joined.groups, strict=True):
+        own, log_own = _one_a_group(_possible(belief), groups, len(joined.alone), max_products)
+        regrouped.append(own)
+        log_kept += log_own
+    return regrouped, log_kept
 
 
-def _product(part: FactoredGLMB, max_hypotheses: int) -> tuple[GLMB, float]:
-    """The heaviest products of positive weight, and the weight of the others."""
-    if part.num_factors != 1:
-        return factored_to_glmb(part, max_hypotheses=max_hypotheses)
-    factor = part.factor(0)
-    return take_hypotheses(factor, np.flatnonzero(factor.hyp_log_weights > -math.inf)), 0.0
+def _one_a_group(belief: FactoredGLMB, groups: Ints, num_groups: int, max_products: int) -> tuple[FactoredGLMB, Floats]:
+    """One factor a group, and the logs of the weights kept; groups: of each factor, or -1."""
+    order, log_kept = np.argsort(groups, kind="stable"), np.zeros(num_groups)
+    ends = np.searchsorted(groups[order], np.arange(num_groups + 1))
+    counts = np.diff(ends)
+    single, none = np.flatnonzero(counts == 1), np.flatnonzero(counts == 0)
+    parts = [take_factors(belief, order[ends[single]]), _nobody(len(none), belief.state_dim)]
+    several = np.flatnonzero(counts > 1)
+    for group in several.tolist():
+        factors = take_factors(belief, order[ends[group] : ends[group + 1]])
+        product, lost = factored_to_glmb(factors, max_hypotheses=max_products)
+        with np.errstate(divide="ignore"):
+            log_kept[group] = np.log1p(-lost)
+        parts.append(FactoredGLMB.from_glmb(product))
+    place = np.argsort(np.concatenate([single, none, several]))
+    return take_factors(FactoredGLMB.product(parts, belief.state_dim), place), log_kept
 
 
-def _fuse_alone(
-    joined: JoinedFactors, weights: Floats, missing_log_weight: float, rule: PowerRule
-) -> tuple[FactoredGLMB, FusionInfo]:
-    """The groups of one label: with two label sets, that it is absent and that it is there."""
-    table = stack_tracks([density.tracks.to_kernel() for density in joined.densities])
-    firsts = offsets_of([density.tracks.num_tracks for density in joined.densities])
-    places = joined.places()
-    log_weights = np.tile([[0.0], [-math.inf]], (len(places), 1, len(weights)))
-    chosen = np.full(places.shape, -1, np.int64)
-    for s, density in enumerate(joined.densities):
-        own = np.flatnonzero(places[:, s] >= 0)
-        factors = places[own, s]
-        log_weights[own, :, s] = density.hyp_log_weights[density.factor_offsets[factors][:, None] + np.arange(2)]
-        chosen[own, s] = firsts[s] + density.track_offsets[factors]
-    held = np.isfinite(log_weights)
-    chosen[~held[:, 1]] = -1
-    floors = np.minimum(np.where(held, log_weights, math.inf).min(axis=1), missing_log_weight)
-    present = held.any(axis=2)
-    means = np.where(held, log_weights, floors[:, None]) @ weights
-    means[~present] = -math.inf
-    there = np.flatnonzero(present[:, 1])
-    labels = table.labels[chosen[there].max(axis=1, initial=-1)]
-    tracks, overlaps = fused_tracks(labels, chosen[there], weights, table, rule)
-    means[there, 1] += overlaps
-    log_normalisers = np.logaddexp(means[:, 0], means[:, 1])
-    if (log_normalisers == -math.inf).any():
-        raise NumericalError("fusion: expected a label set of positive weight; the sensors' densities share no place")
-    logits = means[there, 1] - means[there, 0]
-    fused = FactoredGLMB.from_lmb(unchecked(LMB, tracks, logits))
-    missing = np.count_nonzero(present[:, :, None] & ~held, axis=(0, 1))
-    unknown = np.count_nonzero(~held[there, 1], axis=0)
-    existence = np.exp(np.where(held, log_weights, -math.inf)[there, 1])
-    return fused, FusionInfo(
-        missing_sets=tuple(missing.tolist()),
-        missing_labels=tuple(unknown.tolist()),
-        num_sets=int(present.sum()),
-        num_lost_labels=count_lost(existence, expit(logits)),
-        empty_intersection=not bool(held.all(axis=2).any(axis=1).all()),
-        log_normaliser=float(log_normalisers.sum()),
-        discarded_weight=0.0,
+def _possible(belief: FactoredGLMB) -> FactoredGLMB:
+    """The belief without hypotheses of weight zero."""
+    kept = belief.hyp_log_weights > -np.inf
+    if kept.all():
+        return belief
+    hyp_offsets, entries = take_runs(belief.hyp_offsets, np.flatnonzero(kept))
+    return unchecked(
+        FactoredGLMB,
+        belief.tracks,
+        belief.track_offsets,
+        hyp_offsets,
+        belief.hyp_tracks[entries],
+        belief.hyp_log_weights[kept],
+        offsets_of(kept.astype(np.int64))[belief.factor_offsets],
     )
 
 
-def _summed(infos: Sequence[FusionInfo]) -> FusionInfo:
-    """The report of a product from those of its factors."""
-    return FusionInfo(
-        missing_sets=tuple(map(sum, zip(*(info.missing_sets for info in infos), strict=True))),
-        missing_labels=tuple(map(sum, zip(*(info.missing_labels for info in infos), strict=True))),
-        num_sets=sum(info.num_sets for info in infos),
-        num_lost_labels=sum(info.num_lost_labels for info in infos),
-        empty_intersection=any(info.empty_intersection for info in infos),
-        log_normaliser=math.fsum(info.log_normaliser for info in infos),
-        discarded_weight=-math.expm1(sum(math.log1p(-info.discarded_weight) for info in infos)) + 0.0,
+def _nobody(num_factors: int, state_dim: int) -> FactoredGLMB:
+    """So many factors that are certain of no target."""
+    nothing = np.zeros(num_factors + 1, np.int64)
+    none = np.empty(0, np.int64)
+    return unchecked(
+        FactoredGLMB,
+        TrackTable.empty(state_dim),
+        nothing,
+        nothing.copy(),
+        none,
+        np.zeros(num_factors),
+        np.arange(num_factors + 1),
     )
 
 
-__all__ = ["fuse_factors"]
+def tidied(marginalised: FactoredGLMB) -> FactoredGLMB:
+    """The factors in the order of their first labels; those of one label as `FactoredGLMB.from_lmb` lays them out.
+
+    marginalised: of which every hypothesis has tracks of its own. Factors without tracks go.
+    """
+    counts, sizes = np.diff(marginalised.track_offsets), np.diff(marginalised.hyp_offsets)
+    factor = np.repeat(np.arange(marginalised.num_factors), np.diff(marginalised.factor_offsets))
+    log_odds = np.full((2, marginalised.num_factors), -np.inf)
+    alone = counts[factor] == 1
+    log_odds[sizes[alone], factor[alone]] = marginalised.hyp_log_weights[alone]
+    single = np.flatnonzero(counts == 1)
+    tracks = take_tracks(marginalised.tracks, marginalised.track_offsets[single])
+    lmb = unchecked(LMB, tracks, log_odds[1, single] - log_odds[0, single])
+    others = take_factors(marginalised, np.flatnonzero(counts > 1))
+    return in_label_order(FactoredGLMB.product([FactoredGLMB.from_lmb(lmb), others], marginalised.state_dim))
+
+
+__all__ = ["side_by_side", "tidied"]

@@ -42,6 +42,15 @@ def marginalise(glmb: Glmb, caps: MixtureCaps) -> Glmb:
     equal weights in the order of their first occurrence; a label set of weight zero is kept.
     """
     group_of, first = group_by_label_set(glmb)
+    return marginalise_sets(glmb, group_of, first, caps)[0]
+
+
+@kernel
+def marginalise_sets(glmb: Glmb, group_of: Ints, first: Ints, caps: MixtureCaps) -> tuple[Glmb, Ints]:
+    """As `marginalise`, of hypotheses whose label sets have these numbers; and the number of each that comes out.
+
+    group_of: (num_hyps,) number of each hypothesis's label set. first: (num_sets,) the first hypothesis of each set.
+    """
     num_sets, num_entries = len(first), len(glmb.hyp_tracks)
     set_log_weights, relative = _set_weights(glmb, group_of, num_sets)
     order = descending_order(set_log_weights)
@@ -68,7 +77,7 @@ def marginalise(glmb: Glmb, caps: MixtureCaps) -> Glmb:
             i += 1
             pool_offsets[i] = end
     tracks = pooled_tracks(glmb.tracks, labels, pool_offsets, pool, weights, caps)
-    return Glmb(tracks, hyp_offsets, np.arange(num_tracks), hyp_log_weights)
+    return Glmb(tracks, hyp_offsets, np.arange(num_tracks), hyp_log_weights), order
 
 
 @kernel
@@ -226,4 +235,4 @@ def factored_to_glmb(density: FactoredGlmb, label_of: Ints, num_labels: int, max
     return Glmb(density.tracks, hyp_offsets, hyp_tracks[:end].copy(), hyp_log_weights), discarded
 
 
-__all__ = ["factored_to_glmb", "factors_to_lmb", "glmb_to_lmb", "lmb_to_glmb", "marginalise"]
+__all__ = ["factored_to_glmb", "factors_to_lmb", "glmb_to_lmb", "lmb_to_glmb", "marginalise", "marginalise_sets"]
