@@ -51,7 +51,7 @@ def any_form(array: Any, rng: np.random.Generator) -> Any:
 def spoil(fields: dict[str, Any], rng: np.random.Generator) -> dict[str, Any]:
     """One or two of the arrays with a mistake."""
     spoilt = dict(fields)
-    for name in rng.choice(list(fields), size=rng.integers(1, 3)):
+    for name in rng.choice(list(fields), size=rng.integers(1, 3), replace=False):
         if isinstance(spoilt[name], np.ndarray):
             crook = crooked_integers if spoilt[name].dtype.kind == "i" else crooked_floats
             spoilt[name] = crook(spoilt[name], rng)
