@@ -94,7 +94,7 @@ def test_beliefs_that_need_no_check_are_fused_to_the_same_bytes() -> None:
 
 
 def test_their_kinds_are_checked_all_the_same() -> None:
-    with pytest.raises(InputError, match=r"beliefs\[1\]: expected GLMB; got LMB"):
+    with pytest.raises(InputError, match=r"beliefs\[1\]: expected GLMB or FactoredGLMB; got LMB"):
         CmDeltaGlmb((0.5, 0.5)).fuse(ValidBeliefs([random_glmb(np.random.default_rng(0), 2, 3, 2), LMB.empty(2)]))
     with pytest.raises(InputError, match="one state dimension"):
         Clmb((0.5, 0.5)).fuse(ValidBeliefs([LMB.empty(4), LMB.empty(2)]))
