@@ -6,7 +6,6 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.special import log_expit
 
 from vedette.densities.checks import unchecked
 from vedette.densities.glmb import GLMB
@@ -14,6 +13,7 @@ from vedette.densities.lmb import LMB
 from vedette.errors import InputError
 from vedette.kernels.gaussian.mixtures import MixtureCaps
 from vedette.kernels.labelled import conversions as kernels
+from vedette.probabilities import log_expit
 
 DEFAULT_LOG_MIN_WEIGHT = math.log(1e-5)
 DEFAULT_MERGE_DISTANCE = 2.0

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.special import expit
 
 from vedette.densities import GLMB, LMB, TrackTable
 from vedette.densities.checks import unchecked
@@ -27,6 +26,7 @@ from vedette.kernels.base.types import Bools, Floats, Lmb
 from vedette.kernels.gaussian.mixtures import MixtureCaps
 from vedette.kernels.gaussian.pooling import pooled_tracks
 from vedette.kernels.labelled.conversions import glmb_to_lmb
+from vedette.probabilities import expit
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.special import expit
 
 from vedette.densities import GLMB, LMB, TrackTable
 from vedette.densities.cases import LabelledCases
@@ -36,6 +35,7 @@ from vedette.fusion.views import Views
 from vedette.kernels.base.types import Floats, Glmb
 from vedette.kernels.gaussian.linalg import log_sum
 from vedette.kernels.labelled.conversions import marginalise
+from vedette.probabilities import expit
 
 
 @dataclass(frozen=True, slots=True)
