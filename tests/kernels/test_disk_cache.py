@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import ast
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
-from vedette.kernels.base import disk_cache
+from vedette.kernels.base import sources
 from vedette.kernels.base.compile import JIT_ENABLED
 from waiting import PATIENCE
 
@@ -32,7 +33,7 @@ for name in sys.argv[2:]:
 stats = log_sum.whole.stats  # as it was called from here
 print(sum(stats.cache_hits.values()), sum(stats.cache_misses.values()))
 """
-KERNELS = Path(disk_cache.__file__).parents[1]
+KERNELS = Path(sources.__file__).resolve().parents[1]
 TYPES = ["float64", "float32", "int64", "int32", "uint8", "int8"]
 
 
@@ -101,7 +102,7 @@ def test_a_file_may_be_a_script_and_a_module(tmp_path: Path) -> None:
 
 
 def test_a_stamp_covers_every_kernel_file_that_is_reached() -> None:
-    reached = {path.relative_to(KERNELS).as_posix() for path in disk_cache._source_closure(KERNELS / "steps/lmb.py")}
+    reached = {path.relative_to(KERNELS).as_posix() for path in sources.source_closure(KERNELS / "steps/lmb.py")}
     assert {"steps/lmb.py", "association/search.py", "gaussian/linalg.py", "base/types.py"} <= reached
     assert not any(name.startswith("planning/") for name in reached)
     assert "base/compile.py" in reached
@@ -123,7 +124,7 @@ def late():
 
 def test_every_way_to_import_a_kernel_is_found(tmp_path: Path) -> None:
     (tmp_path / "own.py").write_text(IMPORTS, encoding="utf-8")
-    found = {path.relative_to(KERNELS).as_posix() for path in disk_cache._kernel_imports(tmp_path / "own.py")}
+    found = {path.relative_to(KERNELS).as_posix() for path in sources._kernel_imports(tmp_path / "own.py")}
     assert found == {"gaussian/linalg.py", "planning/known.py", "labelled/gci.py", "steps/lmb.py"}
 
 
@@ -135,14 +136,59 @@ def test_imports_are_found_as_a_parser_finds_them() -> None:
         names |= {node.module for node in named if node.module}
         modules = {KERNELS.parent.joinpath(*name.split(".")[1:]).with_suffix(".py") for name in names}
         expected = {module for module in modules if module.is_relative_to(KERNELS) and module.is_file()}
-        assert disk_cache._kernel_imports(path) >= expected, path
+        assert sources._kernel_imports(path) >= expected, path
+
+
+EDITED = """
+import shutil, sys
+from pathlib import Path
+
+copy = Path(sys.argv[1], "vedette")
+sys.path.insert(0, sys.argv[1])
+import numpy as np
+from vedette.kernels.gaussian import linalg
+from vedette.kernels.base import sources
+
+assert Path(linalg.__file__).is_relative_to(copy)
+file = Path(linalg.__file__).resolve()
+file.write_text(file.read_text(encoding="utf-8") + "# edited", encoding="utf-8")
+print(sources.source_stamp(file))
+"""
 
 
 def test_a_stamp_is_that_of_the_file_that_was_imported(tmp_path: Path) -> None:
     """Edited before its first call, a kernel must not be kept as what was compiled of the edited file."""
-    stamps = [disk_cache._stamp_of_file(str(KERNELS / "steps/lmb.py")) for _ in range(2)]
-    assert stamps[0] == stamps[1] == disk_cache._source_stamp(KERNELS / "steps/lmb.py")
-    assert disk_cache._stamp_of_file(str(tmp_path / "own.py")) == ""
+    shutil.copytree(KERNELS.parent, tmp_path / "vedette", ignore=shutil.ignore_patterns("__pycache__"))
+    stamps = []
+    for _ in range(3):
+        command = [sys.executable, "-c", EDITED, str(tmp_path)]
+        result = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, check=True)
+        stamps += result.stdout.split()
+    assert stamps[0] == sources.source_stamp(KERNELS / "gaussian/linalg.py")
+    assert len(set(stamps)) == 3
+
+
+def test_every_function_has_the_stamp_of_what_compiles_it() -> None:
+    for file in (KERNELS / "gaussian/linalg.py", KERNELS.parent / "models/kinematics.py"):
+        reached = {path.name for path in sources.source_closure(file)}
+        assert {"compile.py", "dispatchers.py", "libraries.py"} <= reached
+
+
+def test_where_the_sources_lie_does_not_tell(tmp_path: Path) -> None:
+    """All environments of a user share what is compiled of the same sources."""
+    shutil.copytree(KERNELS.parent, tmp_path / "vedette", ignore=shutil.ignore_patterns("__pycache__"))
+    (tmp_path / "go").touch()
+    cache = tmp_path / "cache"
+    for folder, expected in ((KERNELS.parents[1], "0 1"), (tmp_path, "1 0")):
+        result = subprocess.run(
+            [sys.executable, "-c", PROGRAM, str(tmp_path), "float64"],
+            env={**os.environ, "VEDETTE_CACHE_DIR": str(cache), "PYTHONPATH": str(folder)},
+            capture_output=True,
+            text=True,
+            timeout=PATIENCE,
+            check=True,
+        )
+        assert result.stdout.splitlines()[-1] == expected
 
 
 OWN = """

@@ -48,7 +48,7 @@ for thread in threads:
     thread.join()
 assert not faults, faults
 assert len(set(types)) == 1
-assert len(function.overloads) == len(log_sum.whole.overloads) == 1
+assert len(function.dispatcher.overloads) == len(log_sum.whole.overloads) == 1
 """
 
 

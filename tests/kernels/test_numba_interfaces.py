@@ -21,8 +21,10 @@ import numba
 import numpy as np
 import pytest
 from numba.core.registry import CPUDispatcher
+from numba.core.sigutils import normalize_signature
 
 from vedette.kernels.base.compile import JIT_ENABLED, SIGNATURES, borrowing, kernel
+from vedette.kernels.base.dispatchers import WholeKernel
 from vedette.kernels.base.libraries import PartLibrary, WholeLibrary
 from vedette.kernels.base.types import Motion
 from vedette.models import constant_survival, constant_velocity
@@ -50,9 +52,10 @@ def takes(function: Callable[..., Any], *names: str) -> bool:
 
 
 def survival() -> Any:
+    """The dispatcher of a model function."""
     function: Any = constant_survival(0.9).function
     function.bind()
-    return function
+    return function.dispatcher
 
 
 def test_core_registry_cpu_dispatcher() -> None:
@@ -91,11 +94,13 @@ def test_dispatcher_reduce_states_and_rebuild() -> None:
 
 
 def test_dispatcher_overloads_by_argument_types() -> None:
-    assert list(survival().overloads) == [tuple(SIGNATURES["prob_survival"][1].args)]
+    arguments, _ = normalize_signature(SIGNATURES["prob_survival"][1])
+    assert list(survival().overloads) == [tuple(arguments)]
 
 
 def test_compile_result_library_and_fndesc() -> None:
-    compiled = survival().get_compile_result(SIGNATURES["prob_survival"][1])
+    arguments, result = normalize_signature(SIGNATURES["prob_survival"][1])
+    compiled = survival().get_compile_result(result(*arguments))
     for name in (compiled.fndesc.llvm_cfunc_wrapper_name, compiled.fndesc.llvm_func_name):
         assert compiled.library.get_pointer_to_function(name) > 0
 
@@ -169,13 +174,44 @@ def test_core_codegen_libraries() -> None:
     outer: Any = kernel(lambda values: middle(values) + tripled(values))
     assert outer(np.array([2.0])) == 16.0
     for part in (inner, tripled, middle):
-        (compiled,) = part.overloads.values()
+        (compiled,) = part.part.overloads.values()
         assert isinstance(compiled.library, PartLibrary)
         assert compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name) == 0
     (whole,) = outer.whole.overloads.values()
     assert isinstance(whole.library, WholeLibrary)
     assert len(whole.library._linking_libraries) >= 3
     assert JITCPUCodegen._library_class is JITCodeLibrary
+
+
+def test_core_registry_contexts_and_core_runtime() -> None:
+    """What was compiled before is loaded without all that compiling needs."""
+    code = "from vedette.kernels.gaussian.linalg import log_sum; import numpy as np, sys; log_sum(np.zeros(1));"
+    for _ in range(2):
+        command = [sys.executable, "-c", code + "print('numba.np.linalg' in sys.modules)"]
+        result = subprocess.run(command, capture_output=True, text=True, timeout=600)
+    assert result.stdout.split() == ["False"], result.stderr
+
+
+def test_a_whole_is_kept_as_machine_code_alone() -> None:
+    name, kind, (code, defined) = fresh(_triple).library.serialize_using_object_code()
+    assert "triple" in name
+    assert (kind, type(code)) == ("object", bytes)
+    assert any("triple" in symbol for symbol in defined)
+
+
+def fresh(function: Callable[..., Any]) -> Any:
+    """What compiling a kernel gives, not read from disk."""
+    whole: Any = WholeKernel(function, targetoptions={"nopython": True})
+    whole.compile("(float64[::1],)")
+    (compiled,) = whole.overloads.values()
+    return compiled
+
+
+def test_core_imputils_lower_constant() -> None:
+    """A compiled function of one's own may name a model function."""
+    function: Any = constant_survival(0.9).function
+    own = numba.njit(lambda state, dt, params: function(state, dt, params))
+    assert own(np.zeros(4), 1.0, np.array([0.9])) == 0.9
 
 
 def test_a_function_of_ones_own_may_call_a_kernel() -> None:
@@ -230,7 +266,7 @@ def test_experimental_function_type_function_model() -> None:
     from numba.core.datamodel import default_manager
     from numba.experimental.function_type import FunctionModel
 
-    model = default_manager.lookup(survival().numba_type)
+    model = default_manager.lookup(survival().model.numba_type)
     assert isinstance(model, FunctionModel)
     assert sorted(model._fields) == ["c_addr", "jit_addr", "py_addr"]
     assert callable(cgutils.create_struct_proxy)

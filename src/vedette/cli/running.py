@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, NoReturn
 
 import typer
 
+from vedette.cli.compiling import compiling
 from vedette.cli.errors import INTERRUPTED, usage_error
 from vedette.cli.output import console as new_console
 from vedette.cli.scenario_files import warn
@@ -23,16 +24,14 @@ if TYPE_CHECKING:
 
 
 def compile_if_cold(scenario: Scenario) -> None:
-    """The first start in an environment compiles for minutes of processor time; say so before it happens."""
-    from vedette.kernels.base.disk_cache import cache_directory, is_cold
+    """The first start of all compiles for a minute or two; it is shared between two processes."""
+    from vedette.kernels.base.places import is_cold
 
     if is_cold():
-        where = cache_directory()
-        cost = "once for this environment, about three minutes of processor time"
-        typer.echo(f"Compiling the kernels: {cost}. They are kept in {where}.", err=True)
         from vedette.evaluation.precompile import precompile
 
-        precompile(scenario)
+        with compiling():
+            precompile(scenario)
 
 
 @contextmanager
@@ -121,7 +120,8 @@ def run(
     with interruptible("nothing was written"):
         compile_if_cold(loaded)
         try:
-            record = run_scenario(loaded, planner, seed=seed, run=run_number, num_threads=threads)
+            with compiling():
+                record = run_scenario(loaded, planner, seed=seed, run=run_number, num_threads=threads)
         except (RunStopped, RunInterrupted) as error:
             if error.record is None:
                 _end(error, "nothing was written")

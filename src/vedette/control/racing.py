@@ -27,7 +27,6 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
-from scipy.special import stdtr, stdtrit
 
 from vedette.control.evidence import Evidence
 from vedette.control.search import first_best, tie_of
@@ -117,6 +116,8 @@ class Race:
 
     def _judge(self, means: Floats, finite: Bools) -> None:
         """Drop what is worse, and see how sure one can be of the best."""
+        from scipy.special import stdtrit
+
         best, num = self._best, self.rewards.shape[1]
         with np.errstate(invalid="ignore"):
             behind = means[best] - means
@@ -138,6 +139,8 @@ class Race:
 
 def _chance_beyond(distances: Floats, errors: Floats, num_samples: int) -> Floats:
     """How likely a mean of so many samples is off by more than a distance, which is positive but for ties."""
+    from scipy.special import stdtr
+
     beyond = np.where(distances >= 0.0, 0.0, 1.0)
     sure = errors > 0.0
     beyond[sure] = stdtr(num_samples - 1, -distances[sure] / errors[sure])

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
-from scipy.special import log_expit
 
 from vedette.densities.checks import offsets_of, unchecked
 from vedette.densities.glmb import GLMB
@@ -17,6 +16,7 @@ from vedette.densities.tracks import TrackTable
 from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.kernels.labelled.case_conversions import LmbCases, glmb_cases_to_lmb
 from vedette.kernels.labelled.power_integrals import SensorCases
+from vedette.probabilities import log_expit
 from vedette.threads import run_chunks
 
 # A label set, and the factor that it belongs to: of an LMB the label, of a GLMB nothing.

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from typing import TypeVar
 
 import numpy as np
-from scipy.special import log_expit
 
 from vedette.densities.checks import distinct_labels, offsets_of, take_runs, unchecked
 from vedette.densities.factored import FactoredGLMB, Labelled
@@ -20,6 +19,7 @@ from vedette.kernels.base.types import Lmb
 from vedette.kernels.gaussian.mixtures import MixtureCaps
 from vedette.kernels.gaussian.pooling import pooled_tracks
 from vedette.kernels.labelled import conversions as kernels
+from vedette.probabilities import log_expit
 
 _Glmb = TypeVar("_Glmb", GLMB, FactoredGLMB)
 

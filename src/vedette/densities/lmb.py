@@ -6,13 +6,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.special import expit
 
 from vedette.densities import checks
 from vedette.densities.tracks import TrackTable
 from vedette.errors import InputError, NumericalError, VedetteError
 from vedette.kernels.base import types as kt
 from vedette.kernels.base.types import Floats
+from vedette.probabilities import expit
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +41,7 @@ class LMB:
     @property
     def existence(self) -> Floats:
         """(num_tracks,) probabilities of existence r."""
-        return np.asarray(expit(self.existence_logit))
+        return expit(self.existence_logit)
 
     @property
     def state_dim(self) -> int:

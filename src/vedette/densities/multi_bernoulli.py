@@ -6,12 +6,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.special import expit
 
 from vedette.densities import checks
 from vedette.errors import InputError, NumericalError, VedetteError
 from vedette.kernels.base import types as kt
 from vedette.kernels.base.types import Floats, Ints
+from vedette.probabilities import expit
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +48,7 @@ class MultiBernoulli:
     @property
     def existence(self) -> Floats:
         """(num_bernoullis,) probabilities of existence r."""
-        return np.asarray(expit(self.existence_logit))
+        return expit(self.existence_logit)
 
     @property
     def state_dim(self) -> int:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy.special import expit, gammaln
 
 from vedette.densities.checks import distinct_labels, offsets_of, run_log_sums
 from vedette.densities.factored import LABELLED, FactoredGLMB, Labelled
@@ -18,6 +17,7 @@ from vedette.densities.tracks import TrackTable
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.labelled.cardinality import convolved
+from vedette.probabilities import expit
 
 
 def cardinality_distribution(density: Labelled | Poisson | IidCluster | MultiBernoulli) -> Floats:
@@ -37,6 +37,8 @@ def cardinality_distribution(density: Labelled | Poisson | IidCluster | MultiBer
     if isinstance(density, IidCluster):
         return np.asarray(np.exp(density.log_cardinality))
     if isinstance(density, Poisson):
+        from scipy.special import gammaln
+
         mean = density.expected_number
         numbers = np.arange(math.ceil(mean + 12.0 * math.sqrt(mean)) + 41)
         return np.asarray(np.exp(numbers * _log(mean) - mean - gammaln(numbers + 1.0))) if mean > 0.0 else np.ones(1)

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.special import stdtrit
 
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats
@@ -56,6 +55,8 @@ def summarise(values: ArrayLike) -> Summary:
 
     Raises `InputError` for no run, or a value that is not finite.
     """
+    from scipy.special import stdtrit
+
     runs = as_array("values", values, "fiu", "numbers, an entry a run").astype(np.float64)
     if runs.ndim == 0 or len(runs) == 0:
         raise InputError(f"values: expected at least one run; got shape {runs.shape}")

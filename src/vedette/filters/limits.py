@@ -8,7 +8,6 @@ from functools import lru_cache
 from typing import TypeVar
 
 import numpy as np
-from scipy.special import gammaincinv, logit
 
 from vedette.densities import GLMB, LMB, FactoredGLMB, Labelled, as_lmb, existence_probabilities, track_moments
 from vedette.densities.label_sets import without_labels
@@ -18,6 +17,7 @@ from vedette.kernels.base.types import Bools, Ints
 from vedette.kernels.gaussian.mixtures import MixtureCaps
 from vedette.kernels.steps.lmb import Reduction
 from vedette.models.arguments import dimension, non_negative, positive, probability, real, reject
+from vedette.probabilities import chi_squared_quantile, logit
 
 _Labelled = TypeVar("_Labelled", GLMB, LMB, FactoredGLMB)
 
@@ -144,7 +144,7 @@ class Limits:
 
     def kept(self, belief: LMB) -> LMB:
         """The belief without the labels that `min_existence`, `max_labels` and `max_position_std` drop."""
-        least, logits = float(logit(self.min_existence)), belief.existence_logit
+        least, logits = logit(self.min_existence), belief.existence_logit
         likeliest = np.argsort(-logits, kind="stable")
         gone = np.union1d(likeliest[self.max_labels :], np.flatnonzero(logits < least))
         return self.without_spread(without_labels(belief, belief.tracks.labels[gone])[0])[0]
@@ -152,7 +152,7 @@ class Limits:
     @property
     def max_existence_logit(self) -> float:
         """Log-odds of `max_existence`."""
-        return float(logit(self.max_existence))
+        return logit(self.max_existence)
 
 
 @lru_cache(maxsize=1000)
@@ -160,7 +160,7 @@ def _truncation(limits: Limits, meas_dim: int) -> Truncation:
     log_gap = -math.log(limits.min_relative_weight) if limits.min_relative_weight > 0.0 else math.inf
     return Truncation(
         SearchCaps(int(limits.max_hypotheses), log_gap, int(limits.max_search_nodes)),
-        2.0 * float(gammaincinv(0.5 * meas_dim, limits.gate_probability)),  # the quantile of chi-squared
+        chi_squared_quantile(meas_dim, limits.gate_probability),
         float(limits.min_log_clutter),
         -math.log(limits.min_track_weight) if limits.min_track_weight > 0.0 else math.inf,
     )
@@ -168,7 +168,7 @@ def _truncation(limits: Limits, meas_dim: int) -> Truncation:
 
 @lru_cache(maxsize=1000)
 def _reduction(limits: Limits) -> Reduction:
-    return Reduction(limits.track_caps(), float(logit(limits.min_existence)), int(limits.max_labels))
+    return Reduction(limits.track_caps(), logit(limits.min_existence), int(limits.max_labels))
 
 
 def _spread_labels(belief: Labelled, max_position_std: float) -> Ints:

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.special import expit
 
 from vedette.densities import GLMB, LMB, FactoredGLMB, Labelled, TrackTable
 from vedette.densities.checks import offsets_of, unchecked
@@ -26,6 +25,7 @@ from vedette.fusion.views import Views
 from vedette.kernels.base.types import Bools, Floats, Lmb
 from vedette.kernels.gaussian.mixtures import MixtureCaps
 from vedette.kernels.gaussian.pooling import pooled_tracks
+from vedette.probabilities import expit
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import expit, log_expit, logit
 
 from vedette.densities import GLMB, LMB, FactoredGLMB, Labelled
 from vedette.densities.cases import LabelledCases, lmb_cases
@@ -34,6 +33,7 @@ from vedette.fusion.lmbs import AlignedLmbs, align_lmbs, require_views, sum_over
 from vedette.fusion.tracks import fused_tracks, reduced_tracks
 from vedette.fusion.views import Views
 from vedette.kernels.base.types import Bools, Floats, Ints, Lmb
+from vedette.probabilities import expit, log_expit, logit
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,7 +130,7 @@ class Clmb:
     def _share(self, own: LabelledCases, weight: float) -> Share:
         lmbs = own if own.kind is LMB else lmb_cases(own)
         held, logits = lmbs.possible, lmbs.existence_logits
-        least = logits.min(axis=1, where=held[:, 1::2], initial=float(logit(self.missing_existence)))
+        least = logits.min(axis=1, where=held[:, 1::2], initial=logit(self.missing_existence))
         return Share(lmbs, weight, held, np.stack([log_expit(-least), log_expit(least)], axis=1))
 
 

@@ -8,7 +8,6 @@ from dataclasses import dataclass, field, replace
 from typing import Any, TypeVar
 
 import numpy as np
-from scipy.special import expit
 
 from vedette.densities import GLMB, LMB, FactoredGLMB, TrackTable
 from vedette.densities.cases import LabelledCases
@@ -40,6 +39,7 @@ from vedette.fusion.views import Views
 from vedette.kernels.base.types import Floats, Glmb
 from vedette.kernels.labelled.conversions import marginalise
 from vedette.kernels.labelled.groups import group_log_sums
+from vedette.probabilities import expit
 
 _Glmb = TypeVar("_Glmb", GLMB, FactoredGLMB)
 

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
-from scipy.special import gammaincinv
 
 from vedette.densities import GLMB, LMB, FactoredGLMB, Labelled, TrackTable, as_lmb
 from vedette.densities.cases import LabelledCases
@@ -19,6 +18,7 @@ from vedette.fusion.validity import ValidBeliefs
 from vedette.fusion.views import Views
 from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.kernels.gaussian.distances import pair_distances
+from vedette.probabilities import chi_squared_quantile
 
 GATE_PROBABILITY = 0.999  # that two estimates of one target are within the gate
 LIKELY = 0.5  # existence from which a label is matched before the others
@@ -73,7 +73,7 @@ def common_names(
         raise InputError(f"gate_probability: expected a number between 0 and 1; got {gate_probability}")
     if not beliefs:
         return []
-    gate = 2.0 * float(gammaincinv(0.5 * beliefs[0].state_dim, gate_probability))  # chi-squared
+    gate = chi_squared_quantile(beliefs[0].state_dim, gate_probability)
     owns = [_Targets.of(belief) for belief in beliefs]
     found, common = owns[0], [{label: label for label in owns[0].labels}]
     for sensor in range(1, len(beliefs)):

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
 
 import numpy as np
-from scipy.special import expit, log_expit
 
 from vedette.densities import LMB, TrackTable
 from vedette.densities.checks import unchecked
@@ -31,6 +30,7 @@ from vedette.fusion.views import Views
 from vedette.kernels.base.types import Floats, Ints, Tracks
 from vedette.kernels.labelled.parallel import update_in_parallel
 from vedette.kernels.labelled.stacking import stack_tracks
+from vedette.probabilities import expit, log_expit
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import erfcx
 
 from vedette.kernels.base.types import Floats
 from vedette.models.arguments import float_array, non_negative, probability, reject
@@ -112,6 +111,8 @@ def cell_shares(step: float, size: float, num: int) -> Floats:
 
 def _integral_below(x: NDArray[np.floating]) -> Floats:
     """G(-x) = phi(x) - x Phi(-x) for x >= 0, whose two terms are nearly equal where x is large."""
+    from scipy.special import erfcx
+
     density = np.exp(-0.5 * x * x) / math.sqrt(2.0 * math.pi)
     return np.asarray(density * (1.0 - x * math.sqrt(0.5 * math.pi) * erfcx(x * math.sqrt(0.5))))
 

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.interpolate import CubicHermiteSpline
 
 from vedette.errors import InputError
 from vedette.models.arguments import real, reject
@@ -101,6 +100,8 @@ class RecordedTargets:
         Raises:
             InputError: no track is there at any of the scans.
         """
+        from scipy.interpolate import CubicHermiteSpline
+
         scans = scan_times(times)
         recorded = real("time_origin", self.time_origin) + (scans - scans[0])
         alive = np.zeros((len(self.tracks), len(scans)), np.bool_)

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import logit
 
 from vedette.control.pseudo import decision_of, draw_paths, targets_of
 from vedette.control.settings import IDEAL_MODES, MobileSensor, PlanningSettings
@@ -19,6 +18,7 @@ from vedette.kernels.planning.bernoulli_rows import bernoulli_size
 from vedette.kernels.planning.ideal import EXPECTED, IDEAL, Decision, Futures
 from vedette.kernels.planning.known import rows_without_scans
 from vedette.kernels.planning.reach import Belief, label_radii, predict_paths
+from vedette.probabilities import logit
 
 
 class Samples(NamedTuple):
@@ -146,6 +146,6 @@ def _group(
 def _spread(group: SensorGroup, num_labels: int, dim: int, missing_existence: float) -> Floats:
     """The rows on all labels; of one that the sensor lacks, an existence that it would hardly have missed."""
     rows = np.zeros((num_labels, bernoulli_size(dim)))
-    rows[:, -2] = min(float(logit(missing_existence)), float(group.rows[:, -2].min(initial=np.inf)))
+    rows[:, -2] = min(logit(missing_existence), float(group.rows[:, -2].min(initial=np.inf)))
     rows[group.labels] = group.rows
     return rows

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy.special import log_expit
 
 from vedette.control.rewards.base import LabelReward, PowerReward, unit_volume_of
 from vedette.control.rewards.label_functions import cardinality_variance_of_label
@@ -15,6 +14,7 @@ from vedette.kernels.base.types import Floats
 from vedette.kernels.gaussian.linalg import LOG_2PI
 from vedette.kernels.planning.label_values import EXPECTED_LOSS, FUNCTION, POWER_INTEGRALS, Valuation
 from vedette.models.functions import ModelFunction
+from vedette.probabilities import log_expit
 
 
 def valuation_of(reward: PowerReward | LabelReward | ExpectedLossReward, prediction: LMB, prior: Floats) -> Valuation:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy.special import ndtr
 
 from vedette.kernels.base.types import Floats, Ints
 
@@ -71,6 +70,8 @@ def _node(x: Floats, side: float, small: Floats, half: Floats, radius: float) ->
 
 def _midpoints(shape: tuple[Floats, ...], radius: float, half: Floats, first: Floats, num: Ints) -> Floats:
     """(num_pairs,) sums over the nodes first .. first + num - 1 of `half` in [-pi / 2, pi / 2]."""
+    from scipy.special import ndtr
+
     pair = np.repeat(np.arange(len(num)), num)
     begins = np.cumsum(num) - num
     node = np.arange(len(pair)) - begins[pair] + first[pair] + 0.5

@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import expit
 
 from vedette.control.constraints.discs import disc_probabilities, near_pairs
 from vedette.control.constraints.protocol import Alone, Situation
 from vedette.densities import GLMB, LMB, FactoredGLMB, Labelled, TrackTable
 from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.models.arguments import float_array, positive, probability
+from vedette.probabilities import expit
 
 # Entries of the tables that a GLMB's hypotheses take at a time.
 _BLOCK = 1 << 21

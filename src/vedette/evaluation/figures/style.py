@@ -182,7 +182,8 @@ def save_figure(figure: Figure, path: Path | str, *, formats: Sequence[str] = _F
     stem = Path(path)
     try:
         stem.parent.mkdir(parents=True, exist_ok=True)
-        return tuple(_save(figure, stem.with_name(f"{stem.name}.{name}"), name) for name in formats)
+        with _laid_out_once(figure):
+            return tuple(_save(figure, stem.with_name(f"{stem.name}.{name}"), name) for name in formats)
     except OSError as error:
         raise InputError(f"path: expected a place to write figures; got {stem}: {error.strerror}") from error
 
@@ -196,6 +197,16 @@ def svg_text(figure: Figure) -> str:
     return out.getvalue()
 
 
+@contextmanager
+def _laid_out_once(figure: Figure) -> Iterator[None]:
+    """Leave the figure as it came: what draws it in the first format lays it out for all."""
+    engine = figure.get_layout_engine()
+    try:
+        yield
+    finally:
+        figure.set_layout_engine(engine)
+
+
 def _save(figure: Figure, path: Path, name: str) -> Path:
     partial = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
@@ -204,4 +215,5 @@ def _save(figure: Figure, path: Path, name: str) -> Path:
         partial.replace(path)
     finally:
         partial.unlink(missing_ok=True)
+    figure.set_layout_engine("none")
     return path

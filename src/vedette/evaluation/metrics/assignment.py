@@ -6,7 +6,6 @@ import math
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.optimize import linear_sum_assignment
 
 from vedette.errors import InputError
 from vedette.kernels.base.types import Bools, Floats, Ints
@@ -146,6 +145,8 @@ def combine(first: float, second: float, order: float) -> float:
 
 
 def _pairs(costs: Floats | Bools) -> tuple[Ints, Ints]:
+    from scipy.optimize import linear_sum_assignment
+
     rows, columns = linear_sum_assignment(costs)
     return rows, columns
 
@@ -164,4 +165,6 @@ def _bottleneck(distances: Floats) -> float:
 
 
 def _is_matchable(allowed: Bools) -> bool:
+    from scipy.optimize import linear_sum_assignment
+
     return bool(allowed[linear_sum_assignment(~allowed)].all())

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.special import gammaincinv
 
 from vedette.densities.checks import check_covariances
 from vedette.evaluation.metrics.matching import Matching
@@ -113,6 +112,8 @@ def nees_interval(counts: ArrayLike, *, dim: int, confidence: float = CONFIDENCE
     as above. Returns two arrays in the shape of counts, NaN where it is 0.
     Raises `InputError` for arguments out of range.
     """
+    from scipy.special import gammaincinv
+
     dimension("dim", dim)
     if not 0.0 < confidence < 1.0:
         raise reject("confidence", "a probability above 0 and below 1", confidence)

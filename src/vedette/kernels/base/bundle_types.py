@@ -6,16 +6,17 @@ through all fields took longer than a whole LMB scan (of 177 microseconds a call
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numba import typeof, types
-from numba.extending import typeof_impl
 
 from vedette.kernels.base.types import Motion, Sensor
 
 # The kinds of bundles that hold model functions.
-TYPED_BY_FIELDS: set[type] = set()
+TYPED_BY_FIELDS: set[type] = {Motion, Sensor}
+
+_TOLD: list[Callable[[type], object]] = []
 
 # By all that the type of a bundle depends on.
 _FOUND: dict[Any, Any] = {}
@@ -47,6 +48,8 @@ def type_of_bundle(value: tuple[Any, ...], context: Any = None) -> Any:
     key = (type(value), *map(_key, value))
     found = _FOUND.get(key)
     if found is None:
+        from numba import typeof, types
+
         found = _FOUND[key] = types.NamedTuple([typeof(field) for field in value], type(value))
     if type(value) in _HELD_KINDS:
         if len(_HELD) >= _MOST_HELD:
@@ -57,10 +60,14 @@ def type_of_bundle(value: tuple[Any, ...], context: Any = None) -> Any:
 
 def typed_by_fields(bundle: Any) -> Any:
     """Have a bundle that holds model functions typed quickly; for use as a decorator."""
-    typeof_impl.register(bundle)(type_of_bundle)
     TYPED_BY_FIELDS.add(bundle)
+    for tell in _TOLD:
+        tell(bundle)
     return bundle
 
 
-for _bundle in _HELD_KINDS:
-    typed_by_fields(_bundle)
+def when_typed(tell: Callable[[type], object]) -> None:
+    """Call `tell` with every bundle that is typed quickly: those there are, and each that comes."""
+    _TOLD.append(tell)
+    for bundle in TYPED_BY_FIELDS:
+        tell(bundle)

@@ -1,17 +1,14 @@
 """Compiled kernels and model functions on disk, safe for any number of processes at once.
 
-Numba stamps a cache entry with the source file of the function itself and so misses an edit in a file it imports; the
-stamp used here covers the file and every `vedette.kernels` module it reaches. An entry is a pickle, so it is read only
-where nobody else can have written it, see `vedette.kernels.base.private_files`.
+What is kept is found by the sources it was compiled of (`vedette.kernels.base.sources`). An entry is a pickle, so it is
+read only where nobody else can have written it, see `vedette.kernels.base.private_files`.
 """
 
 from __future__ import annotations
 
 import contextlib
 import hashlib
-import os
 import pickle
-import re
 import uuid
 import warnings
 from collections.abc import Callable
@@ -19,91 +16,16 @@ from functools import cache, cached_property
 from pathlib import Path
 from typing import Any, ClassVar
 
-import numba
-from numba.core import config
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, NullCache
+from numba.core.runtime import rtsys
 from numba.core.serialize import dumps
 
+from vedette.kernels.base import watching
+from vedette.kernels.base.places import GENERIC, INSTALLED, cache_directory, compiler, folder_name
 from vedette.kernels.base.private_files import fault_of_folder, make_private_folder, read_private, write_private
+from vedette.kernels.base.sources import package_file
 
-_PACKAGE_ROOT = Path(__file__).resolve().parents[2]
 _MARK_LENGTH = hashlib.sha256().digest_size
-
-
-def cache_directory() -> Path:
-    """Directory of the compiled kernels: `$VEDETTE_CACHE_DIR`, or `vedette` in the user's cache directory."""
-    override = os.environ.get("VEDETTE_CACHE_DIR")
-    if override:
-        return Path(override)
-    base = os.environ.get("XDG_CACHE_HOME") or os.environ.get("LOCALAPPDATA") or Path.home() / ".cache"
-    return Path(base) / "vedette"
-
-
-def _checkout_directory() -> Path:
-    # Two checkouts (or versions) side by side must not overwrite each other's entries.
-    return cache_directory() / hashlib.sha256(str(_PACKAGE_ROOT).encode()).hexdigest()[:12]
-
-
-@cache
-def _modules() -> dict[str, Path]:
-    """The files of all kernel modules, by the names that imports give them."""
-    files = (_PACKAGE_ROOT / "kernels").rglob("*.py")
-    return {".".join(("vedette", *file.relative_to(_PACKAGE_ROOT).with_suffix("").parts)): file for file in files}
-
-
-# Found by a pattern: to parse all kernels took longer than all else that a start does.
-_IMPORT = re.compile(r"^[ \t]*from (vedette\.kernels[\w.]*) import (\([^)]*\)|.*)$", re.MULTILINE)
-
-
-@cache
-def _content(path: Path) -> bytes:
-    return path.read_bytes()
-
-
-@cache
-def _kernel_imports(path: Path) -> frozenset[Path]:
-    """Kernel modules that a file names in its imports; one too many would do no harm."""
-    found: set[Path] = set()
-    for module, names in _IMPORT.findall(_content(path).decode()):
-        named = (module, *(f"{module}.{name}" for name in re.findall(r"\w+", names)))
-        found.update(_modules()[name] for name in named if name in _modules())
-    return frozenset(found)
-
-
-# They decide how code is kept and called, not what is compiled.
-_APART = frozenset(
-    _PACKAGE_ROOT / "kernels/base" / name for name in ("bundle_types.py", "disk_cache.py", "private_files.py")
-)
-
-
-@cache
-def _source_closure(path: Path) -> frozenset[Path]:
-    """The file and every kernel module that it reaches by imports, as far as they decide what is compiled."""
-    found, pending = {path}, [path]
-    while pending:
-        new = _kernel_imports(pending.pop()) - found - _APART
-        found |= new
-        pending.extend(new)
-    return frozenset(found)
-
-
-def _compiler() -> str:
-    return f"{numba.__version__} {bool(config.BOUNDSCHECK)}"
-
-
-@cache
-def _source_stamp(path: Path) -> str:
-    digest = hashlib.sha256(_compiler().encode())
-    for file in sorted(_source_closure(path)):
-        digest.update(_content(file))
-    return digest.hexdigest()
-
-
-@cache
-def _stamp_of_file(name: str) -> str:
-    """The stamp of a file of this package, taken when it is imported: it may be edited before anything is compiled."""
-    path = Path(name).resolve()
-    return _source_stamp(path) if path.is_relative_to(_PACKAGE_ROOT) else ""
 
 
 class _PackageLocator:
@@ -115,26 +37,48 @@ class _PackageLocator:
         self._line = function.__code__.co_firstlineno
 
     def ensure_cache_path(self) -> None:
-        make_private_folder(Path(self.get_cache_path()))
+        """Where none can be made, what is installed can still be read."""
+        with contextlib.suppress(OSError):
+            make_private_folder(Path(self.get_cache_path()))
 
     def get_cache_path(self) -> str:
-        relative = self._path.relative_to(_PACKAGE_ROOT).with_suffix("")
-        return str(_checkout_directory() / "_".join(relative.parts))
+        return str(cache_directory() / folder_name(self._path))
 
     def get_source_stamp(self) -> str:
-        return _source_stamp(self._path)
+        return folder_name(self._path)
 
     def get_disambiguator(self) -> str:
         return str(self._line)
 
     @classmethod
     def from_function(cls, function: Callable[..., Any], file: str) -> _PackageLocator | None:
-        path = Path(file).resolve()
-        if not path.is_relative_to(_PACKAGE_ROOT):
-            return None
-        locator = cls(function, path)
-        locator.ensure_cache_path()
-        return locator
+        path = package_file(file)
+        return None if path is None else cls(function, path)
+
+
+class _Place:
+    """A folder that holds entries of one function, and how their keys differ from those of this machine."""
+
+    def __init__(self, folder: Path, *, generic: bool) -> None:
+        self.folder = folder
+        self._generic = generic
+
+    def key(self, key: Any) -> Any:
+        """The key here of what has this key on this machine."""
+        if not self._generic:
+            return key
+        signature, (triple, _, _), code = key
+        return signature, (triple, GENERIC, ""), code
+
+    def is_safe(self, source: Path) -> bool:
+        """Whether it is there and nobody else can write to it; warns once of one that others can write."""
+        try:
+            fault = _fault_of(self.folder.resolve(), source)
+        except (OSError, RuntimeError):
+            return False
+        if fault is not None:
+            _warn_of(fault)
+        return fault is None
 
 
 class _EntryFile:
@@ -144,16 +88,19 @@ class _EntryFile:
     stand under the other's key. Here every file is whole and says what it is; the last of equal writers wins.
     """
 
-    def __init__(self, folder: Path, filename_base: str, source_stamp: str, source: Path) -> None:
-        self._folder = folder
+    def __init__(self, places: list[_Place], filename_base: str, source_stamp: str, source: Path) -> None:
+        self._places = places
         self._source = source
         self._base = filename_base
         self._stamp = source_stamp
 
     def save(self, key: Any, data: Any) -> None:
         """Keep an entry. A disk that is full or not ours to write leaves it compiled in memory alone."""
+        own = self._places[0]
+        if not own.is_safe(self._source):
+            return
         content = dumps(data)
-        path = self._path(key)
+        path = self._path(own, key)
         partial = path.with_name(f"{path.name}.{uuid.uuid4().hex[:16]}")
         with contextlib.suppress(OSError):
             try:
@@ -164,7 +111,15 @@ class _EntryFile:
 
     def load(self, key: Any) -> Any:
         """The entry; None where there is none, one of other sources, a damaged one, or one that others can write."""
-        held = read_private(self._path(key), self._source)
+        for place in self._places:
+            if place.is_safe(self._source):
+                found = self._load(self._path(place, key), place.key(key))
+                if found is not None:
+                    return found
+        return None
+
+    def _load(self, path: Path, key: Any) -> Any:
+        held = read_private(path, self._source)
         if held is None:
             return None
         content = held[_MARK_LENGTH:]
@@ -176,15 +131,15 @@ class _EntryFile:
             return None
 
     def flush(self) -> None:
-        for path in self._folder.glob(f"{self._base}.*.nbc"):
+        for path in self._places[0].folder.glob(f"{self._base}.*.nbc"):
             path.unlink(missing_ok=True)
 
     def _mark(self, key: Any, content: bytes) -> bytes:
         return hashlib.sha256(f"{self._stamp} {key!r} ".encode() + content).digest()
 
-    def _path(self, key: Any) -> Path:
-        digest = hashlib.sha256(repr(key).encode()).hexdigest()[:16]
-        return self._folder / f"{self._base}.{digest}.nbc"
+    def _path(self, place: _Place, key: Any) -> Path:
+        digest = hashlib.sha256(repr(place.key(key)).encode()).hexdigest()[:16]
+        return place.folder / f"{self._base}.{digest}.nbc"
 
 
 class _CacheImpl(CompileResultCacheImpl):  # type: ignore[misc]
@@ -196,12 +151,20 @@ class _Cache(FunctionCache):  # type: ignore[misc]
 
     def __init__(self, function: Callable[..., Any]) -> None:
         super().__init__(function)
-        self.folder = Path(self._cache_path).resolve()
-        self.source = Path(function.__code__.co_filename).resolve()
+        places = [_Place(Path(self._cache_path), generic=False)]
         stamp = self._impl.locator.get_source_stamp()
-        if not isinstance(self._impl.locator, _PackageLocator):
-            stamp = f"{_compiler()} {stamp}"
-        self._cache_file = _EntryFile(self.folder, self._impl.filename_base, stamp, self.source)
+        if isinstance(self._impl.locator, _PackageLocator):
+            places.append(_Place(INSTALLED / places[0].folder.name, generic=True))
+        else:
+            stamp = f"{compiler()} {stamp}"
+        source = Path(function.__code__.co_filename).resolve()
+        self._cache_file = _EntryFile(places, self._impl.filename_base, stamp, source)
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """As Numba's, but all of its own functions are loaded only where one is compiled: half a second."""
+        rtsys.initialize(target_context)
+        with self._guard_against_spurious_io_errors():
+            return self._load_overload(sig, target_context)
 
 
 class OnDemand:
@@ -213,20 +176,14 @@ class OnDemand:
 
     def __init__(self, function: Callable[..., Any]) -> None:
         self._function = function
-        _stamp_of_file(function.__code__.co_filename)
 
     @cached_property
     def own(self) -> Any:
         """The cache of the function."""
         try:
-            found = _Cache(self._function)
-            fault = _fault_of(found.folder, found.source)
+            return _Cache(self._function)
         except (RuntimeError, OSError):
             return NullCache()
-        if fault is None:
-            return found
-        _warn_of(fault)
-        return NullCache()
 
     @property
     def cache_path(self) -> Any:
@@ -234,11 +191,15 @@ class OnDemand:
         return self.own.cache_path
 
     def load_overload(self, signature: Any, target_context: Any) -> Any:
-        """What was compiled for these types, or None."""
-        return self.own.load_overload(signature, target_context)
+        """What was compiled for these types, or None: then it is compiled now."""
+        found = self.own.load_overload(signature, target_context)
+        if found is None:
+            watching.begins(self._function)
+        return found
 
     def save_overload(self, signature: Any, data: Any) -> None:
         """Keep what was compiled."""
+        watching.ends()
         self.own.save_overload(signature, data)
 
 
@@ -254,11 +215,3 @@ def _warn_of(fault: str) -> None:
         RuntimeWarning,
         stacklevel=2,
     )
-
-
-def is_cold() -> bool:
-    """Whether the kernels of this checkout will now be compiled, and kept (model functions do not count)."""
-    folder = _checkout_directory()
-    if config.DISABLE_JIT or any(folder.glob("kernels_*/*.nbc")):
-        return False
-    return not folder.is_dir() or fault_of_folder(folder.resolve(), Path(__file__).resolve()) is None

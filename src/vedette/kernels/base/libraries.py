@@ -59,6 +59,27 @@ class WholeLibrary(JITCodeLibrary):  # type: ignore[misc]
         self._linking_libraries: list[Any] = [_code_of(library) for library in _all_of(self._linking_libraries)]
         super().finalize()
 
+    def serialize_using_object_code(self) -> tuple[str, str, Any]:
+        """Machine code and the names that it defines: nothing takes a whole in, so that nobody needs its source."""
+        self._ensure_finalized()
+        module = self._final_module
+        items = (*module.functions, *module.global_variables)
+        return (
+            self.name,
+            "object",
+            (self._get_compiled_object(), [item.name for item in items if not item.is_declaration]),
+        )
+
+    @classmethod
+    def _unserialize(cls, codegen: Any, state: tuple[str, str, Any]) -> WholeLibrary:
+        name, _, (code, defined) = state
+        library: WholeLibrary = codegen.create_library(name)
+        library.enable_object_caching()
+        library._set_compiled_object(code)
+        library._finalize_final_module()
+        codegen._engine._defined_symbols.update(defined)
+        return library
+
 
 def _all_of(libraries: list[Any]) -> list[Any]:
     """These, and all the libraries that parts among them reach, each once."""

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from functools import cache
+from inspect import isfunction
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import (
@@ -112,14 +113,18 @@ class Section(BaseModel):
     faulty mapping is a section too, with `Unread` in place of what is faulty, so that all other checks can go on.
     """
 
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False, validate_default=True)
+    # Built when first read: a part of a scenario is never read by itself, and to build each took twice as long.
+    model_config = ConfigDict(
+        extra="forbid", frozen=True, strict=True, allow_inf_nan=False, validate_default=True, defer_build=True
+    )
 
     _checks: ClassVar[tuple[Check, ...]] = ()
 
     @classmethod
     def __pydantic_init_subclass__(cls, **_: Any) -> None:
-        methods = (method for parent in reversed(cls.__mro__) for method in vars(parent).values())
-        cls._checks = tuple(method for method in methods if getattr(method, "is_check", False))
+        parents = (parent for parent in reversed(cls.__mro__) if issubclass(parent, Section))
+        methods = (method for parent in parents for method in vars(parent).values())
+        cls._checks = tuple(method for method in methods if isfunction(method) and hasattr(method, "is_check"))
 
     def findings(self) -> Iterator[Finding]:
         """What is wrong with the section beyond its fields one by one."""

@@ -1,0 +1,80 @@
+"""How a command shows that kernels are being compiled: a moving line on a terminal; elsewhere one at start and end."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+from vedette.cli.output import console
+from vedette.text import counted
+
+if TYPE_CHECKING:
+    from vedette.kernels.base.watching import Compiling
+
+
+@contextmanager
+def compiling() -> Iterator[None]:
+    """Say what is compiled meanwhile, how far it is and for how long; nothing, where all is there."""
+    from vedette.kernels.base.watching import watched
+
+    shown = _CompileProgress()
+    try:
+        with watched(shown):
+            yield
+    finally:
+        shown.close()
+
+
+class _CompileProgress:
+    """Hears of every function that is compiled; begins to show with the first."""
+
+    def __init__(self) -> None:
+        self._began: float | None = None
+        self._kernels = self._functions = 0
+        self._now: Compiling | None = None
+
+    def __call__(self, state: Compiling | None) -> None:
+        """See `vedette.kernels.base.watching.watched`."""
+        if self._began is None:
+            self._begin()
+        if state is None:
+            self._kernels += self._now is not None
+            self._functions += self._now.num_functions if self._now is not None else 0
+        self._now = state
+        self._line.update(self._task, description=self._text())
+
+    def close(self) -> None:
+        """Leave one line that says what it was."""
+        if self._began is None:
+            return
+        self._line.stop()
+        seconds = time.monotonic() - self._began
+        self._console.print(f"compiled {counted(self._kernels, 'kernel')} in {seconds:.0f} s", soft_wrap=True)
+
+    def _begin(self) -> None:
+        from rich.progress import Progress, TextColumn, TimeElapsedColumn
+
+        from vedette.kernels.base.places import cache_directory
+
+        self._began = time.monotonic()
+        self._console = console(stderr=True)
+        where = f"kept in {cache_directory()}"
+        self._console.print(f"compiling kernels for this machine: once, a minute or two, {where}", soft_wrap=True)
+        self._line = Progress(
+            TimeElapsedColumn(),
+            TextColumn("{task.description}", markup=False),
+            console=self._console,
+            disable=not self._console.is_terminal,
+            transient=True,
+        )
+        self._task = self._line.add_task("")
+        self._line.start()
+
+    def _text(self) -> str:
+        done = f"{counted(self._kernels, 'kernel')} done"
+        if self._now is None:
+            return done
+        far = f"{self._now.num_done} of {counted(self._now.num_functions, 'function')}"
+        return f"{done}, {self._now.name}: {far}"

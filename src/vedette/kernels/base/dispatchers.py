@@ -1,0 +1,141 @@
+"""What compiles kernels and model functions, and calls them from Python: all that needs Numba.
+
+Loaded when the first of them is called, compiled or read from disk.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from numba import types
+from numba.core import cgutils
+from numba.core.compiler_lock import global_compiler_lock
+from numba.core.errors import NumbaError
+from numba.core.imputils import lower_constant
+from numba.core.registry import CPUDispatcher
+from numba.core.sigutils import normalize_signature
+from numba.experimental.function_type import FunctionModel
+from numba.extending import NativeValue, register_model, typeof_impl, unbox
+
+from vedette.kernels.base.bundle_types import TYPED_BY_FIELDS, type_of_bundle, when_typed
+from vedette.kernels.base.compile import SIGNATURES, ModelFunction
+from vedette.kernels.base.disk_cache import OnDemand
+from vedette.kernels.base.libraries import PartLibrary, WholeLibrary, made_as
+
+when_typed(lambda bundle: typeof_impl.register(bundle)(type_of_bundle))
+
+
+class PartKernel(CPUDispatcher):  # type: ignore[misc]
+    """A function as other kernels call it."""
+
+    def compile(self, sig: Any) -> Any:
+        """As a part."""
+        with made_as(PartLibrary, self.targetctx.codegen()):
+            return super().compile(sig)
+
+
+class WholeKernel(CPUDispatcher):  # type: ignore[misc]
+    """A function with all that it reaches, as Python calls it; kept on disk."""
+
+    @classmethod
+    def of(cls, function: Callable[..., Any], options: dict[str, Any]) -> WholeKernel:
+        """The whole of a function."""
+        whole = cls(function, targetoptions=options)
+        whole._cache = OnDemand(function)
+        return whole
+
+    def compile(self, sig: Any) -> Any:
+        """As a whole."""
+        codegen = self.targetctx.codegen()
+        with made_as(WholeLibrary, codegen):
+            entry = super().compile(sig)
+            # Those of the parts, too, as when it is read from disk.
+            for environment in self.overloads[tuple(normalize_signature(sig)[0])]._find_referenced_environments():
+                codegen.set_env(environment.env_name, environment)
+        return entry
+
+    def typeof_pyval(self, value: Any) -> Any:
+        """The type of an argument that Numba's quick way does not know; asked for by its dispatcher.
+
+        Numba's own way notes a bundle's type as in use, for which the types of all its fields are hashed.
+        """
+        if type(value) in TYPED_BY_FIELDS:
+            return type_of_bundle(value)
+        return super().typeof_pyval(value)
+
+
+class ModelDispatcher(WholeKernel):
+    """A model function's machine code, of the one signature of its kind."""
+
+    model: ModelFunction
+
+    @classmethod
+    def of_model(cls, model: ModelFunction, options: dict[str, Any]) -> ModelDispatcher:
+        """What compiles a model function."""
+        dispatcher: ModelDispatcher = cls.of(model.py_func, options)
+        dispatcher.model = model
+        return dispatcher
+
+    def _reduce_states(self) -> dict[str, Any]:
+        return {**super()._reduce_states(), "kind": self.model.kind}
+
+    @classmethod
+    def _rebuild(cls, kind: str, **states: Any) -> ModelDispatcher:
+        """What unpickling in another process calls; another thread must not meet it half built."""
+        with global_compiler_lock:
+            dispatcher: ModelDispatcher = super()._rebuild(**states)
+            if not hasattr(dispatcher, "model"):
+                dispatcher.model = ModelFunction(dispatcher.py_func, kind)
+                dispatcher.model.__dict__["dispatcher"] = dispatcher
+            return dispatcher
+
+
+def addresses_of(dispatcher: ModelDispatcher) -> tuple[int, int, Any]:
+    """Where a model function's code lies, for C and for kernels, and the type by which kernels know it; compiles it."""
+    # Numba's own lock: a thread that compiles a kernel holds it when it asks for the types of functions.
+    with global_compiler_lock:
+        args, result = normalize_signature(SIGNATURES[dispatcher.model.kind][1])
+        signature = result(*args)
+        if not dispatcher.overloads:  # an unpickled one comes compiled
+            dispatcher.compile(signature)
+            dispatcher.disable_compile()
+        compiled = dispatcher.get_compile_result(signature)
+        names = compiled.fndesc.llvm_cfunc_wrapper_name, compiled.fndesc.llvm_func_name
+        c_address, jit_address = map(compiled.library.get_pointer_to_function, names)
+        if not (c_address and jit_address):  # a kernel that calls it would wait for ever
+            raise RuntimeError(f"the machine code of {dispatcher.py_func.__qualname__} was not found")
+        return c_address, jit_address, _ModelFunctionType(compiled.signature)
+
+
+class _ModelFunctionType(types.FunctionType):  # type: ignore[misc]
+    """Numba's first-class function type, unboxed from two stored addresses.
+
+    Numba's own unboxing looks both addresses up by name at every call of a kernel: 50 microseconds a function.
+    """
+
+
+register_model(_ModelFunctionType)(FunctionModel)
+
+
+@unbox(_ModelFunctionType)  # type: ignore[untyped-decorator]
+def _unbox_model_function(kind: Any, value: Any, context: Any) -> Any:
+    struct = cgutils.create_struct_proxy(kind)(context.context, context.builder)
+    for field, attribute in (("c_addr", "c_address"), ("jit_addr", "jit_address")):
+        address = context.pyapi.object_getattr_string(value, attribute)
+        setattr(struct, field, context.pyapi.long_as_voidptr(address))
+        context.pyapi.decref(address)
+    struct.py_addr = context.builder.ptrtoint(value, context.context.get_value_type(types.voidptr))
+    return NativeValue(struct._getvalue())
+
+
+@lower_constant(_ModelFunctionType)  # type: ignore[untyped-decorator]
+def _named_model_function(context: Any, builder: Any, kind: Any, value: ModelFunction) -> Any:
+    """One that compiled code names."""
+    struct = cgutils.create_struct_proxy(kind)(context, builder)
+    for field, address in (("c_addr", value.c_address), ("jit_addr", value.jit_address), ("py_addr", id(value))):
+        setattr(struct, field, context.add_dynamic_addr(builder, address, info=str(kind)))
+    return struct._getvalue()
+
+
+__all__ = ["ModelDispatcher", "NumbaError", "PartKernel", "WholeKernel", "addresses_of"]

@@ -1,0 +1,112 @@
+"""Says what is being compiled, to whoever asked: a start that compiles takes minutes, and should not look stuck."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, replace
+from typing import Any
+
+from vedette.kernels.base.compile import Kernel
+
+
+@dataclass(frozen=True, slots=True)
+class Compiling:
+    """A kernel that is being compiled with all that it calls."""
+
+    name: str
+    num_done: int  # functions, of those that were not compiled before
+    num_functions: int
+
+
+Listener = Callable[[Compiling | None], None]
+
+
+class _Watch:
+    """Counts the functions of one kernel after another, and tells the listener; None where one is done."""
+
+    def __init__(self, listener: Listener) -> None:
+        self._tell = listener
+        self._compiled: set[int] = set()
+        self._state = Compiling("", 0, 0)
+        self._following = ExitStack()
+        self._follows = False
+
+    def begin(self, function: Callable[..., Any]) -> None:
+        """A kernel is compiled now."""
+        if not self._follows:
+            self._follows = True
+            self._following.enter_context(_told_of_compiled(self._compiled_one))
+        self._state = Compiling(function.__name__, 0, len(_reached(function) - self._compiled))
+        self._tell(self._state)
+
+    def end(self) -> None:
+        """It is done."""
+        self._tell(None)
+
+    def close(self) -> None:
+        """Hear of no more."""
+        self._following.close()
+
+    def _compiled_one(self, function: Callable[..., Any]) -> None:
+        if id(function) not in self._compiled:
+            self._compiled.add(id(function))
+            done = min(self._state.num_done + 1, self._state.num_functions)
+            self._state = replace(self._state, num_done=done)
+            self._tell(self._state)
+
+
+@contextmanager
+def _told_of_compiled(tell: Callable[[Callable[..., Any]], None]) -> Iterator[None]:
+    """Numba says of every function when it has compiled it."""
+    from numba.core import event
+
+    class Follower(event.Listener):  # type: ignore[misc]
+        def on_start(self, event: Any) -> None:
+            pass
+
+        def on_end(self, event: Any) -> None:
+            tell(event.data["dispatcher"].py_func)
+
+    with event.install_listener("numba:compile", Follower()):
+        yield
+
+
+def _reached(function: Callable[..., Any]) -> set[int]:
+    """The function and all kernels that it calls, as far as their names tell."""
+    found, pending = {id(function)}, [function]
+    while pending:
+        code, names = pending[-1].__code__, pending.pop().__globals__
+        for name in code.co_names:
+            called = names.get(name)
+            if isinstance(called, Kernel) and id(called.py_func) not in found:
+                found.add(id(called.py_func))
+                pending.append(called.py_func)
+    return found
+
+
+_watch: _Watch | None = None
+
+
+@contextmanager
+def watched(listener: Listener) -> Iterator[None]:
+    """Tell `listener` of every kernel that is compiled meanwhile: of each function done, and None at its end."""
+    global _watch
+    before, _watch = _watch, _Watch(listener)
+    try:
+        yield
+    finally:
+        _watch.close()
+        _watch = before
+
+
+def begins(function: Callable[..., Any]) -> None:
+    """A kernel was not on disk."""
+    if _watch is not None:
+        _watch.begin(function)
+
+
+def ends() -> None:
+    """It is compiled."""
+    if _watch is not None:
+        _watch.end()

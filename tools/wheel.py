@@ -1,0 +1,23 @@
+"""What a wheel holds beside the sources: kernels that were compiled for it (`python dev.py wheel`), if there are any.
+
+Hatchling calls this while it builds. Without `VEDETTE_COMPILED_KERNELS` the wheel is one of pure Python.
+"""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+from hatchling.builders.hooks.plugin.interface import BuildHookInterface
+
+
+class CompiledKernels(BuildHookInterface):  # type: ignore[type-arg]
+    """Puts a folder of compiled kernels into the package."""
+
+    def initialize(self, version: str, build_data: dict[str, Any]) -> None:
+        """Called before the files are gathered; machine code makes the wheel one of this Python and system."""
+        folder = os.environ.get("VEDETTE_COMPILED_KERNELS")
+        if folder and version == "standard":
+            build_data["force_include"][folder] = "vedette/compiled-kernels"
+            build_data["pure_python"] = False
+            build_data["infer_tag"] = True
