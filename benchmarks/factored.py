@@ -15,6 +15,7 @@ import argparse
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -26,7 +27,7 @@ from vedette.filters import DeltaGlmbFilter, FactoredGlmbFilter, Filter, Limits,
 from vedette.fusion import Clmb, CmDeltaGlmb
 from vedette.models import BirthModel, SensorModel, TargetModel
 from vedette.scenarios import load_scenario
-from vedette.scenarios.build import build_experiment
+from vedette.scenarios.build import build_sensors
 from vedette.simulation import simulate_scan
 from vedette.tracking import Distributed
 
@@ -50,7 +51,7 @@ def variants(errors: list[float], more: bool) -> dict[str, Make]:
     if more:
         found["delta-GLMB, 20,000"] = lambda t, s, c: DeltaGlmbFilter(t, s, replace(c, max_hypotheses=20_000))
     for error in errors:
-        found[f"factored, {error:g}"] = lambda t, s, c, e=error: FactoredGlmbFilter(t, s, c, e)
+        found[f"factored, {error:g}"] = partial(FactoredGlmbFilter, max_split_error=error)
     return found
 
 
@@ -102,7 +103,7 @@ def main() -> None:
     parser.add_argument("--errors", type=float, nargs="+", default=[0.001, 0.01, 0.1, 1.0])
     parser.add_argument("--more-hypotheses", action="store_true")
     options = parser.parse_args()
-    given = build_experiment(load_scenario("paper-a")).tracker.filters[0]
+    given = build_sensors(load_scenario("paper-a"))[0].filter
     layouts = [layout_of(FIRST_SEED + k, given) for k in range(options.layouts)]
     print("| filter | linear-10, m | polar-10, m | still sensors, m | ± paired to LMB | ms a scan |")
     print("|---|---:|---:|---:|---:|---:|")
