@@ -14,6 +14,9 @@ from typing import Any, ParamSpec, TypeVar
 import matplotlib
 from matplotlib import font_manager
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.backends.backend_pdf import FigureCanvasPdf
+from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
 from vedette.errors import InputError
@@ -73,7 +76,8 @@ _SETTINGS: Any = {
     "ytick.major.width": 0.6,
 }
 _FORMATS = ("pdf", "svg", "png")
-_UNDATED: dict[str, dict[str, None]] = {"pdf": {"CreationDate": None}, "svg": {"Date": None}, "png": {}}
+_DOTS_PER_INCH = 300
+_UNDATED: dict[str, dict[str, None]] = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}
 
 
 def styled(function: Callable[_P, _R]) -> Callable[_P, _R]:
@@ -182,7 +186,7 @@ def save_figure(figure: Figure, path: Path | str, *, formats: Sequence[str] = _F
     stem = Path(path)
     try:
         stem.parent.mkdir(parents=True, exist_ok=True)
-        with _laid_out_once(figure):
+        with _as_it_is(figure):
             return tuple(_save(figure, stem.with_name(f"{stem.name}.{name}"), name) for name in formats)
     except OSError as error:
         raise InputError(f"path: expected a place to write figures; got {stem}: {error.strerror}") from error
@@ -192,28 +196,40 @@ def save_figure(figure: Figure, path: Path | str, *, formats: Sequence[str] = _F
 def svg_text(figure: Figure) -> str:
     """The figure as the text of an SVG file; the same figure gives the same text."""
     out = io.StringIO()
-    with _untold():
-        figure.savefig(out, format="svg", metadata=_UNDATED["svg"])
+    with _as_it_is(figure):
+        _print(figure, out, "svg")
     return out.getvalue()
 
 
 @contextmanager
-def _laid_out_once(figure: Figure) -> Iterator[None]:
-    """Leave the figure as it came: what draws it in the first format lays it out for all."""
-    engine = figure.get_layout_engine()
+def _as_it_is(figure: Figure) -> Iterator[None]:
+    """Leave the figure as it came. What draws it in the first format lays it out for all."""
+    engine, dpi, canvas = figure.get_layout_engine(), figure.dpi, figure.canvas
     try:
-        yield
+        with _untold():
+            yield
     finally:
+        figure.set_canvas(canvas)
         figure.set_layout_engine(engine)
+        figure.dpi = dpi
 
 
 def _save(figure: Figure, path: Path, name: str) -> Path:
     partial = path.with_name(f".{path.name}.{os.getpid()}.part")
+    figure.dpi = _DOTS_PER_INCH  # of what is drawn in dots; printing a PDF or an SVG leaves another behind
     try:
-        with _untold():
-            figure.savefig(partial, format=name, dpi=300, metadata=_UNDATED[name])
+        _print(figure, partial, name)
         partial.replace(path)
     finally:
         partial.unlink(missing_ok=True)
     figure.set_layout_engine("none")
     return path
+
+
+def _print(figure: Figure, to: Any, name: str) -> None:
+    """By the canvas of a format: `Figure.savefig` draws twice, the first time to lay out what this lays out itself."""
+    canvas: Any = {"pdf": FigureCanvasPdf, "svg": FigureCanvasSVG, "png": FigureCanvasAgg}[name](figure)
+    if name == "png":
+        canvas.print_png(to)
+    else:
+        getattr(canvas, f"print_{name}")(to, metadata=_UNDATED[name])
