@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from vedette.control.forms import forms_of
 from vedette.control.inputs import Belief
 from vedette.control.priors import heaviest_hypotheses
 from vedette.control.settings import IDEAL_MODES, MobileSensor, PlanningSettings
@@ -90,10 +91,12 @@ def decision_of(
         float(settings.detection_threshold),
     )
     targets, own = sensor.filter.targets, sensor.filter.sensor
+    motion, sees = kernel_motion(targets.motion, constant_survival(1.0)), own.to_kernel(detection_at)
     return Decision(
         LMB.empty(targets.state_dim).to_kernel(),
-        kernel_motion(targets.motion, constant_survival(1.0)),
-        own.to_kernel(detection_at),
+        motion,
+        sees,
+        forms_of(motion, sees, horizon.dt, targets.state_dim),
         horizon,
         futures,
         settings.limits.truncation(own.meas_dim),
