@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from vedette.kernels.base.elementary import exponentials, logs_of_one_and, make_bits
+from vedette.kernels.base.elementary import directions, exponentials, logs, logs_of_one_and, make_bits
 from vedette.kernels.gaussian.information import log_integral, row_size
 from vedette.kernels.gaussian.integrals import integrate_rows, logs_of_one_and_integrals, make_integrals
 
@@ -31,6 +31,36 @@ def test_logarithms_are_exact_to_two_units_in_the_last_place(span: tuple[float, 
     logs_of_one_and(values, make_bits(NUM), make_bits(NUM))
     expected = np.log1p(given.astype(np.longdouble))
     assert np.abs(values / expected - 1.0).max() <= 2.0 * np.finfo(float).eps
+
+
+@pytest.mark.parametrize("span", [(-300.0, 0.0), (-0.1, 0.1), (0.0, 300.0)])
+def test_logarithms_of_any_positive_number_are_exact_to_two_units_in_the_last_place(span: tuple[float, float]) -> None:
+    given = 10.0 ** np.random.default_rng(2).uniform(*span, NUM)
+    values = given.copy()
+    logs(values, make_bits(NUM), make_bits(NUM))
+    expected = np.log(given.astype(np.longdouble))
+    assert np.abs(values / expected - 1.0).max() <= 2.0 * np.finfo(float).eps
+    for none in (-1.0, 0.0, math.nan):
+        values = np.array([none])
+        logs(values, make_bits(1), make_bits(1))
+        assert math.isnan(values[0])
+
+
+@pytest.mark.parametrize("flatness", [1.0, 1e-3, 1e-200, 1e200])
+def test_directions_are_exact_to_two_units_in_the_last_place(flatness: float) -> None:
+    x, y = np.random.default_rng(3).normal(size=(2, NUM))
+    y *= flatness
+    out = np.empty(NUM)
+    directions(y, x, out)
+    expected = np.arctan2(y.astype(np.longdouble), x.astype(np.longdouble))
+    assert np.abs(out / expected - 1.0).max() <= 2.0 * np.finfo(float).eps
+
+
+def test_directions_along_the_axes() -> None:
+    x, y = np.array([1.0, 0.0, -1.0, 0.0, 0.0, 1.0, -1.0]), np.array([0.0, 1.0, 0.0, -1.0, 0.0, 1.0, -1.0])
+    out = np.empty(len(x))
+    directions(y, x, out)
+    np.testing.assert_array_equal(out, np.arctan2(y, x))
 
 
 def test_zero_and_nan_stay_what_they_are() -> None:

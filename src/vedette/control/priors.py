@@ -16,6 +16,9 @@ from vedette.models import MotionModel, constant_survival, kernel_motion
 
 _Labelled = TypeVar("_Labelled", bound=Labelled)
 
+# Over the horizon nobody dies. One model for all decisions, by which what kernels take of a motion is found again.
+ALWAYS_SURVIVES = constant_survival(1.0)
+
 
 def heaviest_hypotheses(belief: GLMB, most: int) -> GLMB:
     """The `most` heaviest hypotheses of positive weight, normalised; of equal weights the first."""
@@ -38,9 +41,7 @@ def predicted(fused: _Labelled, motion: MotionModel, num_steps: int, period: flo
         single = take_hypotheses(single, np.flatnonzero(single.hyp_log_weights > -np.inf))
     means, covs = track_moments(single.tracks)
     with model_errors():
-        means, covs = predict_tracks(
-            kernel_motion(motion, constant_survival(1.0)), float(period), int(num_steps), means, covs
-        )
+        means, covs = predict_tracks(kernel_motion(motion, ALWAYS_SURVIVES), float(period), int(num_steps), means, covs)
     num = single.tracks.num_tracks
     tracks = unchecked(TrackTable, single.tracks.labels, np.arange(num + 1), np.zeros(num), means, covs)
     return unchecked(type(fused), tracks, *single.to_kernel()[1:])

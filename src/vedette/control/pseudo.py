@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from vedette.control.forms import forms_of
 from vedette.control.inputs import Belief
-from vedette.control.priors import heaviest_hypotheses
+from vedette.control.priors import ALWAYS_SURVIVES, heaviest_hypotheses
 from vedette.control.settings import IDEAL_MODES, MobileSensor, PlanningSettings
 from vedette.control.versions import share_versions
 from vedette.densities import GLMB, LMB, MultiTargetSamples, sample_glmb, sample_lmb
@@ -24,7 +25,7 @@ from vedette.kernels.planning.pseudo_glmb import GlmbResults, pseudo_update_glmb
 from vedette.kernels.planning.pseudo_lmb import LmbResults, pseudo_update_lmb
 from vedette.kernels.planning.reach import Belief as KnownBelief
 from vedette.kernels.planning.reach import label_radii, predict_paths
-from vedette.models import constant_survival, kernel_motion
+from vedette.models import kernel_motion
 from vedette.threads import run_chunks
 
 
@@ -90,10 +91,12 @@ def decision_of(
         float(settings.detection_threshold),
     )
     targets, own = sensor.filter.targets, sensor.filter.sensor
+    motion, sees = kernel_motion(targets.motion, ALWAYS_SURVIVES), own.to_kernel(detection_at)
     return Decision(
         LMB.empty(targets.state_dim).to_kernel(),
-        kernel_motion(targets.motion, constant_survival(1.0)),
-        own.to_kernel(detection_at),
+        motion,
+        sees,
+        forms_of(motion, sees, horizon.dt, targets.state_dim),
         horizon,
         futures,
         settings.limits.truncation(own.meas_dim),

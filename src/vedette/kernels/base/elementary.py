@@ -1,4 +1,4 @@
-"""Exponentials and logarithms of many numbers at once: polynomials in loops that the compiler vectorises.
+"""Exponentials, logarithms and angles of many numbers at once: polynomials in loops that the compiler vectorises.
 
 Within two units in the last place of the exact values. A call of the system's function for each number would keep the
 whole loop from wide registers.
@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vedette.kernels.base.compile import borrowing, kernel
+from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Floats, Ints
 
 # Added to a number below 2^51 it leaves the nearest integer in the last bits.
@@ -31,6 +31,10 @@ _INVERSE_9, _INVERSE_10, _INVERSE_11 = 1.0 / 362880.0, 1.0 / 3628800.0, 1.0 / 39
 _INVERSE_12, _INVERSE_13 = 1.0 / 479001600.0, 1.0 / 6227020800.0
 
 LARGEST_EXPONENT = 700.0
+
+# Angles in two parts, the second what the first lacks.
+_HALF_PI_HIGH, _HALF_PI_LOW = 1.57079632679489655800e00, 6.12323399573676603587e-17
+_ATAN_HALF_HIGH, _ATAN_HALF_LOW = 4.63647609000806093515e-01, 2.26987774529616870924e-17
 
 
 class Bits(NamedTuple):
@@ -69,34 +73,86 @@ def exponentials(values: Floats, work: Bits) -> None:
         values[s] *= numbers[s]
 
 
+@inlined
+def _split(bits: Ints, more: Ints, num: int) -> None:
+    """Of numbers 2^k m with m between sqrt(1/2) and sqrt(2), bits become those of m, and more those of k + _ROUNDER."""
+    for s in range(num):
+        k = (bits[s] - _ROOT_HALF_BITS) >> _MANTISSA_BITS
+        more[s] = k + _ROUNDER_BITS
+        bits[s] -= k << _MANTISSA_BITS
+
+
+@inlined
+def _log_near_one(f: float) -> float:
+    """log(1 + f) = 2 artanh(f / (2 + f)), its series with the coefficients of fdlibm (e_log.c)."""
+    root = f / (2.0 + f)
+    z = root * root
+    w = z * z
+    odd = z * (
+        6.666666666666735130e-01
+        + w * (2.857142874366239149e-01 + w * (1.818357216161805012e-01 + w * 1.479819860511658591e-01))
+    )
+    even = w * (3.999999999940941908e-01 + w * (2.222219843214978396e-01 + w * 1.531383769920937332e-01))
+    half = 0.5 * f * f
+    return f - (half - root * (half + odd + even))
+
+
 @borrowing
 def logs_of_one_and(values: Floats, work: Bits, more: Bits) -> None:
     """values = log(1 + values), which are finite and not below zero, or NaN."""
-    numbers, bits, num = work.numbers, work.bits, values.shape[0]
+    numbers, num = work.numbers, values.shape[0]
     for s in range(num):
         numbers[s] = 1.0 + values[s]
-    # 1 + x = 2^k m with m between sqrt(1/2) and sqrt(2).
-    for s in range(num):
-        k = (bits[s] - _ROOT_HALF_BITS) >> _MANTISSA_BITS
-        more.bits[s] = k + _ROUNDER_BITS
-        bits[s] -= k << _MANTISSA_BITS
+    _split(work.bits, more.bits, num)
     for s in range(num):
         x, k = values[s], more.numbers[s] - _ROUNDER
         whole = 1.0 + x
         lost = (x - (whole - 1.0)) / whole  # what the sum 1 + x has lost, in the logarithm
-        f = numbers[s] - 1.0
-        # log(1 + f) = 2 artanh(f / (2 + f)), its series with the coefficients of fdlibm (e_log.c).
-        root = f / (2.0 + f)
-        z = root * root
+        values[s] = k * _LOG_2_HIGH + (_log_near_one(numbers[s] - 1.0) + (k * _LOG_2_LOW + lost))
+
+
+@borrowing
+def logs(values: Floats, work: Bits, more: Bits) -> None:
+    """values = log(values), which are above 1e-300 and finite; NaN of others that are no such numbers."""
+    numbers, num = work.numbers, values.shape[0]
+    for s in range(num):
+        numbers[s] = values[s]
+    _split(work.bits, more.bits, num)
+    for s in range(num):
+        k = more.numbers[s] - _ROUNDER
+        none = 0.0 if values[s] > 0.0 else math.nan
+        values[s] = k * _LOG_2_HIGH + (_log_near_one(numbers[s] - 1.0) + (k * _LOG_2_LOW + none))
+
+
+@borrowing
+def directions(y: Floats, x: Floats, out: Floats) -> None:
+    """out = atan2(y, x) of finite numbers, in [-pi, pi]; 0 where both are 0.
+
+    With the coefficients of fdlibm (s_atan.c). The arc tangent of the quotient t of the smaller by the larger is
+    atan(c) + atan((t - c) / (1 + c t)), with c of 0, 1/2 and 1 the one that leaves the least.
+    """
+    for s in range(out.shape[0]):
+        across, along = abs(y[s]), abs(x[s])
+        small, large = (across, along) if across < along else (along, across)
+        high, middle = 16.0 * small >= 11.0 * large, 16.0 * small >= 7.0 * large
+        above = small - large if high else (2.0 * small - large if middle else small)
+        below = small + large if high else (2.0 * large + small if middle else large)
+        base = 0.5 * _HALF_PI_HIGH if high else (_ATAN_HALF_HIGH if middle else 0.0)
+        rest = 0.5 * _HALF_PI_LOW if high else (_ATAN_HALF_LOW if middle else 0.0)
+        r = above / (below if below > 0.0 else 1.0)
+        z = r * r
         w = z * z
-        odd = z * (
-            6.666666666666735130e-01
-            + w * (2.857142874366239149e-01 + w * (1.818357216161805012e-01 + w * 1.479819860511658591e-01))
+        odd = 9.09088713343650656196e-02 + w * (
+            6.66107313738753120669e-02 + w * (4.97687799461593236017e-02 + w * 1.62858201153657823623e-02)
         )
-        even = w * (3.999999999940941908e-01 + w * (2.222219843214978396e-01 + w * 1.531383769920937332e-01))
-        half = 0.5 * f * f
-        log = f - (half - root * (half + odd + even))
-        values[s] = k * _LOG_2_HIGH + (log + (k * _LOG_2_LOW + lost))
+        odd = z * (3.33333333333329318027e-01 + w * (1.42857142725034663711e-01 + w * odd))
+        even = -7.69187620504482999495e-02 + w * (-5.83357013379057348645e-02 + w * -3.65315727442169155270e-02)
+        even = w * (-1.99999999998764832476e-01 + w * (-1.11111104054623557880e-01 + w * even))
+        angle = base - ((r * (odd + even) - rest) - r)
+        angle = _HALF_PI_HIGH - (angle - _HALF_PI_LOW) if across > along else angle
+        angle = 2.0 * _HALF_PI_HIGH - (angle - 2.0 * _HALF_PI_LOW) if x[s] < 0.0 else angle
+        angle = angle if large > 0.0 else 0.0
+        out[s] = -angle if y[s] < 0.0 else angle
 
 
-__all__ = ["LARGEST_EXPONENT", "Bits", "exponentials", "logs_of_one_and", "make_bits"]
+__all__ = ["LARGEST_EXPONENT", "Bits", "directions", "exponentials", "logs", "logs_of_one_and", "make_bits"]

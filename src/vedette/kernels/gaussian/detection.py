@@ -16,7 +16,7 @@ BY_NODES = 2
 
 
 @inlined
-def _checked(detection: float) -> float:
+def checked(detection: float) -> float:
     if not 0.0 <= detection <= 1.0:
         raise ModelError("detection model: probability is not in [0, 1]")
     return detection
@@ -34,7 +34,7 @@ def _mean_of_nodes(sensor: Sensor, pose: Floats, mean: Floats, cov: Floats, stat
     for i in range(nodes.shape[0]):
         state[0] = mean[0] + a * nodes[i, 1]
         state[1] = mean[1] + b * nodes[i, 1] + c * nodes[i, 2]
-        total += nodes[i, 0] * _checked(sensor.prob_detection(state, pose, sensor.detection_params))
+        total += nodes[i, 0] * checked(sensor.prob_detection(state, pose, sensor.detection_params))
     return min(total, 1.0)  # weights sum to 1 but for rounding
 
 
@@ -45,9 +45,9 @@ def detection_probability(sensor: Sensor, pose: Floats, mean: Floats, cov: Float
     By nodes the position varies and the rest of the state stays at its mean. state: (state_dim,) to be written.
     """
     if sensor.detection_rule == AT_CENTRE:
-        return _checked(sensor.prob_detection(mean, pose, sensor.detection_params))
+        return checked(sensor.prob_detection(mean, pose, sensor.detection_params))
     if sensor.detection_rule == CLOSED_FORM:
-        return _checked(sensor.mean_prob_detection(mean, cov, pose, sensor.detection_params))
+        return checked(sensor.mean_prob_detection(mean, cov, pose, sensor.detection_params))
     return _mean_of_nodes(sensor, pose, mean, cov, state)
 
 

@@ -72,26 +72,6 @@ def to_information(
 
 
 @inlined
-def move_row(given: Floats, given_mean: Floats, mean: Floats, reference: Floats, row: Floats) -> None:
-    """Information row of N(mean, P) into `row`, of that of N(given_mean, P) about the same reference."""
-    n = mean.shape[0]
-    at, last, squared = 0, n * (n + 1) // 2, 0.0
-    for i in range(n):
-        row[last + i] = 0.0
-        for j in range(i + 1):
-            row[at] = given[at]
-            row[last + i] += given[at] * (mean[j] - reference[j])
-            if j < i:
-                row[last + j] += given[at] * (mean[i] - reference[i])
-            at += 1
-    # s = d'Yd + log det(2 pi P), of which the determinant is the given one's.
-    for i in range(n):
-        squared += (mean[i] - reference[i]) * row[last + i] - (given_mean[i] - reference[i]) * given[last + i]
-    row[last + n] = given[last + n] + squared
-    row[last + n + 1] = given[last + n + 1]
-
-
-@inlined
 def log_integral(row: Floats, dim: int) -> float:
     """log of the integral over all states of what `row` describes; NaN where its Y is not positive definite.
 
@@ -123,16 +103,6 @@ def log_integral(row: Floats, dim: int) -> float:
             log_det += math.log(row[at])
             at += k + 2
     return float(0.5 * (dim * LOG_2PI - log_det - row[diagonal]))
-
-
-@borrowing
-def log_integral_of_any(row: Floats, dim: int) -> float:
-    """`log_integral`, which the compiler unrolls for the two usual dimensions: more than twice as fast."""
-    if dim == 4:
-        return log_integral(row, 4)
-    if dim == 5:
-        return log_integral(row, 5)
-    return log_integral(row, dim)
 
 
 @borrowing
@@ -174,4 +144,4 @@ def to_moments(row: Floats, reference: Floats, mean: Floats, cov: Floats, factor
     return True
 
 
-__all__ = ["log_integral", "log_integral_of_any", "log_value", "move_row", "row_size", "to_information", "to_moments"]
+__all__ = ["log_integral", "log_value", "row_size", "to_information", "to_moments"]

@@ -16,7 +16,7 @@ from vedette.kernels.gaussian.scratch import Scratch, wrap_angle
 from vedette.kernels.gaussian.sigma_points import LINEARISED, PointWeights, fill_sigma_points, moments_of_images
 
 # Where a scan leaves less than this of the volume that was expected of it, cov - cross' cross cancels too many digits.
-_LEAST_SHRINKAGE = 1e-8
+LEAST_SHRINKAGE = 1e-8
 
 
 class Innovation(NamedTuple):
@@ -103,7 +103,7 @@ def _project(jacobian: Floats, cov: Floats, cross: Floats, innovation: Floats, n
 
 @inlined
 def _has_volume(noise: Floats, factor: Floats, work: Floats, m: int) -> bool:
-    """Whether the noise has at least `_LEAST_SHRINKAGE` of the determinant of the innovation covariance L L'.
+    """Whether the noise has at least `LEAST_SHRINKAGE` of the determinant of the innovation covariance L L'.
 
     That share bounds from below what any direction of the state keeps of its variance. work: to be written.
     """
@@ -111,16 +111,16 @@ def _has_volume(noise: Floats, factor: Floats, work: Floats, m: int) -> bool:
     for a in range(m):
         expected *= factor[a, a] * factor[a, a]
     if m == 1:
-        return noise[0, 0] > _LEAST_SHRINKAGE * expected
+        return noise[0, 0] > LEAST_SHRINKAGE * expected
     if m == 2:
         skew = 0.5 * (noise[0, 1] + noise[1, 0])
-        return noise[0, 0] * noise[1, 1] - skew * skew > _LEAST_SHRINKAGE * expected
+        return noise[0, 0] * noise[1, 1] - skew * skew > LEAST_SHRINKAGE * expected
     if not cholesky_of_size(noise, work, m):
         return False
     own = 1.0
     for a in range(m):
         own *= work[a, a] * work[a, a]
-    return own > _LEAST_SHRINKAGE * expected
+    return own > LEAST_SHRINKAGE * expected
 
 
 @inlined

@@ -21,13 +21,18 @@ import numpy as np
 
 from vedette.errors import NumericalError
 from vedette.kernels.base.compile import borrowing, inlined, kernel
+from vedette.kernels.base.elementary import logs
 from vedette.kernels.base.types import Bools, Floats, Ints
-from vedette.kernels.gaussian.information import log_integral_of_any, to_information
+from vedette.kernels.gaussian.information import to_information
+from vedette.kernels.gaussian.integrals import Integrals, integrate_rows, make_integrals
 from vedette.kernels.gaussian.linalg import log_add
 from vedette.kernels.gaussian.mixtures import match_components
 
 _SAME_POWER = 1e-12
 _LARGEST_PRODUCT = 1e200
+
+# A term so much below another is lost beside it, whatever the number of label sets.
+_LOST = 60.0
 
 
 class SensorCases(NamedTuple):
@@ -73,14 +78,36 @@ class Terms(NamedTuple):
 
 
 class Work(NamedTuple):
-    """Working arrays of one product."""
+    """Working arrays of one product with all samples side by side, in the last axis."""
 
-    product: Floats  # (row_size,)
-    joint: Floats  # (row_size,)
-    crossed: Floats  # (num_crossed,) log integrals of p^a g^b over the labels of a set
-    peaks: Floats  # (num_changing,) largest term among the label sets of a factor
-    sums: Floats  # (num_changing,) of the terms' exponentials, relative to it
-    products: Floats  # (num_changing,) of such sums over factors, of which one logarithm is taken for all
+    product: Floats  # (row_size, num_samples)
+    joint: Floats  # (row_size, num_samples)
+    integrals: Integrals
+    overlaps: Floats  # (num_samples,) sums of log integral g over the labels of a set
+    quadratics: Floats  # (num_samples,) of q, see `_add_terms`
+    crossed: Floats  # (num_crossed, num_samples) log integrals of p^a g^b over the labels of a set
+    peaks: Floats  # (num_changing, num_samples) largest term among the label sets of a factor
+    sums: Floats  # (num_changing, num_samples) of the terms' exponentials, relative to it
+    products: Floats  # (num_changing, num_samples) of such sums over factors, of which one logarithm is taken for all
+    any_held: Bools  # (num_samples,) whether some label set of the factor is held
+    is_whole: Bools  # (num_samples,) whether no label set was left out so far
+
+
+@kernel
+def _make_work(size: int, num_changing: int, num_crossed: int, num_samples: int) -> Work:
+    return Work(
+        np.empty((size, num_samples)),
+        np.empty((size, num_samples)),
+        make_integrals(num_samples),
+        np.empty(num_samples),
+        np.empty(num_samples),
+        np.empty((num_crossed, num_samples)),
+        np.empty((num_changing, num_samples)),
+        np.empty((num_changing, num_samples)),
+        np.empty((num_changing, num_samples)),
+        np.empty(num_samples, np.bool_),
+        np.empty(num_samples, np.bool_),
+    )
 
 
 @kernel
@@ -120,46 +147,77 @@ def write_rows(cases: SensorCases, places: Places, power: float, first: int, las
 
 
 @inlined
-def _multiply(laid: Laid, chosen: Ints, member: int, product: Floats) -> None:
-    """Row of the product of the chosen cases' powers; where some do not know the label, the others' sum to one."""
-    last = product.shape[0] - 1
-    for k in range(last + 1):
-        total = 0.0
-        for s in range(chosen.shape[0]):
-            total += laid.rows[chosen[s], member, k]
-        product[k] = total
-    if abs(product[last] - 1.0) > _SAME_POWER:
-        scale = 1.0 / product[last]
-        for k in range(last + 1):
-            product[k] *= scale
+def _fill(value: float, out: Floats) -> None:
+    for i in range(out.shape[0]):
+        for s in range(out.shape[1]):
+            out[i, s] = value
 
 
 @inlined
-def _integrate(laid: Laid, chosen: Ints, at: int, terms: Terms, work: Work) -> tuple[float, float]:
-    """Over the labels of a set: the sums of log integral g and of q (see `_add_terms`), and those of `work.crossed`."""
-    product, joint, last = work.product, work.joint, work.product.shape[0] - 1
-    overlap, quadratic, num_crossed = 0.0, 0.0, terms.own_powers.shape[0]
+def _multiply(laid: Laid, chosen: Ints, member: int, product: Floats) -> None:
+    """Rows of the products of the chosen cases' powers; where some do not know the label, the others' sum to one.
+
+    chosen: each sensor's case with the first sample; the other samples' follow it.
+    """
+    size, num_samples, away = product.shape[0], product.shape[1], 0
+    for sample in range(num_samples):
+        for k in range(size):
+            total = 0.0
+            for s in range(chosen.shape[0]):
+                total += laid.rows[chosen[s] + sample, member, k]
+            product[k, sample] = total
+    powers = product[size - 1]
+    for sample in range(num_samples):
+        away += 1 if abs(powers[sample] - 1.0) > _SAME_POWER else 0
+    if away == 0:
+        return
+    for sample in range(num_samples):
+        if abs(powers[sample] - 1.0) > _SAME_POWER:
+            scale = 1.0 / powers[sample]
+            for k in range(size):
+                product[k, sample] *= scale
+
+
+@inlined
+def _add_log_integrals(rows: Floats, dim: int, from_quotient: bool, integrals: Integrals, out: Floats) -> None:
+    """out (num_samples,) += log integrals of rows, which are used up. from_quotient: where none, it is infinite."""
+    integrate_rows(rows, dim, integrals)
+    factors, exponents = integrals.factors, integrals.exponents
+    logs(factors, integrals.bits, integrals.more_bits)
+    for s in range(len(out)):
+        value = exponents[s] + factors[s]
+        # A quotient of Gaussians that is not integrable.
+        out[s] += math.inf if from_quotient and math.isnan(value) else value
+
+
+@inlined
+def _integrate(laid: Laid, chosen: Ints, at: int, terms: Terms, work: Work) -> None:
+    """Over the labels of a set: the overlaps, the quadratics and the crossed ones."""
+    product, joint, num_crossed = work.product, work.joint, terms.own_powers.shape[0]
+    size, num_samples = product.shape
     num_alone = terms.powers.shape[0] - num_crossed
-    for e in range(num_crossed):
-        work.crossed[e] = 0.0
+    for s in range(num_samples):
+        work.overlaps[s], work.quadratics[s] = 0.0, 0.0
+    _fill(0.0, work.crossed)
     for member in range(laid.set_offsets[at], laid.set_offsets[at + 1]):
         _multiply(laid, chosen, member, product)
         for e in range(num_crossed):
-            power = terms.powers[num_alone + e]
-            for k in range(last + 1):
-                joint[k] = power * product[k] + terms.rows[e, member, k]
-            value = log_integral_of_any(joint, terms.dim)
-            if math.isnan(value) and min(terms.own_powers[e], power) < 0.0:
-                value = math.inf  # a quotient of Gaussians that is not integrable
-            work.crossed[e] += value
+            power, given = terms.powers[num_alone + e], terms.rows[e, member]
+            for k in range(size):
+                entries, out = product[k], joint[k]
+                for s in range(num_samples):
+                    out[s] = power * entries[s] + given[k]
+            is_quotient = min(terms.own_powers[e], power) < 0.0
+            _add_log_integrals(joint, terms.dim, is_quotient, work.integrals, work.crossed[e])
         if num_alone > 0:
-            overlap += log_integral_of_any(product, terms.dim)
-            quadratic += product[last - 1]
-    return overlap, quadratic
+            _add_log_integrals(product, terms.dim, False, work.integrals, work.overlaps)
+            rest = product[size - 2]
+            for s in range(num_samples):
+                work.quadratics[s] += rest[s]
 
 
 @inlined
-def _add_terms(at: int, weight: float, overlap: float, quadratic: float, terms: Terms, work: Work) -> None:
+def _add_terms(at: int, sample: int, weight: float, terms: Terms, work: Work) -> None:
     """Add the terms of a label set to the sums of its factor.
 
     One elimination serves every b: g^b has b times the row of g, so that, with q = s - y'Y^-1 y which it leaves,
@@ -170,76 +228,85 @@ def _add_terms(at: int, weight: float, overlap: float, quadratic: float, terms: 
         given = terms.log_weights[e, at]  # with - d log(b) / 2 of each label
         term = given + terms.powers[e] * weight
         if e < num_alone:
-            term += overlap - 0.5 * (terms.powers[e] - 1.0) * quadratic
+            term += work.overlaps[sample] - 0.5 * (terms.powers[e] - 1.0) * work.quadratics[sample]
         else:
-            term += work.crossed[e - num_alone]
+            term += work.crossed[e - num_alone, sample]
         if math.isnan(term) and (math.isinf(weight) or math.isinf(given)):
             term = -math.inf  # both densities are zero, or one is whose power is positive
-        peak = work.peaks[e]
+        peak = work.peaks[e, sample]
         if term > peak:
-            work.sums[e] = 1.0 + (work.sums[e] * math.exp(peak - term) if peak > -math.inf else 0.0)
-            work.peaks[e] = term
-        elif -math.inf < term < math.inf:
-            work.sums[e] += math.exp(term - peak)
+            work.sums[e, sample] = 1.0 + (work.sums[e, sample] * math.exp(peak - term) if term < peak + _LOST else 0.0)
+            work.peaks[e, sample] = term
+        elif peak - _LOST < term < math.inf:
+            work.sums[e, sample] += math.exp(term - peak)
         elif math.isnan(term):
-            work.peaks[e] = term
+            work.peaks[e, sample] = term
 
 
 @inlined
 def _add_factor(work: Work, out: Floats) -> None:
-    """Add the log of a factor's sum to each total, but for what stays in `work.products`."""
-    for e in range(out.shape[0]):
-        out[e] += work.peaks[e]
-        if work.sums[e] > 0.0:
-            work.products[e] *= work.sums[e]
-        if work.products[e] > _LARGEST_PRODUCT:
-            out[e] += math.log(work.products[e])
-            work.products[e] = 1.0
+    """Add the logs of a factor's sums to the totals, but for what stays in `work.products`."""
+    for sample in range(out.shape[0]):
+        if not work.any_held[sample]:
+            continue
+        for e in range(work.sums.shape[0]):
+            out[sample, e] += work.peaks[e, sample]
+            if work.sums[e, sample] > 0.0:
+                work.products[e, sample] *= work.sums[e, sample]
+            if work.products[e, sample] > _LARGEST_PRODUCT:
+                out[sample, e] += math.log(work.products[e, sample])
+                work.products[e, sample] = 1.0
 
 
 @inlined
-def _is_held(laid: Laid, chosen: Ints, at: int) -> bool:
+def _is_held(laid: Laid, chosen: Ints, sample: int, at: int) -> bool:
     held = False
     for s in range(chosen.shape[0]):
-        held |= laid.held[chosen[s], at]
+        held |= laid.held[chosen[s] + sample, at]
     return held
 
 
 @inlined
 def _power_integrals(laid: Laid, chosen: Ints, terms: Terms, work: Work, out: Floats) -> None:
-    """Z of all pairs for one product. A label set that no case holds is left out, also of Z(a, 0)."""
-    num, all_held = work.sums.shape[0], True
-    for e in range(num):
-        out[e], work.products[e] = 0.0, 1.0
+    """Z (num_samples, num_pairs) of one product. A label set that no case holds is left out, also of Z(a, 0)."""
+    num, num_samples = work.sums.shape
+    _fill(0.0, out)
+    _fill(1.0, work.products)
+    for sample in range(num_samples):
+        work.is_whole[sample] = True
     for factor in range(laid.factor_offsets.shape[0] - 1):
-        any_held = False
-        for e in range(num):
-            work.peaks[e], work.sums[e] = -math.inf, 0.0
+        for sample in range(num_samples):
+            work.any_held[sample] = False
+        _fill(-math.inf, work.peaks)
+        _fill(0.0, work.sums)
         for at in range(laid.factor_offsets[factor], laid.factor_offsets[factor + 1]):
-            if not (laid.all_held or _is_held(laid, chosen, at)):
-                all_held = False
-                continue
-            any_held, weight = True, 0.0
-            for s in range(chosen.shape[0]):
-                weight += laid.log_weights[chosen[s], at]
-            overlap, quadratic = _integrate(laid, chosen, at, terms, work)
-            _add_terms(at, weight, overlap, quadratic, terms, work)
-        if any_held:
-            _add_factor(work, out[:num])
-    for e in range(num):
-        out[e] += math.log(work.products[e])
-    for e in range(terms.own_totals.shape[0]):
-        out[num + e] = terms.own_totals[e] if all_held else _own_of_held(laid, chosen, terms.own[e])
+            _integrate(laid, chosen, at, terms, work)
+            for sample in range(num_samples):
+                if not (laid.all_held or _is_held(laid, chosen, sample, at)):
+                    work.is_whole[sample] = False
+                    continue
+                weight = 0.0
+                for s in range(chosen.shape[0]):
+                    weight += laid.log_weights[chosen[s] + sample, at]
+                work.any_held[sample] = True
+                _add_terms(at, sample, weight, terms, work)
+        _add_factor(work, out)
+    for sample in range(num_samples):
+        for e in range(num):
+            out[sample, e] += math.log(work.products[e, sample])
+        for e in range(terms.own_totals.shape[0]):
+            whole = work.is_whole[sample]
+            out[sample, num + e] = terms.own_totals[e] if whole else _own_of_held(laid, chosen, sample, terms.own[e])
 
 
 @borrowing
-def _own_of_held(laid: Laid, chosen: Ints, own: Floats) -> float:
+def _own_of_held(laid: Laid, chosen: Ints, sample: int, own: Floats) -> float:
     """Z(a, 0) over the label sets that some chosen case holds."""
     total = 0.0
     for factor in range(laid.factor_offsets.shape[0] - 1):
         factor_sum, any_held = -math.inf, False
         for at in range(laid.factor_offsets[factor], laid.factor_offsets[factor + 1]):
-            if _is_held(laid, chosen, at):
+            if _is_held(laid, chosen, sample, at):
                 factor_sum, any_held = log_add(factor_sum, own[at]), True
         if any_held:
             total += factor_sum
@@ -254,14 +321,12 @@ def power_table(laid: Laid, first_cases: Ints, actions: Ints, terms: Terms, firs
     `first_cases + action * num_samples + sample`. NaN where a precision of positive powers is not positive definite.
     """
     num_sensors, num_samples, size = len(first_cases), out.shape[1], laid.rows.shape[2]
-    chosen, num = np.empty(num_sensors, np.int64), len(terms.log_weights)
-    sums = np.empty((3, num))
-    work = Work(np.empty(size), np.empty(size), np.empty(len(terms.own_powers)), sums[0], sums[1], sums[2])
+    chosen = np.empty(num_sensors, np.int64)
+    work = _make_work(size, len(terms.log_weights), len(terms.own_powers), num_samples)
     for joint in range(first, last):
-        for sample in range(num_samples):
-            for s in range(num_sensors):
-                chosen[s] = first_cases[s] + actions[joint, s] * num_samples + sample
-            _power_integrals(laid, chosen, terms, work, out[joint, sample])
+        for s in range(num_sensors):
+            chosen[s] = first_cases[s] + actions[joint, s] * num_samples
+        _power_integrals(laid, chosen, terms, work, out[joint])
 
 
 __all__ = ["Laid", "Places", "SensorCases", "Terms", "power_table", "write_rows"]

@@ -23,6 +23,9 @@ from vedette.kernels.gaussian.information import row_size
 # Certain and impossible targets are taken as all but that: a logit whose exponential is still a number.
 ALL_BUT_CERTAIN = 700.0
 
+# A sensor that never misses is taken as one that misses so often: nothing is sure.
+LEAST_MISS = 1e-12
+
 _SAME_POWER = 1e-12
 
 
@@ -45,8 +48,8 @@ def bernoulli_size(dim: int) -> int:
 
 @inlined
 def log_miss(detection: float) -> float:
-    """log (1 - P_D); a sensor that never misses is taken as one that misses once in 1e12, so that nothing is sure."""
-    return math.log(max(1.0 - detection, 1e-12))
+    """log (1 - P_D), at least that of `LEAST_MISS`."""
+    return math.log(max(1.0 - detection, LEAST_MISS))
 
 
 @inlined
@@ -64,4 +67,4 @@ def unscale(rows: Floats) -> None:
                 rows[k, sample] *= scale
 
 
-__all__ = ["ALL_BUT_CERTAIN", "Table", "bernoulli_size", "log_miss", "unscale"]
+__all__ = ["ALL_BUT_CERTAIN", "LEAST_MISS", "Table", "bernoulli_size", "log_miss", "unscale"]

@@ -7,19 +7,47 @@ Gaussian. As a change of a Bernoulli row: the information matrix and log (1 - q)
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from vedette.errors import NumericalError
 from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Floats
 from vedette.kernels.gaussian.detection import detection_probability
-from vedette.kernels.gaussian.innovation import expect_measurement
+from vedette.kernels.gaussian.innovation import Innovation, expect_measurement, make_innovation
 from vedette.kernels.gaussian.linalg import cholesky, inverse_from_factor
 from vedette.kernels.gaussian.prediction import predict
+from vedette.kernels.gaussian.scratch import Scratch, make_scratch
 from vedette.kernels.planning.bernoulli_rows import log_miss
 from vedette.kernels.planning.ideal import Decision
-from vedette.kernels.planning.known import Entries, Work, make_known_work
+from vedette.kernels.planning.known import Entries
 from vedette.kernels.planning.reach import Belief
+
+
+class _Work(NamedTuple):
+    """Arrays in which one label is followed over the horizon."""
+
+    scratch: Scratch
+    seen: Innovation  # of one entry
+    predicted_mean: Floats  # (state_dim,)
+    predicted_cov: Floats  # (state_dim, state_dim)
+    cov: Floats  # (state_dim, state_dim)
+    factor: Floats  # (state_dim, state_dim)
+    inverse: Floats  # (state_dim, state_dim)
+
+
+@kernel
+def _make_work(dim: int, meas_dim: int) -> _Work:
+    return _Work(
+        make_scratch(dim, meas_dim),
+        make_innovation(1, dim, meas_dim),
+        np.empty(dim),
+        np.empty((dim, dim)),
+        np.empty((dim, dim)),
+        np.empty((dim, dim)),
+        np.empty((dim, dim)),
+    )
 
 
 @inlined
@@ -31,7 +59,7 @@ def _invert(matrix: Floats, factor: Floats, out: Floats) -> None:
 
 @borrowing
 def _is_seen(
-    belief: Belief, decision: Decision, course: int, label: int, least: float, work: Work, detections: Floats
+    belief: Belief, decision: Decision, course: int, label: int, least: float, work: _Work, detections: Floats
 ) -> bool:
     """Whether a label is detected with probability `least` or more at some step; the probabilities are written."""
     paths, seen = belief.paths, False
@@ -44,7 +72,7 @@ def _is_seen(
 
 @borrowing
 def _expected_cov(
-    belief: Belief, decision: Decision, course: int, label: int, detections: Floats, work: Work, out: Floats
+    belief: Belief, decision: Decision, course: int, label: int, detections: Floats, work: _Work, out: Floats
 ) -> float:
     """Write the expected covariance at the end of the horizon; returns the log probability of never being detected."""
     paths, horizon, n = belief.paths, decision.horizon, out.shape[0]
@@ -85,7 +113,7 @@ def fill_expected_changes(
     also where earlier scans of the horizon are expected to have narrowed it.
     """
     dim, size = belief.paths.means.shape[2], bases.shape[1]
-    work = make_known_work(dim, len(decision.sensor.angular), decision.horizon.poses.shape[1])
+    work = _make_work(dim, len(decision.sensor.angular))
     cov, information, detections = np.empty((dim, dim)), np.empty((dim, dim)), np.empty(belief.paths.means.shape[1])
     for course in range(first, last):
         for entry in range(entries.first[course], entries.last[course]):

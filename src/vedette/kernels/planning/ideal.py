@@ -13,6 +13,7 @@ from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Floats, Ints, Lmb, Motion, Sensor
 from vedette.kernels.gaussian.linalg import cholesky
 from vedette.kernels.gaussian.scratch import Scratch, wrap_angle
+from vedette.kernels.planning.forms import Forms
 
 IDEAL = 0
 EXPECTED = 1
@@ -57,6 +58,7 @@ class Decision(NamedTuple):
     birth: Lmb  # none: over the horizon nobody is born
     motion: Motion  # all survive
     sensor: Sensor
+    forms: Forms
     horizon: Horizon
     futures: Futures  # as this sensor sees them
     truncation: Truncation
@@ -72,7 +74,8 @@ def most_targets(futures: Futures) -> int:
 
 
 @inlined
-def _add_noise(sensor: Sensor, state: Floats, pose: Floats, normals: Floats, scratch: Scratch, out: Floats) -> None:
+def add_noise(sensor: Sensor, state: Floats, pose: Floats, normals: Floats, scratch: Scratch, out: Floats) -> None:
+    """Add measurement noise, of standard deviates `normals`, to the measurement of a state."""
     noise, factor = scratch.measurement_noise, scratch.innovation_cov
     sensor.measurement_noise_cov(state, pose, sensor.noise_params, noise)
     if not cholesky(noise, factor):
@@ -99,7 +102,7 @@ def ideal_measurement(decision: Decision, action: int, target: int, step: int, s
     if seen:
         sensor.measurement(state, pose, sensor.measurement_params, out)
         if horizon.mode == SAMPLED:
-            _add_noise(sensor, state, pose, futures.normals[step, target], scratch, out)
+            add_noise(sensor, state, pose, futures.normals[step, target], scratch, out)
     return seen
 
 

@@ -5,7 +5,8 @@ label predicted as N(m, P) with existence odds o, an ideal measurement z of the 
 
     odds o (1 - P_D + P_D N(z; h(m), S) / kappa(z)),   density N(m + K (z - h(m)), P - K S K'),
 
-and a scan in which the sampled target is not seen, or not there, odds o (1 - P_D) and the density as it was.
+and a scan in which the sampled target is not seen, or not there, odds o (1 - P_D) and the density as it was. A label is
+followed with all samples side by side.
 """
 
 from __future__ import annotations
@@ -17,18 +18,37 @@ import numpy as np
 
 from vedette.errors import NumericalError
 from vedette.kernels.association.options import log_clutter_at
-from vedette.kernels.association.predicted import log_or_minus_inf
 from vedette.kernels.base.compile import borrowing, inlined, kernel
-from vedette.kernels.base.types import Floats, Ints
-from vedette.kernels.gaussian.information import move_row, to_information
-from vedette.kernels.gaussian.innovation import Innovation, expect, make_innovation, update_mean, whiten
-from vedette.kernels.gaussian.linalg import log_add
-from vedette.kernels.gaussian.prediction import predict
-from vedette.kernels.gaussian.scratch import Scratch, make_scratch
-from vedette.kernels.planning.bernoulli_rows import ALL_BUT_CERTAIN, bernoulli_size, log_miss
-from vedette.kernels.planning.ideal import Decision, ideal_measurement
+from vedette.kernels.base.elementary import exponentials, logs, logs_of_one_and
+from vedette.kernels.base.types import Bools, Floats, Ints
+from vedette.kernels.gaussian.information import to_information
+from vedette.kernels.gaussian.scratch import wrap_angle
+from vedette.kernels.planning.bernoulli_rows import ALL_BUT_CERTAIN, LEAST_MISS, bernoulli_size
+from vedette.kernels.planning.forms import (
+    fill_detection,
+    fill_measurements,
+    find_offsets,
+    place,
+    take_matrix,
+    take_state,
+)
+from vedette.kernels.planning.ideal import IDEAL, SAMPLED, Decision, add_noise
+from vedette.kernels.planning.lanes import (
+    Lanes,
+    LaneWork,
+    expect_lanes,
+    make_lane_work,
+    make_lanes,
+    predict_lanes,
+)
 from vedette.kernels.planning.pseudo_lmb import LmbResults
 from vedette.kernels.planning.reach import Belief
+
+# Samples followed at a time: their numbers stay in the fastest memory.
+_MOST_LANES = 64
+
+# Of a likelihood relative to a miss: its exponential is a double, and far beyond 1e16.
+_LARGEST_EXPONENT = 600.0
 
 
 class Entries(NamedTuple):
@@ -39,102 +59,219 @@ class Entries(NamedTuple):
     own: Ints  # (num_entries,) place among the sensor's labels
 
 
-class Work(NamedTuple):
-    """Arrays in which one label is followed over the horizon."""
-
-    scratch: Scratch
-    unseen: Innovation  # one entry a step: of the label as it is without any measurement so far
-    seen: Innovation  # of one entry: of the label after some measurement
-    measurement: Floats  # (meas_dim,)
-    whitened: Floats  # (meas_dim,)
-    predicted_mean: Floats  # (state_dim,)
-    predicted_cov: Floats  # (state_dim, state_dim)
-    mean: Floats  # (state_dim,)
-    cov: Floats  # (state_dim, state_dim)
-    factor: Floats  # (state_dim, state_dim)
-    inverse: Floats  # (state_dim, state_dim)
-
-
 class Followed(NamedTuple):
-    """What became of a label; its mean and covariance are in the work where it was measured."""
+    """A label with some samples, side by side: what became of it so far."""
 
-    log_odds: float  # factor on the odds of its existence
-    log_miss: float  # of the probability that no scan detects it
-    measured: bool
-    first_at_end: bool  # measured at the last step alone, after which its covariance is the same for all samples
+    means: Floats  # (state_dim, room)
+    covs: Floats  # (state_dim (state_dim + 1) / 2, room) lower triangles
+    log_odds: Floats  # (room,) factor on the odds of its existence
+    log_miss: Floats  # (room,) of the probability that no scan detects it
+    is_measured: Bools  # (room,) by some scan
+
+
+class Work(NamedTuple):
+    """Arrays in which samples are followed."""
+
+    lanes: Lanes
+    own: LaneWork
+    targets: Floats  # (state_dim, room) the label's targets; its own predicted mean where it is not there
+    measurements: Floats  # (meas_dim, room) of the targets, and then the whitened residuals
+    is_seen: Bools  # (room,) the targets that are measured
+    detection: Floats  # (room,) of the targets
+    levels: Floats  # (room,) log weights of a detection
+    missed: Floats  # (room,) log (1 - P_D)
 
 
 @kernel
-def make_known_work(dim: int, meas_dim: int, num_steps: int) -> Work:
+def _make_followed(dim: int, room: int) -> Followed:
+    covs = np.empty((place(dim, 0), room))
+    return Followed(np.empty((dim, room)), covs, np.empty(room), np.empty(room), np.empty(room, np.bool_))
+
+
+@kernel
+def _make_work(dim: int, meas_dim: int, room: int) -> Work:
     return Work(
-        make_scratch(dim, meas_dim),
-        make_innovation(num_steps, dim, meas_dim),
-        make_innovation(1, dim, meas_dim),
-        np.empty(meas_dim),
-        np.empty(meas_dim),
-        np.empty(dim),
-        np.empty((dim, dim)),
-        np.empty(dim),
-        np.empty((dim, dim)),
-        np.empty((dim, dim)),
-        np.empty((dim, dim)),
+        make_lanes(dim, meas_dim, room),
+        make_lane_work(dim, meas_dim, room),
+        np.empty((dim, room)),
+        np.empty((meas_dim, room)),
+        np.empty(room, np.bool_),
+        np.empty(room),
+        np.empty(room),
+        np.empty(room),
     )
 
 
-@borrowing
-def expect_unseen(belief: Belief, decision: Decision, course: int, label: int, work: Work) -> None:
-    """What the label's scans over the course look like until it is measured, the same for all samples."""
-    paths = belief.paths
-    for h in range(decision.horizon.poses.shape[1]):
-        pose = decision.horizon.poses[course, h]
-        expect(decision.sensor, pose, paths.means[label, h], paths.covs[label, h], h, work.unseen, work.scratch)
-
-
 @inlined
-def _take(innovation: Innovation, at: int, decision: Decision, pose: Floats, mean: Floats, work: Work) -> float:
-    """Update by the measurement in `work`, into its mean and covariance; returns the log factor on the odds."""
-    distance = whiten(innovation, at, work.measurement, decision.sensor.angular, math.inf, work.whitened)
-    update_mean(innovation, at, work.whitened, mean, work.mean)
-    _copy_matrix(innovation.covs[at], work.cov)
-    detection = innovation.prob_detection[at]
-    clutter = max(log_clutter_at(decision.sensor, work.measurement, pose), decision.truncation.log_clutter_floor)
-    likelihood = innovation.log_norm[at] - 0.5 * distance - clutter
-    return log_add(log_miss(detection), log_or_minus_inf(detection) + likelihood)
-
-
-@inlined
-def _copy_matrix(given: Floats, out: Floats) -> None:
-    for i in range(out.shape[0]):
-        for j in range(out.shape[1]):
-            out[i, j] = given[i, j]
+def _take_path(belief: Belief, label: int, step: int, num: int, lanes: Lanes) -> None:
+    """As the label is without any scan."""
+    mean, cov = belief.paths.means[label, step], belief.paths.covs[label, step]
+    for i in range(len(mean)):
+        for j in range(i + 1):
+            entries = lanes.covs[place(i, j)]
+            for s in range(num):
+                entries[s] = cov[i, j]
+        entries = lanes.means[i]
+        for s in range(num):
+            entries[s] = mean[i]
 
 
 @borrowing
-def follow(belief: Belief, decision: Decision, course: int, label: int, sample: int, work: Work) -> Followed:
-    """Follow a label with a sample over a course, once `expect_unseen` has been called for the two."""
-    motion, horizon, target = decision.motion, decision.horizon, belief.targets[label, sample]
-    log_odds, missed, measured, first_at_end = 0.0, 0.0, False, False
-    for h in range(horizon.poses.shape[1]):
-        pose = horizon.poses[course, h]
-        if measured:
-            predict(motion, horizon.dt, work.mean, work.cov, work.predicted_mean, work.predicted_cov, work.scratch)
-            expect(decision.sensor, pose, work.predicted_mean, work.predicted_cov, 0, work.seen, work.scratch)
-        detection = work.seen.prob_detection[0] if measured else work.unseen.prob_detection[h]
-        missed += log_miss(detection)
-        if target >= 0 and ideal_measurement(decision, course, target, h, work.scratch, work.measurement):
-            if measured:
-                log_odds += _take(work.seen, 0, decision, pose, work.predicted_mean, work)
-            else:
-                log_odds += _take(work.unseen, h, decision, pose, belief.paths.means[label, h], work)
-                first_at_end = h == horizon.poses.shape[1] - 1
-            measured = True
-            continue
-        log_odds += log_miss(detection)
-        if measured:
-            for j in range(len(work.mean)):
-                work.mean[j] = work.predicted_mean[j]
-            _copy_matrix(work.predicted_cov, work.cov)
-    return Followed(log_odds, missed, measured, first_at_end)
+def _look(
+    belief: Belief, decision: Decision, course: int, label: int, step: int, first: int, num: int, work: Work
+) -> int:
+    """Which of the samples' targets are seen, and their ideal measurements; returns how many are."""
+    sensor, forms, horizon, futures = decision.sensor, decision.forms, decision.horizon, decision.futures
+    pose, scratch, offsets, targets = horizon.poses[course, step], work.own.scratch, work.own.offsets, work.targets
+    for s in range(num):
+        target = belief.targets[label, first + s]
+        for j in range(targets.shape[0]):
+            targets[j, s] = futures.states[step, target, j] if target >= 0 else work.lanes.means[j, s]
+    find_offsets(pose, targets, num, offsets)
+    fill_detection(sensor, forms, pose, targets, offsets, num, scratch, work.detection)
+    count = 0
+    for s in range(num):
+        target, seen = belief.targets[label, first + s], False
+        if target >= 0:
+            # The uniforms are the same for all actions, so that actions are compared on common random numbers.
+            least = horizon.threshold if horizon.mode == IDEAL else futures.uniforms[step, target]
+            seen = work.detection[s] >= least if horizon.mode == IDEAL else work.detection[s] > least
+        work.is_seen[s] = seen
+        count += 1 if seen else 0
+    if count > 0:
+        fill_measurements(sensor, forms.measurement, pose, targets, offsets, num, scratch, work.measurements)
+    if horizon.mode == SAMPLED:
+        for s in range(num):
+            if work.is_seen[s]:
+                take_state(work.measurements, s, scratch.residual)
+                take_state(targets, s, scratch.points[0])
+                normals = futures.normals[step, belief.targets[label, first + s]]
+                add_noise(sensor, scratch.points[0], pose, normals, scratch, scratch.residual)
+                for a in range(len(scratch.residual)):
+                    work.measurements[a, s] = scratch.residual[a]
+    return count
+
+
+@inlined
+def _take_clutter(decision: Decision, pose: Floats, num: int, work: Work) -> None:
+    """levels = - log clutter intensity at the measurements."""
+    measurement = work.own.scratch.residual
+    for s in range(num):
+        level = 0.0
+        if work.is_seen[s]:
+            take_state(work.measurements, s, measurement)
+            level = max(log_clutter_at(decision.sensor, measurement, pose), decision.truncation.log_clutter_floor)
+        work.levels[s] = -level
+
+
+@inlined
+def _whiten(decision: Decision, num: int, work: Work) -> None:
+    """Measurements become whitened residuals, and levels + log N(z; h(m), S) the levels."""
+    lanes, levels = work.lanes, work.levels
+    for s in range(num):
+        levels[s] += lanes.log_norm[s]
+    for a in range(lanes.predicted.shape[0]):
+        residuals, predicted, away = work.measurements[a], lanes.predicted[a], 0
+        for s in range(num):
+            residuals[s] -= predicted[s]
+        if decision.sensor.angular[a]:
+            for s in range(num):
+                away += 0 if -math.pi < residuals[s] <= math.pi else 1
+            if away > 0:
+                for s in range(num):
+                    residuals[s] = wrap_angle(residuals[s])
+        for k in range(a):
+            factors, others = lanes.factor[place(a, k)], work.measurements[k]
+            for s in range(num):
+                residuals[s] -= factors[s] * others[s]
+        divisors = lanes.factor[place(a, a)]
+        for s in range(num):
+            residuals[s] /= divisors[s]
+        for s in range(num):
+            levels[s] -= 0.5 * residuals[s] * residuals[s]
+
+
+@inlined
+def _weigh(num: int, work: Work, out: Followed) -> None:
+    """Multiply the odds: log (1 - P_D + P_D N / kappa) = log (1 - P_D) + log (1 + P_D exp(levels - log (1 - P_D)))."""
+    detection, levels, missed, rest = work.lanes.prob_detection, work.levels, work.missed, work.detection
+    for s in range(num):
+        relative = levels[s] - missed[s]
+        # Beyond the largest exponent the 1 is lost beside the rest.
+        kept = min(max(relative, -_LARGEST_EXPONENT), _LARGEST_EXPONENT)
+        rest[s] = relative - kept if relative > kept and detection[s] > 0.0 else 0.0
+        levels[s] = kept
+    exponentials(levels[:num], work.own.offsets.bits)
+    for s in range(num):
+        levels[s] *= detection[s]
+    logs_of_one_and(levels[:num], work.own.offsets.bits, work.own.offsets.more_bits)
+    for s in range(num):
+        out.log_odds[s] += levels[s] + rest[s] if work.is_seen[s] else 0.0
+
+
+@inlined
+def _update(num: int, work: Work, out: Followed) -> None:
+    """Means and covariances of the samples that are seen are updated, of the others predicted."""
+    lanes, seen, dim = work.lanes, work.is_seen, out.means.shape[0]
+    for i in range(dim):
+        given, means = lanes.means[i], out.means[i]
+        for s in range(num):
+            means[s] = given[s]
+        for a in range(lanes.predicted.shape[0]):
+            whitened, cross = work.measurements[a], lanes.whitened_cross[a * dim + i]
+            for s in range(num):
+                means[s] += cross[s] * whitened[s] if seen[s] else 0.0
+    for k in range(out.covs.shape[0]):
+        predicted, updated, covs = lanes.covs[k], lanes.posterior[k], out.covs[k]
+        for s in range(num):
+            covs[s] = updated[s] if seen[s] else predicted[s]
+    for s in range(num):
+        out.is_measured[s] |= seen[s]
+
+
+@borrowing
+def _keep_predicted(num: int, lanes: Lanes, out: Followed) -> None:
+    for i in range(out.means.shape[0]):
+        given, means = lanes.means[i], out.means[i]
+        for s in range(num):
+            means[s] = given[s]
+    for k in range(out.covs.shape[0]):
+        given, covs = lanes.covs[k], out.covs[k]
+        for s in range(num):
+            covs[s] = given[s]
+
+
+@borrowing
+def _follow(
+    belief: Belief, decision: Decision, course: int, label: int, first: int, num: int, work: Work, out: Followed
+) -> None:
+    """Follow a label over a course, with `num` samples from `first` on."""
+    sensor, forms, horizon, is_path = decision.sensor, decision.forms, decision.horizon, True
+    lanes, own, missed = work.lanes, work.own, work.missed
+    for s in range(num):
+        out.log_odds[s], out.log_miss[s], out.is_measured[s] = 0.0, 0.0, False
+    for step in range(horizon.poses.shape[1]):
+        pose = horizon.poses[course, step]
+        # Until a first measurement all samples have the same label.
+        if is_path:
+            _take_path(belief, label, step, num, lanes)
+        else:
+            predict_lanes(decision.motion, forms, horizon.dt, out.means, out.covs, num, lanes, own)
+        expect_lanes(sensor, forms, pose, num, lanes, own)
+        for s in range(num):
+            missed[s] = max(1.0 - lanes.prob_detection[s], LEAST_MISS)
+        logs(missed[:num], own.offsets.bits, own.offsets.more_bits)
+        for s in range(num):
+            out.log_miss[s] += missed[s]
+            out.log_odds[s] += missed[s]
+        if _look(belief, decision, course, label, step, first, num, work) > 0:
+            _take_clutter(decision, pose, num, work)
+            _whiten(decision, num, work)
+            _weigh(num, work, out)
+            _update(num, work, out)
+            is_path = False
+        else:
+            _keep_predicted(num, lanes, out)
 
 
 @kernel
@@ -150,10 +287,26 @@ def rows_without_scans(means: Floats, covs: Floats, logits: Floats, references: 
     return rows
 
 
-@inlined
-def _write_row(mean: Floats, cov: Floats, reference: Floats, row: Floats, work: Work) -> None:
-    if not to_information(mean, cov, reference, 1.0, row, work.factor, work.inverse):
-        raise NumericalError("pseudo-update: covariance of a track is not positive definite")
+@borrowing
+def _write_changes(
+    found: Followed, first: int, num: int, reference: Floats, base: Floats, own: LaneWork, row: Floats, changes: Floats
+) -> None:
+    """Changes (bernoulli_size, num_samples) of a label, of `num` samples from `first` on."""
+    size = len(base)
+    for s in range(num):
+        for k in range(size - 2):
+            row[k] = 0.0
+        if found.is_measured[s]:
+            take_state(found.means, s, own.mean)
+            take_matrix(found.covs, s, own.cov)
+            if not to_information(own.mean, own.cov, reference, 1.0, row, own.out_cov, own.scratch.product):
+                raise NumericalError("pseudo-update: covariance of a track is not positive definite")
+            for k in range(size - 2):
+                row[k] -= base[k]
+        for k in range(size - 2):
+            changes[k, first + s] = row[k]
+    for s in range(num):
+        changes[size - 2, first + s], changes[size - 1, first + s] = found.log_odds[s], found.log_miss[s]
 
 
 @kernel
@@ -172,46 +325,31 @@ def fill_changes(
     references: (num_labels, state_dim) about which the rows are taken. bases: (num_labels, bernoulli_size) the sensor's
     rows without scans. Both in the order of the sensor's own labels.
     """
-    dim, num_samples, steps = references.shape[1], belief.targets.shape[1], decision.horizon.poses.shape[1]
-    work, size = make_known_work(dim, len(decision.sensor.angular), steps), bases.shape[1]
-    at_end, row = np.empty(size), np.empty(size)
+    dim, meas_dim, num_samples = references.shape[1], len(decision.sensor.angular), belief.targets.shape[1]
+    room = min(num_samples, _MOST_LANES)
+    work, found, row = _make_work(dim, meas_dim, room), _make_followed(dim, room), np.empty(bases.shape[1])
     for course in range(first, last):
         for entry in range(entries.first[course], entries.last[course]):
             label = entries.own[entry]
-            expect_unseen(belief, decision, course, label, work)
-            _write_row(
-                belief.paths.means[label, steps - 1], work.unseen.covs[steps - 1], references[label], at_end, work
-            )
-            for sample in range(num_samples):
-                found = follow(belief, decision, course, label, sample, work)
-                if not found.measured:
-                    row[:] = 0.0
-                else:
-                    if found.first_at_end:
-                        move_row(at_end, belief.paths.means[label, steps - 1], work.mean, references[label], row)
-                    else:
-                        _write_row(work.mean, work.cov, references[label], row, work)
-                    for k in range(size - 2):
-                        row[k] -= bases[label, k]
-                row[size - 2], row[size - 1] = found.log_odds, found.log_miss
-                for k in range(size):
-                    changes[entry, k, sample] = row[k]
+            for start in range(0, num_samples, _MOST_LANES):
+                num = min(_MOST_LANES, num_samples - start)
+                _follow(belief, decision, course, label, start, num, work, found)
+                _write_changes(found, start, num, references[label], bases[label], work.own, row, changes[entry])
 
 
 @kernel
 def pseudo_update_known(belief: Belief, decision: Decision, first: int, last: int, results: LmbResults) -> None:
     """Densities of courses `first:last` of one sensor, for every sample: case `course * num_samples + sample`."""
-    tracks, paths, steps = belief.prior.tracks, belief.paths, decision.horizon.poses.shape[1]
-    num_samples = belief.targets.shape[1]
-    work = make_known_work(tracks.means.shape[1], len(decision.sensor.angular), steps)
+    tracks, num_samples = belief.prior.tracks, belief.targets.shape[1]
+    dim, room = tracks.means.shape[1], min(num_samples, _MOST_LANES)
+    work, found = _make_work(dim, len(decision.sensor.angular), room), _make_followed(dim, room)
     for course in range(first, last):
         for label in range(len(tracks.labels)):
-            expect_unseen(belief, decision, course, label, work)
-            for sample in range(num_samples):
-                found, case = follow(belief, decision, course, label, sample, work), course * num_samples + sample
-                results.logits[case, label] = belief.prior.existence_logit[label] + found.log_odds
-                mean = work.mean if found.measured else paths.means[label, steps - 1]
-                cov = work.cov if found.measured else paths.covs[label, steps - 1]
-                for j in range(len(mean)):
-                    results.means[case, label, j] = mean[j]
-                _copy_matrix(cov, results.covs[case, label])
+            for start in range(0, num_samples, _MOST_LANES):
+                num = min(_MOST_LANES, num_samples - start)
+                _follow(belief, decision, course, label, start, num, work, found)
+                for s in range(num):
+                    case = course * num_samples + start + s
+                    results.logits[case, label] = belief.prior.existence_logit[label] + found.log_odds[s]
+                    take_state(found.means, s, results.means[case, label])
+                    take_matrix(found.covs, s, results.covs[case, label])

@@ -1,0 +1,252 @@
+"""Models at many states side by side: built-in ones in loops that the compiler vectorises, any other state by state.
+
+A model is a function of one state. Of the built-in ones that decisions ask most often, the same formulas stand here
+over an index of states; which of them a decision has, its `Forms` say. All arrays have the states along their last
+axis. A loop writes one array: the compiler gives up on vectorising where many of them might overlap.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from vedette.kernels.base.compile import borrowing, inlined, kernel
+from vedette.kernels.base.elementary import Bits, directions, exponentials, make_bits
+from vedette.kernels.base.types import Floats, Sensor
+from vedette.kernels.gaussian.detection import AT_CENTRE, checked, detection_probability
+from vedette.kernels.gaussian.scratch import Scratch
+
+ANY = 0  # a function of one state
+
+BEARING_RANGE, POSITION = 1, 2  # measurements
+GROWING, CONSTANT = 1, 2  # noise: of bearing and range, growing with the distance; independent, the same everywhere
+GAUSSIAN, SAME = 1, 2  # detection: less with the distance, as exp(-d^2 / (2 sigma^2)); the same everywhere
+
+
+class Forms(NamedTuple):
+    """The forms of a decision's models."""
+
+    is_linear: int  # 1 where the motion is x -> F x with the same noise everywhere, else 0
+    transition: Floats  # (state_dim, state_dim) F over a step of the horizon
+    motion_noise: Floats  # (state_dim, state_dim)
+    measurement: int
+    noise: int
+    detection: int
+    most_detection: float  # at which GAUSSIAN is cut off
+
+
+class Offsets(NamedTuple):
+    """Where states are from the sensor, and working arrays."""
+
+    dx: Floats  # (room,) m
+    dy: Floats  # (room,) m
+    squares: Floats  # (room,) m^2
+    distances: Floats  # (room,) m
+    bits: Bits
+    more_bits: Bits
+
+
+@kernel
+def make_offsets(room: int) -> Offsets:
+    return Offsets(np.empty(room), np.empty(room), np.empty(room), np.empty(room), make_bits(room), make_bits(room))
+
+
+@inlined
+def place(row: int, column: int) -> int:
+    """Place of an entry in the lower triangle of a matrix, row by row."""
+    return row * (row + 1) // 2 + column
+
+
+@inlined
+def take_state(states: Floats, s: int, out: Floats) -> None:
+    """out (state_dim,) = the state at place s of (state_dim, room)."""
+    for j in range(len(out)):
+        out[j] = states[j, s]
+
+
+@inlined
+def take_matrix(lower: Floats, s: int, out: Floats) -> None:
+    """out = the symmetric matrix at place s of lower triangles."""
+    for i in range(out.shape[0]):
+        for j in range(i + 1):
+            out[i, j] = lower[place(i, j), s]
+            out[j, i] = out[i, j]
+
+
+@borrowing
+def find_offsets(pose: Floats, states: Floats, num: int, out: Offsets) -> None:
+    """Offsets of the first `num` states (state_dim, room) from the pose."""
+    x, y, dx, dy, squares, distances = states[0], states[1], out.dx, out.dy, out.squares, out.distances
+    px, py = pose[0], pose[1]
+    for s in range(num):
+        dx[s] = x[s] - px
+    for s in range(num):
+        dy[s] = y[s] - py
+    for s in range(num):
+        squares[s] = dx[s] * dx[s] + dy[s] * dy[s]
+    for s in range(num):
+        distances[s] = math.sqrt(squares[s])
+
+
+@borrowing
+def fill_measurements(
+    sensor: Sensor, form: int, pose: Floats, states: Floats, offsets: Offsets, num: int, scratch: Scratch, out: Floats
+) -> None:
+    """out (meas_dim, room): measurements of states (state_dim, room), whose offsets have been found."""
+    if form == BEARING_RANGE:
+        directions(offsets.dy[:num], offsets.dx[:num], out[0, :num])
+        ranges = out[1]
+        for s in range(num):
+            ranges[s] = offsets.distances[s]
+    elif form == POSITION:
+        for a in range(2):
+            given, written = states[a], out[a]
+            for s in range(num):
+                written[s] = given[s]
+    else:
+        state, measured = scratch.points[0], scratch.residual
+        for s in range(num):
+            take_state(states, s, state)
+            sensor.measurement(state, pose, sensor.measurement_params, measured)
+            for a in range(len(measured)):
+                out[a, s] = measured[a]
+
+
+@borrowing
+def fill_jacobians(
+    sensor: Sensor, form: int, pose: Floats, states: Floats, offsets: Offsets, num: int, scratch: Scratch, out: Floats
+) -> None:
+    """out (meas_dim * state_dim, room): Jacobians of the measurement, row by row; see `jacobian_width`."""
+    dim = states.shape[0]
+    if form == BEARING_RANGE:
+        across, along, right, up = out[0], out[1], out[dim], out[dim + 1]
+        dx, dy, squares, distances = offsets.dx, offsets.dy, offsets.squares, offsets.distances
+        # At the sensor itself there is no direction: whatever is divided by infinity is zero.
+        for s in range(num):
+            across[s] = -dy[s] / (squares[s] if squares[s] > 0.0 else math.inf)
+        for s in range(num):
+            along[s] = dx[s] / (squares[s] if squares[s] > 0.0 else math.inf)
+        for s in range(num):
+            right[s] = dx[s] / (distances[s] if distances[s] > 0.0 else math.inf)
+        for s in range(num):
+            up[s] = dy[s] / (distances[s] if distances[s] > 0.0 else math.inf)
+    elif form == POSITION:
+        for a in range(2):
+            for j in range(2):
+                entries = out[a * dim + j]
+                for s in range(num):
+                    entries[s] = 1.0 if a == j else 0.0
+    else:
+        state, jacobian = scratch.points[0], scratch.measurement_jacobian
+        for s in range(num):
+            take_state(states, s, state)
+            sensor.measurement_jacobian(state, pose, sensor.measurement_params, jacobian)
+            for a in range(jacobian.shape[0]):
+                for j in range(dim):
+                    out[a * dim + j, s] = jacobian[a, j]
+
+
+@inlined
+def jacobian_width(form: int, state_dim: int) -> int:
+    """How many columns of a measurement's Jacobian are filled in; the others are zero."""
+    return state_dim if form == ANY else 2
+
+
+@borrowing
+def fill_noise(
+    sensor: Sensor, form: int, pose: Floats, states: Floats, offsets: Offsets, num: int, scratch: Scratch, out: Floats
+) -> None:
+    """out (meas_dim (meas_dim + 1) / 2, room): lower triangles of the measurement noise, made symmetric."""
+    params, noise = sensor.noise_params, scratch.measurement_noise
+    if form == GROWING:
+        bearings, between, ranges, squares, distances = out[0], out[1], out[2], offsets.squares, offsets.distances
+        near_range, far_range, near_bearing, far_bearing = params[0], params[1], params[2], params[3]
+        for s in range(num):
+            std = near_bearing + far_bearing * distances[s]
+            bearings[s] = std * std
+        for s in range(num):
+            between[s] = 0.0
+        for s in range(num):
+            std = near_range + far_range * squares[s]
+            ranges[s] = std * std
+    elif form == CONSTANT:
+        for a in range(noise.shape[0]):
+            for b in range(a + 1):
+                entries, entry = out[place(a, b)], params[a] * params[a] if a == b else 0.0
+                for s in range(num):
+                    entries[s] = entry
+    else:
+        state = scratch.points[0]
+        for s in range(num):
+            take_state(states, s, state)
+            sensor.measurement_noise_cov(state, pose, sensor.noise_params, noise)
+            for a in range(noise.shape[0]):
+                for b in range(a + 1):
+                    out[place(a, b), s] = 0.5 * (noise[a, b] + noise[b, a])
+
+
+@inlined
+def _detect_by_form(sensor: Sensor, forms: Forms, offsets: Offsets, num: int, out: Floats) -> None:
+    if forms.detection == SAME:
+        for s in range(num):
+            out[s] = sensor.detection_params[0]
+        return
+    spread = sensor.detection_params[0] * sensor.detection_params[0]
+    for s in range(num):
+        # Beyond the least exponent it is 0 but for 1e-304.
+        out[s] = max(-0.5 * offsets.squares[s] / spread, -700.0)
+    exponentials(out[:num], offsets.bits)
+    for s in range(num):
+        out[s] = min(out[s], forms.most_detection)
+
+
+@borrowing
+def fill_detection(
+    sensor: Sensor,
+    forms: Forms,
+    pose: Floats,
+    states: Floats,
+    offsets: Offsets,
+    num: int,
+    scratch: Scratch,
+    out: Floats,
+) -> None:
+    """out (room,): probabilities of detection of targets at states (state_dim, room)."""
+    if forms.detection != ANY:
+        _detect_by_form(sensor, forms, offsets, num, out)
+        return
+    state = scratch.points[0]
+    for s in range(num):
+        take_state(states, s, state)
+        out[s] = sensor.prob_detection(state, pose, sensor.detection_params)
+
+
+@borrowing
+def fill_detection_of_gaussians(
+    sensor: Sensor,
+    forms: Forms,
+    pose: Floats,
+    means: Floats,
+    covs: Floats,
+    offsets: Offsets,
+    num: int,
+    scratch: Scratch,
+    out: Floats,
+) -> None:
+    """out (room,): probabilities of detection of Gaussians, by the sensor's `detection_rule`.
+
+    means: (state_dim, room). covs: (state_dim (state_dim + 1) / 2, room) lower triangles.
+    """
+    if forms.detection != ANY and sensor.detection_rule == AT_CENTRE:
+        _detect_by_form(sensor, forms, offsets, num, out)
+        return
+    mean, cov = scratch.points[1], scratch.factor
+    for s in range(num):
+        take_state(means, s, mean)
+        if sensor.detection_rule == AT_CENTRE:
+            out[s] = checked(sensor.prob_detection(mean, pose, sensor.detection_params))
+        else:
+            take_matrix(covs, s, cov)
+            out[s] = detection_probability(sensor, pose, mean, cov, scratch.points[0])

@@ -1,0 +1,290 @@
+"""Extended Kalman steps of many Gaussians side by side, in loops that the compiler vectorises.
+
+The formulas are those of `vedette.kernels.gaussian.prediction` and `innovation`; entry (i, j) of all matrices is one
+row of numbers, one a Gaussian. Where a number is not as it should be (a matrix that is not definite, a difference that
+cancels), and for sigma points, a Gaussian goes by those kernels by itself, which have the last word.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from vedette.kernels.base.compile import borrowing, inlined, kernel
+from vedette.kernels.base.elementary import logs
+from vedette.kernels.base.types import Floats, Motion, Sensor
+from vedette.kernels.gaussian.innovation import LEAST_SHRINKAGE, Innovation, expect, make_innovation
+from vedette.kernels.gaussian.linalg import LOG_2PI
+from vedette.kernels.gaussian.prediction import predict
+from vedette.kernels.gaussian.scratch import Scratch, make_scratch
+from vedette.kernels.gaussian.sigma_points import LINEARISED
+from vedette.kernels.planning.forms import (
+    Forms,
+    Offsets,
+    fill_detection_of_gaussians,
+    fill_jacobians,
+    fill_measurements,
+    fill_noise,
+    find_offsets,
+    jacobian_width,
+    make_offsets,
+    place,
+    take_matrix,
+    take_state,
+)
+
+
+class Lanes(NamedTuple):
+    """Predicted Gaussians and what each expects of a scan, as `Innovation` has it; of matrices the lower triangles."""
+
+    means: Floats  # (state_dim, room)
+    covs: Floats  # (state_dim (state_dim + 1) / 2, room)
+    predicted: Floats  # (meas_dim, room)
+    factor: Floats  # (meas_dim (meas_dim + 1) / 2, room) L
+    whitened_cross: Floats  # (meas_dim * state_dim, room) W, row by row
+    posterior: Floats  # (state_dim (state_dim + 1) / 2, room)
+    log_norm: Floats  # (room,)
+    prob_detection: Floats  # (room,)
+
+
+class LaneWork(NamedTuple):
+    """Arrays to work in."""
+
+    offsets: Offsets
+    product: Floats  # (state_dim * state_dim, room) Jacobian of the motion times covariance
+    jacobian: Floats  # (meas_dim * state_dim, room) of the measurement
+    noise: Floats  # (meas_dim (meas_dim + 1) / 2, room)
+    volume: Floats  # (room,) determinant of the innovation covariance; NaN where a Gaussian goes by itself
+    scratch: Scratch
+    mean: Floats  # (state_dim,) of one Gaussian, as the rest
+    cov: Floats  # (state_dim, state_dim)
+    out_mean: Floats  # (state_dim,)
+    out_cov: Floats  # (state_dim, state_dim)
+    innovation: Innovation
+
+
+@kernel
+def make_lanes(dim: int, meas_dim: int, room: int) -> Lanes:
+    size, meas_size = place(dim, 0), place(meas_dim, 0)
+    return Lanes(
+        np.empty((dim, room)),
+        np.empty((size, room)),
+        np.empty((meas_dim, room)),
+        np.empty((meas_size, room)),
+        np.empty((meas_dim * dim, room)),
+        np.empty((size, room)),
+        np.empty(room),
+        np.empty(room),
+    )
+
+
+@kernel
+def make_lane_work(dim: int, meas_dim: int, room: int) -> LaneWork:
+    return LaneWork(
+        make_offsets(room),
+        np.empty((dim * dim, room)),
+        np.empty((meas_dim * dim, room)),
+        np.empty((place(meas_dim, 0), room)),
+        np.empty(room),
+        make_scratch(dim, meas_dim),
+        np.empty(dim),
+        np.empty((dim, dim)),
+        np.empty(dim),
+        np.empty((dim, dim)),
+        make_innovation(1, dim, meas_dim),
+    )
+
+
+@inlined
+def _set(value: float, num: int, out: Floats) -> None:
+    for s in range(num):
+        out[s] = value
+
+
+@inlined
+def _add_scaled(scale: float, row: Floats, num: int, out: Floats) -> None:
+    # Jacobians of motions are mostly zeros.
+    if scale != 0.0:
+        for s in range(num):
+            out[s] += scale * row[s]
+
+
+@inlined
+def _add_product(a: Floats, b: Floats, num: int, out: Floats) -> None:
+    for s in range(num):
+        out[s] += a[s] * b[s]
+
+
+@inlined
+def _subtract_product(a: Floats, b: Floats, num: int, out: Floats) -> None:
+    for s in range(num):
+        out[s] -= a[s] * b[s]
+
+
+@inlined
+def _lower(i: int, j: int) -> int:
+    """Place of entry (i, j) of a symmetric matrix."""
+    return place(i, j) if i >= j else place(j, i)
+
+
+@borrowing
+def _predict_linear(forms: Forms, means: Floats, covs: Floats, num: int, lanes: Lanes, work: LaneWork) -> int:
+    """m <- F m, P <- F P F' + Q; returns how many are not finite or not positive on the diagonal."""
+    dim, transition, noise, wrong = means.shape[0], forms.transition, forms.motion_noise, 0
+    for i in range(dim):
+        _set(0.0, num, lanes.means[i])
+        for k in range(dim):
+            _add_scaled(transition[i, k], means[k], num, lanes.means[i])
+            _set(0.0, num, work.product[i * dim + k])
+            for j in range(dim):
+                _add_scaled(transition[i, j], covs[_lower(j, k)], num, work.product[i * dim + k])
+    for i in range(dim):
+        for j in range(i + 1):
+            out = lanes.covs[place(i, j)]
+            _set(0.5 * (noise[i, j] + noise[j, i]), num, out)
+            for k in range(dim):
+                _add_scaled(transition[j, k], work.product[i * dim + k], num, out)
+        mean, variance = lanes.means[i], lanes.covs[place(i, i)]
+        for s in range(num):
+            wrong += 0 if 0.0 < variance[s] < math.inf and abs(mean[s]) < math.inf else 1
+    return wrong
+
+
+@borrowing
+def predict_lanes(
+    motion: Motion, forms: Forms, dt: float, means: Floats, covs: Floats, num: int, lanes: Lanes, work: LaneWork
+) -> None:
+    """Predict the first `num` Gaussians of means (state_dim, room) and covs into the lanes, as `prediction.predict`."""
+    if forms.is_linear == 1 and _predict_linear(forms, means, covs, num, lanes, work) == 0:
+        return
+    for s in range(num):
+        take_state(means, s, work.mean)
+        take_matrix(covs, s, work.cov)
+        predict(motion, dt, work.mean, work.cov, work.out_mean, work.out_cov, work.scratch)
+        for i in range(len(work.mean)):
+            lanes.means[i, s] = work.out_mean[i]
+            for j in range(i + 1):
+                lanes.covs[place(i, j), s] = work.out_cov[i, j]
+
+
+@inlined
+def _project(width: int, num: int, lanes: Lanes, work: LaneWork) -> None:
+    """W = H P, and the lower triangle of H P H' + R to the factor."""
+    dim, meas_dim = lanes.means.shape[0], lanes.predicted.shape[0]
+    for a in range(meas_dim):
+        for j in range(dim):
+            cross = lanes.whitened_cross[a * dim + j]
+            _set(0.0, num, cross)
+            for k in range(width):
+                _add_product(work.jacobian[a * dim + k], lanes.covs[_lower(k, j)], num, cross)
+        for b in range(a + 1):
+            entries, noise = lanes.factor[place(a, b)], work.noise[place(a, b)]
+            _set(0.0, num, entries)
+            for k in range(width):
+                _add_product(lanes.whitened_cross[a * dim + k], work.jacobian[b * dim + k], num, entries)
+            for s in range(num):
+                entries[s] += noise[s]
+
+
+@inlined
+def _condition(num: int, lanes: Lanes, work: LaneWork) -> None:
+    """Factor the innovation covariances, whiten the cross, and take the posterior covariances."""
+    dim, meas_dim, volume = lanes.means.shape[0], lanes.predicted.shape[0], work.volume
+    _set(1.0, num, volume)
+    for a in range(meas_dim):
+        pivots = lanes.factor[place(a, a)]
+        for b in range(a + 1):
+            entries = lanes.factor[place(a, b)]
+            for k in range(b):
+                _subtract_product(lanes.factor[place(a, k)], lanes.factor[place(b, k)], num, entries)
+            if b < a:
+                divisors = lanes.factor[place(b, b)]
+                for s in range(num):
+                    entries[s] /= divisors[s]
+        for s in range(num):
+            # NaN from the first pivot on that is not above zero.
+            volume[s] *= pivots[s] if pivots[s] > 0.0 else math.nan
+        for s in range(num):
+            pivots[s] = math.sqrt(pivots[s] if pivots[s] > 0.0 else math.nan)
+        for j in range(dim):
+            cross = lanes.whitened_cross[a * dim + j]
+            for k in range(a):
+                _subtract_product(lanes.factor[place(a, k)], lanes.whitened_cross[k * dim + j], num, cross)
+            for s in range(num):
+                cross[s] /= pivots[s]
+    for i in range(dim):
+        for j in range(i + 1):
+            given, out = lanes.covs[place(i, j)], lanes.posterior[place(i, j)]
+            for s in range(num):
+                out[s] = given[s]
+            for a in range(meas_dim):
+                _subtract_product(lanes.whitened_cross[a * dim + i], lanes.whitened_cross[a * dim + j], num, out)
+
+
+@inlined
+def _mark_cancelled(num: int, lanes: Lanes, work: LaneWork) -> int:
+    """Make NaN the volumes of Gaussians that must go by themselves, see `innovation`; returns their number."""
+    volume, noise, wrong = work.volume, work.noise, 0
+    if lanes.predicted.shape[0] == 1:
+        own = noise[0]
+        for s in range(num):
+            volume[s] = volume[s] if LEAST_SHRINKAGE * volume[s] < own[s] else math.nan
+    else:
+        first, skew, second = noise[0], noise[1], noise[2]
+        for s in range(num):
+            own_volume = first[s] * second[s] - skew[s] * skew[s]
+            volume[s] = volume[s] if LEAST_SHRINKAGE * volume[s] < own_volume else math.nan
+    for s in range(num):
+        wrong += 0 if 1e-290 < volume[s] < 1e290 else 1
+    return wrong
+
+
+@borrowing
+def _expect_alone(sensor: Sensor, pose: Floats, s: int, lanes: Lanes, work: LaneWork) -> None:
+    dim, innovation = lanes.means.shape[0], work.innovation
+    take_state(lanes.means, s, work.mean)
+    take_matrix(lanes.covs, s, work.cov)
+    expect(sensor, pose, work.mean, work.cov, 0, innovation, work.scratch)
+    for a in range(lanes.predicted.shape[0]):
+        lanes.predicted[a, s] = innovation.predicted[0, a]
+        for b in range(a + 1):
+            lanes.factor[place(a, b), s] = innovation.factor[0, a, b]
+        for j in range(dim):
+            lanes.whitened_cross[a * dim + j, s] = innovation.whitened_cross[0, a, j]
+    for i in range(dim):
+        for j in range(i + 1):
+            lanes.posterior[place(i, j), s] = innovation.covs[0, i, j]
+    lanes.log_norm[s], lanes.prob_detection[s] = innovation.log_norm[0], innovation.prob_detection[0]
+
+
+@borrowing
+def expect_lanes(sensor: Sensor, forms: Forms, pose: Floats, num: int, lanes: Lanes, work: LaneWork) -> None:
+    """Fill in what the first `num` predicted Gaussians expect of a scan from a pose, as `innovation.expect`."""
+    meas_dim, scratch, offsets = lanes.predicted.shape[0], work.scratch, work.offsets
+    if sensor.method != LINEARISED or meas_dim > 2:
+        for s in range(num):
+            _expect_alone(sensor, pose, s, lanes, work)
+        return
+    means = lanes.means
+    find_offsets(pose, means, num, offsets)
+    fill_measurements(sensor, forms.measurement, pose, means, offsets, num, scratch, lanes.predicted)
+    fill_jacobians(sensor, forms.measurement, pose, means, offsets, num, scratch, work.jacobian)
+    fill_noise(sensor, forms.noise, pose, means, offsets, num, scratch, work.noise)
+    _project(jacobian_width(forms.measurement, means.shape[0]), num, lanes, work)
+    _condition(num, lanes, work)
+    wrong = _mark_cancelled(num, lanes, work)
+    for s in range(num):
+        lanes.log_norm[s] = work.volume[s]
+    logs(lanes.log_norm[:num], offsets.bits, offsets.more_bits)
+    for s in range(num):
+        lanes.log_norm[s] = -0.5 * (lanes.log_norm[s] + meas_dim * LOG_2PI)
+    fill_detection_of_gaussians(sensor, forms, pose, means, lanes.covs, offsets, num, scratch, lanes.prob_detection)
+    if wrong > 0:
+        for s in range(num):
+            if not 1e-290 < work.volume[s] < 1e290:
+                _expect_alone(sensor, pose, s, lanes, work)
+
+
+__all__ = ["LaneWork", "Lanes", "expect_lanes", "make_lane_work", "make_lanes", "predict_lanes"]

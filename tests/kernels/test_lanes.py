@@ -1,0 +1,113 @@
+"""Kalman steps of many Gaussians side by side, against the kernels that take one at a time."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from vedette import models
+from vedette.control.forms import forms_of
+from vedette.kernels.gaussian.innovation import expect, make_innovation
+from vedette.kernels.gaussian.prediction import predict
+from vedette.kernels.gaussian.scratch import make_scratch
+from vedette.kernels.planning.forms import ANY
+from vedette.kernels.planning.lanes import expect_lanes, make_lane_work, make_lanes, predict_lanes
+
+NUM, ROOM, DT = 11, 16, 1.5
+POSE = np.array([-300.0, 120.0, 0.4])
+REGION = models.Region(-1000.0, 1000.0, -1000.0, 1000.0)
+
+
+@models.model_function("prob_detection")
+def _own_detection(state: Any, pose: Any, params: Any) -> float:
+    return float(params[0] / (1.0 + abs(state[0] - pose[0]) / 500.0))
+
+
+@models.model_function("measurement_noise_cov")
+def _own_noise(state: Any, pose: Any, params: Any, out: Any) -> None:
+    out[0, 0], out[0, 1], out[1, 0], out[1, 1] = 0.01, 0.02, 0.03, 9.0 + abs(state[1]) / 100.0
+
+
+POLAR = (models.bearing_range(), "bearing_range")
+PLACE = (models.position(), "position")
+BEARING = (models.bearing_only(), "bearing_only")
+GROWING = models.range_dependent_noise(5.0, 5e-5, 0.02, 2e-5)
+SENSORS: dict[str, Any] = {
+    "polar": (POLAR, GROWING, models.gaussian_detection(500.0), "auto", "centre"),
+    "position": (PLACE, models.constant_noise([4.0, 7.0]), models.constant_detection(0.7), "auto", "centre"),
+    "one component": (BEARING, models.constant_noise([0.02]), models.gaussian_detection(500.0), "auto", "mean"),
+    "own parts": (POLAR, models.NoiseModel(_own_noise, np.empty(0), 2), None, "auto", "centre"),
+    "by nodes": (POLAR, GROWING, None, "auto", "mean"),
+    "sigma points": (POLAR, GROWING, models.gaussian_detection(500.0), "ukf", "centre"),
+    "nothing left": (PLACE, models.constant_noise([1e-7, 1e-7]), models.constant_detection(0.7), "auto", "centre"),
+}
+
+
+def sensor_of(name: str) -> models.SensorModel:
+    (measurement, kind), noise, detection, method, at = SENSORS[name]
+    own = models.DetectionModel(_own_detection, np.array([0.9])) if detection is None else detection
+    return models.SensorModel(measurement, noise, own, models.region_clutter(5.0, REGION, kind), method, at)
+
+
+def gaussians(dim: int, seed: int = 0) -> tuple[Any, Any]:
+    rng, std = np.random.default_rng(seed), np.array([20.0, 30.0, 4.0, 5.0, 0.05])[:dim]
+    means = rng.normal(size=(NUM, dim)) * np.array([300.0, 300.0, 10.0, 10.0, 0.1])[:dim]
+    factors = np.diag(std) @ (np.eye(dim) + 0.3 * rng.normal(size=(NUM, dim, dim)))
+    return means, factors @ factors.transpose(0, 2, 1)
+
+
+def side_by_side(values: Any) -> Any:
+    """(k, ROOM) of (NUM, ...) vectors or symmetric matrices, with nonsense in the places that are not asked for."""
+    flat = values if values.ndim == 2 else values[:, *np.tril_indices(values.shape[1])]
+    out = np.full((flat.shape[1], ROOM), np.nan)
+    out[:, :NUM] = flat.T
+    return out
+
+
+@pytest.mark.parametrize("name", SENSORS)
+@pytest.mark.parametrize("motion", [models.constant_velocity(2.0), models.coordinated_turn(2.0, 0.02)])
+def test_steps_are_those_of_one_gaussian_at_a_time(name: str, motion: models.MotionModel) -> None:
+    dim, sensor = motion.state_dim, sensor_of(name)
+    moves, sees = models.kernel_motion(motion, models.constant_survival(1.0)), sensor.to_kernel()
+    forms = forms_of(moves, sees, DT, dim)
+    assert forms.is_linear == (dim == 4)
+    means, covs = gaussians(dim)
+    lanes, work = make_lanes(dim, sensor.meas_dim, ROOM), make_lane_work(dim, sensor.meas_dim, ROOM)
+    predict_lanes(moves, forms, DT, side_by_side(means), side_by_side(covs), NUM, lanes, work)
+    expect_lanes(sees, forms, POSE, NUM, lanes, work)
+    expected, scratch = make_innovation(1, dim, sensor.meas_dim), make_scratch(dim, sensor.meas_dim)
+    mean, cov, lower, few = np.empty(dim), np.empty((dim, dim)), np.tril_indices(dim), np.tril_indices(sensor.meas_dim)
+    for s in range(NUM):
+        predict(moves, DT, means[s], covs[s], mean, cov, scratch)
+        expect(sees, POSE, mean, cov, 0, expected, scratch)
+        close: dict[str, Any] = {"rtol": 1e-12, "atol": 1e-12}
+        np.testing.assert_allclose(lanes.means[:, s], mean, **close)
+        np.testing.assert_allclose(lanes.covs[:, s], cov[lower], **close)
+        np.testing.assert_allclose(lanes.predicted[:, s], expected.predicted[0], **close)
+        np.testing.assert_allclose(lanes.factor[:, s], expected.factor[0][few], **close)
+        np.testing.assert_allclose(lanes.whitened_cross[:, s], expected.whitened_cross[0].ravel(), **close)
+        np.testing.assert_allclose(lanes.posterior[:, s], expected.covs[0][lower], rtol=1e-10, atol=1e-12)
+        np.testing.assert_allclose(lanes.log_norm[s], expected.log_norm[0], **close)
+        np.testing.assert_allclose(lanes.prob_detection[s], expected.prob_detection[0], **close)
+
+
+def test_models_of_a_users_own_have_no_form() -> None:
+    forms = forms_of(
+        models.kernel_motion(models.coordinated_turn(2.0, 0.02), models.constant_survival(1.0)),
+        sensor_of("own parts").to_kernel(),
+        DT,
+        5,
+    )
+    assert (forms.is_linear, forms.noise, forms.detection) == (0, ANY, ANY)
+
+
+def test_what_no_gaussian_has_is_told_as_of_one_alone() -> None:
+    motion, sensor = models.constant_velocity(2.0), sensor_of("polar")
+    moves, sees = models.kernel_motion(motion, models.constant_survival(1.0)), sensor.to_kernel()
+    forms, (means, covs) = forms_of(moves, sees, DT, 4), gaussians(4)
+    means[3, 0] = np.inf
+    lanes, work = make_lanes(4, 2, ROOM), make_lane_work(4, 2, ROOM)
+    with pytest.raises(Exception, match="predicted mean or covariance is not"):
+        predict_lanes(moves, forms, DT, side_by_side(means), side_by_side(covs), NUM, lanes, work)
