@@ -110,7 +110,7 @@ def test_the_papers_scenario_has_the_papers_numbers(name: str) -> None:
     assert control.decision_steps == (10, 20, 30)
     assert {sensor.platform.model_dump()["headings_deg"] for sensor in model.sensors} == {tuple(range(-180, 181, 30))}
     assert (control.horizon_steps, control.horizon_period, control.num_samples) == (5, 2.0, 40)
-    assert (control.limits.max_prior_hypotheses, control.limits.max_hypotheses) == (10, 40)
+    assert (control.limits.max_prior_hypotheses, control.limits.max_hypotheses) == (10, 10)
     assert (model.ospa.cutoff, model.ospa.order, model.ospa.components, model.ospa.window) == (
         100.0,
         1.0,

@@ -25,7 +25,7 @@ IDEAL_MODES = {"ideal": IDEAL, "expected": EXPECTED, "sampled": SAMPLED}
 def planning_limits() -> Limits:
     """Defaults of the pseudo-updates: few hypotheses, one Gaussian a track, and no label ever dropped."""
     return Limits(
-        max_hypotheses=40, min_relative_weight=1e-5, min_track_weight=1.0, max_components=1, min_existence=0.0
+        max_hypotheses=10, min_relative_weight=1e-5, min_track_weight=1.0, max_components=1, min_existence=0.0
     )
 
 

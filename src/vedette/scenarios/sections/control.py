@@ -41,7 +41,7 @@ class PlanningLimits(Section):
         description="Densities of one label within so many nats of each other are taken as one at the start of the "
         "horizon; 0: none are [nats].",
     )
-    max_hypotheses: Count = Field(default=40, description="Most hypotheses after each step of the horizon [-].")
+    max_hypotheses: Count = Field(default=10, description="Most hypotheses after each step of the horizon [-].")
     max_glmb_sensors: Annotated[Whole, Field(ge=0)] = Field(
         default=4, description="With more sensors GLMB beliefs are planned on as LMBs, which plans then say [-]."
     )
