@@ -34,7 +34,7 @@ MODULES = (
     "whole_run", "start", "campaign",
 )  # fmt: skip
 HERE = Path(__file__).resolve().parent
-BEGIN, END = "<!-- from benchmarks/all.py -->", "<!-- to here -->"
+END = "<!-- to here -->"
 QUICK_ROUNDS = 3
 
 
@@ -149,20 +149,20 @@ def markdown(lines: Sequence[Line], *, paired: bool) -> str:
 
 
 def _both(figures: Figures | None) -> str:
-    return (
-        "- | -"
-        if figures is None
-        else " | ".join(f"{value:,.3g}" if value < 100 else f"{value:,.0f}" for value in figures)
-    )
+    return "- | -" if figures is None else " | ".join(map(_short, figures))
 
 
-def write_between(path: Path, text: str) -> None:
-    """Put the table in the place that a page keeps for it."""
-    page = path.read_text(encoding="utf-8")
-    if BEGIN not in page or END not in page:
-        raise SystemExit(f"{path}: expected the lines {BEGIN} and {END}")
-    before, after = page.split(BEGIN)[0], page.split(END)[1]
-    path.write_text(f"{before}{BEGIN}\n\n{text}\n\n{END}{after}", encoding="utf-8")
+def _short(value: float) -> str:
+    return f"{value:,.3g}" if value < 100 else f"{value:,.0f}"
+
+
+def write_between(path: Path, script: str, text: str) -> None:
+    """Put a table in the place that a page keeps for the script that makes it."""
+    page, begin = path.read_text(encoding="utf-8"), f"<!-- from benchmarks/{script} -->"
+    if begin not in page or END not in page.split(begin)[1]:
+        raise SystemExit(f"{path}: expected the lines {begin} and {END}")
+    before, rest = page.split(begin, 1)
+    path.write_text(f"{before}{begin}\n\n{text}\n\n{END}{rest.split(END, 1)[1]}", encoding="utf-8")
 
 
 def draw(lines: Sequence[Line], path: Path) -> None:
@@ -182,16 +182,17 @@ def draw(lines: Sequence[Line], path: Path) -> None:
                 place, scale * line.other.least, height=0.75, color="0.82", label="before" if place == 0 else None
             )
         axis.barh(place, scale * line.own.least, height=0.45, color="C0", label="now" if place == 0 else None)
-        text = f"{scale * line.own.least:,.3g} ms" + ("" if line.ratio is None else f", {line.ratio:.1f} times as fast")
+        text = f"{_short(line.own.least)} {line.measure.unit}"
+        text += "" if line.ratio is None else f", {line.ratio:.1f} times as fast"
         most = scale * max(line.own.least, line.other.least if line.other else 0.0)
         axis.annotate(text, (most, place), xytext=(4, 0), textcoords="offset points", va="center", fontsize=8)
     axis.set_yticks(range(len(known)), [line.measure.key for line in known], fontsize=8)
-    axis.invert_yaxis()
+    axis.set_ylim(len(known) - 0.4, -0.6)
     axis.set(xscale="log", xlabel="least time, ms (CPU time of one thread; of a campaign wall time)")
     axis.set_xlim(right=axis.get_xlim()[1] * 20.0)
     axis.grid(True, axis="x", alpha=0.4)
     if any(line.other for line in known):
-        axis.legend(loc="lower right", frameon=False)
+        axis.legend(loc="upper right", frameon=False)
     figure.savefig(path, dpi=130)
     print(f"wrote {path}")
 
@@ -211,7 +212,7 @@ def main() -> None:
     parser.add_argument("--peers-python", default=os.environ.get("PEERS_PYTHON", sys.executable))
     parser.add_argument("--no-peers", action="store_true")
     parser.add_argument("--figure", type=Path, help="file to draw")
-    parser.add_argument("--write", type=Path, metavar="PAGE", help="Markdown page that has a place for the table")
+    parser.add_argument("--write", type=Path, metavar="PAGE", help="Markdown page with a place for each table")
     parser.add_argument("--serve", action="store_true", help=argparse.SUPPRESS)
     given = parser.parse_args()
     if given.serve:
@@ -228,11 +229,12 @@ def main() -> None:
         library.close()
     faults = "\n".join(f"{key}: {fault}" for key, fault in own.faults.items())
     text = markdown(lines, paired=other is not None)
-    if not given.no_peers and not given.only:
-        text += f"\n\n{peers_table(given.peers_python, quick=given.quick)}"
-    print(f"\n{text}\n{faults}")
+    beside = "" if given.no_peers or given.only else peers_table(given.peers_python, quick=given.quick)
+    print(f"\n{text}\n\n{beside}\n{faults}")
     if given.write:
-        write_between(given.write, text)
+        write_between(given.write, "all.py", text)
+        if beside:
+            write_between(given.write, "peers.py", beside)
     if given.figure:
         draw(lines, given.figure)
 

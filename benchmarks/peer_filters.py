@@ -171,7 +171,7 @@ def _gm_phd(options: dict[str, Any]) -> Step:
     return step
 
 
-PEERS = {"Rust LMB": rust, "Stone Soup": stone_soup}
+PEERS = {"multisensor-lmb-filters-rs": rust, "Stone Soup": stone_soup}
 
 
 def main() -> None:

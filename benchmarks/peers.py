@@ -55,7 +55,7 @@ def our_box(num_objects: int, num_steps: int) -> Iterator[Row]:
         box_run(rule, scans[:3])
         seconds, estimates = box_run(rule, scans)
         found = [estimate.means[:, :2] for estimate in estimates]
-        yield scored("8 sensors", f"ours, {rule}", truth, seconds, found, cutoff=5.0)
+        yield scored("8 sensors", f"Vedette, {rule}", truth, seconds, found, cutoff=5.0)
 
 
 def our_crowd(num_targets: int, num_steps: int) -> Iterator[Row]:
@@ -66,7 +66,7 @@ def our_crowd(num_targets: int, num_steps: int) -> Iterator[Row]:
         _, seconds, estimates = tracked(experiment, scans)
         true = [truth.at(k)[1][:, :2] for k in range(num_steps)]
         found = [np.empty((0, 2))] * (FROM_STEP - 1) + [estimate.means[:, :2] for estimate in estimates]
-        yield scored("crowd", f"ours, {NAMES[kind]}", true, seconds, found, cutoff=CUTOFF)
+        yield scored("crowd", f"Vedette, {NAMES[kind]}", true, seconds, found, cutoff=CUTOFF)
 
 
 def scored(
@@ -125,7 +125,7 @@ def peer_rows(python: str, peer: str, scene: str, num_targets: int, num_steps: i
             return rows
 
 
-PEERS = {"Stone Soup": "stonesoup", "Rust LMB": "multisensor_lmb_filters_rs"}
+PEERS = {"Stone Soup": "stonesoup", "multisensor-lmb-filters-rs": "multisensor_lmb_filters_rs"}
 
 
 def is_installed(python: str, module: str) -> bool:
@@ -181,12 +181,13 @@ def draw(rows: Sequence[Row], path: Path) -> None:
         axes[0].plot(numbers, [row.milliseconds for row in own], **style)
         axes[1].plot(numbers, [row.ospa for row in own], **style)
         axes[2].plot([row.milliseconds for row in own], [row.ospa for row in own], **style)
+    highest = 1.5 * max(row.ospa for row in crowd)
     axes[0].set(xscale="log", yscale="log", xlabel="targets", ylabel="CPU time of a scan, ms")
-    axes[1].set(xscale="log", xlabel="targets", ylabel="OSPA (c = 25 m, p = 1), m", ylim=(0.0, CUTOFF))
-    axes[2].set(xscale="log", xlabel="CPU time of a scan, ms", ylabel="OSPA (c = 25 m, p = 1), m", ylim=(0.0, CUTOFF))
+    axes[1].set(xscale="log", xlabel="targets", ylabel="OSPA (c = 25 m, p = 1), m", ylim=(0.0, highest))
+    axes[2].set(xscale="log", xlabel="CPU time of a scan, ms", ylabel="OSPA (c = 25 m, p = 1), m", ylim=(0.0, highest))
     for each in axes:
         each.grid(True, which="major", alpha=0.4)
-    axes[0].legend(frameon=False)
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=4, frameon=False)
     figure.savefig(path, dpi=110)
     print(f"wrote {path}")
 
@@ -201,7 +202,7 @@ def main() -> None:
     given = parser.parse_args()
     rows = []
     for row in all_rows(given.peers_python, given.crowd, given.objects, given.steps):
-        print(f"{row.scene:10s} {row.num_targets:6d} {row.filter:32s} {row.milliseconds:10.2f} ms {row.ospa:7.2f} m")
+        print(f"{row.scene:10s} {row.num_targets:6d} {row.filter:40s} {row.milliseconds:10.2f} ms {row.ospa:7.2f} m")
         sys.stdout.flush()
         rows.append(row)
     print(table(rows))
