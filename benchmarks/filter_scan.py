@@ -19,9 +19,17 @@ from typing import Any
 import numpy as np
 from timing import Measure, Once
 
-from vedette.densities import GLMB, LMB, map_estimate, unlabelled_estimate
+from vedette.densities import GLMB, LMB, FactoredGLMB, map_estimate, unlabelled_estimate
 from vedette.evaluation import ospa_of_run
-from vedette.filters import CbMemberFilter, CphdFilter, DeltaGlmbFilter, Filter, LmbFilter, PhdFilter
+from vedette.filters import (
+    CbMemberFilter,
+    CphdFilter,
+    DeltaGlmbFilter,
+    FactoredGlmbFilter,
+    Filter,
+    LmbFilter,
+    PhdFilter,
+)
 from vedette.models import SensorModel, TargetModel
 from vedette.scenarios import load_scenario
 from vedette.scenarios.build import build_experiment, build_sensors
@@ -52,6 +60,7 @@ def variants(tracker: DeltaGlmbFilter) -> dict[str, Filter]:
         "delta-GLMB, Gibbs": replace(tracker, assignment="gibbs", marginalised=False),
         "M-delta-GLMB, ranked": replace(tracker, assignment="ranked", marginalised=True),
         "LMB": LmbFilter(*parts),
+        "factored GLMB": FactoredGlmbFilter(*parts),
         "LMB, UKF": LmbFilter(*_unscented(tracker), tracker.limits),
         "PHD": PhdFilter(*parts),
         "CPHD": CphdFilter(*parts),
@@ -74,7 +83,7 @@ def prepared(scenario: str, variant: str) -> Once:
 
 def measures() -> Iterator[Measure]:
     """A scan of each filter that decides with labels."""
-    for name in ("LMB", "delta-GLMB, ranked", "M-delta-GLMB, ranked", "LMB, UKF"):
+    for name in ("LMB", "factored GLMB", "delta-GLMB, ranked", "M-delta-GLMB, ranked", "LMB, UKF"):
         yield Measure("scan", f"linear-10, {name.removesuffix(', ranked')}", partial(prepared, "linear-10", name))
     for name in ("LMB", "LMB, UKF"):
         yield Measure("scan", f"polar-10, {name}", partial(prepared, "polar-10", name))
@@ -87,7 +96,7 @@ def measure(tracker: Any, pose: Any, times: Any, scans: Any) -> tuple[list[float
         start = time.process_time()
         belief, _ = tracker.step(belief, scan, pose, float(times[1] - times[0]), k + 1, rng=rng)
         seconds.append(time.process_time() - start)
-        labelled = isinstance(belief, GLMB | LMB)
+        labelled = isinstance(belief, GLMB | LMB | FactoredGLMB)
         estimates.append(map_estimate(belief) if labelled else unlabelled_estimate(belief, k + 1))
     return seconds, estimates
 
