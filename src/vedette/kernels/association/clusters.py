@@ -86,7 +86,7 @@ def find_clusters(options: Options, work: MarginalWork) -> bool:
                 owners[column] = row
             else:
                 shared = True
-                a, b = _root(leaders, owners[column]), _root(leaders, row)
+                a, b = root_of(leaders, owners[column]), root_of(leaders, row)
                 leaders[max(a, b)] = min(a, b)
     if shared:
         _link_followers(leaders, work.followers, len(options.offsets) - 1)
@@ -99,18 +99,19 @@ def _link_followers(leaders: Ints, followers: Ints, num_rows: int) -> None:
         followers[row] = -1
     # From behind, each right after its leader: they come to stand in order.
     for row in range(num_rows - 1, -1, -1):
-        leader = _root(leaders, row)
+        leader = root_of(leaders, row)
         if leader != row:
             followers[row] = followers[leader]
             followers[leader] = row
 
 
 @inlined
-def _root(leaders: Ints, row: int) -> int:
-    while leaders[row] != row:
-        leaders[row] = leaders[leaders[row]]  # halves the way for the next
-        row = leaders[row]
-    return row
+def root_of(leaders: Ints, item: int) -> int:
+    """Who leads the set of an item, in a union-find where `leaders` names for each another of its set, not after it."""
+    while leaders[item] != item:
+        leaders[item] = leaders[leaders[item]]  # halves the way for the next
+        item = leaders[item]
+    return item
 
 
 @inlined

@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vedette.kernels.association.assignment import Options
+from vedette.kernels.association.clusters import root_of
 from vedette.kernels.base.arrays import counted_ints, filled_ints
 from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Floats, Ints
@@ -111,19 +112,11 @@ def _strengthen(
                     claims.strengths[at] = max(claims.strengths[at], own / total if total > 0.0 else 1.0)
 
 
-@inlined
-def _root(leaders: Ints, factor: int) -> int:
-    while leaders[factor] != factor:
-        leaders[factor] = leaders[leaders[factor]]  # halves the way for the next
-        factor = leaders[factor]
-    return factor
-
-
 @borrowing
 def _join(order: Ints, ends: Ints, others: Ints, sizes: Ints, most: int, leaders: Ints) -> None:
     """Join the two factors of each link in turn, unless they would have more than `most` labels together."""
     for link in order:
-        a, b = _root(leaders, ends[link]), _root(leaders, others[link])
+        a, b = root_of(leaders, ends[link]), root_of(leaders, others[link])
         if a != b and sizes[a] + sizes[b] <= most:
             first, last = min(a, b), max(a, b)
             leaders[last] = first
@@ -156,7 +149,7 @@ def linked_factors(options: Options, row_offsets: Ints, sizes: Ints, least: floa
                 filled += 1
     _join(descending_order(strengths[:filled]), ends, others, sizes, most, leaders)
     for factor in range(num_factors):
-        leaders[factor] = _root(leaders, factor)
+        leaders[factor] = root_of(leaders, factor)
     return leaders
 
 

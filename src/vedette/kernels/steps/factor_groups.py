@@ -13,9 +13,10 @@ from vedette.kernels.association.predicted import Rows, taken_rows
 from vedette.kernels.association.products import product_of
 from vedette.kernels.association.search import SearchCaps
 from vedette.kernels.base.compile import borrowing, inlined, kernel
-from vedette.kernels.base.types import FactoredGlmb, Floats, Ints
-from vedette.kernels.gaussian.linalg import log_add, log_sum
+from vedette.kernels.base.types import FactoredGlmb, Ints
+from vedette.kernels.gaussian.linalg import log_add
 from vedette.kernels.gaussian.mixtures import descending_order
+from vedette.kernels.steps.glmb import log_row_totals, log_total_bound
 
 
 class Factors(NamedTuple):
@@ -164,25 +165,6 @@ def _parents_of(factors: Factors, factor: int, place: Ints) -> Parents:
 
 
 @kernel
-def _log_bound(parents: Parents, log_totals: Floats) -> float:
-    """Log total weight of the choices of these hypotheses if rows could share measurements."""
-    bounds = np.empty(len(parents.log_weights))
-    for parent in range(len(bounds)):
-        bounds[parent] = parents.log_weights[parent]
-        for i in range(parents.offsets[parent], parents.offsets[parent + 1]):
-            bounds[parent] += log_totals[parents.rows[i]]
-    return log_sum(bounds)
-
-
-@kernel
-def _log_row_totals(options: Options) -> Floats:
-    totals = np.empty(len(options.offsets) - 1)
-    for row in range(len(totals)):
-        totals[row] = log_sum(options.log_weights[options.offsets[row] : options.offsets[row + 1]])
-    return totals
-
-
-@kernel
 def gathered_group(
     factors: Factors, members_of: Ints, rows: Rows, options: Options, max_hypotheses: int, place: Ints, columns: Ints
 ) -> Group:
@@ -194,12 +176,12 @@ def gathered_group(
     for i in range(len(members)):
         place[members[i]] = i
     own, measurements = _taken_options(options, members, columns)
-    log_totals = _log_row_totals(own)
+    log_totals = log_row_totals(own)
     parents = _parents_of(factors, members_of[0], place)
-    log_bound = _log_bound(parents, log_totals)
+    log_bound = log_total_bound(log_totals, parents)
     for k in range(1, len(members_of)):
         other = _parents_of(factors, members_of[k], place)
-        log_bound += _log_bound(other, log_totals)
+        log_bound += log_total_bound(log_totals, other)
         parents = product_of(parents, other, max_hypotheses)
     return Group(taken_rows(rows, members), own, parents, measurements, log_bound)
 
@@ -212,7 +194,7 @@ def left_out_of(group: Group, children: Children, caps: SearchCaps) -> float:
     found, nor than the number of its choices times the heaviest that may be left; of parents cut before, their bound.
     """
     options, parents, num = group.options, group.parents, children.filled[0]
-    best, log_totals = children.log_weights[0], _log_row_totals(options)
+    best, log_totals = children.log_weights[0], log_row_totals(options)
     log_next = best - caps.max_log_gap
     if num >= caps.max_hypotheses:
         log_next = max(log_next, children.log_weights[num - 1])

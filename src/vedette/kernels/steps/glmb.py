@@ -27,7 +27,7 @@ from vedette.kernels.association.ranked import rank_children
 from vedette.kernels.association.truncation import Truncation, heaviest_first, keep_heaviest, merge_equal
 from vedette.kernels.base.arrays import filled_ints
 from vedette.kernels.base.compile import kernel
-from vedette.kernels.base.types import Glmb, Ints, Motion, ScanInput, Sensor
+from vedette.kernels.base.types import Floats, Glmb, Ints, Motion, ScanInput, Sensor
 from vedette.kernels.gaussian.linalg import log_sum
 from vedette.kernels.gaussian.mixtures import require_gaussians
 from vedette.kernels.gaussian.scratch import make_scratch
@@ -80,16 +80,25 @@ def _associate(prior: Glmb, rows: Rows, scan: ScanInput, sensor: Sensor, truncat
 
 
 @kernel
-def _log_total_bound(options: Options, parents: Parents) -> float:
-    """Log total weight of all joint choices if rows could share measurements: an upper bound on the true total."""
-    row_totals = np.empty(len(options.offsets) - 1)
-    for row in range(len(row_totals)):
-        row_totals[row] = log_sum(options.log_weights[options.offsets[row] : options.offsets[row + 1]])
+def log_row_totals(options: Options) -> Floats:
+    """(num_rows,) log total weight of each row's options."""
+    totals = np.empty(len(options.offsets) - 1)
+    for row in range(len(totals)):
+        totals[row] = log_sum(options.log_weights[options.offsets[row] : options.offsets[row + 1]])
+    return totals
+
+
+@kernel
+def log_total_bound(log_totals: Floats, parents: Parents) -> float:
+    """Log total weight of all joint choices if rows could share measurements: an upper bound on the true total.
+
+    log_totals: of the rows, as of `log_row_totals`.
+    """
     bounds = np.empty(len(parents.log_weights))
     for parent in range(len(bounds)):
         bounds[parent] = parents.log_weights[parent]
         for i in range(parents.offsets[parent], parents.offsets[parent + 1]):
-            bounds[parent] += row_totals[parents.rows[i]]
+            bounds[parent] += log_totals[parents.rows[i]]
     return log_sum(bounds)
 
 
@@ -125,7 +134,7 @@ def _conclude(
     children, kept = kept_children(found, children, truncation, is_covered)
     posterior, log_total = assemble(children, kept, found.parents, found.rows, found.options)
     require_gaussians(posterior.tracks.means, posterior.tracks.covs)
-    bound = _log_total_bound(found.options, found.parents)
+    bound = log_total_bound(log_row_totals(found.options), found.parents)
     return posterior, StepReport(log_total, bound, found.log_clutter, found.num_raised, cut)
 
 
