@@ -17,7 +17,12 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
+
+from timing import Measure, Once
+
+import vedette
 
 _OWN = Path(__file__).resolve().parents[1] / "src"
 
@@ -41,7 +46,7 @@ if __name__ == "__main__":
 """
 
 
-def measures(folder: Path) -> dict[str, str]:
+def programs_of(folder: Path) -> dict[str, str]:
     """Programs to time, by name."""
     return {
         "vedette --help": _PROGRAM.format(["vedette", "--help"]),
@@ -72,6 +77,26 @@ def environment_of(source: Path, folder: Path, *, bytecode: bool, cache: Path | 
     environment = os.environ | {"PYTHONPATH": str(source), "PYTHONPYCACHEPREFIX": str(folder / "bytecode")}
     environment |= {"PYTHONDONTWRITEBYTECODE": "" if bytecode else "1"}
     return environment | ({"VEDETTE_CACHE_DIR": str(cache)} if cache else {})
+
+
+def prepared(name: str) -> Once:
+    """What gives the CPU seconds of one of the programs, with the library of this process and kernels compiled."""
+    folder = tempfile.TemporaryDirectory()
+    place = Path(folder.name)
+    program = programs_of(place)[name]
+    environment = environment_of(Path(vedette.__file__).parents[1], place, bytecode=True)
+    cpu_seconds(program, environment, place)
+
+    def once(held: tempfile.TemporaryDirectory[str] = folder) -> float:
+        return cpu_seconds(program, environment, Path(held.name))
+
+    return once
+
+
+def measures() -> Iterator[Measure]:
+    """A start of each program."""
+    for name in programs_of(Path()):
+        yield Measure("start", name, partial(prepared, name), unit="s", rounds=5, long=name.startswith("run paper-a"))
 
 
 def turn_about(
@@ -106,7 +131,7 @@ def main() -> None:
     print(f"{'CPU seconds':34}" + "".join(f"{head + ' least':>9}{'median':>9}  " for head in heads))
     with tempfile.TemporaryDirectory() as name:
         folder, bytecode = Path(name), not options.no_bytecode
-        programs = measures(folder)
+        programs = programs_of(folder)
         for what, seconds in turn_about(programs, sources, folder, repeats=options.repeats, bytecode=bytecode):
             print(f"{what:34}" + "  ".join(map(told, seconds)), flush=True)
         if options.cold:
