@@ -166,11 +166,12 @@ def campaign_of(folder: Path, manifest: Mapping[str, Any]) -> Campaign:
         specification = spec_from_data(spec, "spec")
         axes = specification.axes()
         _check_same_as(specification, manifest)
+        read: dict[str, Scenario] = {}
         return Campaign(
             name=manifest["name"],
             seed=manifest["seed"],
             num_runs=manifest["num_runs"],
-            cells=tuple(_cell(entry) for entry in manifest["cells"]),
+            cells=tuple(_cell(entry, read) for entry in manifest["cells"]),
             axes=axes,
             compare=manifest["compare"],
             spec=spec,
@@ -208,14 +209,16 @@ def _combinations(axes: Mapping[str, tuple[Any, ...]]) -> list[list[tuple[str, A
     return [list(settings.items()) for settings in _settings(axes)]
 
 
-def _cell(entry: Mapping[str, Any]) -> Cell:
-    place = f"cell {entry['name']}"
-    document = read_yaml(entry["scenario"], place)
-    if document.faults:
-        raise InputError(document.faults[0].message(place))
-    return Cell(
-        entry["name"], entry["settings"], Scenario(ScenarioModel.model_validate(document.data)), entry["planner"]
-    )
+def _cell(entry: Mapping[str, Any], read: dict[str, Scenario]) -> Cell:
+    """A cell back; `read` holds the scenarios of those before it by their texts, as strategies share one."""
+    text = entry["scenario"]
+    if text not in read:
+        place = f"cell {entry['name']}"
+        document = read_yaml(text, place)
+        if document.faults:
+            raise InputError(document.faults[0].message(place))
+        read[text] = Scenario(ScenarioModel.model_validate(document.data))
+    return Cell(entry["name"], entry["settings"], read[text], entry["planner"])
 
 
 def _difference(place: str, there: Any, here: Any) -> str:
