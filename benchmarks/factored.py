@@ -31,7 +31,7 @@ from vedette.scenarios.build import build_sensors
 from vedette.simulation import simulate_scan
 from vedette.tracking import Distributed
 
-SQUARE, SPEED, NUM_SCANS, FROM_SCAN, FIRST_SEED = 1400.0, 10.0, 40, 10, 300
+SQUARE, SPEED, NUM_SCANS, FROM_SCAN, FIRST_SEED = 1400.0, 10.0, 40, 10, 200
 
 Make = Callable[[TargetModel, SensorModel, Limits], Filter]
 
@@ -99,8 +99,8 @@ def on_layout(layout: Layout, limits: Limits, make: Make) -> float:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--runs", type=int, default=4)
-    parser.add_argument("--layouts", type=int, default=60)
-    parser.add_argument("--errors", type=float, nargs="+", default=[0.001, 0.01, 0.1, 1.0])
+    parser.add_argument("--layouts", type=int, default=240)
+    parser.add_argument("--errors", type=float, nargs="+", default=[0.01, 0.1, 0.3, 0.7, 1.0])
     parser.add_argument("--more-hypotheses", action="store_true")
     options = parser.parse_args()
     given = build_sensors(load_scenario("paper-a"))[0].filter

@@ -53,7 +53,7 @@ class FactoredGlmbFilter(SingleSensorFilter):
         InputError: a part of another kind, or a field out of range.
     """
 
-    max_split_error: float = 0.1
+    max_split_error: float = 0.7
     max_factor_labels: int = 10
 
     def __post_init__(self) -> None:

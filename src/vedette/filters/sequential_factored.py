@@ -28,7 +28,7 @@ class SequentialFactoredFilter(MultiSensorFilter[FactoredGLMB]):
     `FactoredGlmbFilter`.
     """
 
-    max_split_error: float = 0.1
+    max_split_error: float = 0.7
     max_factor_labels: int = 10
     kind: ClassVar[type[FactoredGLMB]] = FactoredGLMB
 
