@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 import math
 from typing import Any
@@ -13,8 +14,10 @@ from filters.examples import DT, REGION, SCENES, assert_same_mixtures, linear_sc
 from reference import glmb as oracle
 from vedette import models
 from vedette.densities import GLMB, LMB, FactoredGLMB, TrackTable
-from vedette.errors import InputError
+from vedette.errors import InputError, NumericalError
 from vedette.filters import DeltaGlmbFilter, FactoredGlmbFilter, Limits
+from vedette.kernels.association.children import Parents
+from vedette.kernels.association.products import product_of
 
 pytestmark = pytest.mark.lanes
 
@@ -190,6 +193,46 @@ def assert_bound_holds(seed: int) -> tuple[float, float]:
 def test_the_error_bound_is_never_below_the_true_error():
     found = np.array([assert_bound_holds(seed) for seed in range(60)])
     assert np.count_nonzero(found[:, 1] > 1e-3) > 10  # something is lost in many of them
+
+
+def contended(max_search_nodes: int, min_track_weight: float = 1e-5) -> tuple[float, float, bool]:
+    """The bound on what was cut off, the weight that was lost, and whether the report says that the search was cut."""
+    rng = np.random.default_rng(5)
+    prior, (targets, sensor, _) = random_prior(rng), contested_scene(rng)
+    scan, few = (
+        rng.normal(size=(3, 2)) * 20.0,
+        Limits(max_search_nodes=max_search_nodes, min_track_weight=min_track_weight),
+    )
+    _, exact = FactoredGlmbFilter(targets, sensor, Limits.none(), 0.0).step(prior, scan, np.zeros(3), DT, 2, rng=rng)
+    wide = dataclasses.replace(few, gate_probability=1.0, min_relative_weight=0.0)
+    _, info = FactoredGlmbFilter(targets, sensor, wide, 0.0).step(prior, scan, np.zeros(3), DT, 2, rng=rng)
+    return info.discarded_weight_bound, -math.expm1(info.log_likelihood - exact.log_likelihood), info.search_cut
+
+
+@pytest.mark.parametrize("max_search_nodes", [1, 2, 5, 20, 100])
+def test_what_a_search_leaves_that_is_cut_short_is_counted(max_search_nodes):
+    bound, lost, is_cut = contended(max_search_nodes)
+    assert is_cut
+    assert 0.0 < lost <= bound + 1e-12
+
+
+def test_a_search_that_finds_nothing_is_not_the_models_fault():
+    with pytest.raises(NumericalError, match=r"step 2: no hypothesis was found within Limits\.max_search_nodes"):
+        contended(1, min_track_weight=1.0)
+
+
+def test_products_of_many_factors_stay_few_and_lose_no_hypothesis():
+    def factor(row: int) -> Parents:
+        return Parents(np.arange(5), np.array([row] * 4), np.log([0.7, 0.2, 0.06, 0.04]))
+
+    parents = factor(0)
+    for row in range(1, 20):
+        parents = product_of(parents, factor(row), 300)
+    assert len(parents.log_weights) < 10_000
+    assert np.all(np.diff(parents.log_weights) <= 0.0)
+    assert parents.log_weights[0] == pytest.approx(20 * math.log(0.7))
+    alone = {round(19 * math.log(0.7) + math.log(0.04), 9)}
+    assert alone <= set(np.round(parents.log_weights, 9).tolist())
 
 
 @pytest.mark.slow

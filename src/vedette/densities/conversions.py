@@ -53,7 +53,8 @@ def marginalise(
     are merged, and the heaviest `max_components` stay; a `merge_distance` of 0 merges nothing.
 
     Hypotheses come out by descending weight, equal weights in the order of their first occurrence. A product of GLMBs
-    is marginalised factor by factor, in their order; factors of one label keep the order of their hypotheses.
+    is marginalised factor by factor, in their order; factors of one label laid out as by
+    `FactoredGLMB.from_lmb` keep the order of their hypotheses.
     Raises `InputError` for a limit outside its range.
     """
     caps = _checked_caps(max_components, log_min_weight, merge_distance)

@@ -161,7 +161,7 @@ def _factors_without(belief: FactoredGLMB, kept: Bools) -> FactoredGLMB:
     for index in np.flatnonzero(~whole & (counts > 0)).tolist():
         tracks = kept[belief.track_offsets[index] : belief.track_offsets[index + 1]]
         parted.append(laid_out(_glmb_without(belief.factor(index), tracks)))
-    return FactoredGLMB.product([take_factors(belief, np.flatnonzero(whole)), *parted], belief.state_dim)
+    return FactoredGLMB.product([take_factors(belief, np.flatnonzero(whole & (counts > 0))), *parted], belief.state_dim)
 
 
 def _glmb_without(belief: GLMB, kept: Bools) -> GLMB:

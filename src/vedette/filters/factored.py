@@ -46,8 +46,8 @@ class FactoredGlmbFilter(SingleSensorFilter):
             0 to 2. Two factors are taken together where both take a measurement with a probability above a hundredth
             of half of this, if they were independent.
         max_factor_labels: labels of a factor at most, and a quarter of those that take a scan together; where more
-            contend, those that do so least are taken as independent. What all this leaves out is in
-            `FilterInfo.factoring_error`.
+            contend, links are made from the strongest on and left out where they would join more. What all this leaves
+            out is in `FilterInfo.factoring_error`.
 
     Raises:
         InputError: a part of another kind, or a field out of range.
@@ -87,7 +87,7 @@ class FactoredGlmbFilter(SingleSensorFilter):
                 prior.to_kernel(),
                 *arguments,
                 self.limits.reduction(),
-                factoring_of(self.max_split_error, self.max_factor_labels),
+                self._factoring(),
             )
         return self._concluded(posterior, report, num_duplicates, f"step {step}: ")
 
@@ -104,7 +104,7 @@ class FactoredGlmbFilter(SingleSensorFilter):
                 prior.to_kernel(),
                 *arguments,
                 limits.reduction(),
-                factoring_of(self.max_split_error, self.max_factor_labels),
+                self._factoring(),
             )
         return blind._concluded(posterior, report, 0, f"step {step}: ")
 
@@ -120,7 +120,7 @@ class FactoredGlmbFilter(SingleSensorFilter):
                 prior.to_kernel(),
                 *arguments,
                 self.limits.reduction(),
-                factoring_of(self.max_split_error, self.max_factor_labels),
+                self._factoring(),
             )
         return self._concluded(posterior, report, num_duplicates, "")
 
@@ -130,12 +130,20 @@ class FactoredGlmbFilter(SingleSensorFilter):
     def _concluded(
         self, posterior: FactoredGlmb, report: FactoredReport, num_duplicates: int, place: str
     ) -> tuple[FactoredGLMB, FilterInfo]:
-        if report.log_total == -math.inf:
-            raise NumericalError(f"{place}no hypothesis has positive weight; do the models forbid this scan?")
+        check_found(report, place)
         log_likelihood = report.log_total + report.log_clutter - self.sensor.clutter.rate
         return factored_posterior(
             posterior, [report], self.limits, log_likelihood=log_likelihood, num_duplicates=num_duplicates
         )
+
+
+def check_found(report: FactoredReport, place: str) -> None:
+    """Raise `NumericalError` where no joint choice was found. place: of the error."""
+    if report.log_total > -math.inf:
+        return
+    if report.cut:
+        raise NumericalError(f"{place}no hypothesis was found within Limits.max_search_nodes; raise it")
+    raise NumericalError(f"{place}no hypothesis has positive weight; do the models forbid this scan?")
 
 
 def check_factoring(max_split_error: Any, max_factor_labels: Any) -> None:

@@ -132,15 +132,18 @@ class Limits:
         """The same, but that no label is dropped."""
         return replace(self, min_existence=0.0, max_labels=2**62, max_position_std=math.inf)
 
-    def without_excess(self, belief: FactoredGLMB) -> tuple[FactoredGLMB, float]:
-        """The belief without the least probable labels beyond `max_labels`, and without those of `without_spread`."""
-        excess = np.empty((0, 2), np.int64)
-        if belief.tracks.num_tracks > self.max_labels:
+    def without_excess(self, belief: FactoredGLMB) -> tuple[FactoredGLMB, float, bool]:
+        """The belief without the least probable labels beyond `max_labels` and without those of `without_spread`; the
+        summed existence of these, and whether there were as many as `max_labels`.
+        """
+        excess, is_full = np.empty((0, 2), np.int64), False
+        if belief.tracks.num_tracks >= self.max_labels:  # labels may have several
             labels, existence = existence_probabilities(belief)
             excess = labels[np.argsort(-existence, kind="stable")[self.max_labels :]]
+            is_full = len(labels) >= self.max_labels
         fewer, dropped = without_labels(belief, excess)
         kept, spread = self.without_spread(fewer)
-        return kept, dropped + spread
+        return kept, dropped + spread, is_full
 
     def kept(self, belief: LMB) -> LMB:
         """The belief without the labels that `min_existence`, `max_labels` and `max_position_std` drop."""

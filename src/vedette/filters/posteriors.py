@@ -78,7 +78,7 @@ def factored_posterior(
     num_duplicates: int,
 ) -> tuple[FactoredGLMB, FilterInfo]:
     """A factored density after updates, one report each; see `FilterInfo` for what is not of them."""
-    found, dropped = limits.without_excess(FactoredGLMB.from_kernel(posterior))
+    found, dropped, is_full = limits.without_excess(FactoredGLMB.from_kernel(posterior))
     return found, FilterInfo(
         log_likelihood=log_likelihood,
         num_hypotheses=found.num_hyps,
@@ -89,6 +89,6 @@ def factored_posterior(
         num_duplicates=num_duplicates,
         num_inexact_clusters=0,
         search_cut=any(bool(report.cut) for report in reports),
-        cap_met=any(bool(report.full) for report in reports) or found.tracks.num_tracks >= limits.max_labels,
+        cap_met=is_full or any(bool(report.full) for report in reports),
         factoring_error=min(2.0, sum(float(report.split_error + 2.0 * report.taken_twice) for report in reports)),
     )

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import ClassVar
 
 from vedette.densities import LMB, FactoredGLMB
-from vedette.errors import NumericalError
-from vedette.filters.factored import check_factoring, factoring_of
+from vedette.filters.factored import check_factoring, check_found, factoring_of
 from vedette.filters.info import FilterInfo
 from vedette.filters.inputs import model_errors
 from vedette.filters.multi_sensor import Looks, MultiSensorFilter
@@ -52,10 +50,7 @@ class SequentialFactoredFilter(MultiSensorFilter[FactoredGLMB]):
                     posterior, report = step_factored(posterior, scan, motion, *own)
                 else:
                     posterior, report = update_factored(posterior, scan, *own)
-            if not math.isfinite(report.log_total):
-                raise NumericalError(
-                    f"{place}, {name}: no hypothesis has positive weight; do the models forbid these scans?"
-                )
+            check_found(report, f"{place}, {name}: ")
             reports.append(report)
         log_total = sum(report.log_total for report in reports)
         return factored_posterior(

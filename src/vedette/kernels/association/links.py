@@ -128,8 +128,8 @@ def linked_factors(options: Options, row_offsets: Ints, sizes: Ints, least: floa
     """(num_factors,) the first factor of the group that each is taken with.
 
     row_offsets: (num_factors + 1,) rows of each. sizes: (num_factors,) labels of each, overwritten. least: links of the
-    product of two claims up to this are cut. most: labels of a group; where links would join more, the strongest are
-    kept, so that large crowds fall apart where they hang together least.
+    product of two claims up to this are cut. most: labels of a group; links are made from the strongest on, and
+    left out where they would join more.
     """
     num_factors, num = len(row_offsets) - 1, options.num_measurements
     leaders, claims = counted_ints(num_factors), _claims(options, row_offsets)

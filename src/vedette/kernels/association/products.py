@@ -29,13 +29,12 @@ def product_of(first: Parents, second: Parents, max_hypotheses: int) -> Parents:
     A pair of which `max_hypotheses` others are surely heavier is left out, but never one with the heaviest hypothesis
     of the other factor: a hypothesis that a factor has kept for the sake of one track is not lost before the scan.
     """
-    most = max(max_hypotheses, len(first.log_weights), len(second.log_weights))
     room = max(len(first.log_weights), len(second.log_weights))
     lefts, rights, log_weights, num = np.empty(room, np.int64), np.empty(room, np.int64), np.empty(room), 0
     for a in range(len(first.log_weights)):
         for b in range(len(second.log_weights)):
             # (a + 1) (b + 1) pairs are at least as heavy as this one.
-            if (a + 1) * (b + 1) > most:
+            if a > 0 and b > 0 and (a + 1) * (b + 1) > max_hypotheses:
                 break
             lefts, rights = grown_ints(lefts, num + 1), grown_ints(rights, num + 1)
             log_weights = grown_floats(log_weights, num + 1)

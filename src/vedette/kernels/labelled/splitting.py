@@ -22,7 +22,7 @@ from vedette.kernels.gaussian.mixtures import descending_order
 from vedette.kernels.labelled.labels import increasing_labels, label_place
 
 # Rounding leaves a product this far from what it is equal to.
-_EQUAL = 1e-13
+_EQUAL = 1e-11
 
 
 class Choices(NamedTuple):
@@ -82,49 +82,44 @@ def _same_choice(symbols: Ints, a: int, b: int, part_of: Ints, part: int) -> boo
 
 
 @kernel
-def _product_error(choices: Choices, part_of: Ints, pairwise: Ints) -> float:
-    """L1 distance of the product of the parts from the choices; of the labels with `pairwise` 1 alone.
-
-    Where labels are left out, hypotheses that differ in them alone are one.
-    """
-    num, num_labels = choices.symbols.shape
-    groups, products, own = np.empty(num, np.int64), np.empty(num), np.empty(num)
+def _product_error(symbols: Ints, weights: Floats, part_of: Ints) -> float:
+    """L1 distance of the product of the parts from the choices; equal ones count as one."""
+    num, num_labels = symbols.shape
+    groups, products = np.empty(num, np.int64), np.empty(num)
+    distinct = group_choices(symbols, filled_ints(num_labels, 0), 0, groups)
+    own = np.zeros(len(distinct))
     for h in range(num):
-        products[h], own[h] = 1.0, choices.weights[h]
-    everything = group_choices(choices.symbols, pairwise, 1, groups)
-    sums = np.zeros(len(everything))
-    for h in range(num):
-        sums[groups[h]] += choices.weights[h]
-    for g in range(len(everything)):
-        own[everything[g]] = sums[g]
+        own[groups[h]] += weights[h]
+        products[h] = 1.0
     for part in range(num_labels):
-        if part_of[part] != part or pairwise[part] == 0:
+        if part_of[part] != part:
             continue
-        firsts = group_choices(choices.symbols, part_of, part, groups)
+        firsts = group_choices(symbols, part_of, part, groups)
         sums = np.zeros(len(firsts))
         for h in range(num):
-            sums[groups[h]] += choices.weights[h]
-        for h in everything:
+            sums[groups[h]] += weights[h]
+        for h in distinct:
             products[h] *= sums[groups[h]]
     error, left = 0.0, 1.0
-    for h in everything:
-        error += abs(own[h] - products[h])
-        left -= products[h]
+    for g in range(len(distinct)):
+        error += abs(own[g] - products[distinct[g]])
+        left -= products[distinct[g]]
     return error + max(0.0, left)
 
 
 @kernel
 def _dependences(choices: Choices) -> tuple[Ints, Ints, Floats]:
     """Every two labels, and the L1 distance of their joint choices from those of independent ones."""
-    num = len(choices.labels)
+    num_hyps, num = choices.symbols.shape
     most = num * (num - 1) // 2
     firsts, seconds, errors = np.empty(most, np.int64), np.empty(most, np.int64), np.empty(most)
-    alone, marked, filled = counted_ints(num), np.zeros(num, np.int64), 0
+    pair, alone, filled = np.empty((num_hyps, 2), np.int64), counted_ints(2), 0
     for a in range(num):
         for b in range(a):
-            marked[a] = marked[b] = 1
-            firsts[filled], seconds[filled], errors[filled] = b, a, _product_error(choices, alone, marked)
-            marked[a] = marked[b] = 0
+            for h in range(num_hyps):
+                pair[h, 0], pair[h, 1] = choices.symbols[h, b], choices.symbols[h, a]
+            firsts[filled], seconds[filled] = b, a
+            errors[filled] = _product_error(pair, choices.weights, alone)
             filled += 1
     return firsts, seconds, errors
 
@@ -148,10 +143,10 @@ def independent_parts(choices: Choices, max_error: float, max_labels: int, min_e
     the error then is.
     """
     num = len(choices.labels)
-    part_of, sizes, everything = counted_ints(num), filled_ints(num, 1), filled_ints(num, 1)
+    part_of, sizes = counted_ints(num), filled_ints(num, 1)
     if num < 2:
         return part_of, 0.0
-    error = _product_error(choices, part_of, everything)
+    error = _product_error(choices.symbols, choices.weights, part_of)
     if error <= max(max_error, _EQUAL):
         return part_of, error
     existences, num_parts = _existences(choices), num
@@ -167,7 +162,7 @@ def independent_parts(choices: Choices, max_error: float, max_labels: int, min_e
                 part_of[k] = first
         sizes[first] += sizes[last]
         num_parts -= 1
-        error = _product_error(choices, part_of, everything) if num_parts > 1 else 0.0
+        error = _product_error(choices.symbols, choices.weights, part_of) if num_parts > 1 else 0.0
         if error <= max(max_error, _EQUAL):
             break
     return part_of, error

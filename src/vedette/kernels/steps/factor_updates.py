@@ -21,7 +21,7 @@ from vedette.kernels.labelled.factor_store import FactorStore, append_part, appe
 from vedette.kernels.labelled.splitting import Choices, choices_of, independent_parts
 from vedette.kernels.labelled.versions import merge_versions
 from vedette.kernels.steps.assembly import assemble
-from vedette.kernels.steps.factor_groups import Group, left_out_of
+from vedette.kernels.steps.factor_groups import Group, log_weight_bound
 from vedette.kernels.steps.glmb import Associated, kept_children
 from vedette.kernels.steps.lmb import Reduction, append_reduced, write_mixture
 
@@ -29,8 +29,8 @@ from vedette.kernels.steps.lmb import Reduction, append_reduced, write_mixture
 TOTAL, KEPT, TWICE, SPLIT, DROPPED, CUT, FULL = range(7)
 _NUM_SUMS = 7
 
-# What rounding leaves of nothing, as a share of a weight.
-_ROUNDING = 1e-13
+# What rounding leaves between the logs of equal weights.
+_ROUNDING = 1e-12
 
 
 class Factoring(NamedTuple):
@@ -128,26 +128,20 @@ def _claim_jointly(group: Group, children: Children, kept: Ints, log_total: floa
 
 @kernel
 def update_group(group: Group, truncation: Truncation, work: Work) -> Glmb:
-    """The posterior of a group in which some joint choice is possible; without any, the log total becomes -inf."""
+    """The posterior of a group; of one in which no joint choice was found it is empty and the log total -inf."""
     found, sums = Associated(group.rows, group.options, group.parents, 0.0, 0), work.sums
     children, cut = rank_children(group.options, group.parents, truncation.search)
-    possible, left, num, best = 0.0, 0.0, children.filled[0], 0.0
-    if num > 0:
-        best, left = children.log_weights[0], left_out_of(group, children, truncation.search)
-    for child in range(num):
-        possible += math.exp(children.log_weights[child] - best)
+    log_bound = log_weight_bound(group, children, truncation.search, cut)
     # A search that ran dry has left nothing out.
-    is_covered = num < truncation.search.max_hypotheses and not cut
+    is_covered = children.filled[0] < truncation.search.max_hypotheses and not cut
     children, kept = kept_children(found, children, truncation, is_covered)
     posterior, log_total = assemble(children, kept, group.parents, group.rows, group.options)
     sums[TOTAL] += log_total
-    if num == 0:
+    sums[CUT] += 1.0 if cut else 0.0
+    if len(kept) == 0:
         return posterior
     _claim_jointly(group, children, kept, log_total, work)
-    total = math.exp(log_total - best)
-    gone = possible + left - total
-    sums[KEPT] -= math.log1p(gone / total) if gone > _ROUNDING * total else 0.0
-    sums[CUT] += 1.0 if cut else 0.0
+    sums[KEPT] -= log_bound - log_total if log_bound - log_total > _ROUNDING else 0.0
     sums[FULL] += 1.0 if len(kept) >= truncation.search.max_hypotheses else 0.0
     return posterior
 
