@@ -26,6 +26,8 @@ class HealthSummary:
             was cut short, an LMB cluster was not summed exactly.
         mean_discarded, worst_discarded: upper bound on the share of a filter's weight that was cut off; NaN where it is
             not known.
+        mean_factoring, worst_factoring: upper bound on the L1 error that a factored filter made by taking labels as
+            independent.
         worst_dropped: expected number of targets in labels that a filter dropped at one scan.
         duplicates, clutter_raised: measurements in all.
         missing_sets: (num_sensors,) share of the fused label sets (CLMB: labels) that the sensor lacks.
