@@ -21,7 +21,7 @@ CASES = [
         "kind: m_delta_glmb",
         "kind: m-delta-glmb",
         [
-            'f.yaml:19:16: filter.kind: expected one of delta_glmb, m_delta_glmb, lmb, phd, cphd, cb_member, custom, got "m-delta-glmb" (did you mean m_delta_glmb?)'
+            'f.yaml:19:16: filter.kind: expected one of delta_glmb, m_delta_glmb, lmb, factored_glmb, phd, cphd, cb_member, custom, got "m-delta-glmb" (did you mean m_delta_glmb?)'
         ],
     ),
     (
