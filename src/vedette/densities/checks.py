@@ -187,6 +187,14 @@ def label_step_up(labels: Ints) -> Bools:
     return np.asarray((before[:, 0] < after[:, 0]) | ((before[:, 0] == after[:, 0]) & (before[:, 1] < after[:, 1])))
 
 
+def labels_increase(labels: Ints, offsets: Ints) -> Bools:
+    """(len(labels) - 1,) whether each label is followed by a greater one, or is the last of its run."""
+    in_order = label_step_up(labels)
+    starts = offsets[(offsets > 0) & (offsets < len(labels))]
+    in_order[starts - 1] = True
+    return in_order
+
+
 def as_floats(field: str, values: Any, shape: Sequence[int | None]) -> Floats:
     """A fresh float64 array of a user's numbers. Raises `InputError` for another shape or for what is no number."""
     return np.array(_given(field, values, "fiu", "numbers", shape), dtype=np.float64, order="C")

@@ -214,9 +214,7 @@ class FactoredGLMB:
             (self.track_offsets[owner] <= self.hyp_tracks) & (self.hyp_tracks < self.track_offsets[owner + 1])
         ).all():
             return False
-        in_order = checks.label_step_up(self.tracks.labels[self.hyp_tracks])
-        starts = self.hyp_offsets[(self.hyp_offsets > 0) & (self.hyp_offsets < len(self.hyp_tracks))]
-        in_order[starts - 1] = True
+        in_order = checks.labels_increase(self.tracks.labels[self.hyp_tracks], self.hyp_offsets)
         weights = self.hyp_log_weights
         if not in_order.all() or np.isnan(weights).any() or (weights == np.inf).any():
             return False

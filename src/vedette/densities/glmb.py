@@ -106,9 +106,7 @@ class GLMB:
         num_entries = len(self.hyp_tracks)
         checks.check_offsets("hyp_offsets", self.hyp_offsets, self.num_hyps, num_entries, empty_allowed=True)
         _check_indices("hyp_tracks", self.hyp_tracks, self.tracks.num_tracks)
-        in_order = checks.label_step_up(self.tracks.labels[self.hyp_tracks])
-        starts = self.hyp_offsets[(self.hyp_offsets > 0) & (self.hyp_offsets < num_entries)]
-        in_order[starts - 1] = True
+        in_order = checks.labels_increase(self.tracks.labels[self.hyp_tracks], self.hyp_offsets)
         if not in_order.all():
             place = int(np.flatnonzero(~in_order)[0])
             hyp = int(np.searchsorted(self.hyp_offsets, place, side="right")) - 1

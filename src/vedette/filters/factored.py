@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -17,6 +17,7 @@ from vedette.filters.inputs import check_belief, model_errors
 from vedette.filters.posteriors import factored_posterior
 from vedette.kernels.base.types import FactoredGlmb
 from vedette.kernels.steps.factored import FactoredReport, Factoring, step_factored, update_factored
+from vedette.kernels.steps.lmb import Reduction
 from vedette.models.arguments import dimension, non_negative
 
 # Of the error that a split may make, the share that one pair of claims to a measurement may.
@@ -83,12 +84,7 @@ class FactoredGlmbFilter(SingleSensorFilter):
         prior = check_belief(belief, FactoredGLMB, self.targets.state_dim)
         arguments = self._arguments(measurements, pose, dt, step, prior, births)
         with model_errors():
-            posterior, report = step_factored(
-                prior.to_kernel(),
-                *arguments,
-                self.limits.reduction(),
-                self._factoring(),
-            )
+            posterior, report = step_factored(prior.to_kernel(), *arguments, *self._reduction())
         return self._concluded(posterior, report, num_duplicates, f"step {step}: ")
 
     def predict(
@@ -96,16 +92,10 @@ class FactoredGlmbFilter(SingleSensorFilter):
     ) -> tuple[FactoredGLMB, FilterInfo]:
         """The belief `dt` seconds later, births included; as `DeltaGlmbFilter.predict`, factor by factor."""
         prior = check_belief(belief, FactoredGLMB, self.targets.state_dim)
-        limits = self.limits.keeping_labels()
-        blind = FactoredGlmbFilter(self.targets, blind_sensor(), limits, self.max_split_error, self.max_factor_labels)
+        blind = replace(self, sensor=blind_sensor(), limits=self.limits.keeping_labels())
         arguments = blind._arguments(NO_SCAN, NO_POSE, dt, step, prior, births)
         with model_errors():
-            posterior, report = step_factored(
-                prior.to_kernel(),
-                *arguments,
-                limits.reduction(),
-                self._factoring(),
-            )
+            posterior, report = step_factored(prior.to_kernel(), *arguments, *blind._reduction())
         return blind._concluded(posterior, report, 0, f"step {step}: ")
 
     def update(
@@ -116,16 +106,11 @@ class FactoredGlmbFilter(SingleSensorFilter):
         prior = check_belief(belief, FactoredGLMB, self.targets.state_dim)
         arguments = self._update_arguments(measurements, pose)
         with model_errors():
-            posterior, report = update_factored(
-                prior.to_kernel(),
-                *arguments,
-                self.limits.reduction(),
-                self._factoring(),
-            )
+            posterior, report = update_factored(prior.to_kernel(), *arguments, *self._reduction())
         return self._concluded(posterior, report, num_duplicates, "")
 
-    def _factoring(self) -> Factoring:
-        return factoring_of(self.max_split_error, self.max_factor_labels)
+    def _reduction(self) -> tuple[Reduction, Factoring]:
+        return self.limits.reduction(), factoring_of(self.max_split_error, self.max_factor_labels)
 
     def _concluded(
         self, posterior: FactoredGlmb, report: FactoredReport, num_duplicates: int, place: str

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -12,6 +11,7 @@ from vedette.kernels.base.compile import inlined, kernel
 from vedette.kernels.base.types import FactoredGlmb, Floats, Glmb, Ints, Mixture, Tracks
 from vedette.kernels.gaussian.linalg import log_add, log_sum
 from vedette.kernels.gaussian.mixtures import copy_component, descending_order
+from vedette.kernels.labelled.groups import group_log_sums
 from vedette.kernels.labelled.splitting import Choices, group_choices
 
 # Places in `FactorStore.filled`.
@@ -120,13 +120,9 @@ def append_single(store: FactorStore, step: int, index: int, end: int, logit: fl
 @kernel
 def append_part(store: FactorStore, glmb: Glmb, choices: Choices, part_of: Ints, part: int) -> FactorStore:
     """Enter the marginal of a GLMB over the labels of a part as a factor, heaviest hypothesis first."""
-    num, groups = len(glmb.hyp_log_weights), np.empty(len(glmb.hyp_log_weights), np.int64)
+    groups = np.empty(len(glmb.hyp_log_weights), np.int64)
     firsts = group_choices(choices.symbols, part_of, part, groups)
-    log_weights = np.empty(len(firsts))
-    for g in range(len(firsts)):
-        log_weights[g] = -math.inf
-    for h in range(num):
-        log_weights[groups[h]] = log_add(log_weights[groups[h]], glmb.hyp_log_weights[h])
+    log_weights = group_log_sums(glmb.hyp_log_weights, groups, len(firsts))
     log_total, number = log_sum(log_weights), filled_ints(len(glmb.tracks.labels), -1)
     store = with_room(
         store, len(glmb.tracks.labels), len(glmb.tracks.log_weights), len(firsts), len(firsts) * len(part_of)

@@ -6,7 +6,6 @@ what told them apart is forgotten. Kept apart they would multiply from scan to s
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -14,9 +13,10 @@ import numpy as np
 from vedette.kernels.base.arrays import counted_ints, filled_ints
 from vedette.kernels.base.compile import kernel
 from vedette.kernels.base.types import Floats, Glmb, Ints, Tracks
-from vedette.kernels.gaussian.linalg import cholesky, log_add, log_sum, solve_lower
+from vedette.kernels.gaussian.linalg import cholesky, log_sum, solve_lower
 from vedette.kernels.gaussian.mixtures import MixtureCaps, descending_order, moment_match
 from vedette.kernels.gaussian.pooling import pooled_tracks
+from vedette.kernels.labelled.groups import group_log_sums
 from vedette.kernels.labelled.splitting import Choices, choices_of, group_choices
 
 
@@ -115,11 +115,7 @@ def merge_versions(glmb: Glmb, caps: MixtureCaps) -> Glmb:
             track = choices.symbols[h, k]
             symbols[h, k] = number[leader[track]] if track >= 0 else -1
     firsts = group_choices(symbols, filled_ints(num_labels, 0), 0, groups)
-    log_weights = np.empty(len(firsts))
-    for g in range(len(firsts)):
-        log_weights[g] = -math.inf
-    for h in range(len(groups)):
-        log_weights[groups[h]] = log_add(log_weights[groups[h]], glmb.hyp_log_weights[h])
+    log_weights = group_log_sums(glmb.hyp_log_weights, groups, len(firsts))
     order, log_total = descending_order(log_weights), log_sum(log_weights)
     offsets, members = np.zeros(len(order) + 1, np.int64), np.empty(len(order) * num_labels, np.int64)
     sorted_weights = np.empty(len(order))
