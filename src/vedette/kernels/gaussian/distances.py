@@ -1,12 +1,43 @@
-"""Distances between Gaussians, all pairs of two lists."""
+"""Distances between Gaussians."""
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
-from vedette.kernels.base.compile import kernel
+from vedette.kernels.base.compile import borrowing, kernel
 from vedette.kernels.base.types import Floats
 from vedette.kernels.gaussian.linalg import cholesky, log_det_from_factor, solve_lower
+
+
+@borrowing
+def l1_bound(mean: Floats, cov: Floats, other_mean: Floats, other_cov: Floats, factor: Floats, offset: Floats) -> float:
+    """Upper bound on the L1 distance of two Gaussians: 2 sqrt(1 - b^2), b their Bhattacharyya coefficient
+
+    b = (det P_a det P_b)^(1/4) / det((P_a + P_b) / 2)^(1/2) exp(-d' (P_a + P_b)^-1 d / 4).
+
+    At most 2, which stands for covariances that are not positive definite. factor: (dim, dim) and offset: (dim,) to
+    work in.
+    """
+    dim, log_coefficient = len(mean), 0.0
+    if not cholesky(cov, factor):
+        return 2.0
+    log_coefficient += 0.25 * log_det_from_factor(factor)
+    if not cholesky(other_cov, factor):
+        return 2.0
+    log_coefficient += 0.25 * log_det_from_factor(factor)
+    for i in range(dim):
+        offset[i] = mean[i] - other_mean[i]
+        for j in range(i + 1):
+            factor[i, j] = 0.5 * (cov[i, j] + other_cov[i, j])
+    if not cholesky(factor, factor):
+        return 2.0
+    log_coefficient -= 0.5 * log_det_from_factor(factor)
+    solve_lower(factor, offset, offset)
+    for i in range(dim):
+        log_coefficient -= 0.125 * offset[i] * offset[i]
+    return 2.0 * math.sqrt(max(0.0, -math.expm1(2.0 * log_coefficient)))
 
 
 @kernel
@@ -36,4 +67,4 @@ def pair_distances(means: Floats, covs: Floats, other_means: Floats, other_covs:
     return squares, log_dets
 
 
-__all__ = ["pair_distances"]
+__all__ = ["l1_bound", "pair_distances"]
