@@ -1,0 +1,223 @@
+"""The default filter beside those that it could be, over scenes of many kinds (`benchmarks/scenes.py`).
+
+    python benchmarks/defaults.py [--scenes WORD ...] [--filters NAME ...] [--errors E ...] [--runs N] [--out FILE]
+
+Compared are the filter that runs where nothing is said, the LMB filter, the delta-GLMB filter with 1,000 and with 20,000
+hypotheses, the M-delta-GLMB filter, and the factored filter with each of `--errors` as its split error. The runs of a
+scene are paired: truth and scans are the same for all. A scene is taken if any of the words is in its name.
+
+Prints a Markdown table a scene: runs; mean OSPA with its standard error, over the scans that the scenario scores;
+how much more that is than the first filter's in the same runs; the ratio to the best filter, of means that are
+comparable, the first filter's plus that difference; OSPA(2) over 10 scans; share of the targets that have an
+estimate within 0.4 of the cutoff; label switches a run; CPU milliseconds a scan, the median over the runs. No run
+begins when a filter has spent `--seconds` on a scene: slow ones have fewer runs.
+
+`--out` appends a line of JSON for each filter and scene, with the figures of every run. What the file held before is in the
+tables, unless it was measured again; `--runs 0` prints the file alone.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scenes import Scene, all_scenes
+
+from vedette.errors import VedetteError
+from vedette.evaluation import match_run, measure_run, ospa_of_run, summarise
+from vedette.models import SensorModel, TargetModel
+from vedette.scenarios import Scenario, with_fields
+from vedette.scenarios.build import build_experiment, build_planner
+from vedette.scenarios.sections.tracking import Filter
+from vedette.simulation import Experiment, RunRecord, simulate
+from vedette.tracking import State, Tracker
+
+SEED, NEAR = 1, 0.4
+Fields = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Timed:
+    """A tracker that adds up the CPU seconds of its steps."""
+
+    inner: Tracker
+    seconds: list[float]
+
+    @property
+    def targets(self) -> TargetModel:
+        return self.inner.targets
+
+    @property
+    def sensors(self) -> tuple[SensorModel, ...]:
+        return self.inner.sensors
+
+    def initial(self) -> State:
+        return self.inner.initial()
+
+    def step(self, *arguments: Any, **options: Any) -> Any:
+        start = time.process_time()
+        found = self.inner.step(*arguments, **options)
+        self.seconds.append(time.process_time() - start)
+        return found
+
+
+@dataclass(frozen=True)
+class Row:
+    """What a filter did in a scene, a number a run; `refused` where it could not."""
+
+    scene: str
+    filter: str
+    ospa: Sequence[float] = ()
+    ospa2: Sequence[float] = ()
+    near: Sequence[float] = ()
+    switches: Sequence[float] = ()
+    milliseconds: Sequence[float] = ()
+    refused: str = ""
+
+
+def compared(errors: Iterable[float]) -> dict[str, Fields]:
+    """The filters by name, each as fields of a scenario; first the one that runs where nothing is said."""
+    usual = Filter()
+    names = ("kind", "max_split_error", "max_factor_labels")
+    found: dict[str, Fields] = {"default": {f"filter.{name}": getattr(usual, name) for name in names}}
+    found["LMB"] = {"filter.kind": "lmb"}
+    for number in (1000, 20_000):
+        found[f"delta-GLMB {number:,}"] = {"filter.kind": "delta_glmb", "filter.limits.max_hypotheses": number}
+    found["M-delta-GLMB"] = {"filter.kind": "m_delta_glmb"}
+    for error in errors:
+        found[f"factored {error:g}"] = {"filter.kind": "factored_glmb", "filter.max_split_error": error}
+    return found
+
+
+def with_filter(scenario: Scenario, fields: Fields) -> Scenario:
+    """The scenario under another filter, fused by the covariance intersection of its kind of density."""
+    kinds = ("clmb", "cm_delta_glmb")
+    if scenario.model.fusion.kind in kinds:
+        fields = {**fields, "fusion.kind": kinds[fields["filter.kind"] != "lmb"]}
+    return with_fields(scenario, fields)
+
+
+def measured(scene: Scene, name: str, fields: Fields, num_runs: int, seconds: float) -> Row:
+    """One filter in one scene."""
+    rows: list[tuple[float, ...]] = []
+    start = time.process_time()
+    for run in range(num_runs):
+        if rows and time.process_time() - start > seconds:
+            break
+        given = scene.scenario(run)
+        try:
+            scenario = with_filter(given, fields)
+            if run == 0:  # compiles, or reads the cache
+                _run(scenario, scene.planner, run, first_scans=4)
+                start = time.process_time()
+            record, milliseconds = _run(scenario, scene.planner, run)
+            rows.append((*_scores(record, scenario), milliseconds))
+        except VedetteError as error:
+            return Row(scene.name, name, refused=str(error).splitlines()[0])
+    return Row(scene.name, name, *np.transpose(rows).tolist())
+
+
+def _run(scenario: Scenario, planner: str, run: int, first_scans: int | None = None) -> tuple[RunRecord, float]:
+    """A run, or its first scans alone, and its CPU milliseconds a scan."""
+    experiment, ospa = build_experiment(scenario), scenario.model.ospa
+    if first_scans is not None:
+        experiment = _shortened(experiment, first_scans)
+    timed = Timed(experiment.tracker, [])
+    score = partial(ospa_of_run, cutoff=ospa.cutoff, order=ospa.order, components=ospa.components)
+    decides = build_planner(scenario, planner, 1)
+    record = simulate(replace(experiment, tracker=timed), decides, seed=SEED, run=run, score=score)
+    return record, 1e3 * sum(timed.seconds) / len(timed.seconds)
+
+
+def _scores(record: RunRecord, scenario: Scenario) -> tuple[float, ...]:
+    """OSPA, OSPA(2), share of targets near an estimate, label switches."""
+    scored, cutoff, of_run = _scored(scenario), scenario.model.ospa.cutoff, measure_run(record, scenario)
+    near = match_run(record.truth, record.estimates, cutoff=NEAR * cutoff, order=1.0)
+    return (
+        float(record.ospa[scored, 0].mean()),
+        float(of_run.ospa2_m[scored].mean()),
+        float(near.num_matched[scored].sum() / max(1, near.num_targets[scored].sum())),
+        float(of_run.label_switches.sum()),
+    )
+
+
+def _shortened(experiment: Experiment, num_scans: int) -> Experiment:
+    steps = tuple(step for step in experiment.decision_steps if step <= num_scans)
+    return replace(experiment, times=experiment.times[:num_scans], decision_steps=steps)
+
+
+def _scored(scenario: Scenario) -> slice:
+    """The scans over which the scenario takes its mean."""
+    ospa, decisions = scenario.model.ospa, scenario.model.decision_steps
+    after = decisions[0] + 1 if decisions else 1
+    return slice((ospa.from_step or after) - 1, ospa.to_step)
+
+
+def table(scene: str, rows: Sequence[Row]) -> Iterator[str]:
+    """A scene's rows, compared with the first."""
+    yield f"\n### {scene}\n"
+    yield "| filter | runs | OSPA, m | more than the first | to the best | OSPA(2), m | near, % | switches | ms |"
+    yield "|---|---:|---:|---:|---:|---:|---:|---:|---:|"
+    first = next((row for row in rows if not row.refused), None)
+    if first is not None:
+        comparable = {row.filter: np.mean(first.ospa) + _more(row, first)[0] for row in rows if not row.refused}
+        best = min(comparable.values())
+    for row in rows:
+        if first is None or row.refused:
+            yield f"| {row.filter} | {row.refused} |"
+            continue
+        more, error = _more(row, first)
+        ospa, ospa2 = summarise(row.ospa), summarise(row.ospa2)
+        yield (
+            f"| {row.filter} | {len(row.ospa)} | {ospa.mean:.2f} ± {ospa.standard_error:.2f} | {more:+.2f} ± {error:.2f} "
+            f"| {comparable[row.filter] / max(best, 1e-9):.3f} | {ospa2.mean:.2f} | {100.0 * np.mean(row.near):.1f} "
+            f"| {np.mean(row.switches):.1f} | {np.median(row.milliseconds):.2f} |"
+        )
+
+
+def _more(row: Row, first: Row) -> tuple[float, float]:
+    """Mean difference of OSPA in the runs that both have, and its standard error."""
+    num = min(len(row.ospa), len(first.ospa))
+    found = summarise(np.subtract(row.ospa[:num], first.ospa[:num]))
+    return float(found.mean), float(found.standard_error)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--scenes", nargs="+", default=[""], help="words in their names; all")
+    parser.add_argument("--filters", nargs="+", help="names of those compared; all")
+    parser.add_argument("--errors", type=float, nargs="*", default=[0.01, 0.1, 0.3], help="of the factored filter")
+    parser.add_argument("--runs", type=int, default=20)
+    parser.add_argument("--seconds", type=float, default=4.0, help="CPU time after which no run begins")
+    parser.add_argument("--out", type=Path, help="file of JSON lines that is added to")
+    options = parser.parse_args()
+    filters = compared(options.errors)
+    wanted = options.filters or list(filters)
+    unknown = set(wanted) - set(filters)
+    if unknown:
+        parser.error(f"--filters: expected some of {', '.join(filters)}; got {', '.join(sorted(unknown))}")
+    lines = options.out.read_text("utf-8").splitlines() if options.out and options.out.exists() else []
+    known = {(row.scene, row.filter): row for row in (Row(**json.loads(line)) for line in lines)}
+    for scene in all_scenes():
+        if not any(word in scene.name for word in options.scenes):
+            continue
+        for name in wanted if options.runs else ():
+            row = measured(scene, name, filters[name], max(2, round(scene.share * options.runs)), options.seconds)
+            known[scene.name, name] = row
+            if options.out:
+                with options.out.open("a", encoding="utf-8") as file:
+                    file.write(json.dumps(asdict(row)) + "\n")
+        rows = [row for (of, _), row in known.items() if of == scene.name]
+        order = [*filters, *(row.filter for row in rows)]
+        print("\n".join(table(scene.name, sorted(rows, key=lambda row: order.index(row.filter)))), flush=True)
+
+
+if __name__ == "__main__":
+    main()
