@@ -2,9 +2,9 @@
 
     python benchmarks/defaults.py [--scenes WORD ...] [--filters NAME ...] [--errors E ...] [--runs N] [--out FILE]
 
-Compared are the filter that runs where nothing is said, the LMB filter, the delta-GLMB filter with 1,000 and with 20,000
-hypotheses, the M-delta-GLMB filter, and the factored filter with each of `--errors` as its split error. The runs of a
-scene are paired: truth and scans are the same for all. A scene is taken if any of the words is in its name.
+Compared are the filter that runs where nothing is said, the LMB filter, the delta-GLMB filter with 1,000 and with
+20,000 hypotheses, the M-delta-GLMB filter, and the factored filter with each of `--errors` as its split error. The runs
+of a scene are paired: truth and scans are the same for all. A scene is taken if any of the words is in its name.
 
 Prints a Markdown table a scene: runs; mean OSPA with its standard error, over the scans that the scenario scores;
 how much more that is than the first filter's in the same runs; the ratio to the best filter, of means that are
@@ -12,8 +12,8 @@ comparable, the first filter's plus that difference; OSPA(2) over 10 scans; shar
 estimate within 0.4 of the cutoff; label switches a run; CPU milliseconds a scan, the median over the runs. No run
 begins when a filter has spent `--seconds` on a scene: slow ones have fewer runs.
 
-`--out` appends a line of JSON for each filter and scene, with the figures of every run. What the file held before is in the
-tables, unless it was measured again; `--runs 0` prints the file alone.
+`--out` appends a line of JSON for each filter and scene, with the figures of every run. What the file held before is in
+the tables, unless it was measured again; `--runs 0` prints the file alone.
 """
 
 from __future__ import annotations
@@ -174,11 +174,11 @@ def table(scene: str, rows: Sequence[Row]) -> Iterator[str]:
             yield f"| {row.filter} | {row.refused} |"
             continue
         more, error = _more(row, first)
-        ospa, ospa2 = summarise(row.ospa), summarise(row.ospa2)
+        ospa, ratio = summarise(row.ospa), comparable[row.filter] / max(best, 1e-9)
+        rest = (np.mean(row.ospa2), 100.0 * np.mean(row.near), np.mean(row.switches), np.median(row.milliseconds))
         yield (
-            f"| {row.filter} | {len(row.ospa)} | {ospa.mean:.2f} ± {ospa.standard_error:.2f} | {more:+.2f} ± {error:.2f} "
-            f"| {comparable[row.filter] / max(best, 1e-9):.3f} | {ospa2.mean:.2f} | {100.0 * np.mean(row.near):.1f} "
-            f"| {np.mean(row.switches):.1f} | {np.median(row.milliseconds):.2f} |"
+            f"| {row.filter} | {len(row.ospa)} | {ospa.mean:.2f} ± {ospa.standard_error:.2f} "
+            f"| {more:+.2f} ± {error:.2f} | {ratio:.3f} | " + " | ".join(f"{value:.2f}" for value in rest) + " |"
         )
 
 

@@ -150,19 +150,18 @@ def crossing_targets() -> Iterator[Scene]:
     }
     yield own("far", far)
     yield own("far, clutter 250", {**far, "sensors.*.clutter.rate": 250.0})
-    measured = {
-        "birth": {"from_measurements": {"expected": 0.1, "max_existence": 0.03, "std": [15.0, 15.0, 10.0, 10.0]}}
-    }
-    from_measurements = {**{key: far[key] for key in far if key != "birth.sites"}, **measured}
+    births = {"expected": 0.1, "max_existence": 0.03, "std": [15.0, 15.0, 10.0, 10.0]}
+    from_measurements = {**far, "birth.sites": [], "birth.from_measurements": births}
     yield own("far, from measurements", from_measurements)
     yield own("far, from measurements, sequential", from_measurements, 2, {"kind": "sequential"})
     matched = {"kind": "cm_delta_glmb", "matching": "assignment"}
     yield own("far, from measurements, GCI matched", from_measurements, 2, matched)
 
 
-def builtin(name: str, planner: str, share: float = 1.0) -> Scene:
-    """A scenario that comes with the library, under a strategy."""
-    return Scene(f"{name}, {planner}", lambda run: load_scenario(name), planner, share)
+def builtin(name: str, planner: str, share: float = 1.0, **fields: Any) -> Scene:
+    """A scenario that comes with the library, with some sections replaced, under a strategy."""
+    scenario = cache(lambda: with_fields(load_scenario(name), fields))
+    return Scene(f"{name}, {planner}", lambda run: scenario(), planner, share)
 
 
 def still_sensors() -> Scene:
@@ -207,7 +206,7 @@ def all_scenes() -> tuple[Scene, ...]:
         builtin("paper-e", "fixed"),
         builtin("paper-e", "jdm"),
         still_sensors(),
-        builtin("three-positions", "still", 0.25),
+        builtin("three-positions", "still", 0.25, fusion={"kind": "sequential"}),
         builtin("shore-radar", "still", 0.5),
         builtin("six-cameras", "jdm", 0.5),
         builtin("eight-mobile", "jdm", 0.25),
