@@ -71,8 +71,8 @@ def own(name: str, fields: dict[str, Any], num_sensors: int = 1, fusion: dict[st
     def scenario() -> Scenario:
         base = Scenario(parse_scenario(BASE))
         [sensor] = base.model.model_dump(mode="json")["sensors"]
-        several = {"sensors": [{**sensor, "name": f"sensor {s}"} for s in range(num_sensors)], "fusion": fusion or {}}
-        return with_fields(with_fields(base, several if num_sensors > 1 else {}), {**fields, "name": name})
+        several = {"sensors": [{**sensor, "name": f"sensor {s}"} for s in range(num_sensors)]}
+        return with_fields(base, {**several, "fusion": fusion or {"kind": "none"}, **fields, "name": name})
 
     return Scene(name, lambda run: scenario())
 
