@@ -10,11 +10,12 @@ right.
 Prints of each filter, and of each way to take two sensors' scans or beliefs together, a Markdown table: the labels and
 scans of which an existence between two bounds was said, the mean that was said, and the share that exists with its
 standard error (runs are independent, scans of a run are not). Labels that a belief does not hold are said not to exist.
-And a table of a line each: the largest difference of said and found over the bins of more than 500; the log loss and
-Brier score of the labels, summed over them, a scan, existences held in 1e-6 to 1 - 1e-6; what the ranks of the true
-number in its posterior distribution (ties broken at random) differ from uniform, as the largest distance of the
-distribution functions, 0 to 1; OSPA (c = 100 m, p = 1); CPU milliseconds a scan. Filters without labels have the number
-alone. Equal arguments print equal tables, but for the times.
+
+Then a table of a line each: the largest difference of said and found over the bins of more than 500, with its standard
+error; the log loss and Brier score of the labels, summed over them, a scan, existences held in 1e-6 to 1 - 1e-6; what
+the ranks of the true number in its posterior distribution (ties broken at random) differ from uniform, as the largest
+distance of the distribution functions, 0 to 1; OSPA (c = 100 m, p = 1); CPU milliseconds a scan. Filters without labels
+have the number alone. Equal arguments print equal tables, but for the times.
 """
 
 from __future__ import annotations
@@ -137,10 +138,13 @@ class Calibration:
         return rows
 
     @property
-    def worst(self) -> float:
-        """Largest difference of said and found over the bins that hold enough."""
+    def worst(self) -> tuple[float, float]:
+        """Largest difference of said and found over the bins that hold enough, and its standard error."""
         rows = self.bins()
-        return float(np.abs(rows[:, 1] - rows[:, 2])[rows[:, 0] > ENOUGH].max())
+        rows = rows[rows[:, 0] > ENOUGH]
+        differences = np.abs(rows[:, 1] - rows[:, 2])
+        place = int(np.argmax(differences))
+        return float(differences[place]), float(rows[place, 3])
 
     @property
     def log_loss(self) -> float:
@@ -256,15 +260,17 @@ def bin_table(found: Calibration) -> Iterator[str]:
 
 def summary_line(case: Case, found: Calibration) -> str:
     """The line of a case in the table of all."""
-    labels = [found.worst, found.log_loss, found.brier]
-    told = " | ".join(f"{value:.3f}" if case.labels else "" for value in labels)
-    return f"| {case.name} | {told} | {found.rank_deviation:.3f} | {found.ospa:.2f} | {found.milliseconds:.2f} |"
+    labels = " | | "
+    if case.labels:
+        worst, error = found.worst
+        labels = f"{worst:.3f} ± {error:.3f} | {found.log_loss:.3f} | {found.brier:.3f}"
+    return f"| {case.name} | {labels} | {found.rank_deviation:.3f} | {found.ospa:.2f} | {found.milliseconds:.2f} |"
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--detection", type=float, nargs="+", default=[0.7, 0.95], help="of each sensor")
-    parser.add_argument("--runs", type=int, default=40)
+    parser.add_argument("--runs", type=int, default=200)
     parser.add_argument("--cases", nargs="+", default=[""], help="words in their names; all")
     parser.add_argument(
         "--errors", type=float, nargs="*", default=[], help="further split errors of the factored filter"

@@ -9,8 +9,9 @@ of a scene are paired: truth and scans are the same for all. A scene is taken if
 Prints a Markdown table a scene: runs; mean OSPA with its standard error, over the scans that the scenario scores;
 how much more that is than the first filter's in the same runs; the ratio to the best filter, of means that are
 comparable, the first filter's plus that difference; OSPA(2) over 10 scans; share of the targets that have an
-estimate within 0.4 of the cutoff; label switches a run; CPU milliseconds a scan, the median over the runs. No run
-begins when a filter has spent `--seconds` on a scene: slow ones have fewer runs.
+estimate within 0.4 of the cutoff; label switches a run; CPU milliseconds a scan, the median over the runs. After the
+second run none begins when a filter has spent `--seconds` on a scene: slow ones have fewer runs. Then a table of the
+ratios in all scenes.
 
 `--out` appends a line of JSON for each filter and scene, with the figures of every run. What the file held before is in
 the tables, unless it was measured again; `--runs 0` prints the file alone.
@@ -109,7 +110,7 @@ def measured(scene: Scene, name: str, fields: Fields, num_runs: int, seconds: fl
     rows: list[tuple[float, ...]] = []
     start = time.process_time()
     for run in range(num_runs):
-        if rows and time.process_time() - start > seconds:
+        if run >= 2 and time.process_time() - start > seconds:
             break
         given = scene.scenario(run)
         try:
@@ -165,25 +166,44 @@ def table(scene: str, rows: Sequence[Row]) -> Iterator[str]:
     yield f"\n### {scene}\n"
     yield "| filter | runs | OSPA, m | more than the first | to the best | OSPA(2), m | near, % | switches | ms |"
     yield "|---|---:|---:|---:|---:|---:|---:|---:|---:|"
-    first = next((row for row in rows if not row.refused), None)
-    if first is not None:
-        comparable = {row.filter: np.mean(first.ospa) + _more(row, first)[0] for row in rows if not row.refused}
-        best = min(comparable.values())
+    ratios = _ratios(rows)
     for row in rows:
-        if first is None or row.refused:
+        if row.refused:
             yield f"| {row.filter} | {row.refused} |"
             continue
-        more, error = _more(row, first)
-        ospa, ratio = summarise(row.ospa), comparable[row.filter] / max(best, 1e-9)
+        (more, error), ospa = _more(row, rows), summarise(row.ospa)
         rest = (np.mean(row.ospa2), 100.0 * np.mean(row.near), np.mean(row.switches), np.median(row.milliseconds))
         yield (
             f"| {row.filter} | {len(row.ospa)} | {ospa.mean:.2f} ± {ospa.standard_error:.2f} "
-            f"| {more:+.2f} ± {error:.2f} | {ratio:.3f} | " + " | ".join(f"{value:.2f}" for value in rest) + " |"
+            f"| {more:+.2f} ± {error:.2f} | {ratios[row.filter]:.3f} | "
+            + " | ".join(f"{value:.2f}" for value in rest)
+            + " |"
         )
 
 
-def _more(row: Row, first: Row) -> tuple[float, float]:
-    """Mean difference of OSPA in the runs that both have, and its standard error."""
+def overview(scenes: dict[str, Sequence[Row]], filters: Sequence[str]) -> Iterator[str]:
+    """The ratio of each filter to the best in every scene, and the largest of all."""
+    yield "\n| ratio to the best | " + " | ".join(filters) + " |"
+    yield "|---|" + "---:|" * len(filters)
+    ratios = {scene: _ratios(rows) for scene, rows in scenes.items()}
+    largest = {
+        name: max((found[name] for found in ratios.values() if name in found), default=np.nan) for name in filters
+    }
+    for scene, found in {**ratios, "largest": largest}.items():
+        yield f"| {scene} | " + " | ".join(f"{found[name]:.3f}" if name in found else "" for name in filters) + " |"
+
+
+def _ratios(rows: Sequence[Row]) -> dict[str, float]:
+    """To the best, by filter, of means that are comparable though not all have all runs."""
+    found = [row for row in rows if not row.refused]
+    means = {row.filter: float(np.mean(found[0].ospa)) + _more(row, found)[0] for row in found}
+    best = min(means.values(), default=np.nan)
+    return {name: mean / best for name, mean in means.items()}
+
+
+def _more(row: Row, rows: Sequence[Row]) -> tuple[float, float]:
+    """Mean difference of OSPA to the first row's in the runs that both have, and its standard error."""
+    first = next(other for other in rows if not other.refused)
     num = min(len(row.ospa), len(first.ospa))
     found = summarise(np.subtract(row.ospa[:num], first.ospa[:num]))
     return float(found.mean), float(found.standard_error)
@@ -195,7 +215,7 @@ def main() -> None:
     parser.add_argument("--filters", nargs="+", help="names of those compared; all")
     parser.add_argument("--errors", type=float, nargs="*", default=[0.01, 0.1, 0.3], help="of the factored filter")
     parser.add_argument("--runs", type=int, default=20)
-    parser.add_argument("--seconds", type=float, default=4.0, help="CPU time after which no run begins")
+    parser.add_argument("--seconds", type=float, default=2.0, help="CPU time after which no run begins")
     parser.add_argument("--out", type=Path, help="file of JSON lines that is added to")
     options = parser.parse_args()
     filters = compared(options.errors)
@@ -205,18 +225,20 @@ def main() -> None:
         parser.error(f"--filters: expected some of {', '.join(filters)}; got {', '.join(sorted(unknown))}")
     lines = options.out.read_text("utf-8").splitlines() if options.out and options.out.exists() else []
     known = {(row.scene, row.filter): row for row in (Row(**json.loads(line)) for line in lines)}
-    for scene in all_scenes():
-        if not any(word in scene.name for word in options.scenes):
-            continue
+    taken = [scene for scene in all_scenes() if any(word in scene.name for word in options.scenes)]
+    shown: dict[str, Sequence[Row]] = {}
+    for scene in taken:
         for name in wanted if options.runs else ():
             row = measured(scene, name, filters[name], max(2, round(scene.share * options.runs)), options.seconds)
             known[scene.name, name] = row
             if options.out:
                 with options.out.open("a", encoding="utf-8") as file:
                     file.write(json.dumps(asdict(row)) + "\n")
-        rows = [row for (of, _), row in known.items() if of == scene.name]
-        order = [*filters, *(row.filter for row in rows)]
-        print("\n".join(table(scene.name, sorted(rows, key=lambda row: order.index(row.filter)))), flush=True)
+        names = [*filters, *(name for of, name in known if of == scene.name and name not in filters)]
+        shown[scene.name] = [known[scene.name, name] for name in names if (scene.name, name) in known]
+        print("\n".join(table(scene.name, shown[scene.name])), flush=True)
+    every = dict.fromkeys(row.filter for rows in shown.values() for row in rows)
+    print("\n".join(overview(shown, list(every))))
 
 
 if __name__ == "__main__":

@@ -136,10 +136,12 @@ def crossing_targets() -> Iterator[Scene]:
     crossing = {
         "birth.sites": [site(start, 20.0, 0.03, 10.0) for start in starts],
         "targets.tracks": [track((x, y, 10.0, -y / 20.0)) for x, y in starts],
+        "sensors.*.noise.std": [8.0, 8.0],
         "sensors.*.detection.probability": 0.9,
     }
     yield own("crossing", crossing)
     yield own("crossing, GCI, born once", {**crossing, "birth.steps": [1]}, 2, {"kind": "cm_delta_glmb"})
+    yield own("crossing, clutter 250", {**crossing, "sensors.*.clutter.rate": 250.0})
     hard = {"sensors.*.detection.probability": 0.6, "sensors.*.clutter.rate": 100.0}
     yield own("crossing, P_D 0.6, clutter 100", crossing | hard)
     corners = [(-300.0, -300.0), (300.0, -300.0), (-300.0, 300.0), (300.0, 300.0)]
