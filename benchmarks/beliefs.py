@@ -133,7 +133,7 @@ class Calibration:
                 row[1:] = (
                     self.said[inside].mean(),
                     self.found[inside].mean(),
-                    np.sqrt(len(excess) * excess.var()) / number,
+                    np.sqrt(len(excess) * excess.var(ddof=1)) / number if len(excess) > 1 else np.nan,
                 )
         return rows
 

@@ -7,11 +7,10 @@ Compared are the filter that runs where nothing is said, the LMB filter, the del
 of a scene are paired: truth and scans are the same for all. A scene is taken if any of the words is in its name.
 
 Prints a Markdown table a scene: runs; mean OSPA with its standard error, over the scans that the scenario scores;
-how much more that is than the first filter's in the same runs; the ratio to the best filter, of means that are
-comparable, the first filter's plus that difference; OSPA(2) over 10 scans; share of the targets that have an
-estimate within 0.4 of the cutoff; label switches a run; CPU milliseconds a scan, the median over the runs. After the
-second run none begins when a filter has spent `--seconds` on a scene: slow ones have fewer runs. Then a table of the
-ratios in all scenes.
+how much more that is than the first filter's, and its ratio to the best, each in the runs that both have, with the
+standard error of the difference; OSPA(2) over 10 scans; share of the targets that have an estimate within 0.4 of the
+cutoff; label switches a run; CPU milliseconds a scan, the median over the runs. After the second run none begins when a
+filter has spent `--seconds` on a scene: slow ones have fewer runs. Then a table of the ratios in all scenes.
 
 `--out` appends a line of JSON for each filter and scene, with the figures of every run. What the file held before is in
 the tables, unless it was measured again; `--runs 0` prints the file alone.
@@ -26,13 +25,13 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scenes import Scene, all_scenes
 
 from vedette.errors import VedetteError
-from vedette.evaluation import match_run, measure_run, ospa_of_run, summarise
+from vedette.evaluation import Summary, match_run, measure_run, ospa_of_run, summarise
 from vedette.models import SensorModel, TargetModel
 from vedette.scenarios import Scenario, with_fields
 from vedette.scenarios.build import build_experiment, build_planner
@@ -161,21 +160,31 @@ def _scored(scenario: Scenario) -> slice:
     return slice((ospa.from_step or after) - 1, ospa.to_step)
 
 
+class Ratio(NamedTuple):
+    """Of means of OSPA in the runs that two filters have, and the standard error of the numerator."""
+
+    ratio: float
+    error: float
+
+    def __str__(self) -> str:
+        return f"{self.ratio:.3f} ± {self.error:.3f}"
+
+
 def table(scene: str, rows: Sequence[Row]) -> Iterator[str]:
-    """A scene's rows, compared with the first."""
+    """A scene's rows, compared with the first and with the best."""
     yield f"\n### {scene}\n"
     yield "| filter | runs | OSPA, m | more than the first | to the best | OSPA(2), m | near, % | switches | ms |"
     yield "|---|---:|---:|---:|---:|---:|---:|---:|---:|"
-    ratios = _ratios(rows)
+    ratios, first = to_the_best(rows), next((row for row in rows if not row.refused), None)
     for row in rows:
-        if row.refused:
+        if first is None or row.refused:
             yield f"| {row.filter} | {row.refused} |"
             continue
-        (more, error), ospa = _more(row, rows), summarise(row.ospa)
+        ospa, more = summarise(row.ospa), _difference(row, first)
         rest = (np.mean(row.ospa2), 100.0 * np.mean(row.near), np.mean(row.switches), np.median(row.milliseconds))
         yield (
             f"| {row.filter} | {len(row.ospa)} | {ospa.mean:.2f} ± {ospa.standard_error:.2f} "
-            f"| {more:+.2f} ± {error:.2f} | {ratios[row.filter]:.3f} | "
+            f"| {more.mean:+.2f} ± {more.standard_error:.2f} | {ratios[row.filter]} | "
             + " | ".join(f"{value:.2f}" for value in rest)
             + " |"
         )
@@ -185,28 +194,32 @@ def overview(scenes: dict[str, Sequence[Row]], filters: Sequence[str]) -> Iterat
     """The ratio of each filter to the best in every scene, and the largest of all."""
     yield "\n| ratio to the best | " + " | ".join(filters) + " |"
     yield "|---|" + "---:|" * len(filters)
-    ratios = {scene: _ratios(rows) for scene, rows in scenes.items()}
+    ratios = {scene: to_the_best(rows) for scene, rows in scenes.items()}
     largest = {
-        name: max((found[name] for found in ratios.values() if name in found), default=np.nan) for name in filters
+        name: max(found[name] for found in ratios.values() if name in found)
+        for name in filters
+        if any(name in found for found in ratios.values())
     }
     for scene, found in {**ratios, "largest": largest}.items():
-        yield f"| {scene} | " + " | ".join(f"{found[name]:.3f}" if name in found else "" for name in filters) + " |"
+        yield f"| {scene} | " + " | ".join(str(found.get(name, "")) for name in filters) + " |"
 
 
-def _ratios(rows: Sequence[Row]) -> dict[str, float]:
-    """To the best, by filter, of means that are comparable though not all have all runs."""
+def to_the_best(rows: Sequence[Row]) -> dict[str, Ratio]:
+    """The largest ratio of each filter's mean to another's, or its own, each in the runs that both have."""
     found = [row for row in rows if not row.refused]
-    means = {row.filter: float(np.mean(found[0].ospa)) + _more(row, found)[0] for row in found}
-    best = min(means.values(), default=np.nan)
-    return {name: mean / best for name, mean in means.items()}
+    return {row.filter: max(_ratio(row, other) for other in found) for row in found}
 
 
-def _more(row: Row, rows: Sequence[Row]) -> tuple[float, float]:
-    """Mean difference of OSPA to the first row's in the runs that both have, and its standard error."""
-    first = next(other for other in rows if not other.refused)
-    num = min(len(row.ospa), len(first.ospa))
-    found = summarise(np.subtract(row.ospa[:num], first.ospa[:num]))
-    return float(found.mean), float(found.standard_error)
+def _ratio(row: Row, other: Row) -> Ratio:
+    num, more = min(len(row.ospa), len(other.ospa)), _difference(row, other)
+    mean = float(np.mean(other.ospa[:num]))
+    return Ratio(1.0 + float(more.mean) / mean, float(more.standard_error) / mean)
+
+
+def _difference(row: Row, other: Row) -> Summary:
+    """How much more OSPA a filter has in the runs that both have."""
+    num = min(len(row.ospa), len(other.ospa))
+    return summarise(np.subtract(row.ospa[:num], other.ospa[:num]))
 
 
 def main() -> None:
@@ -235,8 +248,9 @@ def main() -> None:
                 with options.out.open("a", encoding="utf-8") as file:
                     file.write(json.dumps(asdict(row)) + "\n")
         names = [*filters, *(name for of, name in known if of == scene.name and name not in filters)]
-        shown[scene.name] = [known[scene.name, name] for name in names if (scene.name, name) in known]
-        print("\n".join(table(scene.name, shown[scene.name])), flush=True)
+        if rows := [known[scene.name, name] for name in names if (scene.name, name) in known]:
+            shown[scene.name] = rows
+            print("\n".join(table(scene.name, rows)), flush=True)
     every = dict.fromkeys(row.filter for rows in shown.values() for row in rows)
     print("\n".join(overview(shown, list(every))))
 
