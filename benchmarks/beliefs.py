@@ -1,6 +1,7 @@
 """Whether what filters and fusions believe is true: said against found, where the truth is drawn from the very model.
 
     python benchmarks/beliefs.py [--detection P ...] [--runs N] [--cases WORD ...] [--errors E ...] [--summary]
+    python benchmarks/beliefs.py --summary --write docs/filters.md
 
 Four sites give birth with probability 0.06 at each of 25 scans; targets live on with 0.95 and are detected with P by
 each position sensor, among 10 false measurements a scan. Each run draws targets from just this, so each of the 100
@@ -15,18 +16,22 @@ Then a table of a line each: the largest difference of said and found over the b
 error; the log loss and Brier score of the labels, summed over them, a scan, existences held in 1e-6 to 1 - 1e-6; what
 the ranks of the true number in its posterior distribution (ties broken at random) differ from uniform, as the largest
 distance of the distribution functions, 0 to 1; OSPA (c = 100 m, p = 1); CPU milliseconds a scan. Filters without labels
-have the number alone. Equal arguments print equal tables, but for the times.
+have the number alone. And what share exists of what was said, a line each. Equal arguments print equal tables, but for
+the times.
 """
 
 from __future__ import annotations
 
 import argparse
+import itertools
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+from all import write_between
 from defaults import Fields, Timed, compared
 from numpy.typing import ArrayLike, NDArray
 from scenes import own, site
@@ -258,13 +263,31 @@ def bin_table(found: Calibration) -> Iterator[str]:
             yield f"| {low:g} | {high:g} | {number:.0f} | {said:.3f} | {true:.3f} ± {error:.3f} |"
 
 
-def summary_line(case: Case, found: Calibration) -> str:
-    """The line of a case in the table of all."""
-    labels = " | | "
-    if case.labels:
-        worst, error = found.worst
-        labels = f"{worst:.3f} ± {error:.3f} | {found.log_loss:.3f} | {found.brier:.3f}"
-    return f"| {case.name} | {labels} | {found.rank_deviation:.3f} | {found.ospa:.2f} | {found.milliseconds:.2f} |"
+def summary_table(told: Sequence[tuple[Case, Calibration]]) -> Iterator[str]:
+    """A line each: the scores."""
+    yield "| beliefs | largest difference | log loss | Brier | ranks | OSPA, m | ms |"
+    yield "|---|---:|---:|---:|---:|---:|---:|"
+    for case, found in told:
+        labels = " | | "
+        if case.labels:
+            worst, error = found.worst
+            labels = f"{worst:.3f} ± {error:.3f} | {found.log_loss:.3f} | {found.brier:.3f}"
+        yield f"| {case.name} | {labels} | {found.rank_deviation:.3f} | {found.ospa:.2f} | {found.milliseconds:.2f} |"
+
+
+def shares_table(told: Sequence[tuple[Case, Calibration]]) -> Iterator[str]:
+    """A line each: what share exists of what was said, in brackets where that is too few to judge by."""
+    yield "| beliefs | " + " | ".join(f"{low:g} to {high:g}" for low, high in itertools.pairwise(BOUNDS)) + " |"
+    yield "|---|" + "---:|" * (len(BOUNDS) - 1)
+    for case, found in told:
+        if case.labels:
+            yield f"| {case.name} | " + " | ".join(_share(*row[:3]) for row in found.bins()) + " |"
+
+
+def _share(number: float, said: float, true: float) -> str:
+    if not number:
+        return ""
+    return f"{true:.3f} of {said:.3f}" if number > ENOUGH else f"({true:.3f} of {said:.3f})"
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -275,20 +298,23 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument(
         "--errors", type=float, nargs="*", default=[], help="further split errors of the factored filter"
     )
-    parser.add_argument("--summary", action="store_true", help="without the tables of bins")
+    parser.add_argument("--summary", action="store_true", help="without the tables of each")
+    parser.add_argument("--write", type=Path, metavar="PAGE", help="Markdown page with a place for the tables of all")
     options = parser.parse_args(arguments)
+    texts = []
     for detection in options.detection:
-        print(f"\n## P_D {detection:g}, {options.runs} runs, seed {SEED}")
-        lines = []
+        title = f"P_D {detection:g}, {options.runs} runs, seed {SEED}"
+        print(f"\n## {title}", flush=True)
+        told = []
         for case in cases(options.errors):
-            if not any(word in case.name for word in options.cases):
-                continue
-            found = calibration(case, detection, options.runs)
-            lines.append(summary_line(case, found))
-            if case.labels and not options.summary:
-                print("\n".join(["", f"### {case.name}", "", *bin_table(found)]), flush=True)
-        print("\n| beliefs | largest difference | log loss | Brier | ranks | OSPA, m | ms |")
-        print("\n".join(["|---|---:|---:|---:|---:|---:|---:|", *lines]), flush=True)
+            if any(word in case.name for word in options.cases):
+                told.append((case, calibration(case, detection, options.runs)))
+                if case.labels and not options.summary:
+                    print("\n".join(["", f"### {case.name}", "", *bin_table(told[-1][1])]), flush=True)
+        texts.append("\n".join([f"{title}:", "", *summary_table(told), "", *shares_table(told)]))
+        print(f"\n{texts[-1]}", flush=True)
+    if options.write:
+        write_between(options.write, "beliefs.py", "\n\n".join(texts))
 
 
 if __name__ == "__main__":

@@ -1,6 +1,7 @@
 """The default filter beside those that it could be, over scenes of many kinds (`benchmarks/scenes.py`).
 
     python benchmarks/defaults.py [--scenes WORD ...] [--filters NAME ...] [--errors E ...] [--runs N] [--out FILE]
+    python benchmarks/defaults.py --out FILE --write docs/filters.md
 
 Compared are the filter that runs where nothing is said, the LMB filter, the delta-GLMB filter with 1,000 and with
 20,000 hypotheses, the M-delta-GLMB filter, and the factored filter with each of `--errors` as its split error. The runs
@@ -28,6 +29,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from all import write_between
 from scenes import Scene, all_scenes
 
 from vedette.errors import VedetteError
@@ -192,7 +194,7 @@ def table(scene: str, rows: Sequence[Row]) -> Iterator[str]:
 
 def overview(scenes: dict[str, Sequence[Row]], filters: Sequence[str]) -> Iterator[str]:
     """The ratio of each filter to the best in every scene, and the largest of all."""
-    yield "\n| ratio to the best | " + " | ".join(filters) + " |"
+    yield "| ratio to the best | " + " | ".join(filters) + " |"
     yield "|---|" + "---:|" * len(filters)
     ratios = {scene: to_the_best(rows) for scene, rows in scenes.items()}
     largest = {
@@ -226,10 +228,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--scenes", nargs="+", default=[""], help="words in their names; all")
     parser.add_argument("--filters", nargs="+", help="names of those compared; all")
-    parser.add_argument("--errors", type=float, nargs="*", default=[0.01, 0.1, 0.3], help="of the factored filter")
+    parser.add_argument("--errors", type=float, nargs="*", default=[0.1], help="of the factored filter")
     parser.add_argument("--runs", type=int, default=20)
     parser.add_argument("--seconds", type=float, default=2.0, help="CPU time after which no run begins")
     parser.add_argument("--out", type=Path, help="file of JSON lines that is added to")
+    parser.add_argument("--write", type=Path, metavar="PAGE", help="Markdown page with a place for the table of ratios")
     options = parser.parse_args()
     filters = compared(options.errors)
     wanted = options.filters or list(filters)
@@ -252,7 +255,10 @@ def main() -> None:
             shown[scene.name] = rows
             print("\n".join(table(scene.name, rows)), flush=True)
     every = dict.fromkeys(row.filter for rows in shown.values() for row in rows)
-    print("\n".join(overview(shown, list(every))))
+    text = "\n".join(overview(shown, list(every)))
+    print(f"\n{text}")
+    if options.write:
+        write_between(options.write, "defaults.py", text)
 
 
 if __name__ == "__main__":
