@@ -8,10 +8,11 @@ Compared are the filter that runs where nothing is said, the LMB filter, the del
 of a scene are paired: truth and scans are the same for all. A scene is taken if any of the words is in its name.
 
 Prints a Markdown table a scene: runs; mean OSPA with its standard error, over the scans that the scenario scores;
-how much more that is than the first filter's, and its ratio to the best, each in the runs that both have, with the
-standard error of the difference; OSPA(2) over 10 scans; share of the targets that have an estimate within 0.4 of the
-cutoff; label switches a run; CPU milliseconds a scan, the median over the runs. After the second run none begins when a
-filter has spent `--seconds` on a scene: slow ones have fewer runs. Then a table of the ratios in all scenes.
+how much more that is than the first filter's, and its ratio to the best that has five runs, each in the runs that both
+have, with the standard error of the difference; OSPA(2) over 10 scans; share of the targets that have an estimate
+within 0.4 of the cutoff; label switches a run; CPU milliseconds a scan, the median over the runs. After the second run
+none begins when a filter has spent `--seconds` on a scene: slow ones have fewer runs. Then a table of the ratios in all
+scenes.
 
 `--out` appends a line of JSON for each filter and scene, with the figures of every run. What the file held before is in
 the tables, unless it was measured again; `--runs 0` prints the file alone.
@@ -41,7 +42,7 @@ from vedette.scenarios.sections.tracking import Filter
 from vedette.simulation import Experiment, RunRecord, simulate
 from vedette.tracking import State, Tracker
 
-SEED, NEAR = 1, 0.4
+SEED, NEAR, ENOUGH_RUNS = 1, 0.4, 5
 Fields = dict[str, Any]
 
 
@@ -207,9 +208,13 @@ def overview(scenes: dict[str, Sequence[Row]], filters: Sequence[str]) -> Iterat
 
 
 def to_the_best(rows: Sequence[Row]) -> dict[str, Ratio]:
-    """The largest ratio of each filter's mean to another's, or its own, each in the runs that both have."""
+    """The largest ratio of each filter's mean to another's, in the runs that both have; not to one of too few."""
     found = [row for row in rows if not row.refused]
-    return {row.filter: max(_ratio(row, other) for other in found) for row in found}
+    best = {}
+    for row in found:
+        enough = min(ENOUGH_RUNS, len(row.ospa))
+        best[row.filter] = max(_ratio(row, other) for other in found if len(other.ospa) >= enough)
+    return best
 
 
 def _ratio(row: Row, other: Row) -> Ratio:
