@@ -79,6 +79,7 @@ def test_the_truth_is_drawn_from_the_model() -> None:
     np.testing.assert_allclose(np.cov(np.concatenate(moves).T), noise, atol=0.4)
 
 
+@pytest.mark.slow
 def test_every_case_can_be_asked() -> None:
     for case in cases():
         found = calibration(case, 0.9, 1)
