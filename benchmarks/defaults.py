@@ -23,52 +23,24 @@ from __future__ import annotations
 import argparse
 import json
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from all import write_between
+from compared import Fields, Timed, compared, with_filter
+from pages import write_between
 from scenes import Scene, all_scenes
 
 from vedette.errors import VedetteError
 from vedette.evaluation import Summary, match_run, measure_run, ospa_of_run, summarise
-from vedette.models import SensorModel, TargetModel
-from vedette.scenarios import Scenario, with_fields
+from vedette.scenarios import Scenario
 from vedette.scenarios.build import build_experiment, build_planner
-from vedette.scenarios.sections.tracking import Filter
 from vedette.simulation import Experiment, RunRecord, simulate
-from vedette.tracking import State, Tracker
 
 SEED, NEAR, ENOUGH_RUNS = 1, 0.4, 5
-Fields = dict[str, Any]
-
-
-@dataclass(frozen=True)
-class Timed:
-    """A tracker that adds up the CPU seconds of its steps."""
-
-    inner: Tracker
-    seconds: list[float]
-
-    @property
-    def targets(self) -> TargetModel:
-        return self.inner.targets
-
-    @property
-    def sensors(self) -> tuple[SensorModel, ...]:
-        return self.inner.sensors
-
-    def initial(self) -> State:
-        return self.inner.initial()
-
-    def step(self, *arguments: Any, **options: Any) -> Any:
-        start = time.process_time()
-        found = self.inner.step(*arguments, **options)
-        self.seconds.append(time.process_time() - start)
-        return found
 
 
 @dataclass(frozen=True)
@@ -83,28 +55,6 @@ class Row:
     switches: Sequence[float] = ()
     milliseconds: Sequence[float] = ()
     refused: str = ""
-
-
-def compared(errors: Iterable[float]) -> dict[str, Fields]:
-    """The filters by name, each as fields of a scenario; first the one that runs where nothing is said."""
-    usual = Filter()
-    names = ("kind", "max_split_error", "max_factor_labels")
-    found: dict[str, Fields] = {"default": {f"filter.{name}": getattr(usual, name) for name in names}}
-    found["LMB"] = {"filter.kind": "lmb"}
-    for number in (1000, 20_000):
-        found[f"delta-GLMB {number:,}"] = {"filter.kind": "delta_glmb", "filter.limits.max_hypotheses": number}
-    found["M-delta-GLMB"] = {"filter.kind": "m_delta_glmb"}
-    for error in errors:
-        found[f"factored {error:g}"] = {"filter.kind": "factored_glmb", "filter.max_split_error": error}
-    return found
-
-
-def with_filter(scenario: Scenario, fields: Fields) -> Scenario:
-    """The scenario under another filter, fused by the covariance intersection of its kind of density."""
-    kinds = ("clmb", "cm_delta_glmb")
-    if scenario.model.fusion.kind in kinds:
-        fields = {**fields, "fusion.kind": kinds[fields["filter.kind"] != "lmb"]}
-    return with_fields(scenario, fields)
 
 
 def measured(scene: Scene, name: str, fields: Fields, num_runs: int, seconds: float) -> Row:
