@@ -17,8 +17,8 @@ Fields = dict[str, Any]  # of a scenario, by path
 
 def compared(errors: Iterable[float]) -> dict[str, Fields]:
     """The filters by name, each as fields of a scenario; first the one that runs where nothing is said."""
-    usual = Filter()
-    names = ("kind", "max_split_error", "max_factor_labels")
+    usual, of_scenes = Filter(), {"gaussian_method", "detection_at", "assignment", "limits"}
+    names = [name for name in Filter.model_fields if name not in of_scenes]
     found: dict[str, Fields] = {"default": {f"filter.{name}": getattr(usual, name) for name in names}}
     found["LMB"] = {"filter.kind": "lmb"}
     for number in (1000, 20_000):
