@@ -86,3 +86,11 @@ def test_every_case_can_be_asked() -> None:
         assert np.isfinite(found.bins()[0, :3]).all()
         assert ((found.ranks >= 0.0) & (found.ranks <= 1.0 + 1e-9)).all()
         assert bool(found.said.any()) == case.labels
+
+
+@pytest.mark.parametrize("detection", [0.7, 0.95])
+def test_labels_exist_as_often_as_the_default_filter_says(detection: float) -> None:
+    [default] = (case for case in cases() if case.name == "default")
+    number, said, found, _ = calibration(default, detection, 200).bins().T
+    differences = np.abs(said - found)[number > ENOUGH]
+    assert (differences < 0.05).all(), f"said and found differ by {differences.round(3)}"
