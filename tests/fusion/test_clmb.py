@@ -102,8 +102,21 @@ def test_nothing_in_common_and_nothing_at_all():
 def test_a_glmb_is_converted_first():
     rng = np.random.default_rng(8)
     beliefs = [random_glmb(rng, 3, 10, 2) for _ in range(2)]
-    fused, _ = Clmb(HALVES).fuse(beliefs)
-    _assert_same(fused, Clmb(HALVES).fuse([glmb_to_lmb(belief) for belief in beliefs])[0], 1e-10)
+    for power, most in (("moment_matched", 1), ("auto", 4)):
+        rule = Clmb(HALVES, power)
+        fused, _ = rule.fuse(beliefs)
+        _assert_same(fused, rule.fuse([glmb_to_lmb(belief, max_components=most) for belief in beliefs])[0], 1e-10)
+
+
+def test_auto_keeps_components_apart_while_the_number_of_sensors_allows_it():
+    """One target in one of two places far apart, by all sensors alike, is not half way between them."""
+    weights, means, covs = np.array([0.6, 0.4]), np.array([[0.0], [100.0]]), np.ones((2, 1, 1))
+    belief = mixture_track(weights, means, covs)
+    for num_sensors, components in ((2, 2), (12, 2), (13, 1)):
+        fused, _ = Clmb([1.0 / num_sensors] * num_sensors).fuse([belief] * num_sensors)
+        assert len(fused.tracks.log_weights) == components
+    heaviest = Clmb(HALVES).fuse([belief, belief])[0].tracks
+    assert heaviest.means[np.argmax(heaviest.log_weights)] == pytest.approx(0.0)
 
 
 @pytest.mark.parametrize("mixture_power", ["component_wise", "quadrature"])

@@ -75,8 +75,8 @@ def test_a_delta_glmb_is_marginalised_first():
     rng = np.random.default_rng(8)
     beliefs = [random_glmb(rng, 3, 10, 2) for _ in range(2)]
     assert_same_glmb(
-        CmDeltaGlmb(HALVES).fuse(beliefs)[0],
-        CmDeltaGlmb(HALVES).fuse([marginalise(belief) for belief in beliefs])[0],
+        CmDeltaGlmb(HALVES, "moment_matched").fuse(beliefs)[0],
+        CmDeltaGlmb(HALVES, "moment_matched").fuse([marginalise(belief) for belief in beliefs])[0],
         1e-10,
     )
 

@@ -199,7 +199,7 @@ def test_nobody_and_nowhere():
         CmDeltaGlmb((0.5, 0.5)).fuse([nobody, LMB.empty(2)])  # type: ignore[type-var]
 
 
-@pytest.mark.parametrize("rule", [Clmb(THIRDS), ArithmeticAverage(THIRDS)])
+@pytest.mark.parametrize("rule", [Clmb(THIRDS, "moment_matched"), ArithmeticAverage(THIRDS)])
 def test_fusions_of_lmbs_take_the_lmbs(rule):
     rng = np.random.default_rng(7)
     beliefs = [full(rng, partition) for partition in PARTITIONS[2]]

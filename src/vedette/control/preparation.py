@@ -25,6 +25,7 @@ from vedette.densities import (
     UndetectedIntensity,
     as_lmb,
     existence_probabilities,
+    settled_lmb,
 )
 from vedette.fusion import Clmb, CmDeltaGlmb, Fusion, Linear, LinearRule, ParallelUpdate
 from vedette.models.arguments import reject
@@ -163,15 +164,18 @@ def _planned(
     """The beliefs in the form in which they are planned on. why: GLMBs are LMBs there in any case."""
     beliefs = (*state.local, state.fused)
     notes: tuple[str, ...] = ()
+    # What divides by the common prediction needs beliefs that have one.
+    from_one = getattr(fusion, "shares_prediction", False) or isinstance(reward, ExpectedLossReward)
     if _has_glmb(beliefs) and (why := why or _why_lmbs(num_sensors, fusion, settings, reward, beliefs)):
-        converted: dict[int, LMB] = {id(belief): as_lmb(belief) for belief in beliefs}
+        # Of one belief, open names are settled; of several, each would settle them in its own way.
+        as_planned = settled_lmb if from_one or len({id(belief) for belief in beliefs}) == 1 else as_lmb
+        converted: dict[int, LMB] = {id(belief): as_planned(belief) for belief in beliefs}
         local = tuple(converted[id(belief)] for belief in state.local)
         state = replace(state, local=local, fused=converted[id(state.fused)])
         notes = (f"planned on the LMBs of the GLMB beliefs: {why}",)
         if isinstance(fusion, CmDeltaGlmb):
             fusion = Clmb(fusion.weights)
-    # What divides by the common prediction needs beliefs that have one.
-    if getattr(fusion, "shares_prediction", False) or isinstance(reward, ExpectedLossReward):
+    if from_one:
         state = replace(state, local=(state.fused,) * num_sensors)
     return _Planned(state, fusion, notes)
 

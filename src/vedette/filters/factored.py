@@ -54,7 +54,7 @@ class FactoredGlmbFilter(SingleSensorFilter):
         InputError: a part of another kind, or a field out of range.
     """
 
-    max_split_error: float = 0.05
+    max_split_error: float = 0.01
     max_factor_labels: int = 20
 
     def __post_init__(self) -> None:

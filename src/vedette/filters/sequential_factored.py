@@ -26,7 +26,7 @@ class SequentialFactoredFilter(MultiSensorFilter[FactoredGLMB]):
     `FactoredGlmbFilter`.
     """
 
-    max_split_error: float = 0.05
+    max_split_error: float = 0.01
     max_factor_labels: int = 20
     kind: ClassVar[type[FactoredGLMB]] = FactoredGLMB
 

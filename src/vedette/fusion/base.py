@@ -17,11 +17,11 @@ from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.gaussian.mixtures import MixtureCaps
 from vedette.text import either
 
-MixturePower = Literal["moment_matched", "component_wise", "quadrature"]
-MIXTURE_POWERS: tuple[MixturePower, ...] = ("moment_matched", "component_wise", "quadrature")
+MixturePower = Literal["auto", "moment_matched", "component_wise", "quadrature"]
+MIXTURE_POWERS: tuple[MixturePower, ...] = ("auto", "moment_matched", "component_wise", "quadrature")
 
 # Within these distances a merged Gaussian is as near to the truth as the power is: docs/decisions/0003.
-_MERGE_DISTANCE = {"moment_matched": 0.0, "component_wise": 2.0, "quadrature": 0.5}
+_MERGE_DISTANCE = {"auto": 2.0, "moment_matched": 0.0, "component_wise": 2.0, "quadrature": 0.5}
 
 # Existence from which a sensor is sure of a label, and below which the fusion has lost it.
 SURE, LOST = 0.9, 0.5
@@ -107,7 +107,8 @@ class FusionLimits(NamedTuple):
     log_min_component_weight, merge_distance, max_components: reduction of a track's mixture before it is raised to a
     power and after the fusion (dropped below the weight; merged within the Mahalanobis distance; the heaviest kept).
     A `merge_distance` of None is 2 for component-wise powers and 0.5 for quadrature. Not used with moment matching.
-    max_combinations: bound on the combinations of components of one label, max_components^sensors.
+    max_combinations: bound on the combinations of components of one label, max_components^sensors; under `auto`
+    so many fewer components are kept.
     max_hypotheses: label sets kept in a fused GLMB.
     """
 
@@ -142,11 +143,11 @@ def check_power(mixture_power: str, limits: FusionLimits, num_sensors: int) -> N
         if getattr(limits, name) < 1:
             raise InputError(f"limits.{name}: expected at least 1; got {getattr(limits, name)}")
     combinations = limits.max_components**num_sensors
-    if mixture_power != "moment_matched" and combinations > limits.max_combinations:
+    if mixture_power in ("component_wise", "quadrature") and combinations > limits.max_combinations:
         raise InputError(
             f"limits.max_components: expected {limits.max_components}^{num_sensors} (components to the power of the "
             f"number of sensors) to be at most max_combinations = {limits.max_combinations}; got {combinations}; "
-            f"lower max_components or use moment_matched"
+            f"lower max_components or use auto"
         )
 
 
@@ -156,17 +157,20 @@ def check_floor(name: str, log_floor: float) -> None:
         raise InputError(f"{name}: expected a probability above 0 and below 1; got {math.exp(log_floor)}")
 
 
-def power_rule(mixture_power: str, limits: FusionLimits, state_dim: int) -> PowerRule:
+def power_rule(mixture_power: str, limits: FusionLimits, state_dim: int, num_sensors: int = 1) -> PowerRule:
     """The caps and the cubature rule of a power of mixtures. Raises `InputError` where there is no rule."""
-    points, point_weights = np.empty((0, state_dim)), np.empty(0)
-    if mixture_power == "moment_matched":
+    points, point_weights, most = np.empty((0, state_dim)), np.empty(0), int(limits.max_components)
+    if mixture_power == "auto":
+        while most > 1 and most**num_sensors > limits.max_combinations:
+            most -= 1
+    if mixture_power == "moment_matched" or (mixture_power == "auto" and most == 1):
         return PowerRule(MixtureCaps(-math.inf, 0.0, 1), points, point_weights)
     if mixture_power == "quadrature":
         if state_dim > MAX_DIM:
             raise InputError(f"mixture_power: quadrature needs at most {MAX_DIM} state dimensions; got {state_dim}")
         points, point_weights = fifth_degree_rule(state_dim)
     distance = limits.merge_distance if limits.merge_distance is not None else _MERGE_DISTANCE[mixture_power]
-    caps = MixtureCaps(float(limits.log_min_component_weight), float(distance), int(limits.max_components))
+    caps = MixtureCaps(float(limits.log_min_component_weight), float(distance), most)
     return PowerRule(caps, points, point_weights)
 
 

@@ -68,7 +68,7 @@ class Clmb:
     """
 
     weights: Sequence[float] | Floats
-    mixture_power: MixturePower = "moment_matched"
+    mixture_power: MixturePower = "auto"
     missing_existence: float = 1e-4
     limits: FusionLimits = field(default_factory=FusionLimits)
     by_views: bool = False
@@ -87,7 +87,7 @@ class Clmb:
         """
         check_beliefs(beliefs, (LMB, GLMB, FactoredGLMB), len(self.weights))
         seen = require_views(self.by_views, views, len(self.weights))
-        rule = power_rule(self.mixture_power, self.limits, beliefs[0].state_dim)
+        rule = power_rule(self.mixture_power, self.limits, beliefs[0].state_dim, len(self.weights))
         active = [i for i, weight in enumerate(self.weights) if weight > 0.0]
         weights = np.array([self.weights[i] for i in active])
         aligned = align_lmbs([as_lmb(beliefs[i], rule) for i in active], self.missing_existence)
@@ -120,8 +120,8 @@ class Clmb:
         """
         check_kinds([own.kind for own in cases], (LMB, GLMB), len(self.weights))
         active = [i for i, weight in enumerate(self.weights) if weight > 0.0]
-        # A GLMB's labels become mixtures; powers of the single Gaussians of an LMB are exact.
-        exact = self.mixture_power == "moment_matched" or all(own.kind is LMB for own in cases)
+        # A GLMB's labels become mixtures, under auto matched by one; powers of an LMB's single Gaussians are exact.
+        exact = self.mixture_power in ("auto", "moment_matched") or all(own.kind is LMB for own in cases)
         if self.by_views or not exact or not isinstance(prediction, LMB):
             return None
         shares = [self._share(cases[i], self.weights[i]) for i in active]

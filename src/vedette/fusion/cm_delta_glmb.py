@@ -64,7 +64,9 @@ class CmDeltaGlmb:
         mixture_power: how a power of a mixture is taken. "moment_matched": of the Gaussian of each mixture's mean and
             covariance, as in the M-delta-GLMB; exact for single Gaussians. "component_wise": as the mixture of all
             products of component powers; valid for well separated components, an upper bound of the integral
-            otherwise. "quadrature": the same with each Gaussian's mass and moments corrected by cubature.
+            otherwise. "quadrature": the same with each Gaussian's mass and moments corrected by cubature. "auto":
+            component-wise, with so few components that the number of sensors allows it within
+            `limits.max_combinations`; one is as moment matching.
             docs/decisions/0003-power-of-mixtures.md has their errors.
         missing_log_weight: log of the floor for the weight of a label set that a sensor lacks.
         limits: caps on the cost.
@@ -73,7 +75,7 @@ class CmDeltaGlmb:
     """
 
     weights: Sequence[float] | Floats
-    mixture_power: MixturePower = "moment_matched"
+    mixture_power: MixturePower = "auto"
     missing_log_weight: float = math.log(1e-6)
     limits: FusionLimits = field(default_factory=FusionLimits)
 
@@ -93,7 +95,7 @@ class CmDeltaGlmb:
         a density that is not valid, and `NumericalError` where a product of track densities cannot be integrated.
         """
         check_beliefs(beliefs, (GLMB, FactoredGLMB), len(self.weights))
-        rule = power_rule(self.mixture_power, self.limits, beliefs[0].state_dim)
+        rule = power_rule(self.mixture_power, self.limits, beliefs[0].state_dim, len(self.weights))
         active = [i for i, weight in enumerate(self.weights) if weight > 0.0]
         weights = np.array([self.weights[i] for i in active])
         given: Sequence[GLMB | FactoredGLMB] = beliefs
@@ -144,7 +146,7 @@ class CmDeltaGlmb:
         """The fusions of any of the sensors' cases; None for an LMB prediction, or where the powers are not exact.
 
         cases: one a sensor. prediction: marginalised, of one Gaussian a track. Floors and stand-ins are as in
-        `fuse`.
+        `fuse`, but that under `auto` the stand-ins are single Gaussians.
         Raises `InputError` for another number or kind of cases, and where they share no label set with the
         prediction.
         """
@@ -156,7 +158,7 @@ class CmDeltaGlmb:
         sets = {labels for share in shares for labels in share.cases.sets}
         whole = all(set(share.cases.sets) == sets and share.held.all() for share in shares)
         # Stand-ins for missing sets are the only mixtures, and powers of single Gaussians are exact.
-        exact = self.mixture_power == "moment_matched" or (whole and self.mixture_power != "quadrature")
+        exact = self.mixture_power in ("auto", "moment_matched") or (whole and self.mixture_power != "quadrature")
         if not exact or len(sets) > self.limits.max_hypotheses:
             return None
         return lay_out_glmbs(shares, LabelledCases.of(prediction), active)

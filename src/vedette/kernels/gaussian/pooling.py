@@ -1,4 +1,4 @@
-"""Tracks as single Gaussians, and pools of weighted tracks, each of which becomes one: the mixture of the pool, reduced."""
+"""Tracks as single Gaussians, and pools of weighted tracks that become one each: their mixture, reduced."""
 
 from __future__ import annotations
 

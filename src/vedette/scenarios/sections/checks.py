@@ -115,7 +115,7 @@ def _estimator(model: ScenarioModel) -> Iterator[Finding]:
 
 
 def _combinations(model: ScenarioModel) -> Iterator[Finding]:
-    if model.fusion.kind == "custom" or model.fusion.mixture_power == "moment_matched":
+    if model.fusion.kind == "custom" or model.fusion.mixture_power in ("auto", "moment_matched"):
         return
     limits, num_sensors = model.fusion.limits, len(model.sensors)
     if limits.max_components**num_sensors > limits.max_combinations:

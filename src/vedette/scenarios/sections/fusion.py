@@ -92,10 +92,11 @@ class Fusion(Section):
         description="What is one target at several sensors: that of one label, or what is found so by place before "
         "each fusion (clmb, cm_delta_glmb, arithmetic_average, without feedback or over a network) [-].",
     )
-    mixture_power: Literal["moment_matched", "component_wise", "quadrature"] = Field(
-        default="moment_matched",
+    mixture_power: Literal["auto", "moment_matched", "component_wise", "quadrature"] = Field(
+        default="auto",
         description="Power of a Gaussian mixture: of the Gaussian with its moments; of each component, which is valid "
-        "for well separated ones; or the latter corrected by cubature [-].",
+        "for well separated ones; the latter corrected by cubature; auto: of each of as many components as the number "
+        "of sensors allows [-].",
     )
     missing_weight: Chance = Field(
         default=1e-6, description="Weight of a label set where a sensor lost it by truncation (cm_delta_glmb) [-]."

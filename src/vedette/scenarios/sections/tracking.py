@@ -116,7 +116,7 @@ class Filter(Section):
         "[-].",
     )
     max_split_error: Annotated[float, Field(ge=0.0, le=2.0)] = Field(
-        default=0.05,
+        default=0.01,
         description="Of a factored_glmb: L1 error up to which labels that contended are taken as independent again, "
         "and versions of a label as one; 2: always, as an LMB; 0: where they are [-].",
     )
