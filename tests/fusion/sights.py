@@ -29,6 +29,12 @@ def sensor(detection: Any) -> SensorModel:
     return SensorModel(position(), constant_noise([1.0, 1.0]), detection, clutter)
 
 
+def informed(*chances: float) -> NDArray[np.float64]:
+    """Weights by views of sensors that detect so much: of the information about an existence of .999."""
+    informations = np.array([chance / (1.0 - 0.999 * chance) for chance in chances])
+    return np.asarray(informations / informations.sum())
+
+
 def views(
     detections: Sequence[Any],
     at: Sequence[float] | None = None,

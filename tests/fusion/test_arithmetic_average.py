@@ -7,7 +7,7 @@ import pytest
 from scipy.special import expit
 
 from densities.examples import random_glmb, random_lmb
-from fusion.sights import LABELS, belief, views
+from fusion.sights import LABELS, belief, informed, views
 from vedette.densities import LMB, Poisson, glmb_to_lmb
 from vedette.densities.statistics import track_moments
 from vedette.errors import InputError
@@ -68,7 +68,7 @@ def test_by_views_a_label_is_averaged_over_those_that_see_it() -> None:
     seen = views([0.9, constant_detection(0.3)])
     fused, info = ArithmeticAverage((0.5, 0.5), by_views=True).fuse(beliefs, seen)
     assert fused.tracks.labels.tolist() == [list(LABELS[0]), list(LABELS[2])]  # who sees the second lacks it
-    np.testing.assert_allclose(fused.existence, [0.75 * 0.9 + 0.25 * 0.6, 0.4], rtol=1e-12)
+    np.testing.assert_allclose(fused.existence, [float(informed(0.9, 0.3) @ np.array([0.9, 0.6])), 0.4], rtol=1e-12)
     assert info.missing_labels == (0, 1)
 
 

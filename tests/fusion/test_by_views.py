@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.special import logit
 
-from fusion.sights import BLIND, LABELS, PLACES, assert_same_bits, belief, moments, sensor, views
+from fusion.sights import BLIND, LABELS, PLACES, assert_same_bits, belief, informed, moments, sensor, views
 from vedette.densities import LMB, TrackTable
 from vedette.errors import InputError
 from vedette.fusion import ArithmeticAverage, Clmb, Views
@@ -39,8 +39,7 @@ def test_weights_are_those_of_the_detection_at_each_label() -> None:
     own: Any = moments(fused)
     parts: Any = [moments(each) for each in beliefs]
     for label, chances in zip(LABELS, ([0.9, 0.3], [0.0, 0.3], [0.0, 0.3]), strict=True):
-        shares = np.array(chances) / sum(chances)
-        expected = by_hand(shares, *zip(*(part[label] for part in parts), strict=True))
+        expected = by_hand(informed(*chances), *zip(*(part[label] for part in parts), strict=True))
         for found, wanted in zip(own[label], expected, strict=True):
             np.testing.assert_allclose(found, wanted, rtol=1e-10)
     assert info.num_missing_labels == 0
@@ -56,7 +55,8 @@ def test_a_sensor_that_sees_the_place_and_lacks_the_label_has_its_floor() -> Non
     fused, info = Clmb((0.5, 0.5), by_views=True, missing_existence=1e-3).fuse(
         [first, second], views([constant_detection(0.9), constant_detection(0.6)])
     )
-    assert fused.existence_logit[1] == pytest.approx(0.6 * logit(0.9) + 0.4 * logit(1e-3), rel=1e-12)
+    surer, other = informed(0.9, 0.6)
+    assert fused.existence_logit[1] == pytest.approx(surer * logit(0.9) + other * logit(1e-3), rel=1e-12)
     assert info.missing_labels == (0, 1)
     np.testing.assert_allclose(fused.tracks.means[1], first.tracks.means[1], rtol=1e-12)
     # All that see the place lack the label: the floor, at the density of those that have it.
@@ -90,6 +90,26 @@ def test_where_nobody_has_scanned_sensors_count_by_what_they_would_see(rule: Any
     # The second has scanned, and does not see the first target.
     fused, _ = rule((0.5, 0.5), by_views=True).fuse(beliefs, views([0.9, 0.9], at, [False, True]))
     assert fused.existence[[0, 2]] == pytest.approx([0.95, 0.9])
+
+
+@pytest.mark.parametrize("rule", RULES)
+def test_many_that_hardly_see_do_not_outvote_a_few_that_do(rule: Any) -> None:
+    """Fourteen that detect a fifth of what is there and lack the label, beside two that see it."""
+    rng = np.random.default_rng(9)
+    sees, hardly = belief((0.99, 0.99, 0.99), rng), belief((0.5,), rng, (1,))
+    chances = [constant_detection(0.98)] * 2 + [constant_detection(0.2)] * 14
+    fused, info = rule(np.full(16, 1.0 / 16), by_views=True).fuse([sees] * 2 + [hardly] * 14, views(chances))
+    assert (fused.existence > 0.95).all()
+    assert (info.missing_labels, info.num_lost_labels) == ((0, 0, *(2,) * 14), 0)
+
+
+@pytest.mark.parametrize("rule", RULES)
+def test_one_that_misses_nothing_and_lacks_a_label_decides(rule: Any) -> None:
+    rng = np.random.default_rng(10)
+    beliefs = [belief((0.9,), rng, (0,)), belief((0.9,), rng, (1,))]
+    fused, _ = rule((0.5, 0.5), by_views=True).fuse(beliefs, views([constant_detection(0.5), constant_detection(1.0)]))
+    assert fused.existence[fused.tracks.labels[:, 1] == 0] < 0.01
+    assert np.isfinite(fused.existence_logit).all()
 
 
 @pytest.mark.parametrize("rule", RULES)

@@ -219,10 +219,12 @@ def test_what_cannot_be_fused_is_refused() -> None:
     prediction = three(rng)
     rule, beliefs = ParallelUpdate(), [three(rng, prediction)] * 2
     for seen in (None, shared(None), shared(GLMB.empty(4))):
-        with pytest.raises(InputError, match=r"views.prediction: expected the LMB that all beliefs were updated from"):
+        with pytest.raises(
+            InputError, match=r"views.prediction: expected the LMB or FactoredGLMB that all beliefs were updated"
+        ):
             rule.fuse(beliefs, seen)
-    with pytest.raises(InputError, match=r"beliefs\[0\]: expected LMB; got GLMB"):
-        rule.fuse([GLMB.empty(4)] * 2, shared(prediction))  # type: ignore[list-item]
+    with pytest.raises(InputError, match=r"beliefs\[0\]: expected LMB or FactoredGLMB; got GLMB"):
+        rule.fuse([GLMB.empty(4)] * 2, shared(prediction))  # type: ignore[type-var]
     with pytest.raises(InputError, match=r"beliefs\[0\]: expected labels of views.prediction.*got \[1, 0\]"):
         rule.fuse(beliefs, shared(LMB.empty(4)))
     with pytest.raises(InputError, match="dimension 2"):

@@ -7,9 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from vedette.densities import LMB
-from vedette.scenarios import Scenario, parse_scenario
+from vedette.densities import LMB, FactoredGLMB
+from vedette.evaluation import run_scenario
+from vedette.scenarios import Scenario, load_scenario, parse_scenario, with_fields
 from vedette.scenarios.build import build_experiment, build_planner
+from vedette.scenarios.sections import ScenarioModel
 from vedette.simulation import simulate
 
 SCENE = """\
@@ -44,9 +46,9 @@ ospa: {cutoff: 50.0}
 """
 
 
-def scene(fusion: str, reach: float = 250.0, steps: str = "[1]") -> Scenario:
+def scene(fusion: str, reach: float = 250.0, steps: str = "[1]", filters: str = "filter: {kind: lmb}") -> Scenario:
     text = SCENE.replace("FUSION", fusion).replace("REACH", str(reach)).replace("STEPS", steps)
-    return Scenario(parse_scenario(text))
+    return Scenario(parse_scenario(text.replace("filter: {kind: lmb}", filters)))
 
 
 def found(scenario: Scenario) -> list[int]:
@@ -68,6 +70,58 @@ def found(scenario: Scenario) -> list[int]:
 )
 def test_what_one_sensor_sees_is_kept_by_views_and_by_the_parallel_update(fusion: str, keeps: bool) -> None:
     assert (found(scene(fusion))[3:] == [2] * 9) == keeps
+
+
+@pytest.mark.parametrize(
+    "fusion",
+    [
+        "{kind: parallel}",
+        "{kind: central}",
+        "{kind: clmb, by_views: true, feedback: true}",
+        "{kind: arithmetic_average, by_views: true, feedback: true}",
+        "{kind: clmb, by_views: true}",
+    ],
+)
+def test_the_default_filter_goes_with_every_rule(fusion: str) -> None:
+    """No word of a filter."""
+    assert found(scene(fusion, filters=""))[3:] == [2] * 9
+
+
+def test_central_under_the_default_filter_is_what_takes_scans_in_turn() -> None:
+    central, in_turn = (build_experiment(scene(f"{{kind: {kind}}}", filters="")) for kind in ("central", "sequential"))
+    assert isinstance(central.tracker.initial().fused, FactoredGLMB)
+    assert type(central.tracker) is type(in_turn.tracker)
+
+
+def sixteen(fusion: dict[str, Any], outside: float = 0.0) -> Scenario:
+    """The first scans of the sixteen views under the default filter."""
+    whole = load_scenario("sixteen-views")
+    tracks = [
+        track for track in whole.model.targets.model_dump(mode="json")["tracks"] if (track["start_step"] or 1) < 10
+    ]
+    tracks = [{**track, "end_step": None} for track in tracks]
+    fields = {"time.num_steps": 25, "targets": {"kind": "scripted", "tracks": tracks}, "fusion": fusion}
+    default: Any = ScenarioModel.model_fields["filter"].default
+    chosen = {"filter": default.model_dump(mode="json"), "sensors.*.detection.outside": outside}
+    return with_fields(whole, {**fields, **chosen})
+
+
+def mean_ospa(scenario: Scenario) -> float:
+    """From the sixth scan on, of two runs."""
+    runs = [run_scenario(scenario, "still", seed=2, run=run, num_threads=1) for run in range(2)]
+    return float(np.mean([record.ospa[5:, 0] for record in runs]))
+
+
+def test_many_sensors_in_parallel_find_what_they_find_in_turn() -> None:
+    """Births from measurements make several labels of one target, which all sensors see: not all of these may go."""
+    assert mean_ospa(sixteen({"kind": "parallel"})) < 1.15 * mean_ospa(sixteen({"kind": "sequential"}))
+
+
+@pytest.mark.parametrize("own", [True, False])
+def test_sensors_that_hardly_see_do_not_outvote_those_that_do(own: bool) -> None:
+    """Filters that allow for a fifth of detections where there are none."""
+    fusion = {"kind": "clmb", "by_views": True, **({"matching": "assignment"} if own else {"feedback": True})}
+    assert mean_ospa(sixteen(fusion, 0.2)) < 25.0
 
 
 @pytest.mark.parametrize(("matching", "most"), [("labels", False), ("assignment", True)])

@@ -67,6 +67,7 @@ def test_they_are_all_there_and_valid() -> None:
         "polar-10",
         "shore-radar",
         "six-cameras",
+        "sixteen-views",
         "solent",
         "three-positions",
         "three-radars",

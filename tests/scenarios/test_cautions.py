@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from ruamel.yaml import YAML
 from typer.testing import CliRunner
 
 from scenarios.minimal import MINIMAL, changed
 from vedette.cli import app
-from vedette.scenarios import list_builtin, load_scenario
+from vedette.errors import ScenarioError
+from vedette.evaluation import run_scenario
+from vedette.scenarios import Scenario, list_builtin, load_scenario, with_fields
 from vedette.scenarios.cautions import cautions, prob_detection
+from vedette.scenarios.sections import ScenarioModel
 from vedette.scenarios.sections.sensors import Sensor
 
 SOFT: dict[str, object] = {"kind": "soft_sector", "probability": 0.9, "max_range": 150.0, "range_slope": 0.05}
@@ -37,21 +44,91 @@ def test_births_after_the_first_step_warn_with_their_line(tmp_path: Path) -> Non
     (line,) = of(tmp_path)
     number = MINIMAL.splitlines().index("  steps: [1, 5]") + 1
     assert line.startswith(f"{tmp_path / 'scene.yaml'}:{number}:10: warning: births up to step 5 without feedback")
-    assert "take fusion.matching: assignment, or, where scans can be sent, fusion.kind: sequential" in line
+    assert "take fusion.matching: assignment, or fusion.feedback: true, or fusion: {kind: sequential} where" in line
 
 
 @pytest.mark.parametrize("kind", ["clmb", "arithmetic_average"])
-def test_the_warning_about_views_names_what_to_take_instead(tmp_path: Path, kind: str) -> None:
+@pytest.mark.parametrize("filters", ["factored_glmb", "lmb", "m_delta_glmb"])
+def test_the_warning_about_views_names_what_to_take_instead(tmp_path: Path, kind: str, filters: str) -> None:
     south, rule = "{name: south, position: [0.0, -40.0]", "{kind: cm_delta_glmb, weights: [0.5, 0.5]}"
     blind = (south, f"{south}, heading_deg: 90.0, {SECTOR}")
-    (line,) = of(tmp_path, STEPS, blind, (rule, f"{{kind: {kind}}}"))
+    own = "kind: m_delta_glmb", f"kind: {filters}"
+    (line,) = of(tmp_path, STEPS, blind, own, (rule, f"{{kind: {kind}}}"))
+    parallel = "" if filters == "m_delta_glmb" else "fusion: {kind: parallel} where only densities can; "
     loses = {"clmb": "GCI", "arithmetic_average": "the arithmetic average"}[kind]
     assert (
-        f"{loses} loses what one sensor sees and another does not; take fusion.kind: sequential where scans can be "
-        f"sent; parallel where only densities can; fusion: {{kind: {kind}, by_views: true}} where sensors do not share "
-        "a prediction"
+        f"{loses} loses what one sensor sees and another does not; take fusion: {{kind: sequential}} where scans can "
+        f"be sent; {parallel}fusion: {{kind: {kind}, by_views: true}} where sensors do not share a prediction"
     ) in line
     assert of(tmp_path, STEPS, blind, (rule, f"{{kind: {kind}, by_views: true}}")) == ()
+
+
+CURE = re.compile(r"(fusion): (\{[^}]*\})|((?:fusion|filter)\.[a-z]+): ([a-z_]+)")
+
+
+def cures(lines: Iterable[str]) -> list[dict[str, Any]]:
+    """What warnings say is to be taken instead, as fields of a scenario."""
+    found = [match for line in lines for match in CURE.findall(line.partition("; take ")[2])]
+    return [{section or field: YAML(typ="safe").load(whole or value)} for section, whole, field, value in found]
+
+
+def scene_of(filters: str, fusion: dict[str, Any], number: int, births: str, network: Any) -> Scenario:
+    """Three scans of a part of the sixteen views."""
+    scene = load_scenario("sixteen-views")
+    model = scene.model.model_dump(mode="json")
+    sites = [{"existence": 0.1, "mean": [0.0, 0.0, 0.0, 0.0], "std": [300.0, 300.0, 10.0, 10.0]}]
+    fields = {
+        "time.num_steps": 3,
+        "targets": {"kind": "scripted", "tracks": [{"state": [-118.0, 64.5, 7.3, -13.8]}]},
+        "sensors": model["sensors"][:number],
+        "birth": model["birth"] | ({} if births == "measured" else {"sites": sites, "from_measurements": None}),
+    }
+    return with_fields(scene, fields | {"filter": {"kind": filters}, "fusion": fusion, "network": network})
+
+
+@pytest.mark.parametrize(("number", "births"), [(3, "sites"), (5, "measured")])
+@pytest.mark.parametrize("filters", ["factored_glmb", "lmb", "delta_glmb", "m_delta_glmb"])
+def test_every_cure_that_is_named_is_accepted_and_runs(filters: str, number: int, births: str) -> None:
+    assert filters != "factored_glmb" or ScenarioModel.model_fields["filter"].default.kind == filters
+    ways: list[tuple[dict[str, Any], Any]] = [
+        ({"kind": "clmb", "matching": "assignment"}, None),
+        ({"kind": "cm_delta_glmb"}, None),
+        ({"kind": "clmb", "feedback": True}, None),
+        ({"kind": "cm_delta_glmb", "feedback": True}, None),
+        ({"kind": "arithmetic_average", "by_views": True, "feedback": True}, None),
+        ({"kind": "parallel"}, None),
+        ({"kind": "clmb", "feedback": True, "matching": "assignment"}, {"delay": 1}),
+        ({"kind": "cm_delta_glmb", "feedback": True, "matching": "assignment"}, {"consensus_rounds": 2}),
+    ]
+    named = 0
+    for fusion, network in ways:
+        try:
+            scene = scene_of(filters, fusion, number, births, network)
+        except ScenarioError:
+            continue
+        for fields in cures(cautions(scene)):
+            named += 1
+            run_scenario(with_fields(scene, fields), "still", seed=1, num_threads=1)
+    assert named >= 4
+
+
+def test_more_than_a_handful_of_densities_warn_and_say_what_they_cost() -> None:
+    (line,) = cautions(
+        scene_of("factored_glmb", {"kind": "clmb", "by_views": True, "feedback": True}, 5, "sites", None)
+    )
+    assert "5 sensors fuse densities by GCI, which makes no use of what they have in common" in line
+    assert "take fusion: {kind: sequential} where scans can be sent; fusion: {kind: parallel} where only" in line
+    own = {"kind": "arithmetic_average", "by_views": True, "matching": "assignment"}
+    (line,) = cautions(scene_of("factored_glmb", own, 5, "measured", None))
+    assert "each finds every target by itself, and anew where one comes into its view" in line
+    (line,) = cautions(scene_of("lmb", {"kind": "parallel"}, 5, "measured", None))
+    assert "take filter.kind: factored_glmb" in line
+    for filters, fusion, number in (
+        ("factored_glmb", {"kind": "parallel"}, 5),
+        ("lmb", {"kind": "parallel"}, 4),
+        ("factored_glmb", {"kind": "clmb", "by_views": True, "feedback": True}, 4),
+    ):
+        assert cautions(scene_of(filters, fusion, number, "measured", None)) == ()
 
 
 @pytest.mark.parametrize("kind", ["sequential", "parallel"])

@@ -108,7 +108,7 @@ CASES = [
         "kind: cm_delta_glmb, weights: [0.5, 0.5]",
         "kind: parallel, by_views: true, matching: assignment",
         [
-            'f.yaml:20:16: fusion.kind: expected sequential, cm_delta_glmb or another, as parallel is of lmb filters, and these are m_delta_glmb, got "parallel"',
+            'f.yaml:20:16: fusion.kind: expected sequential or another, as parallel is of lmb or factored_glmb filters, and these are m_delta_glmb, got "parallel"',
             "f.yaml:20:36: fusion.by_views: expected false, as parallel does not weigh labels (clmb and arithmetic_average do), got true",
             'f.yaml:20:52: fusion.matching: expected labels, as under parallel all sensors share them, got "assignment"',
         ],

@@ -19,6 +19,7 @@ NUMBERS = {
     "eight-mobile": (20, 20, 20, 20.0),
     "shore-radar": (8, 6, 8, 7.65),
     "six-cameras": (11, 11, 9, 10.26),
+    "sixteen-views": (18, 6, 4, 10.2875),
     "three-radars": (8, 8, 8, 8.0),
     "two-views-1": (3, 2, 2, 2.6375),
     "two-views-2": (22, 4, 11, 14.725),
@@ -92,6 +93,13 @@ def test_both_views_together_miss_nothing_and_neither_sees_all(name: str) -> Non
     seen = seen_by(scenario, truth_of(scenario))
     assert seen.any(axis=1).all()
     assert not seen.all(axis=0).any()
+
+
+def test_two_or_three_of_sixteen_see_each_target() -> None:
+    scenario = load_scenario("sixteen-views")
+    seen = seen_by(scenario, truth_of(scenario)).sum(axis=1)
+    assert (seen.min(), seen.max()) == (1, 4)
+    assert seen.mean() == pytest.approx(2.82, abs=0.005)
 
 
 @pytest.mark.parametrize(("name", "share"), [("eight-mobile", 0.702), ("six-cameras", 0.598)])

@@ -178,4 +178,4 @@ def test_beliefs_that_are_late_and_births_that_are_later_are_warned_of(tmp_path:
         )
         told = [line for line in cautions(load_scenario(file)) if "come 2 or more scans late" in line]
         assert bool(told) == warned
-        assert all("take fusion.kind: sequential" in line for line in told)
+        assert all("take fusion: {kind: sequential}" in line for line in told)

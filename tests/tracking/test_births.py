@@ -229,6 +229,8 @@ def test_a_sensor_that_keeps_its_belief_counts_by_what_it_sees_whether_it_scanne
     tracker = Distributed(local, Clmb(thirds, by_views=True))
     state, _ = tracker.step(State(beliefs, beliefs[0], 4, 4.0), [None] * 3, poses, 5.0, rngs=rngs(3))
     predicted = [own.predict(belief, 1.0, 5)[0] for own, belief in zip(local, beliefs, strict=True)]
-    shares = np.array([0.9, 0.8, 0.9]) / 2.6  # their probabilities of detection
+    detected = np.array([0.9, 0.8, 0.9])
+    shares = detected / (1.0 - 0.999 * detected)
+    shares /= shares.sum()
     expected, _ = Clmb(tuple(shares)).fuse(predicted)
     np.testing.assert_allclose(state.fused.existence, expected.existence, rtol=1e-12)

@@ -21,7 +21,7 @@ from vedette.kernels.labelled.labels import group_by_label_set
 Label: TypeAlias = tuple[int, ...]
 LabelSet: TypeAlias = tuple[Label, ...]
 _Labelled = TypeVar("_Labelled", GLMB, LMB, FactoredGLMB)
-_WHOLE = MixtureCaps(-math.inf, 0.0, 2**62)  # which leave mixtures as they are
+WHOLE = MixtureCaps(-math.inf, 0.0, 2**62)  # which leave mixtures as they are
 
 
 class LabelSets(NamedTuple):
@@ -126,7 +126,7 @@ def laid_out(glmb: GLMB) -> FactoredGLMB:
     labels, _ = distinct_labels(glmb.tracks.labels[glmb.hyp_tracks])
     if len(labels) > 1:
         return FactoredGLMB.from_glmb(glmb)
-    return FactoredGLMB.from_lmb(LMB.from_kernel(glmb_to_lmb(glmb.to_kernel(), _WHOLE)))
+    return FactoredGLMB.from_lmb(LMB.from_kernel(glmb_to_lmb(glmb.to_kernel(), WHOLE)))
 
 
 def without_labels(belief: _Labelled, labels: Ints) -> tuple[_Labelled, float]:

@@ -145,12 +145,12 @@ class Limits:
         kept, spread = self.without_spread(fewer)
         return kept, dropped + spread, is_full
 
-    def kept(self, belief: LMB) -> LMB:
+    def kept(self, belief: _Labelled) -> _Labelled:
         """The belief without the labels that `min_existence`, `max_labels` and `max_position_std` drop."""
-        least, logits = logit(self.min_existence), belief.existence_logit
-        likeliest = np.argsort(-logits, kind="stable")
-        gone = np.union1d(likeliest[self.max_labels :], np.flatnonzero(logits < least))
-        return self.without_spread(without_labels(belief, belief.tracks.labels[gone])[0])[0]
+        labels, existence = existence_probabilities(belief)
+        likeliest = np.argsort(-existence, kind="stable")
+        gone = np.union1d(likeliest[self.max_labels :], np.flatnonzero(existence < self.min_existence))
+        return self.without_spread(without_labels(belief, labels[gone])[0])[0]
 
     @property
     def max_existence_logit(self) -> float:

@@ -36,8 +36,8 @@ class ArithmeticAverage:
     of targets is the sensors' mean, so that a sensor which does not see a target (r = 0 where it lacks the label) takes
     its share of the existence away; nothing that sensors agree on becomes surer or narrower than at one of them.
 
-    By views, the weights at a label are w_sl proportional to w_s E[P_D^s(l)], as in `Clmb`: a sensor that cannot see
-    the label is left out of it. A target must have one label at all sensors (see `match_labels`).
+    By views, the weights at a label are by how well each sensor sees it, as in `Clmb`: a sensor that cannot see the
+    label is left out of it. A target must have one label at all sensors (see `match_labels`).
 
     Attributes:
         weights: one a sensor, in the order of the beliefs; non-negative, sum 1. A sensor of weight 0 takes no part.

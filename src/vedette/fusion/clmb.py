@@ -50,11 +50,12 @@ class Clmb:
     have cut off the rest; to bound its certainty as its absence is bounded makes joint decisions worse, not better.)
 
     With plain weights it assumes that the sensors see the same part of the world: what one sensor surely sees is lost
-    where another does not see there. By views, the weights at a label are w_sl proportional to w_s E[P_D^s(l)], so that
-    a sensor which cannot see where a target is (or did not scan) has no say in it, neither of its existence nor of its
-    density; one that sees there and lacks the label has its floor. Where nobody who scanned sees a label, sensors count
-    by how well they would; where nobody would, those that have it keep their plain weights. Both ways a target must
-    have one label at all sensors (see `match_labels`).
+    where another does not see there. By views, the weights at a label are w_sl proportional to w_s P / (1 - .999 P),
+    where P = E[P_D^s(l)]: to the information that a scan has of the existence of a target that is there. So a sensor
+    which cannot see where a target is (or did not scan) has no say in it, neither of its existence nor of its density;
+    one that sees there and lacks the label has its floor. Where nobody who scanned sees a label, sensors count by how
+    well they would; where nobody would, those that have it keep their plain weights. Both ways a target must have one
+    label at all sensors (see `match_labels`).
 
     Attributes:
         weights: fusion weights, one a sensor, in the order of the beliefs; non-negative, sum 1. A sensor of weight 0

@@ -15,6 +15,9 @@ from vedette.fusion.views import Views
 from vedette.kernels.base.types import Bools, Floats, Ints, Lmb, Tracks
 from vedette.kernels.labelled.stacking import stack_tracks
 
+# At which existence a scan's information is taken: at 1 that of a sensor which misses nothing is infinite.
+SURE_EXISTENCE = 0.999
+
 
 class AlignedLmbs(NamedTuple):
     """All sensors on the union of their labels of positive existence."""
@@ -59,12 +62,15 @@ def _places(lmb: Lmb) -> dict[tuple[int, int], int]:
 
 
 def weights_by_view(aligned: AlignedLmbs, weights: Floats, views: Views, active: Sequence[int]) -> Floats:
-    """(num_labels, len(active)) weights that each sensor has at each label: w_sl = w_s E[P_D^s(l)], made to sum to one.
+    """(num_labels, len(active)) weights that each sensor has at each label, made to sum to one.
 
-    0 for a sensor that cannot see the label. The mean is over the density of the sensor that is surest of the label,
-    among those that see it where they have it (of all that have it, where none does; of equals the first), so that what
-    a blind sensor believes changes nothing. Where nobody who scanned sees a label, sensors count by how well they would
-    see it if they scanned; where nobody would, those that have it keep their plain weights.
+    In proportion to w_s P / (1 - .999 P), P = E[P_D^s(l)]. P / (1 - r P) is, up to a factor, the information (Fisher's)
+    that a scan has of an existence r: where a target is there, a sensor that detects it in .98 of its scans says 190
+    times as much by detecting it or not as one that does in .2, so that many of these do not outvote it. 0 for a sensor
+    that cannot see the label. The mean is over the density of the sensor that is surest of the label, among those that
+    see it where they have it (of all that have it, where none does; of equals the first), so that what a blind sensor
+    believes changes nothing. Where nobody who scanned sees a label, sensors count by how well they would see it if they
+    scanned; where nobody would, those that have it keep their plain weights.
     weights: (len(active),) of the sensors `active`, positive.
     """
     detection = _detection(aligned, views, active)
@@ -72,7 +78,7 @@ def weights_by_view(aligned: AlignedLmbs, weights: Floats, views: Views, active:
     if unseen.any() and not all(views.scanned):
         detection = np.where(unseen, _detection(aligned, views.if_all_scanned(), active), detection)
         unseen = ~(detection > 0.0).any(axis=1, keepdims=True)
-    shares = weights * np.where(unseen, aligned.held, detection)
+    shares = weights * np.where(unseen, aligned.held, detection / (1.0 - SURE_EXISTENCE * detection))
     return np.asarray(shares / sum_over_sensors(shares)[:, None])
 
 

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import ClassVar, NamedTuple
+from dataclasses import dataclass, field, replace
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 
-from vedette.densities import LMB, TrackTable
-from vedette.densities.checks import unchecked
-from vedette.densities.label_sets import places_of
+from vedette.densities import LMB, FactoredGLMB, TrackTable
+from vedette.densities.checks import offsets_of, unchecked
+from vedette.densities.conversions import marginalised_factors
+from vedette.densities.joining import as_factored, join_factors
+from vedette.densities.label_sets import WHOLE, in_label_order, places_of
 from vedette.errors import InputError, NumericalError
 from vedette.fusion.base import (
     FusionInfo,
@@ -21,16 +23,26 @@ from vedette.fusion.base import (
     check_beliefs,
     check_floor,
     count_lost,
-    power_rule,
 )
-from vedette.fusion.lmbs import sum_over_sensors
-from vedette.fusion.tracks import reduced_tracks
+from vedette.fusion.parallel_factors import (
+    ONE,
+    check_known_labels,
+    check_single,
+    fused_groups,
+    grouped_sets,
+    lmbs_alone,
+    lost_labels,
+)
+from vedette.fusion.parallel_lmbs import check_evidence, posteriors_of, single_tracks, updated_logs
 from vedette.fusion.validity import ValidBeliefs
 from vedette.fusion.views import Views
-from vedette.kernels.base.types import Floats, Ints, Tracks
+from vedette.kernels.base.types import Floats, Ints, Lmb, Tracks
 from vedette.kernels.labelled.parallel import update_in_parallel
 from vedette.kernels.labelled.stacking import stack_tracks
+from vedette.models.arguments import dimension
 from vedette.probabilities import expit, log_expit
+
+_Density = TypeVar("_Density", LMB, FactoredGLMB)
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,16 +50,25 @@ class ParallelUpdate:
     """Fusion of posteriors that were updated from one prediction, each by its sensor's own scan alone.
 
     With independent scans Bayes' rule gives pi+ prod_s (pi_s / pi+), of which each factor is what sensor s's scan said:
-    the common prediction counts once, whatever the number of sensors. Label by label, for single Gaussians (a mixture
-    is first replaced by one of its moments) with P+ = C C':
+    the common prediction counts once, whatever the number of sensors. Label by label, for single Gaussians with P+ = C
+    C':
 
         A_s = C' (P_s^-1 - P+^-1) C, negative eigenvalues set to 0;  z_s = C^-1 (m_s - m+);  eta_s = (I + A_s) z_s
         A = I + sum_s A_s;  eta = sum_s eta_s;  m = m+ + C A^-1 eta;  P = C A^-1 C'
         logit = l+ + sum_s (l_s - l+) - ln|A| / 2 + eta'A^-1 eta / 2 + sum_s (ln|I + A_s| / 2 - eta_s'z_s / 2)
 
-    Exact where every posterior is a single Gaussian, as of linear sensors whose targets are far from each other and
-    from clutter; otherwise as good as the moments are. A sensor that cannot see a target says nothing of it, since its
-    posterior is its prediction: it changes nothing, to the last bit.
+    The mixtures of an LMB are first replaced by Gaussians of their moments. A sensor that cannot see a target says
+    nothing of it, since its posterior is its prediction: it changes nothing, to the last bit.
+
+    Of products of GLMBs the same for each label set I of the labels that belong together: w(I) is in proportion to
+    w+(I) prod_s (w_s(I) / w+(I)) times the integrals of the places of its labels, where w_s(I) is that of a sensor's
+    factor and w+(I) the prediction's of the labels in that factor. So sensors that each say that one of two labels is
+    of no target are taken to speak of the same one: LMBs have them all speak of both, and may lose both. A track that
+    is a mixture says a sum of such terms, and the product is the mixture of all choices of one component of each
+    sensor, of which the Gaussian of the moments is kept. (Where an exponent is not 1, that of each posterior's.)
+
+    Exact for LMBs of single Gaussians and for label sets in which places do not depend on each other; otherwise as good
+    as the moments are.
 
     Attributes:
         weights: exponents v_s of (pi_s / pi+), non-negative, one a sensor; None for 1 each, which is Bayes' rule. Other
@@ -56,12 +77,16 @@ class ParallelUpdate:
             dropped it. That is at most this sure there, and if the prediction was surer, the difference counts; the
             sensor then says nothing of where the target is. Counted in the `FusionInfo`. It should be the filters'
             `min_existence`, or these 0, so that nothing is dropped.
+        limits: caps on the cost: `max_combinations` of components of one label, the likeliest after each sensor (those
+            lighter than 1e-6 of the likeliest go in any case), and `max_hypotheses` label sets of a group, predicted
+            and fused; the others are not used.
 
-    Raises `InputError` for weights or a floor that cannot be used.
+    Raises `InputError` for weights, a floor or limits that cannot be used.
     """
 
     weights: Sequence[float] | Floats | None = None
     missing_existence: float = 1e-4
+    limits: FusionLimits = field(default_factory=FusionLimits)
     shares_prediction: ClassVar[bool] = True  # a tracker must update all beliefs from one
 
     def __post_init__(self) -> None:
@@ -71,44 +96,58 @@ class ParallelUpdate:
                 raise InputError(f"weights: expected non-negative finite numbers, one a sensor; got {weights}")
             object.__setattr__(self, "weights", weights)
         check_floor("missing_existence", math.log(self.missing_existence) if self.missing_existence > 0 else -math.inf)
+        for name in ("max_combinations", "max_hypotheses"):
+            dimension(f"limits.{name}", getattr(self.limits, name))
 
     def linear_rule(self, num_sensors: int) -> LinearRule:
         """pi+^(1 - sum of v) prod_s pi_s^(v_s)."""
         powers = (1.0,) * num_sensors if self.weights is None else tuple(self.weights)
         return LinearRule(1.0 - math.fsum(powers), powers, self.missing_existence)
 
-    def fuse(self, beliefs: Sequence[LMB], views: Views | None = None) -> tuple[LMB, FusionInfo]:
-        """Fused LMB of the labels of the prediction, in increasing order, and what was done.
+    def fuse(self, beliefs: Sequence[_Density], views: Views | None = None) -> tuple[_Density, FusionInfo]:
+        """The fused density of the labels of the prediction, in increasing order, and what was done.
 
-        beliefs: posteriors, LMBs whose labels the prediction has. views: with the common `prediction`, an LMB.
+        Of LMBs an LMB; where a belief or the prediction is a `FactoredGLMB`, one with a Gaussian a label, its factors
+        the smallest groups of labels of which neither the prediction nor a posterior has a factor that spans two.
 
-        Raises `InputError` for a prediction that is missing or no LMB, for another number or kind of beliefs, state
-        dimensions that differ, a density that is not valid or a label that the prediction lacks, and `NumericalError`
-        where a label is certain at one sensor and impossible at another, or a product cannot be integrated.
+        beliefs: posteriors, whose labels the prediction has. views: with the common `prediction`; of a product of GLMBs
+        one with a single Gaussian a label, whatever the hypothesis.
+
+        Raises `InputError` for a prediction that is missing or no such density, for another number or kind of beliefs,
+        state dimensions that differ, a density that is not valid or a label that the prediction lacks, and
+        `NumericalError` where a label is certain at one sensor and impossible at another, or a product cannot be
+        integrated.
         """
         prediction = _prediction_of(views, check=not isinstance(beliefs, ValidBeliefs))
         num_sensors = len(beliefs) if self.weights is None else len(self.weights)
-        check_beliefs(beliefs, (LMB,), num_sensors)
+        check_beliefs(beliefs, (LMB, FactoredGLMB), num_sensors)
         if any(belief.state_dim != prediction.state_dim for belief in beliefs):
             raise InputError(f"beliefs: expected states of dimension {prediction.state_dim}, as of views.prediction")
         weights = np.ones(num_sensors) if self.weights is None else np.array(self.weights)
-        prior, given = _single(prediction), _posteriors(prediction, beliefs, self.missing_existence)
-        try:
-            means, covs, log_overlaps = update_in_parallel(
-                prior.means, prior.covs, given.chosen, weights, given.tracks.means, given.tracks.covs
-            )
-        except FloatingPointError as fault:
-            raise NumericalError(f"fusion of tracks: {fault}") from None
-        logits = _updated(prediction.existence_logit, given.logits, weights) + log_overlaps
-        _check_evidence(prediction.tracks.labels, logits)
+        fused: Any
+        lmbs = [belief for belief in (prediction, *beliefs) if isinstance(belief, LMB)]
+        if len(lmbs) == num_sensors + 1:
+            single = [LMB.from_kernel(Lmb(single_tracks(own), own.existence_logit)) for own in lmbs]
+            fused, info = self._fused_lmbs(single[0], single[1:], weights)
+        else:
+            factored = [as_factored(belief) for belief in beliefs]
+            fused, info = self._fused_factors(as_factored(prediction), factored, weights)
+        return fused, info
+
+    def _fused_lmbs(self, prediction: LMB, beliefs: Sequence[LMB], weights: Floats) -> tuple[LMB, FusionInfo]:
+        """Label by label; of a prediction of single Gaussians."""
+        prior, given = prediction.tracks.to_kernel(), posteriors_of(prediction, beliefs, self.missing_existence)
+        means, covs, log_overlaps = self._updated_tracks(prior.means, prior.covs, given.chosen, weights, given.tracks)
+        logits = updated_logs(prediction.existence_logit, given.logits, weights) + log_overlaps
+        check_evidence(prediction.tracks.labels, logits)
         tracks = TrackTable.from_kernel(Tracks(prior.labels, prior.offsets, prior.log_weights, means, covs))
         present, absent = (
-            _updated(log_expit(sign * prediction.existence_logit), log_expit(sign * given.logits), weights)
+            updated_logs(log_expit(sign * prediction.existence_logit), log_expit(sign * given.logits), weights)
             for sign in (1.0, -1.0)
         )
         active = np.flatnonzero(weights > 0.0).tolist()
         lacking = (given.chosen < 0)[:, active]
-        missing = by_sensor(np.count_nonzero(lacking, axis=0), active, num_sensors)
+        missing = by_sensor(np.count_nonzero(lacking, axis=0), active, len(weights))
         return unchecked(LMB, tracks, logits), FusionInfo(
             missing_sets=missing,
             missing_labels=missing,
@@ -119,21 +158,60 @@ class ParallelUpdate:
             discarded_weight=0.0,
         )
 
+    def _fused_factors(
+        self, prediction: FactoredGLMB, beliefs: Sequence[FactoredGLMB], weights: Floats
+    ) -> tuple[FactoredGLMB, FusionInfo]:
+        """Labels that are alone in their factors label by label, the others group by group."""
+        check_single(prediction)
+        marginal = [
+            marginalised_factors(belief, WHOLE if power == 1.0 else ONE)
+            for belief, power in zip(beliefs, weights.tolist(), strict=True)
+        ]
+        joined = join_factors([prediction, *marginal])
+        check_known_labels(joined)
+        alone, info = self._fused_lmbs(*lmbs_alone(joined), weights)
+        tables = [belief.tracks for belief in joined.densities]
+        starts = offsets_of([table.num_tracks for table in tables[1:]])
+        groups = [
+            grouped_sets(joined, group, starts, weights, self.missing_existence, self.limits.max_hypotheses)
+            for group in np.flatnonzero(~joined.alone).tolist()
+        ]
+        if not groups:
+            return FactoredGLMB.from_lmb(alone), info
+        own = places_of(np.concatenate([group.labels[group.place_labels] for group in groups]), tables[0].labels)
+        chosen = np.concatenate([group.chosen for group in groups])
+        tracks = stack_tracks([table.to_kernel() for table in tables[1:]])
+        prior = tables[0].means[own], tables[0].covs[own]
+        means, covs, log_overlaps = self._updated_tracks(*prior, chosen, weights, tracks)
+        joint, log_normaliser = fused_groups(groups, log_overlaps, means, covs, self.limits.max_hypotheses)
+        fused = in_label_order(FactoredGLMB.product([FactoredGLMB.from_lmb(alone), *joint], prediction.state_dim))
+        missing = tuple((np.array(info.missing_labels) + sum(group.num_missing for group in groups)).tolist())
+        return fused, replace(
+            info,
+            missing_sets=missing,
+            missing_labels=missing,
+            num_sets=info.num_sets + sum(len(group.labels) for group in groups),
+            num_lost_labels=lost_labels(marginal, weights, fused),
+            empty_intersection=False,
+            log_normaliser=info.log_normaliser + log_normaliser,
+            discarded_weight=-math.expm1(sum(group.log_kept for group in groups)) + 0.0,  # no -0
+        )
 
-class _Posteriors(NamedTuple):
-    """The sensors' posteriors on the labels of the prediction."""
+    def _updated_tracks(
+        self, means: Floats, covs: Floats, chosen: Ints, weights: Floats, tracks: Tracks
+    ) -> tuple[Floats, Floats, Floats]:
+        try:
+            return update_in_parallel(means, covs, chosen, weights, tracks, self.limits.max_combinations)
+        except FloatingPointError as fault:
+            raise NumericalError(f"fusion of tracks: {fault}") from None
 
-    chosen: Ints  # (num_labels, num_sensors) place in `tracks`, -1 where the sensor lacks the label
-    tracks: Tracks  # single Gaussians of all sensors
-    logits: Floats  # (num_labels, num_sensors)
 
-
-def _prediction_of(views: Views | None, *, check: bool) -> LMB:
+def _prediction_of(views: Views | None, *, check: bool) -> LMB | FactoredGLMB:
     prediction = None if views is None else views.prediction
-    if not isinstance(prediction, LMB):
+    if not isinstance(prediction, LMB | FactoredGLMB):
         raise InputError(
-            "views.prediction: expected the LMB that all beliefs were updated from, each by its sensor's own scan "
-            f"alone, which a parallel update divides by; got {type(prediction).__name__}"
+            "views.prediction: expected the LMB or FactoredGLMB that all beliefs were updated from, each by its "
+            f"sensor's own scan alone, which a parallel update divides by; got {type(prediction).__name__}"
         )
     if not check:
         return prediction
@@ -142,44 +220,3 @@ def _prediction_of(views: Views | None, *, check: bool) -> LMB:
     except InputError as fault:
         raise InputError(f"views.prediction: {fault}") from None
     return prediction
-
-
-def _single(belief: LMB) -> Tracks:
-    """The tracks, each of one Gaussian."""
-    tracks = belief.tracks.to_kernel()
-    return reduced_tracks(tracks, power_rule("moment_matched", FusionLimits(), belief.state_dim))
-
-
-def _posteriors(prediction: LMB, beliefs: Sequence[LMB], missing_existence: float) -> _Posteriors:
-    shape = prediction.tracks.num_tracks, len(beliefs)
-    floor = math.log(missing_existence) - math.log1p(-missing_existence)
-    logits = np.minimum(prediction.existence_logit, floor)[:, None].repeat(len(beliefs), axis=1)
-    chosen, start = np.full(shape, -1), 0
-    for s, belief in enumerate(beliefs):
-        own = places_of(belief.tracks.labels, prediction.tracks.labels)
-        if (own < 0).any():
-            label = belief.tracks.labels[int(np.argmax(own < 0))].tolist()
-            raise InputError(
-                f"beliefs[{s}]: expected labels of views.prediction, from which it was updated; got {label}"
-            )
-        chosen[own, s] = start + np.arange(len(own))
-        logits[own, s] = belief.existence_logit
-        start += len(own)
-    return _Posteriors(chosen, stack_tracks([_single(belief) for belief in beliefs]), logits)
-
-
-def _updated(prior: Floats, posteriors: Floats, weights: Floats) -> Floats:
-    """prior + sum_s v_s (posterior_s - prior), where what is infinite and stays so adds nothing."""
-    base = prior[:, None]
-    with np.errstate(invalid="ignore"):
-        change = np.where((posteriors == base) | (weights == 0.0), 0.0, posteriors - base)
-        return np.asarray(prior + sum_over_sensors(weights * change))
-
-
-def _check_evidence(labels: Ints, logits: Floats) -> None:
-    faulty = np.isnan(logits)
-    if faulty.any():
-        label = labels[int(np.flatnonzero(faulty)[0])].tolist()
-        raise NumericalError(
-            f"fusion: label {label} is certain to one sensor or the prediction and impossible to another"
-        )

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from vedette.kernels.base.types import Bools, Floats
+from vedette.scenarios.cures import accepted, fusions_instead, with_own_labels
 from vedette.scenarios.faults import Path, Told
 from vedette.scenarios.loading import Scenario, document_of, place_fault
 from vedette.scenarios.names import sensor_names
@@ -27,13 +28,15 @@ from vedette.scenarios.views import field_of_view
 
 # Sensors whose probabilities of detection of one place differ by more than this do not see the same.
 MAX_DIFFERENCE = 0.5
+# Of more sensors than these, what a rule that sends densities leaves unused costs much (docs/networks.md).
+HANDFUL = 4
 _POINTS_A_SIDE = 21
 
 
 def cautions(scenario: Scenario) -> tuple[str, ...]:
     """Warnings of a valid scenario, one line each, with file, line and column where it was read from a file."""
-    found = [*_records(scenario), *_views(scenario.model), *_births(scenario.model), *_late_beliefs(scenario.model)]
-    found += _cells(scenario.model)
+    found = [*_records(scenario), *_views(scenario), *_births(scenario), *_late_beliefs(scenario)]
+    found += [*_many_sensors(scenario), *_cells(scenario.model)]
     if not found:
         return ()
     document = document_of(scenario)
@@ -58,7 +61,8 @@ def _fusion_by_label(model: ScenarioModel) -> Fusion | None:
     return fusion if isinstance(fusion, Fusion) and fusion.kind in BY_LABEL and len(model.sensors) > 1 else None
 
 
-def _births(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
+def _births(scenario: Scenario) -> Iterator[tuple[Path, str]]:
+    model = scenario.model
     steps, fusion = model.birth.steps, _fusion_by_label(model)
     if fusion is None or fusion.feedback or fusion.matching == "assignment":
         return
@@ -68,13 +72,13 @@ def _births(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
     yield (
         ("birth", "steps"),
         f"births {when} without feedback: sensors may take one target up at different steps, under different labels, "
-        f"and {_rule(fusion)}, which fuses by label, then loses it; take fusion.matching: assignment, or, where scans "
-        "can be sent, fusion.kind: sequential (births at step 1 alone, or fusion.feedback with a fusion of the "
-        "filters' kind, avoid this too)",
+        f"and {_rule(fusion)}, which fuses by label, then loses it{with_own_labels(scenario, fusion)} (births at step "
+        "1 alone avoid this too)",
     )
 
 
-def _late_beliefs(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
+def _late_beliefs(scenario: Scenario) -> Iterator[tuple[Path, str]]:
+    model = scenario.model
     fusion, network = _fusion_by_label(model), model.network
     born_later = model.birth.from_measurements is not None or model.birth.steps == "every"
     if fusion is None or network is None or network.delay == 0 or not born_later:
@@ -82,8 +86,37 @@ def _late_beliefs(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
     yield (
         ("network", "delay"),
         f"beliefs come {network.delay} or more scans late: a target that is new to one sensor is unlikely to those "
-        f"whose beliefs are older, and {_rule(fusion)} then keeps it down; take fusion.kind: sequential, where scans "
-        "that come late are put in their place",
+        f"whose beliefs are older, and {_rule(fusion)} then keeps it down, while late scans can be put in their place"
+        f"{fusions_instead(scenario, fusion, by_views=False)}",
+    )
+
+
+def _many_sensors(scenario: Scenario) -> Iterator[tuple[Path, str]]:
+    """Densities of more sensors than those at which rules that send them lose little."""
+    model = scenario.model
+    fusion, num = model.fusion, len(model.sensors)
+    if not isinstance(fusion, Fusion) or num <= HANDFUL:
+        return
+    if fusion.kind == "parallel" and model.filter.kind == "lmb":
+        if model.birth.from_measurements is not None and accepted(scenario, {"filter.kind": "factored_glmb"}):
+            yield (
+                ("filter", "kind"),
+                f"{num} sensors each say of every label by itself what their scans say: of labels that contend for one "
+                "target all say that one of them goes, and both may; take filter.kind: factored_glmb, which says "
+                "it of both together",
+            )
+        return
+    if fusion.kind not in BY_LABEL:
+        return
+    why = (
+        "a target that several see becomes no surer than the mean of what each says, and is found later"
+        if fusion.feedback
+        else "each finds every target by itself, and anew where one comes into its view"
+    )
+    yield (
+        ("fusion", "kind"),
+        f"{num} sensors fuse densities by {_rule(fusion)}, which makes no use of what they have in common: {why}"
+        f"{fusions_instead(scenario, fusion, by_views=False)}",
     )
 
 
@@ -101,7 +134,8 @@ def _cells(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
             return
 
 
-def _views(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
+def _views(scenario: Scenario) -> Iterator[tuple[Path, str]]:
+    model = scenario.model
     fusion = _fusion_by_label(model)
     if fusion is None or fusion.by_views:
         return
@@ -122,23 +156,14 @@ def _views(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
     if spread[worst] > MAX_DIFFERENCE:
         yield (
             ("sensors", list(chances)[int(table[:, worst].argmin())], "detection"),
-            _unlike(names, table, grid, fusion),
+            _unlike(names, table, grid, fusion) + fusions_instead(scenario, fusion, by_views=True),
         )
     elif model.decision_steps:
-        yield from _limited_and_moving(model, fusion)
+        yield from _limited_and_moving(scenario, fusion)
 
 
 def _rule(fusion: Fusion) -> str:
     return "the arithmetic average" if fusion.kind == "arithmetic_average" else "GCI"
-
-
-def _instead(fusion: Fusion) -> str:
-    """What loses nothing where views differ."""
-    kind = "arithmetic_average" if fusion.kind == "arithmetic_average" else "clmb"
-    return (
-        "take fusion.kind: sequential where scans can be sent; parallel where only densities can; "
-        f"fusion: {{kind: {kind}, by_views: true}} where sensors do not share a prediction"
-    )
 
 
 def _unlike(names: list[str], table: Floats, grid: Floats, fusion: Fusion) -> str:
@@ -150,13 +175,13 @@ def _unlike(names: list[str], table: Floats, grid: Floats, fusion: Fusion) -> st
     return (
         f"sensors differ in what they see: in {share} of the region by more than {MAX_DIFFERENCE:g} in probability of "
         f"detection ({chances} at x {grid[worst, 0]:g}, y {grid[worst, 1]:g} m); {_rule(fusion)} loses what one "
-        f"sensor sees and another does not; {_instead(fusion)}"
+        "sensor sees and another does not"
     )
 
 
-def _limited_and_moving(model: ScenarioModel, fusion: Fusion) -> Iterator[tuple[Path, str]]:
+def _limited_and_moving(scenario: Scenario, fusion: Fusion) -> Iterator[tuple[Path, str]]:
     """Sensors that see alike where they start, and need not once they have moved."""
-    region = model.region
+    model, region = scenario.model, scenario.model.region
     across = math.hypot(region.x_max - region.x_min, region.y_max - region.y_min)
     for i, sensor in enumerate(model.sensors):
         field = field_of_view(sensor)
@@ -165,7 +190,7 @@ def _limited_and_moving(model: ScenarioModel, fusion: Fusion) -> Iterator[tuple[
             yield (
                 ("sensors", i, "detection"),
                 f"sensors that move or turn and see only so far will differ in what they see; {_rule(fusion)} loses "
-                f"what one sensor sees and another does not; {_instead(fusion)}",
+                f"what one sensor sees and another does not{fusions_instead(scenario, fusion, by_views=True)}",
             )
             return
 

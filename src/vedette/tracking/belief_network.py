@@ -167,7 +167,8 @@ class BeliefNetwork(LocalFilters):
             current = [self._current(sent, now, j) for sent, j in zip(messages, heard, strict=True)]
             if len(current) == 1:
                 return current[0], None
-            return with_weights(self.fusion, weights.tolist()).fuse(self._for_fusion(current), seen)
+            fused, report = with_weights(self.fusion, weights.tolist()).fuse(self._for_fusion(current), seen)
+            return self._as_kept(fused), report
         predictions = [sent.predictions[j] for sent, j in zip(messages, heard, strict=True)]
         posteriors = [sent.beliefs[j] for sent, j in zip(messages, heard, strict=True)]
         base = predictions[0]

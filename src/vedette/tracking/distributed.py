@@ -89,7 +89,7 @@ class Distributed(LocalFilters):
         if prediction is not None:
             fused = self._kept(fused)
         if self.feedback:
-            local = [fused] * len(local)
+            local = [self._as_kept(fused)] * len(local)
         measured = self._measured(local, scans, at, step + 1, stages)
         told = TrackerInfo(tuple(infos), report, stages.seconds, sent)
         return State(tuple(local), fused, step, float(time), measured), told

@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from vedette.densities import LMB
+from vedette.densities.joining import as_factored
 from vedette.errors import InputError
-from vedette.filters import Filter, FilterInfo, LmbFilter, TwoStepFilter, shared_targets
+from vedette.filters import FactoredGlmbFilter, Filter, FilterInfo, LmbFilter, TwoStepFilter, shared_targets
 from vedette.filters.base import SingleSensorFilter
 from vedette.filters.blind import NO_POSE, NO_SCAN, blind_sensor
 from vedette.fusion import ValidBeliefs
@@ -80,19 +81,28 @@ class LocalFilters:
     ) -> tuple[Any, FilterInfo]:
         """The prediction after the scan of sensor `s`, no label dropped; as it is where the sensor did not scan."""
         own = self.filters[s]
-        if not isinstance(own, LmbFilter):
-            raise reject(f"filters[{s}]", "an LmbFilter, as the sensors share their prediction", own)
+        if not isinstance(own, LmbFilter | FactoredGlmbFilter):
+            raise reject(f"filters[{s}]", "an LmbFilter or FactoredGlmbFilter, as sensors share their prediction", own)
         whole = replace(own, limits=own.limits.keeping_labels())
+        if isinstance(whole, FactoredGlmbFilter):
+            # The errors of all sensors' splits add up, and mixtures are divided by the prediction as they are.
+            apart = replace(whole.limits, merge_distance=0.0)
+            whole = replace(whole, limits=apart, max_split_error=whole.max_split_error / len(self.filters))
         if scan is None:
             _, info = replace(whole, sensor=blind_sensor()).update(prediction, NO_SCAN, NO_POSE, rng=rng)
             return prediction, info
         return whole.update(prediction, scan, pose, rng=rng)
 
-    def _kept(self, belief: LMB) -> LMB:
+    def _kept(self, belief: Any) -> Any:
         """The belief without the labels that the limits of the first filter drop."""
         own = self.filters[0]
-        assert isinstance(own, LmbFilter)
+        assert isinstance(own, SingleSensorFilter)
         return own.limits.kept(belief)
+
+    def _as_kept(self, belief: Any) -> Any:
+        """The same density as the filters keep it: an LMB as a product of GLMBs where they keep these."""
+        own = self.filters[0]
+        return as_factored(belief) if isinstance(own, FactoredGlmbFilter) and isinstance(belief, LMB) else belief
 
     def _for_fusion(self, beliefs: Sequence[Any]) -> Sequence[Any]:
         """What was made of the filters' beliefs at this step, to be fused: checked where a filter is the user's own."""

@@ -1,4 +1,4 @@
-"""Parallel update of single-Gaussian tracks: p+ prod_s (p_s / p+)^(v_s), from posteriors of one common prediction p+.
+"""Parallel update of tracks: p+ prod_s (p_s / p+)^(v_s), from posteriors p_s of one common Gaussian prediction p+.
 
 Everything is done in the coordinates u = C^-1 (x - m+) in which the prediction N(m+, C C') is the standard normal.
 There a posterior N(m_s, P_s) has information I + A_s, A_s = C' (P_s^-1 - P+^-1) C, and mean z_s = C^-1 (m_s - m+), and
@@ -6,19 +6,26 @@ There a posterior N(m_s, P_s) has information I + A_s, A_s = C' (P_s^-1 - P+^-1)
     log (p_s / p+)(u) = ln|I + A_s| / 2 - u'A_s u / 2 + eta_s'u - eta_s'z_s / 2,    eta_s = (I + A_s) z_s.
 
 A posterior that is the prediction has A_s = 0 and z_s = 0 to the last bit, since L^-1 L and L^-1 0 come out exact.
+
+A posterior that is a mixture says a sum of such terms, one a component. The product is then a mixture of one component
+for each choice of a component at every sensor, of which the likeliest are followed.
 """
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 
 from vedette.kernels.base.compile import borrowing, kernel
-from vedette.kernels.base.types import Floats, Ints
+from vedette.kernels.base.types import Floats, Ints, Tracks
 from vedette.kernels.gaussian.eigen import clip_negative
-from vedette.kernels.gaussian.linalg import cholesky, log_det_from_factor, solve_lower, solve_upper
-from vedette.kernels.gaussian.mixtures import require_gaussians
+from vedette.kernels.gaussian.linalg import cholesky, log_det_from_factor, log_sum, solve_lower, solve_upper
+from vedette.kernels.gaussian.mixtures import descending_order, moment_match, require_gaussians
+
+# Choices lighter than this share of the likeliest are not followed.
+_LOG_LEAST = math.log(1e-6)
 
 
 class _Work(NamedTuple):
@@ -27,35 +34,35 @@ class _Work(NamedTuple):
     root: Floats  # (dim, dim) C
     factor: Floats  # (dim, dim) of what is factored just now
     whitened: Floats  # (dim, dim) L_s^-1 C
-    gain: Floats  # (dim, dim) A_s
     rotated: Floats  # (dim, dim)
     vectors: Floats  # (dim, dim)
     offset: Floats  # (dim,) z_s
-    pull: Floats  # (dim,) eta_s
-    information: Floats  # (dim, dim) I + sum_s v_s A_s
-    total_pull: Floats  # (dim,) sum_s v_s eta_s
+
+
+class _Said(NamedTuple):
+    """Factors exp(log_weight - u'A u / 2 + eta'u) of the standard normal: of a sensor's components, or of choices."""
+
+    gains: Floats  # (room, dim, dim) A
+    pulls: Floats  # (room, dim) eta
+    log_weights: Floats  # (room,)
 
 
 @kernel
 def _make_work(dim: int) -> _Work:
     square = (dim, dim)
     return _Work(
-        np.empty(square),
-        np.empty(square),
-        np.empty(square),
-        np.empty(square),
-        np.empty(square),
-        np.empty(square),
-        np.empty(dim),
-        np.empty(dim),
-        np.empty(square),
-        np.empty(dim),
+        np.empty(square), np.empty(square), np.empty(square), np.empty(square), np.empty(square), np.empty(dim)
     )
 
 
+@kernel
+def _make_said(room: int, dim: int) -> _Said:
+    return _Said(np.empty((room, dim, dim)), np.empty((room, dim)), np.empty(room))
+
+
 @borrowing
-def _gain(cov: Floats, work: _Work) -> bool:
-    """A_s of a posterior of this covariance, its negative eigenvalues clipped at 0. False where it is not definite."""
+def _gain(cov: Floats, work: _Work, gain: Floats) -> bool:
+    """A_s (-> gain) of a component of this covariance, negative eigenvalues clipped at 0; whether it is definite."""
     n = len(cov)
     if not cholesky(cov, work.factor):
         return False
@@ -70,53 +77,84 @@ def _gain(cov: Floats, work: _Work) -> bool:
             total = -1.0 if i == j else 0.0
             for k in range(i, n):
                 total += work.whitened[k, i] * work.whitened[k, j]
-            work.gain[i, j] = total
-            work.gain[j, i] = total
-    clip_negative(work.gain, work.rotated, work.vectors)
+            gain[i, j] = total
+            gain[j, i] = total
+    clip_negative(gain, work.rotated, work.vectors)
     return True
 
 
 @borrowing
-def _add(weight: float, mean: Floats, cov: Floats, predicted: Floats, work: _Work) -> tuple[bool, float]:
-    """Add v_s A_s and v_s eta_s; whether the posterior is a Gaussian, and ln|I + A_s| / 2 - eta_s'z_s / 2."""
-    n = len(mean)
-    if not _gain(cov, work):
-        return False, 0.0
+def _say(item: int, mean: Floats, cov: Floats, predicted: Floats, work: _Work, said: _Said) -> bool:
+    """What a posterior's component says, and its normaliser, in place `item`; whether it is a Gaussian."""
+    n, gain, pull = len(mean), said.gains[item], said.pulls[item]
+    if not _gain(cov, work, gain):
+        return False
     for i in range(n):
         work.offset[i] = mean[i] - predicted[i]
     solve_lower(work.root, work.offset, work.offset)
     quadratic = 0.0
     for i in range(n):
-        work.pull[i] = work.offset[i]
+        pull[i] = work.offset[i]
         for j in range(n):
-            work.pull[i] += work.gain[i, j] * work.offset[j]
-        quadratic += work.pull[i] * work.offset[i]
-        work.total_pull[i] += weight * work.pull[i]
-    for i in range(n):
-        for j in range(n):
-            work.information[i, j] += weight * work.gain[i, j]
-        work.gain[i, i] += 1.0
-    if not cholesky(work.gain, work.factor):
-        return False, 0.0
-    return True, 0.5 * (log_det_from_factor(work.factor) - quadratic)
+            pull[i] += gain[i, j] * work.offset[j]
+            work.whitened[i, j] = gain[i, j] + (1.0 if i == j else 0.0)
+        quadratic += pull[i] * work.offset[i]
+    if not cholesky(work.whitened, work.factor):
+        return False
+    said.log_weights[item] = 0.5 * (log_det_from_factor(work.factor) - quadratic)
+    return True
 
 
 @borrowing
-def _solve(predicted: Floats, work: _Work, mean: Floats, cov: Floats) -> tuple[bool, float]:
-    """m+ + C A^-1 eta and C A^-1 C'; whether A is definite, and eta'A^-1 eta / 2 - ln|A| / 2."""
-    n = len(mean)
-    if not cholesky(work.information, work.factor):
+def _multiply(first: _Said, a: int, second: _Said, b: int, power: float, out: _Said, item: int) -> None:
+    """The product of one factor and the power of another, in place `item`."""
+    n = first.pulls.shape[1]
+    for i in range(n):
+        out.pulls[item, i] = first.pulls[a, i] + power * second.pulls[b, i]
+        for j in range(n):
+            out.gains[item, i, j] = first.gains[a, i, j] + power * second.gains[b, i, j]
+    out.log_weights[item] = first.log_weights[a] + power * second.log_weights[b]
+
+
+@borrowing
+def _copy(said: _Said, source: int, out: _Said, item: int) -> None:
+    n = said.pulls.shape[1]
+    for i in range(n):
+        out.pulls[item, i] = said.pulls[source, i]
+        for j in range(n):
+            out.gains[item, i, j] = said.gains[source, i, j]
+    out.log_weights[item] = said.log_weights[source]
+
+
+@borrowing
+def _weigh(item: int, said: _Said, work: _Work) -> tuple[bool, float]:
+    """Factor of I + A (-> work) and F^-1 eta (-> work.offset); whether it is definite, and the log of the integral."""
+    n = said.pulls.shape[1]
+    for i in range(n):
+        for j in range(n):
+            work.rotated[i, j] = said.gains[item, i, j] + (1.0 if i == j else 0.0)
+    if not cholesky(work.rotated, work.factor):
         return False, 0.0
-    solve_lower(work.factor, work.total_pull, work.offset)
+    solve_lower(work.factor, said.pulls[item], work.offset)
     quadratic = 0.0
     for i in range(n):
         quadratic += work.offset[i] * work.offset[i]
+    return True, said.log_weights[item] + 0.5 * (quadratic - log_det_from_factor(work.factor))
+
+
+@borrowing
+def _solve(item: int, predicted: Floats, said: _Said, work: _Work, mean: Floats, cov: Floats) -> tuple[bool, float]:
+    """m+ + C (I + A)^-1 eta and C (I + A)^-1 C'; whether that is definite, and the log of the integral."""
+    n = len(mean)
+    positive, log_integral = _weigh(item, said, work)
+    if not positive:
+        return False, 0.0
     solve_upper(work.factor, work.offset, work.offset)
     for i in range(n):
         mean[i] = predicted[i]
         for k in range(i + 1):
             mean[i] += work.root[i, k] * work.offset[k]
-        # Row i of (F^-1 C')', where A = F F'.
+        # Row i of (F^-1 C')', where I + A = F F'.
         for k in range(n):
             total = work.root[i, k] if k <= i else 0.0
             for m in range(k):
@@ -129,57 +167,92 @@ def _solve(predicted: Floats, work: _Work, mean: Floats, cov: Floats) -> tuple[b
                 total += work.whitened[i, k] * work.whitened[j, k]
             cov[i, j] = total
             cov[j, i] = total
-    return True, 0.5 * (quadratic - log_det_from_factor(work.factor))
+    return True, log_integral
+
+
+@kernel
+def _likeliest(num: int, said: _Said, work: _Work, most: int, out: _Said) -> int:
+    """The likeliest `most` of the first `num` choices (-> out), which take the weight of the others; their number."""
+    weights = np.empty(num)
+    for c in range(num):
+        positive, weights[c] = _weigh(c, said, work)
+        if not positive:
+            raise FloatingPointError("the product of the track densities of a label is not integrable")
+    order, kept = descending_order(weights), 0
+    while kept < min(num, most) and weights[order[kept]] >= weights[order[0]] + _LOG_LEAST:
+        _copy(said, order[kept], out, kept)
+        kept += 1
+    shift = log_sum(weights) - log_sum(weights[order[:kept]]) if kept < num else 0.0
+    for c in range(kept):
+        out.log_weights[c] += shift
+    return kept
 
 
 @kernel
 def update_in_parallel(
-    means: Floats, covs: Floats, chosen: Ints, weights: Floats, own_means: Floats, own_covs: Floats
+    means: Floats, covs: Floats, chosen: Ints, weights: Floats, own: Tracks, max_choices: int
 ) -> tuple[Floats, Floats, Floats]:
     """Fused mean, covariance and log of the integral of p+ prod_s (p_s / p+)^(v_s) of each label.
 
-    means: (num, dim), covs: (num, dim, dim) of the prediction. chosen: (num, S) the sensors' posteriors in `own_means`
-    and `own_covs`, -1 for one that has nothing to say. weights: (S,) the exponents v_s, non-negative. A label of which
-    nobody says anything keeps its prediction as it is.
+    means: (num, dim), covs: (num, dim, dim) of the prediction. chosen: (num, S) the sensors' posteriors in `own`, -1
+    for one that has nothing to say. weights: (S,) the exponents v_s, non-negative; of mixtures 1. max_choices: of a
+    component at each sensor, followed at most. A label of which nobody says anything keeps its prediction as it is.
 
     Raises FloatingPointError where a covariance is not positive definite, NumericalError where a fused one is not.
     """
-    num, dim = means.shape
+    num, dim, largest = len(means), means.shape[1], 1
+    for track in range(len(own.labels)):
+        largest = max(largest, own.offsets[track + 1] - own.offsets[track])
     out_means, out_covs, log_integrals = means.copy(), covs.copy(), np.zeros(num)
-    work = _make_work(dim)
+    work, said = _make_work(dim), _make_said(largest, dim)
+    choices, longer = _make_said(max_choices, dim), _make_said(max_choices * largest, dim)
     for item in range(num):
         if not cholesky(covs[item], work.root):
             raise FloatingPointError("covariance of a predicted track is not positive definite")
-        for i in range(dim):
-            work.total_pull[i] = 0.0
-            for j in range(dim):
-                work.information[i, j] = 1.0 if i == j else 0.0
+        count = 1
+        choices.gains[0], choices.pulls[0], choices.log_weights[0] = 0.0, 0.0, 0.0
         for s in range(len(weights)):
             track = chosen[item, s]
             if track < 0 or weights[s] == 0.0:
                 continue
-            positive, gained = _add(weights[s], own_means[track], own_covs[track], means[item], work)
-            if not positive:
-                raise FloatingPointError("covariance of a track is not positive definite")
-            log_integrals[item] += weights[s] * gained
-        if _is_standard(work.information, work.total_pull):
-            continue
-        positive, gained = _solve(means[item], work, out_means[item], out_covs[item])
-        if not positive:
-            raise FloatingPointError("the product of the track densities of a label is not integrable")
-        log_integrals[item] += gained
+            first, size = own.offsets[track], own.offsets[track + 1] - own.offsets[track]
+            for j in range(size):
+                if not _say(j, own.means[first + j], own.covs[first + j], means[item], work, said):
+                    raise FloatingPointError("covariance of a track is not positive definite")
+                said.log_weights[j] += own.log_weights[first + j]
+            for c in range(count):
+                for j in range(size):
+                    _multiply(choices, c, said, j, weights[s], longer if size > 1 else choices, c * size + j)
+            if size > 1:
+                count = _likeliest(count * size, longer, work, max_choices, choices)
+        if count > 1 or not _is_nothing(choices):
+            log_integrals[item] = _merge(count, choices, means[item], work, out_means[item], out_covs[item])
     require_gaussians(out_means, out_covs)
     return out_means, out_covs, log_integrals
 
 
+@kernel
+def _merge(count: int, choices: _Said, predicted: Floats, work: _Work, mean: Floats, cov: Floats) -> float:
+    """Mean and covariance of the mixture of the choices, and the log of its integral."""
+    n = len(predicted)
+    log_weights, means, covs = np.empty(count), np.empty((count, n)), np.empty((count, n, n))
+    for c in range(count):
+        positive, log_weights[c] = _solve(c, predicted, choices, work, means[c], covs[c])
+        if not positive:
+            raise FloatingPointError("the product of the track densities of a label is not integrable")
+    moment_match(log_weights, means, covs, mean, cov)
+    return log_sum(log_weights)
+
+
 @borrowing
-def _is_standard(information: Floats, pull: Floats) -> bool:
-    """Whether this is the standard normal: nothing was added to the prediction."""
-    for i in range(len(pull)):
-        if pull[i] != 0.0:
+def _is_nothing(said: _Said) -> bool:
+    """Whether the first factor is 1: nothing was added to the prediction."""
+    n = said.pulls.shape[1]
+    for i in range(n):
+        if said.pulls[0, i] != 0.0:
             return False
-        for j in range(len(pull)):
-            if information[i, j] != (1.0 if i == j else 0.0):
+        for j in range(n):
+            if said.gains[0, i, j] != 0.0:
                 return False
     return True
 

@@ -86,8 +86,10 @@ def _fusion_of_kind(model: ScenarioModel) -> Iterator[Finding]:
         yield ("fusion", "kind"), wanted, describe(kind)
     if filters in ("lmb", "custom", *UNLABELLED):
         return
+    if filters == "factored_glmb":
+        return
     if kind == "parallel":
-        wanted = f"sequential, cm_delta_glmb or another, as parallel is of lmb filters, and these are {filters}"
+        wanted = f"sequential or another, as parallel is of lmb or factored_glmb filters, and these are {filters}"
         yield ("fusion", "kind"), wanted, describe(kind)
     if kind in OF_LMBS and model.fusion.feedback:
         yield ("fusion", "feedback"), f"false, as {filters} filters cannot go on from an LMB", "true"
@@ -103,8 +105,6 @@ def _central(model: ScenarioModel) -> Iterator[Finding]:
         return
     if model.filter.kind == "custom":
         yield ("fusion", "kind"), "a fusion, as each sensor has a filter of your own", '"central"'
-    elif model.filter.kind == "factored_glmb":
-        yield ("fusion", "kind"), "sequential, as factored_glmb filters take scans in turn", '"central"'
     elif model.filter.assignment.kind == "gibbs":
         yield ("filter", "assignment", "kind"), "ranked, as one filter takes the scans of all sensors", '"gibbs"'
 

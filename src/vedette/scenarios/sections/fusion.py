@@ -15,6 +15,7 @@ from vedette.scenarios.sections.custom import Custom
 
 if TYPE_CHECKING:  # with the fusions comes the compiler, which a check does without
     from vedette.fusion import Fusion as FusionRule
+    from vedette.fusion import FusionLimits as RuleLimits
 
 
 _WEIGHT_TOLERANCE = 1e-6
@@ -68,9 +69,10 @@ class Fusion(Section):
         description="cm_delta_glmb, clmb: generalised covariance intersection of marginalised delta-GLMB or of LMB "
         "densities (paper section II-D). arithmetic_average: of LMB densities; other ones are converted. sequential: "
         "one belief is predicted, then updated with each sensor's scan in turn. parallel: each sensor updates one "
-        "common prediction, and the LMB posteriors are divided by it; the sensors go on from the result. central: one "
-        "filter takes the scans of all sensors. none: of a single sensor. Joint decisions are by covariance "
-        "intersection of the same kind of density, without views, whatever the kind [-].",
+        "common prediction, and the posteriors are divided by it; the sensors go on from the result (lmb, "
+        "factored_glmb). central: one filter takes the scans of all sensors, of GLMBs as sequential. none: of a single "
+        "sensor. Joint decisions are by covariance intersection of the same kind of density, without views, whatever "
+        "the kind [-].",
     )
     filter: CustomCentral | None = Field(
         default=None,
@@ -84,8 +86,8 @@ class Fusion(Section):
     )
     by_views: bool = Field(
         default=False,
-        description="Whether a sensor's weight at each label is in proportion to the probability that it detects it, "
-        "so that one that cannot see a target has no say in it (clmb, arithmetic_average) [-].",
+        description="Whether a sensor's weight at each label is in proportion to the odds with which it detects it, so "
+        "that one that cannot see a target has no say in it (clmb, arithmetic_average) [-].",
     )
     matching: Literal["labels", "assignment"] = Field(
         default="labels",
@@ -149,7 +151,7 @@ class Fusion(Section):
         if self.kind in ONE_BELIEF:
             return None
         if self.kind == "parallel":
-            return ParallelUpdate(missing_existence=self.missing_existence)
+            return ParallelUpdate(missing_existence=self.missing_existence, limits=self._caps())
         rule = self._by_label(num_sensors)
         return Matched(rule) if self.matching == "assignment" else rule
 
@@ -169,21 +171,26 @@ class Fusion(Section):
         return self.model_copy(update={"kind": kind, "by_views": False})._by_label(num_sensors)
 
     def _by_label(self, num_sensors: int) -> FusionRule:
-        from vedette.fusion import ArithmeticAverage, Clmb, CmDeltaGlmb, FusionLimits
+        from vedette.fusion import ArithmeticAverage, Clmb, CmDeltaGlmb
 
-        weights, caps = self.scaled_weights(num_sensors), self.limits
-        limits = FusionLimits(
+        weights, limits = self.scaled_weights(num_sensors), self._caps()
+        if self.kind == "arithmetic_average":
+            return ArithmeticAverage(weights, self.by_views, limits)
+        if self.kind == "clmb":
+            return Clmb(weights, self.mixture_power, self.missing_existence, limits, self.by_views)
+        return CmDeltaGlmb(weights, self.mixture_power, math.log(self.missing_weight), limits)
+
+    def _caps(self) -> RuleLimits:
+        from vedette.fusion import FusionLimits as RuleLimits
+
+        caps = self.limits
+        return RuleLimits(
             math.log(caps.min_component_weight),
             caps.merge_distance,
             caps.max_components,
             caps.max_combinations,
             caps.max_hypotheses,
         )
-        if self.kind == "arithmetic_average":
-            return ArithmeticAverage(weights, self.by_views, limits)
-        if self.kind == "clmb":
-            return Clmb(weights, self.mixture_power, self.missing_existence, limits, self.by_views)
-        return CmDeltaGlmb(weights, self.mixture_power, math.log(self.missing_weight), limits)
 
 
 class CustomFusion(Custom):

@@ -1,0 +1,205 @@
+"""What posteriors of one common prediction say together of labels that belong together: the sets of a group of them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from vedette.densities import GLMB, LMB, FactoredGLMB, TrackTable, existence_probabilities
+from vedette.densities.checks import offsets_of, unchecked
+from vedette.densities.conversions import factored_to_glmb
+from vedette.densities.joining import JoinedFactors
+from vedette.densities.label_sets import laid_out, places_of, take_tracks
+from vedette.errors import InputError, NumericalError
+from vedette.fusion.base import count_lost
+from vedette.fusion.parallel_lmbs import unknown_label
+from vedette.kernels.base.types import Bools, Floats, Ints, Tracks
+from vedette.kernels.gaussian.mixtures import MixtureCaps
+from vedette.kernels.gaussian.pooling import pooled_tracks
+from vedette.kernels.labelled.groups import group_log_sums
+from vedette.probabilities import log_expit, logit
+
+ONE = MixtureCaps(-math.inf, 0.0, 1)  # which make of a mixture the Gaussian of its moments
+
+
+class GroupedSets(NamedTuple):
+    """Label sets of one group, what the scans said of their weights, and of where their targets are.
+
+    A place is a label together with what each sensor says of it; in most sets a label has the same.
+    """
+
+    labels: Ints  # (num_labels, 2) increasing
+    log_weights: Floats  # (num_sets,) of the prediction times what the scans said, but for the places
+    places: Ints  # (num_sets, num_labels) place of each member; -1 of those that are absent
+    place_labels: Ints  # (num_places,) into `labels`
+    chosen: Ints  # (num_places, num_sensors) track of each sensor, -1 where it has nothing to say
+    num_missing: Ints  # (num_sensors,) labels that a sensor's posterior has dropped
+    log_kept: float  # log of the weight of the prediction's sets that are here
+
+
+def grouped_sets(
+    joined: JoinedFactors, group: int, first_tracks: Ints, weights: Floats, missing_existence: float, max_sets: int
+) -> GroupedSets:
+    """The sets of a group: the prediction's, each with what the sensors' factors say of their part of it.
+
+    A factor says w_s(I) / w+(I) of a set I of its labels, where w+ is the prediction's weight of I among these labels:
+    nothing, where the posterior is the prediction, however it is factored.
+
+    joined: of the prediction, of one Gaussian a label, and the posteriors, marginalised. first_tracks: (S,) place of
+    each posterior's first track in the table of all. weights: (S,) exponents of what the sensors say. max_sets: of the
+    prediction, kept.
+    """
+    labels = np.unique(np.concatenate([part.tracks.labels for part in joined.parts(group)]), axis=0)
+    members, log_weights, log_kept = _predicted_sets(joined, group, labels, max_sets)
+    prior, chosen = log_weights.copy(), np.full((*members.shape, len(weights)), -1)
+    num_missing = np.zeros(len(weights), np.int64)
+    for s, power in enumerate(weights.tolist()):
+        density, groups = joined.densities[1 + s], joined.groups[1 + s]
+        lacking = np.ones(len(labels), np.bool_)
+        for factor in np.flatnonzero(groups == group).tolist() if power > 0.0 else ():
+            start = first_tracks[s] + density.track_offsets[factor]
+            said = _Said.of(density.factor(factor), labels, members, prior)
+            lacking[said.columns] = False
+            log_weights += power * said.log_ratios
+            tracks = np.where(said.tracks >= 0, said.tracks + start, -1)
+            chosen[:, said.columns, s] = tracks
+        for label in np.flatnonzero(lacking & (power > 0.0)).tolist():
+            num_missing[s] += 1
+            log_weights += power * _of_dropped(members[:, label], prior, missing_existence)
+    rows = np.column_stack([np.nonzero(members)[1], chosen[members]])
+    distinct, place = np.unique(rows, axis=0, return_inverse=True)
+    places = np.full(members.shape, -1)
+    places[members] = place.ravel()
+    return GroupedSets(labels, log_weights, places, distinct[:, 0], distinct[:, 1:], num_missing, log_kept)
+
+
+def _predicted_sets(joined: JoinedFactors, group: int, labels: Ints, max_sets: int) -> tuple[Bools, Floats, float]:
+    """(num_sets, num_labels) who is in each set of the prediction, log weights, and log of what the cap left."""
+    product, lost = factored_to_glmb(joined.parts(group)[0], max_hypotheses=max_sets)
+    return _members(product, labels), product.hyp_log_weights, float(np.log1p(-lost))
+
+
+def _members(glmb: GLMB, labels: Ints) -> Bools:
+    """(num_hyps, num_labels) who is in each hypothesis."""
+    members = np.zeros((glmb.num_hyps, len(labels)), np.bool_)
+    hyps = np.repeat(np.arange(glmb.num_hyps), np.diff(glmb.hyp_offsets))
+    members[hyps, places_of(glmb.tracks.labels, labels)[glmb.hyp_tracks]] = True
+    return members
+
+
+class _Said(NamedTuple):
+    """What one factor of a posterior says of each of the prediction's sets."""
+
+    columns: Ints  # (num_own,) its labels
+    log_ratios: Floats  # (num_sets,)
+    tracks: Ints  # (num_sets, num_own) of the factor's; -1 of those absent, and where it lacks the set
+
+    @classmethod
+    def of(cls, factor: GLMB, labels: Ints, members: Bools, prior: Floats) -> _Said:
+        own_labels = np.unique(factor.tracks.labels, axis=0)
+        columns = places_of(own_labels, labels)
+        parts, part_of = np.unique(members[:, columns], axis=0, return_inverse=True)
+        before = group_log_sums(prior, part_of.ravel(), len(parts))
+        sets = _members(factor, own_labels)
+        number = {row.tobytes(): i for i, row in enumerate(parts)}
+        known = [(h, number[row.tobytes()]) for h, row in enumerate(sets) if row.tobytes() in number]
+        # A set that was cut off weighed at most as much as the lightest kept, and no more than was expected.
+        after = np.minimum(before, factor.hyp_log_weights.min())
+        tracks = np.full(parts.shape, -1)
+        for h, part in known:
+            after[part] = factor.hyp_log_weights[h]
+            tracks[part, sets[h]] = factor.hyp_tracks[factor.hyp_offsets[h] : factor.hyp_offsets[h + 1]]
+        return cls(columns, (after - before)[part_of.ravel()], tracks[part_of.ravel()])
+
+
+def _of_dropped(member: Bools, prior: Floats, missing_existence: float) -> Floats:
+    """(num_sets,) what a posterior says that has dropped a label: that it exists at most so surely."""
+    number = member.astype(np.int64)
+    sums = group_log_sums(prior, number, 2)
+    log_odds = min(sums[1] - sums[0], logit(missing_existence))
+    with np.errstate(invalid="ignore"):  # of a side without sets
+        said = log_expit(np.array([-log_odds, log_odds])) - (sums - np.logaddexp(*sums))
+    return np.asarray(said[number])
+
+
+def check_single(prediction: FactoredGLMB) -> None:
+    """Raise `InputError` unless each label has one track, of one Gaussian."""
+    tracks = prediction.tracks
+    num_labels = len(np.unique(tracks.labels, axis=0))
+    if tracks.num_tracks > num_labels or len(tracks.log_weights) > tracks.num_tracks:
+        raise InputError(
+            f"views.prediction: expected one Gaussian for each of its {num_labels} labels, the same in all hypotheses, "
+            f"as of what a parallel update has fused; got {len(tracks.log_weights)} Gaussians"
+        )
+
+
+def check_known_labels(joined: JoinedFactors) -> None:
+    """Raise `InputError` where a posterior has a label that the prediction lacks."""
+    prediction, *posteriors = joined.densities
+    for s, posterior in enumerate(posteriors):
+        unknown = places_of(posterior.tracks.labels, prediction.tracks.labels) < 0
+        if unknown.any():
+            raise unknown_label(s, posterior.tracks.labels[int(unknown.argmax())])
+
+
+def lmbs_alone(joined: JoinedFactors) -> tuple[LMB, list[LMB]]:
+    """What the prediction and each posterior are of the labels that are alone in all their factors."""
+    columns = zip(joined.densities, joined.places().T, strict=True)
+    prediction, *posteriors = [_lmb(density, factors[factors >= 0]) for density, factors in columns]
+    return prediction, posteriors
+
+
+def _lmb(density: FactoredGLMB, factors: Ints) -> LMB:
+    first = density.factor_offsets[factors]
+    logits = density.hyp_log_weights[first + 1] - density.hyp_log_weights[first]
+    return unchecked(LMB, take_tracks(density.tracks, density.track_offsets[factors]), logits)
+
+
+def fused_groups(
+    groups: Sequence[GroupedSets], log_overlaps: Floats, means: Floats, covs: Floats, max_sets: int
+) -> tuple[list[FactoredGLMB], float]:
+    """One density a group, with one Gaussian a label; and the log of the product of the sums of their weights.
+
+    log_overlaps (num,), means (num, dim), covs (num, dim, dim): of the places of all groups, one after the other.
+    """
+    fused, log_normaliser, start = [], 0.0, 0
+    for group in groups:
+        places = np.where(group.places >= 0, group.places + start, -1)
+        start += len(group.place_labels)
+        log_weights = group.log_weights + np.where(places >= 0, log_overlaps[places], 0.0).sum(axis=1)
+        order = np.argsort(-log_weights, kind="stable")[:max_sets]
+        total = float(np.logaddexp.reduce(log_weights[order]))
+        if not math.isfinite(total):
+            raise NumericalError(f"fusion: the sensors contradict each other on the labels {group.labels.tolist()}")
+        log_normaliser += total
+        fused.append(_group(group.labels, places[order], log_weights[order] - total, means, covs))
+    return fused, log_normaliser
+
+
+def _group(labels: Ints, places: Ints, log_weights: Floats, means: Floats, covs: Floats) -> FactoredGLMB:
+    """A GLMB of weighted sets, of which each label has the Gaussian of the moments of its places."""
+    members = places >= 0
+    held = np.flatnonzero(members.any(axis=0))
+    num, columns = len(held), members[:, held]
+    set_of, label_of = np.nonzero(columns)
+    order = np.argsort(label_of, kind="stable")
+    pool, shares = places[:, held][columns][order], np.exp(log_weights)[set_of[order]]
+    table = Tracks(np.zeros((len(means), 2), np.int64), np.arange(len(means) + 1), np.zeros(len(means)), means, covs)
+    offsets = offsets_of(np.bincount(label_of, minlength=num))
+    tracks = pooled_tracks(table, labels[held], offsets, pool, shares, ONE)
+    hyp_offsets = offsets_of(columns.sum(axis=1))
+    return laid_out(unchecked(GLMB, TrackTable.from_kernel(tracks), hyp_offsets, label_of, log_weights))
+
+
+def lost_labels(posteriors: Sequence[FactoredGLMB], weights: Floats, fused: FactoredGLMB) -> int:
+    """Labels that a sensor is sure of and the fused density is not."""
+    labels, existence = existence_probabilities(fused)
+    surest = np.zeros(len(labels))
+    for posterior in [own for own, power in zip(posteriors, weights.tolist(), strict=True) if power > 0.0]:
+        known, own = existence_probabilities(posterior)
+        places = places_of(known, labels)
+        np.maximum.at(surest, places[places >= 0], own[places >= 0])
+    return count_lost(surest[:, None], existence)
