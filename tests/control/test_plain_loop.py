@@ -163,7 +163,7 @@ def test_powers_of_single_gaussians_are_exact(kind: str) -> None:
 @pytest.mark.parametrize("unit_volume", [1.0, "reference"])
 def test_glmbs_may_be_fused_to_an_lmb(kind: str, num_sensors: int, unit_volume: Any) -> None:
     example = situation(kind, num_sensors)
-    fusion = Clmb(np.arange(1.0, num_sensors + 1.0) / sum(range(1, num_sensors + 1)))
+    fusion = Clmb(np.arange(1.0, num_sensors + 1.0) / sum(range(1, num_sensors + 1)), "moment_matched")
     example = replace(example, fusion=fusion, fused=fusion.fuse(example.beliefs)[0])
     assert isinstance(example.fused, LMB)
     assert_equals_plain_loop(example, unit_volume)
@@ -171,7 +171,9 @@ def test_glmbs_may_be_fused_to_an_lmb(kind: str, num_sensors: int, unit_volume: 
 
 @pytest.mark.parametrize("labels", [(A,), (A, C), (A, B, C)])
 def test_an_lmb_prediction_may_lack_labels_of_glmb_filters(labels: Any) -> None:
-    example = replace(situation("delta"), fusion=Clmb((0.5, 0.5)), fused=lmb(labels, np.random.default_rng(3)))
+    example = replace(
+        situation("delta"), fusion=Clmb((0.5, 0.5), "moment_matched"), fused=lmb(labels, np.random.default_rng(3))
+    )
     assert_equals_plain_loop(example)
 
 
@@ -244,7 +246,7 @@ def test_rewards_of_power_integrals(reward: Any, kind: str, num_sensors: int) ->
     detection: dict[str, Any] = {"detection": models.DetectionModel(certain)} if kind == "certain" else {}
     example = situation("lmb" if kind == "lmb" else "delta", num_sensors, seed=3, **detection)
     if kind == "glmbs to lmb":
-        clmb = Clmb(example.fusion.weights)
+        clmb = Clmb(example.fusion.weights, "moment_matched")
         example = replace(example, fusion=clmb, fused=clmb.fuse(example.beliefs)[0])
     evaluator = evaluator_of(example, reward)
     if kind == "certain":
@@ -304,7 +306,7 @@ def test_a_prediction_may_be_certain_of_a_label_that_a_glmb_filter_lacks() -> No
     tracks, rewards = lmb((A, B, C), np.random.default_rng(3)).tracks, []
     for existence_logit in (1.0, np.inf):
         fused = LMB(tracks, np.array([0.0, 0.0, existence_logit]))
-        example = replace(situation("delta"), fusion=Clmb((0.5, 0.5)), fused=fused)
+        example = replace(situation("delta"), fusion=Clmb((0.5, 0.5), "moment_matched"), fused=fused)
         evaluator = evaluator_of(example)
         assert not any(C in labels for labels in evaluator.posteriors[0].sets)
         rewards.append(evaluator.sample_rewards((0,), None))
