@@ -156,7 +156,8 @@ def test_nothing_to_match_and_what_is_refused() -> None:
 def test_near_pairs_are_those_within_the_gate() -> None:
     rng = np.random.default_rng(5)
     means, others = rng.normal(0.0, 30.0, (60, 3)), rng.normal(0.0, 30.0, (80, 3))
-    covs, other_covs = (x @ x.swapaxes(1, 2) for x in (rng.normal(0.0, 6.0, (60, 3, 4)), rng.normal(0, 4.0, (80, 3, 4))))
+    roots = rng.normal(0.0, 6.0, (60, 3, 4)), rng.normal(0.0, 4.0, (80, 3, 4))
+    covs, other_covs = (root @ root.swapaxes(1, 2) for root in roots)
     found, gate = near_pairs(means, covs, others, other_covs, 9.0), 9.0
     total, off = covs[:, None] + other_covs[None], means[:, None] - others[None]
     squares = np.einsum("abi,abij,abj->ab", off, np.linalg.inv(total), off)

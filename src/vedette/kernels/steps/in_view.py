@@ -1,4 +1,4 @@
-"""Which tracks a scan says anything of, so that a scan of one sensor among many costs what is near it, not what there is.
+"""Which tracks a scan says anything of, so that one sensor's scan costs what is near it, not what there is.
 
 A track out of view, which is missed as it had to be, stays as it was: of 1 - p_D nothing is left to write in a double,
 and of p_D g(z | x) / kappa(z) nothing beside 1 whatever was measured.
