@@ -48,7 +48,7 @@ def test_a_scene_has_labels_for_all_its_targets(settings: tuple[int, int | None]
 def test_more_targets_than_a_filter_keeps_by_default_are_all_tracked() -> None:
     """Four targets a sensor: 240, of which a cap of 200 would lose 40."""
     short = {"time.num_steps": 4, "control.decision_steps": []}
-    found = with_fields(scenario(num_sensors=60, num_targets=240, view="full"), short)
+    found = with_fields(scenario(num_sensors=60, num_targets=240), short)
     record = run_scenario(found, "still", seed=0)
     assert len(record.estimates[-1].labels) > 225
 
