@@ -109,9 +109,9 @@ def _labels(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
     if number > model.filter.limits.max_labels:
         yield (
             ("filter", "limits", "max_labels"),
-            f"at most {model.filter.limits.max_labels} labels are kept, and {number:.0f} targets are there at once: the "
-            f"others are never tracked; take filter.limits.max_labels of {number:.0f} and more, as what may become one "
-            "takes labels, too",
+            f"at most {model.filter.limits.max_labels} labels are kept, and {number:.0f} targets are there at once: "
+            f"the others are never tracked; take filter.limits.max_labels of {number:.0f} and more, as what may become "
+            "one takes labels, too",
         )
 
 
