@@ -27,6 +27,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from pages import write_between
 from timing import Figures, Measure
 
 MODULES = (
@@ -34,7 +35,6 @@ MODULES = (
     "whole_run", "start", "campaign",
 )  # fmt: skip
 HERE = Path(__file__).resolve().parent
-END = "<!-- to here -->"
 QUICK_ROUNDS = 3
 
 
@@ -154,15 +154,6 @@ def _both(figures: Figures | None) -> str:
 
 def _short(value: float) -> str:
     return f"{value:,.3g}" if value < 100 else f"{value:,.0f}"
-
-
-def write_between(path: Path, script: str, text: str) -> None:
-    """Put a table in the place that a page keeps for the script that makes it."""
-    page, begin = path.read_text(encoding="utf-8"), f"<!-- from benchmarks/{script} -->"
-    if begin not in page or END not in page.split(begin)[1]:
-        raise SystemExit(f"{path}: expected the lines {begin} and {END}")
-    before, rest = page.split(begin, 1)
-    path.write_text(f"{before}{begin}\n\n{text}\n\n{END}{rest.split(END, 1)[1]}", encoding="utf-8")
 
 
 def draw(lines: Sequence[Line], path: Path) -> None:

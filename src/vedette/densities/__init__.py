@@ -7,6 +7,7 @@ from vedette.densities.conversions import (
     glmb_to_lmb,
     lmb_to_glmb,
     marginalise,
+    settled_lmb,
 )
 from vedette.densities.estimates import (
     Estimate,
@@ -73,6 +74,7 @@ __all__ = [
     "sample_multi_bernoulli",
     "sample_poisson",
     "save_density",
+    "settled_lmb",
     "track_histories",
     "track_moments",
     "unlabelled_estimate",

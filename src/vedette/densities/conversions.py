@@ -15,6 +15,7 @@ from vedette.densities.label_sets import sets_of_factors, take_factors, take_tra
 from vedette.densities.lmb import LMB
 from vedette.densities.tracks import TrackTable
 from vedette.errors import InputError
+from vedette.kernels.association.names import settled_names
 from vedette.kernels.base.types import Lmb
 from vedette.kernels.gaussian.mixtures import MixtureCaps
 from vedette.kernels.gaussian.pooling import pooled_tracks
@@ -25,6 +26,9 @@ _Glmb = TypeVar("_Glmb", GLMB, FactoredGLMB)
 
 DEFAULT_LOG_MIN_WEIGHT = math.log(1e-5)
 DEFAULT_MERGE_DISTANCE = 2.0
+
+# Targets further apart than this, in standard deviations of their difference, are two.
+_APART = 4.0
 
 
 def _checked_caps(max_components: int, log_min_weight: float, merge_distance: float) -> MixtureCaps:
@@ -115,12 +119,17 @@ def as_lmb(
     return LMB.from_kernel(reduced_lmb(density, caps))
 
 
-def reduced_lmb(density: GLMB | FactoredGLMB, caps: MixtureCaps) -> Lmb:
-    """The LMB of a GLMB or of a product of them, its mixtures reduced."""
+def reduced_lmb(density: GLMB | FactoredGLMB, caps: MixtureCaps, *, settled: bool = False) -> Lmb:
+    """The LMB of a GLMB or of a product of them, its mixtures reduced; settled: under the names of `settled_lmb`."""
     if isinstance(density, GLMB):
-        return kernels.glmb_to_lmb(density.to_kernel(), caps)
+        if not settled:
+            return kernels.glmb_to_lmb(density.to_kernel(), caps)
+        density = FactoredGLMB.from_glmb(density)
     all_labels, place = distinct_labels(density.tracks.labels)
     place_of_entry = place[density.hyp_tracks]
+    if settled:
+        hypotheses = density.as_hypotheses()
+        place_of_entry = settled_names(hypotheses, density.factor_offsets, density.track_offsets, place, _APART)
     used = np.bincount(place_of_entry, minlength=len(all_labels)) > 0  # a table may have more
     factor = np.empty(len(all_labels), np.int64)
     factor[place] = np.repeat(np.arange(density.num_factors), np.diff(density.track_offsets))
@@ -155,6 +164,28 @@ def factored_to_lmb(
     """As `glmb_to_lmb`, of a product of GLMBs, all its factors at once."""
     caps = _checked_caps(max_components, log_min_weight, merge_distance)
     return LMB.from_kernel(reduced_lmb(density, caps))
+
+
+def settled_lmb(
+    density: Labelled,
+    *,
+    max_components: int = 1,
+    log_min_weight: float = DEFAULT_LOG_MIN_WEIGHT,
+    merge_distance: float = DEFAULT_MERGE_DISTANCE,
+) -> LMB:
+    """The LMB of the same targets with one name each, where a GLMB leaves open which of several names is whose.
+
+    Hypotheses may differ in nothing but names: two targets swapped, or one that was born either at one step or at
+    another. The labels' own marginals (`as_lmb`) then put every label half here and half there, or call none
+    probable. As a set of targets without names it is all the same, so within each factor the heaviest hypothesis keeps
+    its names and the targets of the others go by those of the targets that they are likeliest to be. Keeps what
+    `as_lmb` keeps, the mean number of targets, but not the labels' own probabilities of existence. An LMB is as it
+    was. Mixtures are reduced as by `marginalise`.
+    """
+    if isinstance(density, LMB):
+        return density
+    caps = _checked_caps(max_components, log_min_weight, merge_distance)
+    return LMB.from_kernel(reduced_lmb(density, caps, settled=True))
 
 
 def lmb_to_glmb(lmb: LMB, *, max_hypotheses: int) -> tuple[GLMB, float]:
@@ -210,4 +241,5 @@ __all__ = [
     "marginalise",
     "marginalised_factors",
     "reduced_lmb",
+    "settled_lmb",
 ]

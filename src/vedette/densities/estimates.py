@@ -11,7 +11,7 @@ import numpy as np
 
 from vedette.densities import checks
 from vedette.densities.checks import distinct_labels
-from vedette.densities.conversions import as_lmb
+from vedette.densities.conversions import settled_lmb
 from vedette.densities.factored import LABELLED, FactoredGLMB, Labelled
 from vedette.densities.glmb import GLMB
 from vedette.densities.iid_cluster import IidCluster
@@ -122,18 +122,19 @@ def _map_of_factors(density: FactoredGLMB) -> Estimate:
 
 
 def marginal_estimate(density: Labelled, threshold: float = 0.5) -> Estimate:
-    """Every label whose probability of existence exceeds `threshold`, each estimated by the heaviest component of its
+    """Every target whose probability of existence exceeds `threshold`, each estimated by the heaviest component of its
     marginal density.
 
-    Not by the mean of that density: targets born close together may have swapped labels, and the mean then lies halfway
-    between the two. For GLMBs, near components (Mahalanobis distance 2) are merged before they are weighed.
+    Of GLMBs these are the targets of `settled_lmb`: one that may go by several names is one target, as probable as all
+    of them, and two whose names may be swapped stand in two places. Near components (Mahalanobis distance 2) are merged
+    before they are weighed.
     Raises `InputError` for a threshold outside [0, 1).
     """
     if not 0.0 <= threshold < 1.0:
         raise InputError(f"threshold: expected a probability below 1; got {threshold}")
     if not isinstance(density, Labelled):
         raise InputError(f"density: expected {LABELLED}, which have labels; got {type(density).__name__}")
-    lmb = as_lmb(density, max_components=_MARGINAL_COMPONENTS)
+    lmb = settled_lmb(density, max_components=_MARGINAL_COMPONENTS)
     chosen = np.flatnonzero(lmb.existence > threshold)
     return _peaks(lmb.tracks, chosen, lmb.existence[chosen])
 

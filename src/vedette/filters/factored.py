@@ -54,8 +54,8 @@ class FactoredGlmbFilter(SingleSensorFilter):
         InputError: a part of another kind, or a field out of range.
     """
 
-    max_split_error: float = 0.7
-    max_factor_labels: int = 10
+    max_split_error: float = 0.05
+    max_factor_labels: int = 20
 
     def __post_init__(self) -> None:
         SingleSensorFilter.__post_init__(self)  # slots replace the class that super() looks for

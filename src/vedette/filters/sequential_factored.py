@@ -35,8 +35,8 @@ class SequentialFactoredFilter(MultiSensorFilter[FactoredGLMB]):
     `FactoredGlmbFilter`.
     """
 
-    max_split_error: float = 0.7
-    max_factor_labels: int = 10
+    max_split_error: float = 0.05
+    max_factor_labels: int = 20
     kind: ClassVar[type[FactoredGLMB]] = FactoredGLMB
 
     def __post_init__(self) -> None:

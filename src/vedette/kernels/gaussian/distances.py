@@ -1,13 +1,14 @@
-"""Distances between Gaussians of two lists, of those pairs that are near each other."""
+"""Distances between Gaussians."""
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 
 from vedette.kernels.base.arrays import grown_ints
-from vedette.kernels.base.compile import inlined, kernel
+from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.gaussian.linalg import cholesky, log_det_from_factor, solve_lower
 
@@ -35,6 +36,35 @@ def _may_be_near(
     return True
 
 
+@borrowing
+def l1_bound(mean: Floats, cov: Floats, other_mean: Floats, other_cov: Floats, factor: Floats, offset: Floats) -> float:
+    """Upper bound on the L1 distance of two Gaussians: 2 sqrt(1 - b^2), b their Bhattacharyya coefficient
+
+    b = (det P_a det P_b)^(1/4) / det((P_a + P_b) / 2)^(1/2) exp(-d' (P_a + P_b)^-1 d / 4).
+
+    At most 2, which stands for covariances that are not positive definite. factor: (dim, dim) and offset: (dim,) to
+    work in.
+    """
+    dim, log_coefficient = len(mean), 0.0
+    if not cholesky(cov, factor):
+        return 2.0
+    log_coefficient += 0.25 * log_det_from_factor(factor)
+    if not cholesky(other_cov, factor):
+        return 2.0
+    log_coefficient += 0.25 * log_det_from_factor(factor)
+    for i in range(dim):
+        offset[i] = mean[i] - other_mean[i]
+        for j in range(i + 1):
+            factor[i, j] = 0.5 * (cov[i, j] + other_cov[i, j])
+    if not cholesky(factor, factor):
+        return 2.0
+    log_coefficient -= 0.5 * log_det_from_factor(factor)
+    solve_lower(factor, offset, offset)
+    for i in range(dim):
+        log_coefficient -= 0.125 * offset[i] * offset[i]
+    return 2.0 * math.sqrt(max(0.0, -math.expm1(2.0 * log_coefficient)))
+
+
 @kernel
 def _candidates(means: Floats, covs: Floats, other_means: Floats, other_covs: Floats, gate: float) -> Ints:
     """(num,) pairs that may be near, counted row by row."""
@@ -50,6 +80,42 @@ def _candidates(means: Floats, covs: Floats, other_means: Floats, other_covs: Fl
     return found[:filled]
 
 
+@borrowing
+def _distance(
+    mean: Floats, cov: Floats, other_mean: Floats, other_cov: Floats, total: Floats, factor: Floats, offset: Floats
+) -> tuple[float, float]:
+    """d'S^-1 d and log det S, infinite where S is not positive definite; the last three are to work in."""
+    for i in range(len(mean)):
+        offset[i] = mean[i] - other_mean[i]
+        for j in range(len(mean)):
+            total[i, j] = cov[i, j] + other_cov[i, j]
+    if not cholesky(total, factor):
+        return math.inf, math.inf
+    solve_lower(factor, offset, offset)
+    squared = 0.0
+    for i in range(len(mean)):
+        squared += offset[i] * offset[i]
+    return squared, log_det_from_factor(factor)
+
+
+@kernel
+def pair_distances(means: Floats, covs: Floats, other_means: Floats, other_covs: Floats) -> tuple[Floats, Floats]:
+    """(n, m) squared distances d'S^-1 d of two lists of Gaussians, and log det S, where S = P_a + P_b.
+
+    means: (n, dim), covs: (n, dim, dim). other_means: (m, dim), other_covs: (m, dim, dim). Infinite where S is not
+    positive definite.
+    """
+    n, m, dim = len(means), len(other_means), means.shape[1]
+    squares, log_dets = np.empty((n, m)), np.empty((n, m))
+    total, factor, offset = np.empty((dim, dim)), np.empty((dim, dim)), np.empty(dim)
+    for a in range(n):
+        for b in range(m):
+            squares[a, b], log_dets[a, b] = _distance(
+                means[a], covs[a], other_means[b], other_covs[b], total, factor, offset
+            )
+    return squares, log_dets
+
+
 @kernel
 def near_pairs(means: Floats, covs: Floats, other_means: Floats, other_covs: Floats, gate: float) -> NearPairs:
     """The pairs with d'S^-1 d up to `gate`; none whose S is not positive definite.
@@ -63,21 +129,12 @@ def near_pairs(means: Floats, covs: Floats, other_means: Floats, other_covs: Flo
     total, factor, offset = np.empty((dim, dim)), np.empty((dim, dim)), np.empty(dim)
     for pair in found:
         a, b = pair // len(other_means), pair % len(other_means)
-        for i in range(dim):
-            offset[i] = means[a, i] - other_means[b, i]
-            for j in range(dim):
-                total[i, j] = covs[a, i, j] + other_covs[b, i, j]
-        if not cholesky(total, factor):
-            continue
-        solve_lower(factor, offset, offset)
-        squared = 0.0
-        for i in range(dim):
-            squared += offset[i] * offset[i]
-        if squared <= gate:
+        squared, log_det = _distance(means[a], covs[a], other_means[b], other_covs[b], total, factor, offset)
+        if squared <= gate and squared < math.inf:
             firsts[filled], seconds[filled] = a, b
-            squares[filled], log_dets[filled] = squared, log_det_from_factor(factor)
+            squares[filled], log_dets[filled] = squared, log_det
             filled += 1
     return NearPairs(firsts[:filled], seconds[:filled], squares[:filled], log_dets[:filled])
 
 
-__all__ = ["NearPairs", "near_pairs"]
+__all__ = ["NearPairs", "l1_bound", "near_pairs", "pair_distances"]

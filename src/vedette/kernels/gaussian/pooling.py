@@ -1,8 +1,9 @@
-"""Pools of weighted tracks, each of which becomes one track: the mixture of the pool, reduced."""
+"""Tracks as single Gaussians, and pools of weighted tracks, each of which becomes one: the mixture of the pool, reduced."""
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,9 +13,34 @@ from vedette.kernels.gaussian.mixtures import (
     MixtureCaps,
     copy_component,
     match_components,
+    moment_match,
     reduce_mixture,
     require_gaussians,
 )
+
+
+class Moments(NamedTuple):
+    """Means and covariances of tracks."""
+
+    means: Floats  # (num_tracks, state_dim)
+    covs: Floats  # (num_tracks, state_dim, state_dim)
+
+
+@kernel
+def moments_of(tracks: Tracks, first: int, last: int) -> Moments:
+    """Of the tracks `first` to `last`."""
+    dim = tracks.means.shape[1]
+    out = Moments(np.empty((last - first, dim)), np.empty((last - first, dim, dim)))
+    for i in range(last - first):
+        start, end = tracks.offsets[first + i], tracks.offsets[first + i + 1]
+        moment_match(
+            tracks.log_weights[start:end],
+            tracks.means[start:end],
+            tracks.covs[start:end],
+            out.means[i],
+            out.covs[i],
+        )
+    return out
 
 
 @inlined
@@ -101,4 +127,4 @@ def pooled_tracks(
     return Tracks(labels, offsets, log_weights, means, covs)
 
 
-__all__ = ["add_to_pool", "pooled_tracks"]
+__all__ = ["Moments", "add_to_pool", "moments_of", "pooled_tracks"]

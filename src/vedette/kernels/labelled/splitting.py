@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vedette.kernels.base.arrays import counted_ints, filled_ints, hashed
-from vedette.kernels.base.compile import kernel
+from vedette.kernels.base.compile import borrowing, kernel
 from vedette.kernels.base.types import Floats, Glmb, Ints
 from vedette.kernels.gaussian.mixtures import descending_order
 from vedette.kernels.labelled.labels import increasing_labels, label_place
@@ -81,47 +81,133 @@ def _same_choice(symbols: Ints, a: int, b: int, part_of: Ints, part: int) -> boo
     return same
 
 
+class _Parts(NamedTuple):
+    """Parts of the labels, each known by its first label; rows of other labels are out of date."""
+
+    groups: Ints  # (num_labels, num_hyps) number of each hypothesis's choice among those of the part
+    sums: Floats  # (num_labels, num_hyps) weight of each of the part's choices
+    counts: Ints  # (num_labels,) choices of the part
+    part_of: Ints  # (num_labels,) first label of the part that each is in
+    sizes: Ints  # (num_labels,) labels of the part
+    table: Ints  # to number pairs of choices in, of a power of two of places, all -1
+    keys: Ints  # as long
+
+
 @kernel
-def _product_error(symbols: Ints, weights: Floats, part_of: Ints) -> float:
-    """L1 distance of the product of the parts from the choices; equal ones count as one."""
-    num, num_labels = symbols.shape
-    groups, products = np.empty(num, np.int64), np.empty(num)
-    distinct = group_choices(symbols, filled_ints(num_labels, 0), 0, groups)
-    own = np.zeros(len(distinct))
-    for h in range(num):
-        own[groups[h]] += weights[h]
-        products[h] = 1.0
-    for part in range(num_labels):
-        if part_of[part] != part:
-            continue
-        firsts = group_choices(symbols, part_of, part, groups)
-        sums = np.zeros(len(firsts))
-        for h in range(num):
-            sums[groups[h]] += weights[h]
-        for h in distinct:
-            products[h] *= sums[groups[h]]
+def _alone(choices: Choices) -> _Parts:
+    """Every label a part."""
+    num_hyps, num = choices.symbols.shape
+    size = 4
+    while size < 2 * num_hyps:
+        size *= 2
+    parts = _Parts(
+        np.empty((num, num_hyps), np.int64),
+        np.zeros((num, num_hyps)),
+        np.zeros(num, np.int64),
+        counted_ints(num),
+        filled_ints(num, 1),
+        filled_ints(size, -1),
+        np.empty(size, np.int64),
+    )
+    most = 0
+    for h in range(num_hyps):
+        for k in range(num):
+            most = max(most, choices.symbols[h, k] + 2)
+    number = np.empty(most, np.int64)
+    for k in range(num):
+        for symbol in range(most):
+            number[symbol] = -1
+        for h in range(num_hyps):
+            symbol = choices.symbols[h, k] + 1
+            if number[symbol] < 0:
+                number[symbol] = parts.counts[k]
+                parts.counts[k] += 1
+            parts.groups[k, h] = number[symbol]
+            parts.sums[k, number[symbol]] += choices.weights[h]
+    return parts
+
+
+@borrowing
+def _pair_choices(parts: _Parts, a: int, b: int, weights: Floats, groups: Ints, sums: Floats) -> int:
+    """Number the choices of two parts together, and sum their weights; how many there are.
+
+    groups, sums: (num_hyps,) written; the rows of either part may be given.
+    """
+    table, keys, count, last = parts.table, parts.keys, 0, len(parts.table) - 1
+    num_b = parts.counts[b]
+    for h in range(len(weights)):
+        key = parts.groups[a, h] * num_b + parts.groups[b, h]
+        slot = hashed(0, key) & last
+        while table[slot] >= 0 and keys[slot] != key:
+            slot = (slot + 1) & last
+        if table[slot] < 0:
+            table[slot], keys[slot] = count, key
+            count += 1
+        groups[h] = table[slot]
+    for slot in range(last + 1):
+        table[slot] = -1
+    for group in range(count):
+        sums[group] = 0.0
+    for h in range(len(weights)):
+        sums[groups[h]] += weights[h]
+    return count
+
+
+@borrowing
+def _dependence(parts: _Parts, a: int, b: int, weights: Floats, groups: Ints, sums: Floats, seen: Ints) -> float:
+    """L1 distance of two parts' joint choices from those of independent ones. groups, sums, seen: to work in."""
+    for group in range(_pair_choices(parts, a, b, weights, groups, sums)):
+        seen[group] = 0
     error, left = 0.0, 1.0
-    for g in range(len(distinct)):
-        error += abs(own[g] - products[distinct[g]])
-        left -= products[distinct[g]]
+    for h in range(len(weights)):
+        if seen[groups[h]] == 0:
+            seen[groups[h]] = 1
+            product = parts.sums[a, parts.groups[a, h]] * parts.sums[b, parts.groups[b, h]]
+            error += abs(sums[groups[h]] - product)
+            left -= product
     return error + max(0.0, left)
 
 
+@borrowing
+def _product_error(parts: _Parts, weights: Floats) -> float:
+    """L1 distance of the product of the parts from the hypotheses, no two of which are the same choice."""
+    error, left = 0.0, 1.0
+    for h in range(len(weights)):
+        product = 1.0
+        for part in range(len(parts.part_of)):
+            if parts.part_of[part] == part:
+                product *= parts.sums[part, parts.groups[part, h]]
+        error += abs(weights[h] - product)
+        left -= product
+    return error + max(0.0, left)
+
+
+@borrowing
+def _join(parts: _Parts, a: int, b: int, weights: Floats) -> None:
+    """Make two parts one."""
+    first, last = min(a, b), max(a, b)
+    # The rows of the first are read up to each hypothesis before they are written there.
+    parts.counts[first] = _pair_choices(parts, first, last, weights, parts.groups[first], parts.sums[first])
+    for k in range(len(parts.part_of)):
+        if parts.part_of[k] == last:
+            parts.part_of[k] = first
+    parts.sizes[first] += parts.sizes[last]
+
+
 @kernel
-def _dependences(choices: Choices) -> tuple[Ints, Ints, Floats]:
-    """Every two labels, and the L1 distance of their joint choices from those of independent ones."""
-    num_hyps, num = choices.symbols.shape
+def _by_dependence(parts: _Parts, weights: Floats) -> tuple[Ints, Ints]:
+    """Every two labels, those that depend on each other most first."""
+    num, num_hyps, filled = len(parts.part_of), len(weights), 0
     most = num * (num - 1) // 2
     firsts, seconds, errors = np.empty(most, np.int64), np.empty(most, np.int64), np.empty(most)
-    pair, alone, filled = np.empty((num_hyps, 2), np.int64), counted_ints(2), 0
+    groups, sums, seen = np.empty(num_hyps, np.int64), np.empty(num_hyps), np.empty(num_hyps, np.int64)
     for a in range(num):
         for b in range(a):
-            for h in range(num_hyps):
-                pair[h, 0], pair[h, 1] = choices.symbols[h, b], choices.symbols[h, a]
             firsts[filled], seconds[filled] = b, a
-            errors[filled] = _product_error(pair, choices.weights, alone)
+            errors[filled] = _dependence(parts, b, a, weights, groups, sums, seen)
             filled += 1
-    return firsts, seconds, errors
+    order = descending_order(errors)
+    return firsts[order], seconds[order]
 
 
 @kernel
@@ -138,32 +224,29 @@ def _existences(choices: Choices) -> Floats:
 def independent_parts(choices: Choices, max_error: float, max_labels: int, min_existence: float) -> tuple[Ints, float]:
     """(num_labels,) the first label of the part that each is in, and the L1 error of their product.
 
-    The parts are as small as an error of at most `max_error` allows, labels that depend on each other most joined
-    first, but none is made larger than `max_labels`, and labels less probable than `min_existence` stay alone, whatever
-    the error then is.
+    choices: no two hypotheses are the same. The parts are as small as an error of at most `max_error` allows, labels
+    that depend on each other most joined first, but none is made larger than `max_labels`, and labels less probable
+    than `min_existence` stay alone, whatever the error then is.
     """
-    num = len(choices.labels)
-    part_of, sizes = counted_ints(num), filled_ints(num, 1)
-    if num < 2:
+    weights, parts = choices.weights, _alone(choices)
+    part_of, sizes, num_parts = parts.part_of, parts.sizes, len(choices.labels)
+    if num_parts < 2:
         return part_of, 0.0
-    error = _product_error(choices.symbols, choices.weights, part_of)
-    if error <= max(max_error, _EQUAL):
+    enough = max(max_error, _EQUAL)
+    error = _product_error(parts, weights)
+    if error <= enough:
         return part_of, error
-    existences, num_parts = _existences(choices), num
-    firsts, seconds, errors = _dependences(choices)
-    for pair in descending_order(errors):
+    existences = _existences(choices)
+    firsts, seconds = _by_dependence(parts, weights)
+    for pair in range(len(firsts)):
         a, b = part_of[firsts[pair]], part_of[seconds[pair]]
         improbable = existences[firsts[pair]] < min_existence or existences[seconds[pair]] < min_existence
         if a == b or improbable or sizes[a] + sizes[b] > max_labels:
             continue
-        first, last = min(a, b), max(a, b)
-        for k in range(num):
-            if part_of[k] == last:
-                part_of[k] = first
-        sizes[first] += sizes[last]
+        _join(parts, a, b, weights)
         num_parts -= 1
-        error = _product_error(choices.symbols, choices.weights, part_of) if num_parts > 1 else 0.0
-        if error <= max(max_error, _EQUAL):
+        error = _product_error(parts, weights) if num_parts > 1 else 0.0
+        if error <= enough:
             break
     return part_of, error
 

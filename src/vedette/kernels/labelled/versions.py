@@ -6,107 +6,163 @@ what told them apart is forgotten. Kept apart they would multiply from scan to s
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 
 from vedette.kernels.base.arrays import counted_ints, filled_ints
-from vedette.kernels.base.compile import kernel
+from vedette.kernels.base.compile import borrowing, kernel
 from vedette.kernels.base.types import Floats, Glmb, Ints, Tracks
+from vedette.kernels.gaussian.distances import l1_bound
 from vedette.kernels.gaussian.linalg import cholesky, log_sum, solve_lower
-from vedette.kernels.gaussian.mixtures import MixtureCaps, descending_order, moment_match
-from vedette.kernels.gaussian.pooling import pooled_tracks
+from vedette.kernels.gaussian.mixtures import MixtureCaps, descending_order
+from vedette.kernels.gaussian.pooling import Moments, moments_of, pooled_tracks
 from vedette.kernels.labelled.groups import group_log_sums
 from vedette.kernels.labelled.splitting import Choices, choices_of, group_choices
 
+# A share of the error so small that nobody looks for a cheaper pair.
+_CHEAP = 1e-3
 
-class _Moments(NamedTuple):
-    """Mean and covariance of every track."""
 
-    means: Floats  # (num_tracks, state_dim)
-    covs: Floats  # (num_tracks, state_dim, state_dim)
+class _Pairs(NamedTuple):
+    """For each version the heavier one of its label that it is made one with at the least cost."""
+
+    costs: Floats  # (num_tracks,) inf where there is none within reach
+    heavier: Ints  # (num_tracks,)
+
+
+@borrowing
+def _may_be_near(other: int, heavier: int, moments: Moments, distance: float, most_apart: float) -> bool:
+    """Whether the Mahalanobis distance may be below `distance` and `l1_bound` at most `most_apart`: by each coordinate.
+
+    A marginal's Bhattacharyya coefficient, exp(-d^2 / (4 (P_a + P_b))) at most, is not below that of the whole.
+    """
+    reach = -2.0 * math.log1p(-0.25 * most_apart * most_apart) if most_apart < 2.0 else math.inf
+    for i in range(moments.means.shape[1]):
+        offset, variance = moments.means[other, i] - moments.means[heavier, i], moments.covs[heavier, i, i]
+        squared = offset * offset
+        if squared > reach * (variance + moments.covs[other, i, i]) or squared > distance * distance * variance:
+            return False
+    return True
 
 
 @kernel
-def _moments_of(tracks: Tracks) -> _Moments:
-    num, dim = len(tracks.labels), tracks.means.shape[1]
-    out = _Moments(np.empty((num, dim)), np.empty((num, dim, dim)))
-    for track in range(num):
-        first, last = tracks.offsets[track], tracks.offsets[track + 1]
-        moment_match(
-            tracks.log_weights[first:last],
-            tracks.means[first:last],
-            tracks.covs[first:last],
-            out.means[track],
-            out.covs[track],
-        )
-    return out
+def _cheapest_pairs(
+    versions: Ints, weights: Floats, moments: Moments, distance: float, max_error: float, pairs: _Pairs
+) -> None:
+    """Find the pairs of one label. versions: heaviest first. A pair that costs more than `max_error` may be left out.
 
-
-@kernel
-def _lead_versions(versions: Ints, moments: _Moments, distance: float, leader: Ints) -> int:
-    """Lead each of a label's versions, heaviest first, to the first within `distance` of it; how many lead."""
-    dim, num_leaders = moments.means.shape[1], 0
-    factor, difference = np.empty((dim, dim)), np.empty(dim)
+    Two versions of weights v and w that are made their mixture change the density by 2 v w / (v + w) times the L1
+    distance between them, at most: as much if which of them it is says all about the other labels, not at all if it
+    says nothing.
+    """
+    dim = moments.means.shape[1]
+    factor, offset, scratch = np.empty((dim, dim)), np.empty(dim), np.empty((dim, dim))
     for i in range(len(versions)):
-        heaviest = versions[i]
-        if leader[heaviest] >= 0:
-            continue
-        leader[heaviest] = heaviest
-        num_leaders += 1
-        if not distance > 0.0 or not cholesky(moments.covs[heaviest], factor):
-            continue
+        heavier, has_factor = versions[i], False
         for k in range(i + 1, len(versions)):
             other = versions[k]
-            if leader[other] >= 0:
+            both, most = weights[heavier] + weights[other], min(max_error, pairs.costs[other])
+            rate = 2.0 * weights[heavier] * weights[other] / both if both > 0.0 else 0.0
+            if most < _CHEAP * max_error:
                 continue
+            if not _may_be_near(other, heavier, moments, distance, most / rate if rate > 0.0 else math.inf):
+                continue
+            if not has_factor and not cholesky(moments.covs[heavier], factor):
+                break
+            has_factor, squared = True, 0.0
             for a in range(dim):
-                difference[a] = moments.means[other, a] - moments.means[heaviest, a]
-            solve_lower(factor, difference, difference)
-            squared = 0.0
+                offset[a] = moments.means[other, a] - moments.means[heavier, a]
+            solve_lower(factor, offset, offset)
             for a in range(dim):
-                squared += difference[a] * difference[a]
-            if squared < distance * distance:
-                leader[other] = heaviest
-    return num_leaders
+                squared += offset[a] * offset[a]
+            if squared >= distance * distance:
+                continue
+            cost = rate * l1_bound(
+                moments.means[other],
+                moments.covs[other],
+                moments.means[heavier],
+                moments.covs[heavier],
+                scratch,
+                offset,
+            )
+            if cost < pairs.costs[other]:
+                pairs.costs[other], pairs.heavier[other] = cost, heavier
 
 
 @kernel
-def _leaders(glmb: Glmb, choices: Choices, weights: Floats, distance: float) -> tuple[Ints, int]:
-    """(num_tracks,) the version that each stands for, and how many there are."""
-    leader, num_leaders = filled_ints(len(weights), -1), 0
-    moments, versions = _moments_of(glmb.tracks), np.empty(len(weights), np.int64)
+def _leaders(glmb: Glmb, choices: Choices, weights: Floats, distance: float, max_error: float) -> tuple[Ints, int]:
+    """(num_tracks,) the version that each stands for, and how many there are.
+
+    Cheapest pairs first, while their costs sum to `max_error` at most.
+    """
+    moments, versions, labels = (
+        moments_of(glmb.tracks, 0, len(weights)),
+        np.empty(len(weights), np.int64),
+        glmb.tracks.labels,
+    )
+    pairs = _Pairs(np.full(len(weights), math.inf), filled_ints(len(weights), -1))
     for k in range(len(choices.labels)):
         count = 0
         for track in range(len(weights)):
-            labels = glmb.tracks.labels
             if labels[track, 0] == choices.labels[k, 0] and labels[track, 1] == choices.labels[k, 1]:
                 versions[count] = track
                 count += 1
-        values = np.empty(count)
-        for i in range(count):
-            values[i] = weights[versions[i]]
-        order = descending_order(values)
-        for i in range(count):
-            order[i] = versions[order[i]]
-        num_leaders += _lead_versions(order, moments, distance, leader)
+        order = descending_order(weights[versions[:count]])
+        _cheapest_pairs(versions[:count][order], weights, moments, distance, max_error, pairs)
+    leader, num_leaders, spent = counted_ints(len(weights)), len(weights), 0.0
+    for track in descending_order(-pairs.costs):
+        spent += pairs.costs[track]
+        if spent > max_error:
+            break
+        leader[track] = pairs.heavier[track]
+        num_leaders -= 1
+    for track in range(len(leader)):
+        while leader[leader[track]] != leader[track]:
+            leader[track] = leader[leader[track]]
     return leader, num_leaders
 
 
 @kernel
-def merge_versions(glmb: Glmb, caps: MixtureCaps) -> Glmb:
-    """The GLMB with each label's versions that lie within `caps.merge_distance` of a heavier one made one track.
+def _pooling_error(glmb: Glmb, merged: Tracks, leader: Ints, number: Ints, weights: Floats) -> float:
+    """Bound on the L1 change of a density each of whose tracks is put in the place of its versions.
 
-    Distances are of the means, under the heavier one's covariance. A merged track is the mixture of its versions, each
-    weighed by all hypotheses that hold it, and reduced; hypotheses that are then equal are one. Heaviest first.
+    A track for another, label by label, changes no more than the weight of the hypotheses that hold it times the
+    distance of the two mixtures, and this no more than the mean distance of their components.
+    """
+    tracks, dim, error = glmb.tracks, merged.means.shape[1], 0.0
+    factor, offset, sizes = np.empty((dim, dim)), np.empty(dim), np.zeros(len(leader), np.int64)
+    for track in range(len(leader)):
+        sizes[leader[track]] += 1
+    for track in range(len(leader)):
+        if sizes[leader[track]] == 1:
+            continue
+        pooled = number[leader[track]]
+        for a in range(tracks.offsets[track], tracks.offsets[track + 1]):
+            for b in range(merged.offsets[pooled], merged.offsets[pooled + 1]):
+                share = weights[track] * math.exp(tracks.log_weights[a] + merged.log_weights[b])
+                apart = l1_bound(tracks.means[a], tracks.covs[a], merged.means[b], merged.covs[b], factor, offset)
+                error += share * apart
+    return error
+
+
+@kernel
+def merge_versions(glmb: Glmb, caps: MixtureCaps, max_error: float) -> tuple[Glmb, float]:
+    """The GLMB with versions of a label made one track, and a bound on the L1 change of the density.
+
+    Only versions within `caps.merge_distance` of a heavier one, under its covariance, and those first by which the
+    density changes least, while all together change it by `max_error` at most before mixtures are reduced. A merged
+    track is the mixture of its versions, each weighed by all hypotheses that hold it, and reduced; hypotheses that are
+    then equal are one. Heaviest first.
     """
     choices, weights = choices_of(glmb), np.zeros(len(glmb.tracks.labels))
     for h in range(len(choices.weights)):
         for e in range(glmb.hyp_offsets[h], glmb.hyp_offsets[h + 1]):
             weights[glmb.hyp_tracks[e]] += choices.weights[h]
-    leader, num_leaders = _leaders(glmb, choices, weights, caps.merge_distance)
+    leader, num_leaders = _leaders(glmb, choices, weights, caps.merge_distance, max_error)
     if num_leaders == len(leader):
-        return glmb
+        return glmb, 0.0
     number, tracks = _merged_tracks(glmb.tracks, leader, num_leaders, weights, caps)
     num_labels, filled = len(choices.labels), 0
     symbols, groups = np.empty(choices.symbols.shape, np.int64), np.empty(len(choices.weights), np.int64)
@@ -125,7 +181,8 @@ def merge_versions(glmb: Glmb, caps: MixtureCaps) -> Glmb:
                 members[filled] = symbols[firsts[order[i]], k]
                 filled += 1
         offsets[i + 1], sorted_weights[i] = filled, log_weights[order[i]] - log_total
-    return Glmb(tracks, offsets, members[:filled].copy(), sorted_weights)
+    error = _pooling_error(glmb, tracks, leader, number, weights)
+    return Glmb(tracks, offsets, members[:filled].copy(), sorted_weights), error
 
 
 @kernel

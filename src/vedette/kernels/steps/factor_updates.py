@@ -29,6 +29,9 @@ from vedette.kernels.steps.lmb import Reduction, append_reduced, write_mixture
 TOTAL, KEPT, TWICE, SPLIT, DROPPED, CUT, FULL = range(7)
 _NUM_SUMS = 7
 
+# Of the error that a group may be split with, what making versions of a label one may add.
+_SHARE_OF_VERSIONS = 1.0
+
 # What rounding leaves between the logs of equal weights.
 _ROUNDING = 1e-12
 
@@ -178,11 +181,11 @@ def append_parts(
     store: FactorStore, glmb: Glmb, factoring: Factoring, reduction: Reduction, sums: Floats
 ) -> FactorStore:
     """Split the posterior of a group and enter its parts."""
-    glmb = merge_versions(glmb, reduction.mixture)
+    glmb, merging_error = merge_versions(glmb, reduction.mixture, _SHARE_OF_VERSIONS * factoring.max_error)
     choices = choices_of(glmb)
     min_existence = 1.0 / (1.0 + math.exp(-reduction.min_existence_logit))
     part_of, error = independent_parts(choices, factoring.max_error, factoring.max_labels, min_existence)
-    sums[SPLIT] += error
+    sums[SPLIT] += error + merging_error
     for part in range(len(part_of)):
         size = 0
         for k in range(len(part_of)):

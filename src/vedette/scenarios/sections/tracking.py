@@ -118,11 +118,11 @@ class Filter(Section):
         "[-].",
     )
     max_split_error: Annotated[float, Field(ge=0.0, le=2.0)] = Field(
-        default=0.7,
-        description="Of a factored_glmb: L1 error up to which labels that contended are taken as independent again; 2: "
-        "always, as an LMB; 0: where they are [-].",
+        default=0.05,
+        description="Of a factored_glmb: L1 error up to which labels that contended are taken as independent again, "
+        "and versions of a label as one; 2: always, as an LMB; 0: where they are [-].",
     )
-    max_factor_labels: Count = Field(default=10, description="Of a factored_glmb: most labels of a factor [-].")
+    max_factor_labels: Count = Field(default=20, description="Of a factored_glmb: most labels of a factor [-].")
     gaussian_method: GaussianMethod = Field(
         default="auto", description="Extended, unscented or cubature Kalman; auto: extended where Jacobians exist [-]."
     )
