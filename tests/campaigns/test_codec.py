@@ -102,6 +102,7 @@ def test_the_layout_of_this_version_is_as_written_here():
     assert {
         name: " ".join((*layout.fixed, *(f"{start}*" for start in layout.more))) for name, layout in OPTIONAL.items()
     } == {
+        "own_rewards": "decision step time_s reward_table sensor action reward reward_se chosen",
         "explanations": "decision step time_s reward reward_se baseline undetected_gain evaluations bound bound_kind "
         "bound_unbounded runner_up margin margin_se missing action_*",
         "target_gains": "decision step time_s birth_step birth_site existence_gain localisation_gain",

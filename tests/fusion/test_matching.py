@@ -15,6 +15,7 @@ from fusion.sights import assert_same_bits
 from vedette.densities import GLMB, LMB, Poisson, as_lmb
 from vedette.errors import InputError
 from vedette.fusion import Clmb, CmDeltaGlmb, Matched, match_labels
+from vedette.kernels.gaussian.distances import near_pairs
 
 Label = tuple[int, int]
 
@@ -150,3 +151,17 @@ def test_nothing_to_match_and_what_is_refused() -> None:
             match_labels([nothing], gate_probability=gate)
         with pytest.raises(InputError, match="gate_probability"):
             Matched(Clmb((1.0,)), gate)
+
+
+def test_near_pairs_are_those_within_the_gate() -> None:
+    rng = np.random.default_rng(5)
+    means, others = rng.normal(0.0, 30.0, (60, 3)), rng.normal(0.0, 30.0, (80, 3))
+    roots = rng.normal(0.0, 6.0, (60, 3, 4)), rng.normal(0.0, 4.0, (80, 3, 4))
+    covs, other_covs = (root @ root.swapaxes(1, 2) for root in roots)
+    found, gate = near_pairs(means, covs, others, other_covs, 9.0), 9.0
+    total, off = covs[:, None] + other_covs[None], means[:, None] - others[None]
+    squares = np.einsum("abi,abij,abj->ab", off, np.linalg.inv(total), off)
+    np.testing.assert_array_equal(np.argwhere(squares <= gate), np.column_stack([found.firsts, found.seconds]))
+    assert 100 < len(found.squares) < 4000
+    np.testing.assert_allclose(found.squares, squares[squares <= gate], rtol=1e-9)
+    np.testing.assert_allclose(found.log_dets, np.linalg.slogdet(total)[1][squares <= gate], rtol=1e-9)

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import json
 import re
 import tomllib
 from html.parser import HTMLParser
@@ -16,6 +17,8 @@ from vedette.reports.origin import versions_table
 from vedette.reports.spec_text import spec_toml
 from vedette.scenarios import load_scenario
 from vedette.scenarios.dumping import dump_scenario
+from vedette.scenarios.generated import GeneratedScene
+from vedette.scenarios.generated_text import scene_text
 
 HOSTILE = '<script>alert("&")</script>'
 
@@ -156,6 +159,37 @@ def test_a_page_that_grows_too_large_leaves_figures_and_runs_out_and_says_so(
     assert words.count("Run by run") == 2
     assert words.count("Consistency") == 1
     assert "1 more typical run is left out" in words
+
+
+def test_figures_of_very_many_lines_are_drawn_in_dots_and_say_so(
+    results: CampaignResults, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    small = page_of(results, tmp_path)
+    assert "<img" not in small
+    monkeypatch.setattr(writing, "MAX_DRAWING_BYTES", 60_000)
+    page = page_of(results, tmp_path)
+    images = re.findall(r'<img src="data:image/png;base64,([^"]+)"', page)
+    assert images
+    assert len(images) == page.count("Drawn in dots to keep the page small")
+    assert max(map(len, images)) < 500_000
+    assert all(len(svg) <= 60_000 for svg in re.findall(r"<svg viewBox.*?</svg>", page, re.DOTALL))
+
+
+def test_the_page_of_many_sensors_is_small_enough_to_send(tmp_path: Path) -> None:
+    """Sensors make lines and curves in proportion to their number and that of decisions."""
+    (tmp_path / "many.yaml").write_text(scene_text(GeneratedScene(num_sensors=24)))
+    scene = {"time.num_steps": 24, "control.decision_steps": list(range(1, 24))}
+    variants = [{"name": "short", "set": scene}]
+    campaign = campaign_of(scenarios=[str(tmp_path / "many.yaml")], planners=["idm"], runs=1, variants=variants)
+    page = page_of(results_of(tmp_path / "results", campaign), tmp_path)
+    start = page.index('id="runs">') + len('id="runs">')
+    replay = page[start : page.index("</script>", start)]
+    (run,) = json.loads(replay)
+    assert len(run["decisions"]) == 23
+    assert len(run["axes"]) == 1
+    assert all(len(json.dumps(curve)) < 400 for curve in run["decisions"][0]["curves"])
+    assert len(replay) < 600_000
+    assert len(page) < 3_000_000
 
 
 @pytest.mark.parametrize(("chosen", "message"), [(("jdm", 9), "expected a finished run"), (("gdm", 0), "expected one")])

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 from ruamel.yaml import YAML
 from typer.testing import CliRunner
 
@@ -17,6 +18,7 @@ from vedette.cli import app
 from vedette.errors import ScenarioError
 from vedette.evaluation import run_scenario
 from vedette.scenarios import Scenario, list_builtin, load_scenario, with_fields
+from vedette.scenarios.build import build_targets
 from vedette.scenarios.cautions import cautions, prob_detection
 from vedette.scenarios.sections import ScenarioModel
 from vedette.scenarios.sections.sensors import Sensor
@@ -218,3 +220,38 @@ def test_check_run_and_a_dry_run_warn_and_go_on(tmp_path: Path) -> None:
         assert result.exit_code == 0, result.output
         assert result.stderr.count("warning: births up to step 5 without feedback") == 1, words
         assert "warning" not in result.stdout
+
+
+CAPPED = "at most 3 labels are kept, and {} targets are there at once: the others are never tracked"
+
+
+@pytest.mark.parametrize("kind", ["lmb", "factored_glmb", "m_delta_glmb"])
+@pytest.mark.parametrize(
+    ("targets", "number"),
+    [
+        ("{kind: crowd, number: 3, std: [1.0, 1.0]}", None),
+        ("{kind: crowd, number: 4, std: [1.0, 1.0]}", 4),
+        ("{kind: poisson, expected: 0.5, mean: [0, 0, 0, 0], std: [1, 1, 1, 1], death_probability: 0.1}", 4),
+        ("{kind: poisson, expected: 0.5, mean: [0, 0, 0, 0], std: [1, 1, 1, 1]}", None),
+    ],
+)
+def test_a_cap_of_labels_that_cannot_suffice_warns(tmp_path: Path, kind: str, targets: str, number: int | None) -> None:
+    scene = with_fields(
+        load_scenario("three-positions"),
+        {
+            "filter": {"kind": kind, "limits": {"max_labels": 3}},
+            "fusion": {"kind": "sequential"},
+            "time.num_steps": 15,
+            "targets": yaml.safe_load(targets),
+        },
+    )
+    found = [line for line in cautions(scene) if "labels are kept" in line]
+    assert len(found) == (number is not None and kind != "m_delta_glmb")
+    assert all(CAPPED.format(number) in line for line in found)
+
+
+def test_scripted_targets_count_while_they_are_there() -> None:
+    scene = load_scenario("three-positions")
+    most = scene.model.targets.expected_number(scene.model.time.num_steps)
+    truth = build_targets(scene).truth(scene.model.time.build(), rng=np.random.default_rng(0))
+    assert most == max(len(truth.at(scan)[0]) for scan in range(scene.model.time.num_steps))

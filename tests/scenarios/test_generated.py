@@ -34,6 +34,25 @@ def test_scenes_of_any_size_are_valid(num_sensors: int, pattern: str, view: str)
     assert np.abs(truth.states[:, :2]).max() <= model.region.x_max + 100.0
 
 
+@pytest.mark.parametrize(
+    ("settings", "most"), [((50, None), 200), ((51, None), 204), ((150, 300), 600), ((2, 900), 904)]
+)
+def test_a_scene_has_labels_for_all_its_targets(settings: tuple[int, int | None], most: int) -> None:
+    found = scenario(num_sensors=settings[0], num_targets=settings[1])
+    assert found.model.filter.limits.max_labels == most
+    assert cautions(found) == ()
+    short = with_fields(found, {"filter.limits.max_labels": len(found.model.birth.sites) - 1})
+    assert "labels are kept" in cautions(short)[0]
+
+
+def test_more_targets_than_a_filter_keeps_by_default_are_all_tracked() -> None:
+    """Four targets a sensor: 240, of which a cap of 200 would lose 40."""
+    short = {"time.num_steps": 4, "control.decision_steps": []}
+    found = with_fields(scenario(num_sensors=60, num_targets=240), short)
+    record = run_scenario(found, "still", seed=0)
+    assert len(record.estimates[-1].labels) > 225
+
+
 def test_a_scene_says_the_settings_that_differ_from_the_usual() -> None:
     scene = GeneratedScene(num_sensors=3, pattern="crowd", num_targets=7, decide_every=5, seed=4)
     text = scene_text(scene)

@@ -9,12 +9,14 @@ import numpy as np
 import pytest
 
 from tracking.scenes import assert_same_lmb, filters, lmb, rngs, scans_of, sensor, targets
+from vedette.densities import LMB, FactoredGLMB, lmb_to_glmb
 from vedette.errors import InputError
 from vedette.filters import MultiSensorGlmbFilter, SequentialLmbFilter
 from vedette.fusion import ArithmeticAverage, Clmb, CmDeltaGlmb, FusionLimits, Matched, ParallelUpdate
 from vedette.fusion.rebasing import rebased, with_labels_of
 from vedette.models import MeasurementBirth
 from vedette.tracking import BeliefNetwork, Central, Distributed, Network, ScanNetwork, State, Tracker
+from vedette.tracking.messages import bytes_of_belief, bytes_of_messages, parts_of_belief
 from vedette.tracking.network import NEVER, hop_counts, metropolis_weights
 
 EQUAL = (1 / 3, 1 / 3, 1 / 3)
@@ -270,3 +272,45 @@ def test_labels_that_sensors_make_themselves_are_matched_in_a_network(rule: Any,
         truth[:, :2] += step * truth[:, 2:]
         state, _ = tracker.step(state, scans_of(truth, sharp, poses, rng), poses, float(step), rngs=rngs(3, step))
     assert [(belief.existence > 0.6).sum() for belief in (*state.local, state.fused)] == [2] * 4
+
+
+def line_of_labels(*labels: int, moved: float = 0.0) -> LMB:
+    """Labels (1, i) at 100 i m."""
+    num = len(labels)
+    means = np.array([[100.0 * i + moved, 0.0, 0.0, 0.0] for i in labels]).reshape(num, 4)
+    return LMB.from_bernoullis([(1, i) for i in labels], np.full(num, 0.5), means, np.tile(np.eye(4), (num, 1, 1)))
+
+
+def test_what_the_others_have_already_is_not_sent() -> None:
+    label, name = bytes_of_belief(line_of_labels(0)), 8
+    links = Network(radio_range=120.0).links(LINE, np.random.default_rng(0))
+    hops = hop_counts(links)
+    shared, own = line_of_labels(0, 1, 2), line_of_labels(0, 1, 2, moved=1.0)
+    assert label == 8 * (2 + 1 + 1 + 4 + 10)
+
+    def sent(hears: int | None, *beliefs: LMB) -> tuple[int, ...]:
+        return bytes_of_messages(Network(120.0, hears), hops, [(belief,) for belief in beliefs])
+
+    # Names are passed on by the one in the middle; of equal content nothing else is.
+    assert sent(None, shared, shared, shared) == (9 * name, 9 * name, 9 * name)
+    # One label that the first alone has goes to the second, and by the second to the third.
+    more = line_of_labels(0, 1, 2, 3)
+    assert sent(None, more, shared, shared) == (10 * name + label, 10 * name + label, 10 * name)
+    assert sent(1, more, shared, shared) == (4 * name + label, 3 * name, 3 * name)
+    # What both ends hold reaches the middle from one of them alone.
+    assert sent(1, more, shared, more) == (4 * name + label, 3 * name, 4 * name)
+    # All different: everything goes everywhere, the ends by way of the middle.
+    apart = sent(None, own, shared, line_of_labels(0, 1, 2, moved=2.0))
+    assert apart == (9 * name + 3 * label, 9 * name + 9 * label, 9 * name + 3 * label)
+
+
+@pytest.mark.parametrize("factored", [False, True])
+def test_parts_have_the_bytes_of_the_whole(factored: bool) -> None:
+    belief: Any = line_of_labels(0, 1, 2)
+    if factored:
+        pair, _ = lmb_to_glmb(line_of_labels(7, 8), max_hypotheses=10)
+        belief = FactoredGLMB.product([FactoredGLMB.from_lmb(belief), FactoredGLMB.from_glmb(pair)], 4)
+    parts = parts_of_belief(belief)
+    assert len(parts) == (4 if factored else 3)
+    assert sum(parts.values()) == bytes_of_belief(belief)
+    assert len(parts_of_belief(line_of_labels(0, 1, 2, moved=1e-12)).keys() & parts.keys()) == 0

@@ -5,13 +5,22 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
+import numpy as np
+
 from vedette.densities import LMB, FactoredGLMB
+from vedette.densities.checks import offsets_of
+from vedette.densities.label_sets import take_factors
 from vedette.filters.factored import check_factoring, check_found, factoring_of
 from vedette.filters.info import FilterInfo
 from vedette.filters.inputs import model_errors
 from vedette.filters.multi_sensor import Looks, MultiSensorFilter
 from vedette.filters.posteriors import factored_posterior
+from vedette.kernels.association.truncation import Truncation
+from vedette.kernels.base.types import FactoredGlmb, ScanInput, Sensor
+from vedette.kernels.steps.factor_updates import Factoring
 from vedette.kernels.steps.factored import FactoredReport, step_factored, update_factored
+from vedette.kernels.steps.in_view import in_view
+from vedette.kernels.steps.lmb import Reduction
 from vedette.models import kernel_motion
 
 
@@ -48,8 +57,10 @@ class SequentialFactoredFilter(MultiSensorFilter[FactoredGLMB]):
             with model_errors():
                 if s == 0:
                     posterior, report = step_factored(posterior, scan, motion, *own)
-                else:
+                elif limits is self.limits:  # by which every label is told whether it stays
                     posterior, report = update_factored(posterior, scan, *own)
+                else:
+                    posterior, report = _updated_in_view(posterior, scan, *own)
             check_found(report, f"{place}, {name}: ")
             reports.append(report)
         log_total = sum(report.log_total for report in reports)
@@ -60,3 +71,20 @@ class SequentialFactoredFilter(MultiSensorFilter[FactoredGLMB]):
             log_likelihood=looks.log_likelihood(log_total, [report.log_clutter for report in reports]),
             num_duplicates=looks.num_duplicates,
         )
+
+
+def _updated_in_view(
+    prior: FactoredGlmb,
+    scan: ScanInput,
+    sensor: Sensor,
+    truncation: Truncation,
+    reduction: Reduction,
+    factoring: Factoring,
+) -> tuple[FactoredGlmb, FactoredReport]:
+    """As `update_factored`, of the factors that the scan may say anything of; the others come first, as they were."""
+    density, marks = FactoredGLMB.from_kernel(prior), in_view(prior.tracks, scan, sensor, truncation)
+    seen = np.diff(offsets_of(marks.astype(np.int64))[prior.track_offsets]) > 0
+    near, far = (take_factors(density, np.flatnonzero(places)) for places in (seen, ~seen))
+    posterior, report = update_factored(near.to_kernel(), scan, sensor, truncation, reduction, factoring)
+    both = [far, FactoredGLMB.from_kernel(posterior)]
+    return FactoredGLMB.product(both, density.state_dim).to_kernel(), report

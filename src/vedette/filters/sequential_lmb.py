@@ -6,13 +6,18 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar
 
+import numpy as np
+
 from vedette.densities import LMB
 from vedette.errors import NumericalError
 from vedette.filters.info import FilterInfo
 from vedette.filters.inputs import model_errors
 from vedette.filters.multi_sensor import Looks, MultiSensorFilter
 from vedette.filters.posteriors import lmb_posterior
-from vedette.kernels.steps.lmb import LmbReport
+from vedette.kernels.association.truncation import Truncation
+from vedette.kernels.base.types import Bools, Lmb, ScanInput, Sensor
+from vedette.kernels.steps.in_view import in_view, marked, put_back
+from vedette.kernels.steps.lmb import LmbReport, Reduction
 from vedette.kernels.steps.multi_sensor_combinations import predict_combinations, standing_combinations
 from vedette.kernels.steps.multi_sensor_lmb import update_lmb
 from vedette.models import kernel_motion
@@ -24,9 +29,10 @@ class SequentialLmbFilter(MultiSensorFilter[LMB]):
 
     After each scan the posterior is projected to an LMB again, so that the order of the sensors matters a little. In
     return the cost grows in proportion to the number of sensors, whatever they see, where that of
-    `MultiSensorLmbFilter` grows exponentially. Of one sensor it is the `LmbFilter`. Labels are dropped, by
-    `Limits.min_existence`, `max_labels` and `max_position_std`, after the last scan alone: one sensor's missed
-    detection does not lose a target that the next one sees. What is cut is counted as by `MultiSensorLmbFilter`.
+    `MultiSensorLmbFilter` grows exponentially; a scan costs what it may say anything of, not all labels. Of one sensor
+    it is the `LmbFilter`. Labels are dropped, by `Limits.min_existence`, `max_labels` and `max_position_std`, after the
+    last scan alone: one sensor's missed detection does not lose a target that the next one sees. What is cut is counted
+    as by `MultiSensorLmbFilter`.
 
     Attributes and errors: as `MultiSensorGlmbFilter`.
     """
@@ -37,14 +43,18 @@ class SequentialLmbFilter(MultiSensorFilter[LMB]):
         motion, posterior = kernel_motion(self.targets.motion, self.targets.survival), prior.to_kernel()
         keeping, reports, search_cut = self.limits.keeping_labels(), list[LmbReport](), False
         given = zip(looks.names, looks.sensors, looks.inputs_in_turn(born, dt), strict=True)
+        settled = np.zeros(0, np.bool_)
         for s, (name, sensor, scan) in enumerate(given):
-            limits = self.limits if s == len(looks.names) - 1 else keeping
-            truncation, reduction = limits.truncation(sensor.meas_dim), limits.reduction()
+            is_last = s == len(looks.names) - 1
+            limits = self.limits if is_last else keeping
+            own = (scan, sensor.to_kernel(), limits.truncation(sensor.meas_dim), limits.reduction())
             with model_errors():
-                before = (
-                    predict_combinations(posterior, scan, 1, motion) if s == 0 else standing_combinations(posterior)
-                )
-                posterior, report, cut = update_lmb(before, scan, sensor.to_kernel(), truncation, reduction)
+                if s == 0:
+                    posterior, report, cut = update_lmb(predict_combinations(posterior, scan, 1, motion), *own)
+                elif is_last:  # of which every label is told whether it stays
+                    posterior, report, cut = update_lmb(standing_combinations(posterior), *own)
+                else:
+                    posterior, report, cut, settled = _updated_in_view(posterior, settled, *own)
             if not math.isfinite(report.sums.log_total):
                 raise NumericalError(
                     f"{place}, {name}: no association has positive weight; do the models forbid these scans?"
@@ -60,3 +70,14 @@ class SequentialLmbFilter(MultiSensorFilter[LMB]):
             num_duplicates=looks.num_duplicates,
             search_cut=search_cut,
         )
+
+
+def _updated_in_view(
+    prior: Lmb, settled: Bools, scan: ScanInput, sensor: Sensor, truncation: Truncation, reduction: Reduction
+) -> tuple[Lmb, LmbReport, bool, Bools]:
+    """As `update_lmb`, of the labels that the scan may say anything of; settled: as of `put_back`, empty of none."""
+    num, marks = len(prior.existence_logit), in_view(prior.tracks, scan, sensor, truncation)
+    updated, report, cut = update_lmb(standing_combinations(marked(prior, marks)), scan, sensor, truncation, reduction)
+    before = settled if len(settled) else np.zeros(num, np.bool_)
+    posterior, settled = put_back(prior, marks, updated, reduction.mixture, before)
+    return posterior, report, cut, settled

@@ -16,8 +16,8 @@ from vedette.errors import InputError
 from vedette.fusion.base import Fusion, FusionInfo, check_beliefs
 from vedette.fusion.validity import ValidBeliefs
 from vedette.fusion.views import Views
-from vedette.kernels.base.types import Bools, Floats, Ints
-from vedette.kernels.gaussian.distances import pair_distances
+from vedette.kernels.base.types import Floats, Ints
+from vedette.kernels.gaussian.distances import near_pairs
 from vedette.probabilities import chi_squared_quantile
 
 GATE_PROBABILITY = 0.999  # that two estimates of one target are within the gate
@@ -86,37 +86,39 @@ def common_names(
 
 def _pairs(own: _Targets, found: _Targets, gate: float) -> dict[int, int]:
     """Place in `found` of those of a sensor's labels that are assigned."""
-    squares, log_dets = pair_distances(own.means, own.covs, found.means, found.covs)
+    near = near_pairs(own.means, own.covs, found.means, found.covs, gate)
+    rows, columns, costs = near.firsts, near.seconds, near.squares + near.log_dets
     place = {label: i for i, label in enumerate(found.labels)}
-    costs = squares + log_dets
-    for i, label in enumerate(own.labels):
-        if label in place:
-            costs[i, place[label]] -= _TIE
-    allowed, pairs = squares <= gate, dict[int, int]()
-    likely = own.existence >= LIKELY, found.existence >= LIKELY
-    left = np.ones(len(own.labels), np.bool_), np.ones(len(found.labels), np.bool_)
-    for rows, columns in (likely, left):
-        _assign(costs, allowed, np.flatnonzero(rows & left[0]), np.flatnonzero(columns & left[1]), pairs)
-        left[0][list(pairs.keys())] = False
-        left[1][list(pairs.values())] = False
+    same = np.array([place.get(label, -1) for label in own.labels], np.int64)
+    costs[same[rows] == columns] -= _TIE
+    pairs = dict[int, int]()
+    likely = (own.existence[rows] >= LIKELY) & (found.existence[columns] >= LIKELY)
+    for among in (likely, np.ones(len(rows), np.bool_)):
+        free = among & ~np.isin(rows, list(pairs.keys())) & ~np.isin(columns, list(pairs.values()))
+        _assign(rows[free], columns[free], costs[free], pairs)
     return pairs
 
 
-def _assign(costs: Floats, allowed: Bools, rows: Ints, columns: Ints, pairs: dict[int, int]) -> None:
-    """Add as many allowed pairs of these rows and columns as can be, at the least sum of costs."""
-    if not len(rows) or not len(columns):
+def _assign(rows: Ints, columns: Ints, costs: Floats, pairs: dict[int, int]) -> None:
+    """Add as many of the allowed pairs (num,) of rows and columns as can be, at the least sum of costs."""
+    row_names, row = np.unique(rows, return_inverse=True)
+    column_names, column = np.unique(columns, return_inverse=True)
+    alone = (np.bincount(row)[row] == 1) & (np.bincount(column)[column] == 1)  # nothing else is near either
+    pairs.update(zip(rows[alone].tolist(), columns[alone].tolist(), strict=True))
+    if alone.all():
         return
-    block, fits = costs[np.ix_(rows, columns)], allowed[np.ix_(rows, columns)]
-    if not fits.any():
+    if alone.any():
+        _assign(rows[~alone], columns[~alone], costs[~alone], pairs)
         return
     from scipy.optimize import linear_sum_assignment  # a third of a second that nobody else has to wait for
 
-    least, most = block[fits].min(), block[fits].max()
     # More than any change of the allowed pairs can save.
-    forbidden = most + (most - least + 1.0) * min(block.shape)
-    for row, column in zip(*linear_sum_assignment(np.where(fits, block, forbidden)), strict=True):
-        if fits[row, column]:
-            pairs[int(rows[row])] = int(columns[column])
+    forbidden = costs.max() + (np.ptp(costs) + 1.0) * min(len(row_names), len(column_names))
+    block = np.full((len(row_names), len(column_names)), forbidden)
+    block[row, column] = costs
+    for r, c in zip(*linear_sum_assignment(block), strict=True):
+        if block[r, c] < forbidden:
+            pairs[int(row_names[r])] = int(column_names[c])
 
 
 def _names(own: _Targets, found: _Targets, pairs: dict[int, int], sensor: int) -> list[Label]:

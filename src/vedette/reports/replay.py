@@ -49,6 +49,8 @@ def replay_data(strategy: Strategy, record: RunRecord, group: str, *, trust: boo
     sensors = [_sensor(name, section) for name, section in zip(names, sections, strict=True)]
     region = scenario.model.region
     has_velocity = scenario.model.motion.kind != "custom"
+    axes = dict[str, dict[str, Any]]()
+    decisions = [_decision(*each, axes) for each in zip(record.decisions, choices_of(record), strict=True)]
     return {
         "cell": strategy.cell.name,
         "group": group,
@@ -68,7 +70,8 @@ def replay_data(strategy: Strategy, record: RunRecord, group: str, *, trust: boo
         "scans": _scans(record, scenario, [sensor["kind"] for sensor in sensors], places, trust),
         "ospa": [_rounded(parts, 2) for parts in record.ospa],
         "ospa_unit": scenario.model.ospa.unit,
-        "decisions": [_decision(*each) for each in zip(record.decisions, choices_of(record), strict=True)],
+        "axes": list(axes.values()),
+        "decisions": decisions,
     }
 
 
@@ -207,34 +210,42 @@ def _measurements(scan: Scan | None, kind: str, pose: Floats, places: int) -> li
     return found
 
 
-def _decision(decision: Decision, choice: Choice) -> dict[str, Any]:
+def _decision(decision: Decision, choice: Choice, axes: dict[str, dict[str, Any]]) -> dict[str, Any]:
     plan = decision.plan
     return {
         "scan": decision.step - 1,
         "actions": choice_words(choice),
         "notes": plan.notes,
-        "curves": _curves(plan),
+        "curves": _curves(plan, axes),
         "map": _map(plan),
         "why": why_data(plan),
     }
 
 
-def _curves(plan: Plan) -> list[dict[str, Any]]:
-    """Reward against action, one curve a sensor; of a joint table the largest over the other sensors' actions."""
+def _curves(plan: Plan, axes: dict[str, dict[str, Any]]) -> list[dict[str, Any]]:
+    """Reward against action, one curve a sensor; of a joint table the largest over the other sensors' actions.
+
+    What the actions are called and where they lie is `along` an axis, of which `axes` has each once.
+    """
     curves = []
     for table in plan.tables:
-        for axis, sensor in enumerate(table.sensors):
+        for place, sensor in enumerate(table.sensors):
             along = action_axis(plan.actions[sensor])
             order = np.argsort(along.places, kind="stable")
-            mean, error = best_over_others(table, axis)
+            mean, error = best_over_others(table, place)
+            axis = {
+                "axis": along.title(),
+                "numeric": along.is_numeric,
+                "places": _rounded(along.places[order], 1),
+                "labels": [along.labels[i] for i in order],
+                "ticks": [along.ticks[i] for i in order],
+            }
+            name = repr(axis)
+            axes.setdefault(name, axis)
             curves.append(
                 {
                     "sensor": sensor,
-                    "axis": along.title(),
-                    "numeric": along.is_numeric,
-                    "places": _rounded(along.places[order], 1),
-                    "labels": [along.labels[i] for i in order],
-                    "ticks": [along.ticks[i] for i in order],
+                    "along": list(axes).index(name),
                     "mean": [_number(value) for value in mean[order]],
                     "error": [_number(value) for value in error[order]],
                     "chosen": int(np.flatnonzero(order == plan.chosen[sensor])[0]),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import html
 import re
 from collections.abc import Mapping
@@ -9,7 +10,7 @@ from collections.abc import Mapping
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
-from vedette.evaluation.figures import svg_text
+from vedette.evaluation.figures import png_bytes, svg_text
 from vedette.evaluation.figures.style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, SKY, VERMILION
 
 # What the page's style sheet gives another shade in the dark.
@@ -33,6 +34,7 @@ _TAG = re.compile(r"<[^>]*>")
 _TEXT = re.compile(r"(<text[^>]*>)([^<]*)(?=</text>)")
 _LONG_NUMBER = re.compile(r"(\d+\.\d{2})\d+")
 _POINTS_TO_PIXELS = 1.9
+_DOTS_PER_INCH = 200
 
 
 def inline_svg(figure: Figure, prefix: str, description: str, names: Mapping[str, str] | None = None) -> Markup:
@@ -55,6 +57,15 @@ def inline_svg(figure: Figure, prefix: str, description: str, names: Mapping[str
         round(width, 2), round(height, 2), description, _POINTS_TO_PIXELS * width
     )
     return opening + Markup(body)  # what Matplotlib wrote: it escapes the texts in a figure itself
+
+
+def inline_png(figure: Figure, description: str) -> Markup:
+    """As `inline_svg`, an `img` of dots: as large whatever is drawn, and in the colours of paper."""
+    content = base64.b64encode(png_bytes(figure, dots_per_inch=_DOTS_PER_INCH)).decode()
+    width = _POINTS_TO_PIXELS * 72.0 * float(figure.get_size_inches()[0])
+    return Markup('<img src="data:image/png;base64,{}" alt="{}" style="max-width: {:.0f}px">').format(
+        content, description, width
+    )
 
 
 def _adapted(tag: str, prefix: str) -> str:

@@ -8,7 +8,7 @@ import itertools
 import json
 import shlex
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -29,12 +29,15 @@ from vedette.reports.origin import versions_table
 from vedette.reports.replay import code_of_sensors, replay_data
 from vedette.reports.saving import run_errors
 from vedette.reports.spec_text import spec_toml
-from vedette.reports.svg import inline_svg
+from vedette.reports.svg import inline_png, inline_svg
 from vedette.reports.tables import Table, cost_table, decision_table, error_table, measure_table
 from vedette.text import named_in
 
 # A page that a mail can carry: beyond these, groups show their errors alone, and typical runs are left out.
 MAX_FIGURE_BYTES, MAX_REPLAY_BYTES = 6_000_000, 4_000_000
+# A figure of more lines than this takes is drawn in dots.
+MAX_DRAWING_BYTES = 1_000_000
+_IN_DOTS = "Drawn in dots to keep the page small; vedette report --figures draws it in lines."
 _FILES = resources.files("vedette.reports") / "page"
 
 
@@ -167,10 +170,15 @@ def _section(group: Group, prefix: str, is_brief: bool) -> _Section:
 def _drawn(
     drawings: Sequence[Drawing], prefix: str, names: Mapping[str, str] | None = None
 ) -> tuple[tuple[Drawing, Markup], ...]:
-    return tuple(
-        (each, inline_svg(each.figure, f"{prefix}-{number}", f"{each.title}. {each.caption}", names))
-        for number, each in enumerate(drawings)
-    )
+    found = []
+    for number, each in enumerate(drawings):
+        told = f"{each.title}. {each.caption}"
+        shown = inline_svg(each.figure, f"{prefix}-{number}", told, names)
+        if len(shown) <= MAX_DRAWING_BYTES:
+            found.append((each, shown))
+        else:
+            found.append((replace(each, caption=f"{each.caption} {_IN_DOTS}"), inline_png(each.figure, told)))
+    return tuple(found)
 
 
 def _replays(

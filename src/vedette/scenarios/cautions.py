@@ -24,6 +24,7 @@ from vedette.scenarios.sections.detection import (
 from vedette.scenarios.sections.fusion import BY_LABEL, Fusion
 from vedette.scenarios.sections.sensors import Sensor
 from vedette.scenarios.sections.targets import RecordedTargets
+from vedette.scenarios.sections.tracking import LABELS_CAPPED, Filter
 from vedette.scenarios.views import field_of_view
 
 # Sensors whose probabilities of detection of one place differ by more than this do not see the same.
@@ -35,8 +36,13 @@ _POINTS_A_SIDE = 21
 
 def cautions(scenario: Scenario) -> tuple[str, ...]:
     """Warnings of a valid scenario, one line each, with file, line and column where it was read from a file."""
+<<<<<<< HEAD
     found = [*_records(scenario), *_views(scenario), *_births(scenario), *_late_beliefs(scenario)]
     found += [*_many_sensors(scenario), *_cells(scenario.model)]
+=======
+    found = [*_records(scenario), *_views(scenario.model), *_births(scenario.model), *_late_beliefs(scenario.model)]
+    found += [*_cells(scenario.model), *_labels(scenario.model)]
+>>>>>>> networks
     if not found:
         return ()
     document = document_of(scenario)
@@ -134,8 +140,25 @@ def _cells(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
             return
 
 
+<<<<<<< HEAD
 def _views(scenario: Scenario) -> Iterator[tuple[Path, str]]:
     model = scenario.model
+=======
+def _labels(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
+    number = model.targets.expected_number(model.time.num_steps)
+    if not isinstance(model.filter, Filter) or model.filter.kind not in LABELS_CAPPED or number is None:
+        return
+    if number > model.filter.limits.max_labels:
+        yield (
+            ("filter", "limits", "max_labels"),
+            f"at most {model.filter.limits.max_labels} labels are kept, and {number:.0f} targets are there at once: "
+            f"the others are never tracked; take filter.limits.max_labels of {number:.0f} and more, as what may become "
+            "one takes labels, too",
+        )
+
+
+def _views(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
+>>>>>>> networks
     fusion = _fusion_by_label(model)
     if fusion is None or fusion.by_views:
         return

@@ -15,6 +15,7 @@ VIEWS = ("full", "limited")
 _MOST_SENSORS, _MOST_TARGETS = 1000, 2000
 
 NUM_STEPS = 60
+_USUAL_LABELS = 200  # of a filter whose file says nothing
 _SIDE = 500.0  # m, of the square that each sensor adds
 _GROUP = 4  # targets that start, or end, at one place
 _SPEEDS = (3.0, 8.0)  # m/s
@@ -73,6 +74,12 @@ class GeneratedScene:
     def total_targets(self) -> int:
         """Number of targets."""
         return 2 * self.num_sensors if self.num_targets is None else self.num_targets
+
+    @property
+    def max_labels(self) -> int | None:
+        """That a filter needs: for each target, and for what two scans of clutter leave; None: no more than usual."""
+        needed = self.total_targets + 2 * self.num_sensors
+        return needed if needed > _USUAL_LABELS else None
 
     @property
     def side(self) -> float:

@@ -33,6 +33,7 @@ def scene_text(scene: GeneratedScene) -> str:
         sensors="\n".join(f"  - {{position: {_row(place)}}}" for place in sensors),
         decisions=_folded(range(scene.decide_every, NUM_STEPS, scene.decide_every)),
         horizon=scene.decide_every,
+        limits="" if scene.max_labels is None else f", limits: {{max_labels: {scene.max_labels}}}",
     )
 
 
@@ -133,7 +134,7 @@ sensor_defaults:
 sensors:
 {sensors}
 
-filter: {{kind: lmb}}
+filter: {{kind: lmb{limits}}}
 
 fusion: {{kind: sequential}}
 

@@ -36,6 +36,22 @@ PLANNED: dict[str, Layout] = {
         {"action_": Kind.COUNT},
     ),
 }
+# What a run of many sensors may have beside those: the rewards of one sensor's own actions, of which a row in `rewards`
+# would have a column for each of the others.
+OWN_REWARDS: dict[str, Layout] = {
+    "own_rewards": Layout(
+        {
+            **_DECISION,
+            "reward_table": Kind.INTEGER,
+            "sensor": Kind.INTEGER,
+            "action": Kind.INTEGER,
+            "reward": Kind.NUMBER,
+            "reward_se": Kind.NUMBER,
+            "chosen": Kind.TRUTH,
+        }
+    )
+}
+_FEW_SENSORS = 16  # of up to so many all rewards stand in `rewards`
 _MOST_REWARDS = 2**26  # of a run, those that were not evaluated included: what a file leaves out takes memory, too
 # Names that tables of many runs have beside these: a platform's own number of such a name gets `action_` in front.
 _TAKEN = {*PLANNED["actions"].fixed, *RUN_COLUMNS}
@@ -53,23 +69,52 @@ def planned_tables(decisions: Sequence[Decision], num_sensors: int) -> dict[str,
     return {"decisions": of_decisions, "actions": _actions(decisions), "rewards": _rewards(decisions, num_sensors)}
 
 
+def own_reward_tables(decisions: Sequence[Decision], num_sensors: int) -> dict[str, Columns]:
+    """The table of `OWN_REWARDS`, where there is something to stand in it."""
+    if num_sensors <= _FEW_SENSORS:
+        return {}
+    parts = [
+        (number, decision, place, table, np.flatnonzero(~np.isnan(table.mean)))
+        for number, decision in enumerate(decisions)
+        for place, table in enumerate(decision.plan.tables)
+        if len(table.sensors) == 1
+    ]
+    if not parts:
+        return {}
+    lengths = [len(actions) for *_, actions in parts]
+    chosen = [actions == each.plan.chosen[table.sensors[0]] for _, each, _, table, actions in parts]
+    return {
+        "own_rewards": {
+            **_columns_of(((number, decision) for number, decision, *_ in parts), lengths),
+            "reward_table": np.repeat(np.array([place for _, _, place, *_ in parts], np.int64), lengths),
+            "sensor": np.repeat(np.array([table.sensors[0] for *_, table, _ in parts], np.int64), lengths),
+            "action": _joined([actions for *_, actions in parts], np.int64),
+            "reward": _joined([table.mean[actions] for *_, table, actions in parts], np.float64),
+            "reward_se": _joined([table.standard_error[actions] for *_, table, actions in parts], np.float64),
+            "chosen": _joined(chosen, bool),
+        }
+    }
+
+
 def decisions_of(tables: Mapping[str, Mapping[str, Any]], poses: Floats) -> tuple[Decision, ...]:
     """The decisions back from their tables and the poses of the run.
 
     Raises `InputError`, `KeyError`, `IndexError` or `ValueError` for tables that do not fit together.
     """
     table, actions, rewards = (tables[name] for name in PLANNED)
-    num = len(table["decision"])
+    num, own = len(table["decision"]), tables.get("own_rewards")
     if not np.array_equal(table["decision"], np.arange(num)):
         raise InputError("decisions, column decision: expected them numbered from 0")
     counted = PLANNED["decisions"].others(table)
     of_actions, of_rewards = _rows_by("decision", actions, num), _rows_by("decision", rewards, num)
+    of_own = [slice(0)] * num if own is None else _rows_by("decision", own, num)
     decisions, room = [], _MOST_REWARDS
     for index, step in enumerate(table["step"].tolist()):
         plan = _plan(
             table["planner"][index],
             {name: column[of_actions[index]] for name, column in actions.items()},
             {name: column[of_rewards[index]] for name, column in rewards.items()},
+            {name: column[of_own[index]] for name, column in (own or {}).items()},
             table["notes"][index],
             {name.removeprefix("num_"): int(table[name][index]) for name in counted if table[name][index] >= 0},
             room,
@@ -83,6 +128,7 @@ def _plan(
     planner: str,
     actions: Mapping[str, Any],
     rewards: Mapping[str, Any],
+    own_rewards: Mapping[str, Any],
     notes: str,
     counts: dict[str, int],
     room: int,
@@ -100,11 +146,34 @@ def _plan(
             values[:, place] = own[name]
         options.append(Actions(tuple(name.removeprefix("action_") for name in names), values))
     shape = tuple(len(values) for values in options)
-    tables: list[RewardTable] = []
-    for rows in _rows_by("reward_table", rewards):
-        tables.append(_table(rewards, rows, shape, room))
-        room -= tables[-1].mean.size
-    return Plan(planner, tuple(options), tuple(chosen), tuple(tables), counts, tuple(notes.splitlines()))
+    tables: dict[int, RewardTable] = {}
+    for number, rows in _rows_of(rewards):
+        tables[number] = _table(rewards, rows, shape, room)
+        room -= tables[number].mean.size
+    for number, rows in _rows_of(own_rewards) if own_rewards else ():
+        if number in tables:
+            raise InputError(f"own_rewards, column reward_table: expected none of those in rewards; got {number}")
+        tables[number] = _own_table(own_rewards, rows, shape, room)
+        room -= tables[number].mean.size
+    if set(tables) != set(range(len(tables))):
+        raise InputError("column reward_table: expected rows of every number from 0")
+    found = tuple(tables[number] for number in range(len(tables)))
+    return Plan(planner, tuple(options), tuple(chosen), found, counts, tuple(notes.splitlines()))
+
+
+def _own_table(rewards: Mapping[str, Any], rows: slice, num_actions: tuple[int, ...], room: int) -> RewardTable:
+    sensors, actions = rewards["sensor"][rows], rewards["action"][rows]
+    sensor = int(sensors[0])
+    if np.any(sensors != sensor) or not 0 <= sensor < len(num_actions):
+        raise InputError(f"own_rewards, column sensor: expected one of {len(num_actions)} for each reward_table")
+    num = num_actions[sensor]
+    if num > room:
+        raise InputError(f"rewards: expected tables of at most {_MOST_REWARDS} entries in all; got more")
+    if np.any(np.diff(actions) <= 0) or actions[0] < 0 or actions[-1] >= num:
+        raise InputError(f"own_rewards: expected each of {num} actions at most once, in order")
+    mean, error = np.full(num, np.nan), np.full(num, np.nan)
+    mean[actions], error[actions] = rewards["reward"][rows], rewards["reward_se"][rows]
+    return RewardTable((sensor,), mean, error)
 
 
 def _table(rewards: Mapping[str, Any], rows: slice, num_actions: tuple[int, ...], room: int) -> RewardTable:
@@ -178,8 +247,9 @@ def _rewards(decisions: Sequence[Decision], num_sensors: int) -> Columns:
         (number, decision, place, table, np.argwhere(~np.isnan(table.mean)))
         for number, decision in enumerate(decisions)
         for place, table in enumerate(decision.plan.tables)
+        if len(table.sensors) > 1 or num_sensors <= _FEW_SENSORS
     ]
-    if sum(table.mean.size for *_, table, _ in parts) > _MOST_REWARDS:
+    if sum(table.mean.size for each in decisions for table in each.plan.tables) > _MOST_REWARDS:
         raise InputError(f"plan.tables: expected at most {_MOST_REWARDS} entries in all; got more")
     lengths = [len(index) for *_, index in parts]
     actions = np.full((sum(lengths), num_sensors), -1)
@@ -215,6 +285,16 @@ def _columns_of(numbered: Iterator[tuple[int, Decision]] | enumerate[Decision], 
 
 def _joined(parts: Sequence[np.ndarray[Any, Any]], dtype: type) -> np.ndarray[Any, Any]:
     return np.concatenate([np.empty(0, dtype), *parts]).astype(dtype, copy=False)
+
+
+def _rows_of(rewards: Mapping[str, Any]) -> Iterator[tuple[int, slice]]:
+    """Each number of `reward_table`, and its rows, which stand in order."""
+    numbers: Ints = rewards["reward_table"]
+    if np.any(np.diff(numbers) < 0) or np.any(numbers < 0):
+        raise InputError("column reward_table: expected rows in order, of numbers from 0")
+    present, first = np.unique(numbers, return_index=True)
+    for number, (start, stop) in zip(present.tolist(), pairwise([*first.tolist(), len(numbers)]), strict=True):
+        yield number, slice(start, stop)
 
 
 def _rows_by(name: str, table: Mapping[str, Any], num: int | None = None) -> list[slice]:

@@ -2,7 +2,8 @@
 
 `step` counts scans from 1 in every table; a row of `tracks` is one estimate at one scan, a row of `actions` one action
 that a sensor could choose at a decision, and a row of `rewards` one that was evaluated, `action_0` that of the first
-sensor. Decisions stand in `planned`, and why they were taken in `explained`.
+sensor; of many sensors those of one's own actions stand apart. Decisions stand in `planned`, and why they were taken in
+`explained`.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from vedette.kernels.base.types import Floats, Ints
 from vedette.simulation.arrow import Columns, Kind, Layout
 from vedette.simulation.explained import EXPLAINED, explained_tables, with_explanations
 from vedette.simulation.health import FUSION_COLUMNS, SENSOR_COLUMNS, Health
-from vedette.simulation.planned import PLANNED, decisions_of, planned_tables
+from vedette.simulation.planned import OWN_REWARDS, PLANNED, decisions_of, own_reward_tables, planned_tables
 from vedette.simulation.records import Decision, RunRecord
 from vedette.simulation.truth import Truth
 
@@ -43,8 +44,8 @@ LAYOUTS: dict[str, Layout] = {
     ),
     **PLANNED,
 }
-# What a run may have beside those, all of them or none.
-OPTIONAL: dict[str, Layout] = EXPLAINED
+# What a run may have beside those; of `EXPLAINED` all or none.
+OPTIONAL: dict[str, Layout] = {**OWN_REWARDS, **EXPLAINED}
 TIMINGS = Layout({"step": Kind.INTEGER}, {"": Kind.NUMBER})
 
 
@@ -81,9 +82,10 @@ def tables_of(record: RunRecord) -> Tables:
 
 def optional_tables_of(record: RunRecord) -> Tables:
     """The tables of `OPTIONAL` that the run has."""
+    found = own_reward_tables(record.decisions, record.num_sensors)
     if not any(decision.plan.explanation is not None for decision in record.decisions):
-        return {}
-    return explained_tables(record.decisions, record.num_sensors)
+        return found
+    return {**found, **explained_tables(record.decisions, record.num_sensors)}
 
 
 def timing_table(record: RunRecord) -> Columns:
@@ -142,7 +144,7 @@ def record_of(
 
 def _decisions_of(tables: Mapping[str, Mapping[str, Any]], poses: Floats) -> tuple[Decision, ...]:
     decisions = decisions_of(tables, poses)
-    if not any(name in tables for name in OPTIONAL):
+    if not any(name in tables for name in EXPLAINED):
         return decisions
     return with_explanations(decisions, tables)
 

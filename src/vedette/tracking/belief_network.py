@@ -21,7 +21,7 @@ from vedette.tracking.births import births_due, births_heard
 from vedette.tracking.distributed import check_labels_of_births, shares_prediction
 from vedette.tracking.local import LocalFilters
 from vedette.tracking.merging import merged, views_of, with_weights
-from vedette.tracking.messages import bytes_of_belief
+from vedette.tracking.messages import bytes_of_messages
 from vedette.tracking.network import NEVER, Network, heard_by, hop_counts, metropolis_weights
 from vedette.tracking.stages import Stages
 
@@ -106,10 +106,11 @@ class BeliefNetwork(LocalFilters):
             births = self._births(fused, scans, at, sent)
         longest = self.network.longest_delay(num)
         memory = _Memory(births, tuple(own for own in waiting if own.step + longest > step))
-        sizes = [bytes_of_belief(belief) for belief in local]
+        messages: list[tuple[Any, ...]] = [(belief,) for belief in local]
         if shares_prediction(self.fusion) and len({id(own) for own in predictions}) > 1:
-            sizes = [size + bytes_of_belief(own) for size, own in zip(sizes, predictions, strict=True)]
-        told = TrackerInfo(infos, report or reports[0], stages.seconds, self.network.bytes_sent(hops, sizes))
+            messages = list(zip(local, predictions, strict=True))
+        heard = bytes_of_messages(self.network, hops, messages)
+        told = TrackerInfo(infos, report or reports[0], stages.seconds, heard)
         return State(tuple(fused), whole, step, float(time), memory), told
 
     def _filtered(

@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from vedette.densities import LMB
 from vedette.errors import InputError
+from vedette.filters import FilterInfo
 from vedette.fusion import Fusion, Matched, Views
 from vedette.kernels.base.types import Floats
 from vedette.models import TargetModel
+from vedette.models.arguments import probability
 from vedette.tracking.base import State, TrackerInfo, check_step
 from vedette.tracking.births import births_due, births_from_scans
+from vedette.tracking.forgetting import without_forgotten
 from vedette.tracking.local import LocalFilters
 from vedette.tracking.messages import bytes_of_belief
 from vedette.tracking.stages import Stages
@@ -29,20 +32,25 @@ class Distributed(LocalFilters):
         fusion: of their beliefs, after every scan; None for a single sensor.
         feedback: whether the fused belief replaces the sensors' own (paper-notes 9). Without it a fusion by views
             counts a sensor that did not scan as if it had, since its belief is its own, of its earlier scans.
+        min_detection: without feedback, where targets are born of measurements, a sensor forgets labels that it would
+            detect with less than this probability, once a birth would say more of them (`without_forgotten`); they
+            would pile up, and be matched with whatever is near. Counted in its `FilterInfo.dropped_existence`. 0: none.
 
     Raises:
         InputError: no filter or something else, filters of different targets, several sensors without a fusion; births
             from measurements, a fusion of beliefs that share their prediction, or one that matches labels, where it
-            does not go together with `feedback`.
+            does not go together with `feedback`; no probability.
     """
 
     fusion: Fusion | None = None
     feedback: bool = False
+    min_detection: float = 0.1
 
     def __post_init__(self) -> None:
         LocalFilters.__post_init__(self)  # slots replace the class that super() looks for
         if self.fusion is None and len(self.filters) > 1:
             raise InputError(f"fusion: expected one for {len(self.filters)} sensors; got none")
+        probability("Distributed.min_detection", self.min_detection)
         if self.feedback or self.fusion is None:
             return
         if shares_prediction(self.fusion):
@@ -80,6 +88,7 @@ class Distributed(LocalFilters):
             scanned = tuple(scan is not None or not self.feedback for scan in scans)
             views, rule = Views(self.sensors, at, scanned, prediction), self.fusion
             with stages.timing("fusion"):
+                local, infos = self._without_forgotten(local, infos, views)
                 made = self._for_fusion(local)
                 if isinstance(rule, Matched):
                     # Labels then outlast the sensor that led them, and are those that decisions need.
@@ -93,6 +102,23 @@ class Distributed(LocalFilters):
         measured = self._measured(local, scans, at, step + 1, stages)
         told = TrackerInfo(tuple(infos), report, stages.seconds, sent)
         return State(tuple(local), fused, step, float(time), measured), told
+
+    def _without_forgotten(
+        self, local: list[Any], infos: list[FilterInfo], views: Views
+    ) -> tuple[list[Any], list[FilterInfo]]:
+        """The sensors' own beliefs without what they have lost sight of, and their reports with what that was."""
+        birth = self.targets.birth.from_measurements
+        if self.feedback or birth is None or self.min_detection == 0.0:
+            return local, infos
+        kept, dropped = zip(
+            *(without_forgotten(belief, birth, views, s, self.min_detection) for s, belief in enumerate(local)),
+            strict=True,
+        )
+        told = [
+            replace(info, dropped_existence=info.dropped_existence + lost)
+            for info, lost in zip(infos, dropped, strict=True)
+        ]
+        return list(kept), told
 
     def _measured(
         self, local: Sequence[Any], scans: Sequence[Any], poses: Floats, step: int, stages: Stages

@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
+from collections.abc import Collection, Sequence
+from hashlib import blake2b
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from vedette.densities import LMB, FactoredGLMB, Labelled
+from vedette.kernels.base.types import Ints
+from vedette.tracking.network import Network
 
-_NUMBER = 8
+NUMBER = 8  # bytes
 
 
 def bytes_of_scan(scan: Any, pose: Any) -> int:
     """The measurements, and the pose that they were taken from; 0 where there was no scan."""
-    return 0 if scan is None else _NUMBER * (np.size(scan) + len(pose))
+    return 0 if scan is None else NUMBER * (np.size(scan) + len(pose))
 
 
 def bytes_of_belief(belief: Any) -> int:
@@ -23,8 +29,85 @@ def bytes_of_belief(belief: Any) -> int:
     tracks, dim = belief.tracks, belief.state_dim
     numbers = 2 * tracks.num_tracks + len(tracks.log_weights) * (1 + dim + dim * (dim + 1) // 2)
     if isinstance(belief, LMB):
-        return _NUMBER * (numbers + tracks.num_tracks)
+        return NUMBER * (numbers + tracks.num_tracks)
     own = belief.num_hyps + len(belief.hyp_tracks)
     if isinstance(belief, FactoredGLMB):
         own -= 2 * int(np.count_nonzero(belief.is_bernoulli))  # of which an existence says all
-    return _NUMBER * (numbers + own)
+    return NUMBER * (numbers + own)
+
+
+def parts_of_belief(belief: Any) -> dict[bytes, int]:
+    """The independent parts of a belief, each by a fingerprint of its content, with its bytes as of `bytes_of_belief`.
+
+    A label of an LMB, a factor of a factored density, a GLMB as a whole; nothing of a density without labels.
+    """
+    if not isinstance(belief, Labelled):
+        return {}
+    tracks, dim = belief.tracks, belief.state_dim
+    of_component = 1 + dim + dim * (dim + 1) // 2
+    if isinstance(belief, LMB):
+        firsts, own = np.arange(tracks.num_tracks + 1), np.ones(tracks.num_tracks, np.int64)
+        others = [belief.existence_logit[i : i + 1].tobytes() for i in range(tracks.num_tracks)]
+    else:
+        factored = belief if isinstance(belief, FactoredGLMB) else FactoredGLMB.from_glmb(belief)
+        firsts, hyps = factored.track_offsets, factored.factor_offsets
+        entries = factored.hyp_offsets[hyps]
+        own = np.diff(hyps) + np.diff(entries) - 2 * factored.is_bernoulli
+        others = [
+            factored.hyp_log_weights[low:high].tobytes()
+            + (factored.hyp_offsets[low : high + 1] - factored.hyp_offsets[low]).tobytes()
+            + (factored.hyp_tracks[first:last] - firsts[i]).tobytes()
+            for i, ((low, high), (first, last)) in enumerate(
+                zip(pairwise(hyps.tolist()), pairwise(entries.tolist()), strict=True)
+            )
+        ]
+        tracks = factored.tracks
+    sizes = NUMBER * (2 * np.diff(firsts) + np.diff(tracks.offsets[firsts]) * of_component + own)
+    parts = {}
+    for (low, high), size, other in zip(pairwise(firsts.tolist()), sizes.tolist(), others, strict=True):
+        start, end = tracks.offsets[low], tracks.offsets[high]
+        of_tracks = tracks.labels[low:high], tracks.offsets[low:high] - start
+        of_components = (array[start:end] for array in (tracks.log_weights, tracks.means, tracks.covs))
+        content = b"".join([other, *(array.tobytes() for array in (*of_tracks, *of_components))])
+        parts[blake2b(content, digest_size=NUMBER).digest()] = size
+    return parts
+
+
+def bytes_of_messages(network: Network, hops: Ints, messages: Sequence[Sequence[Any]]) -> tuple[int, ...]:
+    """What each sensor sends so that all have the beliefs of those whom they hear.
+
+    Each sends the fingerprints of its own parts, a number each, as far as messages travel; then each part goes to those
+    who lack it, from the nearest who hold it, by one neighbour of each. In consensus, averages are sent whole.
+
+    hops: as of `Network.arrivals`. messages: the beliefs that each sensor sends.
+    """
+    if network.consensus_rounds is not None:
+        return network.bytes_sent(hops, [sum(map(bytes_of_belief, beliefs)) for beliefs in messages])
+    held: list[dict[bytes, int]] = []
+    known: dict[int, dict[bytes, int]] = {}
+    for beliefs in messages:
+        held.append({})
+        for belief in beliefs:
+            if id(belief) not in known:
+                known[id(belief)] = parts_of_belief(belief)
+            held[-1] |= known[id(belief)]
+    sent = np.array(network.bytes_sent(hops, [NUMBER * len(parts) for parts in held]))
+    holders, sizes = defaultdict[bytes, list[int]](list), dict[bytes, int]()
+    for sensor, parts in enumerate(held):
+        sizes |= parts
+        for name in parts:
+            holders[name].append(sensor)
+    together = defaultdict[tuple[int, ...], int](int)
+    for name, sensors in holders.items():
+        together[tuple(sensors)] += sizes[name]
+    for owners, size in together.items():
+        sent[_senders(network, hops, owners)] += size
+    return tuple(sent.tolist())
+
+
+def _senders(network: Network, hops: Ints, holders: Collection[int]) -> Ints:
+    """Who passes on what these sensors hold until all who hear them have it."""
+    away = hops[:, list(holders)].min(axis=1)
+    lacking = np.flatnonzero((away > 0) & network.reaches(away))
+    before = (hops[lacking] == 1) & (away == away[lacking, None] - 1)
+    return np.unique(before.argmax(axis=1))

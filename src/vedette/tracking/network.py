@@ -72,7 +72,11 @@ class Network:
 
         hops: `hop_counts` of the links of the step; messages travel over those of the step at which they are sent.
         """
-        return np.where(hops <= self._most_hops, step + self.delay * np.minimum(hops, len(hops)), NEVER)
+        return np.where(self.reaches(hops), step + self.delay * np.minimum(hops, len(hops)), NEVER)
+
+    def reaches(self, hops: Ints) -> Bools:
+        """Whether messages travel over so many links."""
+        return np.asarray(hops <= self._most_hops)
 
     def longest_delay(self, num_sensors: int) -> int:
         """Scans after which no message arrives any more."""

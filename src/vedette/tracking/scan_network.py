@@ -17,7 +17,7 @@ from vedette.tracking.base import State, TrackerInfo, check_step
 from vedette.tracking.births import births_heard
 from vedette.tracking.central import OfAllScans
 from vedette.tracking.merging import merged
-from vedette.tracking.messages import bytes_of_belief, bytes_of_scan
+from vedette.tracking.messages import bytes_of_messages, bytes_of_scan
 from vedette.tracking.network import Network, heard_by, hop_counts
 from vedette.tracking.stages import Stages
 
@@ -89,10 +89,10 @@ class ScanNetwork(OfAllScans):
         hops = hop_counts(self.network.links(at, rngs[0]))
         frame = _Frame(step, dt, tuple(scans), at, self.network.arrivals(hops, step))
         views = Views(self.sensors, at, tuple(scan is not None for scan in scans))
-        sizes = [bytes_of_scan(scan, pose) for scan, pose in zip(scans, at, strict=True)]
+        sent = np.array(self.network.bytes_sent(hops, [bytes_of_scan(*own) for own in zip(scans, at, strict=True)]))
         known = state.memory.known
         if self.network.delay == 0 and len({id(own.belief) for own in known}) > 1:
-            sizes = [size + bytes_of_belief(own.belief) for size, own in zip(sizes, known, strict=True)]
+            sent += bytes_of_messages(self.network, hops, [(own.belief,) for own in known])
             with stages.timing("fusion"):
                 known = self._merge(state.memory, frame, views)
         frames, runs = (*state.memory.frames, frame), _Runs(self, rngs[0])
@@ -104,7 +104,7 @@ class ScanNetwork(OfAllScans):
         with stages.timing("fusion"):
             fused, report = merged(self.merging, [own.belief for own in now], range(num), views)
         infos = tuple(own.info for own in now if own.info is not None)
-        info = TrackerInfo(infos, report, stages.seconds, self.network.bytes_sent(hops, sizes))
+        info = TrackerInfo(infos, report, stages.seconds, tuple(sent.tolist()))
         local = tuple(own.belief for own in now)
         return State(local, fused, step, float(time), _Memory(known, frames, frame)), info
 

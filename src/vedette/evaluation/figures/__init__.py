@@ -10,7 +10,7 @@ from vedette.evaluation.figures.mean_rewards import mean_rewards_figure
 from vedette.evaluation.figures.ospa import ospa_figure
 from vedette.evaluation.figures.rewards import reward_figure
 from vedette.evaluation.figures.roses import roses_figure
-from vedette.evaluation.figures.style import save_figure, svg_text
+from vedette.evaluation.figures.style import png_bytes, save_figure, svg_text
 from vedette.evaluation.figures.sweep import SweepCurve, sweep_figure
 from vedette.evaluation.figures.tracks import overview_figure, tracks_figure
 
@@ -22,6 +22,7 @@ __all__ = [
     "mean_rewards_figure",
     "ospa_figure",
     "overview_figure",
+    "png_bytes",
     "reward_figure",
     "roses_figure",
     "save_figure",

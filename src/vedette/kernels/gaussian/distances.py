@@ -3,12 +3,37 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
-from vedette.kernels.base.compile import borrowing, kernel
-from vedette.kernels.base.types import Floats
+from vedette.kernels.base.arrays import grown_ints
+from vedette.kernels.base.compile import borrowing, inlined, kernel
+from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.gaussian.linalg import cholesky, log_det_from_factor, solve_lower
+
+_SLACK = 1.0 + 1e-9  # for what rounding does to a distance
+
+
+class NearPairs(NamedTuple):
+    """The pairs of two lists of Gaussians within a gate, in the order of the first list, then of the second."""
+
+    firsts: Ints  # (num,) place in the first list
+    seconds: Ints  # (num,) place in the second
+    squares: Floats  # (num,) d'S^-1 d, where S = P_a + P_b
+    log_dets: Floats  # (num,) log det S
+
+
+@inlined
+def _may_be_near(
+    means: Floats, covs: Floats, a: int, other_means: Floats, other_covs: Floats, b: int, gate: float
+) -> bool:
+    """Whether no axis by itself puts a pair out of the gate: d'S^-1 d is at least d_i^2 / S_ii."""
+    for i in range(means.shape[1]):
+        off = means[a, i] - other_means[b, i]
+        if off * off > gate * (covs[a, i, i] + other_covs[b, i, i]):
+            return False
+    return True
 
 
 @borrowing
@@ -41,6 +66,39 @@ def l1_bound(mean: Floats, cov: Floats, other_mean: Floats, other_cov: Floats, f
 
 
 @kernel
+def _candidates(means: Floats, covs: Floats, other_means: Floats, other_covs: Floats, gate: float) -> Ints:
+    """(num,) pairs that may be near, counted row by row."""
+    num, filled = len(other_means), 0
+    found = np.empty(4 * len(means), np.int64)
+    for a in range(len(means)):
+        if filled + num > len(found):
+            found = grown_ints(found, filled + num)
+        for b in range(num):
+            if _may_be_near(means, covs, a, other_means, other_covs, b, gate):
+                found[filled] = a * num + b
+                filled += 1
+    return found[:filled]
+
+
+@borrowing
+def _distance(
+    mean: Floats, cov: Floats, other_mean: Floats, other_cov: Floats, total: Floats, factor: Floats, offset: Floats
+) -> tuple[float, float]:
+    """d'S^-1 d and log det S, infinite where S is not positive definite; the last three are to work in."""
+    for i in range(len(mean)):
+        offset[i] = mean[i] - other_mean[i]
+        for j in range(len(mean)):
+            total[i, j] = cov[i, j] + other_cov[i, j]
+    if not cholesky(total, factor):
+        return math.inf, math.inf
+    solve_lower(factor, offset, offset)
+    squared = 0.0
+    for i in range(len(mean)):
+        squared += offset[i] * offset[i]
+    return squared, log_det_from_factor(factor)
+
+
+@kernel
 def pair_distances(means: Floats, covs: Floats, other_means: Floats, other_covs: Floats) -> tuple[Floats, Floats]:
     """(n, m) squared distances d'S^-1 d of two lists of Gaussians, and log det S, where S = P_a + P_b.
 
@@ -48,23 +106,35 @@ def pair_distances(means: Floats, covs: Floats, other_means: Floats, other_covs:
     positive definite.
     """
     n, m, dim = len(means), len(other_means), means.shape[1]
-    squares, log_dets = np.full((n, m), np.inf), np.full((n, m), np.inf)
+    squares, log_dets = np.empty((n, m)), np.empty((n, m))
     total, factor, offset = np.empty((dim, dim)), np.empty((dim, dim)), np.empty(dim)
     for a in range(n):
         for b in range(m):
-            for i in range(dim):
-                offset[i] = means[a, i] - other_means[b, i]
-                for j in range(dim):
-                    total[i, j] = covs[a, i, j] + other_covs[b, i, j]
-            if not cholesky(total, factor):
-                continue
-            solve_lower(factor, offset, offset)
-            squared = 0.0
-            for i in range(dim):
-                squared += offset[i] * offset[i]
-            squares[a, b] = squared
-            log_dets[a, b] = log_det_from_factor(factor)
+            squares[a, b], log_dets[a, b] = _distance(
+                means[a], covs[a], other_means[b], other_covs[b], total, factor, offset
+            )
     return squares, log_dets
 
 
-__all__ = ["l1_bound", "pair_distances"]
+@kernel
+def near_pairs(means: Floats, covs: Floats, other_means: Floats, other_covs: Floats, gate: float) -> NearPairs:
+    """The pairs with d'S^-1 d up to `gate`; none whose S is not positive definite.
+
+    means: (n, dim), covs: (n, dim, dim). other_means: (m, dim), other_covs: (m, dim, dim).
+    """
+    dim = means.shape[1]
+    found = _candidates(means, covs, other_means, other_covs, _SLACK * gate)
+    firsts, seconds = np.empty(len(found), np.int64), np.empty(len(found), np.int64)
+    squares, log_dets, filled = np.empty(len(found)), np.empty(len(found)), 0
+    total, factor, offset = np.empty((dim, dim)), np.empty((dim, dim)), np.empty(dim)
+    for pair in found:
+        a, b = pair // len(other_means), pair % len(other_means)
+        squared, log_det = _distance(means[a], covs[a], other_means[b], other_covs[b], total, factor, offset)
+        if squared <= gate and squared < math.inf:
+            firsts[filled], seconds[filled] = a, b
+            squares[filled], log_dets[filled] = squared, log_det
+            filled += 1
+    return NearPairs(firsts[:filled], seconds[:filled], squares[:filled], log_dets[:filled])
+
+
+__all__ = ["NearPairs", "l1_bound", "near_pairs", "pair_distances"]

@@ -12,13 +12,14 @@ from typing import NamedTuple
 import numpy as np
 
 from vedette.kernels.base.arrays import counted_ints, filled_ints
-from vedette.kernels.base.compile import borrowing, kernel
+from vedette.kernels.base.compile import inlined, kernel
 from vedette.kernels.base.types import Floats, Glmb, Ints, Tracks
 from vedette.kernels.gaussian.distances import l1_bound
 from vedette.kernels.gaussian.linalg import cholesky, log_sum, solve_lower
 from vedette.kernels.gaussian.mixtures import MixtureCaps, descending_order
 from vedette.kernels.gaussian.pooling import Moments, moments_of, pooled_tracks
 from vedette.kernels.labelled.groups import group_log_sums
+from vedette.kernels.labelled.labels import group_members
 from vedette.kernels.labelled.splitting import Choices, choices_of, group_choices
 
 # A share of the error so small that nobody looks for a cheaper pair.
@@ -32,17 +33,19 @@ class _Pairs(NamedTuple):
     heavier: Ints  # (num_tracks,)
 
 
-@borrowing
+@inlined
 def _may_be_near(other: int, heavier: int, moments: Moments, distance: float, most_apart: float) -> bool:
     """Whether the Mahalanobis distance may be below `distance` and `l1_bound` at most `most_apart`: by each coordinate.
 
-    A marginal's Bhattacharyya coefficient, exp(-d^2 / (4 (P_a + P_b))) at most, is not below that of the whole.
+    A marginal's Bhattacharyya coefficient, exp(-d^2 / (4 (P_a + P_b))) at most, is not below that of the whole, and
+    -log(1 - y) is at most y / (1 - y).
     """
-    reach = -2.0 * math.log1p(-0.25 * most_apart * most_apart) if most_apart < 2.0 else math.inf
+    squared_share = 0.25 * most_apart * most_apart
+    reach = 2.0 * squared_share / (1.0 - squared_share) if squared_share < 1.0 else math.inf
     for i in range(moments.means.shape[1]):
         offset, variance = moments.means[other, i] - moments.means[heavier, i], moments.covs[heavier, i, i]
         squared = offset * offset
-        if squared > reach * (variance + moments.covs[other, i, i]) or squared > distance * distance * variance:
+        if squared > distance * distance * variance or squared > reach * (variance + moments.covs[other, i, i]):
             return False
     return True
 
@@ -156,6 +159,8 @@ def merge_versions(glmb: Glmb, caps: MixtureCaps, max_error: float) -> tuple[Glm
     track is the mixture of its versions, each weighed by all hypotheses that hold it, and reduced; hypotheses that are
     then equal are one. Heaviest first.
     """
+    if not (caps.merge_distance > 0.0 and max_error > 0.0):
+        return glmb, 0.0
     choices, weights = choices_of(glmb), np.zeros(len(glmb.tracks.labels))
     for h in range(len(choices.weights)):
         for e in range(glmb.hyp_offsets[h], glmb.hyp_offsets[h + 1]):
@@ -190,21 +195,15 @@ def _merged_tracks(
     tracks: Tracks, leader: Ints, num_leaders: int, weights: Floats, caps: MixtureCaps
 ) -> tuple[Ints, Tracks]:
     """(num_tracks,) the number of each leader's merged track, and these."""
-    num, filled, end = len(leader), 0, 0
+    num, filled = len(leader), 0
     number, labels = filled_ints(num, -1), np.empty((num_leaders, 2), np.int64)
-    pool_offsets, pool, pooled = np.zeros(num_leaders + 1, np.int64), counted_ints(num), np.empty(num)
     for first in range(num):
-        if leader[first] != first:
-            continue
-        number[first] = filled
-        labels[filled, 0], labels[filled, 1] = tracks.labels[first, 0], tracks.labels[first, 1]
-        for track in range(num):
-            if leader[track] == first:
-                pool[end], pooled[end] = track, weights[track]
-                end += 1
-        filled += 1
-        pool_offsets[filled] = end
-    return number, pooled_tracks(tracks, labels, pool_offsets, pool[:end].copy(), pooled[:end].copy(), caps)
+        if leader[first] == first:
+            number[first] = filled
+            labels[filled, 0], labels[filled, 1] = tracks.labels[first, 0], tracks.labels[first, 1]
+            filled += 1
+    offsets, pool = group_members(number[leader], num_leaders)
+    return number, pooled_tracks(tracks, labels, offsets, pool, weights[pool], caps)
 
 
 __all__ = ["merge_versions"]

@@ -12,6 +12,7 @@ from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.compile import kernel
 from vedette.kernels.base.types import Floats, Lmb, ScanInput, Sensor
 from vedette.kernels.gaussian.scratch import make_scratch
+from vedette.kernels.steps.in_view import in_view, marked
 from vedette.kernels.steps.lmb import weigh_by_existence
 
 
@@ -21,9 +22,10 @@ def prob_explained(belief: Lmb, scan: ScanInput, sensor: Sensor, truncation: Tru
 
     sum over labels of r <p, p_D g(z | .)> / (kappa(z) + the same sum).
     """
-    rows = standing_rows(belief.tracks, len(sensor.angular))
+    seen = marked(belief, in_view(belief.tracks, scan, sensor, truncation))
+    rows = standing_rows(seen.tracks, len(sensor.angular))
     expect_rows(sensor, scan.pose, rows, make_scratch(belief.tracks.means.shape[1], len(sensor.angular)))
-    weigh_by_existence(belief.existence_logit, rows)
+    weigh_by_existence(seen.existence_logit, rows)
     options, _, _ = weighed_options(rows, scan, sensor, truncation)
     odds = np.zeros(len(scan.measurements))
     for option in range(options.offsets[-1]):

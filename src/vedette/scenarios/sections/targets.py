@@ -67,6 +67,14 @@ class ScriptedTargets(Section):
     kind: Literal["scripted"] = Field(default="scripted", description="Kind of targets [-].")
     tracks: Annotated[tuple[ScriptedTarget, ...], Field(strict=False)] = Field(description="The targets [-].")
 
+    def expected_number(self, num_steps: int) -> float | None:
+        """Most targets that are there at one scan."""
+        changes = np.zeros(num_steps + 2, np.int64)
+        for track in self.tracks:
+            changes[min(track.start_step, num_steps + 1)] += 1
+            changes[min((track.end_step or num_steps) + 1, num_steps + 1)] -= 1
+        return float(np.cumsum(changes)[: num_steps + 1].max())
+
     def build(self, world: _World, motion: MotionModel, folder: Path) -> ScriptedSource:
         """The targets, as `motion` moves them."""
         from vedette.simulation import ScriptedTargets
@@ -133,6 +141,10 @@ class RecordedTargets(Section):
     )
     crop: bool = Field(default=True, description="Whether tracks end at the edges of the region [-].")
 
+    def expected_number(self, num_steps: int) -> float | None:
+        """None: it takes the file to know."""
+        return None
+
     def build(self, world: _World, motion: MotionModel, folder: Path) -> RecordedSource:
         """The targets, as they were recorded. Raises `InputError` for a file that cannot be read, or gives none."""
         from vedette.scenarios.records import recorded_source
@@ -157,6 +169,12 @@ class PoissonTargets(Section):
     @check
     def _spreads(self) -> Iterator[Finding]:
         yield from _negative_stds(self.std)
+
+    def expected_number(self, num_steps: int) -> float | None:
+        """Mean number of targets at the last scan, if none has left the region; None of targets that only so go."""
+        if self.death_probability == 0.0:
+            return None
+        return self.expected * (1.0 - (1.0 - self.death_probability) ** num_steps) / self.death_probability
 
     def build(self, world: _World, motion: MotionModel, folder: Path) -> PoissonSource:
         """The targets, as `motion` moves them."""
@@ -188,6 +206,10 @@ class CrowdTargets(Section):
     @check
     def _spreads(self) -> Iterator[Finding]:
         yield from _negative_stds(self.std)
+
+    def expected_number(self, num_steps: int) -> float | None:
+        """The number at every scan, on average."""
+        return float(self.number)
 
     def build(self, world: _World, motion: MotionModel, folder: Path) -> CrowdSource:
         """The targets, as `motion` moves them."""

@@ -103,6 +103,8 @@ class FilterLimits(Section):
 
 # Filters that keep no identity of their targets.
 UNLABELLED = ("phd", "cphd", "cb_member")
+# Filters of which `max_labels` bounds how many targets there can be.
+LABELS_CAPPED = ("lmb", "factored_glmb", "cb_member")
 
 
 class Filter(Section):

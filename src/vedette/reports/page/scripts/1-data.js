@@ -1,5 +1,9 @@
 // The runs that can be replayed, and numbers as a reader wants them.
 const runs = JSON.parse(document.getElementById("runs").textContent);
+// Curves of rewards whose actions are the same share their axis.
+for (const run of runs) {
+  for (const { curves } of run.decisions) curves.forEach((curve) => Object.assign(curve, run.axes[curve.along]));
+}
 
 const minus = (text) => text.replaceAll("-", "\u2212");
 const fixed = (value, digits) => minus(value.toFixed(digits));

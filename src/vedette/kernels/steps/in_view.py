@@ -1,0 +1,145 @@
+"""Which tracks a scan says anything of, so that one sensor's scan costs what is near it, not what there is.
+
+A track out of view, which is missed as it had to be, stays as it was: of 1 - p_D nothing is left to write in a double,
+and of p_D g(z | x) / kappa(z) nothing beside 1 whatever was measured.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from vedette.kernels.association.options import log_clutter_at
+from vedette.kernels.association.truncation import Truncation
+from vedette.kernels.base.compile import inlined, kernel
+from vedette.kernels.base.types import Bools, Ints, Lmb, ScanInput, Sensor, Tracks
+from vedette.kernels.gaussian.detection import detection_probability
+from vedette.kernels.gaussian.linalg import LOG_2PI, cholesky, log_det_from_factor, normalise_logs
+from vedette.kernels.gaussian.mixtures import MixtureCaps, copy_component, make_components, reduce_mixture
+from vedette.kernels.gaussian.scratch import Scratch, make_scratch
+
+_NOTHING = 2.0**-54  # beside 1
+
+
+@kernel
+def _least_log_clutter(scan: ScanInput, sensor: Sensor, floor: float) -> float:
+    """Where clutter is thinnest among the measurements; inf where there are none."""
+    least = math.inf
+    for j in range(len(scan.measurements)):
+        least = min(least, max(log_clutter_at(sensor, scan.measurements[j], scan.pose), floor))
+    return least
+
+
+@inlined
+def _says_something(
+    tracks: Tracks, c: int, scan: ScanInput, sensor: Sensor, least_log_clutter: float, scratch: Scratch
+) -> bool:
+    """Whether the scan may change a component: no measurement is likelier of it than at the peak of the noise alone."""
+    mean, noise = tracks.means[c], scratch.measurement_noise
+    chance = detection_probability(sensor, scan.pose, mean, tracks.covs[c], scratch.points[0])
+    if chance == 0.0 or chance > _NOTHING:
+        return chance > 0.0
+    if least_log_clutter == math.inf:
+        return False
+    sensor.measurement_noise_cov(mean, scan.pose, sensor.noise_params, noise)
+    if not cholesky(noise, scratch.innovation_cov):
+        return True
+    log_peak = -0.5 * (log_det_from_factor(scratch.innovation_cov) + noise.shape[0] * LOG_2PI)
+    return math.log(chance) + log_peak - least_log_clutter > math.log(_NOTHING)
+
+
+@kernel
+def in_view(tracks: Tracks, scan: ScanInput, sensor: Sensor, truncation: Truncation) -> Bools:
+    """(num_tracks,) whether the scan may say anything of each track."""
+    marks, scratch = np.zeros(len(tracks.labels), np.bool_), make_scratch(tracks.means.shape[1], len(sensor.angular))
+    least_log_clutter = _least_log_clutter(scan, sensor, truncation.log_clutter_floor)
+    for i in range(len(marks)):
+        for c in range(tracks.offsets[i], tracks.offsets[i + 1]):
+            if _says_something(tracks, c, scan, sensor, least_log_clutter, scratch):
+                marks[i] = True
+                break
+    return marks
+
+
+@kernel
+def marked(lmb: Lmb, marks: Bools) -> Lmb:
+    """The LMB of the marked tracks."""
+    num, num_components = 0, 0
+    for i in range(len(marks)):
+        if marks[i]:
+            num += 1
+            num_components += lmb.tracks.offsets[i + 1] - lmb.tracks.offsets[i]
+    room, logits, filled = make_components(num_components, lmb.tracks.means.shape[1]), np.empty(num), 0
+    out = Tracks(np.empty((num, 2), np.int64), np.zeros(num + 1, np.int64), room.log_weights, room.means, room.covs)
+    for i in range(len(marks)):
+        if marks[i]:
+            _copy(lmb.tracks, i, out, filled)
+            logits[filled] = lmb.existence_logit[i]
+            filled += 1
+    return Lmb(out, logits)
+
+
+@kernel
+def _copy(source: Tracks, i: int, out: Tracks, num: int) -> None:
+    """Write track `i` of `source` as number `num`."""
+    end = out.offsets[num]
+    for c in range(source.offsets[i], source.offsets[i + 1]):
+        out.log_weights[end] = source.log_weights[c]
+        copy_component(source.means, source.covs, c, out.means, out.covs, end)
+        end += 1
+    out.labels[num, 0], out.labels[num, 1] = source.labels[i, 0], source.labels[i, 1]
+    out.offsets[num + 1] = end
+
+
+@kernel
+def _copy_reduced(source: Tracks, i: int, caps: MixtureCaps, out: Tracks, num: int) -> bool:
+    """As `_copy`, reduced; whether that left all components, so that there is nothing more to reduce."""
+    _copy(source, i, out, num)
+    first, end = out.offsets[num], out.offsets[num + 1]
+    if end - first == 1:
+        return True
+    log_weights, means, covs = reduce_mixture(
+        out.log_weights[first:end], out.means[first:end], out.covs[first:end], caps
+    )
+    normalise_logs(log_weights)
+    out.offsets[num + 1] = first + len(log_weights)
+    for c in range(len(log_weights)):
+        out.log_weights[first + c] = log_weights[c]
+        copy_component(means, covs, c, out.means, out.covs, first + c)
+    return bool(len(log_weights) == end - first)
+
+
+@kernel
+def put_back(prior: Lmb, marks: Bools, updated: Lmb, caps: MixtureCaps, settled: Bools) -> tuple[Lmb, Bools]:
+    """The prior with its marked tracks as in `updated`, or gone where they are not in it; in label order.
+
+    Mixtures of the others are reduced as by an update that changes nothing, which may merge what the last one made,
+    but for the `settled` ones, of which it is known that it does not. Also returns which are settled now.
+    """
+    most, dim = len(marks), prior.tracks.means.shape[1]
+    room = make_components(len(prior.tracks.log_weights) + len(updated.tracks.log_weights), dim)
+    logits, still, num, own = np.empty(most), np.zeros(most, np.bool_), 0, 0
+    out = Tracks(np.empty((most, 2), np.int64), np.zeros(most + 1, np.int64), room.log_weights, room.means, room.covs)
+    for i in range(most):
+        if not marks[i]:
+            if settled[i]:
+                _copy(prior.tracks, i, out, num)
+            still[num] = settled[i] or _copy_reduced(prior.tracks, i, caps, out, num)
+            logits[num] = prior.existence_logit[i]
+            num += 1
+        elif own < len(updated.existence_logit) and _same_label(prior.tracks.labels, i, updated.tracks.labels, own):
+            _copy(updated.tracks, own, out, num)
+            logits[num] = updated.existence_logit[own]
+            num, own = num + 1, own + 1
+    end = out.offsets[num]
+    tracks = Tracks(out.labels[:num], out.offsets[: num + 1], out.log_weights[:end], out.means[:end], out.covs[:end])
+    return Lmb(tracks, logits[:num]), still[:num]
+
+
+@inlined
+def _same_label(labels: Ints, i: int, others: Ints, j: int) -> bool:
+    return bool(labels[i, 0] == others[j, 0] and labels[i, 1] == others[j, 1])
+
+
+__all__ = ["in_view", "marked", "put_back"]
