@@ -36,13 +36,8 @@ _POINTS_A_SIDE = 21
 
 def cautions(scenario: Scenario) -> tuple[str, ...]:
     """Warnings of a valid scenario, one line each, with file, line and column where it was read from a file."""
-<<<<<<< HEAD
     found = [*_records(scenario), *_views(scenario), *_births(scenario), *_late_beliefs(scenario)]
-    found += [*_many_sensors(scenario), *_cells(scenario.model)]
-=======
-    found = [*_records(scenario), *_views(scenario.model), *_births(scenario.model), *_late_beliefs(scenario.model)]
-    found += [*_cells(scenario.model), *_labels(scenario.model)]
->>>>>>> networks
+    found += [*_many_sensors(scenario), *_cells(scenario.model), *_labels(scenario.model)]
     if not found:
         return ()
     document = document_of(scenario)
@@ -140,10 +135,6 @@ def _cells(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
             return
 
 
-<<<<<<< HEAD
-def _views(scenario: Scenario) -> Iterator[tuple[Path, str]]:
-    model = scenario.model
-=======
 def _labels(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
     number = model.targets.expected_number(model.time.num_steps)
     if not isinstance(model.filter, Filter) or model.filter.kind not in LABELS_CAPPED or number is None:
@@ -157,8 +148,8 @@ def _labels(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
         )
 
 
-def _views(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
->>>>>>> networks
+def _views(scenario: Scenario) -> Iterator[tuple[Path, str]]:
+    model = scenario.model
     fusion = _fusion_by_label(model)
     if fusion is None or fusion.by_views:
         return
