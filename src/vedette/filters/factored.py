@@ -20,8 +20,8 @@ from vedette.kernels.steps.factored import FactoredReport, Factoring, step_facto
 from vedette.kernels.steps.lmb import Reduction
 from vedette.models.arguments import dimension, non_negative
 
-# Of the error that a split may make, the share that one pair of claims to a measurement may.
-_SHARE_OF_A_LINK = 0.01
+# Of the error that a split may make, the share that one pair of claims to a measurement may; its error is twice that.
+_SHARE_OF_A_LINK = 0.2
 
 # Of the largest factors, how many may take a scan together.
 _FACTORS_TOGETHER = 4
@@ -44,8 +44,8 @@ class FactoredGlmbFilter(SingleSensorFilter):
         sensor: what the sensor sees of them.
         limits: caps and thresholds; those on hypotheses hold for each factor.
         max_split_error: L1 error, of densities that each integrate to 1, up to which the labels of a factor are split;
-            0 to 2. Two factors are taken together where both take a measurement with a probability above a hundredth
-            of half of this, if they were independent.
+            0 to 2; and up to which versions of a label are made one. Two factors are taken together where both take a
+            measurement with a probability above a tenth of this, if they were independent.
         max_factor_labels: labels of a factor at most, and a quarter of those that take a scan together; where more
             contend, links are made from the strongest on and left out where they would join more. What all this leaves
             out is in `FilterInfo.factoring_error`.

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vedette.kernels.base.arrays import counted_ints, filled_ints
-from vedette.kernels.base.compile import inlined, kernel
+from vedette.kernels.base.compile import kernel
 from vedette.kernels.base.types import Floats, Glmb, Ints, Tracks
 from vedette.kernels.gaussian.distances import l1_bound
 from vedette.kernels.gaussian.linalg import cholesky, log_sum, solve_lower
@@ -22,76 +22,69 @@ from vedette.kernels.labelled.groups import group_log_sums
 from vedette.kernels.labelled.labels import group_members
 from vedette.kernels.labelled.splitting import Choices, choices_of, group_choices
 
-# A share of the error so small that nobody looks for a cheaper pair.
-_CHEAP = 1e-3
-
 
 class _Pairs(NamedTuple):
-    """For each version the heavier one of its label that it is made one with at the least cost."""
+    """For each version a heavier one of its label that it may be made one with, and what that costs."""
 
     costs: Floats  # (num_tracks,) inf where there is none within reach
     heavier: Ints  # (num_tracks,)
 
 
-@inlined
-def _may_be_near(other: int, heavier: int, moments: Moments, distance: float, most_apart: float) -> bool:
-    """Whether the Mahalanobis distance may be below `distance` and `l1_bound` at most `most_apart`: by each coordinate.
+@kernel
+def _likeliest_heavier(versions: Ints, weights: Floats, moments: Moments) -> Ints:
+    """(num_versions,) place of the heavier version that each is probably made one with at the least cost, -1 for none.
 
-    A marginal's Bhattacharyya coefficient, exp(-d^2 / (4 (P_a + P_b))) at most, is not below that of the whole, and
-    -log(1 - y) is at most y / (1 - y).
+    By diagonals alone: for near Gaussians the squared L1 distance grows as sum d^2 / P + (log P - log Q)^2 / 2.
     """
-    squared_share = 0.25 * most_apart * most_apart
-    reach = 2.0 * squared_share / (1.0 - squared_share) if squared_share < 1.0 else math.inf
-    for i in range(moments.means.shape[1]):
-        offset, variance = moments.means[other, i] - moments.means[heavier, i], moments.covs[heavier, i, i]
-        squared = offset * offset
-        if squared > distance * distance * variance or squared > reach * (variance + moments.covs[other, i, i]):
-            return False
-    return True
+    num, dim = len(versions), moments.means.shape[1]
+    means, inverses, logs = np.empty((num, dim)), np.empty((num, dim)), np.empty((num, dim))
+    for k in range(num):
+        for a in range(dim):
+            variance = moments.covs[versions[k], a, a]
+            means[k, a], inverses[k, a], logs[k, a] = moments.means[versions[k], a], 1.0 / variance, math.log(variance)
+    found = filled_ints(num, -1)
+    for k in range(1, num):
+        least, weight = math.inf, weights[versions[k]]
+        for i in range(k):
+            gap = 0.0
+            for a in range(dim):
+                offset, ratio = means[k, a] - means[i, a], logs[k, a] - logs[i, a]
+                gap += offset * offset * inverses[i, a] + 0.5 * ratio * ratio
+            # Of the weights v <= w only w / (v + w) differs from one heavier version to the next.
+            share = weights[versions[i]] / (weights[versions[i]] + weight) if weight > 0.0 else 1.0
+            if share * share * gap < least:
+                least, found[k] = share * share * gap, i
+    return found
 
 
 @kernel
-def _cheapest_pairs(
-    versions: Ints, weights: Floats, moments: Moments, distance: float, max_error: float, pairs: _Pairs
-) -> None:
-    """Find the pairs of one label. versions: heaviest first. A pair that costs more than `max_error` may be left out.
+def _find_pairs(versions: Ints, weights: Floats, moments: Moments, distance: float, pairs: _Pairs) -> None:
+    """Find the pairs of one label. versions: heaviest first.
 
     Two versions of weights v and w that are made their mixture change the density by 2 v w / (v + w) times the L1
     distance between them, at most: as much if which of them it is says all about the other labels, not at all if it
     says nothing.
     """
-    dim = moments.means.shape[1]
-    factor, offset, scratch = np.empty((dim, dim)), np.empty(dim), np.empty((dim, dim))
-    for i in range(len(versions)):
-        heavier, has_factor = versions[i], False
-        for k in range(i + 1, len(versions)):
-            other = versions[k]
-            both, most = weights[heavier] + weights[other], min(max_error, pairs.costs[other])
-            rate = 2.0 * weights[heavier] * weights[other] / both if both > 0.0 else 0.0
-            if most < _CHEAP * max_error:
-                continue
-            if not _may_be_near(other, heavier, moments, distance, most / rate if rate > 0.0 else math.inf):
-                continue
-            if not has_factor and not cholesky(moments.covs[heavier], factor):
-                break
-            has_factor, squared = True, 0.0
-            for a in range(dim):
-                offset[a] = moments.means[other, a] - moments.means[heavier, a]
-            solve_lower(factor, offset, offset)
-            for a in range(dim):
-                squared += offset[a] * offset[a]
-            if squared >= distance * distance:
-                continue
-            cost = rate * l1_bound(
-                moments.means[other],
-                moments.covs[other],
-                moments.means[heavier],
-                moments.covs[heavier],
-                scratch,
-                offset,
+    dim, places = moments.means.shape[1], _likeliest_heavier(versions, weights, moments)
+    factor, offset = np.empty((dim, dim)), np.empty(dim)
+    for k in range(1, len(versions)):
+        if places[k] < 0:
+            continue
+        other, heavier, squared = versions[k], versions[places[k]], 0.0
+        if not cholesky(moments.covs[heavier], factor):
+            continue
+        for a in range(dim):
+            offset[a] = moments.means[other, a] - moments.means[heavier, a]
+        solve_lower(factor, offset, offset)
+        for a in range(dim):
+            squared += offset[a] * offset[a]
+        if squared < distance * distance:
+            v, w = weights[other], weights[heavier]
+            apart = l1_bound(
+                moments.means[other], moments.covs[other], moments.means[heavier], moments.covs[heavier], factor, offset
             )
-            if cost < pairs.costs[other]:
-                pairs.costs[other], pairs.heavier[other] = cost, heavier
+            pairs.costs[other] = 2.0 * v * w / (v + w) * apart if v > 0.0 else 0.0
+            pairs.heavier[other] = heavier
 
 
 @kernel
@@ -113,7 +106,7 @@ def _leaders(glmb: Glmb, choices: Choices, weights: Floats, distance: float, max
                 versions[count] = track
                 count += 1
         order = descending_order(weights[versions[:count]])
-        _cheapest_pairs(versions[:count][order], weights, moments, distance, max_error, pairs)
+        _find_pairs(versions[:count][order], weights, moments, distance, pairs)
     leader, num_leaders, spent = counted_ints(len(weights)), len(weights), 0.0
     for track in descending_order(-pairs.costs):
         spent += pairs.costs[track]
