@@ -12,6 +12,7 @@ import pytest
 
 from filters.examples import DT, REGION, SCENES, assert_same_mixtures, linear_scene, plain_glmb, plain_lmb, together
 from reference import glmb as oracle
+from reference.l1 import l1_distance
 from vedette import models
 from vedette.densities import GLMB, LMB, FactoredGLMB, TrackTable
 from vedette.errors import InputError, NumericalError
@@ -193,6 +194,54 @@ def assert_bound_holds(seed: int) -> tuple[float, float]:
 def test_the_error_bound_is_never_below_the_true_error():
     found = np.array([assert_bound_holds(seed) for seed in range(60)])
     assert np.count_nonzero(found[:, 1] > 1e-3) > 10  # something is lost in many of them
+
+
+def one_scan(prior: FactoredGLMB, scan: Any, sensor: Any, targets: Any, **dials: Any) -> tuple[float, float, float]:
+    """The true L1 error of a scan at the limits that users run, its standard error, and what is stated."""
+    rng = np.random.default_rng(0)
+    exact, _ = DeltaGlmbFilter(targets, sensor, Limits.none()).step(as_one(prior), scan, np.zeros(3), DT, 2, rng=rng)
+    tracker = FactoredGlmbFilter(targets, sensor, **dials)
+    got, info = tracker.step(prior, scan, np.zeros(3), DT, 2, rng=rng)
+    error, spread = l1_distance(expanded(got), plain_glmb(exact), 1000, rng)
+    stated = info.factoring_error + info.reduction_error + 4.0 * info.discarded_weight_bound
+    return error, spread, stated + 2.0 * info.dropped_existence
+
+
+@pytest.mark.parametrize("max_split_error", [None, 0.0, 0.3])
+def test_at_the_default_limits_no_error_is_larger_than_what_is_stated(max_split_error):
+    dials = {} if max_split_error is None else {"max_split_error": max_split_error}
+    lossy = 0
+    for seed in range(30):
+        rng = np.random.default_rng(seed)
+        prior, (targets, sensor, scan) = random_prior(rng), contested_scene(rng)
+        error, spread, stated = one_scan(prior, scan, sensor, targets, **dials)
+        assert error <= stated + 4.0 * spread + 1e-6, f"seed {seed}: error {error} +- {spread}, stated {stated}"
+        lossy += error > 0.01
+    assert lossy > (0 if max_split_error == 0.0 else 3)
+
+
+@pytest.mark.parametrize("apart", [1.0, 1.5, 1.9])
+@pytest.mark.parametrize("max_split_error", [None, 0.0, 0.7])
+def test_labels_that_depend_on_each_other_stay_so_or_it_is_stated(apart, max_split_error):
+    """Both left, or both right, some standard deviations apart; and then an empty scan of a blind sensor."""
+    dials = {} if max_split_error is None else {"max_split_error": max_split_error}
+    places = [[-apart * 5.0, 0.0, 0.0, 0.0], [apart * 5.0, 0.0, 0.0, 0.0]]
+    tracks = TrackTable.from_gaussians(
+        [[-2, 0], [-2, 0], [-2, 1], [-2, 1]], np.array(places + places), [np.diag([100.0, 100.0, 1.0, 1.0])] * 4
+    )
+    prior = FactoredGLMB.from_factors([GLMB.from_hypotheses(tracks, [[0, 2], [1, 3]], [0.5, 0.5])], 4)
+    nobody = models.BirthModel(np.array([0.1]), np.zeros((1, 4)), np.eye(4)[None], frozenset({99}))
+    blind = models.SensorModel(
+        models.position(),
+        models.constant_noise([10.0, 10.0]),
+        models.constant_detection(1e-9),
+        models.region_clutter(1.0, REGION, "position"),
+    )
+    targets = models.TargetModel(models.constant_velocity(0.01), models.constant_survival(0.99), nobody)
+    error, spread, stated = one_scan(prior, np.empty((0, 2)), blind, targets, **dials)
+    assert error <= stated + 4.0 * spread + 1e-6
+    if max_split_error != 0.7:
+        assert error < 0.02 + 4.0 * spread
 
 
 def contended(max_search_nodes: int, min_track_weight: float = 1e-5) -> tuple[float, float, bool]:

@@ -91,4 +91,5 @@ def factored_posterior(
         search_cut=any(bool(report.cut) for report in reports),
         cap_met=is_full or any(bool(report.full) for report in reports),
         factoring_error=min(2.0, sum(float(report.split_error + 2.0 * report.taken_twice) for report in reports)),
+        reduction_error=min(2.0, sum(float(report.reduction_error) for report in reports)),
     )

@@ -1,4 +1,4 @@
-"""Distances between Gaussians."""
+"""Distances between Gaussians, and of mixtures of them."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import numpy as np
 
 from vedette.kernels.base.arrays import grown_ints
 from vedette.kernels.base.compile import borrowing, inlined, kernel
-from vedette.kernels.base.types import Floats, Ints
-from vedette.kernels.gaussian.linalg import cholesky, log_det_from_factor, solve_lower
+from vedette.kernels.base.types import Floats, Ints, Mixture
+from vedette.kernels.gaussian.linalg import cholesky, log_det_from_factor, log_sum, solve_lower
 
 _SLACK = 1.0 + 1e-9  # for what rounding does to a distance
 
@@ -98,6 +98,36 @@ def _distance(
     for i in range(len(mean)):
         squared += offset[i] * offset[i]
     return squared, log_det_from_factor(factor)
+
+
+@kernel
+def reduction_bound(mixture: Mixture, width: int, reduced: Mixture, first: int, last: int) -> float:
+    """Upper bound on the L1 distance of the first `width` components, of any scale, from `reduced[first:last]`.
+
+    Each component counts for the nearest of the reduced ones: with weights w_c, v_k and k(c) it is
+
+        sum_c w_c |N_c - M_k(c)| + sum_k |v_k - sum of the w_c with k(c) = k|.
+    """
+    num, dim, total = last - first, mixture.means.shape[1], log_sum(mixture.log_weights[:width])
+    if num == width or total == -math.inf:
+        return 0.0  # nothing was dropped or merged
+    factor, offset, left, error = np.empty((dim, dim)), np.empty(dim), np.empty(num), 0.0
+    for k in range(num):
+        left[k] = math.exp(reduced.log_weights[first + k])
+    for c in range(width):
+        weight, nearest, least = math.exp(mixture.log_weights[c] - total), 0, math.inf
+        if weight == 0.0:
+            continue
+        for k in range(num):
+            at = first + k
+            apart = l1_bound(mixture.means[c], mixture.covs[c], reduced.means[at], reduced.covs[at], factor, offset)
+            if apart < least:
+                nearest, least = k, apart
+        left[nearest] -= weight
+        error += weight * least
+    for k in range(num):
+        error += abs(left[k])
+    return min(error, 2.0)
 
 
 @kernel

@@ -15,6 +15,7 @@ from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.arrays import filled_ints
 from vedette.kernels.base.compile import borrowing, kernel
 from vedette.kernels.base.types import Floats, Glmb, Ints, Mixture
+from vedette.kernels.gaussian.distances import reduction_bound
 from vedette.kernels.gaussian.linalg import log_add, log_sum
 from vedette.kernels.gaussian.mixtures import copy_component
 from vedette.kernels.labelled.factor_store import FactorStore, append_part, append_single, next_component, with_room
@@ -26,8 +27,8 @@ from vedette.kernels.steps.glmb import Associated, kept_children
 from vedette.kernels.steps.lmb import Reduction, append_reduced, write_mixture
 
 # Places in the sums of a scan; what each is says `FactoredReport`.
-TOTAL, KEPT, TWICE, SPLIT, DROPPED, CUT, FULL = range(7)
-_NUM_SUMS = 7
+TOTAL, KEPT, TWICE, SPLIT, DROPPED, CUT, FULL, REDUCED = range(8)
+_NUM_SUMS = 8
 
 # Of the error that a group may be split with, what making versions of a label one may add.
 _SHARE_OF_VERSIONS = 1.0
@@ -77,11 +78,14 @@ def _append_mixture(
     store: FactorStore, label: Ints, wide: Mixture, width: int, logit: float, reduction: Reduction, sums: Floats
 ) -> FactorStore:
     """Enter a label as a factor of its own, unless it is too improbable."""
+    existence = 1.0 / (1.0 + math.exp(-logit))
     if logit < reduction.min_existence_logit:
-        sums[DROPPED] += 1.0 / (1.0 + math.exp(-logit))
+        sums[DROPPED] += existence
         return store
     store = with_room(store, 1, width, 2, 1)
-    end = append_reduced(wide, width, reduction.mixture, store.components, next_component(store))
+    start = next_component(store)
+    end = append_reduced(wide, width, reduction.mixture, store.components, start)
+    sums[REDUCED] += existence * reduction_bound(wide, width, store.components, start, end)
     append_single(store, label[0], label[1], end, logit)
     return store
 
@@ -185,7 +189,8 @@ def append_parts(
     choices = choices_of(glmb)
     min_existence = 1.0 / (1.0 + math.exp(-reduction.min_existence_logit))
     part_of, error = independent_parts(choices, factoring.max_error, factoring.max_labels, min_existence)
-    sums[SPLIT] += error + merging_error
+    sums[SPLIT] += error
+    sums[REDUCED] += merging_error
     for part in range(len(part_of)):
         size = 0
         for k in range(len(part_of)):

@@ -26,6 +26,7 @@ from vedette.kernels.steps.factor_updates import (
     DROPPED,
     FULL,
     KEPT,
+    REDUCED,
     SPLIT,
     TOTAL,
     TWICE,
@@ -49,6 +50,7 @@ class FactoredReport(NamedTuple):
     full: bool  # a group has as many hypotheses as it may
     taken_twice: float  # upper bound on the probability that factors of two groups take one measurement
     split_error: float  # summed L1 error of the splits
+    reduction_error: float  # summed L1 bound of what merging versions and reducing mixtures changed
     dropped_existence: float  # summed existence of dropped labels
     most_labels: int  # of a group
 
@@ -95,6 +97,7 @@ def _finish(
         sums[FULL] > 0.0,
         min(sums[TWICE], 1.0),
         sums[SPLIT],
+        sums[REDUCED],
         sums[DROPPED],
         most_labels,
     )
