@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,11 @@ from vedette.kernels.steps.in_view import in_view
 from vedette.kernels.steps.multi_sensor_combinations import standing_combinations
 from vedette.kernels.steps.multi_sensor_lmb import update_lmb
 
-KINDS = [(SequentialLmbFilter, sequential_lmb), (SequentialFactoredFilter, sequential_factored)]
+# Every label alone: lists of hypotheses would be cut anew by each scan that says nothing of them, if it went to them all.
+KINDS = [
+    (SequentialLmbFilter, sequential_lmb),
+    (partial(SequentialFactoredFilter, max_split_error=2.0), sequential_factored),
+]
 SPACING, NUM = 150.0, 12  # m, sensors in a row, of which each sees up to its neighbours
 REGION = models.Region(-500.0, NUM * SPACING + 500.0, -500.0, 500.0)
 POSES = np.column_stack([SPACING * np.arange(NUM), np.zeros(NUM), np.zeros(NUM)])

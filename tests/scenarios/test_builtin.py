@@ -42,7 +42,7 @@ NOTE_ROWS = {
     5: ("sensors.0.clutter", RegionClutter()),
     6: ("birth.steps", "every"),
     7: ("fusion.missing_weight", 1e-6),
-    8: ("fusion.mixture_power", "moment_matched"),
+    8: ("fusion.mixture_power", "auto"),
     9: ("fusion.feedback", False),
     10: ("control.horizon_period", 2.0),
     12: ("control.ideal_measurements", "ideal"),

@@ -20,8 +20,9 @@ from vedette.kernels.steps.factored import FactoredReport, Factoring, step_facto
 from vedette.kernels.steps.lmb import Reduction
 from vedette.models.arguments import dimension, non_negative
 
-# Of the error that a split may make, the share that one pair of claims to a measurement may; its error is twice that.
-_SHARE_OF_A_LINK = 0.2
+# Two claims to a measurement make a link where both hold with a probability above this times the error of a split, or
+# above this at all. Weaker links make groups that no list is long enough for.
+_LINK_PER_ERROR, _WEAKEST_LINK = 2.0, 0.02
 
 # Of the largest factors, how many may take a scan together.
 _FACTORS_TOGETHER = 4
@@ -45,10 +46,14 @@ class FactoredGlmbFilter(SingleSensorFilter):
         limits: caps and thresholds; those on hypotheses hold for each factor.
         max_split_error: L1 error, of densities that each integrate to 1, up to which the labels of a factor are split;
             0 to 2; and up to which versions of a label are made one. Two factors are taken together where both take a
-            measurement with a probability above a tenth of this, if they were independent.
+            measurement with a probability above twice this, or above .02, if they were independent; see
+            `scans_together`.
         max_factor_labels: labels of a factor at most, and a quarter of those that take a scan together; where more
             contend, links are made from the strongest on and left out where they would join more. What all this leaves
             out is in `FilterInfo.factoring_error`.
+        scans_together: scans of one time that go into one belief, of this sensor and others, as by `ParallelUpdate`.
+            What a weak link that is cut leaves out counts with each of them: so for S scans links are cut S^2 times
+            later.
 
     Raises:
         InputError: a part of another kind, or a field out of range.
@@ -56,10 +61,12 @@ class FactoredGlmbFilter(SingleSensorFilter):
 
     max_split_error: float = 0.01
     max_factor_labels: int = 20
+    scans_together: int = 1
 
     def __post_init__(self) -> None:
         SingleSensorFilter.__post_init__(self)  # slots replace the class that super() looks for
         check_factoring(self.max_split_error, self.max_factor_labels)
+        dimension("scans_together", self.scans_together)
 
     def initial(self) -> FactoredGLMB:
         """The belief before the first scan: no target."""
@@ -110,7 +117,7 @@ class FactoredGlmbFilter(SingleSensorFilter):
         return self._concluded(posterior, report, num_duplicates, "")
 
     def _reduction(self) -> tuple[Reduction, Factoring]:
-        return self.limits.reduction(), factoring_of(self.max_split_error, self.max_factor_labels)
+        return self.limits.reduction(), factoring_of(self.max_split_error, self.max_factor_labels, self.scans_together)
 
     def _concluded(
         self, posterior: FactoredGlmb, report: FactoredReport, num_duplicates: int, place: str
@@ -138,8 +145,8 @@ def check_factoring(max_split_error: Any, max_factor_labels: Any) -> None:
     dimension("max_factor_labels", max_factor_labels)
 
 
-def factoring_of(max_split_error: float, max_factor_labels: int) -> Factoring:
+def factoring_of(max_split_error: float, max_factor_labels: int, scans_together: int) -> Factoring:
     """The fields of a filter as kernels take them."""
-    error = float(max_split_error)
-    most = int(max_factor_labels)
-    return Factoring(error, 0.5 * _SHARE_OF_A_LINK * error, most, _FACTORS_TOGETHER * most)
+    error, most = float(max_split_error), int(max_factor_labels)
+    link = min(_LINK_PER_ERROR * error, _WEAKEST_LINK) / scans_together**2
+    return Factoring(error, link, most, _FACTORS_TOGETHER * most)

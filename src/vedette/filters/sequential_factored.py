@@ -48,7 +48,7 @@ class SequentialFactoredFilter(MultiSensorFilter[FactoredGLMB]):
     ) -> tuple[FactoredGLMB, FilterInfo]:
         motion, posterior = kernel_motion(self.targets.motion, self.targets.survival), prior.to_kernel()
         keeping, reports = self.limits.keeping_labels(), list[FactoredReport]()
-        factoring = factoring_of(self.max_split_error, self.max_factor_labels)
+        factoring = factoring_of(self.max_split_error, self.max_factor_labels, len(looks.names))
         given = zip(looks.names, looks.sensors, looks.inputs_in_turn(born, dt), strict=True)
         for s, (name, sensor, scan) in enumerate(given):
             limits = self.limits if s == len(looks.names) - 1 else keeping

@@ -8,7 +8,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from vedette.densities import GLMB, LMB, FactoredGLMB, Labelled, TrackTable, as_lmb
+from vedette.densities import GLMB, LMB, FactoredGLMB, Labelled, TrackTable, as_lmb, settled_lmb
 from vedette.densities.cases import LabelledCases
 from vedette.densities.checks import unchecked
 from vedette.densities.label_sets import Label, single_gaussians, take_tracks
@@ -24,6 +24,7 @@ GATE_PROBABILITY = 0.999  # that two estimates of one target are within the gate
 LIKELY = 0.5  # existence from which a label is matched before the others
 # Sensor s makes labels whose index is at least this times s + 1.
 OWN_LABELS = 1_000_000
+_COMPONENTS = 10  # of a track whose names are settled
 _TIE = 1e-6  # between costs, in favour of equal labels
 
 
@@ -200,8 +201,12 @@ class Matched:
             raise InputError(f"gate_probability: expected a number between 0 and 1; got {self.gate_probability}")
 
     def match(self, beliefs: Sequence[Labelled]) -> list[Labelled]:
-        """The beliefs under common labels."""
-        return match_labels(beliefs, gate_probability=self.gate_probability)
+        """The beliefs under common labels; products of GLMBs with the names settled that they leave open.
+
+        Of several labels that may be one target's, each by itself would be matched as an improbable target.
+        """
+        settled = [_settled(belief) for belief in beliefs]
+        return match_labels(settled, gate_probability=self.gate_probability)
 
     def fuse(self, beliefs: Sequence[Labelled], views: Views | None = None) -> tuple[Any, FusionInfo]:
         """The fusion of the beliefs under common labels; see the rule's. Raises as `match_labels` and the rule."""
@@ -210,6 +215,12 @@ class Matched:
     def lay_out(self, cases: Sequence[LabelledCases], prediction: GLMB | LMB) -> None:
         """None: which labels match differs from case to case. Of matched beliefs, ask the rule."""
         return None
+
+
+def _settled(belief: Labelled) -> Labelled:
+    if not isinstance(belief, FactoredGLMB) or belief.is_bernoulli.all():
+        return belief
+    return FactoredGLMB.from_lmb(settled_lmb(belief, max_components=_COMPONENTS))
 
 
 __all__ = ["GATE_PROBABILITY", "LIKELY", "OWN_LABELS", "Matched", "common_names", "match_labels", "relabelled"]

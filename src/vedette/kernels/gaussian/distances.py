@@ -40,9 +40,9 @@ def _may_be_near(
 def l1_bound(mean: Floats, cov: Floats, other_mean: Floats, other_cov: Floats, factor: Floats, offset: Floats) -> float:
     """Upper bound on the L1 distance of two Gaussians.
 
-    It is 2 sqrt(1 - b^2), with their Bhattacharyya coefficient
+    It is 2 sqrt(1 - b^2), with their Bhattacharyya coefficient:
 
-    b = (det P_a det P_b)^(1/4) / det((P_a + P_b) / 2)^(1/2) exp(-d' (P_a + P_b)^-1 d / 4).
+        b = (det P_a det P_b)^(1/4) / det((P_a + P_b) / 2)^(1/2) exp(-d' (P_a + P_b)^-1 d / 4).
 
     At most 2, which stands for covariances that are not positive definite. factor: (dim, dim) and offset: (dim,) to
     work in.
