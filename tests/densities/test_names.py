@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -20,7 +22,7 @@ from vedette.densities import (
     settled_lmb,
 )
 
-_ALL = {"max_components": 10**6, "log_min_weight": -np.inf, "merge_distance": 0.0}
+_ALL: dict[str, Any] = {"max_components": 10**6, "log_min_weight": -np.inf, "merge_distance": 0.0}
 _FAR = 4.0  # standard deviations, as the library has it
 
 
@@ -37,7 +39,7 @@ def _renamed(factor):
 
 def _combined(mixture):
     """Components that are the same one, once."""
-    weights = {}
+    weights: dict[Any, float] = {}
     for weight, mean, cov in mixture:
         key = tuple(mean), tuple(map(tuple, cov))
         weights[key] = weights.get(key, 0.0) + weight
@@ -58,7 +60,7 @@ def test_names_of_a_glmb_are_those_of_the_cheapest_assignments(glmb):
 
 @given(factoreds(max_components=2))
 def test_factors_are_settled_each_by_itself(density):
-    expected = {}
+    expected: dict[Any, Any] = {}
     for factor in density.factors:
         expected |= _renamed(factor)
     _same(plain_lmb(settled_lmb(density, **_ALL)), expected)

@@ -16,7 +16,7 @@ from vedette.kernels.steps.in_view import in_view
 from vedette.kernels.steps.multi_sensor_combinations import standing_combinations
 from vedette.kernels.steps.multi_sensor_lmb import update_lmb
 
-# Every label alone: lists of hypotheses would be cut anew by each scan that says nothing of them, if it went to them all.
+# Every label alone: lists of hypotheses are cut anew by each scan, also by one that says nothing of them.
 KINDS = [
     (SequentialLmbFilter, sequential_lmb),
     (partial(SequentialFactoredFilter, max_split_error=2.0), sequential_factored),

@@ -102,8 +102,7 @@ def test_nothing_in_common_and_nothing_at_all():
 def test_a_glmb_is_converted_first():
     rng = np.random.default_rng(8)
     beliefs = [random_glmb(rng, 3, 10, 2) for _ in range(2)]
-    for power, most in (("moment_matched", 1), ("auto", 4)):
-        rule = Clmb(HALVES, power)
+    for rule, most in ((Clmb(HALVES, "moment_matched"), 1), (Clmb(HALVES), 4)):
         fused, _ = rule.fuse(beliefs)
         _assert_same(fused, rule.fuse([glmb_to_lmb(belief, max_components=most) for belief in beliefs])[0], 1e-10)
 

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-import yaml
 from ruamel.yaml import YAML
 from typer.testing import CliRunner
 
@@ -242,7 +241,7 @@ def test_a_cap_of_labels_that_cannot_suffice_warns(tmp_path: Path, kind: str, ta
             "filter": {"kind": kind, "limits": {"max_labels": 3}},
             "fusion": {"kind": "sequential"},
             "time.num_steps": 15,
-            "targets": yaml.safe_load(targets),
+            "targets": YAML(typ="safe").load(targets),
         },
     )
     found = [line for line in cautions(scene) if "labels are kept" in line]

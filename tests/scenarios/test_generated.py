@@ -14,6 +14,7 @@ from vedette.scenarios.build import build_targets
 from vedette.scenarios.cautions import cautions
 from vedette.scenarios.generated import PATTERNS, VIEWS, GeneratedScene
 from vedette.scenarios.generated_text import scene_text
+from vedette.scenarios.sections.tracking import Filter
 
 
 def scenario(**settings: Any) -> Scenario:
@@ -39,6 +40,7 @@ def test_scenes_of_any_size_are_valid(num_sensors: int, pattern: str, view: str)
 )
 def test_a_scene_has_labels_for_all_its_targets(settings: tuple[int, int | None], most: int) -> None:
     found = scenario(num_sensors=settings[0], num_targets=settings[1])
+    assert isinstance(found.model.filter, Filter)
     assert found.model.filter.limits.max_labels == most
     assert cautions(found) == ()
     short = with_fields(found, {"filter.limits.max_labels": len(found.model.birth.sites) - 1})

@@ -6,14 +6,13 @@ Each section builds its own part (`vedette.scenarios.sections`); here they are p
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
 from vedette.control import MobileSensor, Planner
 from vedette.densities import LMB
 from vedette.errors import InputError
-from vedette.filters import FactoredGlmbFilter, Filter, labels_targets, shared_targets
+from vedette.filters import Filter, labels_targets, shared_targets
 from vedette.fusion import Clmb, CmDeltaGlmb, Fusion, Matched, ParallelUpdate
 from vedette.kernels.base.types import Bools, Floats
 from vedette.models import SensorModel, TargetModel
@@ -71,21 +70,13 @@ def build_sensors(scenario: Scenario) -> tuple[MobileSensor, ...]:
     targets = TargetModel(
         model.motion.build(method, folder), model.survival.build(folder), model.birth.build(model.motion)
     )
-    found = tuple(
+    return tuple(
         MobileSensor(
             model.filter.build(targets, sensor.build(region, method, folder, model.filter.detection_at), folder),
             sensor.platform.build(folder),
         )
         for sensor in model.sensors
     )
-    if model.fusion.kind != "parallel":
-        return found
-    return tuple(replace(sensor, filter=_of_many(sensor.filter, len(found))) for sensor in found)
-
-
-def _of_many(own: Filter, num_sensors: int) -> Filter:
-    """The filter of a sensor whose scan goes into one belief with those of others."""
-    return replace(own, scans_together=num_sensors) if isinstance(own, FactoredGlmbFilter) else own
 
 
 def build_true_sensors(scenario: Scenario, known: Sequence[SensorModel]) -> tuple[TrueSensor, ...]:

@@ -87,7 +87,8 @@ class LocalFilters:
         if isinstance(whole, FactoredGlmbFilter):
             # The errors of all sensors' splits add up, and mixtures are divided by the prediction as they are.
             apart = replace(whole.limits, merge_distance=0.0)
-            whole = replace(whole, limits=apart, max_split_error=whole.max_split_error / len(self.filters))
+            num, error = len(self.filters), whole.max_split_error
+            whole = replace(whole, limits=apart, max_split_error=error / num, scans_together=num)
         if scan is None:
             _, info = replace(whole, sensor=blind_sensor()).update(prediction, NO_SCAN, NO_POSE, rng=rng)
             return prediction, info
