@@ -36,11 +36,11 @@ class FilterInfo:
         factoring_error: of a factored density, upper bound on the L1 error that taking labels as independent has made
             at this scan; 0 for other filters.
         reduction_error: of a factored density, upper bound on the L1 error that taking versions of a label as one, and
-            fewer Gaussians for a track, has made at this scan; other filters do not count it and say 0. The posterior
-            is within factoring_error + reduction_error + 4 discarded_weight_bound of the exact one in L1, but for gates
-            and dropped labels: what is cut off is missed once and spread over the rest once, twice where the claims to
-            measurements are of the rest alone. All this is of one scan, from the belief before it; bounds of several
-            scans do not add up to a bound, as a scan may enlarge the error that it finds.
+            fewer Gaussians for a track, has made at this scan; other filters do not count it and say 0. Not kept with
+            runs. The posterior is within factoring_error + reduction_error + 4 discarded_weight_bound of the exact one
+            in L1, but for gates and dropped labels: what is cut off is missed once and spread over the rest once, twice
+            where the claims to measurements are of the rest alone. All this is of one scan, from the belief before it;
+            bounds of several scans do not add up to a bound, as a scan may enlarge the error that it finds.
     """
 
     log_likelihood: float
