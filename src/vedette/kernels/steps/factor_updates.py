@@ -30,9 +30,6 @@ from vedette.kernels.steps.lmb import Reduction, append_reduced, write_mixture
 TOTAL, KEPT, TWICE, SPLIT, DROPPED, CUT, FULL, REDUCED = range(8)
 _NUM_SUMS = 8
 
-# Of the error that a group may be split with, what making versions of a label one may add.
-_SHARE_OF_VERSIONS = 1.0
-
 # What rounding leaves between the logs of equal weights.
 _ROUNDING = 1e-12
 
@@ -185,7 +182,7 @@ def append_parts(
     store: FactorStore, glmb: Glmb, factoring: Factoring, reduction: Reduction, sums: Floats
 ) -> FactorStore:
     """Split the posterior of a group and enter its parts."""
-    glmb, merging_error = merge_versions(glmb, reduction.mixture, _SHARE_OF_VERSIONS * factoring.max_error)
+    glmb, merging_error = merge_versions(glmb, reduction.mixture, factoring.max_error)
     choices = choices_of(glmb)
     min_existence = 1.0 / (1.0 + math.exp(-reduction.min_existence_logit))
     part_of, error = independent_parts(choices, factoring.max_error, factoring.max_labels, min_existence)
