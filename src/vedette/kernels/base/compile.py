@@ -11,9 +11,13 @@ import inspect
 import os
 import threading
 from collections.abc import Callable
-from functools import cached_property, update_wrapper
+from functools import cache, cached_property, update_wrapper
+from types import ModuleType
 from typing import TYPE_CHECKING, Any, TypeVar, cast
 
+import numpy as np
+
+from vedette.kernels.base.interrupts import interrupts_wait
 from vedette.kernels.base.sources import note_source
 
 if TYPE_CHECKING:
@@ -59,6 +63,13 @@ def _compiled(function: _F, options: dict[str, Any]) -> _F:
 _MAKING = threading.RLock()
 
 
+@cache
+def _dispatchers() -> ModuleType:
+    """What needs Numba, loaded when it is first asked for."""
+    with interrupts_wait():
+        return importlib.import_module("vedette.kernels.base.dispatchers")
+
+
 class Kernel:
     """A function of kernels: part of those that call it, and compiled as a whole where Python calls it."""
 
@@ -71,24 +82,22 @@ class Kernel:
         note_source(function)
 
     def __call__(self, *args: Any) -> Any:
-        return (self._whole or self.whole)(*args)
+        whole = self._whole or self.whole
+        returned = whole(*args)
+        return returned if whole.name is None else whole.name(returned)
 
     @property
     def whole(self) -> WholeKernel:
         """What Python calls."""
-        from vedette.kernels.base.dispatchers import WholeKernel
-
         with _MAKING:
             if self._whole is None:
-                self._whole = WholeKernel.of(self.py_func, self._options)
+                self._whole = _dispatchers().WholeKernel.of(self.py_func, self._options)
         return self._whole
 
     @cached_property
     def part(self) -> PartKernel:
         """What other kernels call; asked for by one that is being compiled."""
-        from vedette.kernels.base.dispatchers import PartKernel
-
-        return PartKernel(self.py_func, targetoptions=self._options | _AS_PART)
+        return _dispatchers().PartKernel(self.py_func, targetoptions=self._options | _AS_PART)
 
     @property
     def _numba_type_(self) -> Any:
@@ -139,16 +148,15 @@ class ModelFunction:
         note_source(function)
 
     def __call__(self, *args: Any) -> Any:
+        """From Python, where an argument may be a read-only array of a density's."""
         if self._numba_type is None:
             self.bind()
-        return self.dispatcher(*args)
+        return self.dispatcher(*map(_writeable, args))
 
     @cached_property
     def dispatcher(self) -> ModelDispatcher:
         """What compiles it and calls it from Python."""
-        from vedette.kernels.base.dispatchers import ModelDispatcher
-
-        return ModelDispatcher.of_model(self, dict(_OPTIONS))
+        return _dispatchers().ModelDispatcher.of_model(self, dict(_OPTIONS))
 
     @property
     def numba_type(self) -> Any:
@@ -161,11 +169,9 @@ class ModelFunction:
 
     def bind(self) -> None:
         """Compile to the signature of the kind and note where the machine code lies; any number of threads may ask."""
-        from vedette.kernels.base.dispatchers import addresses_of
-
         with _MAKING:
             dispatcher = self.dispatcher
-        self.c_address, self.jit_address, found = addresses_of(dispatcher)
+        self.c_address, self.jit_address, found = _dispatchers().addresses_of(dispatcher)
         self._numba_type = found  # last, as it is read without a lock
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -174,6 +180,10 @@ class ModelFunction:
         if named[0].startswith("vedette.") and _found(*named) is self:
             return _found, named
         return _model_of, (self.dispatcher,)
+
+
+def _writeable(value: Any) -> Any:
+    return value.copy() if isinstance(value, np.ndarray) and not value.flags.writeable else value
 
 
 def _found(module: str, name: str) -> Any:
@@ -212,11 +222,9 @@ def compile_model_function(function: Callable[..., Any], kind: str) -> Any:
     model = ModelFunction(function, kind)
     if function.__module__.startswith("vedette."):
         return model
-    from vedette.kernels.base.dispatchers import NumbaError
-
     try:
         model.bind()
-    except NumbaError as error:
+    except _dispatchers().NumbaError as error:
         raise TypeError(f"{kind} function {function.__name__!r} cannot be compiled: {error}") from error
     return model
 

@@ -17,10 +17,12 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, NullCache
+from numba.core.registry import cpu_target
 from numba.core.runtime import rtsys
 from numba.core.serialize import dumps
 
 from vedette.kernels.base import watching
+from vedette.kernels.base.interrupts import interrupts_wait
 from vedette.kernels.base.places import GENERIC, INSTALLED, cache_directory, compiler, folder_name
 from vedette.kernels.base.private_files import fault_of_folder, make_private_folder, read_private, write_private
 from vedette.kernels.base.sources import package_file
@@ -194,6 +196,9 @@ class OnDemand:
         """What was compiled for these types, or None: then it is compiled now."""
         found = self.own.load_overload(signature, target_context)
         if found is None:
+            with interrupts_wait():  # what Numba compiles with, which would stay half there
+                cpu_target.typing_context.refresh()
+                target_context.refresh()
             watching.begins(self._function)
         return found
 

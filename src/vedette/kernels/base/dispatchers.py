@@ -22,6 +22,7 @@ from vedette.kernels.base.bundle_types import TYPED_BY_FIELDS, type_of_bundle, w
 from vedette.kernels.base.compile import SIGNATURES, ModelFunction
 from vedette.kernels.base.disk_cache import OnDemand
 from vedette.kernels.base.libraries import PartLibrary, WholeLibrary, made_as
+from vedette.kernels.base.returned import Shape, naming, returned_without_python, shape_of
 
 when_typed(lambda bundle: typeof_impl.register(bundle)(type_of_bundle))
 
@@ -35,8 +36,18 @@ class PartKernel(CPUDispatcher):  # type: ignore[misc]
             return super().compile(sig)
 
 
+def _is_read_only(kind: Any) -> bool:
+    if isinstance(kind, types.BaseTuple):
+        return any(map(_is_read_only, kind.types))
+    return isinstance(kind, types.Array) and not kind.mutable
+
+
 class WholeKernel(CPUDispatcher):  # type: ignore[misc]
     """A function with all that it reaches, as Python calls it; kept on disk."""
+
+    # What gives names to the plain tuples that it returns; None where they are to have none.
+    name: Callable[[Any], Any] | None = None
+    _shape: Shape = None
 
     @classmethod
     def of(cls, function: Callable[..., Any], options: dict[str, Any]) -> WholeKernel:
@@ -46,14 +57,22 @@ class WholeKernel(CPUDispatcher):  # type: ignore[misc]
         return whole
 
     def compile(self, sig: Any) -> Any:
-        """As a whole."""
-        codegen = self.targetctx.codegen()
-        with made_as(WholeLibrary, codegen):
-            entry = super().compile(sig)
-            # Those of the parts, too, as when it is read from disk.
-            for environment in self.overloads[tuple(normalize_signature(sig)[0])]._find_referenced_environments():
-                codegen.set_env(environment.env_name, environment)
-        return entry
+        """As a whole; raises `TypeError` for a read-only array, for which all would be compiled anew, for minutes."""
+        arguments, _ = normalize_signature(sig)
+        if any(map(_is_read_only, arguments)):
+            raise TypeError(f"kernel {self.py_func.__qualname__}: expected writeable arrays; got a read-only one")
+        with made_as(WholeLibrary, self.targetctx.codegen()), returned_without_python():
+            return super().compile(sig)
+
+    def add_overload(self, cres: Any) -> None:
+        """Take what was compiled or read from disk; all that a call needs stands before it can be called."""
+        for environment in cres._find_referenced_environments():  # those of the parts, too
+            self.targetctx.codegen().set_env(environment.env_name, environment)
+        shape = shape_of(cres.signature.return_type)
+        if self.overloads and shape != self._shape:
+            raise TypeError(f"kernel {self.py_func.__qualname__}: expected one kind of bundle to be returned")
+        self._shape, self.name = shape, shape and naming(shape)
+        super().add_overload(cres)
 
     def typeof_pyval(self, value: Any) -> Any:
         """The type of an argument that Numba's quick way does not know; asked for by its dispatcher.

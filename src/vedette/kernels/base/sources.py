@@ -61,7 +61,15 @@ _ALL = frozenset(PACKAGE_ROOT / "kernels/base" / name for name in ("compile.py",
 # They decide how code is kept and called, not what is compiled.
 _APART = frozenset(
     PACKAGE_ROOT / "kernels/base" / name
-    for name in ("bundle_types.py", "disk_cache.py", "places.py", "private_files.py", "sources.py", "watching.py")
+    for name in (
+        "bundle_types.py",
+        "disk_cache.py",
+        "interrupts.py",
+        "places.py",
+        "private_files.py",
+        "sources.py",
+        "watching.py",
+    )
 )
 
 

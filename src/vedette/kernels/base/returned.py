@@ -1,0 +1,85 @@
+"""How what a kernel returns comes to Python: arrays and plain tuples, which get their names there.
+
+Numba runs Python inside machine code to return an array (it unpickles the array's class) and a named tuple (it calls
+it). Python may run a signal's handler there, and the machine code goes on with the nothing that an interrupted call
+returns: a Ctrl-C ended the process with a segmentation fault. What is made here runs no Python, so that an interrupt
+comes before or after it, and takes less time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import partial
+from typing import Any
+
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.core.boxing import box_tuple
+from numba.core.pythonapi import _boxers
+from numba.np.numpy_support import as_dtype
+
+_NAMED = (types.NamedTuple, types.NamedUniTuple)
+
+# What is returned: None for anything without names inside it, else its class and those of its fields.
+Shape = tuple[type, tuple[Any, ...]] | None
+
+
+def _box_array(kind: Any, value: Any, c: Any) -> Any:
+    """As Numba's, with the class of arrays among the constants of the code."""
+    array_class, dtype = (
+        c.env_manager.read_const(c.env_manager.add_const(constant))
+        for constant in (kind.box_type, as_dtype(kind.dtype))
+    )
+    int32 = ir.IntType(32)
+    signature = ir.FunctionType(c.pyapi.pyobj, [c.pyapi.voidptr, c.pyapi.pyobj, int32, int32, c.pyapi.pyobj])
+    adapt = c.pyapi._get_function(signature, name="NRT_adapt_ndarray_to_python_acqref")
+    place = c.builder.bitcast(cgutils.alloca_once_value(c.builder, value), c.pyapi.voidptr)
+    array = c.builder.call(adapt, [place, array_class, int32(kind.ndim), int32(int(kind.mutable)), dtype])
+    c.context.nrt.decref(c.builder, kind, value)  # the array has its own reference
+    return array
+
+
+_BOXERS = {types.Array: _box_array, **dict.fromkeys(_NAMED, box_tuple)}
+
+
+@contextmanager
+def returned_without_python() -> Iterator[None]:
+    """Have what is compiled meanwhile return so; for a caller who holds the compiler's lock."""
+    before = {kind: _boxers.functions[kind] for kind in _BOXERS}
+    _boxers.functions.update(_BOXERS)
+    try:
+        yield
+    finally:
+        _boxers.functions.update(before)
+
+
+def shape_of(kind: Any) -> Shape:
+    """The names in a return type."""
+    if not isinstance(kind, types.BaseTuple):
+        return None
+    fields = tuple(shape_of(field) for field in kind.types)
+    if isinstance(kind, _NAMED):
+        return kind.instance_class, fields
+    return (tuple, fields) if any(fields) else None
+
+
+def naming(shape: Shape) -> Callable[[tuple[Any, ...]], Any]:
+    """What gives the plain tuples of a shape their names."""
+    assert shape is not None
+    bundle, fields = shape
+    if not any(fields):
+        return partial(tuple.__new__, bundle)
+    inner = [(place, naming(field)) for place, field in enumerate(fields) if field]
+
+    def name(values: tuple[Any, ...]) -> Any:
+        named = list(values)
+        for place, of_field in inner:
+            named[place] = of_field(values[place])
+        return tuple.__new__(bundle, named)
+
+    return name
+
+
+__all__ = ["Shape", "naming", "returned_without_python", "shape_of"]
