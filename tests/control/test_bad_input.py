@@ -23,7 +23,7 @@ from vedette.control import (
     planning_limits,
 )
 from vedette.densities import GLMB, LMB, Poisson
-from vedette.densities.checks import unchecked
+from vedette.densities.containers import unchecked
 from vedette.errors import InputError, ModelError, NumericalError
 from vedette.filters import CbMemberFilter, CphdFilter, Limits, PhdFilter
 from vedette.fusion import Clmb, CmDeltaGlmb

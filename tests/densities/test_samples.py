@@ -23,7 +23,7 @@ from vedette.densities import (
     sample_lmb,
     sample_poisson,
 )
-from vedette.densities.checks import unchecked
+from vedette.densities.containers import unchecked
 from vedette.errors import InputError, NumericalError
 
 MANY = 40_000

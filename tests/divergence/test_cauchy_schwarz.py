@@ -24,7 +24,7 @@ from fusion.examples import A, B, C, full_glmbs, glmb, lmb
 from reference import set_integral as oracle
 from reference.grid import Grid
 from vedette.densities import GLMB, LMB, Poisson, TrackTable, lmb_to_glmb, marginalise
-from vedette.densities.checks import unchecked
+from vedette.densities.containers import unchecked
 from vedette.divergence import cauchy_schwarz, log_inner_product, reference_unit_volume
 from vedette.errors import InputError
 

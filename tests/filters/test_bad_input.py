@@ -11,7 +11,7 @@ import pytest
 
 from vedette import models
 from vedette.densities import GLMB, LMB, FactoredGLMB, TrackTable, existence_probabilities
-from vedette.densities.checks import unchecked
+from vedette.densities.containers import unchecked
 from vedette.errors import InputError, ModelError, NumericalError
 from vedette.filters import (
     CbMemberFilter,

@@ -13,7 +13,7 @@ from scipy.special import logit
 from densities.examples import lmbs, random_glmb, random_lmb
 from fusion.examples import A, B, C, lmb, mixture_track
 from vedette.densities import LMB, Poisson, TrackTable, glmb_to_lmb
-from vedette.densities.checks import unchecked
+from vedette.densities.containers import unchecked
 from vedette.errors import InputError
 from vedette.fusion import Clmb
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from densities.examples import glmbs, random_glmb
 from fusion.examples import ALL_SETS, A, B, C, assert_same_glmb, by_label_set, full_glmbs, glmb
 from vedette.densities import GLMB, LMB, TrackTable, marginalise
-from vedette.densities.checks import unchecked
+from vedette.densities.containers import unchecked
 from vedette.errors import InputError
 from vedette.fusion import CmDeltaGlmb, FusionLimits
 

@@ -89,9 +89,10 @@ def test_labels_that_are_alone_are_fused_as_one_by_one(seed, mixture_power):
     for _ in THIRDS:
         labels = [label for label in LABELS if rng.random() < 0.7]
         beliefs.append(random_factored(rng, [1] * len(labels), max_components=3, labels=rng.permutation(labels)))
+        weights = beliefs[-1].hyp_log_weights.copy()
         for factor in np.flatnonzero(rng.random(len(labels)) < 0.2):
-            weights = beliefs[-1].hyp_log_weights
             weights[2 * factor : 2 * factor + 2] = [-math.inf, 0.0] if rng.random() < 0.5 else [0.0, -math.inf]
+        beliefs[-1] = replace(beliefs[-1], hyp_log_weights=weights)
     rule = CmDeltaGlmb((0.47, 0.32, 0.21), mixture_power=mixture_power, missing_log_weight=math.log(0.01))
     fused, info = rule.fuse(beliefs)
     fused.validate()

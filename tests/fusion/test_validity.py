@@ -9,7 +9,7 @@ import pytest
 
 from densities.examples import random_glmb, random_lmb
 from vedette.densities import LMB, TrackTable
-from vedette.densities.checks import unchecked
+from vedette.densities.containers import unchecked
 from vedette.errors import InputError
 from vedette.fusion import Clmb, CmDeltaGlmb, ValidBeliefs
 from vedette.fusion.validity import all_valid
@@ -31,11 +31,6 @@ def first(value: Any) -> Any:
     return change
 
 
-def locked(array: Any) -> Any:
-    array.flags.writeable = False
-    return array
-
-
 FAULTS = [
     ("labels", lambda a: a[::-1].copy()),
     ("labels", lambda a: np.repeat(a[:1], len(a), axis=0)),
@@ -48,8 +43,6 @@ FAULTS = [
     ("log_weights", first(0.5)),
     ("log_weights", first(np.nan)),
     ("means", first(np.inf)),
-    ("means", lambda a: np.asfortranarray(a)),
-    ("means", locked),
     ("covs", first(-1.0)),
     ("covs", first(np.nan)),
     ("existence_logit", first(np.nan)),

@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from vedette.densities import GLMB, LMB, Labelled, TrackTable, marginalise, track_moments
-from vedette.densities.checks import unchecked
+from vedette.densities.containers import for_kernel, unchecked
 from vedette.densities.label_sets import take_hypotheses
 from vedette.filters.inputs import model_errors
 from vedette.kernels.gaussian.linalg import log_sum
@@ -24,7 +24,7 @@ def heaviest_hypotheses(belief: GLMB, most: int) -> GLMB:
     """The `most` heaviest hypotheses of positive weight, normalised; of equal weights the first."""
     order = np.argsort(-belief.hyp_log_weights, kind="stable")[:most]
     taken = take_hypotheses(belief, order[belief.hyp_log_weights[order] > -np.inf])
-    log_weights = taken.hyp_log_weights - log_sum(taken.hyp_log_weights)
+    log_weights = taken.hyp_log_weights - log_sum(for_kernel(taken.hyp_log_weights))
     return unchecked(GLMB, taken.tracks, taken.hyp_offsets, taken.hyp_tracks, log_weights)
 
 

@@ -14,7 +14,8 @@ from vedette.control.settings import IDEAL_MODES, MobileSensor, PlanningSettings
 from vedette.control.versions import share_versions
 from vedette.densities import GLMB, LMB, MultiTargetSamples, sample_glmb, sample_lmb
 from vedette.densities.cases import LabelledCases
-from vedette.densities.checks import offsets_of, unchecked
+from vedette.densities.checks import offsets_of
+from vedette.densities.containers import unchecked
 from vedette.densities.label_sets import label_sets, places_of, single_gaussians
 from vedette.filters import shared_targets
 from vedette.filters.inputs import model_errors

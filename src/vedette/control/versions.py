@@ -11,7 +11,8 @@ from __future__ import annotations
 import numpy as np
 
 from vedette.densities import GLMB
-from vedette.densities.checks import offsets_of, unchecked
+from vedette.densities.checks import offsets_of
+from vedette.densities.containers import unchecked
 from vedette.densities.label_sets import take_tracks
 from vedette.kernels.base.types import Floats, Ints
 

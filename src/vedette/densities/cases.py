@@ -8,7 +8,8 @@ from typing import TypeAlias
 
 import numpy as np
 
-from vedette.densities.checks import offsets_of, unchecked
+from vedette.densities.checks import offsets_of
+from vedette.densities.containers import for_kernel, unchecked
 from vedette.densities.glmb import GLMB
 from vedette.densities.label_sets import Label, LabelSet, label_sets, single_gaussians, take_hypotheses
 from vedette.densities.lmb import LMB
@@ -74,12 +75,13 @@ class LabelledCases:
     @classmethod
     def of(cls, density: GLMB | LMB) -> LabelledCases:
         """One density as the only case; a GLMB must be marginalised, a mixture is replaced by one of its moments."""
-        tracks = single_gaussians(density.tracks)
+        tracks = single_gaussians(density.tracks).to_kernel()
         if isinstance(density, LMB):
             labels = [tuple(label) for label in tracks.labels.tolist()]
             return cls.of_lmbs(labels, density.existence_logit[None], tracks.means[None], tracks.covs[None])
         means, covs = tracks.means[density.hyp_tracks], tracks.covs[density.hyp_tracks]
-        return cls.of_glmbs(label_sets(density).sets, density.hyp_log_weights[None], means[None], covs[None])
+        log_weights = for_kernel(density.hyp_log_weights)
+        return cls.of_glmbs(label_sets(density).sets, log_weights[None], means[None], covs[None])
 
     @property
     def num_cases(self) -> int:

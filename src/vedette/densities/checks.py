@@ -1,7 +1,6 @@
 """Checks that the containers share. Each raises with the field's name, what was expected and what came.
 
-A container checks itself when it is made, since kernels go by its offsets and indices without looking; those of the
-library's own making are made by `unchecked`.
+A container checks itself when it is made, see `vedette.densities.containers`.
 
 Faults of form (type, shape, order) raise `InputError`. Faults of value (not finite, not normalised, not positive
 definite) raise the `error` given: `NumericalError` where a computation left them, `InputError` for a user's data.
@@ -10,7 +9,7 @@ definite) raise the `error` given: `NumericalError` where a computation left the
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,34 +18,17 @@ from vedette.errors import InputError, NumericalError, VedetteError
 from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.models.arguments import as_array
 
-_Container = TypeVar("_Container")
-
 NORMALISATION_TOLERANCE = 1e-9
 SYMMETRY_TOLERANCE = 1e-9  # of the largest variance
 
 
-def unchecked(container: type[_Container], *fields: Any) -> _Container:
-    """A container of the library's own making, of which the checks would cost more than some steps."""
-    made = object.__new__(container)
-    for name, value in zip(container.__match_args__, fields, strict=True):  # type: ignore[attr-defined]
-        object.__setattr__(made, name, value)
-    return made
-
-
 def check_array(field: str, array: Any, dtype: type, shape: Sequence[int | None]) -> None:
-    """Raise `InputError` unless `array` is a C-contiguous array of this type and shape (None: any length).
-
-    Of any other array, a read-only one too, Numba would compile everything anew, for minutes.
-    """
+    """Raise `InputError` unless `array` is an array of this type and shape (None: any length)."""
     if type(array) is not np.ndarray:
         raise InputError(f"{field}: expected an array of {np.dtype(dtype)}; got {type(array).__name__}")
     if array.dtype != np.dtype(dtype):
         raise InputError(f"{field}: expected an array of {np.dtype(dtype)}; got one of {array.dtype}")
     check_shape(field, array, shape)
-    if not array.flags.c_contiguous:
-        raise InputError(f"{field}: expected a C-contiguous array; got strides {array.strides}")
-    if not (array.flags.writeable and array.flags.aligned):
-        raise InputError(f"{field}: expected a writeable, aligned array; got one that is not (make a copy)")
 
 
 def check_shape(field: str, array: NDArray[Any], shape: Sequence[int | None]) -> None:

@@ -8,7 +8,8 @@ from typing import TypeVar
 
 import numpy as np
 
-from vedette.densities.checks import distinct_labels, offsets_of, take_runs, unchecked
+from vedette.densities.checks import distinct_labels, offsets_of, take_runs
+from vedette.densities.containers import unchecked
 from vedette.densities.factored import FactoredGLMB, Labelled
 from vedette.densities.glmb import GLMB
 from vedette.densities.label_sets import sets_of_factors, take_factors, take_tracks
@@ -128,8 +129,8 @@ def reduced_lmb(density: GLMB | FactoredGLMB, caps: MixtureCaps, *, settled: boo
     all_labels, place = distinct_labels(density.tracks.labels)
     place_of_entry = place[density.hyp_tracks]
     if settled:
-        hypotheses = density.as_hypotheses()
-        place_of_entry = settled_names(hypotheses, density.factor_offsets, density.track_offsets, place, _APART)
+        own = density.to_kernel()
+        place_of_entry = settled_names(density.as_hypotheses(), own.factor_offsets, own.track_offsets, place, _APART)
     used = np.bincount(place_of_entry, minlength=len(all_labels)) > 0  # a table may have more
     factor = np.empty(len(all_labels), np.int64)
     factor[place] = np.repeat(np.arange(density.num_factors), np.diff(density.track_offsets))

@@ -9,6 +9,7 @@ from typing import TypeAlias
 import numpy as np
 
 from vedette.densities import checks
+from vedette.densities.containers import Container, for_kernel, unchecked
 from vedette.densities.glmb import GLMB
 from vedette.densities.lmb import LMB
 from vedette.densities.tracks import TrackTable
@@ -19,7 +20,7 @@ from vedette.kernels.labelled.stacking import join_offsets, stack_glmbs
 
 
 @dataclass(frozen=True, slots=True)
-class FactoredGLMB:
+class FactoredGLMB(Container):
     """Product of independent GLMBs (factors), no two of which share a label.
 
     A GLMB is one factor, an LMB one factor a label. What one factor says of its targets does not depend on another's:
@@ -34,7 +35,7 @@ class FactoredGLMB:
         hyp_log_weights: (num_hyps,) log weights, normalised within each factor.
         factor_offsets: (num_factors + 1,) hypotheses of factor `f` are `factor_offsets[f]:factor_offsets[f + 1]`.
 
-    The arrays are held, not copied, and checked once, here: who changes one later must call `validate` before its use.
+    The arrays are copied, checked once, here, and read-only from then on.
 
     Raises:
         InputError: as `validate`.
@@ -48,6 +49,7 @@ class FactoredGLMB:
     factor_offsets: Ints
 
     def __post_init__(self) -> None:
+        self._own_arrays()
         if not isinstance(self.tracks, TrackTable):
             raise InputError(f"tracks: expected a TrackTable; got {type(self.tracks).__name__}")
         self._validate_factors(InputError)
@@ -77,12 +79,12 @@ class FactoredGLMB:
         return self.tracks.state_dim
 
     def factor(self, index: int) -> GLMB:
-        """One factor, as a GLMB whose arrays are views or copies of these."""
+        """One factor, as a GLMB."""
         low, high = self.track_offsets[index], self.track_offsets[index + 1]
         first, last = self.factor_offsets[index], self.factor_offsets[index + 1]
         table, begin, end = self.tracks, self.hyp_offsets[first], self.hyp_offsets[last]
         start, stop = table.offsets[low], table.offsets[high]
-        tracks = checks.unchecked(
+        tracks = unchecked(
             TrackTable,
             table.labels[low:high],
             table.offsets[low : high + 1] - start,
@@ -91,9 +93,7 @@ class FactoredGLMB:
             table.covs[start:stop],
         )
         offsets = self.hyp_offsets[first : last + 1] - begin
-        return checks.unchecked(
-            GLMB, tracks, offsets, self.hyp_tracks[begin:end] - low, self.hyp_log_weights[first:last]
-        )
+        return unchecked(GLMB, tracks, offsets, self.hyp_tracks[begin:end] - low, self.hyp_log_weights[first:last])
 
     @property
     def factors(self) -> tuple[GLMB, ...]:
@@ -102,31 +102,24 @@ class FactoredGLMB:
 
     def to_kernel(self) -> kt.FactoredGlmb:
         """The same arrays as the bundle that kernels take."""
-        return kt.FactoredGlmb(
-            self.tracks.to_kernel(),
-            self.track_offsets,
-            self.hyp_offsets,
-            self.hyp_tracks,
-            self.hyp_log_weights,
-            self.factor_offsets,
-        )
+        own = (self.track_offsets, self.hyp_offsets, self.hyp_tracks, self.hyp_log_weights, self.factor_offsets)
+        return kt.FactoredGlmb(self.tracks.to_kernel(), *map(for_kernel, own))
 
     def as_hypotheses(self) -> kt.Glmb:
         """The hypotheses of all factors as one list, which is no density: its weights sum to the number of factors."""
-        return kt.Glmb(self.tracks.to_kernel(), self.hyp_offsets, self.hyp_tracks, self.hyp_log_weights)
+        own = map(for_kernel, (self.hyp_offsets, self.hyp_tracks, self.hyp_log_weights))
+        return kt.Glmb(self.tracks.to_kernel(), *own)
 
     @classmethod
     def from_kernel(cls, density: kt.FactoredGlmb) -> FactoredGLMB:
         """The arrays of a bundle as they are; a kernel's own need no check."""
-        return checks.unchecked(cls, TrackTable.from_kernel(density.tracks), *density[1:])
+        return unchecked(cls, TrackTable.from_kernel(density.tracks), *density[1:])
 
     @classmethod
     def empty(cls, state_dim: int) -> FactoredGLMB:
         """The density that is certain of no target: no factor."""
         zero, none = np.zeros(1, np.int64), np.empty(0, np.int64)
-        return checks.unchecked(
-            cls, TrackTable.empty(state_dim), zero, zero.copy(), none, np.empty(0), np.zeros(1, np.int64)
-        )
+        return unchecked(cls, TrackTable.empty(state_dim), zero, zero.copy(), none, np.empty(0), np.zeros(1, np.int64))
 
     @classmethod
     def from_factors(cls, factors: Sequence[GLMB], state_dim: int) -> FactoredGLMB:
@@ -144,9 +137,7 @@ class FactoredGLMB:
     def from_glmb(cls, glmb: GLMB) -> FactoredGLMB:
         """The same density, as one factor."""
         ends = np.array([0, glmb.tracks.num_tracks]), np.array([0, glmb.num_hyps])
-        return checks.unchecked(
-            cls, glmb.tracks, ends[0], glmb.hyp_offsets, glmb.hyp_tracks, glmb.hyp_log_weights, ends[1]
-        )
+        return unchecked(cls, glmb.tracks, ends[0], glmb.hyp_offsets, glmb.hyp_tracks, glmb.hyp_log_weights, ends[1])
 
     @classmethod
     def product(cls, parts: Sequence[FactoredGLMB], state_dim: int) -> FactoredGLMB:
@@ -158,7 +149,7 @@ class FactoredGLMB:
         if len(parts) < 2:
             return parts[0] if parts else cls.empty(state_dim)
         stack = stack_glmbs([part.as_hypotheses() for part in parts])
-        made: FactoredGLMB = checks.unchecked(
+        made: FactoredGLMB = unchecked(
             cls,
             TrackTable.from_kernel(stack.tracks),
             join_offsets([part.track_offsets for part in parts]),
@@ -176,7 +167,7 @@ class FactoredGLMB:
         log_weights[:, 0] = -np.logaddexp(0.0, lmb.existence_logit)
         log_weights[:, 1] = -np.logaddexp(0.0, -lmb.existence_logit)
         ends = np.repeat(np.arange(num + 1), 2)
-        return checks.unchecked(
+        return unchecked(
             cls, lmb.tracks, np.arange(num + 1), ends[:-1], np.arange(num), log_weights.ravel(), 2 * np.arange(num + 1)
         )
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from vedette.densities import checks
+from vedette.densities.containers import Container, for_kernel, unchecked
 from vedette.densities.tracks import TrackTable, log_weights
 from vedette.errors import InputError, NumericalError, VedetteError
 from vedette.kernels.base import types as kt
@@ -17,7 +18,7 @@ from vedette.kernels.labelled.labels import group_by_label_set
 
 
 @dataclass(frozen=True, slots=True)
-class GLMB:
+class GLMB(Container):
     """delta-GLMB density (paper eq. 4); marginalised delta-GLMB (eq. 10) where every label set occurs once.
 
     Attributes:
@@ -26,7 +27,7 @@ class GLMB:
         hyp_tracks: indices into `tracks`, in increasing label order within a hypothesis.
         hyp_log_weights: (num_hyps,) normalised log weights.
 
-    The arrays are held, not copied, and checked once, here: who changes one later must call `validate` before its use.
+    The arrays are copied, checked once, here, and read-only from then on.
 
     Raises:
         InputError: as `validate`.
@@ -38,6 +39,7 @@ class GLMB:
     hyp_log_weights: Floats
 
     def __post_init__(self) -> None:
+        self._own_arrays()
         if not isinstance(self.tracks, TrackTable):
             raise InputError(f"tracks: expected a TrackTable; got {type(self.tracks).__name__}")
         self._validate_hypotheses(InputError)
@@ -59,18 +61,19 @@ class GLMB:
 
     def to_kernel(self) -> kt.Glmb:
         """The same arrays as the bundle that kernels take."""
-        return kt.Glmb(self.tracks.to_kernel(), self.hyp_offsets, self.hyp_tracks, self.hyp_log_weights)
+        own = map(for_kernel, (self.hyp_offsets, self.hyp_tracks, self.hyp_log_weights))
+        return kt.Glmb(self.tracks.to_kernel(), *own)
 
     @classmethod
     def from_kernel(cls, glmb: kt.Glmb) -> GLMB:
         """The arrays of a bundle as they are; a kernel's own need no check."""
-        return checks.unchecked(cls, TrackTable.from_kernel(glmb.tracks), *glmb[1:])
+        return unchecked(cls, TrackTable.from_kernel(glmb.tracks), *glmb[1:])
 
     @classmethod
     def empty(cls, state_dim: int) -> GLMB:
         """The density that is certain of no target."""
         none = TrackTable.empty(state_dim)
-        return checks.unchecked(cls, none, np.zeros(2, np.int64), np.empty(0, np.int64), np.zeros(1))
+        return unchecked(cls, none, np.zeros(2, np.int64), np.empty(0, np.int64), np.zeros(1))
 
     @classmethod
     def from_hypotheses(cls, tracks: TrackTable, hypotheses: Sequence[Sequence[int]], weights: Any) -> GLMB:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from vedette.densities import checks
+from vedette.densities.containers import Container, for_kernel, unchecked
 from vedette.densities.tracks import log_weights as logs_of
 from vedette.errors import InputError, NumericalError, VedetteError
 from vedette.kernels.base import types as kt
@@ -15,7 +16,7 @@ from vedette.kernels.base.types import Floats
 
 
 @dataclass(frozen=True, slots=True)
-class IidCluster:
+class IidCluster(Container):
     """A number of targets from a cardinality distribution, each drawn from one density by itself.
 
     The intensity is the expected number times that density.
@@ -27,7 +28,7 @@ class IidCluster:
         means: (num_components, state_dim).
         covs: (num_components, state_dim, state_dim).
 
-    The arrays are held, not copied, and checked once, here: who changes one later must call `validate` before its use.
+    The arrays are copied, checked once, here, and read-only from then on.
 
     Raises:
         InputError: as `validate`.
@@ -39,6 +40,7 @@ class IidCluster:
     covs: Floats
 
     def __post_init__(self) -> None:
+        self._own_arrays()
         self.validate(error=InputError)
 
     @property
@@ -53,12 +55,13 @@ class IidCluster:
 
     def to_kernel(self) -> tuple[Floats, kt.Mixture]:
         """Log cardinality distribution and density of one target, as kernels take them."""
-        return self.log_cardinality, kt.Mixture(self.log_weights, self.means, self.covs)
+        mixture = kt.Mixture(*map(for_kernel, (self.log_weights, self.means, self.covs)))
+        return for_kernel(self.log_cardinality), mixture
 
     @classmethod
     def from_kernel(cls, log_cardinality: Floats, mixture: kt.Mixture) -> IidCluster:
         """The arrays of a bundle as they are; a kernel's own need no check."""
-        return checks.unchecked(cls, log_cardinality, *mixture)
+        return unchecked(cls, log_cardinality, *mixture)
 
     @classmethod
     def empty(cls, state_dim: int) -> IidCluster:

@@ -7,7 +7,8 @@ from typing import NamedTuple, TypeAlias, TypeVar
 
 import numpy as np
 
-from vedette.densities.checks import distinct_labels, offsets_of, take_runs, unchecked
+from vedette.densities.checks import distinct_labels, offsets_of, take_runs
+from vedette.densities.containers import unchecked
 from vedette.densities.factored import FactoredGLMB
 from vedette.densities.glmb import GLMB
 from vedette.densities.lmb import LMB

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from vedette.densities import checks
+from vedette.densities.containers import Container, for_kernel, unchecked
 from vedette.densities.tracks import TrackTable
 from vedette.errors import InputError, NumericalError, VedetteError
 from vedette.kernels.base import types as kt
@@ -16,7 +17,7 @@ from vedette.probabilities import expit
 
 
 @dataclass(frozen=True, slots=True)
-class LMB:
+class LMB(Container):
     """Labelled multi-Bernoulli density: independent tracks, each with a probability of existence.
 
     Attributes:
@@ -24,7 +25,7 @@ class LMB:
         existence_logit: (num_tracks,) log r - log(1 - r); keeps full precision near r = 0 and r = 1, where it may be
             -inf and inf.
 
-    The arrays are held, not copied, and checked once, here: who changes one later must call `validate` before its use.
+    The arrays are copied, checked once, here, and read-only from then on.
 
     Raises:
         InputError: as `validate`.
@@ -34,6 +35,7 @@ class LMB:
     existence_logit: Floats
 
     def __post_init__(self) -> None:
+        self._own_arrays()
         if not isinstance(self.tracks, TrackTable):
             raise InputError(f"tracks: expected a TrackTable; got {type(self.tracks).__name__}")
         self._validate_existence(InputError)
@@ -50,17 +52,17 @@ class LMB:
 
     def to_kernel(self) -> kt.Lmb:
         """The same arrays as the bundle that kernels take."""
-        return kt.Lmb(self.tracks.to_kernel(), self.existence_logit)
+        return kt.Lmb(self.tracks.to_kernel(), for_kernel(self.existence_logit))
 
     @classmethod
     def from_kernel(cls, lmb: kt.Lmb) -> LMB:
         """The arrays of a bundle as they are; a kernel's own need no check."""
-        return checks.unchecked(cls, TrackTable.from_kernel(lmb.tracks), lmb.existence_logit)
+        return unchecked(cls, TrackTable.from_kernel(lmb.tracks), lmb.existence_logit)
 
     @classmethod
     def empty(cls, state_dim: int) -> LMB:
         """The density that is certain of no target."""
-        return checks.unchecked(cls, TrackTable.empty(state_dim), np.empty(0))
+        return unchecked(cls, TrackTable.empty(state_dim), np.empty(0))
 
     @classmethod
     def from_bernoullis(cls, labels: Any, existence: Any, means: Any, covs: Any) -> LMB:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from vedette.densities import checks
+from vedette.densities.containers import Container, for_kernel, unchecked
 from vedette.errors import InputError, NumericalError, VedetteError
 from vedette.kernels.base import types as kt
 from vedette.kernels.base.types import Floats, Ints
@@ -15,7 +16,7 @@ from vedette.probabilities import expit
 
 
 @dataclass(frozen=True, slots=True)
-class MultiBernoulli:
+class MultiBernoulli(Container):
     """Independent Bernoullis: each is a target with its probability of existence, or nothing. An LMB without labels.
 
     Attributes:
@@ -25,7 +26,7 @@ class MultiBernoulli:
         means: (num_components, state_dim).
         covs: (num_components, state_dim, state_dim), symmetric positive definite.
 
-    The arrays are held, not copied, and checked once, here: who changes one later must call `validate` before its use.
+    The arrays are copied, checked once, here, and read-only from then on.
 
     Raises:
         InputError: as `validate`.
@@ -38,6 +39,7 @@ class MultiBernoulli:
     covs: Floats
 
     def __post_init__(self) -> None:
+        self._own_arrays()
         self.validate(error=InputError)
 
     @property
@@ -63,12 +65,13 @@ class MultiBernoulli:
     def to_kernel(self) -> kt.Lmb:
         """The same arrays as the bundle that kernels take, every label (-1, -1)."""
         labels = np.full((self.num_bernoullis, 2), -1, np.int64)
-        return kt.Lmb(kt.Tracks(labels, self.offsets, self.log_weights, self.means, self.covs), self.existence_logit)
+        mixtures = map(for_kernel, (self.offsets, self.log_weights, self.means, self.covs))
+        return kt.Lmb(kt.Tracks(labels, *mixtures), for_kernel(self.existence_logit))
 
     @classmethod
     def from_kernel(cls, lmb: kt.Lmb) -> MultiBernoulli:
         """The Bernoullis of a bundle, whatever their labels; a kernel's own need no check."""
-        return checks.unchecked(cls, lmb.existence_logit, *lmb.tracks[1:])
+        return unchecked(cls, lmb.existence_logit, *lmb.tracks[1:])
 
     @classmethod
     def empty(cls, state_dim: int) -> MultiBernoulli:

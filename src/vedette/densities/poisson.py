@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from vedette.densities import checks
+from vedette.densities.containers import Container, for_kernel, unchecked
 from vedette.densities.tracks import log_weights
 from vedette.errors import InputError, NumericalError, VedetteError
 from vedette.kernels.base import types as kt
@@ -15,7 +16,7 @@ from vedette.kernels.base.types import Floats
 
 
 @dataclass(frozen=True, slots=True)
-class Poisson:
+class Poisson(Container):
     """Poisson density of intensity sum over i of exp(log_weights[i]) N(.; means[i], covs[i]).
 
     Attributes:
@@ -23,7 +24,7 @@ class Poisson:
         means: (num_components, state_dim).
         covs: (num_components, state_dim, state_dim).
 
-    The arrays are held, not copied, and checked once, here: who changes one later must call `validate` before its use.
+    The arrays are copied, checked once, here, and read-only from then on.
 
     Raises:
         InputError: as `validate`.
@@ -34,6 +35,7 @@ class Poisson:
     covs: Floats
 
     def __post_init__(self) -> None:
+        self._own_arrays()
         self.validate(error=InputError)
 
     @property
@@ -48,12 +50,12 @@ class Poisson:
 
     def to_kernel(self) -> kt.Mixture:
         """The same arrays as the bundle that kernels take."""
-        return kt.Mixture(self.log_weights, self.means, self.covs)
+        return kt.Mixture(*map(for_kernel, (self.log_weights, self.means, self.covs)))
 
     @classmethod
     def from_kernel(cls, mixture: kt.Mixture) -> Poisson:
         """The arrays of a bundle as they are; a kernel's own need no check."""
-        return checks.unchecked(cls, *mixture)
+        return unchecked(cls, *mixture)
 
     @classmethod
     def empty(cls, state_dim: int) -> Poisson:

@@ -94,7 +94,7 @@ def mixture_moments(log_weights: Floats, means: Floats, covs: Floats) -> tuple[F
 def track_moments(tracks: TrackTable) -> tuple[Floats, Floats]:
     """Mean (num_tracks, state_dim) and covariance (num_tracks, state_dim, state_dim) of every track."""
     if len(tracks.log_weights) == tracks.num_tracks:
-        return tracks.means, tracks.covs
+        return tracks.means.copy(), tracks.covs.copy()
     return _run_moments(np.exp(tracks.log_weights), tracks.means, tracks.covs, tracks.offsets)
 
 

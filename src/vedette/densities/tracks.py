@@ -9,13 +9,14 @@ from typing import Any
 import numpy as np
 
 from vedette.densities import checks
+from vedette.densities.containers import Container, for_kernel, unchecked
 from vedette.errors import InputError, NumericalError, VedetteError
 from vedette.kernels.base import types as kt
 from vedette.kernels.base.types import Floats, Ints
 
 
 @dataclass(frozen=True, slots=True)
-class TrackTable:
+class TrackTable(Container):
     """Gaussian-mixture densities of labelled tracks.
 
     Attributes:
@@ -25,7 +26,7 @@ class TrackTable:
         means: (num_components, state_dim).
         covs: (num_components, state_dim, state_dim), symmetric positive definite.
 
-    The arrays are held, not copied, and checked once, here: who changes one later must call `validate` before its use.
+    The arrays are copied, checked once, here, and read-only from then on.
 
     Raises:
         InputError: as `validate`.
@@ -38,6 +39,7 @@ class TrackTable:
     covs: Floats
 
     def __post_init__(self) -> None:
+        self._own_arrays()
         self.validate(error=InputError)
 
     @property
@@ -52,17 +54,17 @@ class TrackTable:
 
     def to_kernel(self) -> kt.Tracks:
         """The same arrays as the bundle that kernels take."""
-        return kt.Tracks(self.labels, self.offsets, self.log_weights, self.means, self.covs)
+        return kt.Tracks(*map(for_kernel, (self.labels, self.offsets, self.log_weights, self.means, self.covs)))
 
     @classmethod
     def from_kernel(cls, tracks: kt.Tracks) -> TrackTable:
         """The arrays of a bundle as they are; a kernel's own need no check."""
-        return checks.unchecked(cls, *tracks)
+        return unchecked(cls, *tracks)
 
     @classmethod
     def empty(cls, state_dim: int) -> TrackTable:
         """A table without tracks."""
-        return checks.unchecked(
+        return unchecked(
             cls,
             np.empty((0, 2), np.int64),
             np.zeros(1, np.int64),

@@ -8,7 +8,7 @@ from typing import TypeAlias
 import numpy as np
 
 from vedette.densities import GLMB, LMB, FactoredGLMB, Labelled
-from vedette.densities.checks import unchecked
+from vedette.densities.containers import unchecked
 from vedette.densities.conversions import factored_to_glmb
 from vedette.densities.joining import as_factored, join_factors
 from vedette.densities.label_sets import in_label_order, take_factors

@@ -9,7 +9,7 @@ import numpy as np
 
 from vedette.densities import GLMB, LMB, Labelled, marginalise
 from vedette.densities.cases import LabelledCases
-from vedette.densities.checks import unchecked
+from vedette.densities.containers import unchecked
 from vedette.densities.conversions import lmb_on_label_sets
 from vedette.densities.label_sets import label_sets, single_gaussians
 from vedette.densities.products import Share, check_exponents, lay_out_products

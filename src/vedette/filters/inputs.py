@@ -6,18 +6,21 @@ import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import lru_cache
+from pathlib import Path
+from traceback import walk_tb
 from typing import Any, TypeVar
 
 import numpy as np
 
 from vedette.densities import GLMB, LMB, FactoredGLMB, IidCluster, Labelled, MultiBernoulli, Poisson, TrackTable
-from vedette.densities.checks import unchecked
+from vedette.densities.containers import unchecked
 from vedette.errors import InputError, ModelError, VedetteError
 from vedette.kernels.base.types import Bools, Floats
 from vedette.models import BirthModel
 from vedette.models.arguments import as_array, reject, step_number
 from vedette.models.measurement import MeasurementModel, wrap_angular
 
+_PACKAGE = Path(__file__).parents[1]
 _Density = TypeVar("_Density", GLMB, LMB, FactoredGLMB, Poisson, IidCluster, MultiBernoulli)
 
 
@@ -118,10 +121,17 @@ def _births_of(birth: BirthModel) -> LMB:
 
 @contextmanager
 def model_errors() -> Iterator[None]:
-    """Turn what a model function raised inside a kernel into a `ModelError` that says so."""
+    """Turn what a model function raised inside a kernel into a `ModelError` that says so.
+
+    Numba leaves the place in the traceback. What a kernel raises itself (`MemoryError`), or Numba, goes on as it is.
+    """
     try:
         yield
     except VedetteError:
         raise
     except Exception as error:
+        places = [Path(frame.f_code.co_filename) for frame, _ in walk_tb(error.__traceback__)]
+        own = places[-1].is_relative_to(_PACKAGE) and not places[-1].is_relative_to(_PACKAGE / "models")
+        if own or any("numba" in place.parts for place in places):
+            raise
         raise ModelError(f"a model function raised {type(error).__name__}: {error}") from error

@@ -8,7 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from vedette.densities import GLMB, LMB, FactoredGLMB, Labelled, TrackTable
-from vedette.densities.checks import offsets_of, unchecked
+from vedette.densities.checks import offsets_of
+from vedette.densities.containers import unchecked
 from vedette.densities.conversions import reduced_lmb
 from vedette.fusion.base import (
     FusionInfo,

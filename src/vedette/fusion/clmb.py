@@ -11,7 +11,7 @@ import numpy as np
 
 from vedette.densities import GLMB, LMB, FactoredGLMB, Labelled
 from vedette.densities.cases import LabelledCases, lmb_cases
-from vedette.densities.checks import unchecked
+from vedette.densities.containers import unchecked
 from vedette.densities.conversions import reduced_lmb
 from vedette.densities.products import PowerProducts, Share, lay_out_products
 from vedette.fusion.base import (

@@ -11,7 +11,8 @@ import numpy as np
 
 from vedette.densities import GLMB, LMB, FactoredGLMB, TrackTable
 from vedette.densities.cases import LabelledCases
-from vedette.densities.checks import offsets_of, take_runs, unchecked
+from vedette.densities.checks import offsets_of, take_runs
+from vedette.densities.containers import unchecked
 from vedette.densities.conversions import marginalised_factors
 from vedette.densities.joining import as_factored
 from vedette.densities.label_sets import take_tracks

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from vedette.densities import LMB, FactoredGLMB, TrackTable
-from vedette.densities.checks import offsets_of, take_runs, unchecked
+from vedette.densities.checks import offsets_of, take_runs
+from vedette.densities.containers import unchecked
 from vedette.densities.conversions import factored_to_glmb
 from vedette.densities.joining import join_factors
 from vedette.densities.label_sets import in_label_order, take_factors, take_tracks

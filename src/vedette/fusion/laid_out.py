@@ -9,7 +9,7 @@ import numpy as np
 
 from vedette.densities import GLMB, LMB
 from vedette.densities.cases import LabelledCases
-from vedette.densities.checks import unchecked
+from vedette.densities.containers import unchecked
 from vedette.densities.conversions import lmb_on_label_sets
 from vedette.densities.products import PowerProducts, Share, lay_out_products
 from vedette.errors import InputError

@@ -8,10 +8,10 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from vedette.densities import GLMB, LMB, FactoredGLMB, Labelled, TrackTable, as_lmb, settled_lmb
+from vedette.densities import GLMB, LMB, FactoredGLMB, Labelled, TrackTable, as_lmb, settled_lmb, track_moments
 from vedette.densities.cases import LabelledCases
-from vedette.densities.checks import unchecked
-from vedette.densities.label_sets import Label, single_gaussians, take_tracks
+from vedette.densities.containers import unchecked
+from vedette.densities.label_sets import Label, take_tracks
 from vedette.errors import InputError
 from vedette.fusion.base import Fusion, FusionInfo, check_beliefs
 from vedette.fusion.validity import ValidBeliefs
@@ -39,8 +39,8 @@ class _Targets(NamedTuple):
     @classmethod
     def of(cls, belief: Labelled) -> _Targets:
         lmb = as_lmb(belief)
-        tracks = single_gaussians(lmb.tracks)
-        return cls([tuple(label) for label in tracks.labels.tolist()], lmb.existence, tracks.means, tracks.covs)
+        labels = [tuple(label) for label in lmb.tracks.labels.tolist()]
+        return cls(labels, lmb.existence, *track_moments(lmb.tracks))
 
 
 def match_labels(beliefs: Sequence[Labelled], *, gate_probability: float = GATE_PROBABILITY) -> list[Labelled]:

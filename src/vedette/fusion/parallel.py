@@ -10,7 +10,8 @@ from typing import Any, ClassVar, TypeVar
 import numpy as np
 
 from vedette.densities import LMB, FactoredGLMB, TrackTable
-from vedette.densities.checks import offsets_of, unchecked
+from vedette.densities.checks import offsets_of
+from vedette.densities.containers import unchecked
 from vedette.densities.conversions import marginalised_factors
 from vedette.densities.joining import as_factored, join_factors
 from vedette.densities.label_sets import WHOLE, in_label_order, places_of

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from vedette.densities import LMB, TrackTable, track_moments
-from vedette.densities.checks import unchecked
+from vedette.densities.containers import unchecked
 from vedette.densities.label_sets import Label, take_tracks
 from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.labelled.stacking import stack_tracks
@@ -36,7 +36,7 @@ def rebased(posterior: LMB, own: LMB, prediction: LMB) -> LMB:
     """
     if own is prediction:
         return posterior
-    means, covs = (np.array(moment) for moment in track_moments(prediction.tracks))
+    means, covs = track_moments(prediction.tracks)
     logits = prediction.existence_logit.copy()
     at, before, after = _common(prediction, own, posterior)
     own_means, own_covs = (moment[before] for moment in track_moments(own.tracks))

@@ -24,7 +24,7 @@ def fused_tracks(
     try:
         offsets, log_weights, means, covs, log_overlaps = fuse_tracks(
             chosen,
-            np.ascontiguousarray(np.broadcast_to(weights, chosen.shape)),
+            np.array(np.broadcast_to(weights, chosen.shape)),
             tracks,
             rule.points,
             rule.point_weights,

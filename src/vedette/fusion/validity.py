@@ -64,6 +64,4 @@ def _formed(belief: LMB) -> bool:
 
 
 def _is(array: Any, dtype: type, ndim: int) -> bool:
-    if type(array) is not np.ndarray or array.dtype != dtype or array.ndim != ndim:
-        return False
-    return bool(array.flags.c_contiguous and array.flags.writeable and array.flags.aligned)
+    return type(array) is np.ndarray and array.dtype == dtype and array.ndim == ndim

@@ -14,6 +14,8 @@ from vedette.errors import InputError
 from vedette.kernels.base.types import Floats
 from vedette.text import plain, printable
 
+_MAX_COUNT = 2**62
+
 
 def reject(field: str, expected: str, got: Any) -> InputError:
     """The error for one bad argument; a long value is cut short."""
@@ -50,9 +52,11 @@ def probability(field: str, value: Any) -> float:
 
 
 def dimension(field: str, value: Any) -> int:
-    """A whole number of at least one."""
+    """A whole number of at least one, and such as a kernel can take."""
     if isinstance(value, bool) or not isinstance(value, numbers.Integral) or value < 1:
         raise reject(field, "a whole number of at least 1", value)
+    if int(value) > _MAX_COUNT:
+        raise reject(field, "a whole number of at most 2^62", value)
     return int(value)
 
 

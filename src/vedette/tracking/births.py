@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vedette.densities import LMB, Labelled, TrackTable, as_lmb
-from vedette.densities.checks import unchecked
+from vedette.densities.containers import unchecked
 from vedette.densities.factored import LABELLED
 from vedette.errors import InputError
 from vedette.filters import Limits

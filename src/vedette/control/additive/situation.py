@@ -10,7 +10,8 @@ import numpy as np
 from vedette.control.pseudo import decision_of, draw_paths, targets_of
 from vedette.control.settings import IDEAL_MODES, MobileSensor, PlanningSettings
 from vedette.densities import LMB
-from vedette.densities.checks import offsets_of, unchecked
+from vedette.densities.checks import offsets_of
+from vedette.densities.containers import unchecked
 from vedette.densities.label_sets import places_of, single_gaussians, take_tracks
 from vedette.filters.inputs import model_errors
 from vedette.kernels.base.types import Floats, Ints
@@ -92,8 +93,9 @@ def starts_of(
     detection_at: as of `SensorModel.to_kernel`.
     """
     with model_errors():
-        references = prediction.tracks.means
-        prior = rows_without_scans(references, prediction.tracks.covs, prediction.existence_logit, references)
+        given = prediction.to_kernel()
+        references = given.tracks.means
+        prior = rows_without_scans(references, given.tracks.covs, given.existence_logit, references)
         shared = IDEAL_MODES[settings.ideal_measurements] == IDEAL or detection_at is not None
         groups = tuple(
             _group(members, prediction, beliefs, sensors, courses, samples, settings, detection_at, rng)

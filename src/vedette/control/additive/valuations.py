@@ -56,8 +56,7 @@ def _valuation(
         0.0,
         np.empty(0) if params is None else params,
         function,
-        prediction.tracks.means,
-        prediction.tracks.covs,
+        *prediction.tracks.to_kernel()[3:],
     )
 
 

@@ -1,0 +1,71 @@
+"""What all densities are: frozen bundles of arrays that are their own and read-only, checked when they are made.
+
+Kernels go by a density's offsets and indices without looking, so that what was checked must stay as it was: a number
+written into one of them later would have a kernel read memory that is not its own.
+"""
+
+from __future__ import annotations
+
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+_Container = TypeVar("_Container", bound="Container")
+
+
+class Container:
+    """A frozen dataclass of arrays and other containers.
+
+    The arrays of its fields are read-only views of arrays that nobody else holds. Those are what kernels take (see
+    `for_kernel`): a read-only array is of another type to Numba, which would compile everything anew for it.
+    """
+
+    __slots__ = ()
+
+    def _own_arrays(self) -> None:
+        """Take copies of the arrays that were given; for a public constructor, before its checks."""
+        for name in self.__match_args__:  # type: ignore[attr-defined]
+            value = getattr(self, name)
+            if type(value) is np.ndarray:
+                object.__setattr__(self, name, _read_only(np.array(value, order="C")))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Through the constructor and its checks: what is unpickled may have been written by anybody."""
+        return type(self), tuple(getattr(self, name) for name in self.__match_args__)  # type: ignore[attr-defined]
+
+
+def unchecked(container: type[_Container], *fields: Any) -> _Container:
+    """A container of the library's own making, of which the checks would cost more than some steps.
+
+    It takes arrays as they are: those that no caller of the library holds.
+    """
+    made = object.__new__(container)
+    for name, value in zip(container.__match_args__, fields, strict=True):  # type: ignore[attr-defined]
+        object.__setattr__(made, name, _held(value) if type(value) is np.ndarray else value)
+    return made
+
+
+def for_kernel(array: NDArray[Any]) -> Any:
+    """A container's array as kernels take it; an array that is nobody's field, as it is."""
+    return array if array.flags.writeable else array.base
+
+
+def _held(array: NDArray[Any]) -> NDArray[Any]:
+    """An array as a field: as it is where it is one already, and without a copy where it stands alone."""
+    base, flags = array.base, array.flags
+    if type(base) is not np.ndarray:
+        if flags.carray:
+            return _read_only(array)
+    elif not flags.writeable and base.shape == array.shape and base.strides == array.strides:
+        return array
+    return _read_only(np.array(array, order="C"))  # such as a part of another, whose base is not of its shape
+
+
+def _read_only(array: NDArray[Any]) -> NDArray[Any]:
+    view = array.view()
+    view.flags.writeable = False
+    return view
+
+
+__all__ = ["Container", "for_kernel", "unchecked"]
