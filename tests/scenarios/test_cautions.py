@@ -48,6 +48,17 @@ def test_births_after_the_first_step_warn_with_their_line(tmp_path: Path) -> Non
     assert "take fusion.matching: assignment, or fusion.feedback: true, or fusion: {kind: sequential} where" in line
 
 
+def test_probabilities_of_a_step_warn_where_a_sensor_scans_at_times_of_its_own() -> None:
+    own = load_scenario("three-radars")
+    steps = with_fields(own, {"survival.period": None, "birth.period": None})
+    birth, survival = cautions(steps)
+    assert "count 3 times from one scan of south-west to the next; say with birth.period" in birth
+    assert "those of a step of 1 s, and count 3 times" in survival
+    assert cautions(own) == cautions(with_fields(steps, {"survival.period": 1.0, "birth.period": 1.0})) == ()
+    assert len(cautions(with_fields(steps, {"survival.probability": 1.0}))) == 1  # nobody dies, however often asked
+    assert cautions(with_fields(steps, {"sensors.*.scans": {"every": 1, "first": 1}})) == ()
+
+
 @pytest.mark.parametrize("kind", ["clmb", "arithmetic_average"])
 @pytest.mark.parametrize("filters", ["factored_glmb", "lmb", "m_delta_glmb"])
 def test_the_warning_about_views_names_what_to_take_instead(tmp_path: Path, kind: str, filters: str) -> None:

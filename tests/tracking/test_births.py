@@ -105,13 +105,13 @@ def test_labels_follow_the_sites_or_are_a_sensors_own() -> None:
     made = births_from_scans(sites, NOBODY, SENSORS[:1], [scan], POSES[:1], 1)
     assert made is not None
     np.testing.assert_array_equal(made.tracks.labels, [[1, 2]])
-    due = births_due(sites, 1, made)
+    due = births_due(sites, 1, 1.0, made)
     assert due is not None
     np.testing.assert_array_equal(due.tracks.labels, [[1, 0], [1, 1], [1, 2]])
     np.testing.assert_allclose(due.existence, [0.5, 0.3, 0.3])
     due.validate()
-    assert births_due(sites, 2, None).tracks.num_tracks == 0  # type: ignore[union-attr]  # sites at step 1 alone
-    assert births_due(targets().birth, 1, None) is None
+    assert births_due(sites, 2, 1.0, None).tracks.num_tracks == 0  # type: ignore[union-attr]  # sites at step 1 alone
+    assert births_due(targets().birth, 1, 1.0, None) is None
     own = born(NOBODY, [None, scan], owner=1)
     np.testing.assert_array_equal(own.tracks.labels, [[7, 2 * OWN_LABELS]])
     assert born(NOBODY, [None, None]).tracks.num_tracks == 0

@@ -127,9 +127,10 @@ class SingleSensorFilter:
         the targets' model.
         """
         targets = self.targets
-        birth = births_for(targets.birth, step, prior, births).to_kernel()
+        period = positive("dt", dt)
+        birth = births_for(targets.birth, period, step, prior, births).to_kernel()
         motion = kernel_motion(targets.motion, targets.survival)
-        return (ScanInput(birth, scan, pose_vector("pose", pose), positive("dt", dt)), motion, *self._own())
+        return (ScanInput(birth, scan, pose_vector("pose", pose), period), motion, *self._own())
 
     def _own(self) -> tuple[Sensor, Truncation]:
         return self.sensor.to_kernel(), self.limits.truncation(self.sensor.meas_dim)

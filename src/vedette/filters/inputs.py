@@ -19,6 +19,7 @@ from vedette.kernels.base.types import Bools, Floats
 from vedette.models import BirthModel
 from vedette.models.arguments import as_array, reject, step_number
 from vedette.models.measurement import MeasurementModel, wrap_angular
+from vedette.probabilities import log_expit
 
 _PACKAGE = Path(__file__).parents[1]
 _Density = TypeVar("_Density", GLMB, LMB, FactoredGLMB, Poisson, IidCluster, MultiBernoulli)
@@ -80,15 +81,20 @@ def check_belief(belief: object, kind: type[_Density], state_dim: int, name: str
     return belief
 
 
-def births_for(birth: BirthModel, step: Any, belief: Labelled | None = None, births: LMB | None = None) -> LMB:
-    """Who may be born at a step: `births`, or the sites of the model where that is None.
+def births_for(
+    birth: BirthModel, dt: float, step: Any, belief: Labelled | None = None, births: LMB | None = None
+) -> LMB:
+    """Who may be born within the `dt` seconds of a step: `births`, or the sites of the model where that is None.
 
     Raises:
         InputError: a step below 1; births of another kind or dimension; a belief with labels of that step or later
             ones, which those of the births could repeat.
     """
     number = step_number(step)
-    born = births_at(birth, number) if births is None else check_belief(births, LMB, birth.state_dim, "births")
+    if births is None:
+        born = births_within(births_at(birth, number), birth.period, dt)
+    else:
+        born = check_belief(births, LMB, birth.state_dim, "births")
     if belief is None or born.tracks.num_tracks == 0:
         return born
     newest = belief.tracks.labels[:, 0].max(initial=np.iinfo(np.int64).min)
@@ -98,7 +104,7 @@ def births_for(birth: BirthModel, step: Any, belief: Labelled | None = None, bir
 
 
 def births_at(birth: BirthModel, step: int) -> LMB:
-    """The LMB of the targets that may be born at `step`, labelled (step, site)."""
+    """The LMB of the targets that may be born at `step`, or within the model's period, labelled (step, site)."""
     if not birth.is_active(step):
         return LMB.empty(birth.state_dim)
     born = _births_of(birth)
@@ -107,6 +113,18 @@ def births_at(birth: BirthModel, step: int) -> LMB:
     tracks = born.tracks
     same = (tracks.offsets, tracks.log_weights, tracks.means, tracks.covs)
     return unchecked(LMB, unchecked(TrackTable, labels, *same), born.existence_logit)
+
+
+def births_within(born: LMB, period: float | None, dt: float) -> LMB:
+    """Who may be born within `dt` seconds, of those who may within `period`; None: at a step of any length.
+
+    1 - r(dt) = (1 - r)^(dt / period).
+    """
+    if period is None:
+        return born
+    log_none = dt / period * log_expit(-born.existence_logit)
+    with np.errstate(divide="ignore"):  # certain births, or none
+        return unchecked(LMB, born.tracks, np.log(-np.expm1(log_none)) - log_none)
 
 
 @lru_cache(maxsize=1000)

@@ -116,8 +116,9 @@ class MultiSensorFilter(ABC, Generic[_Belief]):
         """
         looks = self._looks(scans, poses, rng)
         prior = check_belief(belief, self.kind, self.targets.state_dim)  # type: ignore[type-var]
-        born = births_for(self.targets.birth, step, prior, births)
-        return self._updated(prior, born, looks, positive("dt", dt), f"step {step}")  # type: ignore[arg-type]
+        period = positive("dt", dt)
+        born = births_for(self.targets.birth, period, step, prior, births)
+        return self._updated(prior, born, looks, period, f"step {step}")  # type: ignore[arg-type]
 
     @abstractmethod
     def _updated(self, prior: _Belief, born: LMB, looks: Looks, dt: float, place: str) -> tuple[_Belief, FilterInfo]:

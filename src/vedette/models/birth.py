@@ -19,7 +19,7 @@ class MeasurementBirth:
     min(max_existence, expected u / sum of all u) at the next scan, at rest where it was measured.
 
     Attributes:
-        expected: expected number of such births a scan.
+        expected: expected number of such births a scan, or within the `period` of the births.
         max_existence: the most that any of them may have, in (0, 1).
         std: (state_dim,) standard deviation of the state of a birth.
 
@@ -51,6 +51,10 @@ class MeasurementBirth:
 class BirthModel:
     """Each site may give birth to one target a step; its label is (step, site index) (paper-notes 6).
 
+    With a `period` a site that gives birth within it with probability r does so within dt seconds with probability
+    1 - (1 - r)^(dt / period), so that a stretch of time brings as many targets in however many steps it is cut. The
+    first scan counts as one second after a time without targets.
+
     Attributes:
         existence: (num_sites,) birth probability of each site, in (0, 1).
         means: (num_sites, state_dim) mean state of a birth.
@@ -58,6 +62,8 @@ class BirthModel:
         steps: the filter steps at which births at the sites may happen; None: every step.
         from_measurements: births where a tracker finds measurements that no track explains, beside the sites; None:
             there are none.
+        period: s; the stretch of time within which births have these probabilities, those from measurements too; None:
+            each step, whatever its length (the paper).
 
     Raises:
         InputError: names the field, what was expected and what came.
@@ -68,6 +74,7 @@ class BirthModel:
     covs: Floats
     steps: frozenset[int] | None = None
     from_measurements: MeasurementBirth | None = None
+    period: float | None = None
 
     def __post_init__(self) -> None:
         means = float_array("BirthModel.means", self.means, (None, None))
@@ -85,6 +92,8 @@ class BirthModel:
             raise reject("BirthModel.from_measurements", "a MeasurementBirth or None", measured)
         if measured is not None and len(measured.std) != state_dim:
             raise reject("BirthModel.from_measurements.std", f"{state_dim} numbers", measured.std.tolist())
+        if self.period is not None:
+            object.__setattr__(self, "period", positive("BirthModel.period", self.period))
         for name, value in (("existence", existence), ("means", means), ("covs", covs), ("steps", _steps(self.steps))):
             object.__setattr__(self, name, value)
 

@@ -163,6 +163,23 @@ def _constant_survival(state: Floats, dt: float, params: Floats) -> float:
     return params[0]  # type: ignore[no-any-return]
 
 
-def constant_survival(prob_survival: float) -> SurvivalModel:
-    """The same survival probability per prediction step everywhere (paper: 0.98), whatever the length of the step."""
-    return SurvivalModel(_constant_survival, np.array([probability("prob_survival", prob_survival)]))
+@model_function("prob_survival")
+def _survival_within(state: Floats, dt: float, params: Floats) -> float:
+    return params[0] ** (dt / params[1])  # type: ignore[no-any-return]
+
+
+def constant_survival(prob_survival: float, period: float | None = None) -> SurvivalModel:
+    """The same survival probability everywhere.
+
+    Args:
+        prob_survival: of living through `period` seconds; through dt seconds then prob_survival^(dt / period), in
+            however many steps.
+        period: s; None: it is that of each step, whatever its length (paper: 0.98).
+
+    Raises:
+        InputError: no probability, or no period above 0.
+    """
+    chance = probability("prob_survival", prob_survival)
+    if period is None:
+        return SurvivalModel(_constant_survival, np.array([chance]))
+    return SurvivalModel(_survival_within, np.array([chance, positive("period", period)]))

@@ -122,7 +122,7 @@ class BeliefNetwork(LocalFilters):
         found: dict[tuple[int, int], Any] = {}
         results = []
         for s, (belief, own) in enumerate(zip(state.local, state.memory.births, strict=True)):
-            due = births_due(birth, step, own)
+            due = births_due(birth, step, dt, own)
             if not shares_prediction(self.fusion):
                 predictions.append(None)
                 results.append(self._stepped(s, belief, scans[s], poses[s], dt, step, due, rngs[s]))

@@ -15,7 +15,7 @@ from vedette.densities.containers import unchecked
 from vedette.densities.factored import LABELLED
 from vedette.errors import InputError
 from vedette.filters import Limits
-from vedette.filters.inputs import births_at, model_errors
+from vedette.filters.inputs import births_at, births_within, model_errors
 from vedette.fusion.matching import OWN_LABELS
 from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.types import Floats, Ints, Lmb, ScanInput
@@ -39,18 +39,19 @@ class Unexplained(NamedTuple):
     sensors: Ints  # (num,) which sensor measured it
 
 
-def births_due(birth: BirthModel, step: int, measured: LMB | None) -> LMB | None:
-    """Who may have been born by a step, at the sites or where was measured; None: at the sites alone.
+def births_due(birth: BirthModel, step: int, dt: float, measured: LMB | None) -> LMB | None:
+    """Who may have been born within the `dt` seconds before a step, at the sites or where was measured; None: at the
+    sites alone.
 
     measured: as `births_from_scans` gave for this step; None: of no scan.
     """
     if birth.from_measurements is None:
         return None
-    sites = births_at(birth, step)
-    if measured is None:
-        return sites
-    tracks = TrackTable.from_kernel(stack_tracks([sites.tracks.to_kernel(), measured.tracks.to_kernel()]))
-    return unchecked(LMB, tracks, np.concatenate([sites.existence_logit, measured.existence_logit]))
+    due = births_at(birth, step)
+    if measured is not None:
+        tracks = TrackTable.from_kernel(stack_tracks([due.tracks.to_kernel(), measured.tracks.to_kernel()]))
+        due = unchecked(LMB, tracks, np.concatenate([due.existence_logit, measured.existence_logit]))
+    return births_within(due, birth.period, dt)
 
 
 def births_from_scans(

@@ -85,7 +85,7 @@ class OfAllScans:
         rng: np.random.Generator,
     ) -> tuple[Any, FilterInfo]:
         """The belief after a step. measured: who may be born of measurements, as of `births_due`."""
-        due = births_due(self.targets.birth, step, measured)
+        due = births_due(self.targets.birth, step, dt, measured)
         births = {} if due is None else {"births": due}
         return self.filter.step(belief, scans, poses, dt, step, rng=rng, **births)
 

@@ -68,7 +68,7 @@ class Distributed(LocalFilters):
         """Filter each sensor's scan, then fuse; see `Tracker.step`."""
         at, dt = check_step(state, scans, poses, time, rngs, len(self.filters))
         step, stages = state.step + 1, Stages()
-        births = [births_due(self.targets.birth, step, own) for own in state.memory or (None,) * len(self.filters)]
+        births = [births_due(self.targets.birth, step, dt, own) for own in state.memory or (None,) * len(self.filters)]
         prediction, local, infos = None, [], []
         if shares_prediction(self.fusion):
             with stages.timing("filter"):

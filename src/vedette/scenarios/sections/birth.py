@@ -33,7 +33,9 @@ def _spreads(stds: SomeNumbers) -> Iterator[Finding]:
 class BirthSite(Section):
     """A place where targets appear: one Bernoulli of the birth density."""
 
-    existence: float = Field(gt=0.0, lt=1.0, description="Probability that a target appears, at each such scan [-].")
+    existence: float = Field(
+        gt=0.0, lt=1.0, description="Probability that a target appears, at each such scan or within the period [-]."
+    )
     mean: SomeNumbers = Field(description="Mean state [m, m/s, ...].")
     std: SomeNumbers | None = Field(
         default=None, description="Standard deviation of each state component; else give cov [m, m/s, ...]."
@@ -81,6 +83,12 @@ class Birth(Section):
         default=None, description="Births from measurements, beside the sites; none: at the sites alone [-]."
     )
 
+    period: Positive | None = Field(
+        default=None,
+        description="Time for which the probabilities of births are meant, those from measurements too; none: a scan, "
+        "however long after another [s].",
+    )
+
     @check
     def _somewhere(self) -> Iterator[Finding]:
         if not self.sites and self.from_measurements is None:
@@ -107,4 +115,5 @@ class Birth(Section):
             None
             if measured is None
             else MeasurementBirth(measured.expected, measured.max_existence, np.array(measured.std)[order]),
+            self.period,
         )

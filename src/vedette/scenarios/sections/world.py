@@ -165,13 +165,19 @@ class ConstantSurvival(Section):
     """The same probability of survival everywhere."""
 
     kind: Literal["constant"] = Field(default="constant", description="Kind of survival [-].")
-    probability: Probability = Field(default=0.98, description="Probability of living on to the next scan [-].")
+    probability: Probability = Field(
+        default=0.98, description="Probability of living on to the next scan, or through the period [-]."
+    )
+    period: Positive | None = Field(
+        default=None,
+        description="Time for which the probability is meant; none: a scan, however long after another [s].",
+    )
 
     def build(self, folder: Path) -> SurvivalModel:
         """The survival model."""
         from vedette.models import constant_survival
 
-        return constant_survival(self.probability)
+        return constant_survival(self.probability, self.period)
 
 
 class CustomSurvival(Custom):
