@@ -17,6 +17,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import NamedTuple
 
 ROOT = Path(__file__).resolve().parents[1]
 BUILD = ROOT / "build"
@@ -84,8 +85,22 @@ STAGES = {
 }
 
 
+class Outcome(NamedTuple):
+    """How a stage ended: seconds that it took, and seconds of processor time of all its processes."""
+
+    name: str
+    passed: bool
+    seconds: float
+    cpu: float | None
+
+
 class Running:
-    """A stage that has been started; what it prints is passed through, or kept in a file until it ends."""
+    """A stage that has been started; what it prints is passed through, or kept in a file until it ends.
+
+    cpu: seconds of processor time of all its processes, once it has ended; None where the system does not tell.
+    """
+
+    cpu: float | None = None
 
     def __init__(self, name: str, *, apart: bool) -> None:
         self.name = name
@@ -101,7 +116,23 @@ class Running:
                 stderr=subprocess.STDOUT if apart else None,
             )
 
-    def tell(self) -> None:
+    def ended(self, seconds: float = 0.0) -> bool:
+        """Whether it has come to its end, within so many seconds from now."""
+        deadline = time.monotonic() + seconds
+        while self._poll() is None and time.monotonic() < deadline:
+            time.sleep(0.05)
+        return self.process.returncode is not None
+
+    def _poll(self) -> int | None:
+        if self.process.returncode is not None or sys.platform == "win32":
+            return self.process.poll()
+        number, status, used = os.wait4(self.process.pid, os.WNOHANG)
+        if number:
+            self.process.returncode = os.waitstatus_to_exitcode(status)
+            self.cpu = used.ru_utime + used.ru_stime
+        return self.process.returncode
+
+    def tell(self) -> Outcome:
         """Show what was kept of its output, and how it ended."""
         seconds, status = time.perf_counter() - self._start, self.process.returncode
         if self._log is not None:
@@ -109,6 +140,7 @@ class Running:
             print(self._log.read_text("utf-8", errors="replace"), end="")
         verdict = "passed" if status == 0 else f"FAILED with status {status}"
         print(f"== {self.name}: {verdict} in {seconds:.1f} s\n", flush=True)
+        return Outcome(self.name, status == 0, seconds, self.cpu)
 
 
 @contextmanager
@@ -119,28 +151,34 @@ def ended_at_last(running: list[Running]) -> Iterator[None]:
     finally:
         deadline = time.monotonic() + GRACE
         for one in running:
-            try:
-                one.process.wait(max(0.0, deadline - time.monotonic()))
-            except subprocess.TimeoutExpired:
+            if not one.ended(max(0.0, deadline - time.monotonic())):
                 one.process.terminate()
                 one.process.wait()
             one.tell()
 
 
-def run(names: list[str], at_once: int) -> list[str]:
-    """Run the stages named, so many side by side; returns those that failed."""
+def run(names: list[str], at_once: int) -> list[Outcome]:
+    """Run the stages named, so many side by side."""
     LOGS.mkdir(parents=True, exist_ok=True)
-    waiting, running, failed = list(names), list[Running](), list[str]()
+    waiting, running, outcomes = list(names), list[Running](), list[Outcome]()
     with ended_at_last(running):
         while waiting or running:
             while waiting and len(running) < at_once:
                 running.append(Running(waiting.pop(0), apart=at_once > 1))
             time.sleep(0.05)
-            for one in [one for one in running if one.process.poll() is not None]:
+            for one in [one for one in running if one.ended()]:
                 running.remove(one)
-                one.tell()
-                failed += [one.name] * (one.process.returncode != 0)
-    return failed
+                outcomes.append(one.tell())
+    return outcomes
+
+
+def summary(outcomes: list[Outcome]) -> str:
+    """A line a stage, those that took the most processor time first."""
+    lines = [f"{'stage':16}{'':8}{'elapsed':>10}{'processor':>12}"]
+    for one in sorted(outcomes, key=lambda one: -(one.cpu or 0.0)):
+        cpu = "-" if one.cpu is None else f"{one.cpu:.0f} s"
+        lines.append(f"{one.name:16}{'passed' if one.passed else 'FAILED':8}{one.seconds:8.0f} s{cpu:>12}")
+    return "\n".join(lines)
 
 
 def main(arguments: list[str]) -> int:
@@ -157,11 +195,13 @@ def main(arguments: list[str]) -> int:
     alone = len(names) == 1 or "--one-by-one" in arguments
     start = time.perf_counter()
     try:
-        failed = run(names, 1 if alone else 2)
+        outcomes = run(names, 1 if alone else 2)
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)
         return 130
+    failed = [one.name for one in outcomes if not one.passed]
     verdict = f"FAILED: {', '.join(failed)}" if failed else "all passed"
+    print(summary(outcomes))
     print(f"check of {len(names)} stages in {time.perf_counter() - start:.0f} s: {verdict}")
     return 1 if failed else 0
 
