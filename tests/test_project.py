@@ -212,7 +212,11 @@ def test_a_failed_stage_fails_the_check_and_the_rest_is_run(
     assert all(f"ran {name}" in output for name in stages)
     assert output.splitlines()[-1].endswith("FAILED: second")
     figures = [line.split() for line in output.splitlines()[-4:-1]]
-    assert {name: verdict for name, verdict, *_ in figures} == {"first": "passed", "second": "FAILED", "third": "passed"}
+    assert {name: verdict for name, verdict, *_ in figures} == {
+        "first": "passed",
+        "second": "FAILED",
+        "third": "passed",
+    }
     assert all(line[3] == line[5] == "s" and line[2].isdigit() and line[4].isdigit() for line in figures)
     assert check.main(["first", "third"]) == 0
 

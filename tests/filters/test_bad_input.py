@@ -22,6 +22,8 @@ from vedette.filters import (
     LmbFilter,
     PhdFilter,
 )
+from vedette.filters.inputs import model_errors
+from vedette.kernels.base.arrays import counted_ints
 
 pytestmark = pytest.mark.lanes
 
@@ -254,6 +256,15 @@ def test_a_model_that_raises(kind: Any) -> None:
         step(tracker)
 
 
+def test_what_is_no_fault_of_a_model_function_is_not_said_to_be_one() -> None:
+    """Of a kernel, or of Numba on the way to one: an integer that no kernel can take."""
+    with pytest.raises(Exception, match=r"too large|Maximum allowed") as raised, model_errors():
+        counted_ints(10**30)
+    assert not isinstance(raised.value, ModelError)
+    with pytest.raises(ModelError, match="a model function raised OverflowError: mine"), model_errors():
+        raise OverflowError("mine")
+
+
 @every_kind
 @pytest.mark.parametrize("value", [1.5, -0.1, math.nan, math.inf])
 def test_probabilities_that_are_none(kind: Any, value: float) -> None:
@@ -397,7 +408,7 @@ def test_more_targets_than_caps(kind: Any) -> None:
 @pytest.mark.parametrize(
     ("field", "values"),
     [
-        ("max_hypotheses", (0, -1, 2.5, "many")),
+        ("max_hypotheses", (0, -1, 2.5, "many", 2**62 + 1, 10**30)),
         ("max_search_nodes", (0,)),
         ("max_components", (0,)),
         ("max_labels", (0,)),
