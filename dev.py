@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Set up and run Vedette from a bare clone or source distribution. Needs Python 3.11 to 3.14 and nothing else.
+"""Set up and run Vedette from a bare clone or source distribution. Needs Python 3.11 to 3.15 and nothing else.
 
 usage: python3 dev.py COMMAND [ARGUMENTS]
 
@@ -24,7 +24,7 @@ import webbrowser
 from collections.abc import Iterator
 from pathlib import Path
 
-OLDEST, NEWEST = (3, 11), (3, 14)
+OLDEST, NEWEST = (3, 11), (3, 15)
 
 # Before anything that an older Python would stumble over.
 if not OLDEST <= sys.version_info[:2] <= NEWEST:
@@ -128,8 +128,9 @@ def install(extent: str, *, dependencies: bool) -> None:
     """Install the project, and the dependencies locked for `extent` where they are asked for, into `.venv`."""
     pip = [str(PYTHON), "-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--no-input", "--no-user"]
     if dependencies:
+        source = ["--no-binary", "pyyaml"] if sys.version_info >= (3, 15) else []  # no wheel yet; needs no compiler
         call(
-            [*pip, "--require-hashes", "--only-binary", ":all:", "--requirement", str(lock_file(extent))],
+            [*pip, "--require-hashes", "--only-binary", ":all:", *source, "--requirement", str(lock_file(extent))],
             "Is a package registry within reach, and is this one of the platforms that the packages are built for?",
         )
     call(

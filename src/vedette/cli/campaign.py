@@ -11,6 +11,7 @@ import typer
 from vedette.cli.progress import CampaignProgress
 from vedette.cli.results import print_failures
 from vedette.cli.running import TRUST_HELP, Approval, compile_if_cold, interruptible, processors
+from vedette.extras import need
 from vedette.text import counted
 
 if TYPE_CHECKING:
@@ -43,6 +44,7 @@ def campaign(
     trust: Annotated[bool, typer.Option("--trust", help=TRUST_HELP)] = False,
 ) -> None:
     """Run a campaign, or go on with one: every run that its folder does not hold yet."""
+    need("vedette campaign", "pyarrow")
     from vedette.campaigns import load_spec, resolve
 
     resolved = resolve(load_spec(spec), spec.parent, approve=Approval(trust, spec))

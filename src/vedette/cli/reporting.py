@@ -12,6 +12,7 @@ import typer
 from vedette.cli.errors import usage_error
 from vedette.cli.running import interruptible
 from vedette.errors import InputError
+from vedette.extras import need
 
 
 def report(
@@ -31,6 +32,7 @@ def report(
     ] = False,
 ) -> None:
     """Report on a campaign: one page that opens anywhere, with tables, figures and a replay of runs."""
+    need("vedette report", "jinja2", "matplotlib", "pyarrow")
     replays = None if runs is None else [_cell_and_run(text) for text in runs.split(",")]
     page = out or folder / "report.html"
     with interruptible("what is not yet written is missing; the same command writes it all anew"):

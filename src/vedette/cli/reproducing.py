@@ -16,6 +16,7 @@ from vedette.cli.results import print_progress, print_results
 from vedette.cli.running import TRUST_HELP, Approval, check_planner, interruptible
 from vedette.cli.scenario_files import write_text
 from vedette.errors import InputError
+from vedette.extras import need
 from vedette.text import shown
 
 if TYPE_CHECKING:
@@ -56,6 +57,7 @@ def reproduce(
 
     A campaign with its report, tables and figures.
     """
+    need("vedette reproduce", "jinja2", "matplotlib", "pyarrow")
     from vedette.campaigns import open_results, resolve
     from vedette.campaigns.yardsticks import yardsticks
 

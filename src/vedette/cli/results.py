@@ -12,6 +12,7 @@ from vedette.cli.comparisons import print_comparison
 from vedette.cli.errors import usage_error
 from vedette.cli.running import print_run
 from vedette.errors import VedetteError
+from vedette.extras import need
 from vedette.text import counted
 
 if TYPE_CHECKING:
@@ -42,6 +43,7 @@ def results(
             raise usage_error(f"expected one of {', '.join(_FORMATS)}; got {name}", "--format")
     if formats and export is None:
         raise usage_error("expected with --export, which names the folder", "--format")
+    need("vedette results", "pyarrow")
     from vedette.campaigns.results import open_results
     from vedette.simulation.storage import holds_run, load_run
 

@@ -15,6 +15,7 @@ from vedette.cli.errors import INTERRUPTED, usage_error
 from vedette.cli.output import console as new_console
 from vedette.cli.scenario_files import warn
 from vedette.errors import InputError
+from vedette.extras import need
 from vedette.text import amount, counted
 
 if TYPE_CHECKING:
@@ -115,6 +116,7 @@ def run(
     Approval(trust)(loaded)
     warn(loaded)
     if out is not None:
+        need("vedette run --out", "matplotlib", "pyarrow")
         check_free(out, overwrite)
     stop: RunStopped | RunInterrupted | None = None
     with interruptible("nothing was written"):

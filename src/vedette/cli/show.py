@@ -11,6 +11,7 @@ import typer
 from vedette.cli.errors import usage_error
 from vedette.cli.output import console as new_console
 from vedette.cli.running import TRUST_HELP, Approval
+from vedette.extras import need
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -39,6 +40,8 @@ def show(
 
     if out is not None and out.suffix[1:].lower() not in PICTURE_FORMATS:
         raise usage_error(f"expected a file ending in {', '.join(PICTURE_FORMATS)}; got {out}", "--out")
+    if out is not None:
+        need("vedette show --out", "matplotlib")
     loaded = load_scenario(scenario)
     if not resolved or out is not None:  # the targets move by its motion model
         Approval(trust)(loaded)

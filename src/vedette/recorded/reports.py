@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from vedette.errors import InputError
+from vedette.extras import need
 from vedette.kernels.base.types import Floats, Ints
 from vedette.recorded.geography import to_tangent_plane
 from vedette.text import elided, printable, shown
@@ -179,6 +180,7 @@ def _read_csv(file: Path) -> Table:
 
 
 def _read_parquet(file: Path) -> Table:
+    need(f"{file}, which is a Parquet file,", "pyarrow")
     from pyarrow import ArrowException, parquet  # here, as most programs never need it
 
     try:
