@@ -7,7 +7,7 @@ usage: python3 dev.py COMMAND [ARGUMENTS]
     check [STAGE ...]       run the whole check, or only the stages named (`check --list` names them)
     docs [--open]           build the documentation, say where it is, and with --open show it
     vedette [ARGUMENTS]     run any other command of the program
-    wheel [SCENARIO ...]    build a wheel that holds compiled kernels (those of the scenarios named), in dist/
+    release [SCENARIO ...]  make source distribution and wheels, one with compiled kernels, in dist/, and try each
     setup                   only set up the environment for all of these
 
 The first call makes `.venv` beside this file and installs the locked dependencies into it.
@@ -17,7 +17,6 @@ import contextlib
 import hashlib
 import os
 import platform
-import shutil
 import subprocess
 import sys
 import webbrowser
@@ -158,23 +157,13 @@ def build_docs(*, show: bool) -> int:
     return status
 
 
-def build_wheel(scenarios: list[str]) -> int:
-    """Build a wheel for this Python and system that holds compiled kernels, for processors of every make."""
-    kernels = ROOT / "build" / "compiled-kernels"
-    shutil.rmtree(kernels, ignore_errors=True)
-    os.environ["NUMBA_CPU_NAME"] = "generic"
-    os.environ["VEDETTE_CACHE_DIR"] = os.environ["VEDETTE_COMPILED_KERNELS"] = str(kernels)
-    status = attend([str(PYTHON), str(ROOT / "tools" / "compile_kernels.py"), *scenarios], ROOT)
-    return status or attend([str(PYTHON), "-m", "hatchling", "build", "--target", "wheel"], ROOT)
-
-
 def main(arguments: list[str]) -> int:
     """Run one command; returns the exit status."""
     if not arguments or arguments[0] in ("-h", "--help", "help"):
         print((__doc__ or "").strip())
         return 0 if arguments else 2
     command, rest = arguments[0], arguments[1:]
-    if command not in ("reproduce", "check", "docs", "vedette", "wheel", "setup"):
+    if command not in ("reproduce", "check", "docs", "vedette", "release", "setup"):
         print(f"error: unknown command {command!r}\n\n{(__doc__ or '').strip()}", file=sys.stderr)
         return 2
     if command == "docs" and rest not in ([], ["--open"]):
@@ -188,12 +177,10 @@ def main(arguments: list[str]) -> int:
     if command == "setup":
         print(f"ready: {VENV}")
         return 0
-    if command == "check":
-        return attend([str(PYTHON), str(ROOT / "tools" / "check.py"), *rest], ROOT)
+    if command in ("check", "release"):
+        return attend([str(PYTHON), str(ROOT / "tools" / f"{command}.py"), *rest], ROOT)
     if command == "docs":
         return build_docs(show="--open" in rest)
-    if command == "wheel":
-        return build_wheel(rest)
     program = [str(SCRIPTS / "vedette")]
     return attend([*program, *(["reproduce", *rest] if command == "reproduce" else rest)])
 

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Compile what scenarios need into the cache, by running them: python tools/compile_kernels.py [SCENARIO ...]
 
-`python dev.py wheel` runs this with a cache of its own, for processors of every make.
+`python dev.py release` runs this with a cache of its own, for each level of processor.
 """
 
 from __future__ import annotations
