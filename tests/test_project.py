@@ -308,14 +308,16 @@ def test_how_to_cite_says_this_version_and_the_paper() -> None:
     assert " ".join(paper["title"].split()) in " ".join(README.split())
 
 
-def test_the_changelog_speaks_of_this_version() -> None:
-    assert vedette.__version__ in (ROOT / "CHANGELOG.md").read_text("utf-8")
+def test_the_changelog_begins_with_what_is_unreleased_and_then_this_version() -> None:
+    headings = re.findall(r"^## (.*)$", (ROOT / "CHANGELOG.md").read_text("utf-8"), re.MULTILINE)
+    assert headings[0] == "[Unreleased]"
+    assert re.fullmatch(re.escape(f"[{vedette.__version__}]") + r" - (\d{4}-\d\d-\d\d|YYYY-MM-DD)", headings[1])
 
 
-def build(folder: Path, kind: str, target: Path) -> Path:
+def build(folder: Path, kind: str, target: Path, **environment: str) -> Path:
     """The one file that hatchling builds of the project in a folder."""
     command = [sys.executable, "-m", "hatchling", "build", "--target", kind, "--directory", str(target)]
-    subprocess.run(command, cwd=folder, check=True, capture_output=True)
+    subprocess.run(command, cwd=folder, check=True, capture_output=True, env={**os.environ, **environment})
     (built,) = target.iterdir()
     return built
 
@@ -367,3 +369,39 @@ def test_the_package_holds_the_whole_library_its_types_data_and_licence(wheel_fi
     assert expected <= set(wheel_files)
     assert any(path.endswith("licenses/LICENSE") for path in wheel_files)
     assert not [path for path in wheel_files if path.startswith(("tests/", "tools/"))]
+
+
+def test_a_wheel_with_kernels_is_one_of_this_python_and_system(unpacked: Path, tmp_path: Path) -> None:
+    (tmp_path / "kernels" / "base.0").mkdir(parents=True)
+    (tmp_path / "kernels" / "base.0" / "entry.nbc").write_bytes(b"code")
+    file = build(unpacked, "wheel", tmp_path / "built", VEDETTE_COMPILED_KERNELS=str(tmp_path / "kernels"))
+    tag = f"cp{sys.version_info[0]}{sys.version_info[1]}"
+    assert file.name.startswith(f"vedette-{vedette.__version__}-{tag}-{tag}-")
+    if sys.platform == "linux":
+        assert "-manylinux_" in file.name  # what a registry takes
+    assert zipfile.ZipFile(file).read("vedette/compiled-kernels/base.0/entry.nbc") == b"code"
+
+
+def test_a_release_whose_kernels_or_figures_are_not_there_is_none(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    release = load("tools/release.py")
+    printed: list[str] = []
+    monkeypatch.setattr(release, "call", lambda *_: "".join(printed))
+    tried = release.CleanEnvironment(tmp_path / "a.whl", "[report]", tmp_path)
+    with pytest.raises(release.ReleaseError, match=r"expected a figure run.figures.tracks\.png; there is none"):
+        tried.first_figure("paper-a", compiles=False)
+    (tried.folder / release.FIRST_FIGURE).parent.mkdir(parents=True)
+    (tried.folder / release.FIRST_FIGURE).touch()
+    assert "first figure of paper-a after" in tried.first_figure("paper-a", compiles=False)
+    with pytest.raises(release.ReleaseError, match="expected kernels to be compiled"):
+        tried.first_figure("paper-a", compiles=True)
+    printed.append("compiling kernels for this machine: once")
+    with pytest.raises(release.ReleaseError, match="expected kernels of the wheel"):
+        tried.first_figure("paper-a", compiles=False)
+
+
+def test_a_failed_step_of_a_release_shows_what_it_said(tmp_path: Path) -> None:
+    release = load("tools/release.py")
+    with pytest.raises(release.ReleaseError, match=r"(?s)no such thing.*exit status 3"):
+        release.call([sys.executable, "-c", "print('no such thing'); raise SystemExit(3)"], tmp_path, os.environ)
