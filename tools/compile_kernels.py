@@ -12,8 +12,8 @@ from vedette.evaluation.precompile import precompile
 from vedette.evaluation.runs import run_scenario
 from vedette.scenarios import load_scenario
 
-# Between them, every filter and fusion that `vedette init --from` and the README begin with.
-_SCENARIOS = ("paper-a", "paper-e", "linear-10", "polar-10", "two-views-1", "crowd")
+# Between them, every filter and fusion that `vedette init` and the README begin with.
+_SCENARIOS = ("paper-a", "paper-e", "linear-10", "polar-10", "two-views-1", "shore-radar", "eight-mobile", "crowd")
 
 
 def main(names: list[str]) -> None:
