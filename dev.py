@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Set up and run Vedette from a bare clone or source distribution. Needs Python 3.11 to 3.14 and nothing else.
+"""Set up and run Vedette from a bare clone or source distribution. Needs Python 3.11 to 3.15 and nothing else.
 
 usage: python3 dev.py COMMAND [ARGUMENTS]
 
@@ -7,7 +7,7 @@ usage: python3 dev.py COMMAND [ARGUMENTS]
     check [STAGE ...]       run the whole check, or only the stages named (`check --list` names them)
     docs [--open]           build the documentation, say where it is, and with --open show it
     vedette [ARGUMENTS]     run any other command of the program
-    wheel [SCENARIO ...]    build a wheel that holds compiled kernels (those of the scenarios named), in dist/
+    release [SCENARIO ...]  make source distribution and wheels, one with compiled kernels, in dist/, and try each
     setup                   only set up the environment for all of these
 
 The first call makes `.venv` beside this file and installs the locked dependencies into it.
@@ -17,14 +17,13 @@ import contextlib
 import hashlib
 import os
 import platform
-import shutil
 import subprocess
 import sys
 import webbrowser
 from collections.abc import Iterator
 from pathlib import Path
 
-OLDEST, NEWEST = (3, 11), (3, 14)
+OLDEST, NEWEST = (3, 11), (3, 15)
 
 # Before anything that an older Python would stumble over.
 if not OLDEST <= sys.version_info[:2] <= NEWEST:
@@ -128,8 +127,9 @@ def install(extent: str, *, dependencies: bool) -> None:
     """Install the project, and the dependencies locked for `extent` where they are asked for, into `.venv`."""
     pip = [str(PYTHON), "-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--no-input", "--no-user"]
     if dependencies:
+        source = ["--no-binary", "pyyaml"] if sys.version_info >= (3, 15) else []  # no wheel yet; needs no compiler
         call(
-            [*pip, "--require-hashes", "--only-binary", ":all:", "--requirement", str(lock_file(extent))],
+            [*pip, "--require-hashes", "--only-binary", ":all:", *source, "--requirement", str(lock_file(extent))],
             "Is a package registry within reach, and is this one of the platforms that the packages are built for?",
         )
     call(
@@ -157,23 +157,13 @@ def build_docs(*, show: bool) -> int:
     return status
 
 
-def build_wheel(scenarios: list[str]) -> int:
-    """Build a wheel for this Python and system that holds compiled kernels, for processors of every make."""
-    kernels = ROOT / "build" / "compiled-kernels"
-    shutil.rmtree(kernels, ignore_errors=True)
-    os.environ["NUMBA_CPU_NAME"] = "generic"
-    os.environ["VEDETTE_CACHE_DIR"] = os.environ["VEDETTE_COMPILED_KERNELS"] = str(kernels)
-    status = attend([str(PYTHON), str(ROOT / "tools" / "compile_kernels.py"), *scenarios], ROOT)
-    return status or attend([str(PYTHON), "-m", "hatchling", "build", "--target", "wheel"], ROOT)
-
-
 def main(arguments: list[str]) -> int:
     """Run one command; returns the exit status."""
     if not arguments or arguments[0] in ("-h", "--help", "help"):
         print((__doc__ or "").strip())
         return 0 if arguments else 2
     command, rest = arguments[0], arguments[1:]
-    if command not in ("reproduce", "check", "docs", "vedette", "wheel", "setup"):
+    if command not in ("reproduce", "check", "docs", "vedette", "release", "setup"):
         print(f"error: unknown command {command!r}\n\n{(__doc__ or '').strip()}", file=sys.stderr)
         return 2
     if command == "docs" and rest not in ([], ["--open"]):
@@ -187,12 +177,10 @@ def main(arguments: list[str]) -> int:
     if command == "setup":
         print(f"ready: {VENV}")
         return 0
-    if command == "check":
-        return attend([str(PYTHON), str(ROOT / "tools" / "check.py"), *rest], ROOT)
+    if command in ("check", "release"):
+        return attend([str(PYTHON), str(ROOT / "tools" / f"{command}.py"), *rest], ROOT)
     if command == "docs":
         return build_docs(show="--open" in rest)
-    if command == "wheel":
-        return build_wheel(rest)
     program = [str(SCRIPTS / "vedette")]
     return attend([*program, *(["reproduce", *rest] if command == "reproduce" else rest)])
 

@@ -40,9 +40,12 @@ def load(path: str) -> ModuleType:
     return module
 
 
-def pins(lock: Path) -> dict[str, str]:
-    """Locked name -> version."""
-    return dict(re.findall(r"^([a-z0-9.-]+)==([^ ;\\]+)", lock.read_text("utf-8"), re.MULTILINE))
+def pins(lock: Path) -> dict[str, set[str]]:
+    """Locked name -> versions, with what they are for where Pythons or platforms have different ones."""
+    found: dict[str, set[str]] = {}
+    for name, pin in re.findall(r"^([a-z0-9.-]+)==([^\\]+) \\", lock.read_text("utf-8"), re.MULTILINE):
+        found.setdefault(name, set()).add(pin)
+    return found
 
 
 def canonical(requirement: str) -> str:
@@ -56,7 +59,7 @@ def direct_dependencies() -> list[str]:
     extras = PROJECT["project"]["optional-dependencies"].values()
     groups = PROJECT["dependency-groups"].values()
     listed = [*PROJECT["project"]["dependencies"], *(entry for group in (*extras, *groups) for entry in group)]
-    return [canonical(entry) for entry in listed if isinstance(entry, str)]
+    return [canonical(entry) for entry in listed if isinstance(entry, str) and not entry.startswith("vedette[")]
 
 
 @kernel
@@ -78,7 +81,7 @@ def test_locks_name_no_place_and_hash_every_file(lock: Path) -> None:
     text = lock.read_text("utf-8")
     assert not re.search(r"https?:|file:|--index|--extra-index|--find-links|--trusted", text)
     blocks = re.split(r"\n(?=[a-z])", text.split("\n", 1)[1])
-    assert len(blocks) == len(pins(lock)) > 20
+    assert len(blocks) == sum(map(len, pins(lock).values())) > 20
     assert all("--hash=sha256:" in block for block in blocks)
 
 
@@ -111,7 +114,7 @@ def test_an_unsupported_python_is_told_so_before_anything_else() -> None:
     )
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert result.returncode == 1
-    assert "needs Python 3.11 to 3.14; this is Python 3.8" in result.stderr
+    assert "needs Python 3.11 to 3.15; this is Python 3.8" in result.stderr
 
 
 @pytest.mark.parametrize(
@@ -312,14 +315,16 @@ def test_how_to_cite_says_this_version_and_the_paper() -> None:
     assert " ".join(paper["title"].split()) in " ".join(README.split())
 
 
-def test_the_changelog_speaks_of_this_version() -> None:
-    assert vedette.__version__ in (ROOT / "CHANGELOG.md").read_text("utf-8")
+def test_the_changelog_begins_with_what_is_unreleased_and_then_this_version() -> None:
+    headings = re.findall(r"^## (.*)$", (ROOT / "CHANGELOG.md").read_text("utf-8"), re.MULTILINE)
+    assert headings[0] == "[Unreleased]"
+    assert re.fullmatch(re.escape(f"[{vedette.__version__}]") + r" - (\d{4}-\d\d-\d\d|YYYY-MM-DD)", headings[1])
 
 
-def build(folder: Path, kind: str, target: Path) -> Path:
+def build(folder: Path, kind: str, target: Path, **environment: str) -> Path:
     """The one file that hatchling builds of the project in a folder."""
     command = [sys.executable, "-m", "hatchling", "build", "--target", kind, "--directory", str(target)]
-    subprocess.run(command, cwd=folder, check=True, capture_output=True)
+    subprocess.run(command, cwd=folder, check=True, capture_output=True, env={**os.environ, **environment})
     (built,) = target.iterdir()
     return built
 
@@ -371,3 +376,39 @@ def test_the_package_holds_the_whole_library_its_types_data_and_licence(wheel_fi
     assert expected <= set(wheel_files)
     assert any(path.endswith("licenses/LICENSE") for path in wheel_files)
     assert not [path for path in wheel_files if path.startswith(("tests/", "tools/"))]
+
+
+def test_a_wheel_with_kernels_is_one_of_this_python_and_system(unpacked: Path, tmp_path: Path) -> None:
+    (tmp_path / "kernels" / "base.0").mkdir(parents=True)
+    (tmp_path / "kernels" / "base.0" / "entry.nbc").write_bytes(b"code")
+    file = build(unpacked, "wheel", tmp_path / "built", VEDETTE_COMPILED_KERNELS=str(tmp_path / "kernels"))
+    tag = f"cp{sys.version_info[0]}{sys.version_info[1]}"
+    assert file.name.startswith(f"vedette-{vedette.__version__}-{tag}-{tag}-")
+    if sys.platform == "linux":
+        assert "-manylinux_" in file.name  # what a registry takes
+    assert zipfile.ZipFile(file).read("vedette/compiled-kernels/base.0/entry.nbc") == b"code"
+
+
+def test_a_release_whose_kernels_or_figures_are_not_there_is_none(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    release = load("tools/release.py")
+    printed: list[str] = []
+    monkeypatch.setattr(release, "call", lambda *_: "".join(printed))
+    tried = release.CleanEnvironment(tmp_path / "a.whl", "[report]", tmp_path)
+    with pytest.raises(release.ReleaseError, match=r"expected a figure run.figures.tracks\.png; there is none"):
+        tried.first_figure("paper-a", compiles=False)
+    (tried.folder / release.FIRST_FIGURE).parent.mkdir(parents=True)
+    (tried.folder / release.FIRST_FIGURE).touch()
+    assert "first figure of paper-a after" in tried.first_figure("paper-a", compiles=False)
+    with pytest.raises(release.ReleaseError, match="expected kernels to be compiled"):
+        tried.first_figure("paper-a", compiles=True)
+    printed.append("compiling kernels for this machine: once")
+    with pytest.raises(release.ReleaseError, match="expected kernels of the wheel"):
+        tried.first_figure("paper-a", compiles=False)
+
+
+def test_a_failed_step_of_a_release_shows_what_it_said(tmp_path: Path) -> None:
+    release = load("tools/release.py")
+    with pytest.raises(release.ReleaseError, match=r"(?s)no such thing.*exit status 3"):
+        release.call([sys.executable, "-c", "print('no such thing'); raise SystemExit(3)"], tmp_path, os.environ)

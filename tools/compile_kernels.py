@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Compile what scenarios need into the cache, by running them: python tools/compile_kernels.py [SCENARIO ...]
 
-`python dev.py wheel` runs this with a cache of its own, for processors of every make.
+`python dev.py release` runs this with a cache of its own, for each level of processor.
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ from vedette.evaluation.precompile import precompile
 from vedette.evaluation.runs import run_scenario
 from vedette.scenarios import load_scenario
 
-# Between them, every filter and fusion that `vedette init --from` and the README begin with.
-_SCENARIOS = ("paper-a", "paper-e", "linear-10", "polar-10", "two-views-1", "crowd")
+# Between them, every filter and fusion that `vedette init` and the README begin with.
+_SCENARIOS = ("paper-a", "paper-e", "linear-10", "polar-10", "two-views-1", "shore-radar", "eight-mobile", "crowd")
 
 
 def main(names: list[str]) -> None:

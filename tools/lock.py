@@ -11,7 +11,7 @@ import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-HEADER = "# Locked for Python 3.11 to 3.14 on every platform by tools/lock.py; do not edit.\n"
+HEADER = "# Locked for Python 3.11 to 3.15 on every platform by tools/lock.py; do not edit.\n"
 OPTIONS = [
     "--universal",
     "--python-version=3.11",
@@ -34,6 +34,6 @@ def compile_lock(name: str, *selection: str) -> None:
 
 
 if __name__ == "__main__":
-    compile_lock("runtime", "--group", "build")
+    compile_lock("runtime", "--extra", "all", "--group", "build")
     # The check runs on the very versions that a user gets.
-    compile_lock("check", "--extra", "xarray", "--group", "check", "--constraint", "requirements/runtime.txt")
+    compile_lock("check", "--extra", "all", "--group", "check", "--constraint", "requirements/runtime.txt")

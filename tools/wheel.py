@@ -1,4 +1,4 @@
-"""What a wheel holds beside the sources: kernels that were compiled for it (`python dev.py wheel`), if there are any.
+"""What a wheel holds beside the sources: kernels that were compiled for it (`python dev.py release`), if there are any.
 
 Hatchling calls this while it builds. Without `VEDETTE_COMPILED_KERNELS` the wheel is one of pure Python.
 """
@@ -6,6 +6,8 @@ Hatchling calls this while it builds. Without `VEDETTE_COMPILED_KERNELS` the whe
 from __future__ import annotations
 
 import os
+import platform
+import sys
 from typing import Any
 
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
@@ -20,4 +22,9 @@ class CompiledKernels(BuildHookInterface):  # type: ignore[type-arg]
         if folder and version == "standard":
             build_data["force_include"][folder] = "vedette/compiled-kernels"
             build_data["pure_python"] = False
-            build_data["infer_tag"] = True
+            if sys.platform == "linux":
+                # The code is linked where it is loaded: it runs on whatever system Numba's own wheels run.
+                python = f"cp{sys.version_info[0]}{sys.version_info[1]}"
+                build_data["tag"] = f"{python}-{python}-manylinux_2_28_{platform.machine()}"
+            else:
+                build_data["infer_tag"] = True

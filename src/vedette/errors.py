@@ -13,6 +13,10 @@ class InputError(VedetteError, ValueError):
     """An argument, scan, file or folder that cannot be used."""
 
 
+class MissingPackageError(InputError, ImportError):
+    """What is asked for needs a package that is not installed; the message names the extra that brings it."""
+
+
 class ModelError(VedetteError):
     """A model function raised, or returned something that is not a valid value of its kind."""
 

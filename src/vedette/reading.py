@@ -40,6 +40,13 @@ def read_file(path: Path, most: int = MOST_BYTES) -> bytes:
     return content
 
 
+def unreadable(path: Path, what: str, error: OSError) -> InputError:
+    """What to say of a file that the system does not give, where `what` was expected."""
+    if isinstance(error, FileNotFoundError | NotADirectoryError):
+        return InputError(f"{path}: no such file; expected {what}")
+    return InputError(f"{path}: expected {what}; got {error.strerror or error}")
+
+
 def read_text(path: Path, what: str, most: int) -> str:
     """The text of a UTF-8 file of at most so many bytes; `what` it is called in messages.
 
@@ -51,7 +58,7 @@ def read_text(path: Path, what: str, most: int) -> str:
     except UnicodeDecodeError as error:
         raise InputError(f"{path}: expected UTF-8 text; byte {error.start} is not") from None
     except OSError as error:
-        raise InputError(f"{path}: expected a readable {what}; got {error.strerror}") from None
+        raise unreadable(path, f"a {what}", error) from None
     except ValueError as error:
         raise InputError(f"{path}: expected a {what} of at most {most} bytes; {error}") from None
 

@@ -211,7 +211,9 @@ def test_netcdf_reads_back(results, tmp_path):
 
 def test_a_missing_xarray_is_named(results, monkeypatch):
     monkeypatch.setitem(sys.modules, "xarray", None)
-    with pytest.raises(InputError, match=r"expected xarray, which is not installed; pip install 'vedette\[xarray\]'"):
+    with pytest.raises(
+        InputError, match=r"a dataset needs xarray, which is not installed: pip install 'vedette\[xarray\]'"
+    ):
         results.dataset()
 
 

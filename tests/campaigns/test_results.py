@@ -200,11 +200,11 @@ def test_what_is_no_results_folder_is_named(folder, tmp_path):
         open_results(folder)
     assert not (folder / "campaign.sqlite").exists()
     (folder / "manifest.json").unlink()
-    with pytest.raises(InputError, match=r"manifest\.json: expected the manifest of a campaign; No such file"):
+    with pytest.raises(InputError, match=r"manifest\.json: no such file; expected the manifest of a campaign"):
         open_results(folder)
-    with pytest.raises(InputError, match="expected the results folder of a campaign; got nothing"):
+    with pytest.raises(InputError, match="no such folder; expected the results folder of a campaign"):
         open_results(folder / "nowhere")
-    with pytest.raises(InputError, match="got a file"):
+    with pytest.raises(InputError, match="a file; expected the results folder"):
         open_results(tmp_path / "away")
 
 
@@ -290,7 +290,7 @@ def test_the_command_exports(whole, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "status", "message"),
     [
-        (("nowhere",), 1, "got nothing"),
+        (("nowhere",), 1, "no such folder"),
         ((".", "--format", "excel"), 2, "parquet, csv, netcdf"),
         ((".", "--format", "csv"), 2, "--export"),
     ],

@@ -98,7 +98,7 @@ def test_ctrl_c_says_how_to_go_on(short: Yardstick, monkeypatch: pytest.MonkeyPa
         (
             ("deciding-six-camera",),
             1,
-            "expected a yardstick (deciding-six-cameras), a built-in scenario (beyond-the-gap, crowd, eight-mobile, ",
+            "deciding-six-camera: no such file; expected a yardstick (deciding-six-cameras), a YAML file or one of",
         ),
         ((NAME, "--runs", "0"), 2, "--runs"),
     ],

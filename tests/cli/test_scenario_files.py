@@ -89,7 +89,7 @@ def test_generate_writes_a_commented_file_that_passes_check(tmp_path: Path) -> N
     assert (checked.exit_code, checked.stderr) == (0, "")
     assert checked.stdout.startswith(f"{file}: ok: crowd-limited-3-seed-2, ")
     again = vedette(*words)
-    assert (again.exit_code, again.stderr) == (1, f"{file}: already there; --force overwrites\n")
+    assert (again.exit_code, again.stderr) == (1, f"{file}: already there; --overwrite replaces it\n")
     assert vedette(*words, "--force").exit_code == 0
     assert file.read_text(encoding="utf-8") == text
 
@@ -166,7 +166,7 @@ def test_init_never_overwrites_without_force(taken: str, tmp_path: Path) -> None
     (tmp_path / taken).write_text("mine", encoding="utf-8")
     result = vedette("init", str(tmp_path), "--from", "solent")
     assert (result.exit_code, result.stdout) == (1, "")
-    assert result.stderr == f"{tmp_path / taken}: already there; --force overwrites\n"
+    assert result.stderr == f"{tmp_path / taken}: already there; --overwrite replaces it\n"
     assert (tmp_path / taken).read_text(encoding="utf-8") == "mine"
     assert [file.name for file in tmp_path.iterdir()] == [taken]
     assert vedette("init", str(tmp_path), "--from", "solent", "--force").exit_code == 0
@@ -192,7 +192,7 @@ def test_check_tells_all_faults_of_all_files(tmp_path: Path) -> None:
     assert third == (
         f"{good}: ok: small, 20 scans, 1 target, 2 sensors, m_delta_glmb filter, cm_delta_glmb fusion, 2 decisions"
     )
-    assert fourth.startswith("scenario: expected a YAML file")
+    assert fourth.startswith(f"{absent}: no such file; expected a YAML file or one of ")
 
 
 def test_check_without_files_is_wrong_use() -> None:

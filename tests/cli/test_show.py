@@ -90,7 +90,7 @@ def test_an_unknown_scenario_is_told_without_a_traceback() -> None:
     result = show("paper-b")
     assert (result.exit_code, result.stdout) == (1, "")
     assert result.stderr.startswith(
-        "scenario: expected a YAML file or one of beyond-the-gap, crowd, eight-mobile, linear-10"
+        "paper-b: no such file; expected a YAML file or one of beyond-the-gap, crowd, eight-mobile, linear-10"
     )
 
 

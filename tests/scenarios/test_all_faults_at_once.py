@@ -117,5 +117,5 @@ def test_what_is_no_utf8_is_told(tmp_path: Path) -> None:
 
 
 def test_an_unknown_name_gets_the_nearest_one() -> None:
-    with pytest.raises(InputError, match=r"got 'papre-a' \(did you mean paper-a\?\)"):
+    with pytest.raises(InputError, match=r"^papre-a: no such file; expected .* \(did you mean paper-a\?\)"):
         load_scenario("papre-a")

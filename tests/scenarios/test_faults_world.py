@@ -66,9 +66,7 @@ CASES = [
     (
         "{kind: constant_velocity, sigma_v: 1.0}",
         "{kind: custom, function: 'absent.py:motion', state_dim: 4}",
-        [
-            'f.yaml:4:34: motion.function: expected a file, relative to the scenario file, got "absent.py", which is not there'
-        ],
+        ['f.yaml:4:34: motion.function: expected a file, relative to the scenario file, got "absent.py": no such file'],
     ),
     (
         "{kind: constant_velocity, sigma_v: 1.0}",
@@ -154,9 +152,7 @@ CASES = [
     (
         "  kind: scripted\n  tracks:\n    - {state: [1.0, 2.0, 0.5, -0.5], start_step: 2, end_step: 18}",
         "  kind: recorded\n  path: nowhere.csv",
-        [
-            'f.yaml:12:9: targets.path: expected a file, relative to the scenario file, got "nowhere.csv", which is not there'
-        ],
+        ['f.yaml:12:9: targets.path: expected a file, relative to the scenario file, got "nowhere.csv": no such file'],
     ),
 ]
 

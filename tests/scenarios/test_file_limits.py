@@ -96,7 +96,7 @@ def test_a_name_that_no_file_can_have_is_a_file_that_is_not_there(name: str, tmp
     assert str(error.value).isprintable()
     assert len(str(error.value)) < 1000
     section = {"kind": "recorded", "path": f"{name}.csv"}
-    with pytest.raises(ScenarioError, match=r"targets.*(which is not there|string)"):
+    with pytest.raises(ScenarioError, match=r"targets.*(no such file|string)"):
         with_fields(parse(tmp_path), {"targets": section})
 
 

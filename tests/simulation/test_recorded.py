@@ -243,7 +243,7 @@ def test_bad_csv_is_named(tmp_path, text, message):
 
 
 def test_files_that_are_not_tables(tmp_path):
-    with pytest.raises(InputError, match="expected a file; there is none"):
+    with pytest.raises(InputError, match="no such file; expected recorded targets"):
         RecordedTargets.from_file(tmp_path / "none.csv")
     with pytest.raises(InputError, match=r"a \.csv or \.parquet file"):
         RecordedTargets.from_file(tmp_path / "tracks.xlsx")

@@ -191,7 +191,7 @@ def test_altered_and_truncated_files_are_named(saved: Path, file: str) -> None:
         with pytest.raises(InputError, match=rf"{file}: expected the file as it was written"):
             load_run(saved)
     (saved / file).unlink()
-    with pytest.raises(InputError, match=rf"{file}: expected a file of a saved run"):
+    with pytest.raises(InputError, match=rf"{file}: no such file; expected a file of a saved run"):
         load_run(saved)
 
 
@@ -219,7 +219,7 @@ def test_a_broken_manifest_is_named(saved: Path, manifest: str, message: str) ->
 
 
 def test_what_is_no_run_is_named(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"manifest\.json: expected a file of a saved run"):
+    with pytest.raises(InputError, match=r"manifest\.json: no such file; expected a file of a saved run"):
         load_run(tmp_path / "nowhere")
 
 

@@ -1,5 +1,9 @@
 """Monte Carlo campaigns: many runs of many settings, on one machine or many, kept in a folder that nothing tears."""
 
+from vedette.extras import need
+
+need("a campaign", "pyarrow")
+
 from vedette.campaigns.cells import Campaign, Cell, resolve
 from vedette.campaigns.results import CampaignResults, open_results
 from vedette.campaigns.running import Outcome, Watch, run_campaign

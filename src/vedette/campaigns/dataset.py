@@ -9,7 +9,7 @@ import pyarrow as pa
 
 from vedette.campaigns.cells import Campaign
 from vedette.campaigns.tables import setting_of, unit_of
-from vedette.errors import InputError
+from vedette.extras import need
 
 if TYPE_CHECKING:
     import xarray
@@ -24,12 +24,11 @@ def dataset_of_scans(campaign: Campaign, scans: pa.Table | None) -> xarray.Datas
     (name), `run`, `step` (from 1), the value of each axis of the campaign by cell, and `time_s` by cell and step.
     `attrs["units"]` of a variable is its unit.
 
-    Raises `InputError` where xarray is not installed.
+    Raises `MissingPackageError` where xarray is not installed.
     """
-    try:
-        import xarray
-    except ImportError:
-        raise InputError("dataset: expected xarray, which is not installed; pip install 'vedette[xarray]'") from None
+    need("a dataset", "xarray")
+    import xarray
+
     table = _EMPTY if scans is None else scans
     cells = [cell.name for cell in campaign.cells]
     of_cells = np.array([cells.index(name) for name in table["cell"].to_pylist()], np.int64)

@@ -18,7 +18,7 @@ from vedette.campaigns.cells import Campaign, Cell, safe_name, scenario_text
 from vedette.campaigns.spec import CampaignSpec, spec_from_data
 from vedette.errors import InputError
 from vedette.files import write_whole
-from vedette.reading import parse_json, read_file, said
+from vedette.reading import parse_json, read_file, said, unreadable
 from vedette.scenarios import Scenario
 from vedette.scenarios.sections import ScenarioModel
 from vedette.scenarios.yaml_reader import read_yaml
@@ -108,7 +108,7 @@ def read_manifest(folder: Path) -> dict[str, Any]:
     try:
         manifest = parse_json(read_file(path, _MOST_BYTES))
     except OSError as error:
-        raise InputError(f"{path}: expected the manifest of a campaign; {error.strerror or error}") from None
+        raise unreadable(path, "the manifest of a campaign", error) from None
     except ValueError as error:
         raise InputError(f"{path}: expected the manifest of a campaign; it is cut short or altered: {error}") from None
     if not isinstance(manifest, dict) or manifest.get("format") != FORMAT:

@@ -182,8 +182,8 @@ def open_results(folder: Path | str, metrics: Sequence[Metric] = ()) -> Campaign
     """
     target = Path(folder)
     if not target.is_dir():
-        got = "a file" if target.exists() else "nothing"
-        raise InputError(f"{target}: expected the results folder of a campaign; got {got}")
+        trouble = "a file" if target.exists() else "no such folder"
+        raise InputError(f"{target}: {trouble}; expected the results folder of a campaign")
     manifest = read_manifest(target)
     reader = Reader(target)
     reader.check(contents_checksum(manifest))

@@ -21,6 +21,7 @@ from vedette.campaigns.tasks import Failed, Landed, TaskQueue, perform
 from vedette.errors import InputError, VedetteError
 from vedette.evaluation.metrics import encode_metrics
 from vedette.evaluation.runs import own_metrics
+from vedette.extras import need
 from vedette.text import counted
 
 TABLES = "tables"
@@ -109,6 +110,10 @@ def run_campaign(
         raise VedetteError(
             'a script that runs a campaign with workers needs `if __name__ == "__main__":` around the call'
         )
+    if scheduler is not None:
+        need("a campaign on a cluster", "distributed")
+    elif num_workers > 1:
+        need("a campaign of more than one worker (--workers 1 does without)", "cryptography", "distributed")
     watch = watch or Unwatched()
     failed, num_landed = [], 0
     database = Path(folder) / DATABASE

@@ -9,6 +9,7 @@ import typer
 from vedette import __version__
 from vedette.cli.campaign import campaign
 from vedette.cli.errors import Commands
+from vedette.cli.output import speaking
 from vedette.cli.reporting import report
 from vedette.cli.reproducing import reproduce
 from vedette.cli.results import results
@@ -41,15 +42,15 @@ def main(
     """Options that come before the command."""
 
 
-app.command("list")(list_)
-app.command()(init)
-app.command()(generate)
-app.command()(crowd)
-app.command()(check)
-app.command()(show)
-app.command()(schema)
-app.command()(run)
-app.command()(reproduce)
-app.command()(campaign)
-app.command()(results)
-app.command()(report)
+app.command("list")(speaking(list_))
+app.command()(speaking(init))
+app.command()(speaking(generate))
+app.command()(speaking(crowd))
+app.command()(speaking(check))
+app.command()(speaking(show))
+app.command()(speaking(schema))
+app.command()(speaking(run))
+app.command()(speaking(reproduce))
+app.command()(speaking(campaign))
+app.command()(speaking(results))
+app.command()(speaking(report))

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import shlex
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from vedette.cli import completing
+from vedette.cli.options import Trust, Workers
+from vedette.cli.output import complain, note, publish, say
 from vedette.cli.progress import CampaignProgress
 from vedette.cli.results import print_failures
-from vedette.cli.running import TRUST_HELP, Approval, compile_if_cold, interruptible, processors
+from vedette.cli.running import Approval, compile_if_cold, interruptible, processors
+from vedette.extras import need
 from vedette.text import counted
 
 if TYPE_CHECKING:
@@ -19,14 +24,16 @@ if TYPE_CHECKING:
 
 def campaign(
     spec: Annotated[
-        Path, typer.Argument(help="Campaign file (TOML), or the name of a campaign of `reproduce --list`.")
+        Path,
+        typer.Argument(
+            help="Campaign file (TOML), or the name of a campaign of `reproduce --list`.",
+            autocompletion=completing.campaigns,
+        ),
     ],
     out: Annotated[
         Path | None, typer.Option("--out", metavar="DIR", help="Folder for the results; else named after the campaign.")
     ] = None,
-    workers: Annotated[
-        int, typer.Option("--workers", min=0, help="Processes on this machine; 1: this one; 0: one a processor.")
-    ] = 0,
+    workers: Workers = 0,
     scheduler: Annotated[
         str | None,
         typer.Option(
@@ -40,9 +47,10 @@ def campaign(
         bool, typer.Option("--redo-damaged", help="Run again what was altered since it was kept, in its place.")
     ] = False,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what would be run, and stop.")] = False,
-    trust: Annotated[bool, typer.Option("--trust", help=TRUST_HELP)] = False,
+    trust: Trust = False,
 ) -> None:
     """Run a campaign, or go on with one: every run that its folder does not hold yet."""
+    need("vedette campaign", "pyarrow")
     from vedette.campaigns import load_spec, resolve
 
     resolved = resolve(load_spec(spec), spec.parent, approve=Approval(trust, spec))
@@ -53,9 +61,19 @@ def campaign(
         return
     folder = out or Path(resolved.default_folder)
     outcome = carry_out(resolved, folder, workers, scheduler, redo_damaged)
-    typer.echo(f"{folder}: {outcome.num_landed + outcome.num_found} of {resolved.total} runs")
+    finished = outcome.num_landed + outcome.num_found
+    say(f"{folder}: {finished} of {resolved.total} runs")
     place = shlex.quote(str(folder))
-    typer.echo(f"next: vedette results {place}; vedette report {place}")
+    say(f"next: vedette results {place}; vedette report {place}")
+    publish(
+        {
+            "campaign": resolved.name,
+            "folder": folder,
+            "runs": resolved.total,
+            "finished": finished,
+            "failed": [asdict(each) for each in outcome.failed],
+        }
+    )
     report_failures(outcome.failed)
 
 
@@ -82,31 +100,42 @@ def report_failures(failed: tuple[Failed, ...]) -> None:
     """Name runs that could not be finished, and end with status 1 if there are any."""
     if not failed:
         return
-    typer.echo(f"failed: {counted(len(failed), 'run')}, which the same command tries again:", err=True)
-    print_failures(failed, err=True)
+    complain(f"failed: {counted(len(failed), 'run')}, which the same command tries again:")
+    print_failures(failed, complain)
     raise typer.Exit(1)
 
 
 def _describe(campaign: Campaign) -> None:
     from vedette.scenarios.cautions import cautions
 
-    typer.echo(
+    say(
         f"{campaign.name}: {campaign.total} runs, {campaign.num_runs} of each of {len(campaign.cells)} cells, "
         f"seed {campaign.seed}"
     )
     for field, value in campaign.spec["set"].items():
-        typer.echo(f"  set {field} = {value}")
+        say(f"  set {field} = {value}")
     for variant in campaign.spec["variants"]:
         for field, value in variant["set"].items():
-            typer.echo(f"  variant {variant['name']}: {field} = {value}")
+            say(f"  variant {variant['name']}: {field} = {value}")
     for axis, values in campaign.axes.items():
         compared = " (compared)" if axis == campaign.compare else ""
-        typer.echo(f"  {axis}: {', '.join(str(value) for value in values)}{compared}")
-    warned: set[tuple[str, ...]] = set()
+        say(f"  {axis}: {', '.join(str(value) for value in values)}{compared}")
+    warned: dict[tuple[str, ...], str] = {}
     for cell in campaign.cells:
-        typer.echo(f"  - {cell.name}")
+        say(f"  - {cell.name}")
         lines = cautions(cell.scenario)
         if lines not in warned:  # once for all planners, filters and values of which it is true alike
-            warned.add(lines)
+            warned[lines] = cell.name
             for line in lines:
-                typer.echo(f"cell {cell.name}: {line}", err=True)
+                note(f"cell {cell.name}: {line}")
+    publish(
+        {
+            "campaign": campaign.name,
+            "seed": campaign.seed,
+            "runs": campaign.total,
+            "runs_of_each_cell": campaign.num_runs,
+            "cells": [{"name": cell.name, **cell.settings} for cell in campaign.cells],
+            "compared": campaign.compare,
+            "warnings": [{"cell": cell, "lines": lines} for lines, cell in warned.items() if lines],
+        }
+    )

@@ -6,13 +6,15 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from typing import Any
 
 import typer
 from typer.core import TyperGroup
 
 from vedette.cli.output import accept_any_letter, drop_output, trouble_of_system
-from vedette.errors import VedetteError
+from vedette.errors import InputError, VedetteError
 
 INTERRUPTED = 130
 
@@ -48,3 +50,15 @@ class Commands(TyperGroup):
 def usage_error(message: str, option: str) -> typer.BadParameter:
     """Wrong use of an option: exit status 2."""
     return typer.BadParameter(message, param_hint=option)
+
+
+@contextmanager
+def named_options(options: Mapping[str, str]) -> Iterator[None]:
+    """Errors of arguments of the library's functions, by the options that give them."""
+    try:
+        yield
+    except InputError as error:
+        field, _, rest = str(error).partition(": ")
+        if field not in options:
+            raise
+        raise InputError(f"{options[field]}: {rest}") from error

@@ -1,11 +1,25 @@
-"""What commands print, wherever it goes: a terminal, a file, a pipe that closes, a disk that is full."""
+"""What commands print, wherever it goes: a terminal, a file, a pipe that closes, a disk that is full.
+
+Every command takes `--json` and `--quiet` (`speaking`). What it has to tell goes through here: results by `say` and
+`console`, remarks by `note`, the document of `--json` by `publish`. Errors are printed whatever was asked for.
+"""
 
 from __future__ import annotations
 
 import errno
+import functools
+import inspect
+import json
+import math
 import os
 import sys
-from typing import TYPE_CHECKING
+import warnings
+from collections.abc import Callable, Mapping
+from contextvars import ContextVar
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, get_type_hints
+
+import typer
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -13,11 +27,112 @@ if TYPE_CHECKING:
 _FULL = (errno.ENOSPC, errno.EIO, getattr(errno, "EDQUOT", errno.ENOSPC), errno.EFBIG)
 
 
+class Manner(NamedTuple):
+    """How a command tells what it has to tell: as one JSON document, and without remarks."""
+
+    as_json: bool = False
+    quiet: bool = False
+
+
+_PLAINLY = Manner()
+_manner: ContextVar[Manner] = ContextVar("_manner", default=_PLAINLY)
+_OPTIONS = {
+    "as_json": Annotated[bool, typer.Option("--json", help="Print the result as one JSON document.")],
+    "quiet": Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")],
+}
+
+
+def speaking(command: Callable[..., None]) -> Callable[..., None]:
+    """The command with the options `--json` and `--quiet`."""
+
+    @functools.wraps(command)
+    def spoken(*, as_json: bool, quiet: bool, **options: Any) -> None:
+        before = _manner.set(Manner(as_json, quiet))
+        try:
+            with warnings.catch_warnings():
+                if quiet:
+                    warnings.simplefilter("ignore")
+                command(**options)
+        finally:
+            _manner.reset(before)
+
+    signature = inspect.signature(command)
+    hints = get_type_hints(command, include_extras=True)
+    keyword = inspect.Parameter.KEYWORD_ONLY
+    taken = [each.replace(kind=keyword, annotation=hints[name]) for name, each in signature.parameters.items()]
+    more = [inspect.Parameter(name, keyword, default=False, annotation=kind) for name, kind in _OPTIONS.items()]
+    spoken.__signature__ = signature.replace(parameters=[*taken, *more])  # type: ignore[attr-defined]
+    spoken.__annotations__ = {**hints, **_OPTIONS}
+    return spoken
+
+
+def say(text: str = "", *, nl: bool = True, even_if_quiet: bool = False) -> None:
+    """A line of the result."""
+    manner = _manner.get()
+    if not manner.as_json and (even_if_quiet or not manner.quiet):
+        typer.echo(text, nl=nl)
+
+
+def note(text: str) -> None:
+    """A line beside the result: how far it is, what was left out, what may not be meant."""
+    if not _manner.get().quiet:
+        typer.echo(text, err=True)
+
+
+def complain(text: str) -> None:
+    """A line of what went wrong."""
+    typer.echo(text, err=True)
+
+
+def publish(document: Any) -> None:
+    """The result as data, where it is asked for: one call a command. Numbers that are none become null."""
+    if _manner.get().as_json:
+        typer.echo(json.dumps(_plain(document), indent=2, ensure_ascii=False, allow_nan=False))
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {str(key): _plain(each) for key, each in value.items()}
+    if hasattr(value, "tolist"):  # of NumPy
+        return _plain(value.tolist())
+    if isinstance(value, list | tuple):
+        return [_plain(each) for each in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return str(value) if isinstance(value, Path) else value
+
+
 def console(*, stderr: bool = False) -> Console:
     """A console that takes every text for text: names may hold brackets and colons."""
     from rich.console import Console
 
-    return Console(stderr=stderr, highlight=False, markup=False, emoji=False)
+    manner = _manner.get()
+    silent = manner.quiet or (manner.as_json and not stderr)
+    return Console(stderr=stderr, quiet=silent, highlight=False, markup=False, emoji=False)
+
+
+def print_names(rows: Mapping[str, str]) -> None:
+    """Names, each with what it is; where the terminal is narrow the names stand alone on their lines, whole."""
+    from rich.cells import cell_len
+    from rich.padding import Padding
+    from rich.table import Table
+
+    shown = console()
+    longest = max(map(cell_len, rows), default=0)
+    if shown.width - longest < _LEAST_ROOM:
+        for name, text in rows.items():
+            shown.print(name, soft_wrap=True)
+            shown.print(Padding(text, (0, 0, 0, 2)))
+        return
+    table = Table.grid(padding=(0, 2))
+    table.add_column(no_wrap=True, min_width=longest)
+    table.add_column(overflow="fold")
+    for name, text in rows.items():
+        table.add_row(name, text)
+    shown.print(table)
+
+
+_LEAST_ROOM = 30  # columns beside the names
 
 
 def accept_any_letter() -> None:

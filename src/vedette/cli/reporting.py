@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from vedette.cli.errors import usage_error
+from vedette.cli.errors import named_options, usage_error
+from vedette.cli.options import ResultsFolder
+from vedette.cli.output import note, publish, say
 from vedette.cli.running import interruptible
-from vedette.errors import InputError
+from vedette.extras import need
 
 
 def report(
-    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Results folder of a campaign, finished or not.")],
+    folder: ResultsFolder,
     out: Annotated[
         Path | None, typer.Option("--out", metavar="FILE", help="Where the page goes; else report.html in the folder.")
     ] = None,
@@ -31,6 +32,7 @@ def report(
     ] = False,
 ) -> None:
     """Report on a campaign: one page that opens anywhere, with tables, figures and a replay of runs."""
+    need("vedette report", "jinja2", "matplotlib", "pyarrow")
     replays = None if runs is None else [_cell_and_run(text) for text in runs.split(",")]
     page = out or folder / "report.html"
     with interruptible("what is not yet written is missing; the same command writes it all anew"):
@@ -38,27 +40,18 @@ def report(
         from vedette.reports import code_in_replays, write_figures, write_report
 
         results = open_results(folder)
-        with _named({"path": "--out", "replays": "--runs", "cell": "--runs"}):
+        with named_options({"path": "--out", "replays": "--runs", "cell": "--runs"}):
             write_report(results, page, replays=replays, trust=trust)
-        typer.echo(f"wrote {page}")
-        if (code := code_in_replays(results)) and not trust:
-            typer.echo(f"without measurements, as drawing them runs {', '.join(code)}: --trust allows it", err=True)
+        say(f"wrote {page}")
+        unmeasured = () if trust else code_in_replays(results)
+        if unmeasured:
+            note(f"without measurements, as drawing them runs {', '.join(unmeasured)}: --trust allows it")
+        written: Sequence[Path] = ()
         if figures is not None:
-            with _named({"path": "--figures"}):
+            with named_options({"path": "--figures"}):
                 written = write_figures(results, figures)
-            typer.echo(f"wrote {len(written)} files to {figures}")
-
-
-@contextmanager
-def _named(options: Mapping[str, str]) -> Iterator[None]:
-    """Errors of arguments of the library's functions, by the options that give them."""
-    try:
-        yield
-    except InputError as error:
-        field, _, rest = str(error).partition(": ")
-        if field not in options:
-            raise
-        raise InputError(f"{options[field]}: {rest}") from error
+            say(f"wrote {len(written)} files to {figures}")
+    publish({"page": page, "figures": written, "without_measurements_of": unmeasured})
 
 
 def _cell_and_run(text: str) -> tuple[str, int]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -10,13 +11,15 @@ import typer
 
 from vedette.cli.campaign import carry_out, report_failures
 from vedette.cli.comparisons import print_scores
+from vedette.cli.completing import lists_of_strategies, reproducible
+from vedette.cli.documents import results_document
 from vedette.cli.errors import usage_error
-from vedette.cli.output import console
+from vedette.cli.options import Seed, Trust, Workers
+from vedette.cli.output import console, note, print_names, publish, say
 from vedette.cli.results import print_progress, print_results
-from vedette.cli.running import TRUST_HELP, Approval, check_planner, interruptible
+from vedette.cli.running import Approval, check_planner, interruptible
 from vedette.cli.scenario_files import write_text
-from vedette.errors import InputError
-from vedette.text import shown
+from vedette.extras import need
 
 if TYPE_CHECKING:
     from vedette.campaigns import CampaignResults, CampaignSpec
@@ -30,7 +33,10 @@ _FOLDER = "reproduction"
 
 def reproduce(
     name: Annotated[
-        str, typer.Argument(help="A yardstick of --list, a built-in scenario, or a scenario file.")
+        str,
+        typer.Argument(
+            help="A yardstick of --list, a built-in scenario, or a scenario file.", autocompletion=reproducible
+        ),
     ] = "paper-a",
     planners: Annotated[
         str | None,
@@ -38,24 +44,26 @@ def reproduce(
             "--planners",
             metavar="LIST",
             help="Strategies to compare, the first is the reference; else the yardstick's, or jdm,idm,random.",
+            autocompletion=lists_of_strategies,
         ),
     ] = None,
     runs: Annotated[
         int | None, typer.Option("--runs", min=1, help="Paired runs of each strategy; else the yardstick's, or 30.")
     ] = None,
-    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of all runs.")] = 0,
-    workers: Annotated[int, typer.Option("--workers", min=0, help="Processes; 1: this one; 0: one a processor.")] = 0,
+    seed: Seed = 0,
+    workers: Workers = 0,
     out: Annotated[
         Path | None,
         typer.Option("--out", metavar="DIR", help="Folder for all of it; else reproduction, or as the yardstick."),
     ] = None,
     list_: Annotated[bool, typer.Option("--list", help="List the yardsticks, and stop.")] = False,
-    trust: Annotated[bool, typer.Option("--trust", help=TRUST_HELP)] = False,
+    trust: Trust = False,
 ) -> None:
     """Compare strategies over paired runs, as the paper does, or on a published scene beside what is published of it.
 
     A campaign with its report, tables and figures.
     """
+    need("vedette reproduce", "jinja2", "matplotlib", "pyarrow")
     from vedette.campaigns import open_results, resolve
     from vedette.campaigns.yardsticks import yardsticks
 
@@ -73,7 +81,9 @@ def reproduce(
         print_results(opened)
     else:
         _print_beside_published(opened, yardstick)
-    _write(opened, yardstick, folder)
+    page = _write(opened, yardstick, folder)
+    published = () if yardstick is None else yardstick.published
+    publish({**results_document(opened), "published": [asdict(score) for score in published], "report": page})
     report_failures(outcome.failed)
 
 
@@ -81,10 +91,10 @@ def _spec_of_scenario(scenario: str, planners: str | None) -> CampaignSpec:
     from vedette.campaigns import CampaignSpec
     from vedette.campaigns.yardsticks import yardsticks
     from vedette.scenarios import list_builtin, load_scenario
+    from vedette.scenarios.loading import missing_scenario
 
     if scenario not in list_builtin() and not os.path.isfile(scenario):
-        known = f"a yardstick ({', '.join(yardsticks())}), a built-in scenario ({', '.join(list_builtin())}) or a file"
-        raise InputError(f"name: expected {known}; got {shown(scenario)}")
+        raise missing_scenario(scenario, f"a yardstick ({', '.join(yardsticks())}), ", list(list_builtin()))
     loaded = load_scenario(scenario)
     for strategy in _names(planners) or ():
         check_planner(loaded, strategy, "--planners")
@@ -104,13 +114,10 @@ def _names(planners: str | None) -> tuple[str, ...] | None:
 
 
 def _list(known: dict[str, Yardstick]) -> None:
-    from rich.table import Table
-
-    table = Table.grid(padding=(0, 2))
-    table.add_row("paper-a", "The paper's experiment: joint, independent and random control")
-    for name, yardstick in known.items():
-        table.add_row(name, yardstick.title)
-    console().print(table)
+    paper = {"paper-a": "The paper's experiment: joint, independent and random control"}
+    titles = paper | {name: yardstick.title for name, yardstick in known.items()}
+    print_names(titles)
+    publish([{"name": name, "title": title} for name, title in titles.items()])
 
 
 def _print_beside_published(opened: CampaignResults, yardstick: Yardstick) -> None:
@@ -119,24 +126,26 @@ def _print_beside_published(opened: CampaignResults, yardstick: Yardstick) -> No
 
     for group in opened.comparisons():
         if title := opened.title(group):
-            typer.echo(f"{title}:")
+            say(f"{title}:")
         print_scores((*score_strategies(opened, group), *yardstick.published), group.comparison.unit)
-        typer.echo("")
+        say("")
     for line in provenance(yardstick):
         console().print(line)
     print_progress(opened)
 
 
-def _write(opened: CampaignResults, yardstick: Yardstick | None, folder: Path) -> None:
+def _write(opened: CampaignResults, yardstick: Yardstick | None, folder: Path) -> Path:
+    """The report, and tables and figures beside it."""
     from vedette.campaigns.yardsticks import yardstick_markdown
     from vedette.reports import write_figures, write_report, write_summary
 
     with interruptible(f"{folder} keeps every run; the same command writes the report"):
-        typer.echo("drawing the report ...", err=True)
+        note("drawing the report ...")
         if yardstick is None:
             write_summary(opened, folder)
             write_figures(opened, folder / "figures")
         else:  # of decisions at every scan, figures by the decision would be hundreds: `vedette report --figures`
             write_text(folder / YARDSTICK, yardstick_markdown(opened, yardstick))
-        write_report(opened, folder / "report.html", trust=True)  # what it names has just been run
-    typer.echo(f"wrote {folder}; open {folder / 'report.html'}")
+        write_report(opened, page := folder / "report.html", trust=True)  # what it names has just been run
+    say(f"wrote {folder}; open {page}")
+    return page

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from vedette.cli.comparisons import print_comparison
+from vedette.cli.completing import one_of
+from vedette.cli.documents import results_document, run_document
 from vedette.cli.errors import usage_error
+from vedette.cli.output import publish, say
 from vedette.cli.running import print_run
 from vedette.errors import VedetteError
+from vedette.extras import need
 from vedette.text import counted
 
 if TYPE_CHECKING:
@@ -33,7 +37,12 @@ def results(
     ] = None,
     formats: Annotated[
         list[str] | None,
-        typer.Option("--format", metavar="NAME", help="Of the files: parquet (default), csv, netcdf; may be repeated."),
+        typer.Option(
+            "--format",
+            metavar="NAME",
+            help="Of the files: parquet (default), csv, netcdf; may be repeated.",
+            autocompletion=one_of(*_FORMATS),
+        ),
     ] = None,
 ) -> None:
     """Print the comparison of a campaign's strategies, and what is still to be run, or a single run; export either."""
@@ -42,22 +51,29 @@ def results(
             raise usage_error(f"expected one of {', '.join(_FORMATS)}; got {name}", "--format")
     if formats and export is None:
         raise usage_error("expected with --export, which names the folder", "--format")
+    need("vedette results", "pyarrow")
     from vedette.campaigns.results import open_results
     from vedette.simulation.storage import holds_run, load_run
 
     opened: CampaignResults | RunRecord
     if holds_run(folder):
         opened = load_run(folder)
-        print_run(opened, _unit_of(folder))
+        unit = _unit_of(folder)
+        print_run(opened, unit)
+        document = run_document(opened, unit)
     else:
         opened = open_results(folder)
         print_results(opened)
+        document = results_document(opened)
+    written: list[Path] = []
     if export is not None:
         from vedette.campaigns.export import FORMATS
 
         for name in dict.fromkeys(formats or ("parquet",)):
-            for path in FORMATS[name](opened, export):
-                typer.echo(f"wrote {path}")
+            written += FORMATS[name](opened, export)
+        for path in written:
+            say(f"wrote {path}")
+    publish({**document, "written": written})
 
 
 def _unit_of(folder: Path) -> str:
@@ -71,21 +87,21 @@ def _unit_of(folder: Path) -> str:
         return ""
 
 
-def print_failures(failed: Sequence[Failed | Failure], *, err: bool = False) -> None:
+def print_failures(failed: Sequence[Failed | Failure], tell: Callable[[str], None] = say) -> None:
     """The first of the runs that could not be finished, each with where it stopped."""
     for result in failed[:_SHOWN_FAILURES]:
-        typer.echo(f"  cell {result.cell}, run {result.run}: {result.message}", err=err)
+        tell(f"  cell {result.cell}, run {result.run}: {result.message}")
     if len(failed) > _SHOWN_FAILURES:
-        typer.echo(f"  and {len(failed) - _SHOWN_FAILURES} more", err=err)
+        tell(f"  and {len(failed) - _SHOWN_FAILURES} more")
 
 
 def print_results(opened: CampaignResults) -> None:
     """One comparison a group of settings, then how many runs there are and how many are missing."""
     for group in opened.comparisons():
         if title := opened.title(group):
-            typer.echo(f"{title}:")
+            say(f"{title}:")
         print_comparison(group.comparison)
-        typer.echo("")
+        say("")
     print_progress(opened)
 
 
@@ -94,14 +110,14 @@ def print_progress(opened: CampaignResults) -> None:
     campaign = opened.campaign
     missing = {cell.name: len(opened.missing(cell.name)) for cell in campaign.cells}
     total = campaign.total
-    typer.echo(f"{campaign.name}, seed {campaign.seed}: {total - sum(missing.values())} of {total} runs are finished")
+    say(f"{campaign.name}, seed {campaign.seed}: {total - sum(missing.values())} of {total} runs are finished")
     for cell, number in missing.items():
         if number:
-            typer.echo(f"missing of {cell}: {number}")
+            say(f"missing of {cell}: {number}")
     failures = opened.failures()
     if failures:
-        typer.echo(f"failed: {counted(len(failures), 'run')}, which the same command tries again:")
+        say(f"failed: {counted(len(failures), 'run')}, which the same command tries again:")
         print_failures(failures)
     tables = opened.folder / "tables"
     if tables.is_dir():
-        typer.echo(f"tables: {tables}")
+        say(f"tables: {tables}")

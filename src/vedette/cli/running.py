@@ -11,10 +11,15 @@ from typing import TYPE_CHECKING, Annotated, NoReturn
 import typer
 
 from vedette.cli.compiling import compiling
-from vedette.cli.errors import INTERRUPTED, usage_error
+from vedette.cli.completing import strategies
+from vedette.cli.documents import run_document
+from vedette.cli.errors import INTERRUPTED, named_options, usage_error
+from vedette.cli.options import Overwrite, ScenarioName, Seed, Trust
+from vedette.cli.output import complain, note, publish, say
 from vedette.cli.output import console as new_console
 from vedette.cli.scenario_files import warn
 from vedette.errors import InputError
+from vedette.extras import need
 from vedette.text import amount, counted
 
 if TYPE_CHECKING:
@@ -40,11 +45,8 @@ def interruptible(advice: str) -> Iterator[None]:
     try:
         yield
     except KeyboardInterrupt:
-        typer.echo(f"\ninterrupted: {advice}", err=True)
+        complain(f"\ninterrupted: {advice}")
         raise typer.Exit(INTERRUPTED) from None
-
-
-TRUST_HELP = "Run code that a scenario names also where others may have written it."
 
 
 class Approval:
@@ -71,7 +73,7 @@ class Approval:
                 f"{reason}: read it, and have it run by --trust"
             )
         if new := [name for name in code if name not in self._said]:
-            typer.echo(f"runs code of {'theirs, as trusted' if reason else 'yours'}: {', '.join(new)}", err=True)
+            note(f"runs code of {'theirs, as trusted' if reason else 'yours'}: {', '.join(new)}")
             self._said.update(new)
 
 
@@ -85,23 +87,24 @@ def check_planner(scenario: Scenario, name: str, option: str) -> None:
 
 
 def run(
-    scenario: Annotated[str, typer.Argument(help="Name of a built-in scenario, or a scenario file.")],
+    scenario: ScenarioName,
     planner: Annotated[
         str,
         typer.Option(
             "--planner",
             help="jdm (joint), idm (independent), lookahead (joint, several decisions), random, fixed (first course), "
             "still, or the scenario's own.",
+            autocompletion=strategies,
         ),
     ] = "jdm",
-    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed; with --run it fixes every random number.")] = 0,
+    seed: Seed = 0,
     run_number: Annotated[int, typer.Option("--run", min=0, help="Number of the run.")] = 0,
     out: Annotated[
         Path | None, typer.Option("--out", metavar="DIR", help="Folder for the results and figures; none: only print.")
     ] = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an earlier run in that folder.")] = False,
+    overwrite: Overwrite = False,
     threads: Annotated[int, typer.Option("--threads", min=0, help="Threads a decision; 0: one a processor.")] = 0,
-    trust: Annotated[bool, typer.Option("--trust", help=TRUST_HELP)] = False,
+    trust: Trust = False,
 ) -> None:
     """Run a scenario once: tracks, decisions with their rewards, errors, figures."""
     from vedette.evaluation.runs import run_scenario
@@ -115,7 +118,9 @@ def run(
     Approval(trust)(loaded)
     warn(loaded)
     if out is not None:
-        check_free(out, overwrite)
+        need("vedette run --out", "matplotlib", "pyarrow")
+        with named_options({"directory": "--out"}):
+            check_free(out, overwrite)
     stop: RunStopped | RunInterrupted | None = None
     with interruptible("nothing was written"):
         compile_if_cold(loaded)
@@ -127,18 +132,18 @@ def run(
                 _end(error, "nothing was written")
             record, stop = error.record, error
         print_run(record, loaded.model.ospa.unit)
-        if stop is not None and out is None:
-            _end(stop, "nothing was written")
-        if stop is not None and _holds_whole_run(out):
-            _end(stop, f"{out} keeps the whole run that was there")
-        if out is not None:
-            save_run(record, out, scenario_text=dump_scenario(loaded.model, folder=loaded.folder), overwrite=overwrite)
+        kept = out if stop is None or not _holds_whole_run(out) else None
+        if kept is not None:
+            save_run(record, kept, scenario_text=dump_scenario(loaded.model, folder=loaded.folder), overwrite=overwrite)
+    publish({**run_document(record, loaded.model.ospa.unit), "folder": kept})
+    if stop is not None and kept is None:
+        _end(stop, "nothing was written" if out is None else f"{out} keeps the whole run that was there")
     if out is not None:
         with interruptible(f"wrote {out}, but not all of its figures"):
             _draw_run(record, out / "figures")
         if stop is not None:
             _end(stop, f"wrote {out}, with the {counted(record.num_scans, 'scan')} before")
-        typer.echo(f"wrote {out}")
+        say(f"wrote {out}")
 
 
 def _holds_whole_run(folder: Path | None) -> bool:
@@ -149,8 +154,8 @@ def _holds_whole_run(folder: Path | None) -> bool:
 
 def _end(stop: RunStopped | RunInterrupted, left: str) -> NoReturn:
     """Say where a run stopped and what is left of it; the exit status says why."""
-    typer.echo(str(stop), err=True)
-    typer.echo(left, err=True)
+    complain(str(stop))
+    complain(left)
     raise typer.Exit(INTERRUPTED if isinstance(stop, KeyboardInterrupt) else 1) from None
 
 

@@ -8,8 +8,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from vedette.cli import completing
+from vedette.cli.completing import built_in_scenarios, one_of
 from vedette.cli.errors import usage_error
-from vedette.cli.output import console
+from vedette.cli.options import Overwrite, SceneFile
+from vedette.cli.output import note, print_names, publish, say
 from vedette.errors import InputError, ScenarioError
 
 if TYPE_CHECKING:
@@ -20,20 +23,20 @@ SCHEMA_FILE = "vedette.schema.json"
 
 def list_() -> None:
     """List the scenarios that come with Vedette."""
-    from rich.table import Table
-
     from vedette.scenarios import list_builtin, load_scenario
 
-    table = Table.grid(padding=(0, 2))
-    for name in list_builtin():
-        table.add_row(name, load_scenario(name).model.description)
-    console().print(table)
+    described = {name: load_scenario(name).model.description for name in list_builtin()}
+    print_names(described)
+    publish([{"name": name, "description": text} for name, text in described.items()])
 
 
 def init(
     path: Annotated[Path, typer.Argument(help="File to write, or a folder for scenario.yaml.")] = Path("scenario.yaml"),
-    source: Annotated[str, typer.Option("--from", metavar="NAME", help="Scenario to start from.")] = "shore-radar",
-    force: Annotated[bool, typer.Option("--force", help="Overwrite what is there.")] = False,
+    source: Annotated[
+        str,
+        typer.Option("--from", metavar="NAME", help="Scenario to start from.", autocompletion=built_in_scenarios),
+    ] = "shore-radar",
+    overwrite: Overwrite = False,
 ) -> None:
     """Write a scenario file to start from.
 
@@ -45,28 +48,38 @@ def init(
     if source not in builtin:
         raise usage_error(f"expected one of {', '.join(builtin)}; got {source}", "--from")
     target = path if path.suffix in (".yaml", ".yml") else path / "scenario.yaml"
-    _write_start(_starting_files(load_scenario(source), target), target, force)
+    _write_start(_starting_files(load_scenario(source), target), target, overwrite)
 
 
 def generate(
-    path: Annotated[
-        Path | None, typer.Argument(help="File to write, or a folder; none: a file named after the scene.")
-    ] = None,
+    path: SceneFile = None,
     sensors: Annotated[int, typer.Option("--sensors", min=1, max=1000, help="Number of sensors.")] = 5,
     targets: Annotated[
         int | None, typer.Option("--targets", min=1, max=2000, help="Number of targets; else two a sensor.")
     ] = None,
     pattern: Annotated[
-        str, typer.Option("--pattern", metavar="NAME", help="spread: targets part in groups; crowd: they meet.")
+        str,
+        typer.Option(
+            "--pattern",
+            metavar="NAME",
+            help="spread: targets part in groups; crowd: they meet.",
+            autocompletion=one_of("spread", "crowd"),
+        ),
     ] = "spread",
     view: Annotated[
-        str, typer.Option("--view", metavar="NAME", help="limited: sensors see 250 m; full: everything.")
+        str,
+        typer.Option(
+            "--view",
+            metavar="NAME",
+            help="limited: sensors see 250 m; full: everything.",
+            autocompletion=one_of("limited", "full"),
+        ),
     ] = "limited",
     decide_every: Annotated[
         int, typer.Option("--decide-every", min=1, max=59, help="Scans between decisions, and the horizon.")
     ] = 1,
     seed: Annotated[int, typer.Option("--seed", min=0, help="Of places and courses.")] = 0,
-    force: Annotated[bool, typer.Option("--force", help="Overwrite what is there.")] = False,
+    overwrite: Overwrite = False,
 ) -> None:
     """Write a scene of any number of sensors, made from a seed.
 
@@ -81,23 +94,27 @@ def generate(
     scene = GeneratedScene(
         num_sensors=sensors, pattern=pattern, view=view, num_targets=targets, decide_every=decide_every, seed=seed
     )
-    _write_generated(path, scene.name, scene_text(scene), force)
+    _write_generated(path, scene.name, scene_text(scene), overwrite)
 
 
 def crowd(
-    path: Annotated[
-        Path | None, typer.Argument(help="File to write, or a folder; none: a file named after the crowd.")
-    ] = None,
+    path: SceneFile = None,
     targets: Annotated[int, typer.Option("--targets", min=1, max=100_000, help="Number of targets.")] = 100,
     density: Annotated[float, typer.Option("--density", min=1e-3, max=1e6, help="Targets a square kilometre.")] = 25.0,
     clutter: Annotated[
         float, typer.Option("--clutter", min=0.0, max=100.0, help="False measurements a target and scan.")
     ] = 0.3,
     measured: Annotated[
-        str, typer.Option("--measured", metavar="NAME", help="position, or bearing_range from outside.")
+        str,
+        typer.Option(
+            "--measured",
+            metavar="NAME",
+            help="position, or bearing_range from outside.",
+            autocompletion=one_of("position", "bearing_range"),
+        ),
     ] = "position",
     steps: Annotated[int, typer.Option("--steps", min=1, max=10_000, help="Number of scans.")] = 40,
-    force: Annotated[bool, typer.Option("--force", help="Overwrite what is there.")] = False,
+    overwrite: Overwrite = False,
 ) -> None:
     """Write a scene of any number of targets before one sensor.
 
@@ -109,24 +126,26 @@ def crowd(
     if measured not in MEASURED:
         raise usage_error(f"expected one of {', '.join(MEASURED)}; got {measured}", "--measured")
     made = GeneratedCrowd(num_targets=targets, density=density, clutter=clutter, measured=measured, num_steps=steps)
-    _write_generated(path, made.name, crowd_text(made), force)
+    _write_generated(path, made.name, crowd_text(made), overwrite)
 
 
-def _write_generated(path: Path | None, name: str, text: str, force: bool) -> None:
+def _write_generated(path: Path | None, name: str, text: str, overwrite: bool) -> None:
     """Write a scene to `path`, or into that folder, or beside us, under its name."""
     target = Path(f"{name}.yaml") if path is None else path
     target = target if target.suffix in (".yaml", ".yml") else target / f"{name}.yaml"
-    _write_start({target: _with_schema(text)}, target, force)
+    _write_start({target: _with_schema(text)}, target, overwrite)
 
 
-def _write_start(files: dict[Path, str], target: Path, force: bool) -> None:
+def _write_start(files: dict[Path, str], target: Path, overwrite: bool) -> None:
     """Write files to start from, and the schema beside `target`; `InputError` where one is there already."""
     taken = [str(file) for file in files if file.exists()]
-    if taken and not force:
-        raise InputError(f"{', '.join(taken)}: already there; --force overwrites")
-    for file, content in {**files, target.parent / SCHEMA_FILE: _schema_text()}.items():
+    if taken and not overwrite:
+        raise InputError(f"{', '.join(taken)}: already there; --overwrite replaces it")
+    files = {**files, target.parent / SCHEMA_FILE: _schema_text()}
+    for file, content in files.items():
         write_text(file, content)
-        typer.echo(f"wrote {file}")
+        say(f"wrote {file}")
+    publish({"written": list(files)})
 
 
 def _with_schema(text: str) -> str:
@@ -148,7 +167,11 @@ def _starting_files(scenario: Scenario, target: Path) -> dict[Path, str]:
     return {target: _with_schema(text), **files}
 
 
-def check(files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Scenario files.")]) -> None:
+def check(
+    files: Annotated[
+        list[Path], typer.Argument(metavar="FILE...", help="Scenario files.", autocompletion=completing.scenarios)
+    ],
+) -> None:
     """Name every fault of scenario files.
 
     Each by file, line, column and field, with what was expected and what came. Code of your own is imported and made,
@@ -158,18 +181,22 @@ def check(files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="S
     from vedette.scenarios import load_scenario
     from vedette.scenarios.summary import one_line
 
-    faulty = False
+    found: list[dict[str, object]] = []
     for file in files:
+        summary, faults, warnings = None, list[str](), list[str]()
         try:
             scenario = load_scenario(file)
-            if faults := code_faults(scenario):
-                raise ScenarioError(faults)
-            typer.echo(f"{file}: {one_line(scenario)}")
-            warn(scenario)
+            if lacking := code_faults(scenario):
+                raise ScenarioError(lacking)
+            summary = one_line(scenario)
+            say(f"{file}: {summary}")
+            warnings = warn(scenario)
         except (ScenarioError, InputError) as error:
-            typer.echo(str(error))
-            faulty = True
-    if faulty:
+            say(str(error), even_if_quiet=True)
+            faults = error.faults if isinstance(error, ScenarioError) else [str(error)]
+        found.append({"file": file, "valid": not faults, "summary": summary, "faults": faults, "warnings": warnings})
+    publish({"files": found})
+    if not all(each["valid"] for each in found):
         raise typer.Exit(1)
 
 
@@ -181,19 +208,21 @@ def code_faults(scenario: Scenario) -> list[str]:
     if not code:
         return []
     if reason := not_own(scenario):
-        typer.echo(f"{scenario.path}: warning: {', '.join(code)} is not imported, as {reason}", err=True)
+        note(f"{scenario.path}: warning: {', '.join(code)} is not imported, as {reason}")
         return []
     from vedette.scenarios import code_checks
 
     return code_checks.code_faults(scenario)
 
 
-def warn(scenario: Scenario, before: str = "") -> None:
-    """Print the warnings of a scenario, each with `before` in front, to standard error."""
+def warn(scenario: Scenario) -> list[str]:
+    """Print the warnings of a scenario to standard error; returns them."""
     from vedette.scenarios.cautions import cautions
 
-    for line in cautions(scenario):
-        typer.echo(f"{before}{line}", err=True)
+    lines = list(cautions(scenario))
+    for line in lines:
+        note(line)
+    return lines
 
 
 def schema(
@@ -203,11 +232,14 @@ def schema(
 
     It describes every field, and editors that know it complete and check as one writes.
     """
+    text = _schema_text()
     if out is None:
-        typer.echo(_schema_text(), nl=False)
+        say(text, nl=False)
+        publish(json.loads(text))
     else:
-        write_text(out, _schema_text())
-        typer.echo(f"wrote {out}")
+        write_text(out, text)
+        say(f"wrote {out}")
+        publish({"written": [out]})
 
 
 def _schema_text() -> str:

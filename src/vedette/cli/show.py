@@ -9,8 +9,11 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from vedette.cli.errors import usage_error
+from vedette.cli.options import ScenarioName, Trust
 from vedette.cli.output import console as new_console
-from vedette.cli.running import TRUST_HELP, Approval
+from vedette.cli.output import note, publish, say
+from vedette.cli.running import Approval
+from vedette.extras import need
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -22,14 +25,14 @@ PICTURE_FORMATS = ("png", "pdf", "svg")
 
 
 def show(
-    scenario: Annotated[str, typer.Argument(help="Name of a built-in scenario, or a scenario file.")],
+    scenario: ScenarioName,
     out: Annotated[
         Path | None, typer.Option("--out", metavar="FILE", help="Draw a picture: a .png, .pdf or .svg file.")
     ] = None,
     resolved: Annotated[
         bool, typer.Option("--resolved", help="Print YAML instead, with every default written out.")
     ] = False,
-    trust: Annotated[bool, typer.Option("--trust", help=TRUST_HELP)] = False,
+    trust: Trust = False,
 ) -> None:
     """Show a scenario as tables and as a picture.
 
@@ -39,18 +42,21 @@ def show(
 
     if out is not None and out.suffix[1:].lower() not in PICTURE_FORMATS:
         raise usage_error(f"expected a file ending in {', '.join(PICTURE_FORMATS)}; got {out}", "--out")
+    if out is not None:
+        need("vedette show --out", "matplotlib")
     loaded = load_scenario(scenario)
     if not resolved or out is not None:  # the targets move by its motion model
         Approval(trust)(loaded)
     if resolved:
         from vedette.scenarios.dumping import dump_scenario
 
-        typer.echo(dump_scenario(loaded.model), nl=False)
+        say(dump_scenario(loaded.model), nl=False)
     else:
         _print_tables(loaded)
     if out is not None:
         _draw(loaded, out)
-        typer.echo(f"wrote {out}", err=resolved)
+        (note if resolved else say)(f"wrote {out}")
+    publish({"file": loaded.path, "scenario": loaded.model.model_dump(mode="json"), "picture": out})
 
 
 def _print_tables(scenario: Scenario) -> None:

@@ -18,7 +18,7 @@ from vedette.densities.poisson import Poisson
 from vedette.densities.tracks import TrackTable
 from vedette.errors import InputError, VedetteError
 from vedette.files import write_whole
-from vedette.reading import read_arrays, read_file, said
+from vedette.reading import read_arrays, read_file, said, unreadable
 from vedette.text import shown
 
 FORMAT_NAME = "vedette-density"
@@ -74,7 +74,7 @@ def load_density(path: str | os.PathLike[str]) -> Density:
     try:
         arrays = read_arrays(read_file(source))
     except OSError as fault:
-        raise InputError(f"{source}: expected a density file; {fault.strerror or fault}") from fault
+        raise unreadable(source, "a density file", fault) from fault
     except ValueError as fault:
         raise InputError(f"{source}: expected a density file; it is damaged or another: {fault}") from fault
     kind = _kind_of(source, arrays)

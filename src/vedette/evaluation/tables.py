@@ -61,10 +61,10 @@ def decisions_markdown(comparison: Comparison) -> str:
 def strategy_csv(comparisons: Mapping[str, Comparison] | Comparison) -> str:
     """The numbers behind the table, unrounded, one row a strategy; of several comparisons with their names in front."""
     if isinstance(comparisons, Comparison):
-        rows = [_numbers(comparisons, strategy) for strategy in comparisons.strategies]
+        rows = [strategy_numbers(comparisons, strategy) for strategy in comparisons.strategies]
     else:
         rows = [
-            {"group": name, **_numbers(comparison, strategy)}
+            {"group": name, **strategy_numbers(comparison, strategy)}
             for name, comparison in comparisons.items()
             for strategy in comparison.strategies
         ]
@@ -77,7 +77,8 @@ def strategy_csv(comparisons: Mapping[str, Comparison] | Comparison) -> str:
     return out.getvalue()
 
 
-def _numbers(comparison: Comparison, strategy: str) -> dict[str, str | float]:
+def strategy_numbers(comparison: Comparison, strategy: str) -> dict[str, str | float]:
+    """The numbers of a strategy by name, unrounded: errors, the paired difference, measures."""
     difference = comparison.difference(strategy)
     paired = difference.summary
     parts = [_means(comparison, strategy, part, f"{part}_mean_m", f"{part}_se_m") for part in PARTS]

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from vedette.errors import InputError
+from vedette.extras import need
 from vedette.kernels.base.types import Floats, Ints
 from vedette.recorded.geography import to_tangent_plane
 from vedette.text import elided, printable, shown
@@ -155,7 +156,7 @@ def read_table(path: str | Path) -> Table:
     if file.suffix.lower() not in (".csv", ".parquet"):
         raise InputError(f"{named}: expected a .csv or .parquet file")
     if not os.path.isfile(file):  # a name can be too long, or hold what no name can: for pathlib, an error
-        raise InputError(f"{named}: expected a file; there is none")
+        raise InputError(f"{named}: no such file; expected recorded targets")
     if (size := file.stat().st_size) > _MOST_BYTES:
         raise InputError(f"{named}: expected a file of at most {_MOST_BYTES} bytes; got {size}")
     return _read_csv(file) if file.suffix.lower() == ".csv" else _read_parquet(file)
@@ -179,6 +180,7 @@ def _read_csv(file: Path) -> Table:
 
 
 def _read_parquet(file: Path) -> Table:
+    need(f"{file}, which is a Parquet file,", "pyarrow")
     from pyarrow import ArrowException, parquet  # here, as most programs never need it
 
     try:

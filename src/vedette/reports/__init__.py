@@ -1,5 +1,9 @@
 """A campaign's results as one page that opens anywhere, and as figures for a paper."""
 
+from vedette.extras import need
+
+need("a report", "jinja2", "matplotlib", "pyarrow")
+
 from vedette.reports.saving import write_figures
 from vedette.reports.summary import write_summary
 from vedette.reports.writing import code_in_replays, write_report

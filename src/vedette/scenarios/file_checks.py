@@ -21,7 +21,7 @@ from vedette.scenarios.sections.targets import RecordedTargets
 
 
 def _absent(file: str) -> str:
-    return f"{describe(file)}, which is not there"
+    return f"{describe(file)}: no such file"
 
 
 def recorded_findings(model: ScenarioModel, folder: FilePath) -> Iterator[Finding]:

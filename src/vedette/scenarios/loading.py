@@ -11,12 +11,14 @@ from typing import Any
 from vedette.errors import InputError, ScenarioError
 from vedette.reading import read_text
 from vedette.scenarios.diagnostics import UNKNOWN, read_section, suggestion
-from vedette.scenarios.faults import Fault, Path, Told, describe, named
+from vedette.scenarios.faults import Fault, Path, Told, describe
 from vedette.scenarios.file_checks import recorded_findings, reference_findings
 from vedette.scenarios.sections import ScenarioModel
 from vedette.scenarios.sections.base import attempt
 from vedette.scenarios.yaml_reader import MOST_BYTES, Document, read_yaml
+from vedette.text import elided, printable
 
+_LONGEST_NAME = 200
 BUILTIN_FOLDER = FilePath(__file__).parent / "builtin"
 
 
@@ -100,6 +102,14 @@ def parse_scenario(text: str, file: str = "<text>", folder: FilePath | None = No
     return model
 
 
+def missing_scenario(name: str, more: str, builtin: list[str]) -> InputError:
+    """What to say where there is neither a file nor a built-in scenario of that name, nor any of `more`."""
+    trouble = "a folder" if os.path.isdir(name) else "no such file"
+    near = suggestion(name, builtin)
+    expected = f"{more}a YAML file or one of {', '.join(builtin)}{f' ({near})' if near else ''}"
+    return InputError(f"{elided(printable(name), _LONGEST_NAME)}: {trouble}; expected {expected}")
+
+
 def load_scenario(name_or_path: str | FilePath) -> Scenario:
     """Load a built-in scenario by name, or one of your own from its YAML file.
 
@@ -110,11 +120,12 @@ def load_scenario(name_or_path: str | FilePath) -> Scenario:
     builtin = list_builtin()
     path = builtin.get(str(name_or_path), FilePath(name_or_path))
     if not os.path.isfile(path):  # a name can be too long, or hold what no name can: for pathlib, an error
-        near = suggestion(str(name_or_path), list(builtin))
-        hint = f" ({near})" if near else ""
-        known = ", ".join(builtin)
-        got = named(str(name_or_path))
-        raise InputError(f"scenario: expected a YAML file or one of {known}; got '{got}'{hint}")
+        raise missing_scenario(str(name_or_path), "", list(builtin))
+    if path.suffix.lower() == ".toml":
+        raise InputError(
+            f"{path}: expected a scenario file, which is YAML; a campaign file (TOML) and its scenarios are checked by "
+            f"vedette campaign {path} --dry-run"
+        )
     return Scenario(parse_scenario(read_text(path, "scenario file", MOST_BYTES), str(path), path.parent), path)
 
 

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 
 from vedette.errors import InputError
+from vedette.extras import need
 from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.reading import said
 from vedette.text import shown
@@ -69,6 +70,7 @@ def to_arrow(columns: Columns, layout: Layout, *, nan_is_null: bool = False) -> 
 
     Raises `InputError` for a column that the layout does not have, and for columns of unequal lengths.
     """
+    need("a run on disk", "pyarrow")
     import pyarrow as pa
 
     arrays = []
@@ -95,6 +97,7 @@ def to_arrow(columns: Columns, layout: Layout, *, nan_is_null: bool = False) -> 
 
 def write_table(columns: Columns, layout: Layout, metadata: Mapping[str, str] | None = None) -> bytes:
     """The bytes of an Arrow file, which `pandas.read_feather` and the like read. Raises `InputError` as `to_arrow`."""
+    need("a run on disk", "pyarrow")
     import pyarrow as pa
 
     batch, out = to_arrow(columns, layout).replace_schema_metadata(metadata), pa.BufferOutputStream()
@@ -129,6 +132,7 @@ def read_metadata(content: bytes) -> dict[str, str]:
 
 def _messages(content: bytes) -> tuple[pa.Schema, pa.Message]:
     """The schema and the one batch of a file. The index at its end, made for files of many batches, is not read."""
+    need("a run on disk", "pyarrow")
     import pyarrow as pa
 
     if content[: len(_MAGIC)] != _MAGIC:

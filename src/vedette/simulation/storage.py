@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from vedette.errors import InputError
-from vedette.reading import parse_json, read_file
+from vedette.reading import parse_json, read_file, unreadable
 from vedette.simulation.kept import FORMAT_VERSION, decode_run, encode_run, encode_timings
 from vedette.simulation.records import RunRecord
 from vedette.simulation.tables import run_facts
@@ -159,7 +159,7 @@ def _read(path: Path) -> bytes:
     try:
         return read_file(path)
     except OSError as error:
-        raise InputError(f"{path}: expected a file of a saved run; {error.strerror or error}") from error
+        raise unreadable(path, "a file of a saved run", error) from error
     except ValueError as error:
         raise InputError(f"{path}: expected a file of a saved run; {error}") from error
 
@@ -169,7 +169,9 @@ def check_free(target: Path, overwrite: bool) -> None:
     if not target.exists() or (target.is_dir() and not any(target.iterdir())):
         return
     if not overwrite:
-        raise InputError(f"directory: expected a new folder; {target} exists (ask to overwrite it, or name another)")
+        raise InputError(
+            f"directory: expected a new folder; {target} exists (--overwrite or overwrite=True replaces it)"
+        )
     if not (target / MANIFEST).is_file():
         raise InputError(f"directory: expected a folder that holds a run; {target} holds something else and is kept")
 

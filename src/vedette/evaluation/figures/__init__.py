@@ -3,6 +3,10 @@
 Every function returns a `matplotlib.figure.Figure`; `save_figure` writes it as PDF, SVG and PNG.
 """
 
+from vedette.extras import need
+
+need("a figure", "matplotlib")
+
 from vedette.evaluation.figures.consistency import consistency_figure
 from vedette.evaluation.figures.cost import cost_figure
 from vedette.evaluation.figures.distributions import distributions_figure

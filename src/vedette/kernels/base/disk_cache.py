@@ -23,7 +23,7 @@ from numba.core.serialize import dumps
 
 from vedette.kernels.base import watching
 from vedette.kernels.base.interrupts import interrupts_wait
-from vedette.kernels.base.places import GENERIC, INSTALLED, cache_directory, compiler, folder_name
+from vedette.kernels.base.places import INSTALLED, LEVELS, cache_directory, compiler, folder_name, serves
 from vedette.kernels.base.private_files import fault_of_folder, make_private_folder, read_private, write_private
 from vedette.kernels.base.sources import package_file
 
@@ -59,18 +59,23 @@ class _PackageLocator:
 
 
 class _Place:
-    """A folder that holds entries of one function, and how their keys differ from those of this machine."""
+    """A folder that holds entries of one function, for this machine or for all of a level of `LEVELS`."""
 
-    def __init__(self, folder: Path, *, generic: bool) -> None:
+    def __init__(self, folder: Path, level: str | None = None) -> None:
         self.folder = folder
-        self._generic = generic
+        self._level = level
+
+    def serves(self, key: Any) -> bool:
+        """Whether the machine that this key is of can run what is here."""
+        _, (_, _, features), _ = key
+        return self._level is None or serves(self._level, features)
 
     def key(self, key: Any) -> Any:
         """The key here of what has this key on this machine."""
-        if not self._generic:
+        if self._level is None:
             return key
         signature, (triple, _, _), code = key
-        return signature, (triple, GENERIC, ""), code
+        return signature, (triple, self._level, ""), code
 
     def is_safe(self, source: Path) -> bool:
         """Whether it is there and nobody else can write to it; warns once of one that others can write."""
@@ -114,7 +119,7 @@ class _EntryFile:
     def load(self, key: Any) -> Any:
         """The entry; None where there is none, one of other sources, a damaged one, or one that others can write."""
         for place in self._places:
-            if place.is_safe(self._source):
+            if place.serves(key) and place.is_safe(self._source):
                 found = self._load(self._path(place, key), place.key(key))
                 if found is not None:
                     return found
@@ -153,10 +158,11 @@ class _Cache(FunctionCache):  # type: ignore[misc]
 
     def __init__(self, function: Callable[..., Any]) -> None:
         super().__init__(function)
-        places = [_Place(Path(self._cache_path), generic=False)]
+        places = [_Place(Path(self._cache_path))]
         stamp = self._impl.locator.get_source_stamp()
         if isinstance(self._impl.locator, _PackageLocator):
-            places.append(_Place(INSTALLED / places[0].folder.name, generic=True))
+            installed = INSTALLED / places[0].folder.name
+            places += [_Place(installed, level) for level in LEVELS]
         else:
             stamp = f"{compiler()} {stamp}"
         source = Path(function.__code__.co_filename).resolve()

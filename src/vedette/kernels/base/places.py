@@ -12,11 +12,25 @@ from pathlib import Path
 from vedette.kernels.base.private_files import fault_of_folder
 from vedette.kernels.base.sources import PACKAGE_ROOT, kernel_files, source_stamp
 
-# Made by `python dev.py wheel`; the name is that of no module.
+# Made by `python dev.py release`; the name is that of no module.
 INSTALLED = PACKAGE_ROOT / "compiled-kernels"
 
-# Of every processor of a kind, so that what is installed runs on all.
-GENERIC = "generic"
+# The processors that what is installed was compiled for, best first: LLVM's name, and the features that code for it may
+# use, all of which a processor must have that runs it. The third level of the x86-64 psABI, and any of a kind.
+LEVELS = {
+    "x86-64-v3": frozenset(
+        (
+            *("avx", "avx2", "bmi", "bmi2", "crc32", "cx16", "f16c", "fma", "lzcnt", "movbe", "popcnt", "sahf"),
+            *("sse3", "sse4.1", "sse4.2", "ssse3", "xsave"),
+        )
+    ),
+    "generic": frozenset[str](),
+}
+
+
+def serves(level: str, features: str) -> bool:
+    """Whether a processor can run what was compiled for a level of `LEVELS`; features in LLVM's words, `+avx,-fma`."""
+    return LEVELS[level] <= {feature[1:] for feature in features.split(",") if feature.startswith("+")}
 
 
 def cache_directory() -> Path:

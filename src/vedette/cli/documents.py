@@ -1,0 +1,65 @@
+"""Results as plain data, for `--json`: what the tables of the terminal show, unrounded."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from vedette.campaigns import CampaignResults
+    from vedette.simulation.records import RunRecord
+
+
+def run_document(record: RunRecord, unit: str) -> dict[str, Any]:
+    """A run: what was decided, how good it was (OSPA in `unit`), what it cost, and what was cut off."""
+    from vedette.evaluation.comparison import PARTS, choices_of
+    from vedette.evaluation.health import health_line
+
+    decisions = [
+        {
+            "time_s": decision.time,
+            "actions": [dict(row) for row in choice],
+            "expected_rewards": [
+                {"mean": mean, "standard_error": error} for mean, error in decision.plan.expected_rewards
+            ],
+            "notes": decision.plan.notes,
+        }
+        for decision, choice in zip(record.decisions, choices_of(record), strict=True)
+    ]
+    return {
+        "scenario": record.scenario,
+        "planner": record.planner,
+        "seed": record.seed,
+        "run": record.run,
+        "scans": record.num_scans,
+        "stopped": record.stopped,
+        "decisions": decisions,
+        "ospa": {"unit": unit, **dict(zip(PARTS, record.ospa.mean(axis=0), strict=True))},
+        "seconds": {stage: seconds.sum() for stage, seconds in record.timings.items()},
+        "health": health_line(record),
+    }
+
+
+def results_document(opened: CampaignResults) -> dict[str, Any]:
+    """A campaign: its strategies side by side, group by group, and what is still to be run."""
+    from vedette.evaluation.tables import strategy_numbers
+
+    campaign = opened.campaign
+    missing = {cell.name: len(opened.missing(cell.name)) for cell in campaign.cells}
+    return {
+        "campaign": campaign.name,
+        "seed": campaign.seed,
+        "folder": opened.folder,
+        "runs": campaign.total,
+        "finished": campaign.total - sum(missing.values()),
+        "missing": {name: number for name, number in missing.items() if number},
+        "failed": [asdict(failure) for failure in opened.failures()],
+        "comparisons": [
+            {
+                "settings": group.settings,
+                "unit": group.comparison.unit,
+                "strategies": [strategy_numbers(group.comparison, name) for name in group.comparison.strategies],
+            }
+            for group in opened.comparisons()
+        ],
+    }

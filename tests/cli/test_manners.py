@@ -1,0 +1,205 @@
+"""What every command shares: --json, --quiet, completion, whole names, and words for what is missing or in the way."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+import typer
+from typer.testing import CliRunner, Result
+
+from vedette.campaigns.yardsticks import yardsticks
+from vedette.cli import app, completing
+from vedette.scenarios import list_builtin, load_scenario
+from vedette.scenarios.dumping import dump_scenario
+from vedette.scenarios.overrides import with_fields
+
+COMMANDS: dict[str, Any] = typer.main.get_command(app).commands  # type: ignore[attr-defined]
+SPEC = 'name = "trial"\nscenarios = ["short.yaml"]\nplanners = ["still", "own"]\nruns = 2\n'
+WAIT = 600.0  # s
+
+
+@pytest.fixture
+def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A working folder with a scenario of few scans and a strategy of its own, one with a fault, and a campaign."""
+    fields: dict[str, Any] = {"time.num_steps": 3, "ospa.from_step": None, "ospa.to_step": None}
+    fields |= {"birth.steps": [1], "targets.tracks": [{"state": [x, 0.0, 1.0, 1.0]} for x in (0.0, 300.0)]}
+    fields |= {"planners": {"own": {"kind": "independent"}}}
+    text = dump_scenario(with_fields(load_scenario("linear-10"), fields).model)
+    (tmp_path / "short.yaml").write_text(text, "utf-8")
+    (tmp_path / "faulty.yaml").write_text(text.replace("num_steps: 3", "num_steps: few"), "utf-8")
+    (tmp_path / "spec.toml").write_text(SPEC, "utf-8")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def call(*words: str, columns: int = 80) -> Result:
+    return CliRunner().invoke(app, list(words), env={"COLUMNS": str(columns)})
+
+
+# Each as it may be given after those before it, with keys of its document.
+CALLS: list[tuple[tuple[str, ...], set[str]]] = [
+    (("init", "bay.yaml"), {"written"}),
+    (("generate", "made.yaml"), {"written"}),
+    (("crowd", "crowd.yaml"), {"written"}),
+    (("check", "short.yaml"), {"files"}),
+    (("show", "short.yaml", "--out", "picture.png"), {"file", "scenario", "picture"}),
+    (("schema", "--out", "schema.json"), {"written"}),
+    (("run", "short.yaml", "--planner", "still", "--out", "run"), {"decisions", "ospa", "seconds", "health", "folder"}),
+    (("results", "run"), {"decisions", "ospa", "written"}),
+    (("campaign", "spec.toml", "--dry-run"), {"cells", "compared", "warnings"}),
+    (("campaign", "spec.toml", "--workers", "1"), {"folder", "finished", "failed"}),
+    (("results", "trial-results", "--export", "tables"), {"comparisons", "missing", "written"}),
+    (("report", "trial-results"), {"page", "figures"}),
+    (("reproduce", "short.yaml", "--runs", "1", "--planners", "still", "--workers", "1"), {"comparisons", "report"}),
+]
+LISTS = [("list",), ("reproduce", "--list"), ("schema",)]
+
+
+def test_every_command_has_both_options() -> None:
+    assert {words[0] for words, _ in CALLS} | {"list"} == set(COMMANDS)
+    for command in COMMANDS.values():
+        assert {"--json", "--quiet", "-q"} <= {option for each in command.params for option in each.opts}
+
+
+def test_json_is_one_document_and_quiet_is_silence(place: Path) -> None:
+    for words, keys in CALLS:
+        result = call(*words, "--json")
+        assert result.exit_code == 0, result.output
+        document = json.loads(result.stdout)
+        assert keys <= set(document), words
+        for path in (*document.get("written", ()), *filter(None, (document.get("folder"), document.get("page")))):
+            assert Path(path).exists()
+    for words in LISTS:
+        assert json.loads(call(*words, "--json").stdout)
+    again = {"init", "generate", "crowd", "run"}
+    for words, _ in CALLS:
+        replaced = ("--overwrite",) if words[0] in again else ()
+        result = call(*words, *replaced, "--quiet")
+        assert (result.exit_code, result.output) == (0, ""), words
+
+
+def test_documents_have_the_numbers_unrounded(place: Path) -> None:
+    run = json.loads(call("run", "short.yaml", "--planner", "own", "--json").stdout)
+    ospa = run["ospa"]
+    assert ospa["total"] == pytest.approx(ospa["localisation"] + ospa["cardinality"], rel=1e-12)
+    assert f"mean OSPA {ospa['total']:.2f} m" in call("run", "short.yaml", "--planner", "own").stdout
+    assert call("campaign", "spec.toml", "--workers", "1").exit_code == 0
+    (group,) = json.loads(call("results", "trial-results", "--json").stdout)["comparisons"]
+    assert [each["strategy"] for each in group["strategies"]] == ["still", "own"]
+    assert all(f"{each['total_mean_m']:.2f}" in call("results", "trial-results").stdout for each in group["strategies"])
+
+
+def test_faults_are_in_the_document_and_are_said_when_quiet(place: Path) -> None:
+    result = call("check", "faulty.yaml", "short.yaml", "absent.yaml", "--json")
+    faulty, short, absent = json.loads(result.stdout)["files"]
+    assert (result.exit_code, result.stderr) == (1, "")
+    assert [each["valid"] for each in (faulty, short, absent)] == [False, True, False]
+    assert "num_steps: expected a whole number" in faulty["faults"][0]
+    assert absent["faults"][0].startswith("absent.yaml: no such file")
+    quiet = call("check", "faulty.yaml", "short.yaml", "--quiet")
+    assert (quiet.exit_code, quiet.stdout.splitlines(), quiet.stderr) == (1, faulty["faults"], "")
+    failed = call("run", "faulty.yaml", "--json")
+    assert (failed.exit_code, failed.stdout) == (1, "")
+    assert "num_steps" in failed.stderr
+
+
+MISSING = [
+    *(("check", "gone.yaml"), ("show", "gone.yaml"), ("run", "gone.yaml"), ("reproduce", "gone.yaml")),
+    *(("run", "gone"), ("campaign", "gone.toml"), ("results", "gone"), ("report", "gone")),
+    *(("check", "folder/gone.yaml"), ("results", "."), ("report", ".")),
+]
+
+
+@pytest.mark.parametrize("words", MISSING, ids=" ".join)
+def test_what_is_missing_is_no_such_file(place: Path, words: tuple[str, ...]) -> None:
+    result = call(*words)
+    assert result.exit_code == 1
+    (line,) = result.output.splitlines()
+    name = "manifest.json" if words[-1] == "." else words[-1]
+    assert line.startswith((f"{name}: no such file; expected", f"{name}: no such folder; expected"))
+
+
+def test_a_folder_is_no_scenario(place: Path) -> None:
+    assert call("run", ".").stderr.startswith(".: a folder; expected a YAML file")
+
+
+@pytest.mark.parametrize("command", ["check", "run", "show", "reproduce"])
+def test_a_campaign_file_is_no_scenario_and_what_checks_it_is_said(place: Path, command: str) -> None:
+    result = call(command, "spec.toml")
+    assert result.exit_code == 1
+    assert "vedette campaign spec.toml --dry-run" in result.output
+    assert call("campaign", "spec.toml", "--dry-run").exit_code == 0
+
+
+@pytest.mark.parametrize("words", [("init", "a.yaml"), ("generate", "a.yaml"), ("crowd", "a.yaml")], ids=" ".join)
+def test_the_option_that_overwrites_is_named_and_does(place: Path, words: tuple[str, ...]) -> None:
+    assert call(*words).exit_code == 0
+    refused = call(*words)
+    assert (refused.exit_code, refused.stderr) == (1, "a.yaml: already there; --overwrite replaces it\n")
+    assert call(*words, "--overwrite").exit_code == 0
+    assert call(*words, "--force").exit_code == 0  # its name of before
+
+
+def test_a_run_names_it_too(place: Path) -> None:
+    words = ("run", "short.yaml", "--planner", "still", "--out", "run")
+    assert call(*words).exit_code == 0
+    refused = call(*words)
+    assert refused.exit_code == 1
+    assert refused.stderr.startswith("--out: expected a new folder; run exists (--overwrite ")
+    assert call(*words, "--overwrite").exit_code == 0
+
+
+@pytest.mark.parametrize("columns", [10, 24, 40, 60, 120])
+def test_names_are_whole_at_any_width(columns: int) -> None:
+    for words, names in ((("list",), list_builtin()), (("reproduce", "--list"), {"paper-a": 0, **yardsticks()})):
+        lines = call(*words, columns=columns).stdout.splitlines()
+        assert [line.split()[0] for line in lines if not line.startswith(" ")] == list(names)
+
+
+def test_completion_knows_what_there_is(place: Path) -> None:
+    (place / "scenes").mkdir()
+    assert completing.built_in_scenarios("") == list(list_builtin())
+    assert completing.campaigns("deciding") == sorted(yardsticks())
+    assert completing.scenarios("s") == [*(n for n in list_builtin() if n[0] == "s"), "scenes/", "short.yaml"]
+    (place / "scenes" / "a.yml").touch()
+    (place / "scenes" / "a.txt").touch()
+    assert completing.scenarios("scenes/") == ["scenes/a.yml"]
+    assert completing.scenarios("nowhere/") == []
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (("run", "pap"), ["paper-a", "paper-e"]),
+        (("show", "fa"), ["faulty.yaml"]),
+        (("check", "pol"), ["polar-10"]),
+        (("run", "short.yaml", "--planner", "o"), ["own"]),
+        (("run", "short.yaml", "--planner", "s"), ["still"]),
+        (("run", "gone.yaml", "--planner", "i"), ["idm"]),
+        (("reproduce", "short.yaml", "--planners", "jdm,o"), ["jdm,own"]),
+        (("reproduce", "deciding-six"), ["deciding-six-cameras"]),
+        (("campaign", "sp"), ["spec.toml"]),
+        (("init", "--from", "sol"), ["solent"]),
+        (("results", "--format", "n"), ["netcdf"]),
+        (("generate", "--pattern", "c"), ["crowd"]),
+    ],
+    ids=lambda each: " ".join(each),
+)
+def test_a_shell_is_given_names(place: Path, words: tuple[str, ...], expected: list[str]) -> None:
+    environment = {"_VEDETTE_COMPLETE": "complete_bash", "COMP_WORDS": " ".join(("vedette", *words))}
+    done = subprocess.run(
+        [sys.executable, "-c", "from vedette.cli import app; app(prog_name='vedette')"],
+        env={**os.environ, **environment, "COMP_CWORD": str(len(words))},
+        capture_output=True,
+        text=True,
+        timeout=WAIT,
+        check=False,
+    )
+    assert done.stderr == ""
+    assert done.stdout.split() == expected

@@ -1,0 +1,182 @@
+"""What the light installation can do, and what it says where a package is missing that an extra brings.
+
+Each in a process of its own, in which nothing that an extra brings can be imported.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+import typer
+
+from vedette.cli import app
+from vedette.extras import EXTRA_OF
+
+ROOT = Path(__file__).resolve().parents[1]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+WAIT = 600.0  # s; kernels may have to be compiled
+
+REFUSING = """
+import sys
+
+class Refuse:
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] in REFUSED:
+            raise ModuleNotFoundError(f"No module named {name!r}", name=name)
+
+sys.meta_path.insert(0, Refuse())
+"""
+COMMANDS = """
+import json
+from typer.testing import CliRunner
+from vedette.cli import app
+
+def outcome(arguments):
+    result = CliRunner().invoke(app, arguments)
+    return [result.exit_code, result.stdout, result.stderr, repr(result.exception)]
+
+print(json.dumps([outcome(arguments) for arguments in json.loads(sys.argv[1])]))
+"""
+
+LIGHT = [
+    ["--help"],
+    ["list"],
+    ["init", "bay.yaml"],
+    ["generate", "made.yaml"],
+    ["crowd", "crowd.yaml"],
+    ["check", "bay.yaml", "made.yaml", "crowd.yaml"],
+    ["show", "bay.yaml"],
+    ["schema"],
+    ["run", "linear-10", "--planner", "still"],
+]
+HEAVY = {
+    ("show", "linear-10", "--out", "picture.png"): ("matplotlib", "report"),
+    ("run", "linear-10", "--planner", "still", "--out", "run"): ("matplotlib and pyarrow", "report"),
+    ("campaign", "spec.toml"): ("pyarrow", "campaigns"),
+    ("results", "there"): ("pyarrow", "campaigns"),
+    ("report", "there"): ("jinja2 and matplotlib and pyarrow", "report"),
+    ("reproduce",): ("jinja2 and matplotlib and pyarrow", "report"),
+}
+
+
+def without(refused: list[str], program: str, folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    """A program run where some packages cannot be imported, warnings as errors."""
+    code = f"REFUSED = {refused}\n{REFUSING}\n{program}"
+    return subprocess.run(
+        [sys.executable, "-W", "error", "-c", code, *arguments],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        encoding="utf-8",
+        timeout=WAIT,
+        check=False,
+    )
+
+
+REFUSED = [*EXTRA_OF, "dask"]
+
+
+def outcomes(commands: list[list[str]], folder: Path, refused: list[str] = REFUSED) -> list[tuple[int, str, str, str]]:
+    """Exit status, output, error output and exception of each command."""
+    ran = without(refused, COMMANDS, folder, json.dumps(commands))
+    assert ran.returncode == 0, ran.stderr
+    return [tuple(each) for each in json.loads(ran.stdout.splitlines()[-1])]
+
+
+def brought(extra: str) -> set[str]:
+    """Names of the packages that an extra brings, with those of the extras that it names."""
+    found: set[str] = set()
+    for entry in PROJECT["optional-dependencies"][extra]:
+        if inner := re.fullmatch(r"vedette\[(.*)\]", entry):
+            found.update(*(brought(name) for name in inner[1].split(",")))
+        else:
+            found.add(re.split(r"[<>=]", entry)[0])
+    return found
+
+
+def test_extras_bring_what_they_are_named_for() -> None:
+    assert brought("all") == set(EXTRA_OF)
+    for package, extra in EXTRA_OF.items():
+        assert package in brought(extra)
+        assert brought("campaigns") <= brought(extra)
+    plain = {re.split(r"[<>=]", entry)[0] for entry in PROJECT["dependencies"]}
+    assert plain == {"numba", "numpy", "pydantic", "rich", "ruamel.yaml", "scipy", "typer"}
+
+
+def test_filters_fusion_control_and_scenarios_need_no_extra(tmp_path: Path) -> None:
+    rooms = [
+        f"vedette.{path.relative_to(ROOT / 'src/vedette').with_suffix('').as_posix().replace('/', '.')}"
+        for path in sorted((ROOT / "src/vedette").rglob("*.py"))
+        if path.name != "__init__.py"
+        and not {"campaigns", "reports", "figures"} & set(path.parts)
+        and path.name != "picture.py"
+    ]
+    assert len(rooms) > 200
+    ran = without(REFUSED, "\n".join(f"import {room}" for room in rooms), tmp_path)
+    assert ran.returncode == 0, ran.stderr
+
+
+def test_a_tracking_loop_with_a_plan_needs_no_extra(tmp_path: Path) -> None:
+    (block,) = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text("utf-8"), re.DOTALL)
+    ran = without(REFUSED, block, tmp_path)
+    assert ran.returncode == 0, ran.stderr
+    assert "go to" in ran.stdout
+
+
+def test_light_commands_need_no_extra(tmp_path: Path) -> None:
+    for command, (status, _, error, exception) in zip(LIGHT, outcomes(LIGHT, tmp_path), strict=True):
+        assert (status, exception) == (0, "None"), f"{command}: {error}"
+
+
+def test_commands_that_need_an_extra_name_it_in_one_line(tmp_path: Path) -> None:
+    (tmp_path / "spec.toml").write_text('name = "trial"\nscenarios = ["linear-10"]\nplanners = ["still"]\nruns = 1\n')
+    (tmp_path / "there").mkdir()
+    found = outcomes([list(command) for command in HEAVY], tmp_path)
+    for (command, (names, extra)), (status, output, error, _) in zip(HEAVY.items(), found, strict=True):
+        assert status == 1, command
+        (line,) = error.splitlines()
+        assert line.startswith(f"vedette {command[0]}")
+        assert f" needs {names}, which" in line
+        assert line.endswith(f"not installed: pip install 'vedette[{extra}]'")
+        assert output == ""  # said before anything is done
+    assert {path.name for path in tmp_path.iterdir()} == {"spec.toml", "there"}
+
+
+def test_every_command_is_among_these() -> None:
+    assert set(typer.main.get_command(app).commands) == {command[0] for command in (*LIGHT[1:], *HEAVY)}  # type: ignore[attr-defined]
+
+
+def test_several_workers_need_the_extra_of_clusters_and_one_does_not(tmp_path: Path) -> None:
+    (tmp_path / "spec.toml").write_text('name = "trial"\nscenarios = ["linear-10"]\nplanners = ["still"]\nruns = 1\n')
+    command = ["campaign", "spec.toml", "--workers"]
+    (two, one) = outcomes([[*command, "2"], [*command, "1"]], tmp_path, ["cryptography", "distributed", "dask"])
+    assert two[0] == 1
+    assert "(--workers 1 does without) needs cryptography and distributed" in two[2]
+    assert "pip install 'vedette[cluster]'" in two[2]
+    assert one[0] == 0, one[2]
+    assert (tmp_path / "trial-results" / "tables").is_dir()
+
+
+@pytest.mark.parametrize(
+    ("program", "names", "extra"),
+    [
+        ("import vedette.evaluation.figures", "matplotlib", "report"),
+        ("import vedette.reports", "jinja2 and matplotlib and pyarrow", "report"),
+        ("import vedette.campaigns", "pyarrow", "campaigns"),
+        ("from vedette.simulation.arrow import write_table; write_table({}, None)", "pyarrow", "campaigns"),
+        ("from vedette.recorded.reports import read_table; read_table('a.parquet')", "pyarrow", "campaigns"),
+    ],
+)
+def test_the_library_names_the_extra_too(program: str, names: str, extra: str, tmp_path: Path) -> None:
+    (tmp_path / "a.parquet").write_bytes(b"PAR1")
+    ran = without(REFUSED, program, tmp_path)
+    last = ran.stderr.splitlines()[-1]
+    assert last.startswith("vedette.errors.MissingPackageError: ")
+    assert f"needs {names}, which" in last
+    assert last.endswith(f"pip install 'vedette[{extra}]'")
