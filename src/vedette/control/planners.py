@@ -14,12 +14,13 @@ from vedette.control.evidence import Evidence
 from vedette.control.explaining import Part, Questions
 from vedette.control.inputs import check_choice, check_poses, options_of
 from vedette.control.plan import Plan, RewardTable
-from vedette.control.preparation import AnyReward, Preparation
+from vedette.control.preparation import AnyReward, Preparation, check_sums, stay_glmbs
 from vedette.control.problem import joint_problem, note_lines
 from vedette.control.rewards import CauchySchwarzReward
 from vedette.control.rounds import Decided, decide_alone, decide_jointly
-from vedette.control.search import AutomaticSearch, JointSearch, all_joint_actions, first_best
+from vedette.control.search import AutomaticSearch, JointSearch, SequentialGreedy, all_joint_actions, first_best
 from vedette.control.settings import MobileSensor, PlanningSettings
+from vedette.filters import labels_targets
 from vedette.fusion import Fusion
 from vedette.kernels.base.types import Floats
 from vedette.models.arguments import generator, reject
@@ -52,6 +53,9 @@ class JointPlanner:
         search: which joint actions are evaluated: all of them, as in the paper, or fewer.
         constraints: what the sensors must not do.
         notes: what every plan is to say beside what comes up, such as that the tracks are fused in another way.
+
+    Raises:
+        InputError: a `SequentialGreedy` search of rewards that are no sums over labels.
     """
 
     sensors: tuple[MobileSensor, ...]
@@ -61,6 +65,15 @@ class JointPlanner:
     search: JointSearch = field(default_factory=AutomaticSearch)
     constraints: tuple[Constraint, ...] = ()
     notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.search, SequentialGreedy):
+            return
+        purpose = "SequentialGreedy, which asks for rewards of some of the sensors alone"
+        check_sums(purpose, len(self.sensors), self.fusion, self.settings, self.reward)
+        if stay_glmbs(self.sensors, self.fusion, self.settings, self.reward):
+            expected = f"filters of LMBs, or of products of GLMBs, or settings.max_glmb_targets of 0, for {purpose}"
+            raise reject("sensors", expected, "filters of GLMBs")
 
     @property
     def name(self) -> str:
@@ -177,11 +190,19 @@ class RandomPlanner:
         sensors: the sensors.
         settings: the horizon, over which courses are told apart.
         constraints: what the sensors must not do; a joint action that is drawn and not allowed is moved to one near it.
+
+    Raises:
+        InputError: constraints that look at beliefs, with filters that have no labels.
     """
 
     sensors: tuple[MobileSensor, ...]
     settings: PlanningSettings = field(default_factory=PlanningSettings)
     constraints: tuple[Constraint, ...] = ()
+
+    def __post_init__(self) -> None:
+        asking = [own.name for own in self.constraints if own.needs_beliefs]
+        if asking and not all(labels_targets(sensor.filter) for sensor in self.sensors):
+            raise reject("constraints", "none that asks where targets will be, as filters have no labels", asking[0])
 
     @property
     def name(self) -> str:

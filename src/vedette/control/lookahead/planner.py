@@ -21,7 +21,7 @@ from vedette.control.lookahead.laid_courses import LaidCourses
 from vedette.control.lookahead.problem import Best, Part, SequenceProblem, SequenceSearch
 from vedette.control.lookahead.rules import Rules
 from vedette.control.plan import Bound, Plan
-from vedette.control.preparation import AnyReward, Sums, prepare_sums, unsought
+from vedette.control.preparation import AnyReward, Sums, check_sums, prepare_sums, unsought
 from vedette.control.rewards import CauchySchwarzReward
 from vedette.control.settings import MobileSensor, PlanningSettings
 from vedette.errors import NumericalError
@@ -60,7 +60,7 @@ class HorizonPlanner:
         notes: what every plan is to say.
 
     Raises:
-        InputError: names the field, what was expected and what came.
+        InputError: a field out of range, or a reward, association or fusion that is no sum over labels.
     """
 
     sensors: tuple[MobileSensor, ...]
@@ -86,6 +86,7 @@ class HorizonPlanner:
             if round(steps) < 1 or abs(steps - round(steps)) > 1e-9 * steps:
                 multiple = f"a whole multiple of the horizon_period, {self.settings.horizon_period:g}"
                 raise reject("period", multiple, self.period)
+        check_sums("sequences of decisions", len(self.sensors), self.fusion, self.settings, self.reward)
 
     @property
     def name(self) -> str:
@@ -102,7 +103,7 @@ class HorizonPlanner:
         `JointPlanner.plan`; the search draws after the samples.
 
         Raises:
-            InputError: inputs that do not fit, or a reward or fusion that is no sum over labels.
+            InputError: inputs that do not fit.
             ModelError, NumericalError: as the filters; no sequence whose reward is a number.
         """
         generator(rng)
