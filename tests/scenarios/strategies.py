@@ -218,7 +218,9 @@ def scenarios(draw: st.DrawFn) -> Data:
         | section("renyi", order=positive.filter(lambda order: order != 1.0)),
         search=searches,
         constraints=st.lists(constraints(), max_size=3),
-        lookahead=section(depth=counts, method=st.just("beam"), beam_width=counts, budget=counts, discount=probability)
+        lookahead=section(
+            depth=st.integers(1, 100), method=st.just("beam"), beam_width=counts, budget=counts, discount=probability
+        )
         | section(method=st.just("tree")),
         limits=section(max_prior_hypotheses=counts, max_hypotheses=counts),
     )

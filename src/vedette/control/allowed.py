@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -24,7 +25,7 @@ def mask_of_decision(
     constraints: Sequence[Constraint],
     sensors: Sequence[MobileSensor],
     options: Sequence[Options],
-    fused: Labelled | None,
+    fused: Any,
     poses: Floats,
     settings: PlanningSettings,
 ) -> Mask | None:
@@ -43,7 +44,7 @@ def mask_of_decision(
 def beliefs_ahead(
     constraints: Sequence[Constraint],
     sensors: Sequence[MobileSensor],
-    fused: Labelled | None,
+    fused: Any,
     settings: PlanningSettings,
     first: int,
     last: int,

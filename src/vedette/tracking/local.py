@@ -16,7 +16,7 @@ from vedette.filters.base import SingleSensorFilter
 from vedette.filters.blind import NO_POSE, NO_SCAN, blind_sensor
 from vedette.fusion import ValidBeliefs
 from vedette.models import SensorModel, TargetModel
-from vedette.models.arguments import reject
+from vedette.models.arguments import reject, sequence
 from vedette.tracking.births import check_measured_births
 
 _BORN = "targets are born of measurements"
@@ -37,7 +37,7 @@ class LocalFilters:
     filters: tuple[Filter, ...]
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "filters", tuple(self.filters))
+        object.__setattr__(self, "filters", sequence("filters", self.filters, "a Filter of each sensor"))
         if not self.filters:
             raise InputError("filters: expected at least one; got none")
         for s, local in enumerate(self.filters):

@@ -102,12 +102,11 @@ def _one_belief(model: ScenarioModel) -> Iterator[Finding]:
 
 
 def _central(model: ScenarioModel) -> Iterator[Finding]:
-    if model.filter.kind == "custom" and model.fusion.kind in OF_SCANS:
-        wanted = "a fusion of densities, as each sensor has a filter of your own"
-        yield ("fusion", "kind"), wanted, describe(model.fusion.kind)
-    elif model.fusion.kind != "central":
-        return
-    elif model.filter.assignment.kind == "gibbs":
+    if model.filter.kind == "custom":
+        if model.fusion.kind in OF_SCANS:
+            wanted = "a fusion of densities, as each sensor has a filter of your own"
+            yield ("fusion", "kind"), wanted, describe(model.fusion.kind)
+    elif model.fusion.kind == "central" and model.filter.assignment.kind == "gibbs":
         yield ("filter", "assignment", "kind"), "ranked, as one filter takes the scans of all sensors", '"gibbs"'
 
 
