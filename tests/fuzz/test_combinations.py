@@ -29,7 +29,7 @@ SECONDS = 900  # a first run compiles kernels
 OWN = Path(__file__).parents[1] / "scenarios"
 SHIPS = "time,id,x,y\n" + "".join(f"{2.0 * k},{ship},{9.0 * k},{50.0 * ship}\n" for k in range(12) for ship in (1, 2))
 
-pytestmark = pytest.mark.fuzz
+pytestmark = [pytest.mark.fuzz, pytest.mark.filterwarnings("ignore::vedette.errors.ImplausibleWarning")]
 
 
 @pytest.fixture

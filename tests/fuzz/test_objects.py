@@ -15,7 +15,7 @@ from fuzz.objects import Data, everything
 from fuzz.outcomes import bounded
 from vedette.errors import VedetteError
 
-pytestmark = pytest.mark.fuzz
+pytestmark = [pytest.mark.fuzz, pytest.mark.filterwarnings("ignore::vedette.errors.ImplausibleWarning")]
 
 OTHERS: list[Any] = [
     *(object(), np.nan, np.array([np.nan]), np.array(["a"]), np.array(1.0), np.zeros((2, 2)), np.float64(0.5), 1 + 2j),

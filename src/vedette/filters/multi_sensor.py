@@ -136,7 +136,7 @@ class MultiSensorFilter(ABC, Generic[_Belief]):
             if scans[s] is None:
                 continue
             try:
-                scan, num = check_scan(scans[s], sensor.measurement)
+                scan, num = check_scan(scans[s], sensor)
             except InputError as error:
                 raise InputError(f"scans[{s}]: {error}") from None
             looks.names.append(f"sensor {s}")

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from vedette.covariances import covariance_fault
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats
+from vedette.plausible import implausible, seems_degrees
 from vedette.text import plain, printable
 
 
@@ -203,6 +204,9 @@ def pose_vector(field: str, values: Any) -> Floats:
     pose = float_array(field, values, (None,))
     if len(pose) < 3:
         raise reject(field, "an array of shape (3 or more,)", f"shape {pose.shape}")
+    if seems_degrees(float(pose[2])):
+        degrees = f"{pose[2]:g} degrees are {math.radians(pose[2]):.4f} rad"
+        implausible(field, "a heading in radians", f"{pose[2]:g}, a whole number of several turns", degrees)
     return pose
 
 
