@@ -152,7 +152,9 @@ GOOD = models.constant_noise([0.02, 3.0])
     ids=["constant", "grows"],
 )
 def test_a_bearing_with_noise_beyond_pi_is_refused(noise: models.NoiseModel) -> None:
-    wanted = r"SensorModel.noise: expected .* component 0, an angle, in radians, up to pi; got 5 \(is it in degrees, or are components"
+    wanted = (
+        r"SensorModel.noise: expected .* an angle, in radians, up to pi; got 5 \(is it in degrees, or are components"
+    )
     with pytest.raises(InputError, match=wanted):
         sensor(noise)
 
