@@ -29,6 +29,10 @@ class SlowRewardWarning(UserWarning):
     """A planner computes rewards one by one, because the reward or the fusion does not say how to lay them out."""
 
 
+class ImplausibleWarning(UserWarning):
+    """An argument that is valid, but can hardly be meant so: in another unit, or with its numbers exchanged."""
+
+
 class ScenarioError(VedetteError):
     """A scenario with one or more faults. The message lists the first fifty and counts the others.
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import io
 import json
 import math
+import os
 import re
 import stat
 import zipfile
@@ -34,7 +35,9 @@ def read_file(path: Path, most: int = MOST_BYTES) -> bytes:
             raise IsADirectoryError(21, "it is a folder")
         raise ValueError("it is no regular file")
     with path.open("rb") as file:
-        content = file.read(most + 1)
+        content = file.read(min(os.fstat(file.fileno()).st_size, most) + 1)  # what is asked for is allocated
+        while len(content) <= most and (more := file.read(min(len(content), most) + 1)):  # written meanwhile
+            content += more
     if len(content) > most:
         raise ValueError(f"it has more than {most} bytes")
     return content
@@ -78,11 +81,11 @@ def parse_json(content: bytes | str) -> Any:
 
 
 def _each_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    data = dict(pairs)
-    if len(data) < len(pairs):
-        names = [name for name, _ in pairs]
-        twice = next(name for name in names if names.count(name) > 1)
-        raise ValueError(f"the key {shown(twice)} stands there twice")
+    data: dict[str, Any] = {}
+    for name, value in pairs:
+        if name in data:
+            raise ValueError(f"the key {shown(name)} stands there twice")
+        data[name] = value
     return data
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from datetime import date, timedelta
 from typing import Any
@@ -61,6 +62,14 @@ def plain(value: Any) -> str:
 def shown(value: Any) -> str:
     """A value in a message: in quotes where it is text, in printable letters, and not long."""
     return elided(printable(f"the time {value}" if isinstance(value, date | timedelta) else plain(value)), 80)
+
+
+_NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?")
+
+
+def spreadsheet_text(text: str) -> str:
+    """A text for a cell of a CSV file; one that a spreadsheet would run as a formula has an apostrophe before it."""
+    return f"'{text}" if text.startswith(("=", "+", "-", "@", "\t", "\r")) and not _NUMBER.fullmatch(text) else text
 
 
 def elided(text: str, most: int = 24) -> str:

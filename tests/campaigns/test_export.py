@@ -14,6 +14,7 @@ from vedette.campaigns.export import FORMATS, export_csv, export_netcdf, export_
 from vedette.campaigns.results import open_results
 from vedette.campaigns.tables import tables_of_runs
 from vedette.errors import InputError
+from vedette.text import spreadsheet_text
 
 KEYS = ["cell", "scenario", "planner", "sensors.*.clutter.rate", "run"]
 TABLES = ["runs", "scans", "truth", "tracks", "sensors", "decisions", "actions", "rewards", "timings"]
@@ -182,6 +183,36 @@ def test_csv_holds_the_same(results, tables, tmp_path):
     with files["scans"].open(newline="") as file:
         values = [float(row["ospa_m"]) for row in csv.DictReader(file)]
     np.testing.assert_array_equal(values, tables["scans"]["ospa_m"].to_numpy())
+
+
+FORMULAS = ["=1+1", "+cmd", "-rf", "@SUM(A1)", "\tx", "\r=1"]
+
+
+def test_csv_has_no_cell_that_a_spreadsheet_runs(tmp_path):
+    """Names of variants and settings are anybody's text; numbers and texts of numbers stay what they are."""
+    import csv
+
+    values = [*FORMULAS[:2], "@SUM(A1)", "-2.5e-3", "plain = x"]
+    campaign = make_campaign(grid={"description": values})
+    results = open_results(fill(tmp_path / "results", campaign))
+    files = {path.stem: path for path in export_csv(results, tmp_path)}
+    with files["runs"].open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert list(dict.fromkeys(row["description"] for row in rows)) == [
+        *(f"'{text}" for text in values[:3]),
+        *values[3:],
+    ]
+    assert results.tables()["runs"]["description"].to_pylist()[0] == "=1+1"
+
+
+@pytest.mark.parametrize("text", FORMULAS)
+def test_texts_that_look_like_formulas_get_an_apostrophe(text):
+    assert spreadsheet_text(text) == f"'{text}"
+
+
+@pytest.mark.parametrize("text", ["", "a", "-1", "+.5", "-2.e+10", "a=1", " =1", "sensor 1"])
+def test_other_texts_stay_what_they_are(text):
+    assert spreadsheet_text(text) == text
 
 
 def test_the_dataset_has_every_measure_and_gaps_where_runs_are_missing(results):

@@ -131,6 +131,17 @@ def test_names_of_cells_fit_any_folder() -> None:
     assert max(map(len, names)) <= 120
 
 
+@pytest.mark.parametrize("name", ["-rf", "--force", ".", "..", ".hidden", "../up", "nul", "Con.x", "COM1"])
+def test_names_that_no_file_should_have_are_refused(name: str) -> None:
+    """A folder named `-rf-results` is an option to the next command that is given it."""
+    text = 'name = "{}"\nscenarios = ["paper-a"]\nruns = 1\n[[variants]]\nname = "{}"\n'
+    wanted = r"expected a name that (begins with neither a dash nor a dot|files can have everywhere)"
+    with pytest.raises(InputError, match=rf"^<text>: name: {wanted}.*, got "):
+        parse_spec(text.format(name, "a"))
+    with pytest.raises(InputError, match=rf"^<text>: variants\[0\]\.name: {wanted}.*, got "):
+        parse_spec(text.format("a", name))
+
+
 def test_more_runs_of_the_same_campaign() -> None:
     more = campaign().with_runs(7)
     assert (more.num_runs, more.spec["runs"], len(more.tasks)) == (7, 7, 21)

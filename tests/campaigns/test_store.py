@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import shutil
+import sqlite3
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -204,3 +206,25 @@ def test_a_manifest_that_cannot_be_written_is_named(filled, campaign, monkeypatc
         Store.open(filled, campaign)
     monkeypatch.undo()
     Store.open(filled, campaign).close()
+
+
+def test_words_of_the_file_that_are_no_utf8_are_a_fault_of_the_file(filled, campaign):
+    """SQLite quotes them when it says what is wrong, and Python cannot read what it says."""
+    file = filled / "campaign.sqlite"
+    whole = file.read_bytes()
+    assert b"contents TEXT NOT NULL" in whole
+    file.write_bytes(whole.replace(b"contents TEXT NOT NULL", b"contents TEXT NOT NU\xffL"))
+    for read in (open_results, lambda folder: Store.open(folder, campaign)):
+        with pytest.raises(InputError, match=r"campaign\.sqlite: expected the runs of a campaign as they were written"):
+            read(filled)
+
+
+@pytest.mark.parametrize(
+    "values", ["'a', 0, 1, CAST(x'ff' AS TEXT)", "'a', 'b', 1, 'c'", "x'00', 0, 1, 'c'", "'a', 0, 1, x'00'"]
+)
+def test_failures_that_are_none_are_a_fault_of_the_file(filled, values):
+    with closing(sqlite3.connect(filled / "campaign.sqlite")) as database, database:
+        database.execute(f"INSERT INTO failures VALUES ({values})")
+    with pytest.raises(InputError, match=r"campaign\.sqlite: expected") as caught:
+        open_results(filled).failures()
+    assert str(caught.value).isprintable()

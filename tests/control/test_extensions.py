@@ -157,7 +157,7 @@ def test_an_order_without_a_finite_reward_is_named() -> None:
     with pytest.raises(NumericalError, match="expected a finite number; got inf"):
         planner.plan(*example.arguments, rng=np.random.default_rng(5))
     for order in (0.0, 1.0, math.inf, True, "half"):
-        with pytest.raises(InputError, match="order: expected a finite number above 0 other than 1"):
+        with pytest.raises(InputError, match="order: expected a finite number"):
             RenyiReward(order)  # type: ignore[arg-type]
 
 

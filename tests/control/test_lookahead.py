@@ -236,7 +236,7 @@ def test_bad_arguments(arguments: dict[str, Any], message: str) -> None:
     ("arguments", "message"),
     [
         ({"exploration": -0.1}, "exploration"),
-        ({"rollout": "greedy"}, "rollout: expected random or kept"),
+        ({"rollout": "greedy"}, "rollout: expected one of random, kept"),
         ({"batch": 0}, "batch"),
     ],
 )

@@ -150,7 +150,7 @@ def test_what_is_refused() -> None:
         with pytest.raises(InputError, match="exponents: expected finite numbers, the one above 0 where the other"):
             power_integral(lmb, lmb, a, b)
     for order in (0.0, 1.0, -1.0, math.inf, math.nan):
-        with pytest.raises(InputError, match="order: expected a finite number above 0 other than 1"):
+        with pytest.raises(InputError, match="order: expected a finite number"):
             renyi(lmb, lmb, order)
     poisson = Poisson(np.zeros(1), np.zeros((1, 2)), np.eye(2)[None])
     with pytest.raises(InputError, match="expected labelled densities; got two Poisson densities"):

@@ -125,6 +125,13 @@ def test_csv_holds_the_unrounded_numbers(comparison: Comparison) -> None:
     assert float(rows[3]["share_won"]) == comparison.difference("fixed").share_won
 
 
+def test_csv_has_no_name_that_a_spreadsheet_runs(runs: dict[str, list[RunRecord]]) -> None:
+    compared = compare({"=1+1": runs["jdm"], "idm": runs["idm"]})
+    rows = list(csv.DictReader(io.StringIO(strategy_csv({"@group": compared}))))
+    assert [(row["group"], row["strategy"]) for row in rows] == [("'@group", "'=1+1"), ("'@group", "idm")]
+    assert float(rows[1]["difference_m"]) == float(compared.difference("idm").summary.mean)
+
+
 def test_decision_rows_skip_strategies_without_decisions(comparison: Comparison) -> None:
     rows = decision_rows(comparison, "idm", at_most=1)
     assert [time for time, _ in rows] == ["10 s", "20 s", "30 s"]

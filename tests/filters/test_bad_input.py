@@ -449,7 +449,7 @@ def test_parts_that_do_not_fit(kind: Any) -> None:
 
 def test_options_of_the_delta_glmb_filter() -> None:
     tracker = make(DeltaGlmbFilter)
-    with pytest.raises(InputError, match="assignment: expected 'ranked' or 'gibbs'; got 'murty'"):
+    with pytest.raises(InputError, match="assignment: expected one of ranked, gibbs; got murty"):
         dataclasses.replace(tracker, assignment="murty")
     for value in (0, -3, math.nan):
         with pytest.raises(InputError, match=r"num_gibbs_samples: expected .*at least 1"):

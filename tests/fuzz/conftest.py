@@ -27,7 +27,9 @@ def _numbers(config: pytest.Config, short: int) -> Iterator[int]:
 
 
 def _place(fault: BaseException) -> tuple[str, str]:
-    """What makes two faults the same: the kind, and where it was raised."""
+    """What makes two faults the same: the kind, and where it was raised; of the first in a chain."""
+    while fault.__cause__ is not None:
+        fault = fault.__cause__
     frame = traceback.extract_tb(fault.__traceback__)[-1]
     return type(fault).__name__, f"{frame.filename}:{frame.lineno}"
 

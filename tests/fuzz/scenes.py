@@ -95,10 +95,12 @@ def _sensor(rng: Rng) -> models.SensorModel:
         high = np.where(is_bearing, np.pi, reach)
         clutter = models.measurement_space_clutter(rate, -high, high, angular=is_bearing.astype(bool))
     if kind == "position" or rng.random() < 0.5:
-        noise = models.constant_noise([some(rng, 0.01 if bearing else 10.0, 1e-12, 1e6) for bearing in is_bearing])
+        noise = models.constant_noise(
+            [some(rng, 0.01 if bearing else 10.0, 1e-12, 3.0 if bearing else 1e6) for bearing in is_bearing]
+        )
     else:
         grows = {"sigma_range": some(rng, 10.0, 1e-12, 1e6), "eta_range": one_of(rng, 0.0, 5e-5)}
-        turns = {"sigma_bearing": some(rng, 0.02, 1e-12, 1e6), "eta_bearing": one_of(rng, 0.0, 5e-6)}
+        turns = {"sigma_bearing": some(rng, 0.02, 1e-12, 3.0), "eta_bearing": one_of(rng, 0.0, 5e-6)}
         parts = {"bearing_range": grows | turns, "bearing_only": turns, "range_only": grows}
         noise = models.range_dependent_noise(**parts[kind])
     return models.SensorModel(measurement, noise, _detection(rng), clutter, method=one_of(rng, *METHODS))

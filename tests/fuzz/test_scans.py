@@ -34,7 +34,7 @@ from vedette.errors import InputError, VedetteError
 from vedette.filters import FilterInfo
 from vedette.fusion import Clmb, CmDeltaGlmb
 
-pytestmark = pytest.mark.fuzz
+pytestmark = [pytest.mark.fuzz, pytest.mark.filterwarnings("ignore::vedette.errors.ImplausibleWarning")]
 
 TryCases = Callable[[Callable[[np.random.Generator], object], int], None]
 

@@ -218,10 +218,18 @@ def scenarios(draw: st.DrawFn) -> Data:
         | section("renyi", order=positive.filter(lambda order: order != 1.0)),
         search=searches,
         constraints=st.lists(constraints(), max_size=3),
-        lookahead=section(depth=counts, method=st.just("beam"), beam_width=counts, budget=counts, discount=probability)
+        lookahead=section(
+            depth=st.integers(1, 100), method=st.just("beam"), beam_width=counts, budget=counts, discount=probability
+        )
         | section(method=st.just("tree")),
         limits=section(max_prior_hypotheses=counts, max_hypotheses=counts),
     )
+    followed, decided = draw(tracking(len(carried))), draw(control)
+    if followed["filter"]["kind"] in ("phd", "cphd", "cb_member"):
+        decided["constraints"] = [own for own in decided.get("constraints", []) if own["kind"] != "void_probability"]
+        carried = [{**item, "scans": {}} for item in carried]
+    elif decided.get("search", {}).get("kind") == "sequential_greedy":
+        decided["limits"] = {"max_glmb_targets": 0}
     return {
         "name": draw(names),
         "description": draw(st.text(st.characters(exclude_categories=["Cs", "Cc"]), max_size=30)),
@@ -232,8 +240,8 @@ def scenarios(draw: st.DrawFn) -> Data:
         "birth": {"sites": draw(sites(dim)), **draw(section(steps=st.just("every") | steps(last)))},
         "targets": draw(targets(dim, last)),
         "sensors": [{**item, "name": f"{draw(names)}{number}"} for number, item in enumerate(carried)],
-        **draw(tracking(len(carried))),
-        "control": draw(control),
+        **followed,
+        "control": decided,
         **draw(section(undetected=undetected(max(y)))),
         "ospa": draw(
             section(

@@ -44,7 +44,10 @@ def written(folder: Path, control: str) -> Scenario:
         ("search: {kind: exhaustive, max_joint_actions: 1e3}", ExhaustiveSearch(1000)),
         ("search: {kind: coordinate_ascent}", CoordinateAscent(2)),
         ("search: {kind: coordinate_ascent, num_restarts: 0}", CoordinateAscent(0)),
-        ("search: {kind: sequential_greedy, order: best_first}", SequentialGreedy("best_first")),
+        (
+            "search: {kind: sequential_greedy, order: best_first}, limits: {max_glmb_targets: 0}",
+            SequentialGreedy("best_first"),
+        ),
         ("search: {kind: cross_entropy, num_samples: 50, elite_share: 0.2}", CrossEntropy(50, 0.2)),
     ],
 )

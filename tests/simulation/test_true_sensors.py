@@ -63,7 +63,7 @@ def test_bad_true_sensors_are_named():
     )
     with pytest.raises(InputError, match="detection_of: expected state, as only a position"):
         TrueSensor(bearing, detection_of="measurement")
-    with pytest.raises(InputError, match="detection_of: expected state or measurement; got both"):
+    with pytest.raises(InputError, match="detection_of: expected one of state, measurement; got both"):
         TrueSensor(bearing, detection_of="both")
     with pytest.raises(InputError, match="first_detection: expected a DetectionModel or None; got 1"):
         TrueSensor(bearing, first_detection=1.0)  # type: ignore[arg-type]

@@ -170,9 +170,16 @@ def test_targets_are_found_without_any_site(kind: Any) -> None:
 def test_a_birth_needs_labels_and_a_fusion_that_matches_them() -> None:
     with pytest.raises(InputError, match="expected one that matches labels"):
         Distributed(filters(WORLD, SENSORS), Clmb((0.5, 0.5)))
-    phd = Distributed((PhdFilter(WORLD, SENSORS[0]),))
     with pytest.raises(InputError, match=r"expected a TwoStepFilter.*as targets are born of measurements"):
-        phd.step(phd.initial(), [np.zeros((1, 2))], POSES[:1], 1.0, rngs=rngs(1))
+        Distributed((PhdFilter(WORLD, SENSORS[0]),))
+    placeless = replace(SENSORS[0], measurement=replace(SENSORS[0].measurement, places=None))
+    wanted = r"sensors\[1\]\.measurement: expected a measurement with `places`, as targets are born of measurements"
+    for made in (
+        lambda: Distributed(filters(WORLD, (SENSORS[0], placeless)), Matched(Clmb((0.5, 0.5)))),
+        lambda: Central(MultiSensorLmbFilter(WORLD, (SENSORS[0], placeless))),
+    ):
+        with pytest.raises(InputError, match=wanted):
+            made()
     for fields, name in (
         ({"expected": 0.0}, "expected"),
         ({"max_existence": 1.0}, "max_existence"),

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, BinaryIO
 
+import pyarrow as pa
 from pyarrow import csv, parquet
 
 from vedette.campaigns.results import CampaignResults
@@ -14,6 +15,7 @@ from vedette.campaigns.tables import tables_of_record
 from vedette.errors import InputError
 from vedette.files import write_whole
 from vedette.simulation.records import RunRecord
+from vedette.text import spreadsheet_text
 
 NETCDF = "scans.nc"
 
@@ -34,8 +36,19 @@ def export_tables(results: CampaignResults | RunRecord, folder: Path | str) -> t
 
 
 def export_csv(results: CampaignResults | RunRecord, folder: Path | str) -> tuple[Path, ...]:
-    """Write the same tables as `<name>.csv`; as `export_tables`."""
-    return _write_tables(results, Path(folder), ".csv", csv.write_csv)
+    """Write the same tables as `<name>.csv`; as `export_tables`.
+
+    A text that a spreadsheet would run as a formula has an apostrophe before it (`vedette.text.spreadsheet_text`).
+    """
+    return _write_tables(results, Path(folder), ".csv", _write_csv)
+
+
+def _write_csv(table: pa.Table, file: BinaryIO) -> None:
+    for place, column in enumerate(table.columns):
+        if pa.types.is_string(column.type):
+            texts = [None if text is None else spreadsheet_text(text) for text in column.to_pylist()]
+            table = table.set_column(place, table.field(place), pa.array(texts, pa.string()))
+    csv.write_csv(table.rename_columns([spreadsheet_text(name) for name in table.column_names]), file)
 
 
 def export_netcdf(results: CampaignResults | RunRecord, folder: Path | str) -> tuple[Path, ...]:

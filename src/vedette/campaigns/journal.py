@@ -17,8 +17,8 @@ from pathlib import Path
 from typing import Any
 
 from vedette.errors import InputError
-from vedette.reading import inflate
-from vedette.text import shown
+from vedette.reading import inflate, said
+from vedette.text import printable, shown
 
 DATABASE, LOCK = "campaign.sqlite", "campaign.lock"
 
@@ -155,7 +155,9 @@ class Writer:
     def close(self) -> None:
         """Let other writers in."""
         if self._database is not None:
-            with suppress(sqlite3.Error):  # a reader at this very moment: the emptied journal does no harm
+            with suppress(
+                sqlite3.Error, UnicodeDecodeError
+            ):  # a reader at this very moment: the emptied journal does no harm
                 self._database.execute("PRAGMA busy_timeout = 0")
                 self._database.execute("PRAGMA journal_mode = DELETE")
             self._database.close()
@@ -179,6 +181,10 @@ class Reader:
     def failures(self) -> list[Failure]:
         """The runs that were tried and could not be finished, sorted."""
         rows = self._ask("SELECT cell, run, session, message FROM failures ORDER BY cell, run")
+        _checked_keys(self._path, [row[:2] for row in rows])
+        for _, _, session, message in rows:
+            if not isinstance(session, int) or not isinstance(message, str):
+                raise InputError(f"{self._path}: expected why a run failed; got {shown(message)}")
         return [Failure(*row) for row in rows]
 
     def entry(self, cell: str, run: int) -> Entry:
@@ -245,11 +251,12 @@ def _lock(folder: Path) -> sqlite3.Connection:
     lock = sqlite3.connect(path, timeout=0.0, isolation_level=None, check_same_thread=False)
     try:
         lock.execute("BEGIN EXCLUSIVE")
-    except sqlite3.Error as error:
+    except (sqlite3.Error, UnicodeDecodeError) as error:
         lock.close()
         if _code(error) == sqlite3.SQLITE_BUSY:
             raise InputError(f"{folder}: expected to write alone; another process is writing this campaign") from None
-        raise InputError(f"{folder}: expected a folder that can be written; {path.name}: {error}") from error
+        why = f"{path.name}: {printable(said(error))}"
+        raise InputError(f"{folder}: expected a folder that can be written; {why}") from error
     return lock
 
 
@@ -272,11 +279,11 @@ def _explained(path: Path, where: str = "") -> Iterator[None]:
         yield
     except sqlite3.IntegrityError:
         raise
-    except sqlite3.DatabaseError as error:
-        raise InputError(f"{path}: {where}{_advice(path, error)} ({error})") from error
+    except (sqlite3.DatabaseError, UnicodeDecodeError) as error:  # the latter of words of the file in a message
+        raise InputError(f"{path}: {where}{_advice(path, error)} ({printable(said(error))})") from error
 
 
-def _advice(path: Path, error: sqlite3.DatabaseError) -> str:
+def _advice(path: Path, error: Exception) -> str:
     primary = _code(error) & 0xFF
     if primary in (sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR):
         return "expected room on the disk and a disk that works; what was finished before is kept: make room, go on"
@@ -287,6 +294,6 @@ def _advice(path: Path, error: sqlite3.DatabaseError) -> str:
     return "expected the runs of a campaign as they were written; the file is cut short or altered"
 
 
-def _code(error: sqlite3.Error) -> int:
+def _code(error: Exception) -> int:
     """SQLite's extended code of an error; -1 for what Python's own layer raised."""
     return int(getattr(error, "sqlite_errorcode", -1))

@@ -23,6 +23,9 @@ _MOST_BYTES = 2_000_000
 # A cell is a scenario with its filters built: this many take minutes before the first run.
 _MOST_CELLS, _MOST_VALUES = 10_000, 1000
 
+# Of Windows, which has them in every folder, whatever stands behind a dot.
+_DEVICES = {"con", "prn", "aux", "nul", *(f"{port}{number}" for port in ("com", "lpt") for number in range(1, 10))}
+
 ShortName = Annotated[Name, Field(max_length=60)]
 Names = Annotated[tuple[Name, ...], Field(strict=False, min_length=1)]
 Fields = dict[str, JsonValue]
@@ -68,6 +71,21 @@ class CampaignSpec(Section):
     def _fields_alone(self) -> Iterator[Finding]:
         for name in sorted({"scenario", "planner", "filter", "fusion", "variant"} & self.grid.keys()):
             yield ("grid",), "paths of scenario fields", describe(name)
+
+    @check
+    def _names_of_files(self) -> Iterator[Finding]:
+        places: list[tuple[tuple[str | int, ...], str]] = [(("name",), self.name)]
+        places += [(("variants", i, "name"), variant.name) for i, variant in enumerate(self.variants)]
+        for place, name in places:
+            if name.startswith(("-", ".")):
+                wanted = "a name that begins with neither a dash nor a dot, as files and folders are named after it"
+                yield place, wanted, describe(name)
+            elif name.partition(".")[0].strip().lower() in _DEVICES:
+                yield (
+                    place,
+                    "a name that files can have everywhere; under Windows this one is a device's",
+                    describe(name),
+                )
 
     @check
     def _each_value_once(self) -> Iterator[Finding]:

@@ -174,9 +174,9 @@ def check(
 ) -> None:
     """Name every fault of scenario files.
 
-    Each by file, line, column and field, with what was expected and what came. Code of your own is imported and made,
-    and what it lacks is said; code that others may have written is not. Warnings, of what is valid but costs
-    accuracy or may not be meant, go to standard error and leave the exit status at 0.
+    Each by file, line, column and field, with what was expected and what came. Code of your own is imported, made and
+    tried for three scans, and what it lacks is said; code that others may have written is not. Warnings, of what is
+    valid but costs accuracy or may not be meant, go to standard error and leave the exit status at 0.
     """
     from vedette.scenarios import load_scenario
     from vedette.scenarios.summary import one_line
@@ -210,9 +210,11 @@ def code_faults(scenario: Scenario) -> list[str]:
     if reason := not_own(scenario):
         note(f"{scenario.path}: warning: {', '.join(code)} is not imported, as {reason}")
         return []
+    from vedette.cli.compiling import compiling
     from vedette.scenarios import code_checks
 
-    return code_checks.code_faults(scenario)
+    with compiling():
+        return code_checks.code_faults(scenario)
 
 
 def warn(scenario: Scenario) -> list[str]:

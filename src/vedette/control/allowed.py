@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from vedette.densities import Labelled
 from vedette.filters import shared_targets
 from vedette.kernels.base.types import Floats
 from vedette.kernels.planning.ascent import Allowed
+from vedette.models.arguments import reject
 from vedette.platforms import Options
 
 # A table of which courses go together is formed for so many courses at most; beyond, searches ask the mask.
@@ -23,7 +25,7 @@ def mask_of_decision(
     constraints: Sequence[Constraint],
     sensors: Sequence[MobileSensor],
     options: Sequence[Options],
-    fused: Labelled | None,
+    fused: Any,
     poses: Floats,
     settings: PlanningSettings,
 ) -> Mask | None:
@@ -42,14 +44,21 @@ def mask_of_decision(
 def beliefs_ahead(
     constraints: Sequence[Constraint],
     sensors: Sequence[MobileSensor],
-    fused: Labelled | None,
+    fused: Any,
     settings: PlanningSettings,
     first: int,
     last: int,
 ) -> tuple[Labelled, ...]:
-    """The fused belief predicted by `first` to `last` steps of the horizon; none where no constraint looks at it."""
-    if fused is None or not any(constraint.needs_beliefs for constraint in constraints):
+    """The fused belief predicted by `first` to `last` steps of the horizon; none where no constraint looks at it.
+
+    Raises `InputError` for one without labels.
+    """
+    asking = [constraint.name for constraint in constraints if constraint.needs_beliefs]
+    if fused is None or not asking:
         return ()
+    if not isinstance(fused, Labelled):
+        expected = f"a density with labels, as the constraint {asking[0]} asks where targets will be"
+        raise reject("state.fused", expected, type(fused).__name__)
     motion = shared_targets([sensor.filter for sensor in sensors]).motion
     return tuple(predicted(fused, motion, step, settings.horizon_period) for step in range(first, last + 1))
 

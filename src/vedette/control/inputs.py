@@ -7,13 +7,17 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+from vedette.control.constraints.protocol import Constraint
+from vedette.control.rewards.base import LabelReward, PowerReward
+from vedette.control.rewards.loss import ExpectedLossReward
 from vedette.control.settings import MobileSensor, PlanningSettings
 from vedette.densities import GLMB, LMB, FactoredGLMB, Labelled
 from vedette.errors import InputError
 from vedette.filters import shared_targets
+from vedette.fusion import Fusion
 from vedette.kernels.base.types import Floats
 from vedette.models import TargetModel
-from vedette.models.arguments import float_array, reject
+from vedette.models.arguments import float_array, instance, pose_vector, reject, sequence
 from vedette.platforms import Options, options_at
 from vedette.text import either
 from vedette.tracking import State
@@ -29,11 +33,32 @@ def check_sensors(sensors: Sequence[MobileSensor]) -> TargetModel:
     return shared_targets([sensor.filter for sensor in sensors])
 
 
+def check_steering(planner: Any) -> None:
+    """Keep sensors and constraints of a planner as tuples; `InputError` where they or the settings are no such."""
+    for name, expected in (("sensors", "at least one MobileSensor"), ("constraints", "constraints in a tuple")):
+        object.__setattr__(planner, name, sequence(name, getattr(planner, name), expected))
+    check_sensors(planner.sensors)
+    instance("settings", planner.settings, PlanningSettings)
+    for i, constraint in enumerate(planner.constraints):
+        instance(f"constraints[{i}]", constraint, Constraint)
+
+
+def check_valuing(fusion: Any, reward: Any, notes: Any = ()) -> None:
+    """`InputError` for a fusion, reward or notes of a planner that are no such."""
+    if not all(isinstance(note, str) for note in sequence("notes", notes, "texts in a tuple")):
+        raise reject("notes", "texts in a tuple", notes)
+    instance("fusion", fusion, Fusion)
+    if not callable(reward) and not isinstance(reward, PowerReward | LabelReward | ExpectedLossReward):
+        raise reject("reward", "a function of two densities, a PowerReward or a LabelReward", type(reward).__name__)
+
+
 def check_poses(poses: Any, num_sensors: int) -> Floats:
     """The poses as a (num_sensors, 3 or more) array; `InputError` if they are not that or not finite."""
     checked = float_array("poses", poses, (num_sensors, None))
     if checked.shape[1] < 3:
         raise reject("poses", f"an array of shape ({num_sensors}, 3 or more)", f"shape {checked.shape}")
+    for s, pose in enumerate(checked):
+        pose_vector(f"poses[{s}]", pose)
     return checked
 
 

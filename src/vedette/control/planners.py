@@ -12,17 +12,18 @@ from vedette.control.bounds import bound_of
 from vedette.control.constraints import Constraint, repaired
 from vedette.control.evidence import Evidence
 from vedette.control.explaining import Part, Questions
-from vedette.control.inputs import check_choice, check_poses, options_of
+from vedette.control.inputs import check_choice, check_poses, check_steering, check_valuing, options_of
 from vedette.control.plan import Plan, RewardTable
-from vedette.control.preparation import AnyReward, Preparation
+from vedette.control.preparation import AnyReward, Preparation, check_sums, stay_glmbs
 from vedette.control.problem import joint_problem, note_lines
 from vedette.control.rewards import CauchySchwarzReward
 from vedette.control.rounds import Decided, decide_alone, decide_jointly
-from vedette.control.search import AutomaticSearch, JointSearch, all_joint_actions, first_best
+from vedette.control.search import AutomaticSearch, JointSearch, SequentialGreedy, all_joint_actions, first_best
 from vedette.control.settings import MobileSensor, PlanningSettings
+from vedette.filters import labels_targets
 from vedette.fusion import Fusion
 from vedette.kernels.base.types import Floats
-from vedette.models.arguments import generator, reject
+from vedette.models.arguments import generator, instance, reject, sequence
 from vedette.platforms import Actions
 from vedette.tracking import State
 
@@ -52,6 +53,9 @@ class JointPlanner:
         search: which joint actions are evaluated: all of them, as in the paper, or fewer.
         constraints: what the sensors must not do.
         notes: what every plan is to say beside what comes up, such as that the tracks are fused in another way.
+
+    Raises:
+        InputError: parts of another kind, or a `SequentialGreedy` search of rewards that are no sums over labels.
     """
 
     sensors: tuple[MobileSensor, ...]
@@ -61,6 +65,18 @@ class JointPlanner:
     search: JointSearch = field(default_factory=AutomaticSearch)
     constraints: tuple[Constraint, ...] = ()
     notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        check_steering(self)
+        check_valuing(self.fusion, self.reward, self.notes)
+        instance("search", self.search, JointSearch)
+        if not isinstance(self.search, SequentialGreedy):
+            return
+        purpose = "SequentialGreedy, which asks for rewards of some of the sensors alone"
+        check_sums(purpose, len(self.sensors), self.fusion, self.settings, self.reward)
+        if stay_glmbs(self.sensors, self.fusion, self.settings, self.reward):
+            expected = f"filters of LMBs, or of products of GLMBs, or settings.max_glmb_targets of 0, for {purpose}"
+            raise reject("sensors", expected, "filters of GLMBs")
 
     @property
     def name(self) -> str:
@@ -119,6 +135,9 @@ class IndependentPlanner:
         settings: horizon, samples, caps.
         reward: one of `vedette.control.rewards`, or of the user's own.
         constraints: what each sensor by itself must not do; those on pairs of sensors are not looked at.
+
+    Raises:
+        InputError: parts of another kind.
     """
 
     sensors: tuple[MobileSensor, ...]
@@ -126,6 +145,10 @@ class IndependentPlanner:
     settings: PlanningSettings = field(default_factory=PlanningSettings)
     reward: AnyReward = field(default_factory=CauchySchwarzReward)
     constraints: tuple[Constraint, ...] = ()
+
+    def __post_init__(self) -> None:
+        check_steering(self)
+        check_valuing(self.fusion, self.reward)
 
     @property
     def name(self) -> str:
@@ -177,11 +200,20 @@ class RandomPlanner:
         sensors: the sensors.
         settings: the horizon, over which courses are told apart.
         constraints: what the sensors must not do; a joint action that is drawn and not allowed is moved to one near it.
+
+    Raises:
+        InputError: parts of another kind, or constraints that look at beliefs with filters that have no labels.
     """
 
     sensors: tuple[MobileSensor, ...]
     settings: PlanningSettings = field(default_factory=PlanningSettings)
     constraints: tuple[Constraint, ...] = ()
+
+    def __post_init__(self) -> None:
+        check_steering(self)
+        asking = [own.name for own in self.constraints if own.needs_beliefs]
+        if asking and not all(labels_targets(sensor.filter) for sensor in self.sensors):
+            raise reject("constraints", "none that asks where targets will be, as filters have no labels", asking[0])
 
     @property
     def name(self) -> str:
@@ -191,8 +223,10 @@ class RandomPlanner:
     def plan(self, state: State, poses: Floats, *, rng: np.random.Generator) -> Plan:
         """Drawn from `rng`; the beliefs are not looked at, but by constraints."""
         generator(rng)
-        options = options_of(self.sensors, poses, self.settings)
-        fused = state.fused if self.constraints else None
+        options, fused = options_of(self.sensors, poses, self.settings), None
+        if self.constraints:
+            instance("state", state, State)
+            fused = state.fused
         mask = mask_of_decision(self.constraints, self.sensors, options, fused, np.asarray(poses), self.settings)
         drawn = tuple(int(rng.integers(len(own.courses))) for own in options)
         joint = drawn if mask is None else repaired(mask, drawn)
@@ -214,8 +248,10 @@ class FixedPlanner:
     actions: tuple[Actions, ...]
 
     def __post_init__(self) -> None:
-        if len(self.actions) == 0 or not all(isinstance(own, Actions) and len(own) == 1 for own in self.actions):
-            raise reject("actions", "one action of each sensor, such as Actions.of(heading_deg=30.0)", self.actions)
+        expected = "one action of each sensor, such as Actions.of(heading_deg=30.0)"
+        given = sequence("actions", self.actions, expected)
+        if not given or not all(isinstance(own, Actions) and len(own) == 1 for own in given):
+            raise reject("actions", expected, self.actions)
 
     @property
     def name(self) -> str:

@@ -142,20 +142,39 @@ def prepare_sums(
 ) -> Sums:
     """For decisions that can be nothing else; GLMB beliefs are planned on as LMBs.
 
-    Raises:
-        InputError: inputs that do not fit, or settings, reward or fusion that make a decision no sum over labels.
+    Raises `InputError` for inputs that do not fit, and as `check_sums`.
     """
     check_state(sensors, state)
     planned = _planned(len(sensors), fusion, settings, reward, state, why="so are all sequences of decisions")
-    rule = _rule(len(sensors), planned.fusion, settings, reward, planned.state)
-    if rule is None:
-        if settings.association != "known":
-            raise reject("settings.association", "known, for sequences of decisions", settings.association)
-        expected = "a reward and a fusion of LMBs that are sums over labels, for sequences of decisions"
-        raise reject("reward, fusion", expected, f"{type(reward).__name__}, {type(planned.fusion).__name__}")
+    rule = check_sums("sequences of decisions", len(sensors), planned.fusion, settings, reward)
     fused, local = planned.state.fused, planned.state.local
     assert isinstance(fused, LMB)
     return Sums(rule, fused, tuple(map(as_lmb, local)), state.undetected, planned.notes)
+
+
+def check_sums(
+    purpose: str, num_sensors: int, fusion: Fusion, settings: PlanningSettings, reward: AnyReward
+) -> LinearRule:
+    """How densities are summed where beliefs are LMBs, or are planned on as LMBs.
+
+    Raises `InputError` for settings, a reward or a fusion of which a decision is no sum over labels, and says for which
+    `purpose` it has to be one.
+    """
+    rule = _rule_of_lmbs(num_sensors, _of_lmbs(fusion), settings, reward)
+    if rule is None:
+        if settings.association != "known":
+            raise reject("settings.association", f"known, for {purpose}", settings.association)
+        expected = f"a reward and a fusion of LMBs that are sums over labels, for {purpose}"
+        raise reject("reward, fusion", expected, f"{type(reward).__name__}, {type(fusion).__name__}")
+    return rule
+
+
+def stay_glmbs(sensors: Sequence[MobileSensor], fusion: Fusion, settings: PlanningSettings, reward: AnyReward) -> bool:
+    """Whether beliefs of these filters may be planned on as GLMBs, hypothesis by hypothesis."""
+    initial = [sensor.filter.initial() for sensor in sensors]
+    return any(isinstance(own, GLMB) for own in initial) and not _why_lmbs(
+        len(sensors), fusion, settings, reward, initial
+    )
 
 
 def _planned(
@@ -173,11 +192,14 @@ def _planned(
         local = tuple(converted[id(belief)] for belief in state.local)
         state = replace(state, local=local, fused=converted[id(state.fused)])
         notes = (f"planned on the LMBs of the GLMB beliefs: {why}",)
-        if isinstance(fusion, CmDeltaGlmb):
-            fusion = Clmb(fusion.weights)
+        fusion = _of_lmbs(fusion)
     if from_one:
         state = replace(state, local=(state.fused,) * num_sensors)
     return _Planned(state, fusion, notes)
+
+
+def _of_lmbs(fusion: Fusion) -> Fusion:
+    return Clmb(fusion.weights) if isinstance(fusion, CmDeltaGlmb) else fusion
 
 
 def _has_glmb(beliefs: Sequence[Labelled]) -> bool:
@@ -197,7 +219,7 @@ def _why_lmbs(
     expected = float(existence_probabilities(beliefs[-1])[1].sum())
     if num_sensors > settings.max_glmb_sensors:
         return f"{num_sensors} sensors, of at most {settings.max_glmb_sensors}"
-    if expected > settings.max_glmb_targets:
+    if expected > settings.max_glmb_targets or settings.max_glmb_targets == 0:
         return f"{expected:.1f} targets expected, of at most {settings.max_glmb_targets}"
     return ""
 
@@ -206,9 +228,16 @@ def _rule(
     num_sensors: int, fusion: Fusion, settings: PlanningSettings, reward: AnyReward, state: State
 ) -> LinearRule | None:
     """How densities are summed, None where the decision is no sum."""
+    if not isinstance(reward, ExpectedLossReward) and _has_glmb((*state.local, state.fused)):
+        return None
+    return _rule_of_lmbs(num_sensors, fusion, settings, reward)
+
+
+def _rule_of_lmbs(num_sensors: int, fusion: Fusion, settings: PlanningSettings, reward: AnyReward) -> LinearRule | None:
+    """The same of LMBs, whatever they are."""
     if isinstance(reward, ExpectedLossReward):
         return ParallelUpdate().linear_rule(num_sensors)
-    if settings.association != "known" or _has_glmb((*state.local, state.fused)):
+    if settings.association != "known":
         return None
     if not isinstance(reward, PowerReward | LabelReward) or not speaks_for(reward, "combine", "__call__"):
         return None

@@ -12,7 +12,17 @@ from vedette.errors import InputError
 from vedette.filters import Filter, Limits
 from vedette.kernels.base.types import Floats
 from vedette.kernels.planning.ideal import EXPECTED, IDEAL, SAMPLED
-from vedette.models.arguments import dimension, non_negative, positive, probability, real, reject
+from vedette.models.arguments import (
+    count,
+    dimension,
+    instance,
+    non_negative,
+    one_of,
+    positive,
+    probability,
+    real,
+    reject,
+)
 from vedette.platforms import Platform
 from vedette.platforms.base import check_platform
 
@@ -91,21 +101,17 @@ class PlanningSettings:
     def __post_init__(self) -> None:
         for name in ("horizon_steps", "num_samples", "max_prior_hypotheses"):
             dimension(name, getattr(self, name))
-        for name in ("max_glmb_sensors", "max_glmb_targets", "max_bound_work"):
-            if getattr(self, name) != 0:
-                dimension(name, getattr(self, name))
-        if self.association not in ("known", "full"):
-            raise reject("association", "known or full", self.association)
+        for name in ("max_glmb_sensors", "max_glmb_targets", "max_bound_work", "num_threads"):
+            count(name, getattr(self, name))
+        one_of("association", self.association, ("known", "full"))
         positive("horizon_period", self.horizon_period)
         probability("detection_threshold", self.detection_threshold)
         non_negative("undetected_worth", self.undetected_worth)
         non_negative("max_version_divergence", self.max_version_divergence)
-        if self.num_threads != 0:
-            dimension("num_threads", self.num_threads)
         self._check_certainty()
-        if self.ideal_measurements not in IDEAL_MODES:
-            raise reject("ideal_measurements", f"one of {', '.join(IDEAL_MODES)}", self.ideal_measurements)
+        one_of("ideal_measurements", self.ideal_measurements, IDEAL_MODES)
         own = self.limits
+        instance("limits", own, Limits)
         if own.max_components != 1 or own.min_existence != 0.0 or own.min_track_weight != 1.0:
             raise InputError(
                 "limits: expected max_components 1, min_existence 0 and min_track_weight 1, as in planning_limits()"

@@ -17,6 +17,7 @@ from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.kernels.gaussian.information import row_size
 from vedette.kernels.gaussian.linalg import LOG_2PI
 from vedette.kernels.labelled.power_integrals import Laid, Places, SensorCases, Terms, power_table, write_rows
+from vedette.text import shown
 from vedette.threads import run_chunks
 
 
@@ -105,8 +106,8 @@ def check_exponents(exponents: Sequence[tuple[float, float]]) -> Floats:
     """(num, 2) exponents; `InputError` unless they are pairs of finite numbers, positive where the other one is 0."""
     try:
         pairs = np.array(exponents, np.float64).reshape(len(exponents), 2)
-    except (TypeError, ValueError):
-        raise InputError(f"exponents: expected pairs of numbers (a, b); got {exponents!r}") from None
+    except (TypeError, ValueError, OverflowError):
+        raise InputError(f"exponents: expected pairs of numbers (a, b); got {shown(exponents)}") from None
     fits = np.isfinite(pairs).all(axis=1) & ((pairs != 0.0).all(axis=1) | (pairs.max(axis=1, initial=-np.inf) > 0.0))
     if not fits.all():
         bad = pairs[~fits][0].tolist()

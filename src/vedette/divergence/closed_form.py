@@ -16,6 +16,7 @@ from vedette.errors import InputError, NumericalError
 from vedette.kernels.base.types import Glmb, Tracks
 from vedette.kernels.labelled.inner_products import log_glmbs, log_lmbs, log_tracks
 from vedette.kernels.labelled.stacking import stack_glmbs, stack_tracks
+from vedette.models.arguments import positive
 
 Density: TypeAlias = Labelled | Poisson
 Support = Literal["full", "common"]
@@ -78,8 +79,7 @@ def log_inner_product(a: Density, b: Density, *, unit_volume: float = 1.0) -> fl
 
 def check_densities(densities: dict[str, Density], unit_volume: float) -> float:
     """Raise `InputError` for two densities that cannot be compared; returns the log of the unit volume."""
-    if not 0.0 < unit_volume < math.inf:
-        raise InputError(f"unit_volume: expected a finite number above 0; got {unit_volume}")
+    positive("unit_volume", unit_volume)
     for name, density in densities.items():
         if not isinstance(density, Density):
             raise InputError(f"{name}: expected {LABELLED} or a Poisson; got {type(density).__name__}")

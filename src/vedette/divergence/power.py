@@ -23,6 +23,7 @@ from vedette.divergence.closed_form import (
 from vedette.divergence.parts import Part, paired_parts
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats
+from vedette.models.arguments import real, reject
 
 # Of mixtures, too: the inner products are in closed form, the other two are sums of weights.
 _INNER_PRODUCTS = {(1.0, 1.0): 0, (2.0, 0.0): 1, (0.0, 2.0): 2}
@@ -105,8 +106,8 @@ def renyi(p: Labelled, q: Labelled, order: float, *, support: Support = "full") 
     Infinite where they share none. A result below 0 by rounding is 0. Raises `InputError` as `power_integral` and for
     another order, and `NumericalError` where rounding leaves it further below.
     """
-    if not 0.0 < order < math.inf or order == 1.0:
-        raise InputError(f"order: expected a finite number above 0 other than 1; got {order!r}")
+    if real("order", order) <= 0.0 or order == 1.0:
+        raise reject("order", "a finite number above 0 other than 1", order)
     z, log_p, log_q = power_integrals(p, q, ((order, 1.0 - order), *_MASSES), support=support).tolist()
     if math.isinf(z):
         return math.inf

@@ -12,7 +12,7 @@ import numpy as np
 from vedette.evaluation.actions import choice_words
 from vedette.evaluation.comparison import PARTS, Comparison
 from vedette.evaluation.statistics import PairedDifference, Summary, summarise
-from vedette.text import named_in
+from vedette.text import named_in, spreadsheet_text
 
 _ERRORS = ("OSPA", "Localisation", "Cardinality", "Difference")
 
@@ -64,7 +64,7 @@ def strategy_csv(comparisons: Mapping[str, Comparison] | Comparison) -> str:
         rows = [strategy_numbers(comparisons, strategy) for strategy in comparisons.strategies]
     else:
         rows = [
-            {"group": name, **strategy_numbers(comparison, strategy)}
+            {"group": spreadsheet_text(name), **strategy_numbers(comparison, strategy)}
             for name, comparison in comparisons.items()
             for strategy in comparison.strategies
         ]
@@ -84,7 +84,7 @@ def strategy_numbers(comparison: Comparison, strategy: str) -> dict[str, str | f
     parts = [_means(comparison, strategy, part, f"{part}_mean_m", f"{part}_se_m") for part in PARTS]
     measures = [_means(comparison, strategy, name, f"{name}_mean", f"{name}_se") for name in comparison.measures]
     return {
-        "strategy": strategy,
+        "strategy": spreadsheet_text(strategy),
         "runs": comparison.num_runs,
         **dict(itertools.chain(*parts)),
         "difference_m": float(paired.mean),

@@ -142,4 +142,4 @@ class SingleSensorFilter:
 
     def _check_scan(self, scan: Any, rng: Any) -> tuple[Floats, int]:
         generator(rng)
-        return check_scan(scan, self.sensor.measurement)
+        return check_scan(scan, self.sensor)

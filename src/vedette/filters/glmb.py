@@ -8,7 +8,7 @@ from typing import Any, Literal
 import numpy as np
 
 from vedette.densities import GLMB, LMB
-from vedette.errors import InputError, NumericalError
+from vedette.errors import NumericalError
 from vedette.filters.base import SingleSensorFilter
 from vedette.filters.blind import NO_POSE, NO_SCAN, blind_sensor
 from vedette.filters.info import FilterInfo
@@ -16,7 +16,7 @@ from vedette.filters.inputs import check_belief, model_errors
 from vedette.filters.posteriors import glmb_posterior
 from vedette.kernels.base.types import Glmb
 from vedette.kernels.steps.glmb import StepReport, step_gibbs, step_ranked, update_ranked
-from vedette.models.arguments import dimension
+from vedette.models.arguments import dimension, flag, one_of
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,8 +42,8 @@ class DeltaGlmbFilter(SingleSensorFilter):
 
     def __post_init__(self) -> None:
         SingleSensorFilter.__post_init__(self)  # slots replace the class that super() looks for
-        if self.assignment not in ("ranked", "gibbs"):
-            raise InputError(f"assignment: expected 'ranked' or 'gibbs'; got {self.assignment!r}")
+        one_of("assignment", self.assignment, ("ranked", "gibbs"))
+        flag("marginalised", self.marginalised)
         dimension("num_gibbs_samples", self.num_gibbs_samples)
 
     def initial(self) -> GLMB:

@@ -16,26 +16,28 @@ from vedette.densities import GLMB, LMB, FactoredGLMB, IidCluster, Labelled, Mul
 from vedette.densities.containers import unchecked
 from vedette.errors import InputError, ModelError, VedetteError
 from vedette.kernels.base.types import Bools, Floats
-from vedette.models import BirthModel
+from vedette.models import BirthModel, SensorModel
 from vedette.models.arguments import as_array, reject, step_number
 from vedette.models.measurement import MeasurementModel, wrap_angular
+from vedette.plausible import implausible
 from vedette.probabilities import log_expit
 
+_MOST_STDS = 10.0  # of noise below the least that a measurement is without it
 _PACKAGE = Path(__file__).parents[1]
 _Density = TypeVar("_Density", GLMB, LMB, FactoredGLMB, Poisson, IidCluster, MultiBernoulli)
 
 
-def check_scan(scan: Any, measurement: MeasurementModel) -> tuple[Floats, int]:
+def check_scan(scan: Any, sensor: SensorModel) -> tuple[Floats, int]:
     """The scan as a contiguous (num, meas_dim) array without repeated rows, and how many rows were repeats.
 
-    Angles come out in (-pi, pi].
+    Angles come out in (-pi, pi]. Warns of what noise alone can hardly bring below the least, such as a negative range.
 
     Raises:
         InputError: not an array of that shape, a value that is not finite, or an angle beyond a full turn either way,
             which is in other units. A scan without measurements is an empty array; None is refused, since a sensor
             that did not scan must not be updated at all.
     """
-    meas_dim = measurement.meas_dim
+    measurement, meas_dim = sensor.measurement, sensor.meas_dim
     expected = f"an array of shape (num_measurements, {meas_dim}), empty for a scan without measurements"
     if scan is None:
         raise InputError(f"scan: expected {expected}; got None")
@@ -48,6 +50,8 @@ def check_scan(scan: Any, measurement: MeasurementModel) -> tuple[Floats, int]:
     bad = np.flatnonzero(~np.isfinite(array).all(axis=1))
     if len(bad):
         raise InputError(f"scan: expected finite numbers; got {array[bad[0]].tolist()} in row {bad[0]}")
+    if (array < measurement.least).any():
+        _tell_negative(array, measurement, sensor.noise.least_stds)
     if measurement.angular.any():
         array = _in_one_turn(array, measurement.angular)
     column = np.sort(array[:, 0])
@@ -57,6 +61,14 @@ def check_scan(scan: Any, measurement: MeasurementModel) -> tuple[Floats, int]:
     if len(first) == len(array):
         return array, 0
     return np.ascontiguousarray(array[np.sort(first)]), len(array) - len(first)
+
+
+def _tell_negative(scan: Floats, measurement: MeasurementModel, stds: Floats | None) -> None:
+    below = measurement.least - scan > _MOST_STDS * (np.inf if stds is None else stds)
+    for row, component in np.argwhere(below)[:1].tolist():
+        got = f"{scan[row, component]:g} in row {row}, component {component}"
+        least = f"at least {measurement.least[component]:g}, but for noise"
+        implausible("scan", least, got, "a sign, or components exchanged")
 
 
 def _in_one_turn(scan: Floats, angular: Bools) -> Floats:

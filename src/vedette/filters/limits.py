@@ -16,7 +16,7 @@ from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.types import Bools, Ints
 from vedette.kernels.gaussian.mixtures import MixtureCaps
 from vedette.kernels.steps.lmb import Reduction
-from vedette.models.arguments import dimension, non_negative, positive, probability, real, reject
+from vedette.models.arguments import chance, dimension, is_infinite, non_negative, positive, probability, real, reject
 from vedette.probabilities import chi_squared_quantile, logit
 
 _Labelled = TypeVar("_Labelled", GLMB, LMB, FactoredGLMB)
@@ -77,12 +77,11 @@ class Limits:
         for name in ("min_relative_weight", "min_component_weight", "min_existence"):
             if not 0.0 <= real(f"Limits.{name}", getattr(self, name)) < 1.0:
                 raise reject(f"Limits.{name}", "a number in [0, 1)", getattr(self, name))
-        if not 0.0 < real("Limits.max_existence", self.max_existence) < 1.0:
-            raise reject("Limits.max_existence", "a probability above 0 and below 1", self.max_existence)
+        chance("Limits.max_existence", self.max_existence)
         probability("Limits.min_track_weight", self.min_track_weight)
         if probability("Limits.gate_probability", self.gate_probability) == 0.0:
             raise reject("Limits.gate_probability", "a probability above 0", self.gate_probability)
-        if self.max_position_std != math.inf:
+        if not is_infinite(self.max_position_std):
             positive("Limits.max_position_std", self.max_position_std)
         non_negative("Limits.merge_distance", self.merge_distance)
         real("Limits.min_log_clutter", self.min_log_clutter)

@@ -17,7 +17,7 @@ from vedette.filters.inputs import births_for, check_belief, check_scan
 from vedette.filters.limits import Limits
 from vedette.kernels.base.types import Floats, ScanInput
 from vedette.models import SensorModel, TargetModel
-from vedette.models.arguments import generator, pose_vector, positive
+from vedette.models.arguments import generator, one_a_sensor, pose_vector, positive, reject
 
 _Belief = TypeVar("_Belief", GLMB, LMB, FactoredGLMB)
 
@@ -72,7 +72,7 @@ class MultiSensorFilter(ABC, Generic[_Belief]):
             if not isinstance(value, kind):
                 raise InputError(f"{name}: expected a {kind.__name__}; got {type(value).__name__}")
         if not isinstance(self.sensors, Sequence) or len(self.sensors) == 0:
-            raise InputError(f"sensors: expected a sequence of at least one SensorModel; got {self.sensors!r}")
+            raise reject("sensors", "a sequence of at least one SensorModel", self.sensors)
         for s, sensor in enumerate(self.sensors):
             if not isinstance(sensor, SensorModel):
                 raise InputError(f"sensors[{s}]: expected a SensorModel; got {type(sensor).__name__}")
@@ -130,16 +130,14 @@ class MultiSensorFilter(ABC, Generic[_Belief]):
         Where none scanned, a blind look, with which an update is the prediction.
         """
         generator(rng)
-        for name, given in (("scans", scans), ("poses", poses)):
-            if given is None or len(given) != len(self.sensors):
-                came = "None" if given is None else len(given)
-                raise InputError(f"{name}: expected {len(self.sensors)}, one a sensor; got {came}")
+        one_a_sensor("scans", scans, len(self.sensors))
+        one_a_sensor("poses", poses, len(self.sensors))
         looks = Looks([], [], [], [], 0)
         for s, sensor in enumerate(self.sensors):
             if scans[s] is None:
                 continue
             try:
-                scan, num = check_scan(scans[s], sensor.measurement)
+                scan, num = check_scan(scans[s], sensor)
             except InputError as error:
                 raise InputError(f"scans[{s}]: {error}") from None
             looks.names.append(f"sensor {s}")

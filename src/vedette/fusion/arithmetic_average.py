@@ -26,6 +26,7 @@ from vedette.fusion.views import Views
 from vedette.kernels.base.types import Bools, Floats, Lmb
 from vedette.kernels.gaussian.mixtures import MixtureCaps
 from vedette.kernels.gaussian.pooling import pooled_tracks
+from vedette.models.arguments import flag
 from vedette.probabilities import expit
 
 
@@ -56,6 +57,7 @@ class ArithmeticAverage:
     def __post_init__(self) -> None:
         object.__setattr__(self, "weights", check_weights(self.weights))
         check_power("moment_matched", self.limits, len(self.weights))
+        flag("by_views", self.by_views)
 
     def fuse(self, beliefs: Sequence[Labelled], views: Views | None = None) -> tuple[LMB, FusionInfo]:
         """Fused LMB of the sensors' LMBs (others are first converted), in increasing label order, and what was done.

@@ -15,6 +15,7 @@ from vedette.fusion.validity import ValidBeliefs, all_valid
 from vedette.fusion.views import Views
 from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.gaussian.mixtures import MixtureCaps
+from vedette.models.arguments import dimension, instance, non_negative, one_of, real, reject, sequence
 from vedette.text import either
 
 MixturePower = Literal["auto", "moment_matched", "component_wise", "quadrature"]
@@ -66,6 +67,7 @@ class FusionInfo:
         return sum(self.missing_labels)
 
 
+@runtime_checkable
 class Fusion(Protocol):
     """One belief of all the sensors'. The order of `beliefs` is that of the fusion weights."""
 
@@ -129,19 +131,17 @@ class PowerRule(NamedTuple):
 
 def check_weights(weights: Sequence[float] | Floats) -> tuple[float, ...]:
     """The fusion weights as a tuple. Raises `InputError` unless they are non-negative and sum to one within 1e-9."""
-    checked = tuple(float(weight) for weight in weights)
+    given = sequence("fusion weights", weights, "non-negative numbers that sum to 1, one a sensor")
+    checked = tuple(real(f"fusion weights[{s}]", weight) for s, weight in enumerate(given))
     if not checked or not all(weight >= 0.0 for weight in checked) or not abs(math.fsum(checked) - 1.0) <= 1e-9:
-        raise InputError(f"fusion weights: expected non-negative numbers that sum to 1, one a sensor; got {checked}")
+        raise reject("fusion weights", "non-negative numbers that sum to 1, one a sensor", checked)
     return checked
 
 
 def check_power(mixture_power: str, limits: FusionLimits, num_sensors: int) -> None:
     """Raise `InputError` for an unknown power of mixtures or limits that cannot be kept."""
-    if mixture_power not in MIXTURE_POWERS:
-        raise InputError(f"mixture_power: expected one of {', '.join(MIXTURE_POWERS)}; got {mixture_power!r}")
-    for name in ("max_components", "max_hypotheses"):
-        if getattr(limits, name) < 1:
-            raise InputError(f"limits.{name}: expected at least 1; got {getattr(limits, name)}")
+    one_of("mixture_power", mixture_power, MIXTURE_POWERS)
+    check_limits(limits)
     combinations = limits.max_components**num_sensors
     if mixture_power in ("component_wise", "quadrature") and combinations > limits.max_combinations:
         raise InputError(
@@ -151,16 +151,23 @@ def check_power(mixture_power: str, limits: FusionLimits, num_sensors: int) -> N
         )
 
 
-def check_floor(name: str, log_floor: float) -> None:
-    """Raise `InputError` unless the floor is the log of a probability in (0, 1)."""
-    if not -math.inf < log_floor < 0.0:
-        raise InputError(f"{name}: expected a probability above 0 and below 1; got {math.exp(log_floor)}")
+def check_limits(limits: Any) -> None:
+    """Raise `InputError` unless these are caps that can be kept."""
+    instance("limits", limits, FusionLimits)
+    for name in ("max_components", "max_combinations", "max_hypotheses"):
+        dimension(f"limits.{name}", getattr(limits, name))
+    least = limits.log_min_component_weight
+    if not (isinstance(least, float) and least == -math.inf):
+        real("limits.log_min_component_weight", least)
+    if limits.merge_distance is not None:
+        non_negative("limits.merge_distance", limits.merge_distance)
 
 
 def power_rule(mixture_power: str, limits: FusionLimits, state_dim: int, num_sensors: int = 1) -> PowerRule:
     """The caps and the cubature rule of a power of mixtures. Raises `InputError` where there is no rule."""
     points, point_weights, most = np.empty((0, state_dim)), np.empty(0), int(limits.max_components)
     if mixture_power == "auto":
+        most = min(most, int(limits.max_combinations ** (1.0 / num_sensors)) + 1)
         while most > 1 and most**num_sensors > limits.max_combinations:
             most -= 1
     if mixture_power == "moment_matched" or (mixture_power == "auto" and most == 1):
@@ -189,6 +196,8 @@ def check_beliefs(beliefs: Sequence[Any], kinds: tuple[type, ...], num_sensors: 
 
     `ValidBeliefs` are taken to be what they say.
     """
+    if not isinstance(beliefs, ValidBeliefs):
+        beliefs = sequence("beliefs", beliefs, "densities, one a sensor")
     check_kinds([type(belief) for belief in beliefs], kinds, num_sensors)
     dims = [belief.state_dim for belief in beliefs]
     if len(set(dims)) > 1:

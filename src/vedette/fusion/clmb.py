@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
@@ -22,7 +21,6 @@ from vedette.fusion.base import (
     PowerRule,
     by_sensor,
     check_beliefs,
-    check_floor,
     check_kinds,
     check_power,
     check_weights,
@@ -33,6 +31,7 @@ from vedette.fusion.lmbs import AlignedLmbs, align_lmbs, require_views, sum_over
 from vedette.fusion.tracks import fused_tracks, reduced_tracks
 from vedette.fusion.views import Views
 from vedette.kernels.base.types import Bools, Floats, Ints, Lmb
+from vedette.models.arguments import chance, flag
 from vedette.probabilities import expit, log_expit, logit
 
 
@@ -77,7 +76,8 @@ class Clmb:
     def __post_init__(self) -> None:
         object.__setattr__(self, "weights", check_weights(self.weights))
         check_power(self.mixture_power, self.limits, len(self.weights))
-        check_floor("missing_existence", math.log(self.missing_existence) if self.missing_existence > 0 else -math.inf)
+        chance("missing_existence", self.missing_existence)
+        flag("by_views", self.by_views)
 
     def fuse(self, beliefs: Sequence[Labelled], views: Views | None = None) -> tuple[LMB, FusionInfo]:
         """Fused LMB of the sensors' LMBs (others are first converted), in increasing label order, and what was done.

@@ -26,7 +26,6 @@ from vedette.fusion.base import (
     PowerRule,
     by_sensor,
     check_beliefs,
-    check_floor,
     check_kinds,
     check_power,
     check_weights,
@@ -40,6 +39,7 @@ from vedette.fusion.views import Views
 from vedette.kernels.base.types import Floats, Glmb
 from vedette.kernels.labelled.conversions import marginalise
 from vedette.kernels.labelled.groups import group_log_sums
+from vedette.models.arguments import real, reject
 from vedette.probabilities import expit
 
 _Glmb = TypeVar("_Glmb", GLMB, FactoredGLMB)
@@ -83,7 +83,8 @@ class CmDeltaGlmb:
     def __post_init__(self) -> None:
         object.__setattr__(self, "weights", check_weights(self.weights))
         check_power(self.mixture_power, self.limits, len(self.weights))
-        check_floor("missing_log_weight", self.missing_log_weight)
+        if real("missing_log_weight", self.missing_log_weight) >= 0.0:
+            raise reject("missing_log_weight", "the log of a probability above 0 and below 1", self.missing_log_weight)
 
     def fuse(self, beliefs: Sequence[_Glmb], views: Views | None = None) -> tuple[_Glmb, FusionInfo]:
         """Fused marginalised GLMB of the sensors' GLMBs (delta or marginalised), heaviest set first, and what was done.

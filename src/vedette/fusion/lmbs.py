@@ -14,6 +14,7 @@ from vedette.errors import InputError
 from vedette.fusion.views import Views
 from vedette.kernels.base.types import Bools, Floats, Ints, Lmb, Tracks
 from vedette.kernels.labelled.stacking import stack_tracks
+from vedette.models.arguments import instance
 
 # At which existence a scan's information is taken: at 1 that of a sensor which misses nothing is infinite.
 SURE_EXISTENCE = 0.999
@@ -116,6 +117,7 @@ def require_views(by_views: bool, views: Views | None, num_sensors: int) -> View
             "views: expected the views of the sensors, as the fusion weights labels by_views; got None (a tracker "
             "knows them; decisions do not, and go by a fusion of plain weights)"
         )
+    instance("views", views, Views)
     if len(views.sensors) != num_sensors:
         raise InputError(f"views.sensors: expected {num_sensors}, one for each fusion weight; got {len(views.sensors)}")
     return views

@@ -12,12 +12,12 @@ from vedette.densities import GLMB, LMB, FactoredGLMB, Labelled, TrackTable, as_
 from vedette.densities.cases import LabelledCases
 from vedette.densities.containers import unchecked
 from vedette.densities.label_sets import Label, take_tracks
-from vedette.errors import InputError
 from vedette.fusion.base import Fusion, FusionInfo, check_beliefs
 from vedette.fusion.validity import ValidBeliefs
 from vedette.fusion.views import Views
 from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.gaussian.distances import near_pairs
+from vedette.models.arguments import chance, instance, sequence
 from vedette.probabilities import chi_squared_quantile
 
 GATE_PROBABILITY = 0.999  # that two estimates of one target are within the gate
@@ -69,9 +69,10 @@ def common_names(
     beliefs: Sequence[Labelled], *, gate_probability: float = GATE_PROBABILITY
 ) -> list[dict[Label, Label]]:
     """For each sensor, the label that `match_labels` gives to each of its labels. Raises as that."""
+    if not isinstance(beliefs, ValidBeliefs):
+        beliefs = sequence("beliefs", beliefs, "densities, one a sensor")
     check_beliefs(beliefs, (GLMB, LMB, FactoredGLMB), len(beliefs))
-    if not 0.0 < gate_probability < 1.0:
-        raise InputError(f"gate_probability: expected a number between 0 and 1; got {gate_probability}")
+    chance("gate_probability", gate_probability)
     if not beliefs:
         return []
     gate = chi_squared_quantile(beliefs[0].state_dim, gate_probability)
@@ -197,15 +198,15 @@ class Matched:
     matches_labels: ClassVar[bool] = True  # labels need not agree across sensors
 
     def __post_init__(self) -> None:
-        if not 0.0 < self.gate_probability < 1.0:
-            raise InputError(f"gate_probability: expected a number between 0 and 1; got {self.gate_probability}")
+        instance("rule", self.rule, Fusion)
+        chance("gate_probability", self.gate_probability)
 
     def match(self, beliefs: Sequence[Labelled]) -> list[Labelled]:
         """The beliefs under common labels; products of GLMBs with the names settled that they leave open.
 
         Of several labels that may be one target's, each by itself would be matched as an improbable target.
         """
-        settled = [_settled(belief) for belief in beliefs]
+        settled = [_settled(belief) for belief in sequence("beliefs", beliefs, "densities, one a sensor")]
         return match_labels(settled, gate_probability=self.gate_probability)
 
     def fuse(self, beliefs: Sequence[Labelled], views: Views | None = None) -> tuple[Any, FusionInfo]:

@@ -22,7 +22,7 @@ from vedette.fusion.base import (
     LinearRule,
     by_sensor,
     check_beliefs,
-    check_floor,
+    check_limits,
     count_lost,
 )
 from vedette.fusion.parallel_factors import (
@@ -40,7 +40,7 @@ from vedette.fusion.views import Views
 from vedette.kernels.base.types import Floats, Ints, Lmb, Tracks
 from vedette.kernels.labelled.parallel import update_in_parallel
 from vedette.kernels.labelled.stacking import stack_tracks
-from vedette.models.arguments import dimension
+from vedette.models.arguments import chance, non_negative, sequence
 from vedette.probabilities import expit, log_expit
 
 _Density = TypeVar("_Density", LMB, FactoredGLMB)
@@ -92,13 +92,13 @@ class ParallelUpdate:
 
     def __post_init__(self) -> None:
         if self.weights is not None:
-            weights = tuple(float(weight) for weight in self.weights)
-            if not weights or not all(0.0 <= weight < math.inf for weight in weights):
-                raise InputError(f"weights: expected non-negative finite numbers, one a sensor; got {weights}")
+            given = sequence("weights", self.weights, "non-negative finite numbers, one a sensor")
+            weights = tuple(non_negative(f"weights[{s}]", weight) for s, weight in enumerate(given))
+            if not weights:
+                raise InputError("weights: expected non-negative finite numbers, one a sensor; got none")
             object.__setattr__(self, "weights", weights)
-        check_floor("missing_existence", math.log(self.missing_existence) if self.missing_existence > 0 else -math.inf)
-        for name in ("max_combinations", "max_hypotheses"):
-            dimension(f"limits.{name}", getattr(self.limits, name))
+        chance("missing_existence", self.missing_existence)
+        check_limits(self.limits)
 
     def linear_rule(self, num_sensors: int) -> LinearRule:
         """pi+^(1 - sum of v) prod_s pi_s^(v_s)."""
@@ -120,6 +120,7 @@ class ParallelUpdate:
         integrated.
         """
         prediction = _prediction_of(views, check=not isinstance(beliefs, ValidBeliefs))
+        beliefs = beliefs if isinstance(beliefs, ValidBeliefs) else sequence("beliefs", beliefs, "one density a sensor")
         num_sensors = len(beliefs) if self.weights is None else len(self.weights)
         check_beliefs(beliefs, (LMB, FactoredGLMB), num_sensors)
         if any(belief.state_dim != prediction.state_dim for belief in beliefs):
@@ -208,7 +209,7 @@ class ParallelUpdate:
 
 
 def _prediction_of(views: Views | None, *, check: bool) -> LMB | FactoredGLMB:
-    prediction = None if views is None else views.prediction
+    prediction = views.prediction if isinstance(views, Views) else None
     if not isinstance(prediction, LMB | FactoredGLMB):
         raise InputError(
             "views.prediction: expected the LMB or FactoredGLMB that all beliefs were updated from, each by its "

@@ -10,7 +10,7 @@ from vedette.densities import Labelled, TrackTable
 from vedette.densities.factored import LABELLED
 from vedette.kernels.base.types import Floats
 from vedette.models import SensorModel
-from vedette.models.arguments import float_array, reject
+from vedette.models.arguments import float_array, one_a_sensor, reject, sequence
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -34,12 +34,12 @@ class Views:
     prediction: Labelled | None = None
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "sensors", sequence("views.sensors", self.sensors, "at least one SensorModel"))
         num = len(self.sensors)
         if num == 0 or not all(isinstance(sensor, SensorModel) for sensor in self.sensors):
             raise reject("views.sensors", "at least one SensorModel", self.sensors)
         object.__setattr__(self, "poses", float_array("views.poses", self.poses, (num, None)))
-        if len(self.scanned) != num:
-            raise reject("views.scanned", f"{num}, one a sensor", len(self.scanned))
+        one_a_sensor("views.scanned", self.scanned, num)
         if not isinstance(self.prediction, Labelled | None):
             raise reject("views.prediction", f"{LABELLED}, or None", type(self.prediction).__name__)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import numbers
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from vedette.covariances import covariance_fault
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats
+from vedette.plausible import implausible, seems_degrees
 from vedette.text import plain, printable
 
 _MAX_COUNT = 2**62
@@ -20,14 +22,25 @@ _MAX_COUNT = 2**62
 def reject(field: str, expected: str, got: Any) -> InputError:
     """The error for one bad argument; a long value is cut short."""
     text = printable(got if isinstance(got, str) else plain(got))
+    if not isinstance(got, str) and " at 0x" in text:  # where an object is says nothing of what it is
+        text = " ".join([f"a {type(got).__name__}", *([got.__qualname__] if hasattr(got, "__qualname__") else [])])
     return InputError(f"{field}: expected {expected}; got {text if len(text) <= 200 else text[:197] + '...'}")
 
 
 def real(field: str, value: Any) -> float:
     """A finite real number."""
-    if isinstance(value, bool) or not isinstance(value, numbers.Real) or not math.isfinite(value):
+    try:
+        number = math.nan if isinstance(value, bool) or not isinstance(value, numbers.Real) else float(value)
+    except OverflowError:  # a whole number of hundreds of digits
+        number = math.inf
+    if not math.isfinite(number):
         raise reject(field, "a finite number", value)
-    return float(value)
+    return number
+
+
+def is_infinite(value: Any) -> bool:
+    """Whether it is the number infinity, which stands for no limit."""
+    return isinstance(value, float) and value == math.inf
 
 
 def positive(field: str, value: Any) -> float:
@@ -51,12 +64,65 @@ def probability(field: str, value: Any) -> float:
     return float(value)
 
 
+def chance(field: str, value: Any) -> float:
+    """A number above 0 and below 1."""
+    if not 0.0 < real(field, value) < 1.0:
+        raise reject(field, "a probability above 0 and below 1", value)
+    return float(value)
+
+
+def one_of(field: str, value: Any, words: Collection[str]) -> str:
+    """One of these words."""
+    if not isinstance(value, str) or value not in words:
+        raise reject(field, f"one of {', '.join(words)}", value)
+    return value
+
+
+def flag(field: str, value: Any) -> bool:
+    """True or false."""
+    if not isinstance(value, bool | np.bool_):
+        raise reject(field, "true or false", value)
+    return bool(value)
+
+
+def instance(field: str, value: Any, kind: type) -> None:
+    """Raise unless `value` is of the kind, or meets that protocol."""
+    if not isinstance(value, kind):
+        article = "an" if kind.__name__[0] in "AEIOU" else "a"
+        raise reject(field, f"{article} {kind.__name__}", None if value is None else type(value).__name__)
+
+
+def sequence(field: str, values: Any, expected: str) -> tuple[Any, ...]:
+    """What is in a list, tuple, array or iterator; no text and no mapping."""
+    if isinstance(values, str | bytes | Mapping) or not isinstance(values, Iterable):
+        raise reject(field, expected, values)
+    if isinstance(values, np.ndarray) and values.ndim == 0:
+        raise reject(field, expected, values)
+    return tuple(values)
+
+
+def one_a_sensor(field: str, values: Any, num_sensors: int) -> None:
+    """Raise unless `values` is a list, tuple or array of so many items."""
+    if not isinstance(values, Sequence | np.ndarray) or isinstance(values, str | bytes):
+        raise reject(field, f"{num_sensors}, one a sensor", None if values is None else type(values).__name__)
+    came = 0 if isinstance(values, np.ndarray) and values.ndim == 0 else len(values)
+    if came != num_sensors:
+        raise reject(field, f"{num_sensors}, one a sensor", came)
+
+
 def dimension(field: str, value: Any) -> int:
     """A whole number of at least one, and such as a kernel can take."""
     if isinstance(value, bool) or not isinstance(value, numbers.Integral) or value < 1:
         raise reject(field, "a whole number of at least 1", value)
     if int(value) > _MAX_COUNT:
         raise reject(field, "a whole number of at most 2^62", value)
+    return int(value)
+
+
+def count(field: str, value: Any) -> int:
+    """A whole number of at least zero."""
+    if isinstance(value, bool) or not isinstance(value, numbers.Integral) or value < 0:
+        raise reject(field, "a whole number of at least 0", value)
     return int(value)
 
 
@@ -139,6 +205,9 @@ def pose_vector(field: str, values: Any) -> Floats:
     pose = float_array(field, values, (None,))
     if len(pose) < 3:
         raise reject(field, "an array of shape (3 or more,)", f"shape {pose.shape}")
+    if seems_degrees(float(pose[2])):
+        degrees = f"{pose[2]:g} degrees are {math.radians(pose[2]):.4f} rad"
+        implausible(field, "a heading in radians", f"{pose[2]:g}, a whole number of several turns", degrees)
     return pose
 
 

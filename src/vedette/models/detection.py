@@ -68,9 +68,9 @@ def _guarded(prob_detection: float, field: str = "prob_detection") -> float:
     return min(probability(field, prob_detection), MAX_PROB_DETECTION)
 
 
-def _half_width(half_width_rad: float) -> float:
-    if positive("half_width_rad", half_width_rad) > math.pi:
-        raise reject("half_width_rad", "an angle in (0, pi]", half_width_rad)
+def _half_width(half_width_rad: float, name: str = "half_width_rad") -> float:
+    if positive(name, half_width_rad) > math.pi:
+        raise reject(name, "an angle in radians, in (0, pi] (is it in degrees?)", half_width_rad)
     return float(half_width_rad)
 
 
@@ -147,11 +147,10 @@ def camera(prob_detection: float, max_range: float, reference_half_width_rad: fl
         prob_detection: within the field of view; 1 is taken as `MAX_PROB_DETECTION`.
         max_range: m.
         reference_half_width_rad: where the camera zooms, the half width at which it sees as far as `max_range`; it sees
-            as many times farther as its field is narrower. None: as far at every width.
+            as many times farther as its field is narrower; in (0, pi]. None: as far at every width.
     """
-    reference = (
-        0.0 if reference_half_width_rad is None else positive("reference_half_width_rad", reference_half_width_rad)
-    )
+    given = reference_half_width_rad
+    reference = 0.0 if given is None else _half_width(given, "reference_half_width_rad")
     params = np.array([_guarded(prob_detection), positive("max_range", max_range), reference])
     reach = float(max_range) if reference == 0.0 else math.inf
     return DetectionModel(functions.camera, params, functions.mean_camera, reach)

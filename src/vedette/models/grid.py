@@ -8,11 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from vedette.kernels.base.types import Floats
-from vedette.models.arguments import dimension, positive, reject
+from vedette.models.arguments import dimension, instance, positive, reject
 from vedette.models.region import Region
 
 # A side that is a whole number of cells but for rounding is cut into that number.
 _ROUNDING = 1e-9
+_MOST_CELLS = 10**9  # along a side
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +43,10 @@ class CellGrid:
     def covering(cls, region: Region, cell: float) -> CellGrid:
         """The fewest cells of at most `cell` metres along each side. Raises `InputError` unless that is above 0."""
         size = positive("cell", cell)
+        instance("region", region, Region)
         width, height = region.x_max - region.x_min, region.y_max - region.y_min
+        if max(width, height) / size > _MOST_CELLS:
+            raise reject("cell", f"at least {max(width, height) / _MOST_CELLS:g}, for cells that can be numbered", cell)
         return cls(region, *(max(math.ceil(side / size - _ROUNDING), 1) for side in (width, height)))
 
     @property

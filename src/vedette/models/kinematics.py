@@ -12,7 +12,7 @@ import numpy as np
 
 from vedette.kernels.base.compile import inlined, kernel
 from vedette.kernels.base.types import Floats
-from vedette.models.arguments import non_negative, reject
+from vedette.models.arguments import non_negative, one_of
 from vedette.models.functions import model_function
 from vedette.models.motion import MotionModel
 
@@ -87,8 +87,7 @@ def constant_velocity(sigma_v: float, *, acceleration: str = "held", method: str
         acceleration: "held" or "continuous".
         method: Gaussian method, see `MotionModel`.
     """
-    if acceleration not in _CV_NOISE:
-        raise reject("acceleration", f"one of {', '.join(_CV_NOISE)}", acceleration)
+    one_of("acceleration", acceleration, _CV_NOISE)
     params = np.array([non_negative("sigma_v", sigma_v)])
     return MotionModel(4, _cv_transition, _CV_NOISE[acceleration], np.empty(0), params, _cv_jacobian, method)
 

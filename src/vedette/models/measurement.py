@@ -48,6 +48,7 @@ class MeasurementModel:
         jacobian: model function of kind `measurement_jacobian` (same parameters), or None: sigma points are used.
         angular: one boolean a component, true where it is an angle in radians; () means none. Residuals of angles are
             wrapped to (-pi, pi].
+        least: (meas_dim,) least value of each component without noise, such as 0 of a range; () means none.
         places: plain function of (n, meas_dim) measurements and a pose: the (n, 2) positions where they were taken of a
             target; None where a measurement does not say where. Births from measurements need it.
 
@@ -61,6 +62,7 @@ class MeasurementModel:
     jacobian: ModelFunction | None = None
     angular: Bools = field(default_factory=lambda: np.empty(0, np.bool_))
     places: Callable[[Floats, Floats], Floats] | None = None
+    least: Floats = field(default_factory=lambda: np.empty(0))
 
     def __post_init__(self) -> None:
         dimension("MeasurementModel.meas_dim", self.meas_dim)
@@ -70,6 +72,8 @@ class MeasurementModel:
         if self.places is not None and not callable(self.places):
             raise reject("MeasurementModel.places", "a function or None", self.places)
         object.__setattr__(self, "params", params_vector("MeasurementModel.params", self.params))
+        least = self.least if len(self.least) else np.full(self.meas_dim, -np.inf)
+        object.__setattr__(self, "least", float_array("MeasurementModel.least", least, (self.meas_dim,), finite=False))
         object.__setattr__(self, "angular", angular_flags("MeasurementModel.angular", self.angular, self.meas_dim))
 
     def measure(self, states: ArrayLike, pose: ArrayLike) -> Floats:
@@ -116,17 +120,24 @@ class NoiseModel:
         function: model function of kind `measurement_noise_cov`.
         params: its parameter vector.
         meas_dim: number of measurement components that it serves; None: any, or not known.
+        least_stds: (meas_dim,) the least standard deviation of each component, by which numbers in a wrong unit are
+            told; None: not known.
     """
 
     function: ModelFunction
     params: Floats = field(default_factory=lambda: np.empty(0))
     meas_dim: int | None = None
+    least_stds: Floats | None = None
 
     def __post_init__(self) -> None:
         require_kind("NoiseModel.function", self.function, "measurement_noise_cov")
         object.__setattr__(self, "params", params_vector("NoiseModel.params", self.params))
         if self.meas_dim is not None:
             dimension("NoiseModel.meas_dim", self.meas_dim)
+        if self.least_stds is not None:
+            object.__setattr__(
+                self, "least_stds", float_array("NoiseModel.least_stds", self.least_stds, (self.meas_dim,))
+            )
 
     def covs(self, states: ArrayLike, pose: ArrayLike, meas_dim: int) -> Floats:
         """(n, meas_dim, meas_dim) noise covariances at (n, state_dim) states."""

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from vedette.kernels.base.types import Floats, Motion
 from vedette.kernels.gaussian.sigma_points import CUBATURE, LINEARISED, UNSCENTED
-from vedette.models.arguments import dimension, params_vector, positive, probability, real, reject, state_table
+from vedette.models.arguments import dimension, one_of, params_vector, positive, probability, real, reject, state_table
 from vedette.models.functions import ModelFunction, model_function, numbers_at, require_kind, write_rows
 from vedette.models.probe import probe_array, probe_covariance, probe_jacobian, probe_probability
 
@@ -23,10 +23,8 @@ def resolve_method(name: str, method: str, has_jacobian: bool) -> int:
     Raises:
         InputError: unknown method, or "ekf" without a Jacobian.
     """
-    if method == "auto":
+    if one_of(name, method, ("auto", *METHODS)) == "auto":
         return LINEARISED if has_jacobian else UNSCENTED
-    if method not in METHODS:
-        raise reject(name, f"one of auto, {', '.join(METHODS)}", method)
     if method == "ekf" and not has_jacobian:
         raise reject(name, "auto, ukf or ckf, as no Jacobian is given", method)
     return METHODS[method]

@@ -59,7 +59,7 @@ def constant_noise(stds: ArrayLike) -> NoiseModel:
     values = float_array("stds", stds, (None,))
     if len(values) == 0 or (values <= 0.0).any():
         raise reject("stds", "one or more numbers above 0", stds)
-    return NoiseModel(_constant, values, len(values))
+    return NoiseModel(_constant, values, len(values), values)
 
 
 def axis_noise(std: ArrayLike, growth: ArrayLike) -> NoiseModel:
@@ -74,7 +74,7 @@ def axis_noise(std: ArrayLike, growth: ArrayLike) -> NoiseModel:
         raise reject("std", "2 numbers above 0", std)
     if (growths < 0.0).any():
         raise reject("growth", "2 numbers of at least 0", growth)
-    return NoiseModel(_by_axis, np.concatenate([stds, growths]), 2)
+    return NoiseModel(_by_axis, np.concatenate([stds, growths]), 2, stds)
 
 
 def range_dependent_noise(
@@ -97,11 +97,11 @@ def range_dependent_noise(
     ranges = _growth("range", sigma_range, eta_range)
     bearings = _growth("bearing", sigma_bearing, eta_bearing)
     if ranges and bearings:
-        return NoiseModel(_bearing_range, np.array(ranges + bearings), 2)
+        return NoiseModel(_bearing_range, np.array(ranges + bearings), 2, np.array([bearings[0], ranges[0]]))
     if bearings:
-        return NoiseModel(_bearing, np.array(bearings), 1)
+        return NoiseModel(_bearing, np.array(bearings), 1, np.array(bearings[:1]))
     if ranges:
-        return NoiseModel(_range, np.array(ranges), 1)
+        return NoiseModel(_range, np.array(ranges), 1, np.array(ranges[:1]))
     raise InputError("sigma_range, sigma_bearing: expected at least one of them; got neither")
 
 

@@ -80,7 +80,8 @@ def _places(measurements: Floats, pose: Floats) -> Floats:
 
 def bearing_range() -> MeasurementModel:
     """[bearing, range] of the target from the sensor (paper: z_k)."""
-    return MeasurementModel(2, _bearing_range, np.empty(0), _bearing_range_jacobian, np.array([True, False]), _places)
+    angular, least = np.array([True, False]), np.array([-np.inf, 0.0])
+    return MeasurementModel(2, _bearing_range, np.empty(0), _bearing_range_jacobian, angular, _places, least)
 
 
 def bearing_only() -> MeasurementModel:
@@ -90,4 +91,4 @@ def bearing_only() -> MeasurementModel:
 
 def range_only() -> MeasurementModel:
     """[range]."""
-    return MeasurementModel(1, _range, np.empty(0), _range_jacobian, np.array([False]))
+    return MeasurementModel(1, _range, np.empty(0), _range_jacobian, np.array([False]), least=np.zeros(1))

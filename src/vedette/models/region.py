@@ -9,6 +9,15 @@ from numpy.typing import ArrayLike
 
 from vedette.kernels.base.types import Bools, Floats
 from vedette.models.arguments import as_array, generator, real, reject
+from vedette.plausible import implausible, seem_degrees
+
+
+def tell_degrees(field: str, corners: Floats) -> None:
+    """Warn of an area whose corners are rather longitudes and latitudes."""
+    if seem_degrees(corners):
+        width, height = np.ptp(corners, axis=0)
+        got = f"an area of {width:.3g} by {height:.3g} m at {tuple(corners[0].tolist())}"
+        implausible(field, "metres from the origin", got, "are these longitudes and latitudes")
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,11 +35,18 @@ class Region:
         for low, high in (("x_min", "x_max"), ("y_min", "y_max")):
             if getattr(self, high) <= getattr(self, low):
                 raise reject(f"Region.{high}", f"a number above {low} = {getattr(self, low)}", getattr(self, high))
+        tell_degrees("Region", self.corners)
 
     @property
     def area(self) -> float:
         """Area in m^2."""
         return (self.x_max - self.x_min) * (self.y_max - self.y_min)
+
+    @property
+    def corners(self) -> Floats:
+        """(4, 2) in order, from the south-west one to the east."""
+        x, y = (self.x_min, self.x_max, self.x_max, self.x_min), (self.y_min, self.y_min, self.y_max, self.y_max)
+        return np.column_stack([x, y])
 
     @property
     def bounds(self) -> Floats:

@@ -13,7 +13,7 @@ import numpy as np
 
 from vedette.kernels.base.compile import inlined, kernel
 from vedette.kernels.base.types import Floats
-from vedette.models.arguments import non_negative, reject
+from vedette.models.arguments import non_negative, one_of, reject
 from vedette.models.clutter import ClutterModel, log_or_minus_infinity
 from vedette.models.functions import ModelFunction, model_function
 from vedette.models.measurement import MeasurementModel
@@ -119,8 +119,7 @@ def region_clutter(rate: float, region: Region, kind: str) -> ClutterModel:
         kind: "bearing_range", "bearing_only", "range_only" or "position": what the sensor measures. Clutter of another
             measurement is a `ClutterModel` with a log intensity and sampler of one's own.
     """
-    if kind not in _KINDS:
-        raise reject("kind", f"one of {', '.join(_KINDS)}", kind)
+    one_of("kind", kind, _KINDS)
     if not isinstance(region, Region):
         raise reject("region", "a Region", region)
     rate = non_negative("rate", rate)

@@ -12,12 +12,13 @@ from numpy.typing import ArrayLike
 from vedette.kernels.base.types import Floats, Sensor
 from vedette.kernels.gaussian.detection import AT_CENTRE, BY_NODES, CLOSED_FORM, detection_probabilities
 from vedette.kernels.gaussian.position_integrals import spread_nodes
-from vedette.models.arguments import float_array, pose_vector, reject, state_table
+from vedette.models.arguments import float_array, one_of, pose_vector, reject, state_table
 from vedette.models.clutter import ClutterModel
 from vedette.models.detection import DetectionModel
 from vedette.models.functions import model_function
 from vedette.models.measurement import MeasurementModel, NoiseModel
 from vedette.models.motion import resolve_method
+from vedette.plausible import LARGE_ANGLE, implausible
 
 
 @model_function("measurement_jacobian")
@@ -55,7 +56,7 @@ class SensorModel:
 
     Raises:
         InputError: a part of another type, parts for different numbers of measurement components or different angles,
-            "ekf" without a Jacobian.
+            noise of an angle beyond pi, "ekf" without a Jacobian.
     """
 
     measurement: MeasurementModel
@@ -78,8 +79,23 @@ class SensorModel:
             expected = f"a model for measurements whose angular flags are {self.measurement.angular.tolist()}"
             raise reject("SensorModel.clutter", expected, angular.tolist())
         resolve_method("SensorModel.method", self.method, self.measurement.jacobian is not None)
-        if self.detection_at not in ("centre", "mean"):
-            raise reject("SensorModel.detection_at", "centre or mean", self.detection_at)
+        one_of("SensorModel.detection_at", self.detection_at, ("centre", "mean"))
+        self._check_bearings()
+
+    def _check_bearings(self) -> None:
+        """Noise of angles that says nothing of them is in other units; so it may be long before."""
+        stds = self.noise.least_stds
+        if stds is None:
+            return
+        for component in np.flatnonzero(self.measurement.angular & (stds > LARGE_ANGLE)).tolist():
+            field, expected = (
+                "SensorModel.noise",
+                f"a standard deviation of component {component}, an angle, in radians",
+            )
+            got, meant = f"{stds[component]:g}", "is it in degrees, or are components exchanged"
+            if stds[component] > math.pi:
+                raise reject(field, f"{expected}, up to pi", f"{got} ({meant}?)")
+            implausible(field, expected, got, meant)
 
     @property
     def meas_dim(self) -> int:

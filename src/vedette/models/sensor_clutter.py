@@ -14,7 +14,7 @@ import numpy as np
 from vedette.kernels.base.compile import kernel
 from vedette.kernels.base.types import Floats
 from vedette.kernels.gaussian.scratch import wrap_angle
-from vedette.models.arguments import non_negative, positive, reject
+from vedette.models.arguments import non_negative, one_of, positive, reject
 from vedette.models.clutter import ClutterModel, log_or_minus_infinity
 from vedette.models.functions import ModelFunction, model_function
 from vedette.models.measurement import MeasurementModel
@@ -114,8 +114,7 @@ def around_sensor(
         half_side: of the square, m; one of `radius` and `half_side` is to be given.
         half_width_rad: greatest angle from the heading, in (0, pi]; pi: all round.
     """
-    if kind not in _KINDS:
-        raise reject("kind", f"one of {', '.join(_KINDS)}", kind)
+    one_of("kind", kind, _KINDS)
     if (radius is None) == (half_side is None):
         raise reject("radius, half_side", "one of them", "neither" if radius is None else "both")
     if positive("half_width_rad", half_width_rad) > math.pi:

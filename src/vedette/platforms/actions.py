@@ -8,7 +8,7 @@ import numpy as np
 
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats
-from vedette.models.arguments import float_array
+from vedette.models.arguments import float_array, sequence
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -28,7 +28,7 @@ class Actions:
     values: Floats
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "columns", tuple(self.columns))
+        object.__setattr__(self, "columns", sequence("actions.columns", self.columns, "names of columns"))
         values = float_array("actions.values", self.values, (None, len(self.columns)))
         if len(values) == 0:
             raise InputError("actions.values: expected at least one action; got none")

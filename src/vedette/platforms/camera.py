@@ -82,6 +82,8 @@ class Pointing:
 def _check(pose: Floats) -> None:
     if len(pose) < POSE_DIM:
         raise InputError(f"pose: expected {POSE_DIM} components, with pointing_rad and half_width_rad; got {len(pose)}")
+    if not 0.0 < pose[4] <= math.pi:
+        raise InputError(f"pose: expected half_width_rad in (0, pi]; got {pose[4]:g} (is it in degrees?)")
 
 
 @dataclass(frozen=True, slots=True)

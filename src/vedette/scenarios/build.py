@@ -12,16 +12,20 @@ import numpy as np
 from vedette.control import MobileSensor, Planner
 from vedette.densities import LMB
 from vedette.errors import InputError
-from vedette.filters import Filter, labels_targets, shared_targets
+from vedette.filters import Filter, TwoStepFilter, labels_targets, shared_targets
 from vedette.fusion import Clmb, CmDeltaGlmb, Fusion, Matched, ParallelUpdate
 from vedette.kernels.base.types import Bools, Floats
 from vedette.models import SensorModel, TargetModel
 from vedette.platforms import Actions
 from vedette.platforms.base import actions_at
 from vedette.scenarios.loading import Scenario
+from vedette.scenarios.sections.custom import NotGiven
 from vedette.scenarios.sections.fusion import OF_SCANS, CustomFusion
 from vedette.scenarios.sections.lookahead import Lookahead
 from vedette.scenarios.sections.planners import STRATEGIES, Parts
+from vedette.scenarios.sections.sensing import CustomMeasurement
+from vedette.scenarios.sections.sensors import Sensor
+from vedette.scenarios.sections.tracking import CustomFilter
 from vedette.scenarios.sections.tracking import Filter as FilterSection
 from vedette.simulation.experiment import Experiment
 from vedette.simulation.true_sensors import TrueSensor
@@ -70,13 +74,27 @@ def build_sensors(scenario: Scenario) -> tuple[MobileSensor, ...]:
     targets = TargetModel(
         model.motion.build(method, folder), model.survival.build(folder), model.birth.build(model.motion)
     )
-    return tuple(
-        MobileSensor(
-            model.filter.build(targets, sensor.build(region, method, folder, model.filter.detection_at), folder),
-            sensor.platform.build(folder),
-        )
-        for sensor in model.sensors
-    )
+    found = []
+    for sensor in model.sensors:
+        known = sensor.build(region, method, folder, model.filter.detection_at)
+        local = model.filter.build(targets, known, folder)
+        _check_own(scenario, sensor, known, local)
+        found.append(MobileSensor(local, sensor.platform.build(folder)))
+    return tuple(found)
+
+
+def _check_own(scenario: Scenario, section: Sensor, sensor: SensorModel, local: Filter) -> None:
+    """`NotGiven` where the user's own measurement or filter has less than the scenario asks of it."""
+    model, measured = scenario.model, section.measurement
+    born = model.birth.from_measurements is not None
+    if born and sensor.measurement.places is None and isinstance(measured, CustomMeasurement):
+        wanted = f"{measured.function} to give a measurement with `places`, as targets are born of measurements"
+        raise NotGiven(measured, "function", wanted, "one without")
+    waits = not section.scans.build(model.time.num_steps).all() or (model.network is not None and model.network.delay)
+    if isinstance(model.filter, CustomFilter) and (born or waits) and not isinstance(local, TwoStepFilter):
+        why = "targets are born of measurements" if born else "it must predict without a scan"
+        wanted = f"{model.filter.function} to give a TwoStepFilter, with predict() and update(), as {why}"
+        raise NotGiven(model.filter, "function", wanted, f"a {type(local).__name__}")
 
 
 def build_true_sensors(scenario: Scenario, known: Sequence[SensorModel]) -> tuple[TrueSensor, ...]:
@@ -198,7 +216,10 @@ def build_planner(scenario: Scenario, name: str, num_threads: int = 0) -> Planne
     )
     if name in model.planners:
         return model.planners[name].build(name, parts, folder)
-    return STRATEGIES[name].planner(parts)
+    try:
+        return STRATEGIES[name].planner(parts)
+    except InputError as error:
+        raise InputError(f"planner {name}: {error}") from error
 
 
 def _notes_of_decisions(scenario: Scenario, fusion: Fusion) -> tuple[str, ...]:

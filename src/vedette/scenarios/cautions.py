@@ -12,6 +12,7 @@ from vedette.scenarios.cures import accepted, fusions_instead, with_own_labels
 from vedette.scenarios.faults import Path, Told
 from vedette.scenarios.loading import Scenario, document_of, place_fault
 from vedette.scenarios.names import sensor_names
+from vedette.scenarios.plausibility import implausible
 from vedette.scenarios.sections import ScenarioModel
 from vedette.scenarios.sections.detection import (
     CameraDetection,
@@ -39,6 +40,7 @@ def cautions(scenario: Scenario) -> tuple[str, ...]:
     """Warnings of a valid scenario, one line each, with file, line and column where it was read from a file."""
     found = [*_records(scenario), *_views(scenario), *_births(scenario), *_late_beliefs(scenario)]
     found += [*_many_sensors(scenario), *_cells(scenario.model), *_labels(scenario.model), *_per_scan(scenario.model)]
+    found += implausible(scenario.model)
     if not found:
         return ()
     document = document_of(scenario)

@@ -3,16 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
+import numpy as np
+
 from vedette.errors import VedetteError
-from vedette.scenarios.build import build_experiment, build_planner
+from vedette.filters import labels_targets
+from vedette.scenarios.build import build_experiment, build_planner, build_sensors
 from vedette.scenarios.faults import Told
 from vedette.scenarios.file_checks import customs
 from vedette.scenarios.loading import Scenario, document_of, place_fault
 from vedette.scenarios.sections.custom import NotGiven
+from vedette.simulation.loop import simulate
+from vedette.simulation.stopping import RunStopped, cause_of
 
+_SCANS = 3  # that are tried: enough for one that is missing, and one after births
 # These are made of other parts, and so as parts of the whole.
 _MADE_OF_PARTS = ("filter", "fusion", "central", "planner")
 
@@ -20,7 +27,7 @@ _MADE_OF_PARTS = ("filter", "fusion", "central", "planner")
 def code_faults(scenario: Scenario) -> list[str]:
     """What the code that a scenario names lacks of what it is to give, with file, line and column, in file order.
 
-    Imports and runs that code.
+    Imports and runs that code: makes what it gives, and where all of it can be had, tracks for two or three scans.
     """
     found = list(dict.fromkeys(_faults(scenario)))
     document = document_of(scenario)
@@ -34,12 +41,31 @@ def _faults(scenario: Scenario) -> Iterator[Told]:
     places = {id(section): path for path, section in found}
     alone = [section for _, section in found if section.field not in _MADE_OF_PARTS]
     attempts: list[Callable[[], Any]] = [partial(section.made, scenario.folder) for section in alone]
-    attempts.append(partial(build_experiment, scenario))
     attempts += [partial(build_planner, scenario, name) for name in scenario.model.planners]
+    attempts += [partial(_plan, scenario), partial(_track, scenario)]
     for make in attempts:
         try:
             make()
         except NotGiven as fault:
             yield Told((*places[id(fault.section)], fault.key), fault.wanted, fault.got)
+        except RunStopped as stop:
+            cause = cause_of(stop.__cause__) if isinstance(stop.__cause__, Exception) else str(stop)
+            yield Told((), "parts that fit together", f"in {stop.stage} at step {stop.step}: {cause}")
         except VedetteError as error:
             yield Told((), "parts that fit together", str(error))
+
+
+def _plan(scenario: Scenario) -> None:
+    """Make the planners that the section about control is for."""
+    build_planner(scenario, "random")
+    if labels_targets(build_sensors(scenario)[0].filter):
+        build_planner(scenario, "jdm")
+        if scenario.model.control.lookahead is not None:
+            build_planner(scenario, "lookahead")
+
+
+def _track(scenario: Scenario) -> None:
+    """Go through the first scans without decisions."""
+    experiment = build_experiment(scenario)
+    few = replace(experiment, times=experiment.times[:_SCANS], decision_steps=())
+    simulate(few, None, seed=0, run=0, score=lambda _, estimates: np.zeros((len(estimates), 3)))

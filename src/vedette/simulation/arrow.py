@@ -167,11 +167,13 @@ def _check_names(names: list[str], layout: Layout, place: str) -> None:
     missing = [name for name in layout.fixed if name not in names]
     if missing:
         raise InputError(f"{place}: expected a column {missing[0]}; got {shown(', '.join(names))}")
+    seen: set[str] = set()
     for name in names:
         if layout.kind(name) is None:
             raise InputError(f"{place}: expected no other column than {', '.join(layout.fixed)}; got {shown(name)}")
-        if names.count(name) > 1:
+        if name in seen:
             raise InputError(f"{place}: expected each column once; got {shown(name)} twice")
+        seen.add(name)
 
 
 def _check_types(schema: pa.Schema, layout: Layout, place: str) -> None:

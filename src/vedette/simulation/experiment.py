@@ -9,7 +9,7 @@ import numpy as np
 from vedette.densities import Estimator
 from vedette.errors import InputError
 from vedette.kernels.base.types import Bools, Floats
-from vedette.models.arguments import reject
+from vedette.models.arguments import pose_vector, reject
 from vedette.platforms import Fleet, Platform
 from vedette.simulation.true_sensors import TrueSensor, scanning, true_sensors_of
 from vedette.simulation.truth import TargetSource
@@ -64,6 +64,8 @@ class Experiment:
         shape = self.poses.shape
         if len(shape) != 2 or len(self.poses) != num or shape[1] < 3 or not np.isfinite(self.poses).all():
             raise InputError(f"poses: expected finite numbers of shape ({num}, 3 or more); got {self.poses.tolist()}")
+        for s, pose in enumerate(self.poses):
+            pose_vector(f"poses[{s}]", pose)
         if len(self.first_actions) != num:
             raise InputError(f"first_actions: expected {num}, one a sensor; got {len(self.first_actions)}")
         bad = [step for step in self.decision_steps if not 1 <= step <= len(self.times)]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from vedette.control import Planner, RandomPlanner
+from vedette.plausible import told_elsewhere
 from vedette.simulation.experiment import Experiment
 from vedette.simulation.journal import Journal, Score
 from vedette.simulation.records import RunRecord
@@ -43,7 +44,9 @@ def simulate(experiment: Experiment, planner: Planner | None, *, seed: int, run:
     truth = experiment.targets.truth(experiment.times, rng=run_stream(seed, run, TRUTH))
     journal = Journal(experiment, planner.name if planner is not None else "still", seed, run, truth)
     try:
-        _go(experiment, planner, journal)
+        # Of scans that are drawn nobody has exchanged the numbers.
+        with told_elsewhere():
+            _go(experiment, planner, journal)
         with journal.timing("score"):
             return journal.record(score(truth, journal.estimates))
     except KeyboardInterrupt as interrupt:

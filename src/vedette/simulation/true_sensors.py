@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from vedette.errors import InputError
 from vedette.kernels.base.types import Bools
 from vedette.models import DetectionModel, SensorModel
-from vedette.models.arguments import reject
+from vedette.models.arguments import one_of, reject
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -34,8 +34,7 @@ class TrueSensor:
             raise reject("TrueSensor.model", "a SensorModel", self.model)
         if self.first_detection is not None and not isinstance(self.first_detection, DetectionModel):
             raise reject("TrueSensor.first_detection", "a DetectionModel or None", self.first_detection)
-        if self.detection_of not in ("state", "measurement"):
-            raise reject("TrueSensor.detection_of", "state or measurement", self.detection_of)
+        one_of("TrueSensor.detection_of", self.detection_of, ("state", "measurement"))
         if self.detection_of == "measurement" and self.model.measurement.places is None:
             expected = "state, as only a position or a bearing with a range say where a target was measured"
             raise reject("TrueSensor.detection_of", expected, self.detection_of)

@@ -13,7 +13,7 @@ from vedette.errors import InputError
 from vedette.filters import FilterInfo
 from vedette.kernels.base.types import Floats
 from vedette.models import SensorModel, TargetModel
-from vedette.models.arguments import float_array, real
+from vedette.models.arguments import float_array, one_a_sensor, real
 
 # s. The belief before the first scan holds no target, so that the time before it changes nothing.
 FIRST_PERIOD = 1.0
@@ -106,9 +106,7 @@ def check_step(
     if not isinstance(state, State):
         raise InputError(f"state: expected a State; got {type(state).__name__}")
     for name, given in (("scans", scans), ("poses", poses), ("rngs", rngs)):
-        came = None if given is None else len(given)
-        if came != num_sensors:
-            raise InputError(f"{name}: expected {num_sensors}, one a sensor; got {came}")
+        one_a_sensor(name, given, num_sensors)
     now = real("time", time)
     if state.time is not None and now <= state.time:
         raise InputError(f"time: expected one after that of the last scan, {state.time:g} s; got {now:g}")

@@ -22,7 +22,7 @@ from vedette.kernels.base.types import Floats, Ints, Lmb, ScanInput
 from vedette.kernels.labelled.stacking import stack_tracks
 from vedette.kernels.steps.explained import prob_explained
 from vedette.models import BirthModel, MeasurementBirth, SensorModel
-from vedette.models.arguments import pose_vector
+from vedette.models.arguments import pose_vector, reject
 
 # What a track explains surer than this is no birth: each costs a track until the next scan.
 LEAST_UNEXPLAINED = 0.01
@@ -37,6 +37,14 @@ class Unexplained(NamedTuple):
     positions: Floats  # (num, 2) m
     probabilities: Floats  # (num,) that no track explains it
     sensors: Ints  # (num,) which sensor measured it
+
+
+def check_measured_births(birth: BirthModel, sensors: Sequence[SensorModel]) -> None:
+    """`InputError` where targets are born of measurements that do not say where they were taken."""
+    for s, sensor in enumerate(sensors):
+        if birth.from_measurements is not None and sensor.measurement.places is None:
+            expected = "a measurement with `places`, as targets are born of measurements"
+            raise reject(f"sensors[{s}].measurement", expected, "one without")
 
 
 def births_due(birth: BirthModel, step: int, dt: float, measured: LMB | None) -> LMB | None:

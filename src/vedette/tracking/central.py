@@ -14,7 +14,7 @@ from vedette.kernels.base.types import Floats
 from vedette.models import SensorModel, TargetModel
 from vedette.models.arguments import reject
 from vedette.tracking.base import State, TrackerInfo, check_step
-from vedette.tracking.births import births_due, births_from_scans
+from vedette.tracking.births import births_due, births_from_scans, check_measured_births
 from vedette.tracking.messages import bytes_of_scan
 from vedette.tracking.stages import Stages
 
@@ -55,7 +55,7 @@ class OfAllScans:
         filter: of all sensors' scans.
 
     Raises:
-        InputError: something else than such a filter.
+        InputError: something else than such a filter; births from measurements that do not say where they were taken.
     """
 
     filter: CentralFilter
@@ -63,6 +63,7 @@ class OfAllScans:
     def __post_init__(self) -> None:
         if not isinstance(self.filter, CentralFilter):
             raise reject("filter", "one of several sensors, with targets, sensors, initial() and step()", self.filter)
+        check_measured_births(self.targets.birth, self.sensors)
 
     @property
     def targets(self) -> TargetModel:

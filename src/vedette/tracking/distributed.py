@@ -14,7 +14,7 @@ from vedette.filters import FilterInfo
 from vedette.fusion import Fusion, Matched, Views
 from vedette.kernels.base.types import Floats
 from vedette.models import TargetModel
-from vedette.models.arguments import probability
+from vedette.models.arguments import flag, instance, probability
 from vedette.tracking.base import State, TrackerInfo, check_step
 from vedette.tracking.births import births_due, births_from_scans
 from vedette.tracking.forgetting import without_forgotten
@@ -50,6 +50,9 @@ class Distributed(LocalFilters):
         LocalFilters.__post_init__(self)  # slots replace the class that super() looks for
         if self.fusion is None and len(self.filters) > 1:
             raise InputError(f"fusion: expected one for {len(self.filters)} sensors; got none")
+        if self.fusion is not None:
+            instance("fusion", self.fusion, Fusion)
+        flag("feedback", self.feedback)
         probability("Distributed.min_detection", self.min_detection)
         if self.feedback or self.fusion is None:
             return

@@ -16,7 +16,10 @@ from vedette.filters.base import SingleSensorFilter
 from vedette.filters.blind import NO_POSE, NO_SCAN, blind_sensor
 from vedette.fusion import ValidBeliefs
 from vedette.models import SensorModel, TargetModel
-from vedette.models.arguments import reject
+from vedette.models.arguments import reject, sequence
+from vedette.tracking.births import check_measured_births
+
+_BORN = "targets are born of measurements"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -27,19 +30,24 @@ class LocalFilters:
         filters: one a sensor; all hold the same targets.
 
     Raises:
-        InputError: no filter or something else, filters of different targets.
+        InputError: no filter or something else, filters of different targets; where targets are born of measurements,
+            filters or measurements that these cannot be had of.
     """
 
     filters: tuple[Filter, ...]
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "filters", tuple(self.filters))
+        object.__setattr__(self, "filters", sequence("filters", self.filters, "a Filter of each sensor"))
         if not self.filters:
             raise InputError("filters: expected at least one; got none")
         for s, local in enumerate(self.filters):
             if not isinstance(local, Filter):
                 raise reject(f"filters[{s}]", "a Filter, with targets, sensor, initial() and step()", local)
-        shared_targets(self.filters)
+        birth = shared_targets(self.filters).birth
+        check_measured_births(birth, self.sensors)
+        for s in range(len(self.filters)):
+            if birth.from_measurements is not None:
+                self._two_step(s, _BORN)
 
     @property
     def targets(self) -> TargetModel:
@@ -68,9 +76,7 @@ class LocalFilters:
             return self._predicted(s, belief, dt, step, births)
         if births is None:
             return own.step(belief, scan, pose, dt, step, rng=rng)
-        return self._two_step(s, "targets are born of measurements").step(
-            belief, scan, pose, dt, step, rng=rng, births=births
-        )
+        return self._two_step(s, _BORN).step(belief, scan, pose, dt, step, rng=rng, births=births)
 
     def _predicted(self, s: int, belief: Any, dt: float, step: int, births: LMB | None) -> tuple[Any, FilterInfo]:
         """What sensor `s` expects `dt` seconds later."""
@@ -113,5 +119,6 @@ class LocalFilters:
     def _two_step(self, s: int, why: str) -> TwoStepFilter:
         own = self.filters[s]
         if not isinstance(own, TwoStepFilter):
-            raise reject(f"filters[{s}]", f"a TwoStepFilter, with predict() and update(), as {why}", own)
+            expected = f"a TwoStepFilter, with predict() and update(), as {why}"
+            raise reject(f"filters[{s}]", expected, type(own).__name__)
         return own

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vedette.kernels.base.types import Bools, Floats, Ints
-from vedette.models.arguments import dimension, positive, probability, reject
+from vedette.models.arguments import count, dimension, is_infinite, positive, probability, reject
 
 # Stands for "never" among step numbers and numbers of hops.
 NEVER = np.iinfo(np.int64).max // 2
@@ -38,12 +38,11 @@ class Network:
     consensus_rounds: int | None = None
 
     def __post_init__(self) -> None:
-        if self.radio_range != math.inf:
+        if not is_infinite(self.radio_range):
             positive("Network.radio_range", self.radio_range)
         if probability("Network.loss", self.loss) == 1.0:
             raise reject("Network.loss", "a probability below 1", self.loss)
-        if isinstance(self.delay, bool) or not isinstance(self.delay, int) or self.delay < 0:
-            raise reject("Network.delay", "a whole number of scans from 0 on", self.delay)
+        count("Network.delay", self.delay)
         for name in ("hops", "consensus_rounds"):
             if getattr(self, name) is not None:
                 dimension(f"Network.{name}", getattr(self, name))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from itertools import accumulate
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -38,6 +38,7 @@ class Situation(NamedTuple):
         return tuple(np.split(values, ends[:-1]))
 
 
+@runtime_checkable
 class Constraint(Protocol):
     """Says which courses a sensor may take, and which courses of two sensors go together.
 

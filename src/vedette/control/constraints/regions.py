@@ -11,6 +11,7 @@ from vedette.control.constraints.protocol import Alone, Situation
 from vedette.kernels.base.types import Bools, Floats
 from vedette.models import Region
 from vedette.models.arguments import float_array, reject
+from vedette.models.region import tell_degrees
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,6 +70,7 @@ class KeepOut(Alone):
         if len(corners) < 3:
             raise reject("area", "a Region, or a polygon of at least 3 corners", f"{len(corners)} corners")
         if not isinstance(self.area, Region):
+            tell_degrees("area", corners)
             object.__setattr__(self, "area", corners)
 
     @property
@@ -93,10 +95,7 @@ class KeepOut(Alone):
 
 
 def _corners(area: Any) -> Any:
-    if isinstance(area, Region):
-        x_min, x_max, y_min, y_max = area.bounds
-        return np.array([[x_min, y_min], [x_max, y_min], [x_max, y_max], [x_min, y_max]])
-    return area
+    return area.corners if isinstance(area, Region) else area
 
 
 def _inside(points: Floats, corners: Floats) -> Bools:

@@ -9,8 +9,9 @@ import numpy as np
 from vedette.control.constraints.discs import disc_probabilities, near_pairs
 from vedette.control.constraints.protocol import Alone, Situation
 from vedette.densities import GLMB, LMB, FactoredGLMB, Labelled, TrackTable
+from vedette.densities.factored import LABELLED
 from vedette.kernels.base.types import Bools, Floats, Ints
-from vedette.models.arguments import float_array, positive, probability
+from vedette.models.arguments import float_array, positive, probability, reject
 from vedette.probabilities import expit
 
 # Entries of the tables that a GLMB's hypotheses take at a time.
@@ -68,6 +69,8 @@ def void_probability(belief: Labelled, centres: Floats, radius: float) -> Floats
     a radius that is not above 0.
     """
     positive("radius", radius)
+    if not isinstance(belief, Labelled):
+        raise reject("belief", LABELLED, type(belief).__name__)
     places = float_array("centres", centres, (None, 2))
     disc, track, inside = _inside(belief.tracks, places, radius)
     if isinstance(belief, LMB):

@@ -13,7 +13,7 @@ import numpy as np
 from vedette.control.additive.evaluator import AdditiveEvaluator
 from vedette.control.constraints import Constraint
 from vedette.control.evidence import Evidence
-from vedette.control.inputs import check_poses, check_sensors
+from vedette.control.inputs import check_poses, check_sensors, check_steering, check_valuing
 from vedette.control.lookahead.ahead import Ahead
 from vedette.control.lookahead.beam import BeamSearch
 from vedette.control.lookahead.courses import CourseTree, Stages
@@ -21,15 +21,17 @@ from vedette.control.lookahead.laid_courses import LaidCourses
 from vedette.control.lookahead.problem import Best, Part, SequenceProblem, SequenceSearch
 from vedette.control.lookahead.rules import Rules
 from vedette.control.plan import Bound, Plan
-from vedette.control.preparation import AnyReward, Sums, prepare_sums, unsought
+from vedette.control.preparation import AnyReward, Sums, check_sums, prepare_sums, unsought
 from vedette.control.rewards import CauchySchwarzReward
 from vedette.control.settings import MobileSensor, PlanningSettings
 from vedette.errors import NumericalError
 from vedette.fusion import Fusion
 from vedette.kernels.base.types import Floats
-from vedette.models.arguments import dimension, generator, positive, probability, reject
+from vedette.models.arguments import dimension, generator, instance, positive, probability, reject
 from vedette.platforms import Options
 from vedette.tracking import State
+
+MOST_DECISIONS, MOST_STEPS = 100, 10_000  # of a sequence, and of pseudo-updates from one to the next
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,7 +62,7 @@ class HorizonPlanner:
         notes: what every plan is to say.
 
     Raises:
-        InputError: names the field, what was expected and what came.
+        InputError: a field out of range, or a reward, association or fusion that is no sum over labels.
     """
 
     sensors: tuple[MobileSensor, ...]
@@ -76,7 +78,11 @@ class HorizonPlanner:
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        dimension("depth", self.depth)
+        check_steering(self)
+        check_valuing(self.fusion, self.reward, self.notes)
+        instance("search", self.search, SequenceSearch)
+        if dimension("depth", self.depth) > MOST_DECISIONS:
+            raise reject("depth", f"at most {MOST_DECISIONS} decisions", self.depth)
         dimension("budget", self.budget)
         if self.discount is not None:
             probability("discount", self.discount)
@@ -86,6 +92,9 @@ class HorizonPlanner:
             if round(steps) < 1 or abs(steps - round(steps)) > 1e-9 * steps:
                 multiple = f"a whole multiple of the horizon_period, {self.settings.horizon_period:g}"
                 raise reject("period", multiple, self.period)
+            if steps > MOST_STEPS:
+                raise reject("period", f"at most {MOST_STEPS} times the horizon_period", self.period)
+        check_sums("sequences of decisions", len(self.sensors), self.fusion, self.settings, self.reward)
 
     @property
     def name(self) -> str:
@@ -102,7 +111,7 @@ class HorizonPlanner:
         `JointPlanner.plan`; the search draws after the samples.
 
         Raises:
-            InputError: inputs that do not fit, or a reward or fusion that is no sum over labels.
+            InputError: inputs that do not fit.
             ModelError, NumericalError: as the filters; no sequence whose reward is a number.
         """
         generator(rng)

@@ -6,7 +6,7 @@ import itertools
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from typing import NamedTuple, Protocol, TypeAlias
+from typing import NamedTuple, Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
 
@@ -141,6 +141,7 @@ def printed(sequence: JointSequence) -> tuple[int, ...]:
     return tuple(course for stage in zip(*sequence, strict=True) for course in stage)
 
 
+@runtime_checkable
 class SequenceSearch(Protocol):
     """Finds a joint sequence of large value; what it evaluates is kept in the problem."""
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from vedette.control.lookahead.courses import Sequence
 from vedette.control.lookahead.problem import JointSequence, SequenceProblem
-from vedette.models.arguments import dimension, non_negative, reject
+from vedette.models.arguments import dimension, non_negative, one_of
 
 # Rounds without an evaluation after which a tree that leads to what is known already is given up.
 _IDLE_ROUNDS = 50
@@ -41,8 +41,7 @@ class TreeSearch:
     def __post_init__(self) -> None:
         non_negative("exploration", self.exploration)
         dimension("batch", self.batch)
-        if self.rollout not in ("random", "kept"):
-            raise reject("rollout", "random or kept", self.rollout)
+        one_of("rollout", self.rollout, ("random", "kept"))
 
     def search(self, problem: SequenceProblem, *, rng: np.random.Generator) -> None:
         """Until the budget is used up, or all is known."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import numbers
 from collections.abc import Sequence
 from typing import Any, Literal, Protocol, TypeAlias, runtime_checkable
 
@@ -13,6 +14,7 @@ from vedette.densities.label_sets import places_of
 from vedette.divergence import power_integrals, reference_unit_volume
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats
+from vedette.models.arguments import reject
 from vedette.models.functions import ModelFunction
 
 Exponents: TypeAlias = Sequence[tuple[float, float]]
@@ -80,8 +82,11 @@ class LabelReward(Protocol):
 
 def check_unit_volume(value: Any) -> None:
     """`InputError` unless K is a finite number above 0, or the word "reference"."""
-    if value != "reference" and (isinstance(value, bool | str) or not 0.0 < value < math.inf):
-        raise InputError(f"unit_volume: expected a finite number above 0 or 'reference'; got {value!r}")
+    if isinstance(value, str) and value == "reference":
+        return
+    is_number = isinstance(value, numbers.Real) and not isinstance(value, bool)
+    if not is_number or not 0.0 < value < math.inf:
+        raise reject("unit_volume", "a finite number above 0 or 'reference'", value)
 
 
 def unit_volume_of(reward: Any, predicted: GLMB | LMB) -> float:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -11,8 +10,8 @@ import numpy as np
 from vedette.control.rewards.base import Exponents, UnitVolume, check_unit_volume, unit_volume_of
 from vedette.densities import GLMB, LMB
 from vedette.divergence import cauchy_schwarz, renyi
-from vedette.errors import InputError
 from vedette.kernels.base.types import Floats
+from vedette.models.arguments import real, reject
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,10 +62,8 @@ class RenyiReward:
     order: float = 0.5
 
     def __post_init__(self) -> None:
-        value = self.order
-        number = isinstance(value, int | float) and not isinstance(value, bool)
-        if not number or not 0.0 < value < math.inf or value == 1.0:
-            raise InputError(f"order: expected a finite number above 0 other than 1; got {value!r}")
+        if real("order", self.order) <= 0.0 or self.order == 1.0:
+            raise reject("order", "a finite number above 0 other than 1", self.order)
 
     @property
     def exponents(self) -> Exponents:

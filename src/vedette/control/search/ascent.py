@@ -8,7 +8,7 @@ import numpy as np
 
 from vedette.control.search.known import Joint, Known
 from vedette.control.search.problem import JointProblem
-from vedette.models.arguments import dimension
+from vedette.models.arguments import count
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,8 +31,7 @@ class CoordinateAscent:
     num_restarts: int = 2
 
     def __post_init__(self) -> None:
-        if self.num_restarts != 0:
-            dimension("num_restarts", self.num_restarts)
+        count("num_restarts", self.num_restarts)
 
     def search(self, problem: JointProblem, *, rng: np.random.Generator) -> tuple[int, ...]:
         """The best of all ascents; of equal ones that were evaluated the first in printed order."""

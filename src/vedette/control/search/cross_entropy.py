@@ -11,7 +11,7 @@ from vedette.control.constraints import Mask
 from vedette.control.search.known import Known
 from vedette.control.search.problem import JointProblem
 from vedette.kernels.base.types import Floats, Ints
-from vedette.models.arguments import dimension, reject
+from vedette.models.arguments import chance, dimension, real, reject
 
 # A distribution in which every sensor has an action of this probability has nothing more to find.
 _DEGENERATE = 0.99
@@ -47,9 +47,8 @@ class CrossEntropy:
     def __post_init__(self) -> None:
         dimension("num_samples", self.num_samples)
         dimension("max_rounds", self.max_rounds)
-        if not 0.0 < self.elite_share < 1.0:
-            raise reject("elite_share", "a number above 0 and below 1", self.elite_share)
-        if not 0.0 < self.smoothing <= 1.0:
+        chance("elite_share", self.elite_share)
+        if not 0.0 < real("smoothing", self.smoothing) <= 1.0:
             raise reject("smoothing", "a number above 0, up to 1", self.smoothing)
 
     def search(self, problem: JointProblem, *, rng: np.random.Generator) -> tuple[int, ...]:

@@ -13,7 +13,7 @@ from vedette.control.search.known import Joint, Known
 from vedette.control.search.problem import JointProblem, first_best
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats, Ints
-from vedette.models.arguments import reject
+from vedette.models.arguments import one_of
 
 ORDERS = ("printed", "best_first")
 
@@ -42,8 +42,7 @@ class SequentialGreedy:
     order: Literal["printed", "best_first"] = "printed"
 
     def __post_init__(self) -> None:
-        if self.order not in ORDERS:
-            raise reject("order", f"one of {', '.join(ORDERS)}", self.order)
+        one_of("order", self.order, ORDERS)
 
     def search(self, problem: JointProblem, *, rng: np.random.Generator) -> tuple[int, ...]:
         """The joint action that is decided so; nothing is drawn.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -57,6 +57,7 @@ class JointProblem(NamedTuple):
     partial: Callable[[Ints], Floats] | None = None
 
 
+@runtime_checkable
 class JointSearch(Protocol):
     """Finds a joint action of large mean reward."""
 

@@ -96,10 +96,11 @@ class Birth(Section):
 
     @check
     def _each_once(self) -> Iterator[Finding]:
-        steps = () if self.steps == "every" else self.steps
-        for i, step in enumerate(steps):
-            if step in steps[:i]:
+        seen: set[int] = set()
+        for i, step in enumerate(() if self.steps == "every" else self.steps):
+            if step in seen:
                 yield ("steps", i), "each step once", f"{step} again"
+            seen.add(step)
 
     def build(self, motion: Motion) -> BirthModel:
         """The births, shared by all sensors."""

@@ -14,6 +14,7 @@ from vedette.covariances import covariance_fault
 from vedette.scenarios.faults import Finding, Path, describe
 from vedette.scenarios.sections.base import attempt
 from vedette.scenarios.sections.birth import BirthSite
+from vedette.scenarios.sections.decision_checks import DECISION_CHECKS
 from vedette.scenarios.sections.fusion import OF_LMBS, OF_SCANS
 from vedette.scenarios.sections.network_checks import NETWORK_CHECKS
 from vedette.scenarios.sections.tracking import UNLABELLED
@@ -101,11 +102,11 @@ def _one_belief(model: ScenarioModel) -> Iterator[Finding]:
 
 
 def _central(model: ScenarioModel) -> Iterator[Finding]:
-    if model.fusion.kind != "central":
-        return
     if model.filter.kind == "custom":
-        yield ("fusion", "kind"), "a fusion, as each sensor has a filter of your own", '"central"'
-    elif model.filter.assignment.kind == "gibbs":
+        if model.fusion.kind in OF_SCANS:
+            wanted = "a fusion of densities, as each sensor has a filter of your own"
+            yield ("fusion", "kind"), wanted, describe(model.fusion.kind)
+    elif model.fusion.kind == "central" and model.filter.assignment.kind == "gibbs":
         yield ("filter", "assignment", "kind"), "ranked, as one filter takes the scans of all sensors", '"gibbs"'
 
 
@@ -193,6 +194,13 @@ def _scan_steps(model: ScenarioModel) -> Iterator[Finding]:
         yield from attempt(_first_scan(("sensors", i, "scans", "first"), sensor, model))
 
 
+def _scans_of_unlabelled(model: ScenarioModel) -> Iterator[Finding]:
+    kind = model.filter.kind
+    for i, sensor in enumerate(model.sensors):
+        if kind in UNLABELLED and not sensor.scans.build(model.time.num_steps).all():
+            yield ("sensors", i, "scans"), f"every step, as {kind} filters go on from each scan", "only some"
+
+
 def _first_scan(path: Path, sensor: Sensor, model: ScenarioModel) -> Iterator[Finding]:
     yield from _up_to_last(path, sensor.scans.first, model.time.num_steps)
 
@@ -225,7 +233,9 @@ CHECKS = (
     _targets,
     _sensor_names,
     _scan_steps,
+    _scans_of_unlabelled,
     _score,
     cells_of_undetected,
     *NETWORK_CHECKS,
+    *DECISION_CHECKS,
 )

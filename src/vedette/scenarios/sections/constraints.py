@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
+from vedette.plausible import told_elsewhere
 from vedette.scenarios.faults import Finding
 from vedette.scenarios.sections.base import Point, Positive, Probability, Section, check
 from vedette.scenarios.sections.custom import Custom
@@ -49,7 +50,8 @@ class KeepOut(Section):
         """The constraint."""
         from vedette.control import KeepOut
 
-        return KeepOut(np.array(self.polygon) if self.region is None else self.region.build())
+        with told_elsewhere():
+            return KeepOut(np.array(self.polygon) if self.region is None else self.region.build())
 
 
 class Separation(Section):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
@@ -14,7 +14,7 @@ from vedette.scenarios.sections.base import Count, Positive, Probability, Sectio
 class Lookahead(Section):
     """How many decisions the strategy `lookahead` takes at once, of which it carries out the first."""
 
-    depth: Count = Field(default=3, description="Number of decisions [-].")
+    depth: Annotated[Count, Field(le=100)] = Field(default=3, description="Number of decisions [-].")
     period: Positive | None = Field(
         default=None,
         description="Time from a decision to the next, a whole multiple of horizon_period; none: horizon_steps times "

@@ -79,6 +79,8 @@ class ScenarioModel(Section):
         for name in self.planners:
             if name in STRATEGIES:
                 yield ("planners", name), f"another name than {', '.join(STRATEGIES)}", describe(name)
+            elif name.startswith("-"):
+                yield ("planners", name), "a name that does not begin as an option does", describe(name)
 
     @check
     def _names_of_measures(self) -> Iterator[Finding]:

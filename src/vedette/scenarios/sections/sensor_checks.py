@@ -20,6 +20,15 @@ def noise_findings(measurement: Measurement, noise: Noise, path: Path) -> Iterat
         yield path, f"range_dependent, constant or custom noise for a {kind} measurement", "by_axis noise"
     elif noise.kind == "constant" and dim is not None and len(noise.std) != dim:
         yield (*path, "std"), _components(measurement, dim), describe(noise.std)
+    elif noise.kind == "constant":
+        for component in measurement.angular:
+            if (std := noise.std[component]) > math.pi:
+                meant = "exchanged" if min(noise.std) < math.pi else "in degrees"
+                wanted = f"a bearing's standard deviation in radians, up to pi ({meant}?)"
+                yield (*path, "std", component), wanted, describe(std)
+    elif noise.kind == "range_dependent" and measurement.angular and noise.sigma_bearing_deg > 180.0:
+        wanted = "a bearing's standard deviation in degrees, up to 180"
+        yield (*path, "sigma_bearing_deg"), wanted, describe(noise.sigma_bearing_deg)
 
 
 def clutter_findings(measurement: Measurement, clutter: Clutter, path: Path) -> Iterator[Finding]:

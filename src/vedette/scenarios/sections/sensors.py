@@ -10,8 +10,17 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from pydantic import Field
 
+from vedette.plausible import told_elsewhere
 from vedette.scenarios.faults import Finding, describe
-from vedette.scenarios.sections.base import DetectionAt, GaussianMethod, Name, Point, Section, Step, check
+from vedette.scenarios.sections.base import (
+    DetectionAt,
+    GaussianMethod,
+    Name,
+    Point,
+    Section,
+    Step,
+    check,
+)
 from vedette.scenarios.sections.clutter import Clutter, RegionClutter
 from vedette.scenarios.sections.detection import Detection, GaussianDetection
 from vedette.scenarios.sections.platforms import AnyPlatform, Still
@@ -104,14 +113,10 @@ class Sensor(Section):
         from vedette.models import SensorModel
 
         measurement = self.measurement.build(folder)
-        return SensorModel(
-            measurement,
-            self.noise.build(self.measurement, folder),
-            self.detection.build(folder),
-            self.clutter.build(measurement, self.measurement.kind, region, folder),
-            method,
-            detection_at,
-        )
+        noise, detection = self.noise.build(self.measurement, folder), self.detection.build(folder)
+        clutter = self.clutter.build(measurement, self.measurement.kind, region, folder)
+        with told_elsewhere():
+            return SensorModel(measurement, noise, detection, clutter, method, detection_at)
 
     def build_true(self, known: SensorModel, region: Region, folder: Path) -> TrueSensorModel:
         """What it is, beside what the filters know; errors as of `build`."""

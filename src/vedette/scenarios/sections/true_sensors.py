@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from pydantic import Field
 
+from vedette.plausible import told_elsewhere
 from vedette.scenarios.faults import Finding, describe
 from vedette.scenarios.sections.base import Section
 from vedette.scenarios.sections.clutter import Clutter
@@ -70,13 +71,14 @@ class TrueSensor(Section):
 
         like = self._like(measurement)
         measured = known.measurement if self.measurement is None else self.measurement.build(folder)
-        model = replace(
-            known,
-            measurement=measured,
-            noise=known.noise if self.noise is None else self.noise.build(like, folder),
-            detection=known.detection if self.detection is None else self.detection.build(folder),
-            clutter=self.clutter.build(measured, like.kind, region, folder) if self.clutter else known.clutter,
-            method="auto",  # the filters' may need a Jacobian; nothing is filtered with this model
-        )
+        parts: dict[str, Any] = {
+            "measurement": measured,
+            "noise": known.noise if self.noise is None else self.noise.build(like, folder),
+            "detection": known.detection if self.detection is None else self.detection.build(folder),
+            "clutter": self.clutter.build(measured, like.kind, region, folder) if self.clutter else known.clutter,
+        }
+        with told_elsewhere():
+            # The filters' method may need a Jacobian; nothing is filtered with this model.
+            model = replace(known, method="auto", **parts)
         first = None if self.first_detection is None else self.first_detection.build(folder)
         return Made(model, first, self.detection_of)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
+from vedette.plausible import told_elsewhere
 from vedette.scenarios.faults import Finding, describe
 from vedette.scenarios.sections.base import (
     GaussianMethod,
@@ -67,7 +68,8 @@ class RegionSection(Section):
         """The surveillance region."""
         from vedette.models import Region
 
-        return Region(self.x_min, self.x_max, self.y_min, self.y_max)
+        with told_elsewhere():
+            return Region(self.x_min, self.x_max, self.y_min, self.y_max)
 
 
 StateOrder = Annotated[

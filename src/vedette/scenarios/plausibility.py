@@ -1,0 +1,103 @@
+"""What a scenario says that is valid but can hardly be meant: other units, numbers exchanged, spreads squared."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from vedette.kernels.base.types import Floats
+from vedette.plausible import LARGE_ANGLE, seem_degrees
+from vedette.scenarios.faults import Path, format_path
+from vedette.scenarios.sections import ScenarioModel
+from vedette.scenarios.sections.birth import BirthSite
+from vedette.scenarios.sections.sensing import Measurement, Noise
+from vedette.scenarios.sections.targets import ScriptedTargets
+from vedette.scenarios.sections.world import RegionSection, grouped_order
+
+# Standard deviations from every birth site at which a target begins that filters never find.
+_FAR_FROM_SITES = 8.0
+
+
+def implausible(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
+    """Where in a scenario, and what was expected, came and was probably meant."""
+    yield from _bearings(model)
+    yield from _areas(model)
+    yield from _beyond_sites(model)
+
+
+def _bearings(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
+    """Noise of bearings that leaves little of them."""
+    told: list[Noise] = []  # what sensors share once
+    for s, sensor in enumerate(model.sensors):
+        true = None if sensor.truth is None else sensor.truth.noise
+        for where, noise in ((("noise",), sensor.noise), (("truth", "noise"), true)):
+            if noise is not None and noise not in told:
+                told.append(noise)
+                yield from _bearing_noise(("sensors", s, *where), sensor.measurement, noise)
+
+
+def _bearing_noise(path: Path, measurement: Measurement, noise: Noise) -> Iterator[tuple[Path, str]]:
+    for component in measurement.angular:
+        if noise.kind == "range_dependent":
+            std, at = math.radians(noise.sigma_bearing_deg), (*path, "sigma_bearing_deg")
+            if std > LARGE_ANGLE:
+                yield at, f"{format_path(at)}: {_degrees(std)} leave little of a bearing"
+        elif noise.kind == "constant" and noise.std[component] > LARGE_ANGLE:
+            std, at = noise.std[component], (*path, "std", component)
+            meant = "are the numbers exchanged" if min(noise.std) < std else "is it in degrees"
+            yield at, f"{format_path(at)}: expected radians of a bearing; got {std:g}, {_degrees(std)} ({meant}?)"
+
+
+def _degrees(angle: float) -> str:
+    return f"{math.degrees(angle):.0f} degrees"
+
+
+def _areas(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
+    """Areas that are too small, too far away, to be in metres."""
+    for path, corners in _corners(model):
+        if seem_degrees(corners):
+            width, height = np.ptp(corners, axis=0)
+            got = f"an area of {width:.3g} by {height:.3g} m"
+            yield path, f"{format_path(path)}: expected metres from the origin; got {got} (are these degrees?)"
+
+
+def _corners(model: ScenarioModel) -> Iterator[tuple[Path, Floats]]:
+    regions: list[tuple[Path, Any]] = [(("region",), model.region)]
+    if model.undetected is not None:
+        regions.append((("undetected", "region"), model.undetected.region))
+    for i, constraint in enumerate(model.control.constraints):
+        path: Path = ("control", "constraints", i)
+        if constraint.kind in ("stay_inside", "keep_out"):
+            regions.append(((*path, "region"), constraint.region))
+        if constraint.kind == "keep_out" and constraint.polygon is not None:
+            yield (*path, "polygon"), np.array(constraint.polygon)
+    for path, region in regions:
+        if isinstance(region, RegionSection):
+            yield path, np.array([[region.x_min, region.y_min], [region.x_max, region.y_max]])
+
+
+def _beyond_sites(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
+    """Targets that begin where no site has any."""
+    targets, birth = model.targets, model.birth
+    if not isinstance(targets, ScriptedTargets) or birth.from_measurements is not None or not birth.sites:
+        return
+    order = grouped_order(model.motion)[:2]
+    for i, track in enumerate(targets.tracks):
+        start = np.array(track.state)[order]
+        distances = [_distance(start, site, order) for site in birth.sites]
+        nearest = int(np.argmin(distances))
+        if distances[nearest] > _FAR_FROM_SITES:
+            path: Path = ("targets", "tracks", i, "state")
+            far = f"begins {distances[nearest]:.0f} standard deviations from the nearest birth site"
+            hint = f" (are standard deviations in birth.sites[{nearest}].cov?)"
+            told = f"{format_path(path)}: {far}, and is hardly found"
+            yield path, told + (hint if birth.sites[nearest].cov is not None else "")
+
+
+def _distance(start: Floats, site: BirthSite, order: list[int]) -> float:
+    """Of a position from a site, in its standard deviations."""
+    off = start - np.array(site.mean)[order]
+    return math.sqrt(float(off @ np.linalg.solve(site.covariance()[np.ix_(order, order)], off)))

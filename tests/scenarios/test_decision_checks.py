@@ -1,0 +1,184 @@
+"""What only some decisions can be made with is refused before a run, in the file and in Python."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from scenarios.minimal import changed
+from vedette.control import (
+    CauchySchwarzReward,
+    HorizonPlanner,
+    JointPlanner,
+    PlanningSettings,
+    RandomPlanner,
+    SequentialGreedy,
+    VoidProbability,
+)
+from vedette.errors import InputError, ScenarioError
+from vedette.scenarios import Scenario, parse_scenario
+from vedette.scenarios.build import build_planner, build_sensors
+from vedette.scenarios.code_checks import code_faults
+
+LMB = (("{kind: m_delta_glmb}", "{kind: lmb}"), ("{kind: cm_delta_glmb, weights: [0.5, 0.5]}", "{kind: clmb}"))
+PHD = (
+    ("{kind: m_delta_glmb}", "{kind: phd}"),
+    ("{kind: cm_delta_glmb, weights: [0.5, 0.5]}", "{kind: none}"),
+    ("  - {name: south, position: [0.0, -40.0]}\n", ""),
+    ("estimator: {kind: marginal, threshold: 0.6}\n", ""),
+)
+
+
+def with_control(text: str, *changes: tuple[str, str], more: str = "") -> str:
+    return changed(("{decision_steps: [4, 8]}", f"{{decision_steps: [4, 8], {text}}}{more}"), *changes)
+
+
+def scenario(text: str, *changes: tuple[str, str], more: str = "") -> Scenario:
+    return Scenario(parse_scenario(with_control(text, *changes, more=more)), Path("scenario.yaml"))
+
+
+def fault(text: str) -> str:
+    with pytest.raises(ScenarioError) as error:
+        parse_scenario(text, "f.yaml")
+    (only,) = error.value.faults
+    return only
+
+
+GREEDY = "search: {kind: sequential_greedy}"
+OWN = "\nplanners: {mine: {kind: joint, search: {kind: sequential_greedy}}}"
+
+
+@pytest.mark.parametrize(
+    ("text", "place", "wanted"),
+    [
+        (with_control(GREEDY), "22:50: control.search.kind", "as decisions on m_delta_glmb beliefs are no sums over"),
+        (with_control(f"{GREEDY}, association: full", *LMB), "22:50: control.search.kind", "with control.association"),
+        (with_control("num_samples: 2", more=OWN), "23:47: planners.mine.search.kind", "m_delta_glmb beliefs"),
+        (
+            with_control("constraints: [{kind: void_probability, radius: 5, probability: 0.9}]", *PHD),
+            "20:56: control.constraints[0].kind",
+            "another constraint, as phd filters have no labels to look ahead by",
+        ),
+        (
+            changed(*PHD, ("heading_deg: 4.0", "heading_deg: 4.0, scans: {every: 2}")),
+            "17:67: sensors[0].scans",
+            "every step, as phd filters go on from each scan",
+        ),
+    ],
+)
+def test_the_check_says_where(text: str, place: str, wanted: str) -> None:
+    told = fault(text)
+    assert told.startswith(f"f.yaml:{place}: expected "), told
+    assert wanted in told
+
+
+@pytest.mark.parametrize(
+    ("text", "changes"),
+    [
+        (GREEDY, LMB),
+        (f"{GREEDY}, limits: {{max_glmb_targets: 0}}", ()),
+        (f"{GREEDY}, limits: {{max_glmb_sensors: 1}}", ()),
+        (f"{GREEDY}, reward: {{kind: expected_loss}}", ()),
+        (f"{GREEDY}, association: full, reward: {{kind: expected_loss}}", LMB),
+        (GREEDY, PHD),
+    ],
+)
+def test_where_greedy_searches_can_be_had_they_are(text: str, changes: tuple[tuple[str, str], ...]) -> None:
+    given = scenario(text, *changes)
+    name = "random" if changes == PHD else "jdm"
+    assert build_planner(given, name) is not None
+
+
+@pytest.mark.parametrize(
+    ("settings", "reward", "wanted"),
+    [
+        (PlanningSettings(), CauchySchwarzReward(), "sensors: expected filters of LMBs, .*; got filters of GLMBs"),
+        (PlanningSettings(association="full"), CauchySchwarzReward(), "settings.association: expected known, for"),
+        (PlanningSettings(), lambda predicted, updated: 0.0, "reward, fusion: expected a reward and a fusion of LMBs"),
+    ],
+)
+def test_planners_refuse_it_when_they_are_made(settings: PlanningSettings, reward: Any, wanted: str) -> None:
+    given = scenario("num_samples: 2")
+    sensors, fusion = build_sensors(given), given.model.fusion.build(2, given.folder)
+    assert fusion is not None
+    with pytest.raises(InputError, match=wanted):
+        JointPlanner(sensors, fusion, settings, reward, SequentialGreedy())
+    if "sensors:" not in wanted:
+        with pytest.raises(InputError, match=wanted):
+            HorizonPlanner(sensors, fusion, settings, reward)
+
+
+def test_a_strategy_that_a_scenario_has_no_part_for_is_named_before_the_run() -> None:
+    with pytest.raises(InputError, match=r"planner lookahead: settings.association: expected known, for sequences of"):
+        build_planner(scenario("association: full"), "lookahead")
+
+
+def test_constraints_that_look_at_beliefs_need_labels() -> None:
+    sensors = build_sensors(scenario("num_samples: 2", *PHD))
+    with pytest.raises(InputError, match="constraints: expected none that asks where targets will be"):
+        RandomPlanner(sensors, constraints=(VoidProbability(5.0, 0.9),))
+
+
+def own(name: str) -> str:
+    return f"{{kind: custom, function: 'own_parts.py:{name}'}}"
+
+
+BORN = (
+    "  steps: [1, 5]\n",
+    "  from_measurements: {expected: 0.5, max_existence: 0.03, std: [5.0, 5.0, 2.0, 2.0]}\n  steps: [1, 5]\n",
+)
+LABELS = ("{kind: cm_delta_glmb, weights: [0.5, 0.5]}", "{kind: clmb, matching: assignment}")
+
+
+@pytest.mark.parametrize(
+    ("changes", "wanted"),
+    [
+        (
+            (
+                ("heading_deg: 4.0", "heading_deg: 4.0, scans: {every: 2}"),
+                ("{kind: m_delta_glmb}", own("Filter")),
+                LMB[1],
+            ),
+            "19:34: filter.function: expected own_parts.py:Filter to give a TwoStepFilter, with predict() and "
+            "update(), as it must predict without a scan, got a Filter",
+        ),
+        (
+            (BORN, LABELS, ("{kind: m_delta_glmb}", own("Filter"))),
+            "as targets are born of measurements, got a Filter",
+        ),
+        (
+            (("{kind: m_delta_glmb}", own("Filter")),),
+            "expected parts that fit together, got in the fusion at step 1: beliefs[0]: expected GLMB or FactoredGLMB; "
+            "got LMB",
+        ),
+        (
+            (("{kind: cm_delta_glmb, weights: [0.5, 0.5]}", own("fusion").replace("}", ", feedback: true}")),),
+            "got in the filter of sensor 1 at step 2: belief: expected a GLMB; got LMB",
+        ),
+        (
+            (*PHD[:3], ("{kind: marginal, threshold: 0.6}", own("sure"))),
+            "which have labels; got Poisson",
+        ),
+        (
+            (("{decision_steps: [4, 8]}", f"{{decision_steps: [4, 8], {GREEDY}, reward: {own('reward')}}}"), *LMB),
+            "planner jdm: reward, fusion: expected a reward and a fusion of LMBs that are sums over labels",
+        ),
+        (
+            (("{decision_steps: [4, 8]}", f"{{decision_steps: [4], lookahead: {{}}, reward: {own('reward')}}}"), *LMB),
+            "planner lookahead: reward, fusion: expected a reward and a fusion of LMBs that are sums over labels",
+        ),
+    ],
+)
+def test_code_of_ones_own_is_tried_with_the_parts_around_it(
+    changes: tuple[tuple[str, str], ...], wanted: str, tmp_path: Path
+) -> None:
+    from vedette.scenarios import load_scenario
+
+    (tmp_path / "own_parts.py").write_bytes(Path(__file__).with_name("own_parts.py").read_bytes())
+    file = tmp_path / "scenario.yaml"
+    file.write_text(changed(*changes))
+    faults = code_faults(load_scenario(file))
+    assert faults
+    assert wanted in faults[0]
