@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from vedette.campaigns import Failed
     from vedette.campaigns.journal import Failure
     from vedette.campaigns.results import CampaignResults
+    from vedette.scenarios import Scenario
     from vedette.simulation.records import RunRecord
 
 _SHOWN_FAILURES = 10
@@ -48,7 +49,7 @@ def results(
     opened: CampaignResults | RunRecord
     if holds_run(folder):
         opened = load_run(folder)
-        print_run(opened, _unit_of(folder))
+        print_run(opened, _scenario_of(folder))
     else:
         opened = open_results(folder)
         print_results(opened)
@@ -60,15 +61,15 @@ def results(
                 typer.echo(f"wrote {path}")
 
 
-def _unit_of(folder: Path) -> str:
-    """Of the OSPA of a saved run; none where the scenario is not kept beside it, or cannot be read."""
+def _scenario_of(folder: Path) -> Scenario | None:
+    """That of a saved run; None where it is not kept beside it, or cannot be read."""
     from vedette.scenarios import load_scenario
     from vedette.simulation.storage import SCENARIO
 
     try:
-        return load_scenario(folder / SCENARIO).model.ospa.unit
+        return load_scenario(folder / SCENARIO)
     except VedetteError:
-        return ""
+        return None
 
 
 def print_failures(failed: Sequence[Failed | Failure], *, err: bool = False) -> None:

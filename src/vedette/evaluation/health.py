@@ -36,6 +36,7 @@ class HealthSummary:
         worst_lost: most such labels at a scan.
         disjoint: share of the scans at which no label set is held by every sensor.
         worst_fusion_discarded: most weight that the fusion cut off.
+        sensors: what they are called.
     """
 
     num_scans: int
@@ -55,10 +56,14 @@ class HealthSummary:
     worst_lost: int
     disjoint: float
     worst_fusion_discarded: float
+    sensors: tuple[str, ...]
 
 
-def summarise_health(records: Sequence[RunRecord]) -> HealthSummary:
-    """The reports of runs with the same sensors. Raises `InputError` for no run or other numbers of sensors."""
+def summarise_health(records: Sequence[RunRecord], sensors: Sequence[str] = ()) -> HealthSummary:
+    """The reports of runs with the same sensors, which are called `sensors`, or else `sensor 1` and so on.
+
+    Raises `InputError` for no run or other numbers of sensors.
+    """
     if len({record.num_sensors for record in records}) != 1:
         raise InputError("records: expected one run or more, of equally many sensors")
 
@@ -89,19 +94,20 @@ def summarise_health(records: Sequence[RunRecord]) -> HealthSummary:
         worst_lost=int(lost.max()),
         disjoint=share(joined("fusion_empty_intersection") > 0),
         worst_fusion_discarded=float(joined("fusion_discarded_weight").max()),
+        sensors=tuple(sensors) or tuple(f"sensor {number + 1}" for number in range(records[0].num_sensors)),
     )
 
 
-def health_line(record: RunRecord) -> str:
+def health_line(record: RunRecord, sensors: Sequence[str] = ()) -> str:
     """A run's health in a line: `health: all exact`, or what was cut off, missing or left out."""
-    health = summarise_health([record])
+    health = summarise_health([record], sensors)
     statements = _statements(health, lambda share: f"{round(share * health.num_scans)} of {health.num_scans} scans")
     return f"health: {'; '.join(text for text, _ in statements) or 'all exact'}"
 
 
-def health_findings(records: Sequence[RunRecord]) -> tuple[str, ...]:
+def health_findings(records: Sequence[RunRecord], sensors: Sequence[str] = ()) -> tuple[str, ...]:
     """What of the health of some runs may have cost accuracy, in words; none where nothing did."""
-    statements = _statements(summarise_health(records), lambda share: f"{percent(share)} of the scans")
+    statements = _statements(summarise_health(records, sensors), lambda share: f"{percent(share)} of the scans")
     return tuple(text for text, is_much in statements if is_much)
 
 
@@ -136,7 +142,7 @@ def _of_fusion(health: HealthSummary, scans: Callable[[float], str]) -> Iterator
     worst = int(np.argmax(health.missing_sets))
     if health.missing_sets[worst]:
         share = percent(float(health.missing_sets[worst]))
-        yield f"{share} of label sets were missing at sensor {worst + 1}", False
+        yield f"{share} of label sets were missing at {health.sensors[worst]}", False
     cut = health.worst_fusion_discarded
     if cut:
         yield f"up to {percent(cut)} of the fused weight was cut off at a scan", cut > _MUCH
