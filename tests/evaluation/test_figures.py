@@ -116,7 +116,7 @@ def test_joint_rewards_are_a_heat_map_with_the_choice_framed_and_the_best_over_t
     frames = [patch.get_xy() for patch in upper.patches if isinstance(patch, Rectangle)]
     assert frames == [(decision.chosen[0] - 0.5, decision.chosen[1] - 0.5)] * 2
     np.testing.assert_allclose(lower.lines[0].get_ydata(), decision.tables[0].mean.max(axis=1))  # type: ignore[arg-type]
-    assert bar.get_ylabel() == "Joint reward (CS divergence)"
+    assert bar.get_ylabel() == "Joint reward\n(CS divergence)"
 
 
 def test_heat_map_of_any_pair_of_three_sensors() -> None:

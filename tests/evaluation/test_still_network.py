@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -76,7 +77,7 @@ def test_rewards_say_what_they_are(scenario: Scenario, records: dict[str, list[R
     upper, lower, bar = reward_figure(records["jdm"][0].decisions[0].plan, scene=scene_of(scenario, "jdm")).axes
     assert upper.get_xlabel() == "Heading of Boat Anna (deg)"
     assert lower.get_ylabel() == "Largest joint reward\n(minus expected loss, m²)"
-    assert bar.get_ylabel() == "Joint reward (minus expected loss, m²)"
+    assert bar.get_ylabel() == "Joint reward\n(minus expected loss, m²)"
     assert scene_of(load_scenario("paper-a"), "jdm").reward == "CS divergence"
     plain = reward_figure(make_plan("idm", np.random.default_rng(1)))
     assert plain.axes[0].get_ylabel() == "Reward"
@@ -191,7 +192,8 @@ def test_of_many_sensors_those_with_the_most_at_stake_are_drawn_and_legends_fit(
     roses = roses_figure(compare({"idm": [record]}))
     assert [text.get_text() for text in roses.legends[0].get_texts()] == ["40 sensors, taken together"]
     # Of 40 sensors eight chose each of five headings.
-    np.testing.assert_allclose([bar.get_height() ** 2 for bar in roses.axes[0].patches], 0.2)
+    bars: list[Any] = list(roses.axes[0].patches)
+    np.testing.assert_allclose([bar.get_height() ** 2 for bar in bars], 0.2)
     tracks = tracks_figure(record)
     assert not tracks.axes[0].texts
     for figure in (rewards, roses, tracks, reward_figure(record.decisions[0].plan)):

@@ -12,7 +12,7 @@ from matplotlib.patches import Ellipse, Patch, Wedge
 from matplotlib.ticker import MaxNLocator
 
 from vedette.evaluation.figures.labels import drawn_text
-from vedette.evaluation.figures.scene import draw_zones, zone_handles
+from vedette.evaluation.figures.scene import draw_zones, name_offsets, zone_handles
 from vedette.evaluation.figures.style import (
     COLUMN_WIDTH,
     GREY,
@@ -52,7 +52,7 @@ def scenario_figure(scenario: Scenario, truth: Truth) -> Figure:
         axis.set_major_locator(MaxNLocator(6, steps=[1, 2, 5, 10]))
     axes.set_xlabel(f"x ({unit})")
     axes.set_ylabel(f"y ({unit})")
-    axes.set_title(drawn_text(scenario.name))
+    axes.set_title(drawn_text(scenario.name), pad=14)  # above the names of sensors at the upper edge
     handles = [*_legend(scenario), *zone_handles(zones(scenario.model))]
     columns = legend_columns([str(handle.get_label()) for handle in handles])
     figure.legend(handles=handles, loc="outside lower center", ncols=columns)
@@ -92,7 +92,10 @@ def _draw_tracks(axes: Axes, truth: Truth, scale: float) -> None:
 
 def _draw_sensors(axes: Axes, scenario: Scenario, scale: float) -> None:
     model = scenario.model
-    for name, sensor in zip(sensor_names(model), model.sensors, strict=True):
+    region = scenario.model.region
+    extent = max(region.x_max - region.x_min, region.y_max - region.y_min)
+    offsets = name_offsets(np.array([sensor.position for sensor in model.sensors]), extent)
+    for name, sensor, offset in zip(sensor_names(model), model.sensors, offsets, strict=True):
         place = (sensor.position[0] * scale, sensor.position[1] * scale)
         if sensor.platform.top_speed > 0.0:
             _draw_heading(axes, place, np.radians(sensor.heading_deg))
@@ -102,7 +105,7 @@ def _draw_sensors(axes: Axes, scenario: Scenario, scale: float) -> None:
         axes.plot(*place, marker="s", markersize=6, color=INK, zorder=5)
         paper = {"boxstyle": "square,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.75}
         style: dict[str, Any] = {"textcoords": "offset points", "fontsize": 7, "zorder": 4.5, "bbox": paper}
-        axes.annotate(drawn_text(name), place, xytext=(0, 7), ha="center", **style)
+        axes.annotate(drawn_text(name), place, **offset, **style)
 
 
 def _draw_field(axes: Axes, place: tuple[float, float], field: FieldOfView, scale: float) -> None:

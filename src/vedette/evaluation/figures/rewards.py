@@ -27,6 +27,8 @@ from vedette.evaluation.figures.style import (
 from vedette.kernels.base.types import Floats
 from vedette.platforms import Actions
 
+_PANEL_WIDTH = 2.4  # inches, within the labels of a column
+
 
 @styled
 def reward_figure(plan: Plan, *, pair: tuple[int, int] | None = None, scene: Scene | None = None) -> Figure:
@@ -110,7 +112,7 @@ def _draw_curves(axes: Axes, plan: Plan, sensors: Sequence[int], scene: Scene, l
     mark_actions(axes, action_axis(plan.actions[sensors[0]]))
     axes.set_ylabel(scene.reward_title("Largest joint reward" if joint else "Reward").replace(" (", "\n("))
     # Above the panel: wherever a legend would lie inside, some curve passes.
-    columns = legend_columns([str(each) for each in axes.get_legend_handles_labels()[1]])
+    columns = legend_columns([str(each) for each in axes.get_legend_handles_labels()[1]], width=_PANEL_WIDTH)
     axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=columns, frameon=False, handlelength=1.8)
 
 
@@ -191,4 +193,4 @@ def _draw_heat_map(
     column, row = plan.chosen[pair[0]], plan.chosen[pair[1]]
     for shade, width in (("black", 2.6), ("white", 1.2)):  # legible on the dark and on the light end of the scale
         axes.add_patch(Rectangle((column - 0.5, row - 0.5), 1, 1, fill=False, edgecolor=shade, linewidth=width))
-    figure.colorbar(image, ax=axes, label=scene.reward_title("Joint reward"))
+    figure.colorbar(image, ax=axes, label=scene.reward_title("Joint reward").replace(" (", "\n("))

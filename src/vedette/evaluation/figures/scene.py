@@ -19,6 +19,7 @@ from vedette.scenarios.sections.planners import STRATEGIES, NamedIndependent, Na
 from vedette.scenarios.views import INSIDE, NO_GO, REGION, Zone, zones
 from vedette.text import elided
 
+_NEAR = 0.1  # of the extent of a figure
 _ZONES: dict[str, dict[str, Any]] = {
     REGION: {"edgecolor": GREY, "linewidth": 0.8, "linestyle": "--"},
     INSIDE: {"edgecolor": INK, "linewidth": 0.8, "linestyle": "-."},
@@ -68,6 +69,19 @@ def scene_of(scenario: Scenario, planner: str) -> Scene:
     elif planner in STRATEGIES:
         words = model.control.reward.words
     return Scene(sensor_names(model), words, zones(model))
+
+
+def name_offsets(places: Floats, extent: float) -> list[dict[str, Any]]:
+    """Where the names of sensors stand, given (num, 2) places: above, or below where one near by is above."""
+    above: list[Floats] = []
+    offsets: list[dict[str, Any]] = []
+    for place in places:
+        if any(np.hypot(*(place - other)) < _NEAR * extent for other in above):
+            offsets.append({"xytext": (0, -7), "va": "top", "ha": "center"})
+        else:
+            above.append(place)
+            offsets.append({"xytext": (0, 7), "ha": "center"})
+    return offsets
 
 
 def draw_zones(axes: Axes, drawn: Sequence[Zone], scale: float) -> None:

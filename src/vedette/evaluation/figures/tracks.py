@@ -17,7 +17,7 @@ from vedette.errors import InputError
 from vedette.evaluation.comparison import Comparison
 from vedette.evaluation.figures.labels import drawn_text, short_label
 from vedette.evaluation.figures.ospa import draw_ospa
-from vedette.evaluation.figures.scene import Scene, draw_zones, zone_handles
+from vedette.evaluation.figures.scene import Scene, draw_zones, name_offsets, zone_handles
 from vedette.evaluation.figures.style import (
     COLUMN_WIDTH,
     GREY,
@@ -32,15 +32,16 @@ from vedette.kernels.base.types import Floats, Ints
 from vedette.simulation.records import Decision, RunRecord
 
 _LARGE = 5000.0  # m, beyond which axes are in kilometres
+_TITLE_PAD = 14  # points, above the names of sensors at the upper edge
 _SENSOR_MARKERS = "sDpP*X"
-_MOST_NAMED = 8  # sensors, of which there is room for names and decisions
+_MOST_NAMED, _MOST_DECISIONS = 8, 12  # sensors whose names, and decisions whose numbers, there is room for
 
 
 @styled
 def tracks_figure(*records: RunRecord, titles: Sequence[str] | None = None, scene: Scene | None = None) -> Figure:
     """Truth, estimates, sensor paths, decisions and zones in the plane; one panel a run, on equal axes.
 
-    Of more than eight sensors, names and decisions are left out.
+    Of more than eight sensors, names and decisions are left out; so are more than twelve decisions.
 
     Args:
         records: one run fills a column, two fill the width of the page.
@@ -62,7 +63,7 @@ def tracks_figure(*records: RunRecord, titles: Sequence[str] | None = None, scen
     scale = 1e-3 if _reach(records) > _LARGE else 1.0
     for panel, record, name in zip(panels, records, names, strict=True):
         draw_tracks(panel, record, scale, scene)
-        panel.set_title(drawn_text(name))
+        panel.set_title(drawn_text(name), pad=_TITLE_PAD)
     frame_tracks(panels[0], records, scale, scene)
     _add_legend(figure, records[0], scene)
     return figure
@@ -93,7 +94,7 @@ def overview_figure(
     shade = colour(comparison.strategies.index(strategy))
     draw_tracks(left, record, scale, scene, shade)
     frame_tracks(left, [record], scale, scene)
-    left.set_title(f"{short_label(strategy)}, run {record.run}")
+    left.set_title(f"{short_label(strategy)}, run {record.run}", pad=_TITLE_PAD)
     draw_ospa(right, comparison, "total")
     several = f", mean of {comparison.num_runs} runs" if comparison.num_runs > 1 else " of one run"
     right.set_ylabel(f"{right.get_ylabel()}{several}")
@@ -175,7 +176,10 @@ def _draw_sensor(axes: Axes, record: RunRecord, sensor: int, scale: float, scene
     axes.plot(*path[0], marker=marker, color=INK, markerfacecolor=GREY, markersize=9, zorder=6)
     paper = {"boxstyle": "square,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.75}
     style: dict[str, Any] = {"textcoords": "offset points", "fontsize": 7, "zorder": 9, "bbox": paper}
-    axes.annotate(scene.name(sensor), _point(path[0]), xytext=(0, 7), ha="center", **style)
+    offset = name_offsets(record.poses[0, :, :2], _reach([record]))[sensor]
+    axes.annotate(scene.name(sensor), _point(path[0]), **offset, **style)
+    if len(record.decisions) > _MOST_DECISIONS:
+        return
     for number, decision in enumerate(record.decisions, start=1):
         if len(decision.plan.actions[sensor]) == 1:
             continue
@@ -229,7 +233,7 @@ def _add_legend(figure: Figure, record: RunRecord, scene: Scene, shade: str = ""
         ),
         "sensor, path" if moved else "sensor": Line2D([], [], marker="s", color=GREY, markersize=4.5, **path),
     }
-    if record.decisions and record.num_sensors <= _MOST_NAMED:
+    if 0 < len(record.decisions) <= _MOST_DECISIONS and record.num_sensors <= _MOST_NAMED:
         shown["decision"] = Line2D([], [], linestyle="", marker="$\\rightarrow$", color=INK, markersize=8)
     shown |= {str(patch.get_label()): patch for patch in zone_handles(scene.zones)}
     columns = legend_columns(list(shown), width=figure.get_figwidth())
