@@ -4,10 +4,9 @@
 
 Of this project's own files (tests/filters/recordings), and of those of other programs where they are at hand: in the
 folder that VEDETTE_RECORDED_SCANS names, or in shared/reference beside the checkout (docs/recorded-scans.md).
-OSPA with c = 100 m and p = 1, mean over 100 scans, then
-mean and standard deviation over the files; CPU time of a step, median over scans and files. With `--redraws` the targets
-of each file are seen anew N times, detections, noise and clutter drawn by its parameters: mean with standard error,
-standard deviation, best and worst over the draws of all files.
+OSPA with c = 100 m and p = 1, mean over 100 scans, then mean and standard deviation over the files; CPU time of a step,
+median over scans and files. With `--redraws` the targets of each file are seen anew N times, detections, noise and
+clutter drawn by its parameters: mean with standard error, standard deviation, best and worst over all draws.
 """
 
 from __future__ import annotations

@@ -15,6 +15,7 @@ from vedette.cli.results import results
 from vedette.cli.running import run
 from vedette.cli.scenario_files import check, crowd, generate, init, list_, schema
 from vedette.cli.show import show
+from vedette.cli.upgrading import upgrade
 
 app = typer.Typer(
     cls=Commands,
@@ -53,3 +54,4 @@ app.command()(reproduce)
 app.command()(campaign)
 app.command()(results)
 app.command()(report)
+app.command()(upgrade)

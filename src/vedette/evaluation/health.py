@@ -27,7 +27,7 @@ class HealthSummary:
         mean_discarded, worst_discarded: upper bound on the share of a filter's weight that was cut off; NaN where it is
             not known.
         mean_factoring, worst_factoring: upper bound on the L1 error that a factored filter made by taking labels as
-            independent.
+            independent; NaN where it is not known.
         worst_dropped: expected number of targets in labels that a filter dropped at one scan.
         duplicates, clutter_raised: measurements in all.
         missing_sets: (num_sensors,) share of the fused label sets (CLMB: labels) that the sensor lacks.
@@ -73,8 +73,8 @@ def summarise_health(records: Sequence[RunRecord], sensors: Sequence[str] = ()) 
     def share(at_sensors: Bools) -> float:
         return float(at_sensors.reshape(len(at_sensors), -1).any(axis=1).mean())
 
-    discarded = joined("discarded_weight_bound")
-    known = discarded[~np.isnan(discarded)]
+    discarded, factoring = joined("discarded_weight_bound"), joined("factoring_error")
+    known, factoring = discarded[~np.isnan(discarded)], factoring[~np.isnan(factoring)]
     lost = joined("fusion_num_lost_labels")
     return HealthSummary(
         num_scans=len(discarded),
@@ -83,8 +83,8 @@ def summarise_health(records: Sequence[RunRecord], sensors: Sequence[str] = ()) 
         inexact=share(joined("num_inexact_clusters") > 0),
         mean_discarded=float(known.mean()) if len(known) else np.nan,
         worst_discarded=float(known.max()) if len(known) else np.nan,
-        mean_factoring=float(joined("factoring_error").mean()),
-        worst_factoring=float(joined("factoring_error").max()),
+        mean_factoring=float(factoring.mean()) if len(factoring) else np.nan,
+        worst_factoring=float(factoring.max()) if len(factoring) else np.nan,
         worst_dropped=float(joined("dropped_existence").max()),
         duplicates=int(joined("num_duplicates").sum()),
         clutter_raised=int(joined("num_clutter_raised").sum()),
@@ -162,7 +162,9 @@ def _of_filters(health: HealthSummary, scans: Callable[[float], str]) -> Iterato
         yield cap, True
     elif np.isnan(worst):
         yield "how much weight was cut off is not known", False
-    if health.worst_factoring:
+    if np.isnan(health.worst_factoring):
+        yield "how much weight was moved by taking labels as independent is not known", False
+    elif health.worst_factoring:
         mean = health.mean_factoring
         yield (
             f"taking labels as independent moved up to {percent(health.worst_factoring / 2.0)} of a filter's weight at "
