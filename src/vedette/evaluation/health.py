@@ -120,6 +120,11 @@ def percent(share: float) -> str:
     return f"{share:.0%}".replace("%", " %")
 
 
+def _at_most(bound: float) -> str:
+    """An upper bound on a share, in words."""
+    return "less than 1 %" if bound < 0.01 else f"at most {percent(bound)}"
+
+
 def _statements(health: HealthSummary, scans: Callable[[float], str]) -> list[tuple[str, bool]]:
     """Everything that was not exact, the gravest first, and whether it is more than a trifle."""
     found = [*_of_fusion(health, scans), *_of_filters(health, scans)]
@@ -156,7 +161,8 @@ def _of_filters(health: HealthSummary, scans: Callable[[float], str]) -> Iterato
     worst = health.worst_discarded
     cap = f"a cap was met at {scans(health.cap_met)}" if health.cap_met else ""
     if worst > 0.0:  # neither none nor unknown
-        bound = f"up to {percent(worst)} of a filter's weight was cut off ({percent(health.mean_discarded)} on average)"
+        on_average = _at_most(health.mean_discarded)
+        bound = f"{_at_most(worst)} of a filter's weight was cut off at a scan ({on_average} on average)"
         yield f"{cap}, and {bound}" if cap else bound, worst > _MUCH
     elif cap:
         yield cap, True
@@ -167,8 +173,8 @@ def _of_filters(health: HealthSummary, scans: Callable[[float], str]) -> Iterato
     elif health.worst_factoring:
         mean = health.mean_factoring
         yield (
-            f"taking labels as independent moved up to {percent(health.worst_factoring / 2.0)} of a filter's weight at "
-            f"a scan ({percent(mean / 2.0)} on average)",
+            f"taking labels as independent moved {_at_most(health.worst_factoring / 2.0)} of a filter's weight at a "
+            f"scan ({_at_most(mean / 2.0)} on average)",
             mean > 10.0 * _MUCH,
         )
     if health.worst_dropped:

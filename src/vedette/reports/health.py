@@ -41,17 +41,20 @@ _ROWS = (
     _Row("Search cut short", f"ranking stopped at max_search_nodes; {_SCANS}", lambda h: percent(h.search_cut)),
     _Row("Cluster not exact", f"summed over its heaviest joint choices only; {_SCANS}", lambda h: percent(h.inexact)),
     _Row(
-        "Weight cut off, mean",
-        "upper bound on the share of a filter's weight that its caps left out, mean over scans and sensors",
+        "Weight cut off at most, mean",
+        "upper bound on the share of a filter's weight that its caps left out at a scan, mean over scans and sensors; "
+        "how far it moves the estimates is another question (the report's documentation has a study of it)",
         lambda h: _weight(h.mean_discarded),
     ),
-    _Row("Weight cut off, worst", "the same at the worst scan", lambda h: _weight(h.worst_discarded)),
+    _Row("Weight cut off at most, worst", "the same at the worst scan", lambda h: _weight(h.worst_discarded)),
     _Row(
-        "Taken as independent, mean",
+        "Taken as independent at most, mean",
         "upper bound on the share of a factored filter's weight that was moved by it, mean over scans and sensors",
         lambda h: _weight(h.mean_factoring / 2.0),
     ),
-    _Row("Taken as independent, worst", "the same at the worst scan", lambda h: _weight(h.worst_factoring / 2.0)),
+    _Row(
+        "Taken as independent at most, worst", "the same at the worst scan", lambda h: _weight(h.worst_factoring / 2.0)
+    ),
     _Row(
         "Targets dropped, worst",
         "expected number of targets in labels that a filter dropped at a scan",
