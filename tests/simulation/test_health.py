@@ -142,7 +142,7 @@ def test_all_exact_is_said_only_where_nothing_was_cut_off() -> None:
 
 def test_a_bound_is_told_as_one() -> None:
     record = _synthetic()
-    record.health.discarded_weight_bound[:] = 0.004
+    record.health.discarded_weight_bound[:] = 0.0004
     record.health.factoring_error[:] = 0.0
     assert "less than 1 % of a filter's weight was cut off at a scan (less than 1 % on average)" in health_line(record)
     record.health.discarded_weight_bound[3, 1] = 0.72
