@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -137,7 +138,8 @@ def test_in_the_paper_scenario_the_bound_is_what_was_cut_off():
     fewer = {"time.num_steps": 14, "ospa.from_step": 1, "ospa.to_step": 14, "control.decision_steps": None}
     scenario = with_fields(load_scenario("paper-a"), {**fewer, "filter.limits.max_hypotheses": 100})
     record = run_scenario(scenario, "still", seed=0, run=1, num_threads=1)
-    tracker, scans = build_sensors(scenario)[0].filter, scans_of(record, build_experiment(scenario))
+    tracker: Any = build_sensors(scenario)[0].filter
+    scans: Any = scans_of(record, build_experiment(scenario))
     every = replace(tracker, limits=replace(tracker.limits, max_hypotheses=10**6, min_relative_weight=1e-16))
     belief, most = tracker.initial(), 0.0
     for at in range(record.num_scans):

@@ -49,7 +49,7 @@ def replay_data(strategy: Strategy, record: RunRecord, group: str, *, trust: boo
     sensors = [_sensor(name, section) for name, section in zip(names, sections, strict=True)]
     has_velocity = scenario.model.motion.kind != "custom"
     axes = dict[str, dict[str, Any]]()
-    decisions = [_decision(*each, axes) for each in zip(record.decisions, choices_of(record), strict=True)]
+    decisions = [_decision(*each, axes, names) for each in zip(record.decisions, choices_of(record), strict=True)]
     return {
         "cell": strategy.cell.name,
         "group": group,
@@ -210,7 +210,9 @@ def _measurements(scan: Scan | None, kind: str, pose: Floats, places: int) -> li
     return found
 
 
-def _decision(decision: Decision, choice: Choice, axes: dict[str, dict[str, Any]]) -> dict[str, Any]:
+def _decision(
+    decision: Decision, choice: Choice, axes: dict[str, dict[str, Any]], names: Sequence[str]
+) -> dict[str, Any]:
     plan = decision.plan
     return {
         "scan": decision.step - 1,
@@ -218,7 +220,7 @@ def _decision(decision: Decision, choice: Choice, axes: dict[str, dict[str, Any]
         "notes": plan.notes,
         "curves": _curves(plan, axes),
         "map": _map(plan),
-        "why": why_data(plan),
+        "why": why_data(plan, names),
     }
 
 

@@ -137,7 +137,7 @@ function drawSensor(context, run, view, step, s) {
   }
   context.fillRect(px - 5.5, py - 5.5, 11, 11);
   context.strokeRect(px - 5.5, py - 5.5, 11, 11);
-  if (run.sensors.length <= MOST_NAMED) mark(context, clipped(name, 20), px, py + 17, colours.ink);
+  if (run.sensors.length <= MOST_NAMED) mark(context, clipped(name, 20), px, py + (py + 24 < MARGIN.top + view.inner.height ? 17 : -17), colours.ink);
 }
 
 function drawTarget(context, view, [target, x, y], show) {
