@@ -18,6 +18,7 @@ from vedette.densities.estimates import Estimate
 from vedette.errors import InputError
 from vedette.evaluation import Comparison, compare
 from vedette.evaluation.figures import (
+    Scene,
     cost_figure,
     distributions_figure,
     ospa_figure,
@@ -52,7 +53,7 @@ def test_tracks_show_every_target_label_and_sensor_on_equal_axes() -> None:
     assert np.ptp(axes.get_xlim()) == pytest.approx(np.ptp(axes.get_ylim()))
     longest = sorted(len(line.get_xdata()) for line in axes.lines)[-2:]  # type: ignore[arg-type]
     assert longest == [record.num_scans] * 2
-    assert {text.get_text() for text in axes.texts} >= {"S1", "S2", "1", "2", "3"}
+    assert {text.get_text() for text in axes.texts} >= {"sensor 1", "sensor 2", "1", "2", "3"}
 
 
 def test_tracks_of_two_runs_share_their_axes() -> None:
@@ -85,8 +86,8 @@ def test_tracks_refuse_no_run_and_other_numbers_of_titles() -> None:
 
 def test_independent_rewards_are_one_curve_a_sensor_in_degrees() -> None:
     decision = plan("idm")
-    (axes,) = reward_figure(decision).axes
-    assert (axes.get_xlabel(), axes.get_ylabel()) == ("Heading (deg)", "Reward (CS divergence)")
+    (axes,) = reward_figure(decision, scene=Scene(reward="CS divergence")).axes
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("Heading (deg)", "Reward\n(CS divergence)")
     curve = axes.lines[0]
     np.testing.assert_allclose(curve.get_xdata(), DEGREES)  # type: ignore[arg-type]
     np.testing.assert_allclose(curve.get_ydata(), decision.tables[0].mean)  # type: ignore[arg-type]
@@ -110,12 +111,12 @@ def test_curves_run_from_west_to_west_whatever_the_order_of_the_actions() -> Non
 
 def test_joint_rewards_are_a_heat_map_with_the_choice_framed_and_the_best_over_the_others() -> None:
     decision = plan("jdm")
-    upper, lower, bar = reward_figure(decision).axes
+    upper, lower, bar = reward_figure(decision, scene=Scene(reward="CS divergence")).axes
     np.testing.assert_array_equal(upper.images[0].get_array(), decision.tables[0].mean.T)
     frames = [patch.get_xy() for patch in upper.patches if isinstance(patch, Rectangle)]
     assert frames == [(decision.chosen[0] - 0.5, decision.chosen[1] - 0.5)] * 2
     np.testing.assert_allclose(lower.lines[0].get_ydata(), decision.tables[0].mean.max(axis=1))  # type: ignore[arg-type]
-    assert bar.get_ylabel() == "Joint reward (CS divergence)"
+    assert bar.get_ylabel() == "Joint reward\n(CS divergence)"
 
 
 def test_heat_map_of_any_pair_of_three_sensors() -> None:
@@ -167,8 +168,8 @@ def test_ospa_has_a_curve_and_a_band_a_strategy_and_marks_decisions(comparison: 
 
 def test_overview_shows_a_run_beside_the_errors(comparison: Comparison) -> None:
     left, right = overview_figure(make_record(), comparison).axes
-    assert (left.get_title(), right.get_title()) == ("JDM, one run", "Mean of 4 runs")
-    assert (left.get_ylabel(), right.get_ylabel()) == ("y (m)", "OSPA (m)")
+    assert left.get_title() == "JDM, run 0"
+    assert (left.get_ylabel(), right.get_ylabel()) == ("y (m)", "OSPA (m), mean of 4 runs")
 
 
 def test_ospa_parts_are_panels(comparison: Comparison) -> None:

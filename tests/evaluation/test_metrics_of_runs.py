@@ -66,10 +66,12 @@ def test_nees_is_the_mean_over_the_pairs_of_the_scan() -> None:
         if not near.any():
             assert math.isnan(metrics.nees_mean[scan])
             assert math.isnan(metrics.position_nees_mean[scan])
+            assert math.isnan(metrics.position_nees_max[scan])
             continue
         full, position = nees(errors, estimate.covs)[near], nees(errors[:, :2], estimate.covs[:, :2, :2])[near]
         assert metrics.nees_mean[scan] == pytest.approx(full.mean())
         assert metrics.position_nees_mean[scan] == pytest.approx(position.mean())
+        assert metrics.position_nees_max[scan] == pytest.approx(position.max())
 
 
 def test_states_of_another_dimension_have_a_nees_of_position_alone() -> None:

@@ -83,16 +83,27 @@ def scans_of(recording: Recording, sensor: int) -> list[Any]:
 def redraw(recording: Recording, *, rng: np.random.Generator) -> Recording:
     """The same targets seen anew: detections, noise and clutter drawn by the parameters of the file."""
     parameters = recording.parameters
-    scans = []
-    for positions in recording.positions:
-        seen = positions[rng.random(len(positions)) < parameters["P_D"][0]]
-        if len(parameters["X_true"]) == 5:
-            seen = np.column_stack([np.arctan2(seen[:, 0], seen[:, 1]), np.hypot(seen[:, 0], seen[:, 1])])
-        seen = seen + rng.normal(size=seen.shape) * np.sqrt(np.diagonal(parameters["R"]))
-        low, high = parameters["range_c"].T
-        clutter = rng.uniform(low, high, (rng.poisson(parameters["lambda_c"][0]), 2))
-        scans.append(rng.permutation(np.concatenate([seen, clutter])))
-    return replace(recording, scans=tuple(scans))
+    scans, numbers = [], []
+    for number, positions in enumerate(recording.positions, start=1):
+        of_sensors = [_seen_anew(parameters, sensor, positions, rng) for sensor in range(len(parameters["P_D"]))]
+        scans.append(np.concatenate(of_sensors))
+        numbers += [(number, sensor) for sensor, scan in enumerate(of_sensors, start=1) for _ in scan]
+    steps, sensors = np.array(numbers).T
+    drawn = {"Z": np.concatenate(scans).T, "Zk": steps} | ({"Zs": sensors} if "n_sensors" in parameters else {})
+    return replace(recording, scans=tuple(scans), parameters={**parameters, **drawn})
+
+
+def _seen_anew(parameters: dict[str, Any], sensor: int, positions: Any, rng: np.random.Generator) -> Any:
+    """One scan of a sensor, counted from 0."""
+    several = "n_sensors" in parameters
+    seen = positions[rng.random(len(positions)) < parameters["P_D"][sensor]]
+    if len(parameters["X_true"]) == 5:
+        seen = np.column_stack([np.arctan2(seen[:, 0], seen[:, 1]), np.hypot(seen[:, 0], seen[:, 1])])
+    cov = parameters["R_sensor"][:, :, sensor] if several else parameters["R"]
+    seen = seen + rng.normal(size=seen.shape) * np.sqrt(np.diagonal(cov))
+    low, high = parameters["region" if several else "range_c"].T
+    clutter = rng.uniform(low, high, (rng.poisson(parameters["lambda_c"][sensor]), 2))
+    return rng.permutation(np.concatenate([seen, clutter]))
 
 
 @models.model_function("measurement")

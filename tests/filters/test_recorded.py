@@ -100,3 +100,20 @@ def test_the_files_are_what_the_script_writes(family):
                     assert archive[name] == values
                 else:
                     np.testing.assert_allclose(archive[name], values, rtol=1e-6, atol=1e-6)
+
+
+@pytest.mark.parametrize("family", ["lin30", "ct15", "mslin3"])
+def test_targets_seen_anew_are_seen_as_the_file_says(family):
+    original = recorded.load(family, 1)
+    parameters = original.parameters
+    draws = [recorded.redraw(original, rng=np.random.default_rng(draw)) for draw in range(20)]
+    num_targets = sum(map(len, original.positions))
+    for sensor, (probability, rate) in enumerate(zip(parameters["P_D"], parameters["lambda_c"], strict=True)):
+        if family == "mslin3":
+            of_draws = [recorded.scans_of(draw, sensor) for draw in draws]
+        else:
+            of_draws = [list(draw.scans) for draw in draws]
+        assert {len(scans) for scans in of_draws} == {100}
+        mean = np.mean([sum(map(len, scans)) for scans in of_draws])
+        assert mean == pytest.approx(probability * num_targets + 100.0 * rate, rel=0.03)
+    assert sum(map(len, draws[0].scans)) == draws[0].parameters["Z"].shape[1]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,7 +12,12 @@ import pytest
 from filters.examples import DT, SCENES, assert_same_glmb, linear_scene, plain_glmb
 from reference import glmb as oracle
 from vedette.densities import GLMB, TrackTable
+from vedette.evaluation.runs import run_scenario
 from vedette.filters import Limits
+from vedette.scenarios import load_scenario
+from vedette.scenarios.build import build_experiment, build_sensors
+from vedette.scenarios.overrides import with_fields
+from vedette.simulation.replay import scans_of
 
 pytestmark = pytest.mark.lanes
 
@@ -124,3 +130,27 @@ def test_gibbs_converges_to_ranked():
         distances.append(sum(abs(weights.get(labels, 0.0) - got.get(labels, 0.0)) for labels in weights | got))
     assert distances[0] > distances[1] > distances[2]
     assert distances[2] < 1e-6
+
+
+@pytest.mark.slow
+def test_in_the_paper_scenario_the_bound_is_what_was_cut_off():
+    """Much of a scan's weight lies in variations beyond the cap, however little they matter."""
+    fewer = {"time.num_steps": 14, "ospa.from_step": 1, "ospa.to_step": 14, "control.decision_steps": None}
+    scenario = with_fields(load_scenario("paper-a"), {**fewer, "filter.limits.max_hypotheses": 100})
+    record = run_scenario(scenario, "still", seed=0, run=1, num_threads=1)
+    tracker: Any = build_sensors(scenario)[0].filter
+    scans: Any = scans_of(record, build_experiment(scenario))
+    every = replace(tracker, limits=replace(tracker.limits, max_hypotheses=10**6, min_relative_weight=1e-16))
+    belief, most = tracker.initial(), 0.0
+    for at in range(record.num_scans):
+        arguments = scans[at][0].measurements, record.poses[at, 0], 1.0, at + 1
+        if at >= 8:
+            _, whole = every.step(belief, *arguments, rng=np.random.default_rng(0))
+            assert not whole.cap_met
+        belief, info = tracker.step(belief, *arguments, rng=np.random.default_rng(0))
+        if at >= 8:
+            discarded = -math.expm1(info.log_likelihood - whole.log_likelihood)
+            assert discarded <= info.discarded_weight_bound + 1e-9
+            assert info.discarded_weight_bound == pytest.approx(discarded, abs=2e-3)
+            most = max(most, discarded)
+    assert most > 0.5

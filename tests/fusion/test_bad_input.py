@@ -52,12 +52,14 @@ def test_floors(floor: Any) -> None:
 
 
 def test_words_and_flags() -> None:
-    for rule in (Clmb, CmDeltaGlmb):
+    powers: list[Any] = [Clmb, CmDeltaGlmb]
+    for rule in powers:
         with pytest.raises(InputError, match="mixture_power: expected one of auto, "):
-            rule(EQUAL, mixture_power=["auto"])  # type: ignore[arg-type]
-    for rule in (Clmb, ArithmeticAverage):
+            rule(EQUAL, mixture_power=["auto"])
+    by_views: list[Any] = [Clmb, ArithmeticAverage]
+    for rule in by_views:
         with pytest.raises(InputError, match="by_views: expected true or false; got yes"):
-            rule(EQUAL, by_views="yes")  # type: ignore[arg-type]
+            rule(EQUAL, by_views="yes")
     with pytest.raises(InputError, match="rule: expected a Fusion; got None"):
         Matched(None)  # type: ignore[arg-type]
     for gate in (None, "a", 0.0, math.nan):

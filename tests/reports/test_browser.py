@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 
+from evaluation.still_network import NAMES, STILL_NETWORK
 from reports.browser import Browser, Page, chromium
 from reports.examples import MIXED_SENSORS, SUMS, campaign_of, results_of
 from vedette.reports import write_report
@@ -265,6 +266,19 @@ def test_pointing_at_a_reward_says_its_actions_and_its_value(page: Page) -> None
     assert page.complaints() == []
 
 
+def test_a_network_with_names_and_zones_opens_without_complaints(browser: Browser, tmp_path: Path) -> None:
+    results = results_of(tmp_path / "results", campaign_of(planners=["jdm", "idm"], runs=1, set=STILL_NETWORK))
+    write_report(results, tmp_path / "page.html")
+    page = browser.open(tmp_path / "page.html")
+    page.evaluate("document.getElementById('replay').focus()")
+    page.press("End")
+    assert page.complaints() == []
+    assert text(page, "reward-title") == "Reward (minus expected loss, m²)"
+    shown = str(page.evaluate("document.body.innerText"))
+    assert all(word in shown for word in (*NAMES, "no-go zone", "sensors stay inside"))
+    assert not re.search(r"\bsensor 1\b|\bS1\b", shown)
+
+
 def test_the_replay_shows_why_a_decision_was_taken(browser: Browser, tmp_path: Path) -> None:
     """Bars of targets and sensors at the decision on display; nothing before the first."""
     write_report(
@@ -281,7 +295,7 @@ def test_the_replay_shows_why_a_decision_was_taken(browser: Browser, tmp_path: P
         assert not page.evaluate("document.querySelector('[data-part=why]').hidden")
         assert "Second best" in text(page, "why-facts")
         assert "the best of all joint actions" in text(page, "why-facts")
-        for part, names in (("targets", ["1.0", "1.1", "1.2", "1.3"]), ("sensors", ["1: ", "2: "])):
+        for part, names in (("targets", ["1.0", "1.1", "1.2", "1.3"]), ("sensors", ["sensor 1: ", "sensor 2: "])):
             shown = page.evaluate(
                 f"[...document.querySelectorAll('[data-part=why-{part}] .name')].map((each) => each.textContent)"
             )

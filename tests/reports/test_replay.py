@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from evaluation.still_network import NAMES, POLYGON, STILL_NETWORK
 from evaluation.synthetic import make_record
 from reports.examples import MIXED_SENSORS, SUMS, campaign_of, results_of
 from simulation.test_explained import explanation_of
@@ -101,6 +102,18 @@ def test_a_joint_decision_is_a_map_and_curves_with_the_choice(strategies: Mappin
     for curve, chosen in zip(decision["curves"], (i, j), strict=True):
         assert curve["chosen"] == chosen
         assert max(curve["mean"]) == curve["mean"][chosen]
+
+
+def test_a_sensor_that_stands_has_no_rewards_and_zones_are_there(tmp_path: Path) -> None:
+    both = strategies_of(tmp_path / "results", planners=["jdm", "idm"], set=STILL_NETWORK)
+    joint, alone = (replay_data(both[name], both[name].records[0], "", trust=True) for name in ("jdm", "idm"))
+    assert [sensor["name"] for sensor in joint["sensors"]] == list(NAMES)
+    assert joint["decisions"][0]["map"]["sensors"] == (1, 2)
+    for data in (joint, alone):
+        assert [curve["sensor"] for curve in data["decisions"][0]["curves"]] == [1, 2]
+        assert data["reward"] == "minus expected loss, m²"
+        assert [kind for kind, _ in data["zones"]] == ["region", "no-go zone", "sensors stay inside"]
+        assert data["zones"][1][1] == POLYGON
 
 
 def test_independent_decisions_are_curves_and_fixed_ones_nothing(strategies: Mapping[str, Strategy]) -> None:

@@ -140,6 +140,18 @@ def test_all_exact_is_said_only_where_nothing_was_cut_off() -> None:
         assert health_line(replace(record, health=health)) != "health: all exact", name
 
 
+def test_a_bound_is_told_as_one() -> None:
+    record = _synthetic()
+    record.health.discarded_weight_bound[:] = 0.0004
+    record.health.factoring_error[:] = 0.0
+    assert "less than 1 % of a filter's weight was cut off at a scan (less than 1 % on average)" in health_line(record)
+    record.health.discarded_weight_bound[3, 1] = 0.72
+    record.health.factoring_error[2, 0] = 0.5
+    line = health_line(record)
+    assert "at most 72 % of a filter's weight was cut off at a scan (less than 1 % on average)" in line
+    assert "taking labels as independent moved at most 25 % of a filter's weight at a scan" in line
+
+
 def test_weight_that_is_unknown_is_not_said_to_be_none() -> None:
     health = Health.unreported(40, 2)
     health.discarded_weight_bound[:] = math.nan

@@ -201,7 +201,7 @@ def test_altered_and_truncated_files_are_named(saved: Path, file: str) -> None:
         ("{", "cut short or altered"),
         ("[]", "got another file"),
         ('{"format": "photo album"}', "got another file"),
-        ('{"format": "vedette-run", "format_version": 99}', "format 6; got 99, written by another version"),
+        ('{"format": "vedette-run", "format_version": 99}', "format 6; got 99, written by a later version"),
         (
             '{"format": "vedette-run", "format_version": 3, "versions": {"vedette": "0.1"}}',
             "expected format 6; got 3, written by an earlier version of this program: run it again, or read it with "

@@ -9,12 +9,14 @@ from __future__ import annotations
 import io
 import json
 import zipfile
+from typing import Any
 
 from vedette.errors import InputError
 from vedette.reading import parse_json, read_members, said
 from vedette.simulation.kept import decode_run, encode_run
 from vedette.simulation.records import RunRecord
 from vedette.simulation.tables import run_facts
+from vedette.simulation.upgrading import upgraded_files
 
 _RUN = "run.json"
 _EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest that a zip archive can say
@@ -41,6 +43,18 @@ def decode(payload: bytes, timings: bytes | None = None) -> RunRecord:
 
     Raises `InputError` for bytes that are not those of a run.
     """
+    facts, members = _members(payload)
+    return decode_run(facts, members, "run", timings)
+
+
+def upgraded(payload: bytes, number: int) -> bytes:
+    """The bytes of a run of a format `number` in the present one. Raises `InputError` as `decode`."""
+    facts, members = _members(payload)
+    return encode(decode_run(facts, upgraded_files(members, number), "run"))
+
+
+def _members(payload: bytes) -> tuple[dict[str, Any], dict[str, bytes]]:
+    """What names a run, and its files."""
     try:
         members = read_members(payload)
         facts = parse_json(members[_RUN])
@@ -50,4 +64,4 @@ def decode(payload: bytes, timings: bytes | None = None) -> RunRecord:
         raise InputError(
             f"run: expected the bytes of a run; got others: {type(error).__name__}: {said(error)}"
         ) from error
-    return decode_run(facts, members, "run", timings)
+    return facts, members

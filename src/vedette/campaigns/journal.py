@@ -10,7 +10,7 @@ import hashlib
 import itertools
 import sqlite3
 import zlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -145,6 +145,33 @@ class Writer:
         assert self._database is not None
         with _explained(self._path, f"cell {cell}, run {run}: "):
             self._database.execute("UPDATE runs SET metrics = ?, metrics_sha256 = ? WHERE cell = ? AND run = ?", row)
+
+    def rewrite(self, payload: Callable[[Entry], bytes]) -> None:
+        """Give every run another payload, all in one transaction.
+
+        Raises `InputError`, and changes nothing, for a run that is not as it was written, and as `payload` does.
+        """
+        assert self._database is not None
+        with _explained(self._path):
+            keys = self._database.execute("SELECT cell, run FROM runs ORDER BY cell, run").fetchall()
+            self._database.execute("BEGIN IMMEDIATE")
+            with self._database:
+                for key in _checked_keys(self._path, keys):
+                    self._rewrite(*key, payload)
+
+    def _rewrite(self, cell: str, run: int, payload: Callable[[Entry], bytes]) -> None:
+        assert self._database is not None
+        where = f"{self._path}: cell {cell}, run {run}: "
+        rows = self._database.execute(f"SELECT {_COLUMNS} FROM runs WHERE cell = ? AND run = ?", (cell, run))
+        entry = _verified(rows.fetchone())
+        if entry is None:
+            raise InputError(f"{where}expected the run as it was written; it is cut short or altered")
+        try:
+            content = payload(entry)
+        except InputError as error:
+            raise InputError(f"{where}{error}") from error
+        row = (zlib.compress(content, _LEVEL), _checksum(cell, run, content), cell, run)
+        self._database.execute("UPDATE runs SET payload = ?, payload_sha256 = ? WHERE cell = ? AND run = ?", row)
 
     def discard(self, cell: str, run: int) -> None:
         """Take a run out of the file."""

@@ -23,7 +23,7 @@ from vedette.scenarios import Scenario
 from vedette.scenarios.sections import ScenarioModel
 from vedette.scenarios.yaml_reader import read_yaml
 from vedette.simulation.kept import FORMAT_VERSION
-from vedette.simulation.storage import check_version, versions
+from vedette.simulation.storage import VersionCheck, check_version, versions
 from vedette.text import shown
 
 MANIFEST = "manifest.json"
@@ -102,8 +102,11 @@ def new_session() -> dict[str, Any]:
     return {"started": _now(), "versions": versions("llvmlite"), "machine": machine}
 
 
-def read_manifest(folder: Path) -> dict[str, Any]:
-    """The manifest of a results folder. Raises `InputError`, naming the file, where there is none that can be used."""
+def read_manifest(folder: Path, check: VersionCheck = check_version) -> dict[str, Any]:
+    """The manifest of a results folder, of a format that passes `check`.
+
+    Raises `InputError`, naming the file, where there is none that can be used.
+    """
     path = folder / MANIFEST
     try:
         manifest = parse_json(read_file(path, _MOST_BYTES))
@@ -114,7 +117,7 @@ def read_manifest(folder: Path) -> dict[str, Any]:
     if not isinstance(manifest, dict) or manifest.get("format") != FORMAT:
         raise InputError(f"{path}: expected the manifest of a campaign; got another file")
     sessions = manifest.get("sessions")
-    check_version(manifest, sessions[-1] if isinstance(sessions, list) and sessions else None, path)
+    check(manifest, sessions[-1] if isinstance(sessions, list) and sessions else None, path)
     missing = [field for field in (*_FIXED, "num_runs", "sessions") if field not in manifest]
     if missing:
         raise InputError(f"{path}: expected a field {missing[0]}; it is cut short or altered")

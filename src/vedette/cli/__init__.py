@@ -16,6 +16,7 @@ from vedette.cli.results import results
 from vedette.cli.running import run
 from vedette.cli.scenario_files import check, crowd, generate, init, list_, schema
 from vedette.cli.show import show
+from vedette.cli.upgrading import upgrade
 
 app = typer.Typer(
     cls=Commands,
@@ -54,3 +55,4 @@ app.command()(speaking(reproduce))
 app.command()(speaking(campaign))
 app.command()(speaking(results))
 app.command()(speaking(report))
+app.command()(speaking(upgrade))

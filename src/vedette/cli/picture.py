@@ -8,18 +8,27 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Ellipse, Rectangle, Wedge
+from matplotlib.patches import Ellipse, Patch, Wedge
 from matplotlib.ticker import MaxNLocator
 
 from vedette.evaluation.figures.labels import drawn_text
-from vedette.evaluation.figures.style import COLUMN_WIDTH, GREY, VERMILION, colour, line_style, new_figure, styled
+from vedette.evaluation.figures.scene import draw_zones, name_offsets, zone_handles
+from vedette.evaluation.figures.style import (
+    COLUMN_WIDTH,
+    GREY,
+    INK,
+    colour,
+    legend_columns,
+    line_style,
+    new_figure,
+    styled,
+)
 from vedette.kernels.base.types import Floats
 from vedette.scenarios import Scenario
 from vedette.scenarios.names import sensor_names
-from vedette.scenarios.views import FieldOfView, field_of_view
+from vedette.scenarios.views import FieldOfView, field_of_view, zones
 from vedette.simulation import Truth
 
-_INK = "#222222"
 _MARGIN = 0.04  # of the drawn extent
 _KILOMETRES_FROM = 4000.0  # m of extent
 
@@ -33,7 +42,7 @@ def scenario_figure(scenario: Scenario, truth: Truth) -> Figure:
     figure = new_figure(float(np.clip(COLUMN_WIDTH * 0.85 * aspect, 1.5, 2.5 * COLUMN_WIDTH)) + 0.7)
     axes = figure.subplots()
     axes.set_aspect("equal")
-    _draw_region(axes, scenario, scale)
+    draw_zones(axes, zones(scenario.model), scale)
     _draw_births(axes, scenario, scale)
     _draw_tracks(axes, truth, scale)
     _draw_sensors(axes, scenario, scale)
@@ -43,8 +52,10 @@ def scenario_figure(scenario: Scenario, truth: Truth) -> Figure:
         axis.set_major_locator(MaxNLocator(6, steps=[1, 2, 5, 10]))
     axes.set_xlabel(f"x ({unit})")
     axes.set_ylabel(f"y ({unit})")
-    axes.set_title(drawn_text(scenario.name))
-    figure.legend(handles=_legend(has_sites=bool(scenario.model.birth.sites)), loc="outside lower center", ncols=3)
+    axes.set_title(drawn_text(scenario.name), pad=14)  # above the names of sensors at the upper edge
+    handles = [*_legend(scenario), *zone_handles(zones(scenario.model))]
+    columns = legend_columns([str(handle.get_label()) for handle in handles])
+    figure.legend(handles=handles, loc="outside lower center", ncols=columns)
     return figure
 
 
@@ -58,15 +69,6 @@ def _extent(scenario: Scenario, truth: Truth) -> tuple[Floats, Floats]:
     return low - margin, high + margin
 
 
-def _draw_region(axes: Axes, scenario: Scenario, scale: float) -> None:
-    region = scenario.model.region
-    width, height = (region.x_max - region.x_min) * scale, (region.y_max - region.y_min) * scale
-    corner = (region.x_min * scale, region.y_min * scale)
-    axes.add_patch(
-        Rectangle(corner, width, height, fill=False, edgecolor=GREY, linewidth=0.8, linestyle="--", zorder=2)
-    )
-
-
 def _draw_births(axes: Axes, scenario: Scenario, scale: float) -> None:
     """A cross at each site, and the ellipse of two standard deviations."""
     birth = scenario.model.birth.build(scenario.model.motion)
@@ -75,10 +77,8 @@ def _draw_births(axes: Axes, scenario: Scenario, scale: float) -> None:
         width, height = 4.0 * np.sqrt(variances) * scale
         angle = float(np.degrees(np.arctan2(axes_of[1, 0], axes_of[0, 0])))
         centre = (float(mean[0] * scale), float(mean[1] * scale))
-        axes.add_patch(
-            Ellipse(centre, width, height, angle=angle, facecolor=VERMILION, alpha=0.15, linewidth=0, zorder=1)
-        )
-        axes.plot(*centre, marker="+", color=VERMILION, markersize=9, markeredgewidth=0.8, zorder=2)
+        axes.add_patch(Ellipse(centre, width, height, angle=angle, facecolor=INK, alpha=0.15, linewidth=0, zorder=1))
+        axes.plot(*centre, marker="+", color=INK, markersize=9, markeredgewidth=0.8, zorder=2)
 
 
 def _draw_tracks(axes: Axes, truth: Truth, scale: float) -> None:
@@ -92,17 +92,20 @@ def _draw_tracks(axes: Axes, truth: Truth, scale: float) -> None:
 
 def _draw_sensors(axes: Axes, scenario: Scenario, scale: float) -> None:
     model = scenario.model
-    for name, sensor in zip(sensor_names(model), model.sensors, strict=True):
+    region = scenario.model.region
+    extent = max(region.x_max - region.x_min, region.y_max - region.y_min)
+    offsets = name_offsets(np.array([sensor.position for sensor in model.sensors]), extent)
+    for name, sensor, offset in zip(sensor_names(model), model.sensors, offsets, strict=True):
         place = (sensor.position[0] * scale, sensor.position[1] * scale)
         if sensor.platform.top_speed > 0.0:
             _draw_heading(axes, place, np.radians(sensor.heading_deg))
         field = field_of_view(sensor)
         if field is not None and np.isfinite(field.reach):
             _draw_field(axes, place, field, scale)
-        axes.plot(*place, marker="s", markersize=6, color=_INK, zorder=5)
+        axes.plot(*place, marker="s", markersize=6, color=INK, zorder=5)
         paper = {"boxstyle": "square,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.75}
         style: dict[str, Any] = {"textcoords": "offset points", "fontsize": 7, "zorder": 4.5, "bbox": paper}
-        axes.annotate(drawn_text(name), place, xytext=(0, 7), ha="center", **style)
+        axes.annotate(drawn_text(name), place, **offset, **style)
 
 
 def _draw_field(axes: Axes, place: tuple[float, float], field: FieldOfView, scale: float) -> None:
@@ -112,16 +115,22 @@ def _draw_field(axes: Axes, place: tuple[float, float], field: FieldOfView, scal
 
 def _draw_heading(axes: Axes, place: tuple[float, float], heading: float) -> None:
     ahead = (14.0 * float(np.cos(heading)), 14.0 * float(np.sin(heading)))
-    arrow = {"arrowstyle": "<|-", "color": _INK, "linewidth": 0.9, "shrinkA": 0, "shrinkB": 0}
+    arrow = {"arrowstyle": "<|-", "color": INK, "linewidth": 0.9, "shrinkA": 0, "shrinkB": 0}
     axes.annotate("", place, xytext=ahead, textcoords="offset points", arrowprops=arrow, zorder=4)
 
 
-def _legend(*, has_sites: bool) -> list[Line2D]:
-    target: dict[str, Any] = {"color": _INK, "linewidth": 1.0}
+def _legend(scenario: Scenario) -> list[Line2D | Patch]:
+    fields = [field_of_view(sensor) for sensor in scenario.model.sensors]
+    has_fields = any(field is not None and np.isfinite(field.reach) for field in fields)
+    target: dict[str, Any] = {"color": INK, "linewidth": 1.0}
     return [
         Line2D([], [], marker="o", markerfacecolor="white", markersize=4.5, label="target start", **target),
         Line2D([], [], marker="^", markersize=5, label="target end", **target),
-        Line2D([], [], linestyle="", marker="s", markersize=6, color=_INK, label="sensor"),
-        *([Line2D([], [], linestyle="", marker="+", color=VERMILION, label="birth site, 2 std")] if has_sites else []),
-        Line2D([], [], linestyle="--", color=GREY, linewidth=0.8, label="region"),
+        Line2D([], [], linestyle="", marker="s", markersize=6, color=INK, label="sensor"),
+        *(
+            [Line2D([], [], linestyle="", marker="+", color=INK, label="birth site, 2 std")]
+            if scenario.model.birth.sites
+            else []
+        ),
+        *([Patch(color=GREY, alpha=0.15, linewidth=0, label="field of view")] if has_fields else []),
     ]

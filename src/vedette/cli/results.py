@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from vedette.campaigns import Failed
     from vedette.campaigns.journal import Failure
     from vedette.campaigns.results import CampaignResults
+    from vedette.scenarios import Scenario
     from vedette.simulation.records import RunRecord
 
 _SHOWN_FAILURES = 10
@@ -58,9 +59,9 @@ def results(
     opened: CampaignResults | RunRecord
     if holds_run(folder):
         opened = load_run(folder)
-        unit = _unit_of(folder)
-        print_run(opened, unit)
-        document = run_document(opened, unit)
+        scenario = _scenario_of(folder)
+        print_run(opened, scenario)
+        document = run_document(opened, "" if scenario is None else scenario.model.ospa.unit)
     else:
         opened = open_results(folder)
         print_results(opened)
@@ -76,15 +77,15 @@ def results(
     publish({**document, "written": written})
 
 
-def _unit_of(folder: Path) -> str:
-    """Of the OSPA of a saved run; none where the scenario is not kept beside it, or cannot be read."""
+def _scenario_of(folder: Path) -> Scenario | None:
+    """That of a saved run; None where it is not kept beside it, or cannot be read."""
     from vedette.scenarios import load_scenario
     from vedette.simulation.storage import SCENARIO
 
     try:
-        return load_scenario(folder / SCENARIO).model.ospa.unit
+        return load_scenario(folder / SCENARIO)
     except VedetteError:
-        return ""
+        return None
 
 
 def print_failures(failed: Sequence[Failed | Failure], tell: Callable[[str], None] = say) -> None:

@@ -131,7 +131,7 @@ def run(
             if error.record is None:
                 _end(error, "nothing was written")
             record, stop = error.record, error
-        print_run(record, loaded.model.ospa.unit)
+        print_run(record, loaded)
         kept = out if stop is None or not _holds_whole_run(out) else None
         if kept is not None:
             save_run(record, kept, scenario_text=dump_scenario(loaded.model, folder=loaded.folder), overwrite=overwrite)
@@ -140,7 +140,7 @@ def run(
         _end(stop, "nothing was written" if out is None else f"{out} keeps the whole run that was there")
     if out is not None:
         with interruptible(f"wrote {out}, but not all of its figures"):
-            _draw_run(record, out / "figures")
+            _draw_run(record, loaded, out / "figures")
         if stop is not None:
             _end(stop, f"wrote {out}, with the {counted(record.num_scans, 'scan')} before")
         say(f"wrote {out}")
@@ -163,14 +163,18 @@ def _end(stop: RunStopped | RunInterrupted, left: str) -> NoReturn:
 _MOST_DECISIONS = 12
 
 
-def print_run(record: RunRecord, unit: str) -> None:
-    """What was decided in a run, how good it was (OSPA in `unit`), what it cost, and what was cut off."""
+def print_run(record: RunRecord, scenario: Scenario | None) -> None:
+    """What was decided in a run, how good it was, what it cost, and what was cut off.
+
+    Without the scenario, OSPA has no unit and sensors have numbers.
+    """
     from rich.table import Table
 
     from vedette.evaluation.actions import choice_words
     from vedette.evaluation.certainty import certainty_lines
     from vedette.evaluation.comparison import choices_of
     from vedette.evaluation.health import health_line
+    from vedette.scenarios.names import sensor_names
 
     console = new_console()
     console.print(
@@ -194,21 +198,23 @@ def print_run(record: RunRecord, unit: str) -> None:
             console.print(f"note: {note}", soft_wrap=True)
     for line in certainty_lines(record):
         console.print(line, soft_wrap=True)
+    unit, names = (scenario.model.ospa.unit, sensor_names(scenario.model)) if scenario else ("", ())
     total, localisation, cardinality = record.ospa.mean(axis=0)
     parts = f"(localisation {localisation:.2f}, cardinality {cardinality:.2f})"
     console.print(f"mean OSPA {amount(f'{total:.2f}', unit)} {parts}")
     spent = ", ".join(f"{stage} {seconds.sum():.2f} s" for stage, seconds in record.timings.items())
     console.print(f"time spent: {spent}")
-    console.print(health_line(record), soft_wrap=True)
+    console.print(health_line(record, names), soft_wrap=True)
 
 
-def _draw_run(record: RunRecord, folder: Path) -> None:
-    from vedette.evaluation.figures import reward_figure, save_figure, tracks_figure
+def _draw_run(record: RunRecord, scenario: Scenario, folder: Path) -> None:
+    from vedette.evaluation.figures import reward_figure, save_figure, scene_of, tracks_figure
 
-    save_figure(tracks_figure(record), folder / "tracks")
+    scene = scene_of(scenario, record.planner)
+    save_figure(tracks_figure(record, scene=scene), folder / "tracks")
     for decision in record.decisions:
-        if decision.plan.tables:
-            save_figure(reward_figure(decision.plan), folder / f"rewards-{decision.time:g}s")
+        if decision.plan.tables and any(len(actions) > 1 for actions in decision.plan.actions):
+            save_figure(reward_figure(decision.plan, scene=scene), folder / f"rewards-{decision.time:g}s")
 
 
 def processors() -> int:

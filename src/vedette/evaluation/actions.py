@@ -32,9 +32,9 @@ class ActionAxis(NamedTuple):
     labels: tuple[str, ...]
     is_numeric: bool
 
-    def title(self, sensor: int | None = None) -> str:
-        """`Heading (deg)`, `Heading of sensor 1 (deg)`."""
-        of = "" if sensor is None else f" of sensor {sensor + 1}"
+    def title(self, sensor: str = "") -> str:
+        """`Heading (deg)`; of a sensor that is named, `Heading of sensor 1 (deg)`."""
+        of = f" of {sensor}" if sensor else ""
         return self.name[:1].upper() + self.name[1:] + of + (f" ({self.unit})" if self.unit else "")
 
     def counted(self) -> ActionAxis:

@@ -27,7 +27,7 @@ class HealthSummary:
         mean_discarded, worst_discarded: upper bound on the share of a filter's weight that was cut off; NaN where it is
             not known.
         mean_factoring, worst_factoring: upper bound on the L1 error that a factored filter made by taking labels as
-            independent.
+            independent; NaN where it is not known.
         worst_dropped: expected number of targets in labels that a filter dropped at one scan.
         duplicates, clutter_raised: measurements in all.
         missing_sets: (num_sensors,) share of the fused label sets (CLMB: labels) that the sensor lacks.
@@ -36,6 +36,7 @@ class HealthSummary:
         worst_lost: most such labels at a scan.
         disjoint: share of the scans at which no label set is held by every sensor.
         worst_fusion_discarded: most weight that the fusion cut off.
+        sensors: what they are called.
     """
 
     num_scans: int
@@ -55,10 +56,14 @@ class HealthSummary:
     worst_lost: int
     disjoint: float
     worst_fusion_discarded: float
+    sensors: tuple[str, ...]
 
 
-def summarise_health(records: Sequence[RunRecord]) -> HealthSummary:
-    """The reports of runs with the same sensors. Raises `InputError` for no run or other numbers of sensors."""
+def summarise_health(records: Sequence[RunRecord], sensors: Sequence[str] = ()) -> HealthSummary:
+    """The reports of runs with the same sensors, which are called `sensors`, or else `sensor 1` and so on.
+
+    Raises `InputError` for no run or other numbers of sensors.
+    """
     if len({record.num_sensors for record in records}) != 1:
         raise InputError("records: expected one run or more, of equally many sensors")
 
@@ -68,8 +73,8 @@ def summarise_health(records: Sequence[RunRecord]) -> HealthSummary:
     def share(at_sensors: Bools) -> float:
         return float(at_sensors.reshape(len(at_sensors), -1).any(axis=1).mean())
 
-    discarded = joined("discarded_weight_bound")
-    known = discarded[~np.isnan(discarded)]
+    discarded, factoring = joined("discarded_weight_bound"), joined("factoring_error")
+    known, factoring = discarded[~np.isnan(discarded)], factoring[~np.isnan(factoring)]
     lost = joined("fusion_num_lost_labels")
     return HealthSummary(
         num_scans=len(discarded),
@@ -78,8 +83,8 @@ def summarise_health(records: Sequence[RunRecord]) -> HealthSummary:
         inexact=share(joined("num_inexact_clusters") > 0),
         mean_discarded=float(known.mean()) if len(known) else np.nan,
         worst_discarded=float(known.max()) if len(known) else np.nan,
-        mean_factoring=float(joined("factoring_error").mean()),
-        worst_factoring=float(joined("factoring_error").max()),
+        mean_factoring=float(factoring.mean()) if len(factoring) else np.nan,
+        worst_factoring=float(factoring.max()) if len(factoring) else np.nan,
         worst_dropped=float(joined("dropped_existence").max()),
         duplicates=int(joined("num_duplicates").sum()),
         clutter_raised=int(joined("num_clutter_raised").sum()),
@@ -89,19 +94,20 @@ def summarise_health(records: Sequence[RunRecord]) -> HealthSummary:
         worst_lost=int(lost.max()),
         disjoint=share(joined("fusion_empty_intersection") > 0),
         worst_fusion_discarded=float(joined("fusion_discarded_weight").max()),
+        sensors=tuple(sensors) or tuple(f"sensor {number + 1}" for number in range(records[0].num_sensors)),
     )
 
 
-def health_line(record: RunRecord) -> str:
+def health_line(record: RunRecord, sensors: Sequence[str] = ()) -> str:
     """A run's health in a line: `health: all exact`, or what was cut off, missing or left out."""
-    health = summarise_health([record])
+    health = summarise_health([record], sensors)
     statements = _statements(health, lambda share: f"{round(share * health.num_scans)} of {health.num_scans} scans")
     return f"health: {'; '.join(text for text, _ in statements) or 'all exact'}"
 
 
-def health_findings(records: Sequence[RunRecord]) -> tuple[str, ...]:
+def health_findings(records: Sequence[RunRecord], sensors: Sequence[str] = ()) -> tuple[str, ...]:
     """What of the health of some runs may have cost accuracy, in words; none where nothing did."""
-    statements = _statements(summarise_health(records), lambda share: f"{percent(share)} of the scans")
+    statements = _statements(summarise_health(records, sensors), lambda share: f"{percent(share)} of the scans")
     return tuple(text for text, is_much in statements if is_much)
 
 
@@ -112,6 +118,11 @@ def percent(share: float) -> str:
     if 0.99 < share < 1.0:
         return ">99 %"
     return f"{share:.0%}".replace("%", " %")
+
+
+def _at_most(bound: float) -> str:
+    """An upper bound on a share, in words."""
+    return "less than 1 %" if bound < 0.01 else f"at most {percent(bound)}"
 
 
 def _statements(health: HealthSummary, scans: Callable[[float], str]) -> list[tuple[str, bool]]:
@@ -136,7 +147,7 @@ def _of_fusion(health: HealthSummary, scans: Callable[[float], str]) -> Iterator
     worst = int(np.argmax(health.missing_sets))
     if health.missing_sets[worst]:
         share = percent(float(health.missing_sets[worst]))
-        yield f"{share} of label sets were missing at sensor {worst + 1}", False
+        yield f"{share} of label sets were missing at {health.sensors[worst]}", False
     cut = health.worst_fusion_discarded
     if cut:
         yield f"up to {percent(cut)} of the fused weight was cut off at a scan", cut > _MUCH
@@ -150,17 +161,20 @@ def _of_filters(health: HealthSummary, scans: Callable[[float], str]) -> Iterato
     worst = health.worst_discarded
     cap = f"a cap was met at {scans(health.cap_met)}" if health.cap_met else ""
     if worst > 0.0:  # neither none nor unknown
-        bound = f"up to {percent(worst)} of a filter's weight was cut off ({percent(health.mean_discarded)} on average)"
+        on_average = _at_most(health.mean_discarded)
+        bound = f"{_at_most(worst)} of a filter's weight was cut off at a scan ({on_average} on average)"
         yield f"{cap}, and {bound}" if cap else bound, worst > _MUCH
     elif cap:
         yield cap, True
     elif np.isnan(worst):
         yield "how much weight was cut off is not known", False
-    if health.worst_factoring:
+    if np.isnan(health.worst_factoring):
+        yield "how much weight was moved by taking labels as independent is not known", False
+    elif health.worst_factoring:
         mean = health.mean_factoring
         yield (
-            f"taking labels as independent moved up to {percent(health.worst_factoring / 2.0)} of a filter's weight at "
-            f"a scan ({percent(mean / 2.0)} on average)",
+            f"taking labels as independent moved {_at_most(health.worst_factoring / 2.0)} of a filter's weight at a "
+            f"scan ({_at_most(mean / 2.0)} on average)",
             mean > 10.0 * _MUCH,
         )
     if health.worst_dropped:

@@ -74,7 +74,7 @@ def _tracks_drawings(group: Group) -> Iterator[Drawing]:
     for strategy, record in typical_records(group):
         typical = ", the typical one: its mean OSPA is the median" if group.comparison is not None else ""
         caption = f"Run {record.run} of {strategy.name}{typical}."
-        figure = tracks_figure(record, titles=(f"{elided(strategy.name)}, run {record.run}",))
+        figure = tracks_figure(record, titles=(f"{elided(strategy.name)}, run {record.run}",), scene=strategy.scene)
         yield Drawing(f"tracks-{strategy.cell.name}", f"Tracks, {strategy.name}", caption, figure)
 
 
@@ -111,24 +111,30 @@ def error_drawings(group: Group) -> Iterator[Drawing]:
 
 
 def _decision_drawings(group: Group) -> Iterator[Drawing]:
-    comparison = group.comparison
-    if comparison is not None and any(any(runs) for runs in comparison.choices):
-        yield Drawing(
-            "decisions",
-            "Where the sensors were sent",
-            "Share of the runs that chose each action at each decision; areas are in proportion to shares.",
-            roses_figure(comparison),
-        )
+    if group.comparison is None:
+        return
+    try:
+        figure = roses_figure(group.comparison, group.strategies[0].scene)
+    except InputError:  # none was made, or there was nothing to choose
+        return
+    yield Drawing(
+        "decisions",
+        "Where the sensors were sent",
+        "Share of the runs that chose each action at each decision; areas are in proportion to shares. Sensors that "
+        "can but stand are left out, and more than six are taken together.",
+        figure,
+    )
 
 
 def _reward_drawings(group: Group) -> Iterator[Drawing]:
     for strategy in group.strategies:
-        figure = _rewards(strategy.records)
+        figure = _rewards(strategy)
         if figure is not None:
             caption = (
                 f"Rewards that {strategy.name} decided on, averaged over {_runs(len(strategy.records))}. The area of a "
                 "mark is the share of the runs that chose the action; joint rewards of more than two sensors are the "
-                "largest over the others."
+                "largest over the others. Sensors without a choice are left out; of more than six, those with the most "
+                "at stake are drawn."
             )
             yield Drawing(f"rewards-{strategy.cell.name}", f"Rewards, {strategy.name}", caption, figure)
 
@@ -137,10 +143,10 @@ def _runs(number: int) -> str:
     return "1 run" if number == 1 else f"{number} runs"
 
 
-def _rewards(records: Sequence[RunRecord]) -> Figure | None:
-    """None for strategies that weigh no actions, or whose runs had different ones to weigh."""
+def _rewards(strategy: Strategy) -> Figure | None:
+    """None for strategies that weigh no actions or have but one, or whose runs had different ones to weigh."""
     try:
-        return mean_rewards_figure(records)
+        return mean_rewards_figure(strategy.records, strategy.scene)
     except InputError:
         return None
 

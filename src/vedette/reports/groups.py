@@ -15,6 +15,7 @@ from vedette.campaigns.results import CampaignResults
 from vedette.errors import InputError
 from vedette.evaluation import Comparison, RunMetrics
 from vedette.evaluation.comparison import scored
+from vedette.evaluation.figures.scene import Scene, scene_of
 from vedette.evaluation.figures.style import strategy_label
 from vedette.kernels.base.types import Bools
 from vedette.scenarios.sections.tracking import UNLABELLED
@@ -42,6 +43,11 @@ class Strategy:
     def name(self) -> str:
         """The label as a reader should see it."""
         return strategy_label(self.label)
+
+    @property
+    def scene(self) -> Scene:
+        """What figures of its runs say of its scenario."""
+        return scene_of(self.cell.scenario, self.cell.planner)
 
     @property
     def has_labels(self) -> bool:

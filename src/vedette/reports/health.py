@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from vedette.evaluation.health import HealthSummary, health_findings, percent, summarise_health
 from vedette.fusion.base import LOST, SURE
-from vedette.reports.groups import Group
-from vedette.reports.tables import Table
+from vedette.kernels.base.types import Bools, Floats
+from vedette.reports.groups import Group, Strategy
+from vedette.reports.tables import Table, nees_spread
 from vedette.scenarios.sections.fusion import ONE_BELIEF
 
 
@@ -29,9 +30,9 @@ def _weight(share: float) -> str:
     return "unknown" if math.isnan(share) else percent(share)
 
 
-def _worst_sensor(shares: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> str:
+def _worst_sensor(shares: Floats, names: Sequence[str]) -> str:
     worst = int(np.argmax(shares))
-    return f"{percent(float(shares[worst]))} (sensor {worst + 1})" if shares[worst] else "0 %"
+    return f"{percent(float(shares[worst]))} ({names[worst]})" if shares[worst] else "0 %"
 
 
 _SCANS = "share of the scans, at any sensor"
@@ -40,17 +41,20 @@ _ROWS = (
     _Row("Search cut short", f"ranking stopped at max_search_nodes; {_SCANS}", lambda h: percent(h.search_cut)),
     _Row("Cluster not exact", f"summed over its heaviest joint choices only; {_SCANS}", lambda h: percent(h.inexact)),
     _Row(
-        "Weight cut off, mean",
-        "upper bound on the share of a filter's weight that its caps left out, mean over scans and sensors",
+        "Weight cut off at most, mean",
+        "upper bound on the share of a filter's weight that its caps left out at a scan, mean over scans and sensors; "
+        "how far it moves the estimates is another question (the report's documentation has a study of it)",
         lambda h: _weight(h.mean_discarded),
     ),
-    _Row("Weight cut off, worst", "the same at the worst scan", lambda h: _weight(h.worst_discarded)),
+    _Row("Weight cut off at most, worst", "the same at the worst scan", lambda h: _weight(h.worst_discarded)),
     _Row(
-        "Taken as independent, mean",
+        "Taken as independent at most, mean",
         "upper bound on the share of a factored filter's weight that was moved by it, mean over scans and sensors",
         lambda h: _weight(h.mean_factoring / 2.0),
     ),
-    _Row("Taken as independent, worst", "the same at the worst scan", lambda h: _weight(h.worst_factoring / 2.0)),
+    _Row(
+        "Taken as independent at most, worst", "the same at the worst scan", lambda h: _weight(h.worst_factoring / 2.0)
+    ),
     _Row(
         "Targets dropped, worst",
         "expected number of targets in labels that a filter dropped at a scan",
@@ -65,13 +69,13 @@ _ROWS = (
     _Row(
         "Label sets missing at a sensor",
         "share of the fused label sets (CLMB: labels) that the sensor which lacks most lacks",
-        lambda h: _worst_sensor(h.missing_sets),
+        lambda h: _worst_sensor(h.missing_sets, h.sensors),
         needs_fusion=True,
     ),
     _Row(
         "Labels unknown to a sensor",
         "share of the scans at which the sensor where that is most frequent lacks a label that another has",
-        lambda h: _worst_sensor(h.unknown_labels),
+        lambda h: _worst_sensor(h.unknown_labels, h.sensors),
         needs_fusion=True,
     ),
     _Row(
@@ -108,7 +112,7 @@ def health_table(group: Group) -> Table | None:
     if not strategies:
         return None
     has_fusion = any(each.cell.scenario.model.fusion.kind not in ONE_BELIEF for each in strategies)
-    summaries = [summarise_health(each.records) for each in strategies]
+    summaries = [summarise_health(each.records, each.scene.names) for each in strategies]
     rows = [row for row in _ROWS if has_fusion or not row.needs_fusion]
     caption = "What filters and fusion had to leave out, over all scans of all runs in common."
     return Table(
@@ -120,6 +124,23 @@ def health_table(group: Group) -> Table | None:
 
 
 def group_health(group: Group) -> tuple[tuple[str, str], ...]:
-    """Name and findings, in a sentence, of each strategy whose filters or fusion left out more than a trifle."""
-    said = ((each.name, health_findings(each.records)) for each in group.strategies if each.records)
+    """Name and findings, in a sentence, of each strategy whose filters or fusion left out more than a trifle.
+
+    So has one with an estimate that is farther off than its covariance allows.
+    """
+    said = (
+        (each.name, (*health_findings(each.records, each.scene.names), *_consistency_findings(each, group.counted)))
+        for each in group.strategies
+        if each.records
+    )
     return tuple((name, f"{'; '.join(findings)}.") for name, findings in said if findings)
+
+
+def _consistency_findings(strategy: Strategy, counted: Bools) -> Iterator[str]:
+    """The estimate that is worst for its covariance, where no consistent filter has one like it."""
+    spread = nees_spread(strategy, counted)
+    if spread is not None and not spread.is_by_chance:
+        yield (
+            f"in run {spread.run} at {spread.time:g} s an estimate was far worse than its covariance says: position "
+            f"NEES / 2 of {spread.largest:.4g}, where 1 is consistent and {spread.median:.2f} is the median"
+        )

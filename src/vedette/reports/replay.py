@@ -14,7 +14,7 @@ from vedette.errors import VedetteError
 from vedette.evaluation import choices_of, match_run
 from vedette.evaluation.actions import action_axis, choice_words
 from vedette.evaluation.comparison import Choice
-from vedette.evaluation.figures.rewards import best_over_others, best_over_pair
+from vedette.evaluation.figures.rewards import best_over_others, best_over_pair, first_pair
 from vedette.kernels.base.types import Floats
 from vedette.reports.groups import Strategy
 from vedette.reports.why import why_data
@@ -45,12 +45,11 @@ def replay_data(strategy: Strategy, record: RunRecord, group: str, *, trust: boo
     scenario = strategy.cell.scenario
     extent = _extent(record, scenario)
     places = max(0, _DIGITS - math.floor(math.log10(max(extent[1] - extent[0], extent[3] - extent[2]))))
-    names, sections = sensor_names(scenario.model), scenario.model.sensors
+    scene, names, sections = strategy.scene, sensor_names(scenario.model), scenario.model.sensors
     sensors = [_sensor(name, section) for name, section in zip(names, sections, strict=True)]
-    region = scenario.model.region
     has_velocity = scenario.model.motion.kind != "custom"
     axes = dict[str, dict[str, Any]]()
-    decisions = [_decision(*each, axes) for each in zip(record.decisions, choices_of(record), strict=True)]
+    decisions = [_decision(*each, axes, names) for each in zip(record.decisions, choices_of(record), strict=True)]
     return {
         "cell": strategy.cell.name,
         "group": group,
@@ -58,7 +57,7 @@ def replay_data(strategy: Strategy, record: RunRecord, group: str, *, trust: boo
         "run": record.run,
         "labelled": strategy.has_labels,
         "extent": _rounded(extent, places),
-        "region": [region.x_min, region.x_max, region.y_min, region.y_max],
+        "zones": [[zone.kind, [_rounded(corner, places) for corner in zone.corners]] for zone in scene.zones],
         "sensors": sensors,
         "times": _rounded(record.times, 6),
         "truth": [_targets(record, scan, places, has_velocity) for scan in range(record.num_scans)],
@@ -71,6 +70,7 @@ def replay_data(strategy: Strategy, record: RunRecord, group: str, *, trust: boo
         "ospa": [_rounded(parts, 2) for parts in record.ospa],
         "ospa_unit": scenario.model.ospa.unit,
         "axes": list(axes.values()),
+        "reward": scene.reward,
         "decisions": decisions,
     }
 
@@ -210,7 +210,9 @@ def _measurements(scan: Scan | None, kind: str, pose: Floats, places: int) -> li
     return found
 
 
-def _decision(decision: Decision, choice: Choice, axes: dict[str, dict[str, Any]]) -> dict[str, Any]:
+def _decision(
+    decision: Decision, choice: Choice, axes: dict[str, dict[str, Any]], names: Sequence[str]
+) -> dict[str, Any]:
     plan = decision.plan
     return {
         "scan": decision.step - 1,
@@ -218,18 +220,20 @@ def _decision(decision: Decision, choice: Choice, axes: dict[str, dict[str, Any]
         "notes": plan.notes,
         "curves": _curves(plan, axes),
         "map": _map(plan),
-        "why": why_data(plan),
+        "why": why_data(plan, names),
     }
 
 
 def _curves(plan: Plan, axes: dict[str, dict[str, Any]]) -> list[dict[str, Any]]:
-    """Reward against action, one curve a sensor; of a joint table the largest over the other sensors' actions.
+    """Reward against action, one curve a sensor with a choice; of a joint table the largest over the others' actions.
 
     What the actions are called and where they lie is `along` an axis, of which `axes` has each once.
     """
     curves = []
     for table in plan.tables:
         for place, sensor in enumerate(table.sensors):
+            if len(plan.actions[sensor]) == 1:
+                continue
             along = action_axis(plan.actions[sensor])
             order = np.argsort(along.places, kind="stable")
             mean, error = best_over_others(table, place)
@@ -255,11 +259,11 @@ def _curves(plan: Plan, axes: dict[str, dict[str, Any]]) -> list[dict[str, Any]]
 
 
 def _map(plan: Plan) -> dict[str, Any] | None:
-    """The joint rewards of the first two sensors, the largest over the others."""
+    """The joint rewards of the first two sensors with a choice, the largest over the others."""
     joint = next((table for table in plan.tables if len(table.sensors) > 1), None)
-    if joint is None:
+    pair = first_pair(plan.tables, plan.actions)
+    if joint is None or pair is None:
         return None
-    pair = (joint.sensors[0], joint.sensors[1])
     axes = [action_axis(plan.actions[sensor]) for sensor in pair]
     orders = [np.argsort(along.places, kind="stable") for along in axes]
     reward = best_over_pair(joint, pair)[np.ix_(*orders)]

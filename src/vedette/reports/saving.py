@@ -37,8 +37,9 @@ def write_figures(results: CampaignResults, path: str | Path) -> tuple[Path, ...
         for drawing in group_drawings(group):
             written += save_figure(drawing.figure, folder / _file_name(f"{prefix}{drawing.name}"))
         if group.comparison is not None:  # beside one another what the page has apart
-            first = typical_records(group)[0][1]
-            written += save_figure(overview_figure(first, group.comparison), folder / _file_name(f"{prefix}overview"))
+            first, record = typical_records(group)[0]
+            overview = overview_figure(record, group.comparison, strategy=first.label, scene=first.scene)
+            written += save_figure(overview, folder / _file_name(f"{prefix}overview"))
     for drawing in sweep_drawings(results.campaign, errors):
         written += save_figure(drawing.figure, folder / _file_name(drawing.name))
     return tuple(written)

@@ -17,6 +17,7 @@ from vedette.reports.groups import Group, Strategy
 from vedette.simulation.records import RunRecord
 from vedette.text import elided_apart
 
+_BY_CHANCE = 1e-3  # chance below which a largest value says that the filter is not consistent
 _LONGEST_NAME = 32  # letters, beyond which the page gives the full name as a title
 
 Measure = Callable[[RunMetrics, Bools], float]
@@ -147,6 +148,9 @@ def measure_table(group: Group) -> Table | None:
     for name, note, dim in _consistency_kinds(strategies):
         rows.append((name, *(_consistency(each, group.counted, dim) for each in strategies)))
         notes.append(note)
+        if dim == 2:
+            rows += _spread_rows(strategies, group.counted)
+            notes += ["of the means at the scans of all runs", "of a single estimate, with its run and time"]
     over = "Mean over the runs ± one standard error" if any(len(each.metrics) > 1 for each in strategies) else "One run"
     caption = (
         f"{over}, over the same scans as above; cutoff {score.cutoff:g} m, order "
@@ -190,6 +194,54 @@ def _consistency(strategy: Strategy, counted: Bools, dim: int) -> str:
     return f"{mean:.2f} ({percent(float(average.consistent[known].mean()))})"
 
 
+@dataclass(frozen=True, slots=True)
+class NeesSpread:
+    """How the position NEES of a strategy spreads, over its dimension, which is 2.
+
+    Attributes:
+        median: of the means at the scans of all runs.
+        largest: of a single estimate; run, time: where that is (time in s).
+        is_by_chance: whether a consistent filter has so large a one in more than one of a thousand such comparisons.
+    """
+
+    median: float
+    largest: float
+    run: int
+    time: float
+    is_by_chance: bool
+
+
+def nees_spread(strategy: Strategy, counted: Bools) -> NeesSpread | None:
+    """Over the counted scans; None where no estimate is matched."""
+    means = np.array([metrics.position_nees_mean[counted] for metrics in strategy.metrics]) / 2.0
+    largest = np.array([metrics.position_nees_max[counted] for metrics in strategy.metrics]) / 2.0
+    if np.isnan(largest).all():
+        return None
+    run, scan = np.unravel_index(np.nanargmax(largest), largest.shape)
+    record = strategy.records[run]
+    pairs = sum(_num_pairs(*each)[counted].sum() for each in zip(strategy.records, strategy.metrics, strict=True))
+    return NeesSpread(
+        median=float(np.nanmedian(means)),
+        largest=float(largest[run, scan]),
+        run=record.run,
+        time=float(record.times[counted][scan]),
+        is_by_chance=bool(pairs * np.exp(-largest[run, scan]) > _BY_CHANCE),  # half of chi-square of 2 is exponential
+    )
+
+
+def _spread_rows(strategies: Sequence[Strategy], counted: Bools) -> Iterator[tuple[str, ...]]:
+    spreads = [nees_spread(each, counted) for each in strategies]
+    yield "  median", *("\N{EN DASH}" if each is None else f"{each.median:.2f}" for each in spreads)
+    places = [None if each is None else f"(run {each.run}, {each.time:g} s)" for each in spreads]
+    yield (
+        "  largest",
+        *(
+            f"{each.largest:.4g} {place}" if each else "\N{EN DASH}"
+            for each, place in zip(spreads, places, strict=True)
+        ),
+    )
+
+
 def _over_runs(kind: _Kind, strategy: Strategy, counted: Bools) -> str:
     if kind.needs_labels and not strategy.has_labels:
         return "\N{EN DASH}"
@@ -215,7 +267,7 @@ def stage_seconds(strategy: Strategy) -> dict[str, Floats]:
             else:
                 spent.setdefault(f"{stage}, a scan", []).append(seconds)
     joined = {stage: np.concatenate(parts) for stage, parts in spent.items()}
-    return {stage: seconds for stage, seconds in joined.items() if len(seconds)}
+    return {stage: seconds for stage, seconds in joined.items() if seconds.any()}
 
 
 def cost_table(group: Group) -> Table | None:

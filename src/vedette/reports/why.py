@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -17,8 +18,8 @@ _SAME = 1e-9
 _WORDS = {"of_targets": "gain by target", "of_sensors": "shares of the sensors", "runner_up": "second best"}
 
 
-def why_data(plan: Plan) -> dict[str, Any] | None:
-    """What is shown; None for a decision that was kept without explanation.
+def why_data(plan: Plan, names: Sequence[str] = ()) -> dict[str, Any] | None:
+    """What is shown, with the sensors' names; None for a decision that was kept without explanation.
 
     Facts as pairs of texts; of the ten targets that matter most label and gains, of the others their number and sums;
     what is gained by targets not found before; of each sensor number, action, share and the reward without it.
@@ -27,18 +28,18 @@ def why_data(plan: Plan) -> dict[str, Any] | None:
     if why is None or why.reward is None:
         return None
     return {
-        "facts": _facts(plan, why, why.reward),
+        "facts": _facts(plan, why, why.reward, names or [f"sensor {s + 1}" for s in range(plan.num_sensors)]),
         **({"targets": [], "more": None} if why.of_targets is None else _targets(why.of_targets)),
         "undetected": _number(why.of_undetected or 0.0),
         "sensors": _sensors(plan, why),
     }
 
 
-def _facts(plan: Plan, why: Explanation, reward: float) -> list[tuple[str, str]]:
+def _facts(plan: Plan, why: Explanation, reward: float, names: Sequence[str]) -> list[tuple[str, str]]:
     start = "" if why.baseline is None else f"; {_text(why.baseline, reward)} without any scan"
     facts = [("Reward", f"{_with_error(reward, why.standard_error)}{start}")]
     if why.runner_up is not None:
-        facts.append(("Second best", f"{_margin(why.runner_up, reward)}: {_others(plan, why.runner_up)}"))
+        facts.append(("Second best", f"{_margin(why.runner_up, reward)}: {_others(plan, why.runner_up, names)}"))
     facts.append(("Evaluated", counted(why.evaluations, "choice")))
     if why.bound is not None:
         facts.append(("Bound", str(why.bound)))
@@ -57,9 +58,9 @@ def _margin(runner_up: RunnerUp, reward: float) -> str:
     return f"less by {_with_error(runner_up.margin, runner_up.standard_error)}{apart}"
 
 
-def _others(plan: Plan, runner_up: RunnerUp) -> str:
+def _others(plan: Plan, runner_up: RunnerUp, names: Sequence[str]) -> str:
     words = (
-        f"sensor {s + 1} to {row_words(rounded(own.columns, own.values[other]))}"
+        f"{names[s]} to {row_words(rounded(own.columns, own.values[other]))}"
         for s, (own, chosen, other) in enumerate(zip(plan.actions, plan.chosen, runner_up.actions, strict=True))
         if other != chosen
     )

@@ -6,8 +6,13 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from vedette.scenarios.sections import ScenarioModel
+from vedette.scenarios.sections.constraints import KeepOut, StayInside
 from vedette.scenarios.sections.detection import CameraDetection, LimitedRange, LimitedSector, SoftSector
 from vedette.scenarios.sections.sensors import Sensor
+from vedette.scenarios.sections.world import RegionSection
+
+REGION, NO_GO, INSIDE = "region", "no-go zone", "sensors stay inside"
 
 
 class FieldOfView(NamedTuple):
@@ -17,6 +22,31 @@ class FieldOfView(NamedTuple):
     half_width: float
     reach: float
     probability: float
+
+
+class Zone(NamedTuple):
+    """A part of the plane, such as where no sensor may go: what it is, and its corners in order, m."""
+
+    kind: str
+    corners: tuple[tuple[float, float], ...]
+
+
+def zones(model: ScenarioModel) -> tuple[Zone, ...]:
+    """The region, and what constraints say of where sensors may be."""
+    found = [Zone(REGION, _corners(model.region))]
+    for section in model.control.constraints:
+        if isinstance(section, StayInside):
+            found.append(Zone(INSIDE, _corners(section.region)))
+        elif isinstance(section, KeepOut):
+            found.append(Zone(NO_GO, section.polygon or _corners(section.region)))
+    return tuple(found)
+
+
+def _corners(region: RegionSection | None) -> tuple[tuple[float, float], ...]:
+    if region is None:
+        return ()
+    west, east, south, north = region.x_min, region.x_max, region.y_min, region.y_max
+    return ((west, south), (east, south), (east, north), (west, north))
 
 
 def field_of_view(sensor: Sensor, pose: Sequence[float] | None = None) -> FieldOfView | None:

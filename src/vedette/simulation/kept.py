@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -26,7 +27,10 @@ from vedette.text import shown
 # Of saved runs and of campaigns; another wherever a table gains, loses or renames a column. A table that may be missing
 # needs none: programs of before it was there pass it over, and what they wrote reads as it did.
 FORMAT_VERSION = 6
-_ENDING = ".arrow"
+# What the tables of a format lack of those of the next, and what stands there in runs of that format, NaN where it is
+# not known: by it they are upgraded (`vedette.simulation.upgrading`). What was released once stays here.
+LACKING: dict[int, dict[str, dict[str, float]]] = {5: {"sensors": {"factoring_error": math.nan}}}
+ENDING = ".arrow"
 
 
 def encode_run(record: RunRecord) -> dict[str, bytes]:
@@ -35,9 +39,9 @@ def encode_run(record: RunRecord) -> dict[str, bytes]:
     Raises `InputError` for a record that contradicts itself or holds an invalid plan.
     """
     check_record(record)
-    files = {f"{name}{_ENDING}": write_table(table, LAYOUTS[name]) for name, table in tables_of(record).items()}
+    files = {f"{name}{ENDING}": write_table(table, LAYOUTS[name]) for name, table in tables_of(record).items()}
     optional = optional_tables_of(record)
-    return files | {f"{name}{_ENDING}": write_table(table, OPTIONAL[name]) for name, table in optional.items()}
+    return files | {f"{name}{ENDING}": write_table(table, OPTIONAL[name]) for name, table in optional.items()}
 
 
 def decode_run(
@@ -49,14 +53,14 @@ def decode_run(
     """
     tables = {}
     for name, layout in LAYOUTS.items():
-        file = f"{name}{_ENDING}"
+        file = f"{name}{ENDING}"
         if file not in files:
             raise InputError(f"{place}: expected a file {file}; got {shown(', '.join(files)) if files else 'none'}")
         tables[name] = read_table(files[file], layout, f"{place}/{file}")
     for name, layout in OPTIONAL.items():
-        if (file := f"{name}{_ENDING}") in files:
+        if (file := f"{name}{ENDING}") in files:
             tables[name] = read_table(files[file], layout, f"{place}/{file}")
-    spent = {} if timings is None else decode_timings(timings, f"{place}/timings{_ENDING}")
+    spent = {} if timings is None else decode_timings(timings, f"{place}/timings{ENDING}")
     try:
         record = record_of(facts, tables, spent)
         check_record(record)

@@ -10,17 +10,18 @@ from __future__ import annotations
 import hashlib
 import json
 import platform
+import shlex
 import shutil
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 from vedette.errors import InputError
 from vedette.reading import parse_json, read_file, unreadable
-from vedette.simulation.kept import FORMAT_VERSION, decode_run, encode_run, encode_timings
+from vedette.simulation.kept import FORMAT_VERSION, LACKING, decode_run, encode_run, encode_timings
 from vedette.simulation.records import RunRecord
 from vedette.simulation.tables import run_facts
 from vedette.text import printable, shown
@@ -71,6 +72,16 @@ def load_run(directory: Path | str) -> RunRecord:
     """
     folder = Path(directory)
     manifest = read_manifest(folder)
+    files = read_files(folder, manifest)
+    if TIMINGS not in files:
+        raise InputError(
+            f"{folder / MANIFEST}: expected a file {TIMINGS}; it names {shown(', '.join(files)) or 'none'}"
+        )
+    return decode_run(manifest["run"], files, str(folder), files[TIMINGS])
+
+
+def read_files(folder: Path, manifest: Mapping[str, Any]) -> dict[str, bytes]:
+    """The files of a saved run by name, as they were written. Raises `InputError` as `load_run`."""
     files = {}
     for name, checksum in manifest["files"].items():
         if Path(name).name != name:
@@ -79,15 +90,55 @@ def load_run(directory: Path | str) -> RunRecord:
         if hashlib.sha256(content).hexdigest() != checksum:
             raise InputError(f"{folder / name}: expected the file as it was written; it is cut short or altered")
         files[name] = content
-    if TIMINGS not in files:
+    return files
+
+
+# Raises `InputError` for a manifest of a format that is not wanted: the manifest, what has the versions that wrote it,
+# and where it is.
+VersionCheck: TypeAlias = Callable[[Mapping[str, Any], Any, Path], None]
+
+
+def check_version(manifest: Mapping[str, Any], session: Any, place: Path) -> None:
+    """`InputError` unless a saved run or a campaign is of this format; it says what to do with another."""
+    number = _number(manifest)
+    if number == FORMAT_VERSION:
+        return
+    if number in LACKING:
+        cure = f"vedette upgrade {shlex.quote(str(place.parent))}"
         raise InputError(
-            f"{folder / MANIFEST}: expected a file {TIMINGS}; it names {shown(', '.join(files)) or 'none'}"
+            f"{place}: expected format {FORMAT_VERSION}; got {number}, written by an earlier version of this program: "
+            f"`{cure}` brings it to this one"
         )
-    return decode_run(manifest["run"], files, str(folder), files[TIMINGS])
+    writer = session.get("versions") if isinstance(session, dict) else None
+    writer = writer.get("vedette") if isinstance(writer, dict) else None
+    reader = "the version that wrote it"
+    if isinstance(writer, str) and writer != versions()["vedette"]:
+        reader = f"vedette {printable(writer)[:40]}"
+    which = "another" if number is None else "a later" if number > FORMAT_VERSION else "an earlier"
+    got = shown(manifest.get("format_version"))
+    raise InputError(
+        f"{place}: expected format {FORMAT_VERSION}; got {got}, written by {which} version of this program: "
+        f"run it again, or read it with {reader}"
+    )
 
 
-def read_manifest(directory: Path | str) -> dict[str, Any]:
-    """The manifest of a saved run: format, versions, run, checksums of its files. Raises `InputError` as `load_run`."""
+def check_upgradable(manifest: Mapping[str, Any], session: Any, place: Path) -> None:
+    """`InputError` unless a saved run or a campaign is of this format, or of one that can be brought to it."""
+    if _number(manifest) not in LACKING:
+        check_version(manifest, session, place)
+
+
+def _number(manifest: Mapping[str, Any]) -> int | None:
+    """Of the format; None for what no format has."""
+    number = manifest.get("format_version")
+    return number if isinstance(number, int) and not isinstance(number, bool) and number > 0 else None
+
+
+def read_manifest(directory: Path | str, check: VersionCheck = check_version) -> dict[str, Any]:
+    """The manifest of a saved run of a format that passes `check`: format, versions, run, checksums of its files.
+
+    Raises `InputError` as `load_run`.
+    """
     path = Path(directory) / MANIFEST
     try:
         manifest = parse_json(_read(path))
@@ -97,7 +148,7 @@ def read_manifest(directory: Path | str) -> dict[str, Any]:
         raise InputError(f"{path}: expected the manifest of a run; it is cut short or altered: {error}") from error
     if not isinstance(manifest, dict) or manifest.get("format") != FORMAT:
         raise InputError(f"{path}: expected the manifest of a run; got another file")
-    check_version(manifest, manifest, path)
+    check(manifest, manifest, path)
     if not isinstance(manifest.get("files"), dict) or not isinstance(manifest.get("run"), dict):
         raise InputError(f"{path}: expected the fields files and run; it is cut short or altered")
     return manifest
@@ -120,26 +171,6 @@ def _manifest(record: RunRecord, files: Mapping[str, bytes]) -> dict[str, Any]:
         "versions": versions(),
         "files": {name: hashlib.sha256(content).hexdigest() for name, content in files.items()},
     }
-
-
-def check_version(manifest: Mapping[str, Any], session: Any, place: object) -> None:
-    """`InputError` unless a saved run or a campaign is of this format; it says what to do with another.
-
-    session: what has the `versions` that wrote it, if it has.
-    """
-    number = manifest.get("format_version")
-    if number == FORMAT_VERSION:
-        return
-    writer = session.get("versions") if isinstance(session, dict) else None
-    writer = writer.get("vedette") if isinstance(writer, dict) else None
-    reader = "the version that wrote it"
-    if isinstance(writer, str) and writer != versions()["vedette"]:
-        reader = f"vedette {printable(writer)[:40]}"
-    which = "an earlier" if isinstance(number, int) and 0 < number < FORMAT_VERSION else "another"
-    raise InputError(
-        f"{place}: expected format {FORMAT_VERSION}; got {shown(number)}, written by {which} version of this program: "
-        f"run it again, or read it with {reader}"
-    )
 
 
 def versions(*more: str) -> dict[str, str]:

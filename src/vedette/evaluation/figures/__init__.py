@@ -14,11 +14,13 @@ from vedette.evaluation.figures.mean_rewards import mean_rewards_figure
 from vedette.evaluation.figures.ospa import ospa_figure
 from vedette.evaluation.figures.rewards import reward_figure
 from vedette.evaluation.figures.roses import roses_figure
+from vedette.evaluation.figures.scene import Scene, scene_of
 from vedette.evaluation.figures.style import png_bytes, save_figure, svg_text
 from vedette.evaluation.figures.sweep import SweepCurve, sweep_figure
 from vedette.evaluation.figures.tracks import overview_figure, tracks_figure
 
 __all__ = [
+    "Scene",
     "SweepCurve",
     "consistency_figure",
     "cost_figure",
@@ -30,6 +32,7 @@ __all__ = [
     "reward_figure",
     "roses_figure",
     "save_figure",
+    "scene_of",
     "svg_text",
     "sweep_figure",
     "tracks_figure",

@@ -13,15 +13,22 @@ from matplotlib.figure import Figure
 from vedette.control.plan import RewardTable
 from vedette.errors import InputError
 from vedette.evaluation.actions import ActionAxis, action_axis
-from vedette.evaluation.figures.rewards import best_over_others, best_over_pair, map_ticks, mark_actions
+from vedette.evaluation.figures.rewards import (
+    best_over_others,
+    best_over_pair,
+    choosing,
+    first_pair,
+    map_ticks,
+    mark_actions,
+)
+from vedette.evaluation.figures.scene import Scene
 from vedette.evaluation.figures.style import (
     HEAT_MAP,
     INK,
-    MARKERS,
     TEXT_WIDTH,
-    colour,
-    line_style,
+    legend_columns,
     new_figure,
+    sensor_looks,
     shown_decisions,
     styled,
 )
@@ -31,66 +38,86 @@ from vedette.simulation.records import RunRecord
 
 _COLUMNS = 3
 _LARGEST_MARK = 60.0  # points squared, of a choice made in every run
-_PAIR = (0, 1)
 _LEVELS = 48  # of colour, which a vector file holds one by one
 
 
 @styled
-def mean_rewards_figure(records: Sequence[RunRecord]) -> Figure:
+def mean_rewards_figure(records: Sequence[RunRecord], scene: Scene | None = None) -> Figure:
     """Mean reward over the runs of one strategy against action, a panel a decision, with how often each was chosen.
 
     Independent decisions: one curve a sensor with a band of one standard error over the runs. Joint decisions: a heat
-    map over the first two sensors, the largest over the others where there are more; where the joint table was too
-    large to keep, curves with the other sensors at their choice. The area of a mark is the share of the runs that chose
-    the action. Of many decisions at most six are shown.
+    map over the first two sensors with a choice, the largest over the others where there are more; where the joint
+    table was too large to keep, curves with the other sensors at their choice. The area of a mark is the share of the
+    runs that chose the action. A sensor that has but one action has no curve; of more than six, those have one whose
+    choice makes the most difference. Of many decisions at most six are shown.
 
-    Raises `InputError` for runs without rewards, or without a common set of actions.
+    Raises `InputError` for runs without rewards, without a choice, or without a common set of actions.
     """
+    scene = scene or Scene()
     number = max((len(record.decisions) for record in records), default=0)
     decisions = [mean_rewards(records, decision) for decision in shown_decisions(number)]
     if not decisions:
         raise InputError("records: expected runs with decisions; got none")
-    joint = any(len(table.sensors) > 1 for table in decisions[0].tables)
+    pair = first_pair(decisions[0].tables, decisions[0].actions)
+    drawn = choosing([(each.tables, each.actions) for each in decisions])
+    if not drawn:
+        raise InputError("records: expected a sensor with a choice; got one action each")
     columns = min(len(decisions), _COLUMNS)
     rows = -(-len(decisions) // columns)
     width = TEXT_WIDTH * (columns / _COLUMNS if columns < _COLUMNS else 1.0)
-    figure = new_figure((2.35 if joint else 1.9) * rows + (0.0 if joint else 0.2), width=width)
-    panels = figure.subplots(rows, columns, sharey=not joint, squeeze=False)
+    words = 0.0 if all(action_axis(decisions[0].actions[sensor]).is_numeric for sensor in drawn) else 0.4
+    height = (1.9 + words) * rows + 0.4 if pair is None else 2.35 * rows
+    figure = new_figure(height, width=width)
+    panels = figure.subplots(rows, columns, sharey=pair is None, squeeze=False)
     for panel, rewards in zip(panels.ravel(), decisions, strict=False):
-        if joint:
-            _draw_joint(figure, panel, rewards)
+        if pair is None:
+            _draw_curves(panel, rewards, drawn, scene)
         else:
-            _draw_curves(panel, rewards)
+            _draw_joint(figure, panel, rewards, pair)
         panel.set_title(f"{rewards.time:g} s")
     for panel in panels.ravel()[len(decisions) :]:
         panel.set_visible(False)
-    _label(figure, panels, decisions[0], joint)
+    if pair is None:
+        for row in panels[:, 0]:
+            row.set_ylabel("Mean reward")
+        _name_curves(figure, panels, scene)
+    else:
+        _name_maps(figure, panels, pair, decisions[0], scene)
     return figure
 
 
-def _label(figure: Figure, panels: Any, rewards: MeanRewards, joint: bool) -> None:
+def _name_curves(figure: Figure, panels: Any, scene: Scene) -> None:
+    handles, labels = panels[0, 0].get_legend_handles_labels()
+    columns = legend_columns(labels, width=figure.get_figwidth())
+    title = scene.reward_title() if scene.reward else None
+    figure.legend(handles, labels, loc="outside upper center", ncols=columns, title=title, title_fontsize=7)
+
+
+def _name_maps(figure: Figure, panels: Any, pair: tuple[int, int], rewards: MeanRewards, scene: Scene) -> None:
+    across, up = (action_axis(rewards.actions[sensor]).title(scene.name(sensor)) for sensor in pair)
     for panel in panels[-1]:
-        if joint:
-            panel.set_xlabel(action_axis(rewards.actions[_PAIR[0]]).title(_PAIR[0]))
-    for row in panels[:, 0]:
-        row.set_ylabel(action_axis(rewards.actions[_PAIR[1]]).title(_PAIR[1]) if joint else "Mean reward")
-    if not joint:
-        handles, labels = panels[0, 0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside upper center", ncols=min(len(labels), 6))
+        panel.set_xlabel(across)
+    for panel in panels[:, 0]:
+        panel.set_ylabel(up)
+    if scene.reward:
+        figure.suptitle(scene.reward_title("Colour: mean reward"), fontsize=7)
 
 
-def _draw_curves(axes: Axes, rewards: MeanRewards) -> None:
-    along = {sensor: action_axis(rewards.actions[sensor]) for table in rewards.tables for sensor in table.sensors}
+def _draw_curves(axes: Axes, rewards: MeanRewards, drawn: Sequence[int], scene: Scene) -> None:
+    along, looks = {sensor: action_axis(rewards.actions[sensor]) for sensor in drawn}, sensor_looks(drawn)
     alike = len({each.title() if each.is_numeric else each.labels for each in along.values()}) == 1
     for table, share in zip(rewards.tables, rewards.shares, strict=True):
         for axis, sensor in enumerate(table.sensors):
+            if sensor not in along:
+                continue
             others = tuple(other for other in range(share.ndim) if other != axis)
             _draw_curve(
                 axes,
                 along[sensor] if alike else along[sensor].counted(),
-                sensor,
                 best_over_others(table, axis),
                 share.sum(axis=others),
+                scene.name(sensor),
+                looks[sensor],
             )
     if alike:
         mark_actions(axes, next(iter(along.values())), 90)
@@ -98,11 +125,13 @@ def _draw_curves(axes: Axes, rewards: MeanRewards) -> None:
         axes.set_xlabel("Number of the action")
 
 
-def _draw_curve(axes: Axes, along: ActionAxis, sensor: int, curve: tuple[Floats, Floats], share: Floats) -> None:
+def _draw_curve(
+    axes: Axes, along: ActionAxis, curve: tuple[Floats, Floats], share: Floats, name: str, looks: Any
+) -> None:
     order = np.argsort(along.places, kind="stable")
     places = along.places[order]
     mean, error, share = curve[0][order], curve[1][order], share[order]
-    shade = colour(sensor)
+    shade, marker, dashes = looks
     if along.is_numeric:
         axes.fill_between(places, mean - error, mean + error, color=shade, alpha=0.2, linewidth=0)
     else:
@@ -111,18 +140,19 @@ def _draw_curve(axes: Axes, along: ActionAxis, sensor: int, curve: tuple[Floats,
         places,
         mean,
         color=shade,
-        linestyle=line_style(sensor) if along.is_numeric else ":",
-        label=f"sensor {sensor + 1}",
+        linestyle=dashes if along.is_numeric else ":",
+        label=name,
     )
+    chosen = share > 0.0
     axes.scatter(
-        places, mean, s=_LARGEST_MARK * share, color=shade, marker=MARKERS[sensor % len(MARKERS)],
-        edgecolors=INK, linewidths=np.where(share > 0.0, 0.5, 0.0).tolist(), zorder=3,
+        places[chosen], mean[chosen], s=_LARGEST_MARK * share[chosen], color=shade,
+        marker=marker, edgecolors=INK, linewidths=0.5, zorder=3,
     )  # fmt: skip
 
 
-def _draw_joint(figure: Figure, axes: Axes, rewards: MeanRewards) -> None:
+def _draw_joint(figure: Figure, axes: Axes, rewards: MeanRewards, pair: tuple[int, int]) -> None:
     place, table = next((i, table) for i, table in enumerate(rewards.tables) if len(table.sensors) > 1)
-    reward, share = best_over_pair(table, _PAIR), _pair_share(table, rewards.shares[place])
+    reward, share = best_over_pair(table, pair), _pair_share(table, rewards.shares[place], pair)
     edges = [np.arange(length + 1) - 0.5 for length in reward.shape]
     image = axes.pcolormesh(
         *edges, reward.T, cmap=matplotlib.colormaps[HEAT_MAP].resampled(_LEVELS), edgecolors="face", linewidth=0.1
@@ -133,7 +163,7 @@ def _draw_joint(figure: Figure, axes: Axes, rewards: MeanRewards) -> None:
     )
     axes.grid(False)
     axes.set_aspect("equal" if reward.shape[0] == reward.shape[1] else "auto")
-    for axis, sensor in zip((axes.xaxis, axes.yaxis), _PAIR, strict=True):
+    for axis, sensor in zip((axes.xaxis, axes.yaxis), pair, strict=True):
         map_ticks(axis, action_axis(rewards.actions[sensor]), 5)
     bar = figure.colorbar(image, ax=axes, shrink=0.9)
     bar.ax.tick_params(labelsize=6)
@@ -142,8 +172,8 @@ def _draw_joint(figure: Figure, axes: Axes, rewards: MeanRewards) -> None:
     bar.solids.set(edgecolor="face", rasterized=False)  # a page would have to load the picture
 
 
-def _pair_share(table: RewardTable, share: Floats) -> Floats:
+def _pair_share(table: RewardTable, share: Floats, pair: tuple[int, int]) -> Floats:
     """Share of the runs that chose each pair of actions, whatever the other sensors did."""
-    positions = [table.sensors.index(sensor) for sensor in _PAIR]
+    positions = [table.sensors.index(sensor) for sensor in pair]
     summed = share.sum(axis=tuple(axis for axis in range(share.ndim) if axis not in positions))
     return np.asarray(summed if positions[0] < positions[1] else summed.T)

@@ -13,49 +13,85 @@ from matplotlib.patches import Rectangle
 from vedette.control.plan import Plan, RewardTable
 from vedette.errors import InputError
 from vedette.evaluation.actions import ActionAxis, action_axis, with_minus
+from vedette.evaluation.figures.scene import Scene
 from vedette.evaluation.figures.style import (
+    COLOURS,
     COLUMN_WIDTH,
     HEAT_MAP,
-    MARKERS,
-    colour,
     degrees_label,
-    line_style,
+    legend_columns,
     new_figure,
+    sensor_looks,
     styled,
 )
 from vedette.kernels.base.types import Floats
 from vedette.platforms import Actions
 
+_PANEL_WIDTH = 2.4  # inches, within the labels of a column
+
 
 @styled
-def reward_figure(plan: Plan, *, pair: tuple[int, int] = (0, 1)) -> Figure:
+def reward_figure(plan: Plan, *, pair: tuple[int, int] | None = None, scene: Scene | None = None) -> Figure:
     """Reward against action, one curve a sensor, the choice marked, with bands of one standard error over the samples.
 
     Actions of one column lie at its number, and others side by side; sensors of other columns have panels of their own.
     A plan made independently has its curves as they are. A joint plan has above them a heat map of the joint table with
     the chosen actions framed; its curves are the most that a sensor's action can bring with the best actions of the
     others. With more than two sensors the heat map is likewise the maximum over the sensors outside `pair`. What a
-    search did not evaluate is left blank.
+    search did not evaluate is left blank. A sensor that has but one action has no curve; of more than six, those have
+    one whose choice makes the most difference.
 
     Args:
         plan: with reward tables.
-        pair: the sensors on the axes of the heat map.
+        pair: the sensors on the axes of the heat map; else the first two that have a choice.
+        scene: what sensors and rewards are called.
 
-    Raises `InputError` for a plan without tables (random or fixed control), or a pair that is not two of its sensors.
+    Raises `InputError` for a plan without tables (random or fixed control) or without a choice, or a pair that is not
+    two of its sensors.
     """
+    scene = scene or Scene()
     plan.validate()
     if not plan.tables:
         raise InputError(f"plan: expected reward tables; got none, as planner {plan.planner!r} weighs no actions")
+    drawn = choosing([(plan.tables, plan.actions)])
+    if not drawn:
+        raise InputError("plan: expected a sensor with a choice; got one action each")
     joint = [table for table in plan.tables if len(table.sensors) > 1]
-    groups = alike(plan.actions, [sensor for table in plan.tables for sensor in table.sensors])
+    pair = pair or first_pair(plan.tables, plan.actions)
+    groups = alike(plan.actions, drawn)
+    if pair is None:
+        joint = []
     heights = [1.55] * len(joint[:1]) + [1.0] * len(groups)
     figure = new_figure((COLUMN_WIDTH + 1.4 if joint else 2.3) + 1.9 * (len(groups) - 1))
     panels = figure.subplots(len(heights), 1, height_ratios=heights, squeeze=False)[:, 0]
-    if joint:
-        _draw_heat_map(figure, panels[0], plan, joint[0], pair)
+    if joint and pair is not None:
+        _draw_heat_map(figure, panels[0], plan, joint[0], pair, scene)
     for axes, sensors in zip(panels[-len(groups) :], groups, strict=True):
-        _draw_curves(axes, plan, sensors)
+        _draw_curves(axes, plan, sensors, scene, sensor_looks(drawn))
     return figure
+
+
+def choosing(decided: Sequence[tuple[Sequence[RewardTable], Sequence[Actions]]]) -> tuple[int, ...]:
+    """The sensors with more than one action in any of some decisions, of which tables and actions are given.
+
+    Of more than six, the six whose choice makes the most difference to the reward.
+    """
+    spans: dict[int, float] = {}
+    for tables, actions in decided:
+        for table in tables:
+            for axis, sensor in enumerate(table.sensors):
+                if len(actions[sensor]) > 1:
+                    curve = best_over_others(table, axis)[0]
+                    known = curve[np.isfinite(curve)]
+                    spans[sensor] = spans.get(sensor, 0.0) + float(np.ptp(known) if len(known) else 0.0)
+    return tuple(sorted(sorted(spans, key=lambda sensor: -spans[sensor])[: len(COLOURS)]))
+
+
+def first_pair(tables: Sequence[RewardTable], actions: Sequence[Actions]) -> tuple[int, int] | None:
+    """The first two sensors with a choice of a joint table; None where there are none."""
+    joint = [table.sensors for table in tables if len(table.sensors) > 1]
+    with_choice = [sensor for sensors in joint[:1] for sensor in sensors if len(actions[sensor]) > 1]
+    return (with_choice[0], with_choice[1]) if len(with_choice) > 1 else None
 
 
 def alike(actions: Sequence[Actions], sensors: Sequence[int]) -> list[list[int]]:
@@ -67,25 +103,26 @@ def alike(actions: Sequence[Actions], sensors: Sequence[int]) -> list[list[int]]
     return list(groups.values())
 
 
-def _draw_curves(axes: Axes, plan: Plan, sensors: Sequence[int]) -> None:
+def _draw_curves(axes: Axes, plan: Plan, sensors: Sequence[int], scene: Scene, looks: dict[int, Any]) -> None:
     for table in plan.tables:
         for axis, sensor in enumerate(table.sensors):
             if sensor in sensors:
-                _draw_curve(axes, plan, sensor, *best_over_others(table, axis))
+                _draw_curve(axes, plan, sensor, *best_over_others(table, axis), scene.name(sensor), looks[sensor])
     joint = any(len(table.sensors) > 1 for table in plan.tables)
     mark_actions(axes, action_axis(plan.actions[sensors[0]]))
-    axes.set_ylabel("Largest joint reward" if joint else "Reward (CS divergence)")
+    axes.set_ylabel(scene.reward_title("Largest joint reward" if joint else "Reward").replace(" (", "\n("))
     # Above the panel: wherever a legend would lie inside, some curve passes.
-    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2, frameon=False, handlelength=1.8)
+    columns = legend_columns([str(each) for each in axes.get_legend_handles_labels()[1]], width=_PANEL_WIDTH)
+    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=columns, frameon=False, handlelength=1.8)
 
 
-def _draw_curve(axes: Axes, plan: Plan, sensor: int, mean: Floats, error: Floats) -> None:
+def _draw_curve(axes: Axes, plan: Plan, sensor: int, mean: Floats, error: Floats, name: str, looks: Any) -> None:
     # Changes of heading come in another order than the headings that they lead to.
     axis = action_axis(plan.actions[sensor])
     order = np.argsort(axis.places, kind="stable")
     places, mean, error = axis.places[order], mean[order], error[order]
     chosen = int(np.flatnonzero(order == plan.chosen[sensor])[0])
-    shade = colour(sensor)
+    shade, marker, dashes = looks
     if axis.is_numeric:
         axes.fill_between(places, mean - error, mean + error, color=shade, alpha=0.2, linewidth=0)
     else:
@@ -94,12 +131,12 @@ def _draw_curve(axes: Axes, plan: Plan, sensor: int, mean: Floats, error: Floats
         places,
         mean,
         color=shade,
-        linestyle=line_style(sensor) if axis.is_numeric else "",
-        marker=MARKERS[sensor % len(MARKERS)],
+        linestyle=dashes if axis.is_numeric else "",
+        marker=marker,
         markersize=6,
         markeredgecolor="black",
         markevery=[chosen],
-        label=f"sensor {sensor + 1}: {with_minus(axis.labels[order[chosen]])}",
+        label=f"{name}: {with_minus(axis.labels[order[chosen]])}",
     )
     axes.plot(places, mean, color=shade, linestyle="", marker=".", markersize=3)
 
@@ -143,15 +180,17 @@ def best_over_pair(table: RewardTable, pair: tuple[int, int]) -> Floats:
     return reward.T if positions[0] > positions[1] else reward
 
 
-def _draw_heat_map(figure: Figure, axes: Axes, plan: Plan, table: RewardTable, pair: tuple[int, int]) -> None:
+def _draw_heat_map(
+    figure: Figure, axes: Axes, plan: Plan, table: RewardTable, pair: tuple[int, int], scene: Scene
+) -> None:
     reward = best_over_pair(table, pair)
     image = axes.imshow(reward.T, origin="lower", cmap=HEAT_MAP, aspect="auto", interpolation="nearest")
     axes.grid(False)
     for axis, sensor in zip((axes.xaxis, axes.yaxis), pair, strict=True):
         along = action_axis(plan.actions[sensor])
         map_ticks(axis, along, 7)
-        axis.set_label_text(along.title(sensor))
+        axis.set_label_text(along.title(scene.name(sensor)))
     column, row = plan.chosen[pair[0]], plan.chosen[pair[1]]
     for shade, width in (("black", 2.6), ("white", 1.2)):  # legible on the dark and on the light end of the scale
         axes.add_patch(Rectangle((column - 0.5, row - 0.5), 1, 1, fill=False, edgecolor=shade, linewidth=width))
-    figure.colorbar(image, ax=axes, label="Joint reward (CS divergence)")
+    figure.colorbar(image, ax=axes, label=scene.reward_title("Joint reward").replace(" (", "\n("))

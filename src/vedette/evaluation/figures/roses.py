@@ -3,20 +3,25 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.patches import Patch
 
 from vedette.errors import InputError
-from vedette.evaluation.actions import row_words, with_minus
+from vedette.evaluation.actions import Row, row_words, with_minus
 from vedette.evaluation.comparison import Choice, Comparison
 from vedette.evaluation.figures.labels import short_labels
+from vedette.evaluation.figures.scene import Scene
 from vedette.evaluation.figures.style import (
+    COLOURS,
     GREY,
     TEXT_WIDTH,
-    colour,
+    legend_columns,
     new_figure,
+    sensor_looks,
     shown_decisions,
     styled,
 )
@@ -28,44 +33,60 @@ _SECTORS = 24  # that headings which are no fixed set are counted in
 
 
 @styled
-def roses_figure(comparison: Comparison) -> Figure:
+def roses_figure(comparison: Comparison, scene: Scene | None = None) -> Figure:
     """Shares of the runs in which each action was chosen: a row a strategy that decides, a column a decision.
 
     A rose where every sensor was sent on a heading, and bars of the actions in words elsewhere. Headings are
     counter-clockwise from east (0). Sensors stand side by side within the sector of a heading. The area of a bar of a
-    rose is in proportion to the share: the radius goes with its square root. Of many decisions at most six are shown,
-    evenly spread, the first and the last among them.
+    rose is in proportion to the share: the radius goes with its square root. Sensors that never had anything to do but
+    stand are left out, and more than six are taken together. Of many decisions at most six are shown, evenly spread,
+    the first and the last among them.
 
-    Raises `InputError` where no strategy made a decision.
+    Raises `InputError` where no strategy made a decision, or no sensor had a choice.
     """
     rows = [index for index, runs in enumerate(comparison.choices) if any(runs)]
     if not rows:
         raise InputError("comparison: expected decisions; got none")
     columns = shown_decisions(len(comparison.decision_times))
-    num_sensors, names = _num_sensors(comparison), short_labels(comparison.strategies, 20)
+    movers, names = _movers(comparison), short_labels(comparison.strategies, 20)
+    sensors = {sensor: (scene or Scene()).name(sensor) for sensor in movers}
+    if together := len(movers) > len(COLOURS):
+        sensors = {0: f"{len(movers)} sensors, taken together"}
+    shades = [shade for shade, _, _ in sensor_looks(list(sensors)).values()]
     size = min(TEXT_WIDTH / (len(columns) + 0.35), _SIZE)
     figure = new_figure(size * len(rows) + 0.5, width=size * (len(columns) + 0.35))
-    are_headings = all("heading_deg" in dict(row) for choice in _all_choices(comparison) for row in choice)
+    are_headings = all(
+        "heading_deg" in dict(choice[sensor]) for choice in _all_choices(comparison) for sensor in movers
+    )
     polar = {"projection": "polar"} if are_headings else {}
     panels = figure.subplots(len(rows), len(columns), subplot_kw=polar, squeeze=False)
     for row, index in enumerate(rows):
         for column, decision in enumerate(columns):
             panel = panels[row, column]
-            chosen = [run[decision] for run in comparison.choices[index] if decision < len(run)]
+            runs = [run[decision] for run in comparison.choices[index] if decision < len(run)]
+            chosen = [tuple(choice[sensor] for sensor in movers) for choice in runs]
+            if together:
+                chosen = [(each,) for choice in chosen for each in choice]
             if are_headings and chosen:
-                _draw_rose(panel, _headings(chosen), num_sensors)
+                _draw_rose(panel, _headings(chosen), shades)
             else:
-                _draw_bars(panel, chosen)
+                _draw_bars(panel, chosen, shades)
             if row == 0:
                 panel.set_title(f"{comparison.decision_times[decision]:g} s", pad=9)
         panels[row, 0].set_ylabel(names[index], labelpad=22, fontsize=8)
-    handles, labels = panels[0, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=min(num_sensors, 6))
+    handles = [Patch(color=shade, label=name) for shade, name in zip(shades, sensors.values(), strict=True)]
+    side_by_side = legend_columns(list(sensors.values()), width=figure.get_figwidth())
+    figure.legend(handles=handles, loc="outside lower center", ncols=side_by_side)
     return figure
 
 
-def _num_sensors(comparison: Comparison) -> int:
-    return max(map(len, _all_choices(comparison)))
+def _movers(comparison: Comparison) -> list[int]:
+    """The sensors that may do more than stand."""
+    of_sensors: list[tuple[Row, ...]] = list(zip(*_all_choices(comparison), strict=True))
+    found = [sensor for sensor, chosen in enumerate(of_sensors) if any(chosen)]
+    if not found:
+        raise InputError("comparison: expected a sensor with a choice; got none")
+    return found
 
 
 def _all_choices(comparison: Comparison) -> list[Choice]:
@@ -78,30 +99,30 @@ def _headings(chosen: list[Choice]) -> Ints:
     return np.array(degrees, np.int64).reshape(len(chosen), -1) % 360
 
 
-def _draw_bars(axes: Any, chosen: list[Choice]) -> None:
+def _draw_bars(axes: Any, chosen: list[Choice], shades: Sequence[str]) -> None:
     """One bar a sensor and action that was chosen, the most frequent of each sensor on top."""
     place, ticks = 0, []
-    for sensor, rows in enumerate(zip(*chosen, strict=True)):
-        for number, (row, count) in enumerate(Counter(rows).most_common(_MOST_BARS)):
-            label = {"label": f"sensor {sensor + 1}"} if number == 0 else {}
-            axes.barh(place, count / len(chosen), color=colour(sensor), height=0.8, **label)
+    for shade, rows in zip(shades, zip(*chosen, strict=True), strict=False):
+        for row, count in Counter(rows).most_common(_MOST_BARS):
+            axes.barh(place, count / len(chosen), color=shade, height=0.8)
             ticks.append(with_minus(row_words(row)))
             place += 1
-    axes.set_yticks(range(place), ticks, fontsize=4)
+    axes.set_yticks(range(place), ticks, fontsize=5)
+    axes.set_axisbelow(True)
     axes.invert_yaxis()
     axes.set_xlim(0.0, 1.0)
     axes.set_xticks([0.0, 0.5, 1.0], ["0", "", "100 %"], fontsize=6)
 
 
-def _draw_rose(axes: Any, chosen: Ints, num_sensors: int) -> None:
+def _draw_rose(axes: Any, chosen: Ints, shades: Sequence[str]) -> None:
     centres, width = _sectors(chosen)
-    share = width / max(num_sensors, 1) * 0.9
-    for sensor in range(chosen.shape[1]):
-        counts = _shares(chosen[:, sensor], centres, width)
+    share = width / len(shades) * 0.9
+    for place, shade in enumerate(shades):
+        counts = _shares(chosen[:, place], centres, width)
         # The first sensor lies first counter-clockwise, so that overlapping choices of all sensors stay visible.
-        places = centres + (sensor - (num_sensors - 1) / 2.0) * share
+        places = centres + (place - (len(shades) - 1) / 2.0) * share
         shown = counts > 0.0
-        axes.bar(places[shown], np.sqrt(counts[shown]), width=share, color=colour(sensor), label=f"sensor {sensor + 1}")
+        axes.bar(places[shown], np.sqrt(counts[shown]), width=share, color=shade)
     axes.set_thetagrids(range(0, 360, 90), ["0°", "90°", "180°", "270°"])
     axes.set_ylim(0.0, 1.0)
     axes.set_yticks(np.sqrt([0.1, 0.5]), ["10 %", "50 %"])

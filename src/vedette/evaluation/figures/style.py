@@ -18,6 +18,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.backends.backend_pdf import FigureCanvasPdf
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
+from matplotlib.font_manager import FontProperties
+from matplotlib.textpath import text_to_path
 
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats
@@ -77,6 +79,8 @@ _SETTINGS: Any = {
 }
 _FORMATS = ("pdf", "svg", "png")
 _DOTS_PER_INCH = 300
+_POINTS_PER_INCH = 72.0
+_AROUND_LABEL = 0.52  # inches, of the handle of an entry of a legend and the gaps beside it
 _UNDATED: dict[str, dict[str, None]] = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}
 
 
@@ -141,9 +145,13 @@ def degrees_label(value: float) -> str:
 
 
 def legend_columns(labels: Sequence[str], *, width: float = COLUMN_WIDTH) -> int:
-    """How many entries of a legend stand side by side within a width in inches: at least one, at most five."""
-    longest = max(map(len, labels), default=1)
-    return max(1, min(5, len(labels), int((width - 0.1) / (0.42 + 0.05 * longest))))
+    """How many entries of a legend stand side by side within a width in inches: at least one, at most six."""
+    font = FontProperties(size=_SETTINGS["legend.fontsize"])
+    with _untold():
+        longest = max(
+            (text_to_path.get_text_width_height_descent(label, font, False)[0] for label in labels), default=0
+        )
+    return max(1, min(6, len(labels), int((width - 0.2) / (_AROUND_LABEL + longest / _POINTS_PER_INCH))))
 
 
 def span_times(axes: Axes, times: Floats) -> None:
@@ -155,6 +163,20 @@ def span_times(axes: Axes, times: Floats) -> None:
 def colour(index: int) -> str:
     """Colour of the strategy at this place, the same in every figure."""
     return COLOURS[index % len(COLOURS)]
+
+
+def sensor_looks(sensors: Sequence[int]) -> dict[int, tuple[str, str, Any]]:
+    """Colour, marker and dashes of each sensor of a figure, no two of six alike.
+
+    They are the same in every figure of at most six sensors, and those of the first three have colours that none of the
+    first three strategies has.
+    """
+    are_few = max(sensors, default=0) < len(COLOURS)
+    places = {sensor: sensor if are_few else place for place, sensor in enumerate(sensors)}
+    return {
+        sensor: (COLOURS[(place + 3) % len(COLOURS)], MARKERS[place % len(MARKERS)], line_style(place))
+        for sensor, place in places.items()
+    }
 
 
 def shown_decisions(number: int, most: int = 6) -> tuple[int, ...]:

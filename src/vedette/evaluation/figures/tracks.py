@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.legend_handler import HandlerTuple
 from matplotlib.lines import Line2D
 from matplotlib.patches import Wedge
 from matplotlib.ticker import MaxNLocator
@@ -16,12 +17,14 @@ from vedette.errors import InputError
 from vedette.evaluation.comparison import Comparison
 from vedette.evaluation.figures.labels import drawn_text, short_label
 from vedette.evaluation.figures.ospa import draw_ospa
+from vedette.evaluation.figures.scene import Scene, draw_zones, name_offsets, zone_handles
 from vedette.evaluation.figures.style import (
     COLUMN_WIDTH,
     GREY,
     INK,
     TEXT_WIDTH,
     colour,
+    legend_columns,
     new_figure,
     styled,
 )
@@ -29,21 +32,27 @@ from vedette.kernels.base.types import Floats, Ints
 from vedette.simulation.records import Decision, RunRecord
 
 _LARGE = 5000.0  # m, beyond which axes are in kilometres
+_TITLE_PAD = 14  # points, above the names of sensors at the upper edge
 _SENSOR_MARKERS = "sDpP*X"
+_MOST_NAMED, _MOST_DECISIONS = 8, 12  # sensors whose names, and decisions whose numbers, there is room for
 
 
 @styled
-def tracks_figure(*records: RunRecord, titles: Sequence[str] | None = None) -> Figure:
-    """Truth, estimates, sensor paths and decisions in the plane; one panel a run, on equal axes.
+def tracks_figure(*records: RunRecord, titles: Sequence[str] | None = None, scene: Scene | None = None) -> Figure:
+    """Truth, estimates, sensor paths, decisions and zones in the plane; one panel a run, on equal axes.
+
+    Of more than eight sensors, names and decisions are left out; so are more than twelve decisions.
 
     Args:
         records: one run fills a column, two fill the width of the page.
         titles: one a run; by default the strategies.
+        scene: the sensors' names, and the zones.
 
     Raises `InputError` for no record, or another number of titles.
     """
     if not records:
         raise InputError("records: expected at least one run; got none")
+    scene = scene or Scene()
     names = tuple(titles) if titles is not None else tuple(short_label(record.planner) for record in records)
     if len(names) != len(records):
         raise InputError(f"titles: expected {len(records)}; got {len(names)}")
@@ -53,43 +62,64 @@ def tracks_figure(*records: RunRecord, titles: Sequence[str] | None = None) -> F
     panels = figure.subplots(1, len(records), sharex=True, sharey=True, squeeze=False)[0]
     scale = 1e-3 if _reach(records) > _LARGE else 1.0
     for panel, record, name in zip(panels, records, names, strict=True):
-        draw_tracks(panel, record, scale)
-        panel.set_title(drawn_text(name))
-    frame_tracks(panels[0], records, scale)
-    figure.legend(handles=tracks_legend(records[0]), loc="outside lower center", ncols=3 if len(records) == 1 else 6)
+        draw_tracks(panel, record, scale, scene)
+        panel.set_title(drawn_text(name), pad=_TITLE_PAD)
+    frame_tracks(panels[0], records, scale, scene)
+    _add_legend(figure, records[0], scene)
     return figure
 
 
 @styled
-def overview_figure(record: RunRecord, comparison: Comparison) -> Figure:
-    """One picture of an experiment, as wide as a page: the tracks of one run, and the errors of all strategies."""
+def overview_figure(
+    record: RunRecord, comparison: Comparison, *, strategy: str = "", scene: Scene | None = None
+) -> Figure:
+    """One picture of an experiment, as wide as a page: the tracks of one run, and the errors of all strategies.
+
+    Colours are those of the strategies in both.
+
+    Args:
+        record: the run.
+        comparison: of all strategies.
+        strategy: which of them the run is of; else the one named as its planner.
+        scene: the sensors' names, and the zones.
+
+    Raises `InputError` for a strategy that is not compared.
+    """
+    scene, strategy = scene or Scene(), strategy or record.planner
+    if strategy not in comparison.strategies:
+        raise InputError(f"strategy: expected one of {', '.join(comparison.strategies)}; got {strategy!r}")
     figure = new_figure(TEXT_WIDTH / 2 + 0.1, width=TEXT_WIDTH)
     left, right = figure.subplots(1, 2)
     scale = 1e-3 if _reach([record]) > _LARGE else 1.0
-    draw_tracks(left, record, scale)
-    frame_tracks(left, [record], scale)
-    left.set_title(f"{short_label(record.planner)}, one run")
+    shade = colour(comparison.strategies.index(strategy))
+    draw_tracks(left, record, scale, scene, shade)
+    frame_tracks(left, [record], scale, scene)
+    left.set_title(f"{short_label(strategy)}, run {record.run}", pad=_TITLE_PAD)
     draw_ospa(right, comparison, "total")
+    several = f", mean of {comparison.num_runs} runs" if comparison.num_runs > 1 else " of one run"
+    right.set_ylabel(f"{right.get_ylabel()}{several}")
     right.set_xlabel("Time (s)")
-    right.set_title(f"Mean of {comparison.num_runs} runs" if comparison.num_runs > 1 else "OSPA of one run")
-    right.legend(loc="upper right")
-    figure.legend(handles=tracks_legend(record), loc="outside lower center", ncols=6)
+    # Above the panel, where it hides no curve.
+    columns = legend_columns([str(label) for label in right.get_legend_handles_labels()[1]])
+    right.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=columns, frameon=False)
+    _add_legend(figure, record, scene, shade)
     return figure
 
 
-def draw_tracks(axes: Axes, record: RunRecord, scale: float = 1.0) -> None:
-    """Draw one run into axes, in metres times `scale`."""
+def draw_tracks(axes: Axes, record: RunRecord, scale: float, scene: Scene, shade: str = "") -> None:
+    """Draw one run into axes, in metres times `scale`; the estimates in a shade, or else coloured by label."""
+    draw_zones(axes, scene.zones, scale)
     _draw_truth(axes, record, scale)
-    _draw_estimates(axes, record, scale)
+    _draw_estimates(axes, record, scale, shade)
     for sensor in range(record.num_sensors):
-        _draw_sensor(axes, record, sensor, scale)
+        _draw_sensor(axes, record, sensor, scale, scene)
     axes.set_aspect("equal")
     axes.set_xlabel("x (m)" if scale == 1.0 else "x (km)")
 
 
-def frame_tracks(axes: Axes, records: Sequence[RunRecord], scale: float = 1.0) -> None:
+def frame_tracks(axes: Axes, records: Sequence[RunRecord], scale: float, scene: Scene) -> None:
     """Limits, shared by all panels, of a square around everything but a stray estimate; a label on the y axis."""
-    points = np.concatenate([_positions(record) for record in records]) * scale
+    points = np.concatenate([scene.corners, *(_positions(record) for record in records)]) * scale
     low, high = points.min(axis=0), points.max(axis=0)
     axes.set_ylabel("y (m)" if scale == 1.0 else "y (km)")
     reach = 0.55 * max(float((high - low).max()), np.finfo(float).eps)
@@ -116,18 +146,19 @@ def _draw_truth(axes: Axes, record: RunRecord, scale: float) -> None:
         axes.plot(*path[-1], marker="^", color=INK, markerfacecolor="white", markersize=5, zorder=4)
 
 
-def _draw_estimates(axes: Axes, record: RunRecord, scale: float) -> None:
+def _draw_estimates(axes: Axes, record: RunRecord, scale: float, shade: str) -> None:
     labels = np.concatenate([estimate.labels for estimate in record.estimates])
     points = np.concatenate([estimate.means[:, :2] for estimate in record.estimates]) * scale
-    if _recur(labels):
+    if not shade and _recur(labels):
         distinct, of_estimate = np.unique(labels, axis=0, return_inverse=True)
         groups = [points[of_estimate.ravel() == index] for index in range(len(distinct))]
     else:
         groups = [points]
     for index, mine in enumerate(groups):
         axes.plot(
-            mine[:, 0], mine[:, 1], linestyle="", marker=".", markersize=3.2, color=colour(index), alpha=0.8, zorder=3
-        )
+            mine[:, 0], mine[:, 1], linestyle="", marker=".", markersize=3.2, color=shade or colour(index), alpha=0.8,
+            zorder=3,
+        )  # fmt: skip
 
 
 def _recur(labels: Ints) -> bool:
@@ -135,17 +166,23 @@ def _recur(labels: Ints) -> bool:
     return len(np.unique(labels, axis=0)) < len(labels)
 
 
-def _draw_sensor(axes: Axes, record: RunRecord, sensor: int, scale: float) -> None:
+def _draw_sensor(axes: Axes, record: RunRecord, sensor: int, scale: float, scene: Scene) -> None:
     path = record.poses[:, sensor, :2] * scale
     axes.plot(path[:, 0], path[:, 1], color=GREY, linewidth=1.6, linestyle=(0, (2.5, 1)), zorder=5)
+    if record.num_sensors > _MOST_NAMED:
+        axes.plot(*path[0], marker="s", color=INK, markerfacecolor=GREY, markersize=4, markeredgewidth=0.5, zorder=6)
+        return
     marker = _SENSOR_MARKERS[sensor % len(_SENSOR_MARKERS)]
     axes.plot(*path[0], marker=marker, color=INK, markerfacecolor=GREY, markersize=9, zorder=6)
     paper = {"boxstyle": "square,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.75}
     style: dict[str, Any] = {"textcoords": "offset points", "fontsize": 7, "zorder": 9, "bbox": paper}
-    axes.annotate(f"S{sensor + 1}", _point(path[0]), xytext=(-6, 5), ha="right", **style)
-    if (path[-1] != path[0]).any():
-        axes.annotate(f"S{sensor + 1}", _point(path[-1]), xytext=(3, 3), **style)
+    offset = name_offsets(record.poses[0, :, :2], _reach([record]))[sensor]
+    axes.annotate(scene.name(sensor), _point(path[0]), **offset, **style)
+    if len(record.decisions) > _MOST_DECISIONS:
+        return
     for number, decision in enumerate(record.decisions, start=1):
+        if len(decision.plan.actions[sensor]) == 1:
+            continue
         place = _point(decision.poses[sensor, :2] * scale)
         arrow = {"arrowstyle": "<|-", "color": INK, "linewidth": 0.9, "shrinkA": 0, "shrinkB": 0}
         ahead = 13.0 * _direction(decision, sensor)
@@ -180,25 +217,25 @@ def _point(values: Floats) -> tuple[float, float]:
     return float(values[0]), float(values[1])
 
 
-def tracks_legend(record: RunRecord) -> list[Line2D]:
-    """What the marks mean, for a legend outside the axes."""
+def _add_legend(figure: Figure, record: RunRecord, scene: Scene, shade: str = "") -> None:
+    """What the marks mean, below the axes; estimates that are coloured by label have a mark of several colours."""
     open_marker: dict[str, Any] = {"color": INK, "markerfacecolor": "white", "markersize": 4.5, "linewidth": 0.9}
     labels = np.concatenate([estimate.labels for estimate in record.estimates])
-    handles = [
-        Line2D([], [], marker="o", label="target start", **open_marker),
-        Line2D([], [], marker="^", label="target end", **open_marker),
-        Line2D(
-            [],
-            [],
-            linestyle="",
-            marker=".",
-            color=colour(0),
-            label="estimates, by label" if _recur(labels) else "estimates",
+    by_label = not shade and _recur(labels)
+    shades = [colour(index) for index in range(3)] if by_label else [shade or colour(0)]
+    moved = bool((record.poses[:, :, :2] != record.poses[0, :, :2]).any())
+    path: Any = {"linestyle": (0, (2.5, 1)), "linewidth": 1.6} if moved else {"linestyle": ""}
+    shown: dict[str, Any] = {
+        "target start": Line2D([], [], marker="o", **open_marker),
+        "target end": Line2D([], [], marker="^", **open_marker),
+        "estimates, by label" if by_label else "estimates": tuple(
+            Line2D([], [], linestyle="", marker=".", color=each) for each in shades
         ),
-        Line2D(
-            [], [], linestyle=(0, (2.5, 1)), marker="s", color=GREY, markersize=4.5, linewidth=1.6, label="sensor path"
-        ),
-    ]
-    if record.decisions:
-        handles.append(Line2D([], [], linestyle="", marker="$\\rightarrow$", color=INK, markersize=8, label="decision"))
-    return handles
+        "sensor, path" if moved else "sensor": Line2D([], [], marker="s", color=GREY, markersize=4.5, **path),
+    }
+    if 0 < len(record.decisions) <= _MOST_DECISIONS and record.num_sensors <= _MOST_NAMED:
+        shown["decision"] = Line2D([], [], linestyle="", marker="$\\rightarrow$", color=INK, markersize=8)
+    shown |= {str(patch.get_label()): patch for patch in zone_handles(scene.zones)}
+    columns = legend_columns(list(shown), width=figure.get_figwidth())
+    by_parts = {tuple: HandlerTuple(ndivide=None, pad=0.0)}
+    figure.legend(list(shown.values()), list(shown), loc="outside lower center", ncols=columns, handler_map=by_parts)

@@ -65,6 +65,12 @@ class Matching:
         np.divide(sum_by_scan(self.scans, values, self.num_scans), counts, out=means, where=counts > 0)
         return means
 
+    def max_by_scan(self, values: Floats) -> Floats:
+        """(num_scans,) largest of (num_pairs,) values over the pairs of each scan; NaN where there is none."""
+        largest = np.full(self.num_scans, np.nan)
+        np.fmax.at(largest, self.scans, values)
+        return largest
+
 
 def sum_by_scan(scans: Ints, values: Floats, num_scans: int) -> Floats:
     """(num_scans,) sum of (num,) values over the entries of each scan."""

@@ -42,6 +42,7 @@ class RunMetrics:
         nees_count: number of pairs that `nees_mean` is over; 0 throughout where estimated and true states differ in
             dimension.
         position_nees_mean: mean NEES of the position over all pairs; NaN where there is none.
+        position_nees_max: the largest; NaN where there is no pair.
         label_switches: targets matched to another label than at their last match.
         fragmentations: targets matched again after a break.
         own: measures of one's own, by name.
@@ -58,6 +59,7 @@ class RunMetrics:
     nees_mean: Floats
     nees_count: Ints
     position_nees_mean: Floats
+    position_nees_max: Floats
     label_switches: Ints
     fragmentations: Ints
     own: dict[str, Floats] = field(default_factory=dict)
@@ -137,6 +139,7 @@ def measure(record: RunRecord, *, cutoff: float, order: float, window: int, own:
         nees_mean=matching.mean_by_scan(full),
         nees_count=np.bincount(matching.scans[~np.isnan(full)], minlength=matching.num_scans),
         position_nees_mean=matching.mean_by_scan(position),
+        position_nees_max=matching.max_by_scan(position),
         label_switches=breaks.label_switches,
         fragmentations=breaks.fragmentations,
     )

@@ -11,16 +11,53 @@ from vedette.kernels.gaussian.linalg import log_add, log_sum
 
 # Log weight of an option that is to be taken only where there is no other.
 _FORBIDDEN = -1e200
+_LIKELIEST = 6  # options of a row that are looked at for those that another row wants
+_ROUNDING = 1e-12
+
+
+@inlined
+def _share_contested(options: Options, row: int, other: int, log_total: float, log_other: float) -> float:
+    """Share of the choices of two rows in which both take one measurement, over the likeliest ones of each."""
+    contested = 0.0
+    for mine in range(options.offsets[row], min(options.offsets[row] + _LIKELIEST, options.offsets[row + 1])):
+        for its in range(options.offsets[other], min(options.offsets[other] + _LIKELIEST, options.offsets[other + 1])):
+            if options.columns[mine] >= 0 and options.columns[mine] == options.columns[its]:
+                contested += math.exp(options.log_weights[mine] - log_total + options.log_weights[its] - log_other)
+    return contested
 
 
 @borrowing
-def log_left_out_bound(options: Options, rows: Ints, log_summed: float, log_next: float) -> float:
+def _log_uncontested(options: Options, rows: Ints, work: DualWork) -> float:
+    """Upper bound on the log share of the joint choices, if rows could share measurements, in which none do.
+
+    Rows are paired, each with the one that it contends with most of those without a partner; choices in which no pair
+    shares a measurement are no fewer than those in which nobody does, and pairs are independent of one another.
+    """
+    log_totals, taken, log_share = work.row_dual, work.row_option, 0.0
+    for i in range(len(rows)):
+        log_totals[i] = log_sum(options.log_weights[options.offsets[rows[i]] : options.offsets[rows[i] + 1]])
+        taken[i] = 0
+    for i in range(len(rows)):
+        most, partner = 0.0, -1
+        for j in range(i + 1, len(rows)):
+            if taken[i] == 0 and taken[j] == 0:
+                contested = _share_contested(options, rows[i], rows[j], log_totals[i], log_totals[j])
+                if contested > most:
+                    most, partner = contested, j
+        if partner >= 0:
+            taken[partner] = 1
+            log_share += math.log1p(-min(most, 1.0 - _ROUNDING))  # rounding must leave something of everything
+    return log_share
+
+
+@borrowing
+def log_left_out_bound(options: Options, rows: Ints, log_summed: float, log_next: float, work: DualWork) -> float:
     """Upper bound on the log of the total weight of the joint choices that were not summed.
 
-    The lesser of two: all joint choices if rows could share measurements, less those summed; and the number of joint
-    choices times exp(`log_next`), which none of those left out exceeds.
+    The lesser of two: all joint choices if none but pairs of rows were kept from sharing measurements, less those
+    summed; and the number of joint choices times exp(`log_next`), which none of those left out exceeds.
     """
-    log_all, log_count = 0.0, 0.0
+    log_all, log_count = _log_uncontested(options, rows, work), 0.0
     for row in rows:
         start, stop = options.offsets[row], options.offsets[row + 1]
         log_all += log_sum(options.log_weights[start:stop])

@@ -142,7 +142,7 @@ def _ranked_cluster(
     log_next = peak - caps.max_log_gap
     if work.search.sizes[HEAP] > 0:
         log_next = max(log_next, -work.search.heap_bounds[0])
-    log_left_out = log_left_out_bound(options, rows, log_total, log_next)
+    log_left_out = log_left_out_bound(options, rows, log_total, log_next, work.search.work)
     open_sides(options, rows, log_total, work.search.work, out)
     return log_total, -log_add(0.0, log_left_out - log_total), True
 

@@ -20,6 +20,7 @@ class CauchySchwarzReward(Section):
     """Cauchy-Schwarz divergence between the predicted and the updated density (paper eqs. 5, 8 and 13 to 17)."""
 
     kind: Literal["cauchy_schwarz"] = Field(default="cauchy_schwarz", description="Kind of reward [-].")
+    words: ClassVar[str] = "CS divergence"
     unit_volume: Literal["reference"] | Positive = Field(
         default=1.0,
         description='Unit K of hyper-volume: a number, or "reference" for (4 pi)^(d/2) sqrt(det P) of the predicted '
@@ -37,6 +38,7 @@ class RenyiReward(Section):
     """Renyi divergence of the predicted from the updated density."""
 
     kind: Literal["renyi"] = Field(default="renyi", description="Kind of reward [-].")
+    words: ClassVar[str] = "Rényi divergence"
     order: Positive = Field(
         default=0.5, description="Exponent of the predicted density; not 1. 0.5: twice the Bhattacharyya distance [-]."
     )
@@ -57,6 +59,7 @@ class KullbackLeiblerReward(Section):
     """Kullback-Leibler divergence of the updated from the predicted density, target by target."""
 
     kind: Literal["kullback_leibler"] = Field(default="kullback_leibler", description="Kind of reward [-].")
+    words: ClassVar[str] = "KL divergence, nats"
 
     def build(self, folder: Path) -> Built:
         """The value of an updated density."""
@@ -69,6 +72,7 @@ class CardinalityVarianceReward(Section):
     """Less the variance of the number of targets after the update."""
 
     kind: Literal["cardinality_variance"] = Field(default="cardinality_variance", description="Kind of reward [-].")
+    words: ClassVar[str] = "minus variance of cardinality"
 
     def build(self, folder: Path) -> Built:
         """The value of an updated density."""
@@ -81,6 +85,7 @@ class ExpectedGospaReward(Section):
     """Less the mean squared GOSPA error of the best estimate after the update."""
 
     kind: Literal["expected_gospa"] = Field(default="expected_gospa", description="Kind of reward [-].")
+    words: ClassVar[str] = "minus squared GOSPA, m²"
     cutoff: Positive = Field(default=100.0, description="Error that counts as a lost target [m].")
 
     def build(self, folder: Path) -> Built:
@@ -94,6 +99,7 @@ class PeecsReward(Section):
     """Less the posterior expected error of cardinality and states."""
 
     kind: Literal["peecs"] = Field(default="peecs", description="Kind of reward [-].")
+    words: ClassVar[str] = "minus PEECS"
     share: Probability = Field(default=0.5, description="Weight of the error of the number of targets [-].")
     cutoff: Positive = Field(default=100.0, description="Error of a position that counts as 1 [m].")
 
@@ -108,6 +114,7 @@ class ExpectedLossReward(Section):
     """Less the squared error to be expected of the targets' positions; in closed form, without samples."""
 
     kind: Literal["expected_loss"] = Field(default="expected_loss", description="Kind of reward [-].")
+    words: ClassVar[str] = "minus expected loss, m²"
     cutoff: Positive = Field(default=100.0, description="Error that counts as a lost target [m].")
 
     def build(self, folder: Path) -> Built:
@@ -122,6 +129,7 @@ class CustomReward(Custom):
     `LabelReward`."""
 
     kind: Literal["custom"] = Field(default="custom", description="Kind of reward [-].")
+    words: ClassVar[str] = ""
     gives: ClassVar[str] = "vedette.control:Reward"
 
     def lacking(self, found: object) -> str:

@@ -10,6 +10,8 @@ function readColours() {
 }
 
 const seriesColour = (index) => colours[SERIES[index % SERIES.length]];
+// As in the figures: none of the first three sensors has a colour that one of the first three strategies has.
+const sensorShade = (sensor) => SERIES[(sensor + 3) % SERIES.length];
 
 // Points of the colour map "cividis" of Matplotlib.
 const HEAT = [

@@ -1,4 +1,6 @@
-// One scan of a run in the plane.
+// One scan of a run in the plane. Of many sensors there is no room for the names; the pointer tells them.
+const MOST_NAMED = 20;
+const clipped = (name, most) => (name.length > most ? `${name.slice(0, most - 1)}\u2026` : name);
 function drawScene(canvas, run, step, show) {
   const { context, width, height } = prepared(canvas);
   const view = viewOf(run, width, height);
@@ -8,7 +10,7 @@ function drawScene(canvas, run, step, show) {
   context.beginPath();
   context.rect(MARGIN.left, MARGIN.top, view.inner.width, view.inner.height);
   context.clip();
-  drawRegion(context, run, view);
+  drawZones(context, run, view);
   if (show.measurements) run.sensors.forEach((_, s) => drawMeasurements(context, run, view, step, s));
   if (show.trails) drawTrails(context, run, view, step);
   run.sensors.forEach((_, s) => drawSensor(context, run, view, step, s));
@@ -18,12 +20,35 @@ function drawScene(canvas, run, step, show) {
   return view;
 }
 
-function drawRegion(context, run, view) {
-  const [xMin, xMax, yMin, yMax] = run.region;
+// The region, and where sensors may not go (hatched) or must stay.
+function drawZones(context, run, view) {
+  for (const [kind, corners] of run.zones) {
+    context.lineWidth = 1;
+    context.strokeStyle = kind === "region" ? colours.grey : colours.ink;
+    context.setLineDash({ region: [5, 4], "no-go zone": [] }[kind] ?? [8, 3, 2, 3]);
+    polygon(context, view, corners);
+    context.stroke();
+    context.setLineDash([]);
+    if (kind === "no-go zone") hatch(context, view);
+  }
+}
+
+function polygon(context, view, corners) {
+  context.beginPath();
+  corners.forEach(([x, y], place) => (place ? context.lineTo(view.x(x), view.y(y)) : context.moveTo(view.x(x), view.y(y))));
+  context.closePath();
+}
+
+// Fill the polygon that was just drawn with slanted lines.
+function hatch(context, view) {
+  const { width, height } = view.inner;
+  context.save();
+  context.clip("evenodd");
   context.strokeStyle = colours.grey;
-  context.setLineDash([5, 4]);
-  context.strokeRect(view.x(xMin), view.y(yMax), view.x(xMax) - view.x(xMin), view.y(yMin) - view.y(yMax));
-  context.setLineDash([]);
+  for (let x = -height; x < width; x += 8) {
+    line(context, MARGIN.left + x, MARGIN.top + height, MARGIN.left + x + height, MARGIN.top);
+  }
+  context.restore();
 }
 
 function drawTrails(context, run, view, step) {
@@ -68,8 +93,8 @@ function drawMeasurements(context, run, view, step, s) {
   const [x, y] = run.poses[step][s];
   const kind = run.sensors[s].kind;
   for (const [origin, u, v] of (run.scans[step] ?? [])[s] ?? []) {
-    context.strokeStyle = seriesColour(s);
-    context.globalAlpha = origin ? 0.95 : 0.45;
+    context.strokeStyle = origin ? colours.ink : colours.grey;
+    context.globalAlpha = origin ? 0.95 : 0.6;
     context.lineWidth = origin ? 1.6 : 1;
     if (kind === "ray") {
       const reach = 2 * extentOf(run) * view.scale;
@@ -93,8 +118,8 @@ function drawSensor(context, run, view, step, s) {
   const [x, y, heading, middle = heading, halfWidth = seen.half_width, range = seen.range] = run.poses[step][s];
   const [px, py] = [view.x(x), view.y(y)];
   if (range !== undefined) {
-    context.fillStyle = seriesColour(s);
-    context.globalAlpha = 0.08;
+    context.fillStyle = colours.grey;
+    context.globalAlpha = 0.1;
     context.beginPath();
     if (halfWidth !== undefined && halfWidth < Math.PI) context.moveTo(px, py);
     const spread = halfWidth ?? Math.PI;
@@ -103,7 +128,7 @@ function drawSensor(context, run, view, step, s) {
     context.globalAlpha = 1;
   }
   context.strokeStyle = colours.ink;
-  context.fillStyle = seriesColour(s);
+  context.fillStyle = colours.grey;
   context.lineWidth = 1.5;
   const [tipX, tipY] = [px + 20 * Math.cos(heading), py - 20 * Math.sin(heading)];
   line(context, px, py, tipX, tipY);
@@ -112,7 +137,7 @@ function drawSensor(context, run, view, step, s) {
   }
   context.fillRect(px - 5.5, py - 5.5, 11, 11);
   context.strokeRect(px - 5.5, py - 5.5, 11, 11);
-  mark(context, name.length > 6 ? `S${s + 1}` : name, px, py + 17, colours.ink);
+  if (run.sensors.length <= MOST_NAMED) mark(context, clipped(name, 20), px, py + (py + 24 < MARGIN.top + view.inner.height ? 17 : -17), colours.ink);
 }
 
 function drawTarget(context, view, [target, x, y], show) {

@@ -4,8 +4,9 @@ function drawRewards(canvas, run, step) {
   const decision = decisionAt(run, step);
   if (width < 150) return; // not laid out yet
   if (!decision?.curves.length) return;
-  if (decision.map) drawMap(context, width, height, decision.map);
-  else drawCurves(context, width, height, decision.curves);
+  const names = run.sensors.map(({ name }) => clipped(name, 16));
+  if (decision.map) drawMap(context, width, height, decision.map, names);
+  else drawCurves(context, width, height, decision.curves, names);
 }
 
 // Where a square map lies in its canvas.
@@ -15,7 +16,7 @@ function mapFrame(width, height, map) {
   return { left, top, size, columns: map.mean.length, rows: map.mean[0].length };
 }
 
-function drawMap(context, width, height, map) {
+function drawMap(context, width, height, map, names) {
   const { left, top, size, columns, rows } = mapFrame(width, height, map);
   const known = map.mean.flat().filter((value) => value !== null);
   const [low, high] = [Math.min(...known), Math.max(...known)];
@@ -32,7 +33,7 @@ function drawMap(context, width, height, map) {
     context.strokeRect(left + i * cell.width, top + (rows - 1 - j) * cell.height, cell.width, cell.height);
   }
   drawHeatScale(context, left + size + 8, top, size, low, high);
-  labelMap(context, map, left, top, size);
+  labelMap(context, map, left, top, size, names);
 }
 
 function drawHeatScale(context, x, top, size, low, high) {
@@ -47,7 +48,7 @@ function drawHeatScale(context, x, top, size, low, high) {
   context.fillText(low.toPrecision(3), x + 11, top + size - 6);
 }
 
-function labelMap(context, map, left, top, size) {
+function labelMap(context, map, left, top, size, names) {
   const [across, up] = map.ticks;
   context.fillStyle = colours.grey;
   const place = (list, k) => ((k + 0.5) * size) / list.length;
@@ -63,12 +64,12 @@ function labelMap(context, map, left, top, size) {
   }
   context.textAlign = "center";
   context.textBaseline = "top";
-  context.fillText(`sensor ${map.sensors[0] + 1}`, left + size / 2, top + size + 18);
+  context.fillText(names[map.sensors[0]], left + size / 2, top + size + 18);
   context.save();
   context.translate(8, top + size / 2);
   context.rotate(-Math.PI / 2);
   context.textBaseline = "middle";
-  context.fillText(`sensor ${map.sensors[1] + 1}`, 0, 0);
+  context.fillText(names[map.sensors[1]], 0, 0);
   context.restore();
 }
 
@@ -86,11 +87,11 @@ function curvesFrame(width, height, curves) {
   };
 }
 
-function drawCurves(context, width, height, curves) {
+function drawCurves(context, width, height, curves, names) {
   const frame = curvesFrame(width, height, curves);
   const { x, y } = drawFrame(context, frame, placesOf(curves, curves[0]) === curves[0].places ? curves[0].axis.toLowerCase() : "action");
   curves.forEach((curve, place) => {
-    const shade = seriesColour(curve.sensor);
+    const shade = colours[sensorShade(curve.sensor)];
     const places = placesOf(curves, curve);
     context.strokeStyle = shade;
     context.lineWidth = 1.6;
@@ -99,35 +100,36 @@ function drawCurves(context, width, height, curves) {
     context.stroke();
     context.fillStyle = shade;
     disc(context, x(places[curve.chosen]), y(curve.mean[curve.chosen]), 4.5);
-    if (curves.length > 3) return; // no room for their names; the pointer tells them
+    if (curves.length > 2) return; // no room for their names; the pointer tells them
     context.textAlign = "left";
     context.textBaseline = "middle";
-    const name = `sensor ${curve.sensor + 1}: ${minus((curve.numeric ? curve.labels : curve.ticks)[curve.chosen])}`;
-    context.fillText(name, frame.left + (place % 3) * 100, 9);
+    const name = `${names[curve.sensor]}: ${minus((curve.numeric ? curve.labels : curve.ticks)[curve.chosen])}`;
+    context.fillText(name, frame.left + place * 140, 9);
   });
 }
 
 const rewardText = (value) => (value === null ? "not evaluated" : `reward ${minus(value.toPrecision(4))}`);
-const actionText = (sensor, label) => `sensor ${sensor + 1} to ${minus(label)}`;
+const actionText = (name, label) => `${name} to ${minus(label)}`;
 
 // The reward under the pointer, in words; nothing beside the map or the curves.
-function describeReward(canvas, decision, x, y) {
+function describeReward(canvas, run, decision, x, y) {
   if (!decision?.curves.length) return [];
+  const names = run.sensors.map(({ name }) => name);
   const [width, height] = [canvas.clientWidth, canvas.clientHeight];
-  return decision.map ? describeCell(mapFrame(width, height, decision.map), decision.map, x, y)
-    : describeAction(curvesFrame(width, height, decision.curves), decision.curves, x);
+  return decision.map ? describeCell(mapFrame(width, height, decision.map), decision.map, names, x, y)
+    : describeAction(curvesFrame(width, height, decision.curves), decision.curves, names, x);
 }
 
-function describeCell({ left, top, size, columns, rows }, map, x, y) {
+function describeCell({ left, top, size, columns, rows }, map, names, x, y) {
   const i = Math.floor(((x - left) / size) * columns);
   const j = rows - 1 - Math.floor(((y - top) / size) * rows);
   if (i < 0 || j < 0 || i >= columns || j >= rows) return [];
-  const joint = map.sensors.map((sensor, axis) => actionText(sensor, map.labels[axis][axis ? j : i])).join(", ");
+  const joint = map.sensors.map((sensor, axis) => actionText(names[sensor], map.labels[axis][axis ? j : i])).join(", ");
   const chosen = i === map.chosen[0] && j === map.chosen[1] ? " (chosen)" : "";
   return [`${joint}: ${rewardText(map.mean[i][j])}${chosen}`];
 }
 
-function describeAction(frame, curves, x) {
+function describeAction(frame, curves, names, x) {
   const share = (x - frame.left) / (frame.right - frame.left);
   const place = frame.x[0] + share * (frame.x[1] - frame.x[0]);
   if (share < -0.02 || share > 1.02) return [];
@@ -136,6 +138,6 @@ function describeAction(frame, curves, x) {
     const k = off.indexOf(Math.min(...off));
     const error = curve.error[k] ? ` \u00b1 ${curve.error[k].toPrecision(2)}` : "";
     const chosen = k === curve.chosen ? " (chosen)" : "";
-    return `${actionText(curve.sensor, curve.labels[k])}: ${rewardText(curve.mean[k])}${error}${chosen}`;
+    return `${actionText(names[curve.sensor], curve.labels[k])}: ${rewardText(curve.mean[k])}${error}${chosen}`;
   });
 }

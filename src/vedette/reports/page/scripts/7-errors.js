@@ -35,11 +35,11 @@ function drawErrors(canvas, run, step) {
   context.strokeStyle = colours.grey;
   for (const { scan } of run.decisions) line(context, x(run.times[scan]), frame.top, x(run.times[scan]), frame.bottom);
   context.setLineDash([]);
-  context.strokeStyle = colours.blue;
+  context.strokeStyle = colours.ink;
   context.lineWidth = 1.6;
   context.beginPath();
   total.forEach((value, k) => context.lineTo(x(run.times[k]), y(value)));
   context.stroke();
-  context.fillStyle = colours.vermilion;
+  context.fillStyle = colours.ink;
   disc(context, x(run.times[step]), y(total[step]), 4);
 }

@@ -64,11 +64,11 @@ function targetRows(why) {
   return rows;
 }
 
-const sensorRows = (why) => why.sensors.map(([sensor, action, share, without]) => ({
-  name: `${sensor + 1}: ${minus(action)}`,
-  segments: [{ value: share, shade: SERIES[sensor % SERIES.length] }],
+const sensorRows = (why, names) => why.sensors.map(([sensor, action, share, without]) => ({
+  name: `${names[sensor]}: ${minus(action)}`,
+  segments: [{ value: share, shade: sensorShade(sensor) }],
   numbers: [short(share), short(without)],
-  title: `sensor ${sensor + 1}, ${minus(action)}: share ${short(share)}; the reward had it not scanned: ${short(without)}`,
+  title: `${names[sensor]}, ${minus(action)}: share ${short(share)}; the reward had it not scanned: ${short(without)}`,
 }));
 
 // In place of the bars where there are none.
@@ -89,7 +89,7 @@ function tellWhy(part, run, decision) {
   part("why").hidden = !why;
   if (!why) return;
   part("why-facts").replaceChildren(...why.facts.flatMap(([name, text]) => [element("dt", "", name), element("dd", "", minus(text))]));
-  for (const [name, rows] of [["targets", targetRows(why)], ["sensors", sensorRows(why)]]) {
+  for (const [name, rows] of [["targets", targetRows(why)], ["sensors", sensorRows(why, run.sensors.map(({ name }) => name))]]) {
     fillBars(part(`why-${name}`), rows);
     part(`why-${name}`).parentElement.hidden = rows.length === 0;
   }

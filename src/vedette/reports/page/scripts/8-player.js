@@ -22,6 +22,7 @@ function startReplay(root) {
     const counts = `${truth[state.step].length} targets, ${estimates[state.step].length} estimates`;
     part("summary").textContent = `t = ${time} s: ${counts}, ${errors}`;
     part("decision").textContent = decisionText();
+    part("reward-title").textContent = run().reward ? `Reward (${run().reward})` : "Reward";
     tellWhy(part, run(), decisionAt(run(), state.step));
     part("scene").setAttribute("aria-label", `${run().strategy}, run ${run().run}, ${part("summary").textContent}`);
     part("scrubber").value = state.step;
@@ -43,7 +44,7 @@ function startReplay(root) {
     const { pointer, view } = state;
     if (pointer?.part === "scene") return describeAt(run(), state.step, view, pointer.x, pointer.y, show());
     if (!pointer) return [];
-    return describeReward(part("rewards"), decisionAt(run(), state.step), pointer.x, pointer.y);
+    return describeReward(part("rewards"), run(), decisionAt(run(), state.step), pointer.x, pointer.y);
   }
 
   function tellPointer() {

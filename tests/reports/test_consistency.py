@@ -1,0 +1,92 @@
+"""A single estimate that is far off for its covariance is told, however small the mean over all is."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from reports.examples import campaign_of, results_of
+from vedette.evaluation.runs import measure_run
+from vedette.reports.groups import Group, gather
+from vedette.reports.health import group_health
+from vedette.reports.tables import measure_table, nees_spread
+from vedette.simulation.records import RunRecord
+
+TIMES = 25.0  # how much longer an error becomes
+
+
+@pytest.fixture(scope="module")
+def group(tmp_path_factory: pytest.TempPathFactory) -> Group:
+    settings = {"time.num_steps": 30, "ospa.from_step": 12, "ospa.to_step": 30}
+    campaign = campaign_of(planners=["still", "random"], seed=4, set=settings)
+    (found,) = gather(results_of(tmp_path_factory.mktemp("consistency") / "results", campaign))
+    return found
+
+
+def off_once(record: RunRecord, step: int) -> RunRecord:
+    """The run with one estimate of a scan much surer of itself than it has a right to be."""
+    estimate = record.estimates[step - 1]
+    covs = estimate.covs.copy()
+    covs[0] /= TIMES**2
+    changed = (*record.estimates[: step - 1], replace(estimate, covs=covs), *record.estimates[step:])
+    return replace(record, estimates=changed)
+
+
+def with_record(group: Group, label: str, run: int, record: RunRecord) -> Group:
+    strategies = []
+    for each in group.strategies:
+        if each.label == label:
+            records = (*each.records[:run], record, *each.records[run + 1 :])
+            metrics = (*each.metrics[:run], measure_run(record, each.cell.scenario), *each.metrics[run + 1 :])
+            each = replace(each, records=records, metrics=metrics)
+        strategies.append(each)
+    return replace(group, strategies=tuple(strategies))
+
+
+def rows_of(group: Group) -> Mapping[str, tuple[str, ...]]:
+    table = measure_table(group)
+    assert table is not None
+    assert len(table.rows) == len(table.notes)
+    return {row[0]: row[1:] for row in table.rows}
+
+
+def test_the_worst_estimate_is_named_with_its_run(group: Group) -> None:
+    before = nees_spread(group.strategies[1], group.counted)
+    assert before is not None
+    assert before.is_by_chance
+    off = with_record(group, "random", 1, off_once(group.strategies[1].records[1], 20))
+    spread = nees_spread(off.strategies[1], off.counted)
+    assert spread is not None
+    assert (spread.run, spread.time, spread.is_by_chance) == (1, 20.0, False)
+    assert spread.median == pytest.approx(before.median, rel=0.05)
+    told = dict(group_health(off))["Random"]
+    assert "in run 1 at 20 s an estimate was far worse than its covariance says" in told
+    assert f"position NEES / 2 of {spread.largest:.4g}" in told
+    assert "far worse than its covariance" not in dict(group_health(group)).get("Random", "")
+    assert "far worse than its covariance" not in dict(group_health(off)).get("Not moving", "")
+    rows = rows_of(off)
+    assert rows["  largest"][1] == f"{spread.largest:.4g} (run 1, 20 s)"
+    assert rows["  median"][1] == f"{spread.median:.2f}"
+
+
+def test_the_largest_is_that_of_a_pair_of_a_counted_scan(group: Group) -> None:
+    strategy = group.strategies[0]
+    spread = nees_spread(strategy, group.counted)
+    assert spread is not None
+    largest = np.array([metrics.position_nees_max for metrics in strategy.metrics])[:, group.counted]
+    assert spread.largest == np.nanmax(largest) / 2.0
+    late = np.array([metrics.position_nees_max for metrics in strategy.metrics]) / 2.0
+    late[:, ~group.counted] = np.nan
+    assert late[spread.run, int(spread.time) - 1] == spread.largest
+
+
+def test_without_an_estimate_there_is_no_spread(group: Group) -> None:
+    strategy = group.strategies[0]
+    none = [replace(each, position_nees_max=np.full(each.num_scans, np.nan)) for each in strategy.metrics]
+    assert nees_spread(replace(strategy, metrics=tuple(none)), group.counted) is None
+    assert rows_of(replace(group, strategies=(replace(strategy, metrics=tuple(none)),)))["  largest"] == (
+        "\N{EN DASH}",
+    )
