@@ -26,7 +26,6 @@ from vedette.scenarios.sections.fusion import BY_LABEL, Fusion
 from vedette.scenarios.sections.sensors import Sensor
 from vedette.scenarios.sections.targets import RecordedTargets
 from vedette.scenarios.sections.tracking import LABELS_CAPPED, Filter
-from vedette.scenarios.sections.world import ConstantSurvival
 from vedette.scenarios.views import field_of_view
 
 # Sensors whose probabilities of detection of one place differ by more than this do not see the same.
@@ -39,7 +38,7 @@ _POINTS_A_SIDE = 21
 def cautions(scenario: Scenario) -> tuple[str, ...]:
     """Warnings of a valid scenario, one line each, with file, line and column where it was read from a file."""
     found = [*_records(scenario), *_views(scenario), *_births(scenario), *_late_beliefs(scenario)]
-    found += [*_many_sensors(scenario), *_cells(scenario.model), *_labels(scenario.model), *_per_scan(scenario.model)]
+    found += [*_many_sensors(scenario), *_cells(scenario.model), *_labels(scenario.model)]
     found += implausible(scenario.model)
     if not found:
         return ()
@@ -79,22 +78,6 @@ def _births(scenario: Scenario) -> Iterator[tuple[Path, str]]:
         f"and {_rule(fusion)}, which fuses by label, then loses it{with_own_labels(scenario, fusion)} (births at step "
         "1 alone avoid this too)",
     )
-
-
-def _per_scan(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
-    """Probabilities a scan, where a sensor does not scan at every step: they count at every step all the same."""
-    every, name = max((own.scans.every, name) for own, name in zip(model.sensors, sensor_names(model), strict=True))
-    survival, per_scan = model.survival, []
-    if model.birth.period is None and model.birth.steps == "every":
-        per_scan.append("birth")
-    if isinstance(survival, ConstantSurvival) and survival.period is None and survival.probability < 1.0:
-        per_scan.append("survival")
-    for section in per_scan if every > 1 else ():
-        yield (
-            (section,),
-            f"its probabilities are those of a step of {model.time.step_period:g} s, and count {every} times from one "
-            f"scan of {name} to the next; say with {section}.period for what stretch of time they are meant",
-        )
 
 
 def _late_beliefs(scenario: Scenario) -> Iterator[tuple[Path, str]]:

@@ -11,11 +11,12 @@ import numpy as np
 from vedette.kernels.base.types import Floats
 from vedette.plausible import LARGE_ANGLE, seem_degrees
 from vedette.scenarios.faults import Path, format_path
+from vedette.scenarios.names import sensor_names
 from vedette.scenarios.sections import ScenarioModel
 from vedette.scenarios.sections.birth import BirthSite
 from vedette.scenarios.sections.sensing import Measurement, Noise
 from vedette.scenarios.sections.targets import ScriptedTargets
-from vedette.scenarios.sections.world import RegionSection, grouped_order
+from vedette.scenarios.sections.world import ConstantSurvival, RegionSection, grouped_order
 
 # Standard deviations from every birth site at which a target begins that filters never find.
 _FAR_FROM_SITES = 8.0
@@ -26,6 +27,7 @@ def implausible(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
     yield from _bearings(model)
     yield from _areas(model)
     yield from _beyond_sites(model)
+    yield from _per_scan(model)
 
 
 def _bearings(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
@@ -101,3 +103,19 @@ def _distance(start: Floats, site: BirthSite, order: list[int]) -> float:
     """Of a position from a site, in its standard deviations."""
     off = start - np.array(site.mean)[order]
     return math.sqrt(float(off @ np.linalg.solve(site.covariance()[np.ix_(order, order)], off)))
+
+
+def _per_scan(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
+    """Probabilities a scan, where a sensor does not scan at every step: they count at every step all the same."""
+    every, name = max((own.scans.every, name) for own, name in zip(model.sensors, sensor_names(model), strict=True))
+    survival, per_scan = model.survival, []
+    if model.birth.period is None and model.birth.steps == "every":
+        per_scan.append("birth")
+    if isinstance(survival, ConstantSurvival) and survival.period is None and survival.probability < 1.0:
+        per_scan.append("survival")
+    for section in per_scan if every > 1 else ():
+        yield (
+            (section,),
+            f"its probabilities are those of a step of {model.time.step_period:g} s, and count {every} times from one "
+            f"scan of {name} to the next; say with {section}.period for what stretch of time they are meant",
+        )
