@@ -55,9 +55,9 @@ def test_words_and_flags() -> None:
     for rule in (Clmb, CmDeltaGlmb):
         with pytest.raises(InputError, match="mixture_power: expected one of auto, "):
             rule(EQUAL, mixture_power=["auto"])  # type: ignore[arg-type]
-    for rule in (Clmb, ArithmeticAverage):
+    for weighing in (Clmb, ArithmeticAverage):
         with pytest.raises(InputError, match="by_views: expected true or false; got yes"):
-            rule(EQUAL, by_views="yes")  # type: ignore[arg-type]
+            weighing(EQUAL, by_views="yes")  # type: ignore[arg-type]
     with pytest.raises(InputError, match="rule: expected a Fusion; got None"):
         Matched(None)  # type: ignore[arg-type]
     for gate in (None, "a", 0.0, math.nan):

@@ -173,7 +173,7 @@ def _platform(rng: Rng) -> Data:
         own_part("Hopper"),
     ]
     if rng.random() < 0.8:
-        return pick(rng, carriers)  # type: ignore[no-any-return]
+        return pick(rng, carriers)
     zooms: Data = pick(rng, [{}, {"half_widths_deg": [20.0, 60.0]}, {"turn_rate_deg": 20.0}, {"relative": True}])
     carrier: Data = pick(rng, [{}, {"carrier": pick(rng, carriers)}])
     return {"kind": "camera", "half_width_deg": 40.0, "pointings_deg": [0.0, 120.0], **zooms, **carrier}
@@ -194,7 +194,7 @@ def _detection(rng: Rng, platform: Data) -> Data:
         {**soft, "cut": True},
         own_model("detection"),
     ]
-    return pick(rng, kinds)  # type: ignore[no-any-return]
+    return pick(rng, kinds)
 
 
 def _filter(rng: Rng, num_sensors: int) -> Data:
