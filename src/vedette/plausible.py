@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -38,8 +37,8 @@ def implausible(field: str, expected: str, got: str, meant: str) -> None:
 
 
 def seems_degrees(heading: float) -> bool:
-    """Whether a heading in rad is rather one in degrees: a whole number of more than a turn."""
-    return abs(heading) > 2.0 * math.pi and heading == round(heading)
+    """Whether a heading in rad is rather one in degrees: a whole number from 10 to two turns of these."""
+    return 10.0 <= abs(heading) <= 720.0 and heading == round(heading)
 
 
 def seem_degrees(corners: Floats) -> bool:

@@ -26,7 +26,7 @@ from reference.grid import Grid
 from vedette.densities import GLMB, LMB, Poisson, TrackTable, lmb_to_glmb, marginalise
 from vedette.densities.containers import unchecked
 from vedette.divergence import cauchy_schwarz, log_inner_product, reference_unit_volume
-from vedette.errors import InputError
+from vedette.errors import InputError, NumericalError
 
 pytestmark = pytest.mark.lanes
 
@@ -235,3 +235,11 @@ def test_reference_volume_weighs_covariances_by_existence():
         reference_unit_volume(GLMB.empty(4))
     with pytest.raises(InputError, match="density: expected a GLMB"):
         reference_unit_volume(None)  # type: ignore[arg-type]
+
+
+def test_an_overlap_that_is_no_number_is_said():
+    """Intensities whose squares are beyond any number."""
+    heavy = Poisson(np.array([700.0]), np.zeros((1, 4)), np.eye(4)[None])
+    for measure in (cauchy_schwarz, log_inner_product):
+        with pytest.raises(NumericalError, match="Poisson densities: expected an overlap that is a number"):
+            measure(heavy, heavy)

@@ -213,6 +213,7 @@ def test_generators(kind: Any, rng: Any) -> None:
         tracker.step(tracker.initial(), NEAR, POSE, 1.0, 1, rng=rng)
 
 
+@pytest.mark.filterwarnings("ignore::vedette.errors.ImplausibleWarning")  # of a bearing with much noise
 @every_kind
 def test_angles(kind: Any) -> None:
     """Any within a full turn is taken as the direction that it is; beyond that it is in other units."""

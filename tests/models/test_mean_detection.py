@@ -222,7 +222,7 @@ def test_what_is_no_probability_is_refused():
 def test_other_arguments_are_named():
     with pytest.raises(InputError, match="mean_function: expected a function decorated"):
         models.DetectionModel(beyond_the_edge, np.array([0.9, 1.0]), beyond_the_edge)
-    with pytest.raises(InputError, match="detection_at: expected centre or mean; got middle"):
+    with pytest.raises(InputError, match="detection_at: expected one of centre, mean; got middle"):
         sensor(models.constant_detection(0.9), detection_at="middle")
     with pytest.raises(InputError, match="covs"):
         sensor(models.constant_detection(0.9)).mean_detection(np.zeros((2, 4)), np.zeros((1, 4, 4)), POSE)

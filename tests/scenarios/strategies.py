@@ -88,9 +88,13 @@ def platforms() -> st.SearchStrategy[Data]:
 def sensors(draw: st.DrawFn) -> Data:
     kind = draw(st.sampled_from(list(MEASUREMENT_DIM)))
     dim = MEASUREMENT_DIM[kind]
-    grown = section("range_dependent", sigma_range=positive, eta_range=zero_or_more, sigma_bearing_deg=positive)
+    grown = section(
+        "range_dependent", sigma_range=positive, eta_range=zero_or_more, sigma_bearing_deg=st.floats(1e-9, 180.0)
+    )
     by_axis = needed("by_axis", std=vector(2, positive), growth=vector(2, zero_or_more))
-    noises = [needed("constant", std=vector(dim, positive)), custom(), by_axis if kind == "position" else grown]
+    angles = [st.floats(1e-9, 3.0)] if kind.startswith("bearing") else []
+    stds = st.tuples(*angles, *[positive] * (dim - len(angles))).map(list)
+    noises = [needed("constant", std=stds), custom(), by_axis if kind == "position" else grown]
     low = draw(vector(dim, st.floats(-3.0, 0.0)))  # of an angle and its high no further apart than a turn
     boxes = needed("measurement_space", rate=rates, low=st.just(low), high=vector(dim, st.floats(1.0, 3.0)))
     around = needed("around_sensor", radius=positive) | needed("around_sensor", rate=rates, half_side=positive)

@@ -185,7 +185,7 @@ def test_a_heading_in_degrees_is_told(heading: float) -> None:
             call()
 
 
-@pytest.mark.parametrize("heading", [0.0, 3.0, -6.0, 20.0 * math.pi, 1e3 * 0.371 + 0.2, 90.5])
+@pytest.mark.parametrize("heading", [0.0, 3.0, -6.0, 20.0 * math.pi, 1e3 * 0.371 + 0.2, 90.5, 9.0, 1e4])
 def test_headings_that_come_of_integration_are_not(heading: float) -> None:
     models.bearing_range().measure(np.zeros(4), np.array([0.0, 0.0, heading]))
 

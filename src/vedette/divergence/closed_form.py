@@ -70,7 +70,7 @@ def log_inner_product(a: Density, b: Density, *, unit_volume: float = 1.0) -> fl
     """
     log_unit_volume = check_densities({"a": a, "b": b}, unit_volume)
     if isinstance(a, Poisson) and isinstance(b, Poisson):
-        shared = math.exp(log_unit_volume + log_tracks(_intensities(a, b), 0, 1))
+        shared = _overlap(_intensities(a, b), 0, 1, log_unit_volume)
         return shared - a.expected_number - b.expected_number
     assert not isinstance(a, Poisson)
     assert not isinstance(b, Poisson)
@@ -157,8 +157,16 @@ def _intensities(a: Poisson, b: Poisson) -> Tracks:
 
 def _poisson(a: Poisson, b: Poisson, log_unit_volume: float) -> float:
     tracks = _intensities(a, b)
-    own_a, own_b, cross = (math.exp(log_unit_volume + log_tracks(tracks, i, j)) for i, j in ((0, 0), (1, 1), (0, 1)))
+    own_a, own_b, cross = (_overlap(tracks, i, j, log_unit_volume) for i, j in ((0, 0), (1, 1), (0, 1)))
     return at_least_zero(0.5 * (own_a + own_b) - cross, max(own_a, own_b))
+
+
+def _overlap(tracks: Tracks, i: int, j: int, log_unit_volume: float) -> float:
+    """K times the integral of the product of two intensities; `NumericalError` where it is no number."""
+    try:
+        return math.exp(log_unit_volume + log_tracks(tracks, i, j))
+    except OverflowError:
+        raise NumericalError("Poisson densities: expected an overlap that is a number; got one beyond 1e308") from None
 
 
 def at_least_zero(divergence: float, magnitude: float, name: str = "Cauchy-Schwarz") -> float:

@@ -207,7 +207,7 @@ def pose_vector(field: str, values: Any) -> Floats:
         raise reject(field, "an array of shape (3 or more,)", f"shape {pose.shape}")
     if seems_degrees(float(pose[2])):
         degrees = f"{pose[2]:g} degrees are {math.radians(pose[2]):.4f} rad"
-        implausible(field, "a heading in radians", f"{pose[2]:g}, a whole number of several turns", degrees)
+        implausible(field, "a heading in radians", f"{pose[2]:g}, a whole number", degrees)
     return pose
 
 
