@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from vedette.densities import GLMB, LMB, Poisson, TrackTable
+from vedette.densities import GLMB, LMB, Estimate, FactoredGLMB, IidCluster, MultiBernoulli, Poisson, TrackTable
 from vedette.densities.containers import unchecked
 from vedette.errors import InputError, NumericalError
 
@@ -295,3 +295,10 @@ def test_bad_bernoullis_are_refused(labels, existence, message):
 def test_bad_intensities_are_refused(numbers, covs, message):
     with pytest.raises(InputError, match=message):
         Poisson.from_gaussians(numbers, [[0.0]], covs)
+
+
+@pytest.mark.parametrize("kind", [TrackTable, GLMB, LMB, FactoredGLMB, Poisson, IidCluster, MultiBernoulli, Estimate])
+@pytest.mark.parametrize("state_dim", [0, -1, 2.5, True, "4", None, 10**12, 10**30])
+def test_a_state_has_a_number_of_components(kind, state_dim):
+    with pytest.raises(InputError, match="state_dim: expected a whole number of at "):
+        kind.empty(state_dim)

@@ -23,6 +23,7 @@ from vedette.densities.statistics import cardinality_distribution, existence_pro
 from vedette.densities.tracks import TrackTable
 from vedette.errors import InputError, NumericalError, VedetteError
 from vedette.kernels.base.types import Floats, Ints
+from vedette.models.arguments import no_gaussians
 
 _MARGINAL_COMPONENTS = 10
 # A component of weight 1.5 to 2 is more often one target that two measurements fit than two: docs/filters.md.
@@ -53,9 +54,7 @@ class Estimate:
     @classmethod
     def empty(cls, state_dim: int) -> Estimate:
         """No target."""
-        return cls(
-            np.empty((0, 2), np.int64), np.empty((0, state_dim)), np.empty((0, state_dim, state_dim)), np.empty(0)
-        )
+        return cls(np.empty((0, 2), np.int64), *no_gaussians(state_dim), np.empty(0))
 
     def validate(self, *, error: type[VedetteError] = NumericalError) -> None:
         """Raise `InputError` for faults of form, `error` for what is no state, covariance or probability."""

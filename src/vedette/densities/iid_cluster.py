@@ -13,6 +13,7 @@ from vedette.densities.tracks import log_weights as logs_of
 from vedette.errors import InputError, NumericalError, VedetteError
 from vedette.kernels.base import types as kt
 from vedette.kernels.base.types import Floats
+from vedette.models.arguments import no_gaussians
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +67,7 @@ class IidCluster(Container):
     @classmethod
     def empty(cls, state_dim: int) -> IidCluster:
         """The density that is certain of no target."""
-        return cls(np.zeros(1), np.empty(0), np.empty((0, state_dim)), np.empty((0, state_dim, state_dim)))
+        return cls(np.zeros(1), np.empty(0), *no_gaussians(state_dim))
 
     @classmethod
     def from_gaussians(cls, cardinality: Any, weights: Any, means: Any, covs: Any) -> IidCluster:
@@ -93,6 +94,7 @@ class IidCluster(Container):
         checks.check_log_weights("log_cardinality", self.log_cardinality, error)
         whole = np.array([0, len(self.log_cardinality)])
         checks.check_normalised("log_cardinality", self.log_cardinality, whole, error)
+        checks.check_array("log_weights", self.log_weights, np.float64, (None,))
         num = len(self.log_weights)
         offsets = np.array([0, num] if num else [0])
         checks.check_mixtures("", offsets, self.log_weights, self.means, self.covs, len(offsets) - 1, error)

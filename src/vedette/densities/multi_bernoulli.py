@@ -12,6 +12,7 @@ from vedette.densities.containers import Container, for_kernel, unchecked
 from vedette.errors import InputError, NumericalError, VedetteError
 from vedette.kernels.base import types as kt
 from vedette.kernels.base.types import Floats, Ints
+from vedette.models.arguments import no_gaussians
 from vedette.probabilities import expit
 
 
@@ -76,8 +77,7 @@ class MultiBernoulli(Container):
     @classmethod
     def empty(cls, state_dim: int) -> MultiBernoulli:
         """The density that is certain of no target."""
-        covs = np.empty((0, state_dim, state_dim))
-        return cls(np.empty(0), np.zeros(1, np.int64), np.empty(0), np.empty((0, state_dim)), covs)
+        return cls(np.empty(0), np.zeros(1, np.int64), np.empty(0), *no_gaussians(state_dim))
 
     @classmethod
     def from_gaussians(cls, existence: Any, means: Any, covs: Any) -> MultiBernoulli:

@@ -13,6 +13,7 @@ from vedette.densities.tracks import log_weights
 from vedette.errors import InputError, NumericalError, VedetteError
 from vedette.kernels.base import types as kt
 from vedette.kernels.base.types import Floats
+from vedette.models.arguments import no_gaussians
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +61,7 @@ class Poisson(Container):
     @classmethod
     def empty(cls, state_dim: int) -> Poisson:
         """The density that is certain of no target."""
-        return cls(np.empty(0), np.empty((0, state_dim)), np.empty((0, state_dim, state_dim)))
+        return cls(np.empty(0), *no_gaussians(state_dim))
 
     @classmethod
     def from_gaussians(cls, expected_numbers: Any, means: Any, covs: Any) -> Poisson:

@@ -13,6 +13,7 @@ from vedette.densities.containers import Container, for_kernel, unchecked
 from vedette.errors import InputError, NumericalError, VedetteError
 from vedette.kernels.base import types as kt
 from vedette.kernels.base.types import Floats, Ints
+from vedette.models.arguments import no_gaussians
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,15 +64,9 @@ class TrackTable(Container):
 
     @classmethod
     def empty(cls, state_dim: int) -> TrackTable:
-        """A table without tracks."""
-        return unchecked(
-            cls,
-            np.empty((0, 2), np.int64),
-            np.zeros(1, np.int64),
-            np.empty(0),
-            np.empty((0, state_dim)),
-            np.empty((0, state_dim, state_dim)),
-        )
+        """A table without tracks. Raises `InputError` for what is no dimension of a state."""
+        labels, offsets = np.empty((0, 2), np.int64), np.zeros(1, np.int64)
+        return unchecked(cls, labels, offsets, np.empty(0), *no_gaussians(state_dim))
 
     @classmethod
     def from_gaussians(cls, labels: Any, means: Any, covs: Any) -> TrackTable:

@@ -17,6 +17,7 @@ from vedette.plausible import implausible, seems_degrees
 from vedette.text import plain, printable
 
 _MAX_COUNT = 2**62
+_MOST_STATE_DIMENSIONS = 10_000
 
 
 def reject(field: str, expected: str, got: Any) -> InputError:
@@ -124,6 +125,14 @@ def count(field: str, value: Any) -> int:
     if isinstance(value, bool) or not isinstance(value, numbers.Integral) or value < 0:
         raise reject(field, "a whole number of at least 0", value)
     return int(value)
+
+
+def no_gaussians(state_dim: Any) -> tuple[Floats, Floats]:
+    """(0, state_dim) means and (0, state_dim, state_dim) covariances. Raises for what is no dimension of a state."""
+    dim = dimension("state_dim", state_dim)
+    if dim > _MOST_STATE_DIMENSIONS:
+        raise reject("state_dim", f"a whole number of at most {_MOST_STATE_DIMENSIONS}", state_dim)
+    return np.empty((0, dim)), np.empty((0, dim, dim))
 
 
 def step_number(value: Any) -> int:

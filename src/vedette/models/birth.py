@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vedette.kernels.base.types import Floats
-from vedette.models.arguments import float_array, positive, positive_definite, real, reject
+from vedette.models.arguments import float_array, no_gaussians, positive, positive_definite, real, reject
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -114,7 +114,7 @@ class BirthModel:
     @classmethod
     def none(cls, state_dim: int) -> BirthModel:
         """No births ever."""
-        return cls(np.empty(0), np.empty((0, state_dim)), np.empty((0, state_dim, state_dim)))
+        return cls(np.empty(0), *no_gaussians(state_dim))
 
 
 def _steps(steps: Iterable[int] | None) -> frozenset[int] | None:
