@@ -28,8 +28,9 @@ def precompile(scenario: Scenario) -> None:
     forbidden, or fail) is compiled where it is first used; no result depends on it.
     """
     experiment = build_experiment(scenario)
-    if not isinstance(experiment.tracker.initial().fused, Labelled):
-        _compile_tracker(experiment)  # there is no fusion nor planning without labels
+    labelled = isinstance(experiment.tracker.initial().fused, Labelled)
+    if not (labelled and experiment.tracker.targets.birth.num_sites):
+        _compile_tracker(experiment)  # no fusion nor planning without labels; no example without birth sites
         return
     other = get_context("spawn").Process(target=_compile_planning, args=(scenario,), daemon=True)
     try:
