@@ -60,6 +60,7 @@ HEAVY = {
     ("run", "linear-10", "--planner", "still", "--out", "run"): ("matplotlib and pyarrow", "report"),
     ("campaign", "spec.toml"): ("pyarrow", "campaigns"),
     ("results", "there"): ("pyarrow", "campaigns"),
+    ("upgrade", "there"): ("pyarrow", "campaigns"),
     ("report", "there"): ("jinja2 and matplotlib and pyarrow", "report"),
     ("reproduce",): ("jinja2 and matplotlib and pyarrow", "report"),
 }

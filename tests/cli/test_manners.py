@@ -55,6 +55,7 @@ CALLS: list[tuple[tuple[str, ...], set[str]]] = [
     (("campaign", "spec.toml", "--dry-run"), {"cells", "compared", "warnings"}),
     (("campaign", "spec.toml", "--workers", "1"), {"folder", "finished", "failed"}),
     (("results", "trial-results", "--export", "tables"), {"comparisons", "missing", "written"}),
+    (("upgrade", "trial-results"), {"folder", "format_was", "format"}),
     (("report", "trial-results"), {"page", "figures"}),
     (("reproduce", "short.yaml", "--runs", "1", "--planners", "still", "--workers", "1"), {"comparisons", "report"}),
 ]
