@@ -28,7 +28,7 @@ WAIT = 600.0  # s
 def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A working folder with a scenario of few scans and a strategy of its own, one with a fault, and a campaign."""
     fields: dict[str, Any] = {"time.num_steps": 3, "ospa.from_step": None, "ospa.to_step": None}
-    fields |= {"birth.steps": [1], "targets.tracks": [{"state": [x, 0.0, 1.0, 1.0]} for x in (0.0, 300.0)]}
+    fields |= {"birth.steps": [1], "targets.tracks": [{"state": [x, 0.0, 1.0, 1.0]} for x in (0.0, 40.0)]}
     fields |= {"planners": {"own": {"kind": "independent"}}}
     text = dump_scenario(with_fields(load_scenario("linear-10"), fields).model)
     (tmp_path / "short.yaml").write_text(text, "utf-8")
