@@ -157,6 +157,15 @@ LABELS = ("{kind: cm_delta_glmb, weights: [0.5, 0.5]}", "{kind: clmb, matching: 
             (("{kind: cm_delta_glmb, weights: [0.5, 0.5]}", own("fusion").replace("}", ", feedback: true}")),),
             "got in the filter of sensor 1 at step 2: belief: expected a GLMB; got LMB",
         ),
+        (  # sensors that hardly ever hear each other fuse nothing in the first scans
+            (
+                (
+                    "{kind: cm_delta_glmb, weights: [0.5, 0.5]}",
+                    own("fusion").replace("}", ", feedback: true}\nnetwork: {loss: 0.999}"),
+                ),
+            ),
+            "got in the filter of sensor 1 at step 2: belief: expected a GLMB; got LMB",
+        ),
         (
             (*PHD[:3], ("{kind: marginal, threshold: 0.6}", own("sure"))),
             "which have labels; got Poisson",

@@ -65,7 +65,13 @@ def _plan(scenario: Scenario) -> None:
 
 
 def _track(scenario: Scenario) -> None:
-    """Go through the first scans without decisions."""
-    experiment = build_experiment(scenario)
-    few = replace(experiment, times=experiment.times[:_SCANS], decision_steps=())
-    simulate(few, None, seed=0, run=0, score=lambda _, estimates: np.zeros((len(estimates), 3)))
+    """Go through the first scans without decisions; where sensors may be out of touch, first as if all were in."""
+    network, tried = scenario.model.network, [scenario]
+    if network is not None:
+        every = {"radio_range": None, "hops": None, "loss": 0.0, "delay": 0}
+        model = scenario.model.model_copy(update={"network": network.model_copy(update=every)})
+        tried.insert(0, replace(scenario, model=model))
+    for each in tried:
+        experiment = build_experiment(each)
+        few = replace(experiment, times=experiment.times[:_SCANS], decision_steps=())
+        simulate(few, None, seed=0, run=0, score=lambda _, estimates: np.zeros((len(estimates), 3)))
