@@ -164,7 +164,7 @@ LABELS = ("{kind: cm_delta_glmb, weights: [0.5, 0.5]}", "{kind: clmb, matching: 
                     own("fusion").replace("}", ", feedback: true}\nnetwork: {loss: 0.999}"),
                 ),
             ),
-            "got in the filter of sensor 1 at step 2: belief: expected a GLMB; got LMB",
+            "got in the filter at step 2: belief: expected a GLMB; got LMB",
         ),
         (
             (*PHD[:3], ("{kind: marginal, threshold: 0.6}", own("sure"))),
