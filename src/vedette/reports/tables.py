@@ -200,7 +200,8 @@ class NeesSpread:
 
     Attributes:
         median: of the means at the scans of all runs.
-        largest: of a single estimate; run, time: where that is (time in s).
+        largest: of a single estimate.
+        run, time: where that is; time in s.
         is_by_chance: whether a consistent filter has so large a one in more than one of a thousand such comparisons.
     """
 
