@@ -108,7 +108,7 @@ def refused(place: Path) -> Iterator[None]:
         yield
     except VedetteError as error:
         text = str(error)
-        assert ": expected" in text or "got" in text, text
+        assert "expected" in text or "got" in text, text
         assert len(text) < 10_000, f"{len(text)} letters: {text[:300]}"
         assert place.parent.name in text or place.name in text, text
 

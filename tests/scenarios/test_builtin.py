@@ -98,7 +98,7 @@ def test_the_papers_scenario_has_the_papers_numbers(name: str) -> None:
     model = load_scenario(name).model
     assert (model.time.num_steps, model.time.step_period, model.time.start) == (40, 1.0, 1.0)
     assert model.motion == ConstantVelocity(sigma_v=5.0)
-    assert model.survival.model_dump() == {"kind": "constant", "probability": 0.98}
+    assert model.survival.model_dump() == {"kind": "constant", "probability": 0.98, "period": None}
     for sensor in model.sensors:
         assert sensor.measurement == BearingRange()
         noise = RangeDependentNoise(sigma_range=10.0, eta_range=5e-5, sigma_bearing_deg=1.0, eta_bearing=5e-6)
