@@ -54,8 +54,8 @@ def tests(purpose: str, *places: str) -> Stage:
     return Stage(purpose, python("pytest", "-q", "--durations=10", *places))
 
 
-# In the order in which they start. The tests of the library and of decisions compile nearly all kernels, while the other
-# side is busy with what needs none of them; what starts processes begins when the kernels are there.
+# In the order in which they start. The tests of the library and of decisions compile nearly all kernels, while the
+# other side is busy with what needs none of them; what starts processes begins when the kernels are there.
 STAGES = {
     "tests-library": tests(
         "models, filters, fusion and all below",
