@@ -6,6 +6,8 @@ written into one of them later would have a kernel read memory that is not its o
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from operator import attrgetter
 from typing import Any, TypeVar
 
 import numpy as np
@@ -51,21 +53,25 @@ def for_kernel(array: NDArray[Any]) -> Any:
     return array if array.flags.writeable else array.base
 
 
+def kernel_arrays(*fields: str) -> Callable[[Container], tuple[Any, ...]]:
+    """What takes the arrays of these fields (two or more) as kernels do; in a fraction of the time of `for_kernel`."""
+    return attrgetter(*(f"{field}.base" for field in fields))
+
+
 def _held(array: NDArray[Any]) -> NDArray[Any]:
     """An array as a field: as it is where it is one already, and without a copy where it stands alone."""
     base, flags = array.base, array.flags
     if type(base) is not np.ndarray:
-        if flags.carray:
-            return _read_only(array)
-    elif not flags.writeable and base.shape == array.shape and base.strides == array.strides:
+        return _read_only(array if flags.carray else np.array(array, order="C"))
+    if not flags.writeable and array.size == base.size and array.strides == base.strides:
         return array
-    return _read_only(np.array(array, order="C"))  # such as a part of another, whose base is not of its shape
+    return _read_only(np.array(array, order="C"))  # a part of another, whose base is not of its shape
 
 
 def _read_only(array: NDArray[Any]) -> NDArray[Any]:
     view = array.view()
-    view.flags.writeable = False
+    view.setflags(False)  # type: ignore[call-arg]  # by name, or as an attribute, it takes three times as long
     return view
 
 
-__all__ = ["Container", "for_kernel", "unchecked"]
+__all__ = ["Container", "for_kernel", "kernel_arrays", "unchecked"]

@@ -9,7 +9,7 @@ from typing import TypeAlias
 import numpy as np
 
 from vedette.densities import checks
-from vedette.densities.containers import Container, for_kernel, unchecked
+from vedette.densities.containers import Container, kernel_arrays, unchecked
 from vedette.densities.glmb import GLMB
 from vedette.densities.lmb import LMB
 from vedette.densities.tracks import TrackTable
@@ -17,6 +17,8 @@ from vedette.errors import InputError, NumericalError, VedetteError
 from vedette.kernels.base import types as kt
 from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.kernels.labelled.stacking import join_offsets, stack_glmbs
+
+_ARRAYS = kernel_arrays("track_offsets", "hyp_offsets", "hyp_tracks", "hyp_log_weights", "factor_offsets")
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,13 +104,11 @@ class FactoredGLMB(Container):
 
     def to_kernel(self) -> kt.FactoredGlmb:
         """The same arrays as the bundle that kernels take."""
-        own = (self.track_offsets, self.hyp_offsets, self.hyp_tracks, self.hyp_log_weights, self.factor_offsets)
-        return kt.FactoredGlmb(self.tracks.to_kernel(), *map(for_kernel, own))
+        return kt.FactoredGlmb(self.tracks.to_kernel(), *_ARRAYS(self))
 
     def as_hypotheses(self) -> kt.Glmb:
         """The hypotheses of all factors as one list, which is no density: its weights sum to the number of factors."""
-        own = map(for_kernel, (self.hyp_offsets, self.hyp_tracks, self.hyp_log_weights))
-        return kt.Glmb(self.tracks.to_kernel(), *own)
+        return kt.Glmb(self.tracks.to_kernel(), *_ARRAYS(self)[1:4])
 
     @classmethod
     def from_kernel(cls, density: kt.FactoredGlmb) -> FactoredGLMB:

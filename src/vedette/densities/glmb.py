@@ -9,12 +9,14 @@ from typing import Any
 import numpy as np
 
 from vedette.densities import checks
-from vedette.densities.containers import Container, for_kernel, unchecked
+from vedette.densities.containers import Container, kernel_arrays, unchecked
 from vedette.densities.tracks import TrackTable, log_weights
 from vedette.errors import InputError, NumericalError, VedetteError
 from vedette.kernels.base import types as kt
 from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.labelled.labels import group_by_label_set
+
+_ARRAYS = kernel_arrays("hyp_offsets", "hyp_tracks", "hyp_log_weights")
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,8 +63,7 @@ class GLMB(Container):
 
     def to_kernel(self) -> kt.Glmb:
         """The same arrays as the bundle that kernels take."""
-        own = map(for_kernel, (self.hyp_offsets, self.hyp_tracks, self.hyp_log_weights))
-        return kt.Glmb(self.tracks.to_kernel(), *own)
+        return kt.Glmb(self.tracks.to_kernel(), *_ARRAYS(self))
 
     @classmethod
     def from_kernel(cls, glmb: kt.Glmb) -> GLMB:

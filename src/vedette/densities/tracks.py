@@ -9,11 +9,13 @@ from typing import Any
 import numpy as np
 
 from vedette.densities import checks
-from vedette.densities.containers import Container, for_kernel, unchecked
+from vedette.densities.containers import Container, kernel_arrays, unchecked
 from vedette.errors import InputError, NumericalError, VedetteError
 from vedette.kernels.base import types as kt
 from vedette.kernels.base.types import Floats, Ints
 from vedette.models.arguments import no_gaussians
+
+_ARRAYS = kernel_arrays("labels", "offsets", "log_weights", "means", "covs")
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +57,7 @@ class TrackTable(Container):
 
     def to_kernel(self) -> kt.Tracks:
         """The same arrays as the bundle that kernels take."""
-        return kt.Tracks(*map(for_kernel, (self.labels, self.offsets, self.log_weights, self.means, self.covs)))
+        return kt.Tracks(*_ARRAYS(self))
 
     @classmethod
     def from_kernel(cls, tracks: kt.Tracks) -> TrackTable:
