@@ -27,6 +27,7 @@ GRACE = 10.0  # seconds that an interrupted stage has to tidy up
 # Tests that start processes, and those of the program as a user runs it; the others are of the library's parts.
 CAMPAIGNS = ["tests/campaigns", "tests/fuzz", "tests/test_extending.py", "tests/test_project.py"]
 CONTROL = ["tests/control"]
+FILTERS = ["tests/filters", "tests/tracking"]
 PROGRAM = [f"tests/{name}" for name in ("cli", "evaluation", "reports", "scenarios", "simulation", "test_examples.py")]
 
 
@@ -58,15 +59,16 @@ def tests(purpose: str, *places: str) -> Stage:
 # other side is busy with what needs none of them; what starts processes begins when the kernels are there.
 STAGES = {
     "tests-library": tests(
-        "models, filters, fusion and all below",
+        "models, densities, fusion and all below",
         "tests",
-        *(f"--ignore={place}" for place in (*CAMPAIGNS, *CONTROL, *PROGRAM)),
+        *(f"--ignore={place}" for place in (*CAMPAIGNS, *CONTROL, *FILTERS, *PROGRAM)),
     ),
     "types": Stage("strict types of the library", python("mypy")),
     "types-tests": Stage("types of the tests", python("mypy", "--config-file", "tests/mypy.ini")),
     "jit-off": lane("kernels as plain Python", "jit-off", NUMBA_DISABLE_JIT="1"),
     # An index is out of bounds however well the code is optimised, and little optimisation compiles faster.
     "bounds": lane("kernels with bounds checks", "bounds", NUMBA_BOUNDSCHECK="1", NUMBA_OPT="1"),
+    "tests-filters": tests("filters and trackers", *FILTERS),
     "tests-control": tests("decisions: futures, rewards, searches, planners", *CONTROL),
     "tests-program": tests("command line, scenarios, reports, examples", *PROGRAM),
     "tests-campaigns": tests("campaigns, fuzzers, extensions, the project itself", *CAMPAIGNS),

@@ -149,6 +149,9 @@ def test_bad_requests_are_refused():
     singular = unchecked(Poisson, np.array([5.0]), np.zeros((1, 2)), np.zeros((1, 2, 2)))
     with pytest.raises(NumericalError, match="covs"):
         sample_poisson(singular, 3, rng=rng)
+    for log_weight in (30.0, 1e3):
+        with pytest.raises(InputError, match=r"density.expected_number: expected at most 1e\+09 targets in"):
+            sample_poisson(unchecked(Poisson, np.array([log_weight]), np.zeros((1, 2)), np.eye(2)[None]), 10, rng=rng)
 
 
 @pytest.mark.parametrize(

@@ -47,7 +47,8 @@ class Poisson(Container):
     @property
     def expected_number(self) -> float:
         """Mean number of targets."""
-        return float(np.exp(self.log_weights).sum())
+        with np.errstate(over="ignore"):  # more than any number
+            return float(np.exp(self.log_weights).sum())
 
     def to_kernel(self) -> kt.Mixture:
         """The same arrays as the bundle that kernels take."""

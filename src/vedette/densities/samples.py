@@ -19,6 +19,8 @@ from vedette.errors import InputError, NumericalError, VedetteError
 from vedette.kernels.base.types import Floats, Ints
 from vedette.models.arguments import generator
 
+_MOST_TARGETS = 1e9
+
 
 @dataclass(frozen=True, slots=True)
 class MultiTargetSamples:
@@ -79,9 +81,18 @@ def sample_lmb(density: LMB, num_samples: int, *, rng: np.random.Generator) -> M
 
 
 def sample_poisson(density: Poisson, num_samples: int, *, rng: np.random.Generator) -> MultiTargetSamples:
-    """Independent samples of a Poisson density: a number of targets, then independent states."""
+    """Independent samples of a Poisson density: a number of targets, then independent states.
+
+    Raises `InputError` where more than 10^9 targets are to be expected in all.
+    """
     _check(num_samples, rng)
-    return _alike(density, rng.poisson(density.expected_number, num_samples), rng)
+    expected = density.expected_number
+    if not expected * num_samples <= _MOST_TARGETS:
+        got = f"{expected:g} in each of {num_samples}"
+        raise InputError(
+            f"density.expected_number: expected at most {_MOST_TARGETS:g} targets in all samples; got {got}"
+        )
+    return _alike(density, rng.poisson(expected, num_samples), rng)
 
 
 def sample_iid_cluster(density: IidCluster, num_samples: int, *, rng: np.random.Generator) -> MultiTargetSamples:
