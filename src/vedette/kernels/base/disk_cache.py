@@ -202,10 +202,10 @@ class OnDemand:
         """What was compiled for these types, or None: then it is compiled now."""
         found = self.own.load_overload(signature, target_context)
         if found is None:
+            watching.begins(self._function)
             with interrupts_wait():  # what Numba compiles with, which would stay half there
                 cpu_target.typing_context.refresh()
                 target_context.refresh()
-            watching.begins(self._function)
         return found
 
     def save_overload(self, signature: Any, data: Any) -> None:
