@@ -182,9 +182,8 @@ class Writer:
     def close(self) -> None:
         """Let other writers in."""
         if self._database is not None:
-            with suppress(
-                sqlite3.Error, UnicodeDecodeError
-            ):  # a reader at this very moment: the emptied journal does no harm
+            # A reader at this very moment: the emptied journal does no harm.
+            with suppress(sqlite3.Error, UnicodeDecodeError):
                 self._database.execute("PRAGMA busy_timeout = 0")
                 self._database.execute("PRAGMA journal_mode = DELETE")
             self._database.close()

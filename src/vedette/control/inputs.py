@@ -17,7 +17,7 @@ from vedette.filters import shared_targets
 from vedette.fusion import Fusion
 from vedette.kernels.base.types import Floats
 from vedette.models import TargetModel
-from vedette.models.arguments import float_array, instance, pose_vector, reject, sequence
+from vedette.models.arguments import float_array, instance, reject, sequence, tell_degrees
 from vedette.platforms import Options, options_at
 from vedette.text import either
 from vedette.tracking import State
@@ -57,8 +57,8 @@ def check_poses(poses: Any, num_sensors: int) -> Floats:
     checked = float_array("poses", poses, (num_sensors, None))
     if checked.shape[1] < 3:
         raise reject("poses", f"an array of shape ({num_sensors}, 3 or more)", f"shape {checked.shape}")
-    for s, pose in enumerate(checked):
-        pose_vector(f"poses[{s}]", pose)
+    for s, heading in enumerate(checked[:, 2].tolist()):
+        tell_degrees(f"poses[{s}]", heading)
     return checked
 
 

@@ -8,12 +8,14 @@ from typing import Any
 import numpy as np
 
 from vedette.densities import checks
-from vedette.densities.containers import Container, for_kernel, unchecked
+from vedette.densities.containers import Container, kernel_arrays, unchecked
 from vedette.densities.tracks import log_weights as logs_of
 from vedette.errors import InputError, NumericalError, VedetteError
 from vedette.kernels.base import types as kt
 from vedette.kernels.base.types import Floats
 from vedette.models.arguments import no_gaussians
+
+_ARRAYS = kernel_arrays("log_cardinality", "log_weights", "means", "covs")
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,8 +58,8 @@ class IidCluster(Container):
 
     def to_kernel(self) -> tuple[Floats, kt.Mixture]:
         """Log cardinality distribution and density of one target, as kernels take them."""
-        mixture = kt.Mixture(*map(for_kernel, (self.log_weights, self.means, self.covs)))
-        return for_kernel(self.log_cardinality), mixture
+        log_cardinality, *mixture = _ARRAYS(self)
+        return log_cardinality, kt.Mixture(*mixture)
 
     @classmethod
     def from_kernel(cls, log_cardinality: Floats, mixture: kt.Mixture) -> IidCluster:

@@ -8,12 +8,14 @@ from typing import Any
 import numpy as np
 
 from vedette.densities import checks
-from vedette.densities.containers import Container, for_kernel, unchecked
+from vedette.densities.containers import Container, kernel_arrays, unchecked
 from vedette.errors import InputError, NumericalError, VedetteError
 from vedette.kernels.base import types as kt
 from vedette.kernels.base.types import Floats, Ints
 from vedette.models.arguments import no_gaussians
 from vedette.probabilities import expit
+
+_ARRAYS = kernel_arrays("existence_logit", "offsets", "log_weights", "means", "covs")
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,8 +68,8 @@ class MultiBernoulli(Container):
     def to_kernel(self) -> kt.Lmb:
         """The same arrays as the bundle that kernels take, every label (-1, -1)."""
         labels = np.full((self.num_bernoullis, 2), -1, np.int64)
-        mixtures = map(for_kernel, (self.offsets, self.log_weights, self.means, self.covs))
-        return kt.Lmb(kt.Tracks(labels, *mixtures), for_kernel(self.existence_logit))
+        existence_logit, *mixtures = _ARRAYS(self)
+        return kt.Lmb(kt.Tracks(labels, *mixtures), existence_logit)
 
     @classmethod
     def from_kernel(cls, lmb: kt.Lmb) -> MultiBernoulli:

@@ -8,12 +8,14 @@ from typing import Any
 import numpy as np
 
 from vedette.densities import checks
-from vedette.densities.containers import Container, for_kernel, unchecked
+from vedette.densities.containers import Container, kernel_arrays, unchecked
 from vedette.densities.tracks import log_weights
 from vedette.errors import InputError, NumericalError, VedetteError
 from vedette.kernels.base import types as kt
 from vedette.kernels.base.types import Floats
 from vedette.models.arguments import no_gaussians
+
+_ARRAYS = kernel_arrays("log_weights", "means", "covs")
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +54,7 @@ class Poisson(Container):
 
     def to_kernel(self) -> kt.Mixture:
         """The same arrays as the bundle that kernels take."""
-        return kt.Mixture(*map(for_kernel, (self.log_weights, self.means, self.covs)))
+        return kt.Mixture(*_ARRAYS(self))
 
     @classmethod
     def from_kernel(cls, mixture: kt.Mixture) -> Poisson:

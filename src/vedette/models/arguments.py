@@ -216,10 +216,15 @@ def pose_vector(field: str, values: Any) -> Floats:
     pose = float_array(field, values, (None,))
     if len(pose) < 3:
         raise reject(field, "an array of shape (3 or more,)", f"shape {pose.shape}")
-    if seems_degrees(float(pose[2])):
-        degrees = f"{pose[2]:g} degrees are {math.radians(pose[2]):.4f} rad"
-        implausible(field, "a heading in radians", f"{pose[2]:g}, a whole number", degrees)
+    tell_degrees(field, float(pose[2]))
     return pose
+
+
+def tell_degrees(field: str, heading: float) -> None:
+    """Warn of a heading of a pose that is rather in degrees."""
+    if seems_degrees(heading):
+        degrees = f"{heading:g} degrees are {math.radians(heading):.4f} rad"
+        implausible(field, "a heading in radians", f"{heading:g}, a whole number", degrees)
 
 
 def state_table(field: str, values: Any, state_dim: int | None = None) -> Floats:

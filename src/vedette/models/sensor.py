@@ -88,10 +88,8 @@ class SensorModel:
         if stds is None:
             return
         for component in np.flatnonzero(self.measurement.angular & (stds > LARGE_ANGLE)).tolist():
-            field, expected = (
-                "SensorModel.noise",
-                f"a standard deviation of component {component}, an angle, in radians",
-            )
+            field = "SensorModel.noise"
+            expected = f"a standard deviation of component {component}, an angle, in radians"
             got, meant = f"{stds[component]:g}", "is it in degrees, or are components exchanged"
             if stds[component] > math.pi:
                 raise reject(field, f"{expected}, up to pi", f"{got} ({meant}?)")
