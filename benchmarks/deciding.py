@@ -1,97 +1,269 @@
-"""Does it pay to decide jointly? Strategies on generated scenes of more and more sensors (docs/deciding.md).
+"""Where should the sensors go? Rewards, rules of thumb and an oracle over scenes of many kinds (docs/deciding.md).
 
-    python benchmarks/deciding.py --runs 50 --workers 2
-    python benchmarks/deciding.py --sensors 2 3 --patterns crowd --views limited --every 5 --runs 5
+    python benchmarks/deciding.py --runs 100 --workers 2 --out benchmarks/results/deciding.csv
+    python benchmarks/deciding.py --scenes paper-a --runs 100
+    python benchmarks/deciding.py --runs 0 --out benchmarks/results/deciding.csv --write docs/deciding.md
 
-Writes each scene (`vedette generate`), runs the strategies on it in a folder that is kept (`--out`), and goes on with
-what is there; then prints a Markdown table for each scene, and one of all of them. Runs are paired: at the same
-number every strategy meets the same truth, drawn anew in each run. OSPA has one standard error over the runs; "worst
-run" is the largest mean of a run; "more than" is the paired difference to the first strategy; "N error" the number of
-estimates minus that of targets; "tracked" the share of all targets, seen or not, that have an estimate; "s a decision"
-the median wall time of a decision of all sensors, in a process of one thread.
+Runs are paired: at the same number every strategy meets the same truth, and the same luck where it sees it. A scene is
+taken if any of the words is in its name. With `--out` each run is written as it ends, and what is there is not run
+again, so that it goes on after a Ctrl-C; `--runs 0` prints the tables of the file alone.
+
+A table a scene. "more" is the paired mean difference to the first strategy, joint decisions by the expected loss, with
+its standard error; it is marked * where Holm's correction over the scene's strategies leaves it told from zero at 95 %.
+"won" is the share of runs in which the first strategy is better. "lost" is the part of OSPA that is of lost and false
+targets. "score" is 0 for the best rule of thumb, 1 for the oracle of one decision. "short" is how far the choices may
+be from the best joint ones, by the plans' own bounds. "ms" is CPU time of a decision on one thread, the mean over
+decisions and runs.
 """
 
 from __future__ import annotations
 
 import argparse
-import itertools
-from collections.abc import Iterator, Sequence
+import csv
+import time
+from collections.abc import Iterable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from functools import partial
+from multiprocessing import get_context
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
-import campaign_tables
+import numpy as np
+from deciding_scenes import RULES, Scene, scenes, strategies
+from pages import write_between
 
-from vedette.campaigns import CampaignResults, CampaignSpec
-from vedette.campaigns.results import GroupComparison
-from vedette.campaigns.scores import score_markdown, score_row, score_strategies
-from vedette.scenarios.generated import PATTERNS, VIEWS, GeneratedScene
-from vedette.scenarios.generated_text import scene_text
+from vedette.control import Plan, Planner
+from vedette.evaluation.metrics import ospa_of_run
+from vedette.evaluation.statistics import paired_difference, summarise
+from vedette.kernels.base.types import Floats
+from vedette.scenarios import Scenario, with_fields
+from vedette.scenarios.build import build_experiment, build_planner
+from vedette.simulation import KnowsTruth, Truth, simulate
 
-RUNS = 50
-# What the scenes leave to the campaign.
-SETTINGS: dict[str, Any] = {
-    "control.reward": {"kind": "expected_loss", "cutoff": 100.0},
-    "planners": {"greedy": {"kind": "joint", "search": {"kind": "sequential_greedy"}}},
-}
-
-
-def scenes(given: argparse.Namespace) -> Iterator[GeneratedScene]:
-    """The scenes that the options ask for, small ones first."""
-    for num_sensors, pattern, view, every in itertools.product(given.sensors, given.patterns, given.views, given.every):
-        yield GeneratedScene(num_sensors=num_sensors, pattern=pattern, view=view, decide_every=every, seed=given.seed)
-
-
-def campaign_on(scene: GeneratedScene, file: Path, given: argparse.Namespace) -> CampaignSpec:
-    """The strategies on one scene."""
-    return CampaignSpec(
-        name=f"deciding-{scene.name}",
-        scenarios=(file.name,),
-        planners=tuple(given.planners),
-        runs=RUNS,
-        compare="planner",
-        set={**SETTINGS, **({} if given.samples is None else {"control.num_samples": given.samples})},
-    )
+SEED, FIRST, ORACLE, LEVEL = 0, "jdm loss", "oracle 1", 0.05
+BEFORE = ("random", "fixed")
+LEAST_GAP = 0.02  # m, between a rule of thumb and the oracle: below it there is nothing to score
+COLUMNS = (
+    *("idm loss", "jdm cs", "jdm cs-k", "jdm gospa", "lookahead 2", "lookahead 3", "best rule", "oracle 1", "oracle 2"),
+    *BEFORE,
+)
 
 
-def table(results: CampaignResults, group: GroupComparison) -> Iterator[str]:
+class Score(NamedTuple):
+    """What came of one run."""
+
+    ospa: float  # mean over the scored scans
+    lost: float  # its part of lost and false targets
+    milliseconds: float  # of a decision
+    short: float  # how far the choices may be from the best, relative; NaN where plans do not say
+
+
+Runs = dict[str, dict[int, Score]]  # by strategy and run
+
+
+class Timed:
+    """A planner with a clock of the process's CPU time, that keeps the bounds of its plans."""
+
+    def __init__(self, planner: Planner) -> None:
+        self.planner = planner
+        self.seconds: list[float] = []
+        self.short: list[float] = []
+
+    @property
+    def name(self) -> str:
+        """As of the planner."""
+        return self.planner.name
+
+    def told(self, truth: Truth) -> Timed:
+        """As of the planner."""
+        if isinstance(self.planner, KnowsTruth):
+            self.planner = self.planner.told(truth)
+        return self
+
+    def plan(self, *situation: Any, rng: np.random.Generator) -> Plan:
+        """As of the planner."""
+        begin = time.process_time()
+        plan = self.planner.plan(*situation, rng=rng)
+        self.seconds.append(time.process_time() - begin)
+        if plan.bound is not None and not plan.bound.unbounded:
+            self.short.append(plan.bound.relative)
+        return plan
+
+
+def prepared(scene: Scene) -> Scenario:
+    """The scenario with all strategies in it."""
+    given = scene.scenario()
+    return with_fields(given, {"planners": strategies(given), "control.explain": False})
+
+
+def score(scene_name: str, strategy: str, run: int) -> Score:
+    """One run."""
+    [scene] = [own for own in scenes() if own.name == scene_name]
+    scenario = prepared(scene)
+    planner, ospa = build_planner(scenario, strategy, 1), scenario.model.ospa
+    assert planner is not None
+    timed = Timed(planner)
+    ospa_of = partial(ospa_of_run, cutoff=ospa.cutoff, order=ospa.order, components=ospa.components)
+    record = simulate(build_experiment(scenario), timed, seed=SEED, run=run, score=ospa_of)
+    first = ospa.from_step or (scenario.model.decision_steps[0] + 1 if scenario.model.decision_steps else 1)
+    total, _, lost = record.ospa[first - 1 : ospa.to_step].mean(axis=0).tolist()
+    short = float(np.mean(timed.short)) if timed.short else np.nan
+    return Score(total, lost, 1e3 * float(np.mean(timed.seconds)), short)
+
+
+class Store:
+    """Scores by scene, strategy and run; in a CSV file, where there is one."""
+
+    def __init__(self, file: Path | None) -> None:
+        self.file, self.found = file, dict[str, Runs]()
+        if file is None or not file.exists():
+            return
+        with file.open(newline="", encoding="utf-8") as lines:
+            for scene, strategy, run, *numbers in csv.reader(lines):
+                self._keep(scene, strategy, int(run), Score(*map(float, numbers)))
+
+    def has(self, scene: str, strategy: str, run: int) -> bool:
+        """Whether it has been run."""
+        return run in self.found.get(scene, {}).get(strategy, {})
+
+    def add(self, scene: str, strategy: str, run: int, score: Score) -> None:
+        """Keep one."""
+        self._keep(scene, strategy, run, score)
+        if self.file is not None:
+            self.file.parent.mkdir(parents=True, exist_ok=True)
+            with self.file.open("a", newline="", encoding="utf-8") as out:
+                csv.writer(out).writerow([scene, strategy, run, *(f"{number:.6g}" for number in score)])
+
+    def _keep(self, scene: str, strategy: str, run: int, score: Score) -> None:
+        self.found.setdefault(scene, {}).setdefault(strategy, {})[run] = score
+
+
+def holm(p_values: Sequence[float]) -> list[bool]:
+    """Which hypotheses are rejected at `LEVEL` for the whole family (Holm 1979)."""
+    order, rejected = np.argsort(p_values), [False] * len(p_values)
+    for rank, place in enumerate(order.tolist()):
+        if p_values[place] > LEVEL / (len(p_values) - rank):
+            break
+        rejected[place] = True
+    return rejected
+
+
+def p_value(differences: Floats) -> float:
+    """Of Student's t test, two-sided, that the mean is zero."""
+    from scipy.stats import ttest_1samp
+
+    if len(differences) < 2 or not differences.any():
+        return 1.0
+    return float(ttest_1samp(differences, 0.0).pvalue)
+
+
+def paired(runs: Runs, strategy: str, other: str) -> tuple[Floats, Floats]:
+    """(num,) OSPA of two strategies in the runs that both have."""
+    both = sorted(runs.get(strategy, {}).keys() & runs.get(other, {}).keys())
+    return (np.array([runs[name][run].ospa for run in both]) for name in (strategy, other))  # type: ignore[return-value]
+
+
+def best_rule(runs: Runs) -> str | None:
+    """The rule of thumb, of those that ask for no luck, of least mean error."""
+    known = [f"rule {rule}" for rule in RULES if runs.get(f"rule {rule}")]
+    return min(known, key=lambda name: float(np.mean([own.ospa for own in runs[name].values()])), default=None)
+
+
+def table(runs: Runs) -> Iterator[str]:
     """The table of one scene."""
-    yield score_markdown(score_strategies(results, group), group.comparison.unit, group.labels[0])
-    yield f"{group.comparison.num_runs} paired runs of {group.comparison.scenario}."
+    yield "| Strategy | OSPA (m) | more (m) | won | lost (m) | score | short | ms | runs |"
+    yield "| --- |" + " ---: |" * 8
+    names = [name for name in runs if len(runs[name]) > 1]
+    differences = {name: np.subtract(*paired(runs, name, FIRST)) for name in names}
+    clear = dict(zip(names, holm([p_value(own) for own in differences.values()]), strict=True))
+    rule = best_rule(runs)
+    ends = [summarise([own.ospa for own in runs[end].values()]).mean for end in (rule, ORACLE) if end in runs]
+    for name in sorted(names, key=lambda name: np.mean([own.ospa for own in runs[name].values()])):
+        scores = np.array(list(runs[name].values()))
+        total = summarise(scores[:, 0])
+        more = summarise(differences[name]) if len(differences[name]) > 1 else None
+        cells = [name, f"{total.mean:.2f} ± {total.standard_error:.2f}"]
+        if name == FIRST or more is None:
+            cells += ["", ""]
+        else:
+            star = "*" if clear[name] else ""
+            cells += [f"{more.mean:+.2f} ± {more.standard_error:.2f}{star}", f"{np.mean(differences[name] > 0):.0%}"]
+        apart = len(ends) == 2 and abs(ends[0] - ends[1]) > LEAST_GAP
+        place = (ends[0] - total.mean) / (ends[0] - ends[1]) if apart else np.nan
+        short = np.nanmean(scores[:, 3]) if np.isfinite(scores[:, 3]).any() else np.nan
+        cells += [f"{scores[:, 1].mean():.2f}", "" if np.isnan(place) else f"{place:.2f}"]
+        cells += ["" if np.isnan(short) else f"{short:.1%}", f"{scores[:, 2].mean():.1f}", str(len(scores))]
+        yield "| " + " | ".join(cells) + " |"
 
 
-def overview(all_results: Sequence[CampaignResults], planners: Sequence[str]) -> Iterator[str]:
-    """One row a scene: the error of the first strategy, and how much more the others have."""
-    first, *others = planners
-    yield f"| Scene | {first} | " + " | ".join(f"{name} more by" for name in others) + " | runs |"
-    yield "| --- |" + " ---: |" * (len(planners) + 1)
-    for results in all_results:
-        for group in results.comparisons():
-            reference, *scores = score_strategies(results, group)
-            parts = [score_row(reference)[1], *(score_row(score)[3] for score in scores), str(reference.num_runs)]
-            yield f"| {group.comparison.scenario} | " + " | ".join(parts) + " |"
+def overview(found: dict[str, Runs], names: Iterable[str]) -> Iterator[str]:
+    """One row a scene: the first strategy, and how much more others have."""
+    yield f"| Scene | {FIRST} | " + " | ".join(COLUMNS) + " | runs |"
+    yield "| --- |" + " ---: |" * (len(COLUMNS) + 2)
+    for name in names:
+        runs = found[name]
+        if len(runs.get(FIRST, {})) < 2:
+            continue
+        total = summarise([own.ospa for own in runs[FIRST].values()])
+        cells = [name, f"{total.mean:.2f} ± {total.standard_error:.2f}"]
+        for column in COLUMNS:
+            own = best_rule(runs) if column == "best rule" else column
+            first, second = paired(runs, own or "", FIRST)
+            if len(first) < 2:
+                cells.append("")
+                continue
+            more = paired_difference(first, second).summary
+            word = f" ({own.removeprefix('rule ')})" if column == "best rule" and own else ""
+            cells.append(f"{more.mean:+.2f} ± {more.standard_error:.2f}{word}")
+        yield "| " + " | ".join([*cells, str(total.num_runs)]) + " |"
+
+
+def wanted(given: argparse.Namespace, store: Store) -> Iterator[tuple[str, str, int]]:
+    """What is to be run: of all scenes the first runs first."""
+    taken = [own for own in scenes() if not given.scenes or any(word in own.name for word in given.scenes)]
+    for scene in taken:
+        names = [*strategies(scene.scenario()), *BEFORE]
+        for run in range(round(given.runs * scene.share)):
+            for name in names:
+                chosen = not given.strategies or any(name.startswith(word) for word in given.strategies)
+                if chosen and not name.startswith(tuple(given.without)) and not store.has(scene.name, name, run):
+                    yield scene.name, name, run
+
+
+def run_all(given: argparse.Namespace, store: Store) -> None:
+    """Run what is wanted; what fails is told, and the rest goes on."""
+    with ProcessPoolExecutor(given.workers, get_context("spawn")) as pool:
+        futures = {pool.submit(score, *task): task for task in wanted(given, store)}
+        try:
+            for done in as_completed(futures):
+                try:
+                    store.add(*futures[done], done.result())
+                except Exception as error:
+                    print(f"failed: {futures[done]}: {error}", flush=True)
+        except KeyboardInterrupt:
+            pool.shutdown(cancel_futures=True)
+            raise
 
 
 def main() -> None:
-    parser = campaign_tables.parser(__doc__ or "", "deciding-results")
-    parser.add_argument("--sensors", type=int, nargs="+", default=[2, 3, 5, 8, 20], help="numbers of sensors")
-    parser.add_argument("--patterns", nargs="+", choices=PATTERNS, default=PATTERNS, help="of the targets")
-    parser.add_argument("--views", nargs="+", choices=VIEWS, default=VIEWS, help="of the sensors")
-    parser.add_argument("--every", type=int, nargs="+", default=[1], help="scans between decisions")
-    parser.add_argument(
-        "--planners", nargs="+", default=["jdm", "greedy", "idm", "random", "fixed"], help="the first is compared to"
-    )
-    parser.add_argument("--samples", type=int, help="of a decision, instead of the scenes'")
-    parser.add_argument("--seed", type=int, default=0, help="of the scenes")
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--scenes", nargs="+", default=(), help="words in the names of scenes; all without")
+    parser.add_argument("--strategies", nargs="+", default=(), help="beginnings of the names of strategies")
+    parser.add_argument("--without", nargs="+", default=("pair",), help="beginnings of names that are left out")
+    parser.add_argument("--runs", type=int, default=50, help="of each strategy; scenes that take long have a share")
+    parser.add_argument("--workers", type=int, default=1, help="processes")
+    parser.add_argument("--out", type=Path, help="CSV file of results, which is gone on with")
+    parser.add_argument("--write", type=Path, help="page of the documentation whose table is replaced")
     given = parser.parse_args()
-    given.out.mkdir(parents=True, exist_ok=True)
-    done = []
-    for scene in scenes(given):
-        file = given.out / f"{scene.name}.yaml"
-        file.write_text(scene_text(scene), encoding="utf-8")
-        results = campaign_tables.run(campaign_on(scene, file, given), given.out / scene.name, given, given.out)
-        campaign_tables.print_tables(results, table)
-        done.append(results)
-    print(*overview(done, given.planners), sep="\n")
+    store = Store(given.out)
+    run_all(given, store)
+    names = [scene.name for scene in scenes() if scene.name in store.found]
+    for name in names:
+        print(f"\n### {name}\n", *table(store.found[name]), sep="\n", flush=True)
+    lines = "\n".join(overview(store.found, names))
+    print(f"\n{lines}")
+    if given.write is not None:
+        write_between(given.write, "deciding.py", lines)
 
 
 if __name__ == "__main__":

@@ -29,6 +29,7 @@ from vedette.control.rewards import (
     RenyiReward,
     Reward,
 )
+from vedette.control.rules_of_thumb import RulePlanner
 from vedette.control.search import (
     AutomaticSearch,
     CoordinateAscent,
@@ -77,6 +78,7 @@ __all__ = [
     "RenyiReward",
     "Reward",
     "RewardTable",
+    "RulePlanner",
     "RunnerUp",
     "SearchCurve",
     "Separation",

@@ -98,6 +98,11 @@ def map_estimate(density: Labelled) -> Estimate:
     raise InputError(f"density: expected {LABELLED}, which have labels; got {type(density).__name__}")
 
 
+def best_estimate(density: Any, step: int) -> Estimate:
+    """An `Estimator` of every density: `map_estimate` where it has labels, else `unlabelled_estimate`."""
+    return map_estimate(density) if isinstance(density, Labelled) else unlabelled_estimate(density, step)
+
+
 def _map_of_glmb(density: GLMB) -> Estimate:
     weights = np.exp(density.hyp_log_weights)
     sizes = np.diff(density.hyp_offsets)
@@ -250,6 +255,7 @@ def track_histories(estimates: Sequence[Estimate], times: Floats) -> tuple[Track
 __all__ = [
     "Estimate",
     "TrackHistory",
+    "best_estimate",
     "map_estimate",
     "marginal_estimate",
     "track_histories",

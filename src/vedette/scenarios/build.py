@@ -20,7 +20,7 @@ from vedette.platforms import Actions
 from vedette.platforms.base import actions_at
 from vedette.scenarios.loading import Scenario
 from vedette.scenarios.sections.custom import NotGiven
-from vedette.scenarios.sections.fusion import OF_SCANS, CustomFusion
+from vedette.scenarios.sections.fusion import OF_SCANS, ONE_BELIEF, CustomFusion
 from vedette.scenarios.sections.lookahead import Lookahead
 from vedette.scenarios.sections.planners import STRATEGIES, Parts
 from vedette.scenarios.sections.sensing import CustomMeasurement
@@ -28,6 +28,7 @@ from vedette.scenarios.sections.sensors import Sensor
 from vedette.scenarios.sections.tracking import CustomFilter
 from vedette.scenarios.sections.tracking import Filter as FilterSection
 from vedette.simulation.experiment import Experiment
+from vedette.simulation.oracle import Timetable
 from vedette.simulation.true_sensors import TrueSensor
 from vedette.simulation.truth import TargetSource
 from vedette.tracking import BeliefNetwork, Central, CentralFilter, Distributed, ScanNetwork, Searching, Tracker
@@ -182,8 +183,8 @@ def build_targets(scenario: Scenario) -> TargetSource:
 
 def build_planner(scenario: Scenario, name: str, num_threads: int = 0) -> Planner | None:
     """The planner of a strategy: `jdm` (joint), `idm` (independent), `lookahead` (joint, over several decisions),
-    `random`, `fixed` (sensors keep their first course), or one of the scenario's own; None for `still`, where the
-    sensors are never under way.
+    `nearest`, `assigned`, `centroid` (rules of thumb), `oracle` (who knows the targets), `random`, `fixed` (sensors
+    keep their first course), or one of the scenario's own; None for `still`, where the sensors are never under way.
 
     Args:
         scenario: with the sensors that it steers.
@@ -213,13 +214,29 @@ def build_planner(scenario: Scenario, name: str, num_threads: int = 0) -> Planne
         control.build_constraints(folder),
         _notes_of_decisions(scenario, fusion),
         (control.lookahead or Lookahead()).build(),
+        model.estimator.build(folder),
+        {"timetable": _timetable(scenario), "cutoff": model.ospa.cutoff},
     )
     if name in model.planners:
-        return model.planners[name].build(name, parts, folder)
+        return model.planners[name].planner(name, parts, folder)
     try:
         return STRATEGIES[name].planner(parts)
     except InputError as error:
         raise InputError(f"planner {name}: {error}") from error
+
+
+def _timetable(scenario: Scenario) -> Timetable:
+    """When the sensors scan and decide, and how what they say becomes one, for an oracle."""
+    model, num = scenario.model, len(scenario.model.sensors)
+    section, powers = model.fusion, (1.0,) * num
+    shared = section.kind in ONE_BELIEF or isinstance(section, CustomFusion) or section.feeds_back
+    if not isinstance(section, CustomFusion) and section.kind in ("clmb", "cm_delta_glmb") and not section.by_views:
+        powers = section.scaled_weights(num)
+    born, scans = model.birth, build_scan_times(scenario)
+    rebirths = born.from_measurements is not None or born.steps == "every"
+    return Timetable(
+        model.time.build(), model.decision_steps, powers, shared or model.network is not None, rebirths, scans
+    )
 
 
 def _notes_of_decisions(scenario: Scenario, fusion: Fusion) -> tuple[str, ...]:

@@ -4,6 +4,7 @@ from vedette.simulation.born_targets import PoissonTargets
 from vedette.simulation.crowds import CrowdTargets
 from vedette.simulation.experiment import Experiment
 from vedette.simulation.loop import simulate
+from vedette.simulation.oracle import KnowsTruth, OraclePlanner, Timetable
 from vedette.simulation.records import Decision, RunRecord
 from vedette.simulation.scans import CLUTTER, Scan, simulate_scan, simulate_scans
 from vedette.simulation.storage import load_run, save_run
@@ -15,11 +16,14 @@ __all__ = [
     "CrowdTargets",
     "Decision",
     "Experiment",
+    "KnowsTruth",
+    "OraclePlanner",
     "PoissonTargets",
     "RunRecord",
     "Scan",
     "ScriptedTargets",
     "TargetSource",
+    "Timetable",
     "TrueSensor",
     "Truth",
     "load_run",

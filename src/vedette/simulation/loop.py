@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from vedette.control import Planner, RandomPlanner
 from vedette.plausible import told_elsewhere
 from vedette.simulation.experiment import Experiment
 from vedette.simulation.journal import Journal, Score
+from vedette.simulation.oracle import KnowsTruth
 from vedette.simulation.records import RunRecord
 from vedette.simulation.scans import simulate_scans
 from vedette.simulation.stopping import RunInterrupted, RunStopped, cause_of
+from vedette.simulation.truth import Truth
 
 # Streams of one run: strategies meet the same truth and the same luck in the scans, whatever else they draw.
 TRUTH, SCANS, FILTER, PLANNER, RANDOM_CONTROL = range(5)
@@ -58,10 +62,17 @@ def simulate(experiment: Experiment, planner: Planner | None, *, seed: int, run:
         raise RunStopped(message, journal.step, journal.time, journal.stage(error), record) from error
 
 
+def _told(planner: Any, truth: Truth) -> Planner | None:
+    """The planner of this run, where it is one that knows the targets."""
+    told: Planner | None = planner.told(truth) if isinstance(planner, KnowsTruth) else planner
+    return told
+
+
 def _go(experiment: Experiment, planner: Planner | None, journal: Journal) -> None:
     """Every scan of a run, one after the other, written down in the journal."""
     seed, run, num = journal.seed, journal.run, experiment.num_sensors
     scan_rngs, filter_rngs = (sensor_streams(seed, run, stream, num) for stream in (SCANS, FILTER))
+    planner = _told(planner, journal.truth)
     planner_rng = run_stream(seed, run, RANDOM_CONTROL if isinstance(planner, RandomPlanner) else PLANNER)
     tracker = experiment.tracker
     state, fleet = tracker.initial(), experiment.fleet(moving=planner is not None)

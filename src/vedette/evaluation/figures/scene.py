@@ -15,7 +15,7 @@ from vedette.evaluation.figures.style import GREY, INK
 from vedette.kernels.base.types import Floats
 from vedette.scenarios import Scenario
 from vedette.scenarios.names import sensor_names
-from vedette.scenarios.sections.planners import STRATEGIES, NamedIndependent, NamedJoint
+from vedette.scenarios.sections.planners import STRATEGIES, NamedIndependent, NamedJoint, NamedLookahead
 from vedette.scenarios.views import INSIDE, NO_GO, REGION, Zone, zones
 from vedette.text import elided
 
@@ -64,7 +64,7 @@ def scene_of(scenario: Scenario, planner: str) -> Scene:
     """What figures of runs of a scenario under a strategy say."""
     model = scenario.model
     own, words = model.planners.get(planner), ""  # a planner of the user's own may weigh anything
-    if isinstance(own, NamedJoint | NamedIndependent):
+    if isinstance(own, NamedJoint | NamedIndependent | NamedLookahead):
         words = (own.reward or model.control.reward).words
     elif planner in STRATEGIES:
         words = model.control.reward.words

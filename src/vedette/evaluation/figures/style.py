@@ -118,6 +118,10 @@ def new_figure(height: float, *, width: float = COLUMN_WIDTH) -> Figure:
 _LABELS = {
     "jdm": "JDM",
     "idm": "IDM",
+    "nearest": "Nearest target",
+    "assigned": "Assigned target",
+    "centroid": "Centroid",
+    "oracle": "Oracle",
     "random": "Random",
     "fixed": "Fixed",
     "still": "Not moving",

@@ -10,16 +10,20 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, NamedTuple
 import numpy as np
 from pydantic import Field
 
-from vedette.scenarios.sections.base import Section
+from vedette.scenarios.sections.base import Count, Section
 from vedette.scenarios.sections.custom import Custom
+from vedette.scenarios.sections.lookahead import Lookahead
 from vedette.scenarios.sections.rewards import AnyReward
 from vedette.scenarios.sections.search import AnySearch
 
 if TYPE_CHECKING:  # with the planners comes the compiler, which a check does without
     from vedette.control import Constraint, JointSearch, MobileSensor, Plan, Planner, PlanningSettings
     from vedette.control.preparation import AnyReward as PlannedReward
+    from vedette.control.rules_of_thumb import Rule
+    from vedette.densities import Estimator
     from vedette.fusion import Fusion
     from vedette.platforms import Actions
+    from vedette.simulation import Truth
 
 
 class Parts(NamedTuple):
@@ -29,7 +33,8 @@ class Parts(NamedTuple):
     horizon, samples, caps, threads. reward: the value of a density. search: which joint actions are evaluated.
     first_actions: what each sensor does where nothing decides. constraints: what they must not do. notes: what plans
     are to say of the fusion. lookahead: arguments of `vedette.control.HorizonPlanner` by name, about sequences of
-    decisions.
+    decisions. estimate: reads the targets off the fused belief. oracle: arguments of
+    `vedette.simulation.OraclePlanner` by name, about scans and scores.
     """
 
     sensors: tuple[MobileSensor, ...]
@@ -41,6 +46,8 @@ class Parts(NamedTuple):
     constraints: tuple[Constraint, ...]
     notes: tuple[str, ...]
     lookahead: dict[str, Any]
+    estimate: Estimator
+    oracle: dict[str, Any]
 
 
 class Strategy(NamedTuple):
@@ -96,10 +103,30 @@ def _fixed(parts: Parts) -> Planner:
     return FixedPlanner(parts.first_actions)
 
 
+def _rule(rule: Rule, targets: tuple[int, ...] | None = None) -> Callable[[Parts], Planner]:
+    def planner(parts: Parts) -> Planner:
+        from vedette.control import RulePlanner
+
+        return RulePlanner(parts.sensors, rule, parts.settings, parts.constraints, parts.estimate, targets)
+
+    return planner
+
+
+def _oracle(parts: Parts, **given: Any) -> Planner:
+    from vedette.simulation import OraclePlanner
+
+    own: dict[str, Any] = {"settings": parts.settings, "constraints": parts.constraints, "estimate": parts.estimate}
+    return OraclePlanner(parts.sensors, **own, **parts.oracle, **given)
+
+
 STRATEGIES = {
     "jdm": Strategy(True, _joint),
     "idm": Strategy(True, _independent),
     "lookahead": Strategy(True, _lookahead),
+    "nearest": Strategy(False, _rule("nearest")),
+    "assigned": Strategy(False, _rule("assigned")),
+    "centroid": Strategy(False, _rule("centroid")),
+    "oracle": Strategy(False, _oracle),
     "random": Strategy(False, _random),
     "fixed": Strategy(False, _fixed),
     "still": Strategy(False, lambda parts: None),
@@ -114,7 +141,7 @@ class NamedJoint(Section):
     reward: AnyReward | None = Field(default=None, description="In place of control.reward; none: that one [-].")
     needs_labels: ClassVar[bool] = STRATEGIES["jdm"].needs_labels
 
-    def build(self, name: str, parts: Parts, folder: Path) -> Planner:
+    def planner(self, name: str, parts: Parts, folder: Path) -> Planner:
         """The planner, under the name that the scenario gives it."""
         search = parts.search if self.search is None else self.search.build(folder)
         reward = parts.reward if self.reward is None else self.reward.build(folder)
@@ -128,22 +155,67 @@ class NamedIndependent(Section):
     reward: AnyReward | None = Field(default=None, description="In place of control.reward; none: that one [-].")
     needs_labels: ClassVar[bool] = STRATEGIES["idm"].needs_labels
 
-    def build(self, name: str, parts: Parts, folder: Path) -> Planner:
+    def planner(self, name: str, parts: Parts, folder: Path) -> Planner:
         """The planner, under the name that the scenario gives it."""
         reward = parts.reward if self.reward is None else self.reward.build(folder)
         return Named(name, _independent(parts._replace(reward=reward)))
 
 
+class NamedLookahead(Lookahead):
+    """Decisions over several periods, as of lookahead, by a reward or a depth of its own."""
+
+    kind: Literal["lookahead"] = Field(default="lookahead", description="Kind of planner [-].")
+    reward: AnyReward | None = Field(default=None, description="In place of control.reward; none: that one [-].")
+    needs_labels: ClassVar[bool] = STRATEGIES["lookahead"].needs_labels
+
+    def planner(self, name: str, parts: Parts, folder: Path) -> Planner:
+        """The planner, under the name that the scenario gives it."""
+        reward = parts.reward if self.reward is None else self.reward.build(folder)
+        return Named(name, _lookahead(parts._replace(reward=reward, lookahead=self.build())))
+
+
+class NamedRule(Section):
+    """Sensors that head for the estimated targets by a rule of thumb, as of the strategies of these names."""
+
+    kind: Literal["nearest", "assigned", "centroid"] = Field(
+        description="For each sensor its nearest target that none before it took; the s-th target for the s-th sensor; "
+        "the middle of all targets [-]."
+    )
+    targets: Annotated[tuple[Count, ...], Field(strict=False)] | None = Field(
+        default=None, description="Of assigned: the number of each sensor's target instead, counted from 1 [-]."
+    )
+    needs_labels: ClassVar[bool] = False
+
+    def planner(self, name: str, parts: Parts, folder: Path) -> Planner:
+        """The planner, under the name that the scenario gives it."""
+        return Named(name, _rule(self.kind, self.targets)(parts))
+
+
+class NamedOracle(Section):
+    """What is done by who knows where the targets are, as of oracle: the floor beside which strategies are put."""
+
+    kind: Literal["oracle"] = Field(default="oracle", description="Kind of planner [-].")
+    depth: Count = Field(default=1, description="Decisions in a row that it looks at [-].")
+    beam_width: Count = Field(
+        default=8, description="Joint actions, those best for one decision, that it follows to the next [-]."
+    )
+    needs_labels: ClassVar[bool] = False
+
+    def planner(self, name: str, parts: Parts, folder: Path) -> Planner:
+        """The planner, under the name that the scenario gives it."""
+        return Named(name, _oracle(parts, depth=self.depth, beam_width=self.beam_width))
+
+
 class CustomPlanner(Custom):
     """A user's own planner; called with `sensors`, `fusion`, `settings`, `reward`, `search`, `first_actions`,
-    `constraints`, `notes`, `lookahead`, of which it names those that it wants."""
+    `constraints`, `notes`, `lookahead`, `estimate`, `oracle`, of which it names those that it wants."""
 
     kind: Literal["custom"] = Field(default="custom", description="Kind of planner [-].")
     spared: ClassVar[tuple[str, ...]] = ("name",)  # which the scenario gives
     gives: ClassVar[str] = "vedette.control:Planner"
     needs_labels: ClassVar[bool] = False
 
-    def build(self, name: str, parts: Parts, folder: Path) -> Planner:
+    def planner(self, name: str, parts: Parts, folder: Path) -> Planner:
         """The user's own, under the name that the scenario gives it."""
         return Named(name, self.made(folder, **parts._asdict()))
 
@@ -159,5 +231,14 @@ class Named:
         """What the planner decides."""
         return replace(self.planner.plan(*situation, rng=rng), planner=self.name)
 
+    def told(self, truth: Truth) -> Named:
+        """The same, where the planner is one that knows the targets of a run."""
+        from vedette.simulation import KnowsTruth
 
-AnyPlanner = Annotated[NamedJoint | NamedIndependent | CustomPlanner, Field(discriminator="kind")]
+        return replace(self, planner=self.planner.told(truth)) if isinstance(self.planner, KnowsTruth) else self
+
+
+AnyPlanner = Annotated[
+    NamedJoint | NamedIndependent | NamedLookahead | NamedRule | NamedOracle | CustomPlanner,
+    Field(discriminator="kind"),
+]

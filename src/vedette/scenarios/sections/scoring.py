@@ -25,12 +25,9 @@ class MapEstimator(Section):
 
     def build(self, folder: Path) -> Estimator:
         """How estimates are read off a density after a scan, given its number, by which unlabelled ones are named."""
-        from vedette.densities import Labelled, map_estimate, unlabelled_estimate
+        from vedette.densities import best_estimate
 
-        def estimate(density: Belief, step: int) -> Estimate:
-            return map_estimate(density) if isinstance(density, Labelled) else unlabelled_estimate(density, step)
-
-        return estimate
+        return best_estimate
 
 
 class MarginalEstimator(Section):

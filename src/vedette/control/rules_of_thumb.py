@@ -1,0 +1,140 @@
+"""Rules of thumb: sensors head for the estimated targets, without any reward, as one would steer them by hand."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Literal, TypeAlias, get_args
+
+import numpy as np
+
+from vedette.control.allowed import mask_of_decision, single_mask
+from vedette.control.constraints import Constraint, repaired
+from vedette.control.inputs import check_steering, options_of
+from vedette.control.plan import Plan
+from vedette.control.search import first_best
+from vedette.control.settings import MobileSensor, PlanningSettings
+from vedette.densities import Estimator, best_estimate
+from vedette.kernels.base.types import Floats
+from vedette.models.arguments import dimension, generator, instance, one_of, reject, sequence
+from vedette.platforms import Options
+from vedette.tracking import State
+
+Rule: TypeAlias = Literal["nearest", "assigned", "centroid"]
+
+# Of a camera's pose: where it points, and half the width of what it sees, which other sensors do not have.
+_POINTING, _HALF_WIDTH = 3, 4
+# Weight of how well it points, relative to distances: above rounding, below what tells places apart.
+_AIM = 1e-6
+
+
+def _nearest(places: Floats, sensors: Floats) -> Floats:
+    """The nearest target of each sensor that none before it took; when all are taken, again from all."""
+    gaps = np.hypot(*(sensors[:, np.newaxis] - places).transpose(2, 0, 1))
+    taken = np.zeros(len(places), np.int64)
+    chosen = []
+    for own in gaps:
+        chosen.append(int(np.argmin(np.where(taken == taken.min(), own, np.inf))))
+        taken[chosen[-1]] += 1
+    return np.asarray(places[chosen])
+
+
+def _assigned(places: Floats, sensors: Floats) -> Floats:
+    """The s-th target for sensor s, beginning again where there are fewer targets."""
+    return np.asarray(places[np.arange(len(sensors)) % len(places)])
+
+
+def _centroid(places: Floats, sensors: Floats) -> Floats:
+    """The middle of all targets, for all sensors."""
+    return np.tile(places.mean(axis=0), (len(sensors), 1))
+
+
+_GOALS: dict[str, Callable[[Floats, Floats], Floats]] = {
+    "nearest": _nearest,
+    "assigned": _assigned,
+    "centroid": _centroid,
+}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RulePlanner:
+    """Every sensor heads for a place among the targets that are estimated now, by a rule of thumb.
+
+    Of its courses it takes the one that is nearest to that place on the mean over the horizon, which for courses of one
+    speed is the one nearest in heading; a camera that stays where it is turns to it. Where no target is estimated, each
+    takes its first course.
+
+    Attributes:
+        sensors: the sensors.
+        rule: "nearest": for each sensor, in printed order, its nearest target that none before it took; "assigned": the
+            s-th target, in the order of labels, for the s-th sensor; "centroid": the mean of all, for all sensors.
+        settings: the horizon, over which courses are told apart.
+        constraints: what the sensors must not do; each then takes the best of what it may, and a joint action that is
+            not allowed is moved to one near it.
+        estimate: reads the targets off the fused belief.
+        targets: of "assigned": the number of each sensor's target instead, counted from 1; those beyond the last begin
+            again.
+
+    Raises:
+        InputError: parts of another kind, or `targets` of another rule or number of sensors.
+    """
+
+    sensors: tuple[MobileSensor, ...]
+    rule: Rule
+    settings: PlanningSettings = field(default_factory=PlanningSettings)
+    constraints: tuple[Constraint, ...] = ()
+    estimate: Estimator = best_estimate
+    targets: tuple[int, ...] | None = None
+
+    def __post_init__(self) -> None:
+        check_steering(self)
+        one_of("rule", self.rule, get_args(Rule))
+        if self.targets is not None:
+            given = sequence("targets", self.targets, f"{len(self.sensors)} numbers of targets, one a sensor")
+            if self.rule != "assigned" or len(given) != len(self.sensors):
+                expected = f"{len(self.sensors)} numbers of targets, one a sensor, for the rule assigned"
+                raise reject("targets", expected, f"{self.targets} for {self.rule}")
+            object.__setattr__(self, "targets", tuple(dimension(f"targets[{s}]", own) for s, own in enumerate(given)))
+
+    @property
+    def name(self) -> str:
+        """The strategy, as of the rule."""
+        return self.rule
+
+    def plan(self, state: State, poses: Floats, *, rng: np.random.Generator) -> Plan:
+        """The courses that head for the rule's places; of equal ones the first in printed order. Draws nothing.
+
+        Raises `InputError` for inputs that do not fit, and as the estimator.
+        """
+        generator(rng)
+        instance("state", state, State)
+        options = options_of(self.sensors, poses, self.settings)
+        at = np.asarray(poses, np.float64)
+        mask = mask_of_decision(self.constraints, self.sensors, options, state.fused, at, self.settings)
+        places = np.asarray(self.estimate(state.fused, state.step).means)[:, :2]
+        goals = self._goals(places, at[:, :2]) if len(places) else [None] * len(options)
+        joint = tuple(
+            first_best(np.where(single_mask(mask, s, len(own.courses)), _merits(own, goal), -np.inf))
+            for s, (own, goal) in enumerate(zip(options, goals, strict=True))
+        )
+        if mask is not None:
+            joint = repaired(mask, joint)
+        chosen = tuple(own.first_action(course) for own, course in zip(options, joint, strict=True))
+        return Plan(self.name, tuple(own.actions for own in options), chosen, (), {}, mask.notes if mask else ())
+
+    def _goals(self, places: Floats, sensors: Floats) -> Floats:
+        if self.targets is not None:
+            return np.asarray(places[(np.array(self.targets) - 1) % len(places)])
+        return _GOALS[self.rule](places, sensors)
+
+
+def _merits(own: Options, goal: Floats | None) -> Floats:
+    """(num_courses,) less the mean distance to a place; of courses that are equal in it, how well a camera points."""
+    if goal is None:
+        return np.zeros(len(own.courses))
+    offsets = goal - own.courses[..., :2]
+    near: Floats = -np.hypot(offsets[..., 0], offsets[..., 1]).mean(axis=1)
+    if own.courses.shape[2] <= _HALF_WIDTH or not (own.courses[..., _HALF_WIDTH] > 0.0).any():
+        return near
+    turn = np.arctan2(offsets[..., 1], offsets[..., 0]) - own.courses[..., _POINTING]
+    return np.asarray(near + _AIM * max(1.0, float(-near.min())) * np.cos(turn).mean(axis=1))

@@ -1,0 +1,94 @@
+"""How well targets could be known after the scans of a stretch of time: the recursion of covariances at the truth."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from vedette.kernels.base.types import Floats, Ints
+from vedette.models import MotionModel, SensorModel
+
+# Of central differences, in units of the state.
+_STEP = 1e-3
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Stretch:
+    """The scans from one decision to the next, at the true targets.
+
+    Covariances go through P <- F P F' + Q, then P^-1 <- P^-1 + P_D H' R^-1 H of each sensor that scans, where P_D is
+    the share of scans that detect the target (posterior Cramer-Rao bound, Tichavsky, Muravchik and Nehorai 1998).
+
+    Attributes:
+        transitions, noises: F and Q, (num_scans, num_targets, dim, dim).
+        alive: (num_scans, num_targets) 1 where the target is there, else 0.
+        told: of each sensor (num_courses, num_scans, num_targets, dim, dim) P_D H' R^-1 H of its scans.
+        powers: of each sensor, with which its information counts in the fused density.
+        one_belief: whether all scans go into one belief, to which sensors return after every scan.
+        cutoff: the error that counts as a lost target, m.
+    """
+
+    transitions: Floats
+    noises: Floats
+    alive: Floats
+    told: tuple[Floats, ...]
+    powers: tuple[float, ...]
+    one_belief: bool
+    cutoff: float
+
+    def follow(self, covs: Sequence[Floats], actions: Ints) -> tuple[Floats, list[Floats]]:
+        """(num_joint,) what joint actions (num_joint, num_sensors) cost, and the covariances after the last scan.
+
+        covs: (num_targets, dim, dim) of each belief before. After: (num_joint, num_targets, dim, dim) of each. The cost
+        is the sum over scans and targets of min(sqrt(tr P), cutoff), P that of the position in the fused density.
+        """
+        costs = np.zeros(len(actions))
+        beliefs: list[Floats] = [np.broadcast_to(own, (len(actions), *own.shape)) for own in covs]
+        for k, (moved, noise) in enumerate(zip(self.transitions, self.noises, strict=True)):
+            said = [own[actions[:, s], k] for s, own in enumerate(self.told)]
+            infos: list[Floats] = [_inverse(moved @ own @ moved.swapaxes(-1, -2) + noise) for own in beliefs]
+            if self.one_belief:
+                beliefs = [_inverse(infos[0] + self._summed(said))]
+                fused = beliefs[0]
+            else:
+                infos = [own + scan for own, scan in zip(infos, said, strict=True)]
+                beliefs = [_inverse(own) for own in infos]
+                fused = _inverse(self._summed(infos))
+            errors = np.sqrt(fused[..., 0, 0] + fused[..., 1, 1])
+            costs += np.minimum(errors, self.cutoff) @ self.alive[k]
+        return costs, beliefs
+
+    def _summed(self, informations: Sequence[Floats]) -> Floats:
+        """With the sensors' powers."""
+        return np.asarray(sum(power * own for power, own in zip(self.powers, informations, strict=True)))
+
+
+def _inverse(matrices: Floats) -> Floats:
+    return np.asarray(np.linalg.inv(matrices), np.float64)
+
+
+def transition_jacobians(motion: MotionModel, states: Floats, dt: float) -> Floats:
+    """(num, dim, dim) derivatives of the motion over `dt` seconds at (num, dim) states, by central differences."""
+    moved = motion.propagate(_shifted(states), dt).reshape(2, motion.state_dim, *states.shape)
+    return np.moveaxis((moved[0] - moved[1]) / (2.0 * _STEP), 0, -1)
+
+
+def scan_information(sensor: SensorModel, states: Floats, pose: Floats) -> Floats:
+    """(num, dim, dim) P_D H' R^-1 H of one scan of targets at (num, dim) states."""
+    num, dim = states.shape
+    measured = sensor.measurement.measure(_shifted(states), pose).reshape(2, dim, num, sensor.meas_dim)
+    change = measured[0] - measured[1]
+    angular = sensor.measurement.angular
+    change[..., angular] = np.remainder(change[..., angular] + np.pi, 2.0 * np.pi) - np.pi
+    jacobians = change.transpose(1, 2, 0) / (2.0 * _STEP)
+    weights = np.linalg.inv(sensor.noise.covs(states, pose, sensor.meas_dim))
+    seen = sensor.detection.prob(states, pose)[:, np.newaxis, np.newaxis]
+    return np.asarray(seen * (jacobians.swapaxes(1, 2) @ weights @ jacobians))
+
+
+def _shifted(states: Floats) -> Floats:
+    """(2 dim num, dim) each component of each state a step further, then a step back."""
+    steps = _STEP * np.eye(states.shape[1])[:, np.newaxis]
+    return np.ascontiguousarray(np.concatenate([states + steps, states - steps]).reshape(-1, states.shape[1]))

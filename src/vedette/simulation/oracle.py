@@ -1,0 +1,229 @@
+"""An oracle that knows where the targets are: the floor of what control can reach, beside which plans are put."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple, Protocol, runtime_checkable
+
+import numpy as np
+
+from vedette.control import (
+    AutomaticSearch,
+    Constraint,
+    JointProblem,
+    JointSearch,
+    MobileSensor,
+    Plan,
+    Planner,
+    PlanningSettings,
+)
+from vedette.control.allowed import mask_of_decision
+from vedette.control.constraints import Mask, repaired
+from vedette.control.inputs import check_poses, check_steering, options_of
+from vedette.densities import Estimator, best_estimate
+from vedette.errors import InputError
+from vedette.filters import shared_targets
+from vedette.kernels.base.types import Bools, Floats, Ints
+from vedette.models.arguments import dimension, generator, instance, positive
+from vedette.platforms import Options
+from vedette.platforms.base import courses_of
+from vedette.simulation.cramer_rao import Stretch, scan_information, transition_jacobians
+from vedette.simulation.truth import Truth
+from vedette.tracking import State
+
+# Of a target that a belief has lost, the standard deviation of components beyond the position, relative to the cutoff.
+_LOST = 0.1
+
+
+@runtime_checkable
+class KnowsTruth(Protocol):
+    """A planner that is told the true targets at the beginning of a run; `vedette.simulation.simulate` does."""
+
+    def told(self, truth: Truth) -> Planner:
+        """The planner for these targets."""
+        ...
+
+
+class Timetable(NamedTuple):
+    """When sensors scan and decide, and how what they say becomes one.
+
+    times: (num_scans,) s. decision_steps: scans, from 1, after which they decide. powers: of each sensor, with which
+    what it says counts in the fused density. one_belief: whether all scans go into one belief, to which sensors return
+    after every scan; otherwise each keeps its own. rebirths: whether a target that was lost may be found again.
+    scans_at: (num_sensors, num_scans or more) whether each scans then; None: always.
+    """
+
+    times: Floats
+    decision_steps: tuple[int, ...]
+    powers: tuple[float, ...]
+    one_belief: bool
+    rebirths: bool
+    scans_at: Bools | None = None
+
+
+class _Moment(NamedTuple):
+    """Where a decision begins."""
+
+    step: int
+    poses: Floats
+    covs: tuple[Floats, ...]  # (num_targets, dim, dim) of each belief
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class OraclePlanner:
+    """The joint action of least Cramer-Rao error at the true targets, over all scans up to the next decision.
+
+    It begins with the covariances that the filters have of the targets that they track, and follows them through all
+    scans (`vedette.simulation.cramer_rao.Stretch`). Scans may miss and filters may err, so that no single run is bound
+    by it; of what control does for localisation it is the floor. Targets that appear later are not foreseen.
+
+    Attributes:
+        sensors: the sensors.
+        timetable: when they scan and decide.
+        cutoff: the error that counts as a lost target, m.
+        depth: decisions in a row that are looked at.
+        beam_width: how many joint actions, those best for one decision, are followed to the next one.
+        settings: the horizon, over which courses are told apart.
+        search: which joint actions are looked at.
+        constraints: what the sensors must not do, tested at the decision at hand.
+        estimate: reads the tracks off a belief.
+        truth: the targets; None: `told` brings them.
+
+    Raises:
+        InputError: parts of another kind.
+    """
+
+    sensors: tuple[MobileSensor, ...]
+    timetable: Timetable
+    cutoff: float = 100.0
+    depth: int = 1
+    beam_width: int = 8
+    settings: PlanningSettings = field(default_factory=PlanningSettings)
+    search: JointSearch = field(default_factory=AutomaticSearch)
+    constraints: tuple[Constraint, ...] = ()
+    estimate: Estimator = best_estimate
+    truth: Truth | None = None
+
+    def __post_init__(self) -> None:
+        check_steering(self)
+        positive("cutoff", self.cutoff)
+        dimension("depth", self.depth)
+        dimension("beam_width", self.beam_width)
+        instance("search", self.search, JointSearch)
+
+    @property
+    def name(self) -> str:
+        """The strategy "oracle"."""
+        return "oracle"
+
+    def told(self, truth: Truth) -> OraclePlanner:
+        """The same for the targets of a run."""
+        return replace(self, truth=truth)
+
+    def plan(self, state: State, poses: Floats, *, rng: np.random.Generator) -> Plan:
+        """The joint action of least cost; `rng` is for the search. Raises `InputError` for inputs that do not fit."""
+        generator(rng)
+        instance("state", state, State)
+        if self.truth is None:
+            raise InputError("truth: expected the targets of the run, as of told(); got None")
+        at = check_poses(poses, len(self.sensors))
+        options = options_of(self.sensors, at, self.settings)
+        mask = mask_of_decision(self.constraints, self.sensors, options, state.fused, at, self.settings)
+        step = max(state.step, 1)
+        ids, covs = self._tracked(state, *self.truth.at(step - 1))
+        best, _ = self._decide(_Moment(step, at, covs), self.truth, ids, self.depth, mask, rng)
+        chosen = tuple(own.first_action(course) for own, course in zip(options, best, strict=True))
+        notes = mask.notes if mask is not None else ()
+        return Plan(self.name, tuple(own.actions for own in options), chosen, (), {}, notes)
+
+    def _tracked(self, state: State, ids: Ints, states: Floats) -> tuple[Ints, tuple[Floats, ...]]:
+        """The targets that can be helped, and their covariances in each belief."""
+        beliefs = (state.fused,) if self.timetable.one_belief else state.local
+        kept = np.ones(len(ids), bool)
+        if not self.timetable.rebirths:
+            kept = self._covs(state.fused, state.step, states)[1]
+        return ids[kept], tuple(self._covs(own, state.step, states)[0][kept] for own in beliefs)
+
+    def _covs(self, belief: object, step: int, states: Floats) -> tuple[Floats, Bools]:
+        """(num, dim, dim) of the estimates nearest to targets, and whether there is one within the cutoff."""
+        from scipy.optimize import linear_sum_assignment  # a third of a second that nobody else has to wait for
+
+        estimate = self.estimate(belief, step)
+        stds = np.full(states.shape[1], _LOST * self.cutoff)
+        stds[:2] = self.cutoff
+        covs, found = np.tile(np.diag(stds**2), (len(states), 1, 1)), np.zeros(len(states), bool)
+        offsets = states[:, np.newaxis, :2] - estimate.means[:, :2]
+        gaps = np.minimum(np.hypot(offsets[..., 0], offsets[..., 1]), self.cutoff)
+        for target, track in zip(*linear_sum_assignment(gaps), strict=True):
+            if gaps[target, track] < self.cutoff:
+                covs[target], found[target] = estimate.covs[track], True
+        return covs, found
+
+    def _decide(
+        self, moment: _Moment, truth: Truth, ids: Ints, depth: int, mask: Mask | None, rng: np.random.Generator
+    ) -> tuple[tuple[int, ...], float]:
+        """The best joint action, and what it costs together with the decisions after it."""
+        last = next((own for own in self.timetable.decision_steps if own > moment.step), len(self.timetable.times))
+        options = options_of(self.sensors, moment.poses, self.settings)
+        courses = self._courses(moment, options, last)
+        stretch = self._stretch(moment.step, last, courses, truth, ids)
+        known: dict[tuple[int, ...], float] = {}
+
+        def evaluate(actions: Ints) -> Floats:
+            costs = stretch.follow(moment.covs, actions)[0]
+            known.update(zip(map(tuple, actions.tolist()), costs.tolist(), strict=True))
+            return -costs
+
+        first = (0,) * len(self.sensors)
+        first = first if mask is None else repaired(mask, first)
+        problem = JointProblem(tuple(len(own.courses) for own in options), evaluate, lambda: first, mask)
+        best = self.search.search(problem, rng=rng)
+        if depth == 1 or last >= len(self.timetable.times):
+            return best, known[best]
+        totals = {}
+        for joint in sorted(known, key=lambda joint: (known[joint], joint))[: self.beam_width]:
+            ends = np.stack([own[course, -1] for own, course in zip(courses, joint, strict=True)])
+            covs = tuple(own[0] for own in stretch.follow(moment.covs, np.array([joint]))[1])
+            later = self._decide(_Moment(last, ends, covs), truth, ids, depth - 1, None, rng)
+            totals[joint] = known[joint] + later[1]
+        best = min(totals, key=lambda joint: (totals[joint], joint))
+        return best, totals[best]
+
+    def _courses(self, moment: _Moment, options: tuple[Options, ...], last: int) -> tuple[Floats, ...]:
+        """Of each sensor (num_courses, num_scans, pose_dim) where it is at the scans up to the next decision."""
+        times = self.timetable.times
+        waits, found = times[moment.step : last] - times[moment.step - 1], []
+        for s, (sensor, own) in enumerate(zip(self.sensors, options, strict=True)):
+            actions = own.actions.values[[own.first_action(course) for course in range(len(own.courses))]]
+            found.append(courses_of(f"sensors[{s}].platform", sensor.platform, moment.poses[s], actions, waits))
+        return tuple(found)
+
+    def _stretch(self, first: int, last: int, courses: tuple[Floats, ...], truth: Truth, ids: Ints) -> Stretch:
+        """The scans after scan `first` up to scan `last`; a target that has ended stays where it was."""
+        table, times = self.timetable, self.timetable.times
+        motion = shared_targets([sensor.filter for sensor in self.sensors]).motion
+        dim, num = motion.state_dim, len(ids)
+        states, alive = np.empty((last - first + 1, num, dim)), np.zeros((last - first + 1, num))
+        for k in range(len(states)):
+            now, own = truth.at(first - 1 + k)
+            _, places, rows = np.intersect1d(ids, now, assume_unique=True, return_indices=True)
+            states[k] = states[max(k - 1, 0)]
+            states[k, places], alive[k, places] = own[rows], 1.0
+        steps = list(zip(states[:-1], np.diff(times[first - 1 : last]).tolist(), strict=True))
+        told = []
+        for s, (sensor, own) in enumerate(zip(self.sensors, courses, strict=True)):
+            said = np.zeros((*own.shape[:2], num, dim, dim))
+            for k in range(last - first):
+                if table.scans_at is None or table.scans_at[s, first + k]:
+                    for course in range(len(own)):
+                        said[course, k] = scan_information(sensor.filter.sensor, states[k + 1], own[course, k])
+            told.append(said)
+        return Stretch(
+            np.array([transition_jacobians(motion, own, dt) for own, dt in steps]).reshape(-1, num, dim, dim),
+            np.array([motion.noise_covs(own, dt) for own, dt in steps]).reshape(-1, num, dim, dim),
+            alive[1:],
+            tuple(told),
+            table.powers,
+            table.one_belief,
+            self.cutoff,
+        )
