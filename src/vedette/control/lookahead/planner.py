@@ -15,6 +15,7 @@ import numpy as np
 from vedette.control.additive.evaluator import AdditiveEvaluator
 from vedette.control.bounds import bound_of
 from vedette.control.constraints import Constraint
+from vedette.control.cutoff import beyond_cutoff
 from vedette.control.evidence import Evidence
 from vedette.control.inputs import check_poses, check_sensors, check_steering, check_valuing
 from vedette.control.lookahead.ahead import Ahead
@@ -86,7 +87,7 @@ class HorizonPlanner:
     period: float | None = None
     search: SequenceSearch = field(default_factory=BeamSearch)
     budget: int = 2000
-    discount: float | None = 0.5
+    discount: float | None = 0.25
     constraints: tuple[Constraint, ...] = ()
     notes: tuple[str, ...] = ()
 
@@ -256,6 +257,7 @@ class HorizonPlanner:
             yield f"depth {depth} does not pay: the actions are those of the best single decision"
         if self.settings.confidence is not None:
             yield "decided on num_samples samples, whatever the confidence: sequences are not raced"
+        yield from beyond_cutoff(single.evaluator, courses)
 
 
 def _best(problem: SequenceProblem) -> Best:
