@@ -38,8 +38,9 @@ def lmbs(num_sensors: int = 2, **sensor: Any) -> Situation:
 
 
 def planner(given: Situation, reward: Any = None, **arguments: Any) -> HorizonPlanner:
+    """Of which only the end counts, unless it is said otherwise."""
     reward = CauchySchwarzReward() if reward is None else reward
-    return HorizonPlanner(given.sensors, given.fusion, given.settings, reward, **arguments)
+    return HorizonPlanner(given.sensors, given.fusion, given.settings, reward, **{"discount": None, **arguments})
 
 
 def decide(planner: Any, given: Situation, seed: int = 1) -> Plan:

@@ -75,9 +75,8 @@ def lmbs(num_sensors: int = 2) -> Situation:
 
 def decide(given: Situation, constraints: Any, reward: Any = None, **arguments: Any) -> Plan:
     reward = ExpectedLossReward() if reward is None else reward
-    planner = HorizonPlanner(
-        given.sensors, given.fusion, given.settings, reward, constraints=tuple(constraints), **arguments
-    )
+    arguments = {"discount": None, "constraints": tuple(constraints), **arguments}
+    planner = HorizonPlanner(given.sensors, given.fusion, given.settings, reward, **arguments)
     plan: Plan = planner.plan(*given.arguments, rng=np.random.default_rng(1))
     plan.validate()
     return plan

@@ -44,7 +44,8 @@ def state(expected: Any) -> State:
 
 
 def planner(**arguments: Any) -> HorizonPlanner:
-    return HorizonPlanner(sensors(), ParallelUpdate(), ONE, ExpectedLossReward(100.0), **arguments)
+    given = {"discount": None, **arguments}
+    return HorizonPlanner(sensors(), ParallelUpdate(), ONE, ExpectedLossReward(100.0), **given)
 
 
 def detections(headings: Any, start: Any) -> Any:

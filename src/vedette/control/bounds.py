@@ -31,12 +31,20 @@ def bound_of(evidence: Evidence, choice: Sequence[int]) -> Bound | None:
     reward = evidence.mean_of(choice)
     if evidence.is_complete():
         return Bound(evidence.best, reward, "exhaustive")
-    evaluator = evidence.evaluator
-    if not isinstance(evaluator, AdditiveEvaluator) or evaluator.additive.coefficients is None:
-        return None
-    best = best_values(evaluator.additive, evaluator.settings.max_bound_work)
-    unbounded = int(np.isinf(best).sum())
-    return Bound(float(best.sum()) + _most_found(evaluator.additive), reward, "by target", unbounded)
+    most = most_by_target(evidence)
+    return None if most is None else Bound(most[0], reward, "by target", most[1])
+
+
+def most_by_target(evidence: Evidence) -> tuple[float, int] | None:
+    """What no joint action has a larger mean reward than, and of how many targets nothing is known; worked out once.
+
+    None of rewards that are no sums over targets.
+    """
+    evaluator, known = evidence.evaluator, evidence.most_by_target
+    if not known and isinstance(evaluator, AdditiveEvaluator) and evaluator.additive.coefficients is not None:
+        best = best_values(evaluator.additive, evaluator.settings.max_bound_work)
+        known.append((float(best.sum()) + _most_found(evaluator.additive), int(np.isinf(best).sum())))
+    return known[0] if known else None
 
 
 def best_values(additive: AdditiveRewards, max_work: int) -> Floats:

@@ -33,6 +33,7 @@ class Evidence:
         which: the sensors.
         rewards: their sample rewards.
         shape: number of different courses of each of the sensors.
+        most_by_target: what `vedette.control.bounds` found, where it was asked.
     """
 
     evaluator: AnyEvaluator
@@ -44,6 +45,7 @@ class Evidence:
     _errors: list[Floats] = field(default_factory=list)
     _evaluations: list[int] = field(default_factory=list)
     _best: list[float] = field(default_factory=list)
+    most_by_target: list[tuple[float, int]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         shape = self.evaluator.joint_shape()

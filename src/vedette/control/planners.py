@@ -10,6 +10,7 @@ import numpy as np
 from vedette.control.allowed import mask_of_decision, single_mask
 from vedette.control.bounds import bound_of
 from vedette.control.constraints import Constraint, repaired
+from vedette.control.cutoff import beyond_cutoff
 from vedette.control.evidence import Evidence
 from vedette.control.explaining import Part, Questions
 from vedette.control.inputs import check_choice, check_poses, check_steering, check_valuing, options_of
@@ -110,7 +111,7 @@ class JointPlanner:
         chosen = tuple(own.first_action(course) for own, course in zip(evaluator.options, best, strict=True))
         actions = tuple(own.actions for own in evaluator.options)
         tables, (counts, found), bound = evidence.tables(best), evaluator.account(), bound_of(evidence, best)
-        notes = (*self.notes, *found)
+        notes = (*self.notes, *found, *beyond_cutoff(evaluator, best))
         return Plan(
             self.name,
             actions,
@@ -162,25 +163,26 @@ class IndependentPlanner:
         if prepared.races:
             return _plan_of(self.name, prepared, decide_alone(prepared, rng=rng))
         evaluator = prepared.evaluator(self.settings.num_samples, rng=rng)
-        chosen: list[int] = []
+        courses: list[int] = []
         tables: list[RewardTable] = []
         parts: list[Part] = []
         for s, own in enumerate(evaluator.options):
             evidence = Evidence(evaluator, (s,), evaluator.alone(s))
             allowed = all_joint_actions((len(own.courses),))[single_mask(prepared.mask, s, len(own.courses))]
             best = int(allowed[first_best(evidence.evaluate(allowed)), 0])
-            chosen.append(own.first_action(best))
+            courses.append(best)
             tables.extend(evidence.tables((best,)))
             parts.append(Part.alone(evidence, best))
-        actions, questions = tuple(own.actions for own in evaluator.options), Questions(self.name, tuple(parts))
+        counts, notes = evaluator.account()
         return Plan(
             self.name,
-            actions,
-            tuple(chosen),
+            tuple(own.actions for own in evaluator.options),
+            tuple(own.first_action(course) for own, course in zip(evaluator.options, courses, strict=True)),
             tuple(tables),
-            *evaluator.account(),
+            counts,
+            (*notes, *beyond_cutoff(evaluator, courses)),
             certainty=prepared.certainty,
-            questions=questions,
+            questions=Questions(self.name, tuple(parts)),
         )
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from vedette.control.additive.evaluator import AdditiveEvaluator
 from vedette.control.allowed import allowed_of, single_mask
+from vedette.control.bounds import most_by_target
 from vedette.control.constraints import Mask
 from vedette.control.evidence import Evidence
 from vedette.control.search import JointProblem, all_joint_actions, first_best
@@ -39,8 +40,12 @@ def joint_problem(evidence: Evidence, mask: Mask | None) -> JointProblem:
     def partial(actions: Ints) -> Floats:
         return np.asarray(additive(np.ascontiguousarray(actions, np.int64)).mean(axis=1))
 
+    def bound() -> float:
+        most = most_by_target(evidence)
+        return np.inf if most is None else most[0]
+
     compiled = additive.coefficients is not None and allowed is not None
-    return plain._replace(line=line, ascend=ascend if compiled else None, partial=partial)
+    return plain._replace(line=line, ascend=ascend if compiled else None, partial=partial, bound=bound)
 
 
 def note_lines(evidence: Evidence, choice: Sequence[int], mask: Mask | None) -> None:

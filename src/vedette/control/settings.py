@@ -58,6 +58,7 @@ class PlanningSettings:
             LMBs, which the plan then says.
         undetected_worth: of finding a target of `State.undetected`, in units of the reward (of the expected loss: m^2);
             0: nobody is looked for. Targets not found are taken to stay where they are over the horizon.
+        end: s, time of the last scan, on the clock of `State.time`: no decision after it is planned for; None: none is.
         max_prior_hypotheses: heaviest hypotheses of each local posterior that enter the pseudo-updates. An LMB enters
             whole.
         max_version_divergence: nats within which a label's densities under two of these hypotheses are taken as one,
@@ -91,6 +92,7 @@ class PlanningSettings:
     max_version_divergence: float = 1e-3
     max_bound_work: int = 256
     undetected_worth: float = 0.0
+    end: float | None = None
     confidence: float | None = None
     indifference: float = 0.0
     max_samples: int = 2000
@@ -108,6 +110,8 @@ class PlanningSettings:
         probability("detection_threshold", self.detection_threshold)
         non_negative("undetected_worth", self.undetected_worth)
         non_negative("max_version_divergence", self.max_version_divergence)
+        if self.end is not None:
+            real("end", self.end)
         self._check_certainty()
         one_of("ideal_measurements", self.ideal_measurements, IDEAL_MODES)
         own = self.limits

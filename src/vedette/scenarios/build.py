@@ -6,6 +6,7 @@ Each section builds its own part (`vedette.scenarios.sections`); here they are p
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -207,7 +208,7 @@ def build_planner(scenario: Scenario, name: str, num_threads: int = 0) -> Planne
     parts = Parts(
         sensors,
         fusion,
-        control.build(num_threads),
+        replace(control.build(num_threads), end=float(model.time.build()[-1])),
         control.reward.build(folder),
         control.search.build(folder),
         _first_actions(scenario, sensors),

@@ -35,19 +35,28 @@ class BeamSearch:
 
     def search(self, problem: SequenceProblem, *, rng: np.random.Generator) -> None:
         """Until nothing is better, or the budget is used up."""
+        best = problem.best()
+        self._climb(problem, best.sequence, best.value, rng)
+        if problem.left > 0:
+            joint = self._joined(problem, rng)
+            self._climb(problem, joint, problem.evaluate([joint])[0], rng)
+
+    def _joined(self, problem: SequenceProblem, rng: np.random.Generator) -> JointSequence:
+        """Each sensor joins those before it, the ones after it not scanning."""
         scanning: list[Sequence | None] = [None] * problem.num_sensors
         # Who does not scan yet is in the way of others all the same.
         beside: list[Sequence | None] = [None] * problem.num_sensors
         if problem.rules is not None:
             beside[:] = problem.rules.start
-        beams: list[list[Sequence]] = [[] for _ in scanning]
         for s in range(problem.num_sensors):
             # Every sensor has its share of the budget, and one evaluation is left for what comes of it.
             share = (problem.left - 1) // (problem.num_sensors - s)
-            beams[s] = self._grow(problem, scanning, beside, s, share, rng)
-            scanning[s] = beside[s] = beams[s][0]
-        joint = tuple(own for own in scanning if own is not None)
-        value = problem.evaluate([joint])[0]
+            scanning[s] = beside[s] = self._grow(problem, scanning, beside, s, share, rng)[0]
+        return tuple(own for own in scanning if own is not None)
+
+    def _climb(self, problem: SequenceProblem, joint: JointSequence, value: float, rng: np.random.Generator) -> None:
+        """From a joint sequence to one that neither a sensor alone nor a combination of beams betters."""
+        beams = [[own] for own in joint]
         while problem.left > 0:
             joint, value, beams = self._ascend(problem, joint, value, beams, rng)
             if math.prod(map(len, beams)) > problem.left:

@@ -5,24 +5,30 @@ from __future__ import annotations
 import copy
 import itertools
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
 from vedette.control.additive.evaluator import AdditiveEvaluator
+from vedette.control.bounds import bound_of
 from vedette.control.constraints import Constraint
+from vedette.control.cutoff import beyond_cutoff
 from vedette.control.evidence import Evidence
 from vedette.control.inputs import check_poses, check_sensors, check_steering, check_valuing
 from vedette.control.lookahead.ahead import Ahead
 from vedette.control.lookahead.beam import BeamSearch
 from vedette.control.lookahead.courses import CourseTree, Stages
 from vedette.control.lookahead.laid_courses import LaidCourses
-from vedette.control.lookahead.problem import Best, Part, SequenceProblem, SequenceSearch
+from vedette.control.lookahead.problem import Best, JointSequence, Part, SequenceProblem, SequenceSearch
 from vedette.control.lookahead.rules import Rules
-from vedette.control.plan import Bound, Plan
+from vedette.control.plan import Plan
 from vedette.control.preparation import AnyReward, Sums, check_sums, prepare_sums, unsought
+from vedette.control.problem import joint_problem, note_lines
 from vedette.control.rewards import CauchySchwarzReward
+from vedette.control.search import AutomaticSearch
 from vedette.control.settings import MobileSensor, PlanningSettings
 from vedette.errors import NumericalError
 from vedette.fusion import Fusion
@@ -32,6 +38,14 @@ from vedette.platforms import Options
 from vedette.tracking import State
 
 MOST_DECISIONS, MOST_STEPS = 100, 10_000  # of a sequence, and of pseudo-updates from one to the next
+
+
+class _Single(NamedTuple):
+    """The best single decision, and what it was made on."""
+
+    evaluator: AdditiveEvaluator
+    evidence: Evidence
+    choice: tuple[int, ...]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -73,7 +87,7 @@ class HorizonPlanner:
     period: float | None = None
     search: SequenceSearch = field(default_factory=BeamSearch)
     budget: int = 2000
-    discount: float | None = None
+    discount: float | None = 0.25
     constraints: tuple[Constraint, ...] = ()
     notes: tuple[str, ...] = ()
 
@@ -115,25 +129,33 @@ class HorizonPlanner:
             ModelError, NumericalError: as the filters; no sequence whose reward is a number.
         """
         generator(rng)
-        trees = self._trees(poses)
         sums = prepare_sums(self.sensors, self.fusion, self.settings, self.reward, state)
-        rules = self._rules(trees, state)
-        problem, first = self._problem(trees if rules is None else rules.trees, rules, sums, rng)
-        num_joint = math.prod(tree.count(self.budget) for tree in problem.trees)
-        if num_joint <= self.budget:
-            problem.evaluate(itertools.product(*(tree.all() for tree in problem.trees)))
+        trees = self._trees(poses, self._stages(state))
+        rules, samples = self._rules(trees, state), copy.deepcopy(rng)
+        trees = trees if rules is None else rules.trees
+        single = self._single(trees, rules, sums, rng)
+        if trees[0].stages.depth == 1:
+            return self._plan(single, None, trees, rules, sums)
+        problem = self._problem(trees, rules, sums, single.evaluator, samples)
+        if math.prod(tree.count(self.budget) for tree in trees) <= self.budget:
+            problem.evaluate(itertools.product(*(tree.all() for tree in trees)))
         else:
-            if rules is not None:
-                problem.evaluate([rules.start])
+            problem.begin(single.choice)
             self.search.search(problem, rng=rng)
-        return self._plan(problem, first, sums, complete=num_joint <= self.budget)
+        return self._plan(single, problem, trees, rules, sums)
 
-    def _trees(self, poses: Floats) -> tuple[CourseTree, ...]:
+    def _stages(self, state: State) -> Stages:
+        """`depth` decisions, or those that are still to come."""
+        settings, depth = self.settings, self.depth
+        stride = settings.horizon_steps if self.period is None else round(self.period / settings.horizon_period)
+        if settings.end is not None and state.time is not None:
+            still = (settings.end - state.time) / (stride * settings.horizon_period)
+            depth = min(depth, max(1, math.ceil(still - 1e-9)))
+        return Stages(depth, stride, settings.horizon_steps, float(settings.horizon_period))
+
+    def _trees(self, poses: Floats, stages: Stages) -> tuple[CourseTree, ...]:
         check_sensors(self.sensors)
-        settings, at = self.settings, check_poses(poses, len(self.sensors))
-        steps = settings.horizon_steps
-        stride = steps if self.period is None else round(self.period / settings.horizon_period)
-        stages = Stages(self.depth, stride, steps, float(settings.horizon_period))
+        at = check_poses(poses, len(self.sensors))
         return tuple(
             CourseTree(f"sensors[{s}].platform", sensor.platform, pose, stages)
             for s, (sensor, pose) in enumerate(zip(self.sensors, at, strict=True))
@@ -145,14 +167,29 @@ class HorizonPlanner:
         poses, stages = np.array([tree.pose for tree in trees]), trees[0].stages
         return Rules.of(trees, Ahead(self.constraints, self.sensors, self.settings, state.fused, poses, stages))
 
-    def _problem(
+    def _single(
         self, trees: tuple[CourseTree, ...], rules: Rules | None, sums: Sums, rng: np.random.Generator
-    ) -> tuple[SequenceProblem, AdditiveEvaluator]:
-        """What is searched, and an evaluator whose options are those of the first decision."""
-        options = tuple(tree.options(()) for tree in trees)
-        samples = copy.deepcopy(rng)
-        nothing = tuple(own._replace(courses=own.courses[:0]) for own in options)
-        first = replace(self._lay_out(options[0].courses.shape[1], sums, nothing, rng), options=options)
+    ) -> _Single:
+        """What a `JointPlanner` would decide."""
+        options, steps = tuple(tree.options(()) for tree in trees), trees[0].stages.steps
+        now = tuple(own._replace(courses=np.ascontiguousarray(own.courses[:, :steps])) for own in options)
+        evaluator = self._lay_out(steps, sums, now, rng)
+        evidence = Evidence(evaluator, tuple(range(len(trees))), evaluator.joint())
+        mask = None if rules is None else rules.first()
+        choice = AutomaticSearch().search(joint_problem(evidence, mask), rng=rng)
+        note_lines(evidence, choice, mask)
+        return _Single(evaluator, evidence, choice)
+
+    def _problem(
+        self,
+        trees: tuple[CourseTree, ...],
+        rules: Rules | None,
+        sums: Sums,
+        first: AdditiveEvaluator,
+        samples: np.random.Generator,
+    ) -> SequenceProblem:
+        """What is searched; samples: draws them. first: whose account it goes on with."""
+        depth = trees[0].stages.depth
 
         def part(weight: float, stage: int) -> Part:
             num_steps = trees[0].stages.num_steps(stage)
@@ -163,10 +200,10 @@ class HorizonPlanner:
             )
 
         if self.discount is None:
-            parts = [part(1.0, self.depth)]
+            parts = [part(1.0, depth)]
         else:
-            parts = [part(self.discount**d, d + 1) for d in range(self.depth) if self.discount > 0.0 or d == 0]
-        return SequenceProblem(trees, self.depth, tuple(parts), self.budget, rules), first
+            parts = [part(self.discount**d, d + 1) for d in range(depth) if self.discount > 0.0 or d == 0]
+        return SequenceProblem(trees, depth, tuple(parts), self.budget, rules)
 
     def _lay_out(
         self, num_steps: int, sums: Sums, options: tuple[Options, ...], rng: np.random.Generator
@@ -176,27 +213,51 @@ class HorizonPlanner:
             self.sensors, options, sums.rule, settings, self.reward, sums.fused, sums.local, sums.undetected, rng=rng
         )
 
-    def _plan(self, problem: SequenceProblem, first: AdditiveEvaluator, sums: Sums, *, complete: bool) -> Plan:
-        best = _best(problem)
-        evidence = Evidence(first, tuple(range(len(self.sensors))), first.joint())
-        evidence.note(np.array(list(problem.found)), np.array([own.rewards for own in problem.found.values()]))
-        courses = tuple(own[0] for own in best.sequence)
-        chosen = tuple(own.first_action(course) for own, course in zip(first.options, courses, strict=True))
-        if self.settings.confidence is not None:
-            first.notes["decided on num_samples samples, whatever the confidence: sequences are not raced"] = None
-        constrained = () if problem.rules is None else problem.rules.notes(best.sequence)
+    def _plan(
+        self,
+        single: _Single,
+        problem: SequenceProblem | None,
+        trees: tuple[CourseTree, ...],
+        rules: Rules | None,
+        sums: Sums,
+    ) -> Plan:
+        """Of the best sequence that was found; problem: None where a single decision is all."""
+        first, evidence = single.evaluator, single.evidence
+        sequence: JointSequence = tuple((course,) for course in single.choice)
+        if problem is not None:
+            sequence, evidence = _best(problem).sequence, Evidence(first, evidence.which, evidence.rewards)
+            evidence.note(np.array(list(problem.found)), np.array([own.rewards for own in problem.found.values()]))
+        courses = tuple(own[0] for own in sequence)
+        constrained = () if rules is None else rules.notes(sequence)
         counts, found = first.account()
         return Plan(
             self.name,
             tuple(own.actions for own in first.options),
-            chosen,
+            tuple(own.first_action(course) for own, course in zip(first.options, courses, strict=True)),
             evidence.tables(courses),
             counts,
-            (*self.notes, *unsought(self.settings, sums.undetected, sums=True), *constrained, *sums.notes, *found),
-            problem.curve(),
-            Bound(best.value, best.value, "exhaustive") if complete else None,
-            sequence=tuple(tree.rows(own) for tree, own in zip(problem.trees, best.sequence, strict=True)),
+            (
+                *self.notes,
+                *unsought(self.settings, sums.undetected, sums=True),
+                *constrained,
+                *sums.notes,
+                *found,
+                *self._told(single, courses, trees[0].stages.depth),
+            ),
+            evidence.curve() if problem is None else problem.curve(),
+            bound_of(evidence, courses) if problem is None else problem.bound(),
+            sequence=tuple(tree.rows(own) for tree, own in zip(trees, sequence, strict=True)),
         )
+
+    def _told(self, single: _Single, courses: tuple[int, ...], depth: int) -> Iterator[str]:
+        """What a reader must know of the depth and of the samples."""
+        if depth < self.depth:
+            yield f"depth {depth} in place of {self.depth}: no more decisions come before the end"
+        if depth > 1 and courses == single.choice:
+            yield f"depth {depth} does not pay: the actions are those of the best single decision"
+        if self.settings.confidence is not None:
+            yield "decided on num_samples samples, whatever the confidence: sequences are not raced"
+        yield from beyond_cutoff(single.evaluator, courses)
 
 
 def _best(problem: SequenceProblem) -> Best:

@@ -13,7 +13,7 @@ import numpy as np
 from vedette.control.lookahead.courses import CourseTree, Sequence
 from vedette.control.lookahead.laid_courses import LaidCourses, Taken
 from vedette.control.lookahead.rules import Rules
-from vedette.control.plan import SearchCurve
+from vedette.control.plan import Bound, SearchCurve
 from vedette.control.search import first_best
 from vedette.kernels.base.types import Floats
 
@@ -125,10 +125,28 @@ class SequenceProblem:
         self._evaluations.append(len(self._values))
         self._best.append(max((best.value for best in self.found.values()), default=-math.inf))
 
+    def begin(self, choice: tuple[int, ...]) -> None:
+        """Evaluate a joint sequence to begin with: all sensors keep to a joint action; or another that is allowed."""
+        joint: Taken = tuple((course,) for course in choice)
+        for s, own in enumerate(joint):
+            whole = None if own is None else self.kept(s, own, joint)
+            joint = (*joint[:s], whole, *joint[s + 1 :])
+        if None not in joint:
+            self.evaluate([joint])
+        if not self.found and self.rules is not None:
+            self.evaluate([self.rules.start])
+
     def best(self) -> Best:
         """The best of all; of those that are equal up to rounding the first in printed order."""
         each = sorted(self.found.values(), key=lambda best: printed(best.sequence))
         return each[first_best(np.array([best.value for best in each]))]
+
+    def bound(self) -> Bound | None:
+        """That of the best, where all joint sequences were evaluated."""
+        if math.prod(tree.count(self.budget) for tree in self.trees) > self.budget:
+            return None
+        best = self.best().value
+        return Bound(best, best, "exhaustive")
 
     def curve(self) -> SearchCurve:
         """How the search went, from the first whole joint sequence on."""

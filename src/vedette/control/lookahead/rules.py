@@ -6,6 +6,8 @@ from collections.abc import Sequence as Several
 from dataclasses import dataclass, field
 from itertools import combinations
 
+import numpy as np
+
 from vedette.control.constraints import Mask, names_of
 from vedette.control.lookahead.ahead import Ahead, Place
 from vedette.control.lookahead.constrained import ConstrainedTree
@@ -54,6 +56,13 @@ class Rules:
             found = furthest(own, ahead, mask)
         start = tuple(tree.kept(taken) for tree, taken in zip(own, found, strict=True))
         return cls(own, ahead, mask, len(found[0]), start)
+
+    def first(self) -> Mask:
+        """Of the first decision, without dead ends."""
+        single = tuple(np.zeros(len(own), bool) for own in self.mask.single)
+        for own, tree in zip(single, self.trees, strict=True):
+            own[list(tree.allowed(()))] = True
+        return Mask(single, self.mask.together)
 
     def allows(self, joint: Several[Sequence | None]) -> bool:
         """Whether sequences that sensors take together are allowed; None: what a sensor does is not asked."""

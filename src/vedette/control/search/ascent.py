@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -36,16 +37,24 @@ class CoordinateAscent:
     def search(self, problem: JointProblem, *, rng: np.random.Generator) -> tuple[int, ...]:
         """The best of all ascents; of equal ones that were evaluated the first in printed order."""
         known = Known(problem)
-        starts = [known.allowed(problem.independent()), *known.drawn(self.num_restarts, rng=rng)]
-        if problem.ascend is not None:
-            known.rewards([starts[0], *(known.allowed(problem.ascend(start)) for start in starts)])
-        else:
-            for start in starts:
-                _ascend(known, start)
+        ascents(known, first_starts(known, self.num_restarts, rng=rng))
         return known.best()
 
 
-def _ascend(known: Known, start: Joint) -> None:
+def first_starts(known: Known, num_restarts: int, *, rng: np.random.Generator) -> list[Joint]:
+    """The independent decision, and joint actions drawn at random."""
+    return [known.allowed(known.problem.independent()), *known.drawn(num_restarts, rng=rng)]
+
+
+def ascents(known: Known, starts: Sequence[Joint]) -> list[Joint]:
+    """The ends of ascents, which are known then, and so is the first start."""
+    climb = known.problem.ascend
+    ends = [_ascend(known, start) if climb is None else known.allowed(climb(start)) for start in starts]
+    known.rewards([starts[0], *ends])
+    return ends
+
+
+def _ascend(known: Known, start: Joint) -> Joint:
     """One ascent. Along a line the first of the largest is taken, to the last digit, so that none goes in circles."""
     at, settled, sensor, num_sensors = start, 0, 0, len(start)
     while settled < num_sensors:
@@ -53,3 +62,4 @@ def _ascend(known: Known, start: Joint) -> None:
         best = max(line, key=known.values.__getitem__)
         settled = settled + 1 if best == at else 1
         at, sensor = best, (sensor + 1) % num_sensors
+    return at

@@ -46,6 +46,7 @@ class JointProblem(NamedTuple):
     ascend: the end of a coordinate ascent from a joint action, where it is compiled; it keeps to `mask` if what it
         starts from does. None: the search ascends itself.
     partial: as `evaluate`, where -1 says that a sensor does not scan. None: not to be had.
+    bound: what no joint action has a larger mean reward than; inf where that is not known. None: not to be had.
     """
 
     shape: tuple[int, ...]
@@ -55,6 +56,7 @@ class JointProblem(NamedTuple):
     line: Callable[[tuple[int, ...], int], Floats] | None = None
     ascend: Callable[[tuple[int, ...]], tuple[int, ...]] | None = None
     partial: Callable[[Ints], Floats] | None = None
+    bound: Callable[[], float] | None = None
 
 
 @runtime_checkable

@@ -38,7 +38,7 @@ class Lookahead(Section):
     )
     budget: Count = Field(default=2000, description="Most joint sequences that are evaluated for a decision [-].")
     discount: Probability | None = Field(
-        default=None,
+        default=0.25,
         description="Weight of the reward at the end of a decision's horizon relative to that of the decision before; "
         "none: only the end of the last one's counts [-].",
     )
