@@ -20,9 +20,10 @@ from vedette.platforms import Actions
 from vedette.platforms.base import actions_at
 from vedette.scenarios.loading import Scenario
 from vedette.scenarios.sections.custom import NotGiven
-from vedette.scenarios.sections.fusion import OF_SCANS, CustomFusion
+from vedette.scenarios.sections.fusion import IN_FULL, OF_SCANS, CustomFusion
 from vedette.scenarios.sections.lookahead import Lookahead
 from vedette.scenarios.sections.planners import STRATEGIES, Parts
+from vedette.scenarios.sections.rewards import AnyReward
 from vedette.scenarios.sections.sensing import CustomMeasurement
 from vedette.scenarios.sections.sensors import Sensor
 from vedette.scenarios.sections.tracking import CustomFilter
@@ -211,7 +212,7 @@ def build_planner(scenario: Scenario, name: str, num_threads: int = 0) -> Planne
         control.search.build(folder),
         _first_actions(scenario, sensors),
         control.build_constraints(folder),
-        _notes_of_decisions(scenario, fusion),
+        _notes_of_decisions(scenario, fusion, getattr(strategy, "reward", None) or control.reward),
         (control.lookahead or Lookahead()).build(),
     )
     if name in model.planners:
@@ -222,23 +223,18 @@ def build_planner(scenario: Scenario, name: str, num_threads: int = 0) -> Planne
         raise InputError(f"planner {name}: {error}") from error
 
 
-def _notes_of_decisions(scenario: Scenario, fusion: Fusion) -> tuple[str, ...]:
+def _notes_of_decisions(scenario: Scenario, fusion: Fusion, reward: AnyReward) -> tuple[str, ...]:
     """What joint decisions say of their fusion, where the tracks are fused in another way."""
     section = scenario.model.fusion
-    if isinstance(section, CustomFusion) or (
-        section.kind in ("clmb", "cm_delta_glmb", "none") and not section.by_views
-    ):
+    in_full = isinstance(fusion, ParallelUpdate) or reward.kind == "expected_loss"
+    if not in_full or section.kind in (*IN_FULL, "none"):
         return ()
-    own = f"{section.kind} by views" if section.by_views else section.kind
-    if isinstance(fusion, ParallelUpdate):
-        exact = section.kind in (*OF_SCANS, "parallel") and not section.by_views
-        return () if exact else (f"joint rewards take all scans in full; tracks are fused by another rule ({own})",)
-    rule = "clmb" if isinstance(fusion, Clmb) else "cm_delta_glmb"
-    return (f"joint rewards are of plain covariance intersection ({rule}); tracks are fused by another rule ({own})",)
+    own = f"{section.kind} by views" if section.kind != "custom" and section.by_views else section.kind
+    return (f"joint rewards take all scans in full; tracks are fused by another rule ({own})",)
 
 
 def _fusion_of_decisions(scenario: Scenario, local: Filter) -> Fusion:
-    """A user's own; otherwise plain GCI of the kind of density that is fused, or that the filters have."""
+    """A user's own; otherwise as the section says."""
     section, num_sensors = scenario.model.fusion, len(scenario.model.sensors)
     if isinstance(section, CustomFusion):
         return section.build(num_sensors, scenario.folder)

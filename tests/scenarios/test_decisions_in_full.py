@@ -1,0 +1,102 @@
+"""Joint decisions where every sensor's scans count in full: the same on the same belief, whatever filter keeps it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from vedette.control import Plan
+from vedette.densities import LMB, FactoredGLMB, TrackTable, lmb_to_glmb
+from vedette.scenarios import Scenario, load_scenario, with_fields
+from vedette.scenarios.build import build_experiment, build_planner
+from vedette.tracking import State
+
+NUM_LABELS = 3
+FILTERS = {
+    "lmb": lambda lmb: lmb,
+    "factored_glmb": FactoredGLMB.from_lmb,
+    "delta_glmb": lambda lmb: lmb_to_glmb(lmb, max_hypotheses=2**NUM_LABELS)[0],
+    "m_delta_glmb": lambda lmb: lmb_to_glmb(lmb, max_hypotheses=2**NUM_LABELS)[0],
+}
+
+
+def belief() -> LMB:
+    """Three targets of `paper-a`, far from each other."""
+    means = np.array([[-60.0, 250.0, 4.0, -3.0], [180.0, -120.0, -4.0, 5.0], [-220.0, -300.0, 0.0, 5.0]])
+    cov = np.diag([400.0, 900.0, 16.0, 9.0])
+    labels = [(1, i) for i in range(NUM_LABELS)]
+    tracks = TrackTable.from_mixtures(labels, [(np.ones(1), mean[None], cov[None]) for mean in means])
+    return LMB(tracks, np.array([3.0, 1.0, 2.0]))
+
+
+def planned(filters: str, fusion: str, planner: str, **fields: Any) -> tuple[Scenario, Plan]:
+    """A decision of `paper-a` on that belief, as this filter would hold it."""
+    changes = {"filter.kind": filters, "fusion.kind": fusion, **fields}
+    scenario = with_fields(load_scenario("paper-a"), changes)
+    decides, held = build_planner(scenario, planner, 1), FILTERS[filters](belief())
+    assert decides is not None
+    poses = build_experiment(scenario).poses
+    state = State((held,) * len(poses), held, 1, 1.0)
+    return scenario, decides.plan(state, poses, rng=np.random.default_rng(0))
+
+
+@pytest.mark.parametrize("planner", ["jdm", "lookahead"])
+@pytest.mark.parametrize("fusion", ["sequential", "central", "parallel", "arithmetic_average", "clmb by views"])
+def test_one_belief_is_decided_on_alike_whatever_filter_holds_it(fusion: str, planner: str) -> None:
+    kind, _, views = fusion.partition(" by ")
+    fields = {"fusion.by_views": True} if views else {}
+    _, wanted = planned("lmb", kind, planner, **fields)
+    for filters in FILTERS:
+        if kind == "parallel" and filters.endswith("delta_glmb"):
+            continue  # no such scenario
+        _, plan = planned(filters, kind, planner, **fields)
+        assert plan.chosen == wanted.chosen
+        for own, table in zip(plan.tables, wanted.tables, strict=True):
+            np.testing.assert_allclose(own.mean, table.mean, rtol=1e-9, atol=1e-9)
+
+
+def test_a_product_under_covariance_intersection_is_decided_on_as_an_lmb_is() -> None:
+    _, wanted = planned("lmb", "clmb", "jdm")
+    for fusion in ("clmb", "cm_delta_glmb"):
+        _, plan = planned("factored_glmb", fusion, "jdm")
+        np.testing.assert_allclose(plan.tables[0].mean, wanted.tables[0].mean, rtol=1e-9)
+
+
+def test_two_scans_count_twice_under_any_filter() -> None:
+    # By powers of one half each, what both sensors see would count once.
+    _, full = planned("factored_glmb", "sequential", "jdm")
+    _, halved = planned("factored_glmb", "cm_delta_glmb", "jdm")
+    assert full.expected_rewards[0][0] > 1.3 * halved.expected_rewards[0][0]
+
+
+@pytest.mark.parametrize(
+    ("filters", "fusion", "reward", "said"),
+    [
+        ("lmb", "sequential", "expected_loss", None),
+        ("factored_glmb", "central", "cauchy_schwarz", None),
+        ("factored_glmb", "parallel", "cauchy_schwarz", None),
+        ("delta_glmb", "cm_delta_glmb", "cauchy_schwarz", None),
+        ("delta_glmb", "cm_delta_glmb", "expected_loss", "cm_delta_glmb"),
+        ("lmb", "clmb", "expected_loss", "clmb"),
+        ("delta_glmb", "arithmetic_average", "cauchy_schwarz", "arithmetic_average"),
+    ],
+)
+def test_plans_say_where_scans_count_in_full_and_tracks_are_fused_otherwise(
+    filters: str, fusion: str, reward: str, said: str | None
+) -> None:
+    _, plan = planned(filters, fusion, "jdm", **{"control.reward": {"kind": reward}})
+    found = [note for note in plan.notes if note.startswith("joint rewards")]
+    wanted = f"joint rewards take all scans in full; tracks are fused by another rule ({said})"
+    assert found == ([] if said is None else [wanted])
+    # Of a strategy with a reward of its own, by its own reward.
+    named = {"planners": {"own": {"kind": "joint", "reward": {"kind": reward}}}}
+    _, plan = planned(filters, fusion, "own", **named)
+    assert [note for note in plan.notes if note.startswith("joint rewards")] == found
+
+
+def test_greedy_searches_go_with_glmb_filters_whose_scans_count_in_full() -> None:
+    fields = {"control.search": {"kind": "sequential_greedy"}}
+    _, plan = planned("delta_glmb", "sequential", "jdm", **fields)
+    assert "planned on the LMBs of the GLMB beliefs: ParallelUpdate fuses LMBs" in plan.notes
