@@ -100,3 +100,11 @@ def test_greedy_searches_go_with_glmb_filters_whose_scans_count_in_full() -> Non
     fields = {"control.search": {"kind": "sequential_greedy"}}
     _, plan = planned("delta_glmb", "sequential", "jdm", **fields)
     assert "planned on the LMBs of the GLMB beliefs: ParallelUpdate fuses LMBs" in plan.notes
+
+
+@pytest.mark.parametrize("planner", ["jdm", "idm", "lookahead"])
+def test_plans_say_that_radio_does_not_hold_for_decisions(planner: str) -> None:
+    said = "decided by one who hears every sensor at once, whatever the network lets through"
+    for network, wanted in (({"radio_range": 300.0}, True), ({"delay": 2}, True), ({}, False), (None, False)):
+        _, plan = planned("lmb", "sequential", planner, network=network)
+        assert (said in plan.notes) == wanted

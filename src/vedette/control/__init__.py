@@ -39,6 +39,7 @@ from vedette.control.search import (
     SequentialGreedy,
 )
 from vedette.control.settings import MobileSensor, PlanningSettings, planning_limits
+from vedette.control.watched import WatchedPlanner
 
 __all__ = [
     "AdditiveEvaluator",
@@ -88,6 +89,7 @@ __all__ = [
     "TargetGains",
     "TreeSearch",
     "VoidProbability",
+    "WatchedPlanner",
     "mask_of",
     "planning_limits",
     "void_probability",

@@ -21,7 +21,7 @@ from vedette.control.lookahead.laid_courses import LaidCourses
 from vedette.control.lookahead.problem import Best, Part, SequenceProblem, SequenceSearch
 from vedette.control.lookahead.rules import Rules
 from vedette.control.plan import Bound, Plan
-from vedette.control.preparation import AnyReward, Sums, check_sums, prepare_sums, unsought
+from vedette.control.preparation import AnyReward, Sums, check_sums, prepare_sums, unsought, without_scans
 from vedette.control.rewards import CauchySchwarzReward
 from vedette.control.settings import MobileSensor, PlanningSettings
 from vedette.errors import NumericalError
@@ -173,7 +173,16 @@ class HorizonPlanner:
     ) -> AdditiveEvaluator:
         settings = replace(self.settings, horizon_steps=num_steps)
         return AdditiveEvaluator.prepare(
-            self.sensors, options, sums.rule, settings, self.reward, sums.fused, sums.local, sums.undetected, rng=rng
+            self.sensors,
+            options,
+            sums.rule,
+            settings,
+            self.reward,
+            sums.fused,
+            sums.local,
+            sums.undetected,
+            time=sums.time,
+            rng=rng,
         )
 
     def _plan(self, problem: SequenceProblem, first: AdditiveEvaluator, sums: Sums, *, complete: bool) -> Plan:
@@ -186,13 +195,19 @@ class HorizonPlanner:
             first.notes["decided on num_samples samples, whatever the confidence: sequences are not raced"] = None
         constrained = () if problem.rules is None else problem.rules.notes(best.sequence)
         counts, found = first.account()
+        ahead = replace(self.settings, horizon_steps=problem.trees[0].stages.num_steps(self.depth))
+        found = (
+            *unsought(self.settings, sums.undetected, sums=True),
+            *without_scans(self.sensors, ahead, sums.time),
+            *found,
+        )
         return Plan(
             self.name,
             tuple(own.actions for own in first.options),
             chosen,
             evidence.tables(courses),
             counts,
-            (*self.notes, *unsought(self.settings, sums.undetected, sums=True), *constrained, *sums.notes, *found),
+            (*self.notes, *constrained, *sums.notes, *found),
             problem.curve(),
             Bound(best.value, best.value, "exhaustive") if complete else None,
             sequence=tuple(tree.rows(own) for tree, own in zip(problem.trees, best.sequence, strict=True)),
