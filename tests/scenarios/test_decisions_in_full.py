@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from vedette.control import Plan
-from vedette.densities import LMB, FactoredGLMB, TrackTable, lmb_to_glmb
+from vedette.densities import GLMB, LMB, FactoredGLMB, Labelled, TrackTable, lmb_to_glmb
 from vedette.scenarios import Scenario, load_scenario, with_fields
 from vedette.scenarios.build import build_experiment, build_planner
 from vedette.tracking import State
@@ -31,11 +31,25 @@ def belief() -> LMB:
     return LMB(tracks, np.array([3.0, 1.0, 2.0]))
 
 
-def planned(filters: str, fusion: str, planner: str, **fields: Any) -> tuple[Scenario, Plan]:
-    """A decision of `paper-a` on that belief, as this filter would hold it."""
+def open_names() -> tuple[LMB, GLMB]:
+    """Two targets whose names a GLMB leaves open, as they may have been swapped; and the LMB of the likelier names."""
+    here, there = np.array([-60.0, 250.0, 4.0, -3.0]), np.array([180.0, -120.0, -4.0, 5.0])
+    cov, labels = np.diag([400.0, 900.0, 16.0, 9.0]), [(1, 0), (1, 1)]
+    states = np.array([here, there, there, here])
+    swapped = GLMB.from_hypotheses(
+        TrackTable.from_gaussians(np.array(labels * 2), states, np.array([cov] * 4)), [[0, 1], [2, 3]], [0.55, 0.45]
+    )
+    tracks = TrackTable.from_gaussians(np.array(labels), states[:2], np.array([cov] * 2))
+    return LMB(tracks, np.full(2, np.inf)), swapped
+
+
+def planned(
+    filters: str, fusion: str, planner: str, held: Labelled | None = None, **fields: Any
+) -> tuple[Scenario, Plan]:
+    """A decision of `paper-a` on a belief; without one on that of three targets, as this filter would hold it."""
     changes = {"filter.kind": filters, "fusion.kind": fusion, **fields}
     scenario = with_fields(load_scenario("paper-a"), changes)
-    decides, held = build_planner(scenario, planner, 1), FILTERS[filters](belief())
+    decides, held = build_planner(scenario, planner, 1), held or FILTERS[filters](belief())
     assert decides is not None
     poses = build_experiment(scenario).poses
     state = State((held,) * len(poses), held, 1, 1.0)
@@ -55,6 +69,30 @@ def test_one_belief_is_decided_on_alike_whatever_filter_holds_it(fusion: str, pl
         assert plan.chosen == wanted.chosen
         for own, table in zip(plan.tables, wanted.tables, strict=True):
             np.testing.assert_allclose(own.mean, table.mean, rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize("fusion", ["sequential", "arithmetic_average", "clmb", "cm_delta_glmb"])
+def test_the_expected_loss_is_the_same_under_any_fusion_and_filter(fusion: str) -> None:
+    loss = {"control.reward": {"kind": "expected_loss"}}
+    _, wanted = planned("lmb", "parallel", "jdm", **loss)
+    for filters in FILTERS:
+        if fusion == "cm_delta_glmb" and filters == "lmb":
+            continue  # no such scenario
+        _, plan = planned(filters, fusion, "jdm", **loss)
+        np.testing.assert_allclose(plan.tables[0].mean, wanted.tables[0].mean, rtol=1e-9)
+
+
+@pytest.mark.parametrize("reward", ["cauchy_schwarz", "expected_loss"])
+@pytest.mark.parametrize("filters", ["factored_glmb", "delta_glmb", "m_delta_glmb"])
+def test_open_names_are_settled_before_a_decision(filters: str, reward: str) -> None:
+    """Not half way between the two places where each may be."""
+    settled, swapped = open_names()
+    held = FactoredGLMB.from_glmb(swapped) if filters == "factored_glmb" else swapped
+    fields = {"control.reward": {"kind": reward}}
+    _, wanted = planned("lmb", "sequential", "jdm", settled, **fields)
+    _, plan = planned(filters, "sequential", "jdm", held, **fields)
+    assert plan.chosen == wanted.chosen
+    np.testing.assert_allclose(plan.tables[0].mean, wanted.tables[0].mean, rtol=1e-9)
 
 
 def test_a_product_under_covariance_intersection_is_decided_on_as_an_lmb_is() -> None:
