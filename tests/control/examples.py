@@ -188,5 +188,6 @@ def additive_of(situation: Situation, reward: Any = None, seed: int = 5) -> Addi
         CauchySchwarzReward() if reward is None else reward,
         situation.fused,
         (situation.fused,) * len(situation.sensors) if shared else situation.beliefs,
+        time=situation.state.time,
         rng=np.random.default_rng(seed),
     )

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from control.plain_loop import scans_then
 from vedette.control import MobileSensor, PlanningSettings
 
 
@@ -28,6 +29,8 @@ def followed(
         motion.process_noise_cov(mean, settings.horizon_period, motion.noise_params, noise)
         mean = motion.propagate(mean[None], settings.horizon_period)[0]
         cov = jacobian @ cov @ jacobian.T + noise
+        if not scans_then(sensor, h, settings):
+            continue
         detection = float(own.detection.prob(mean[None], pose)[0])
         missed *= 1.0 - detection
         if target is None or own.detection.prob(target[h][None], pose)[0] < settings.detection_threshold:

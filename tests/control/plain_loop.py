@@ -17,6 +17,20 @@ from vedette.divergence import cauchy_schwarz, reference_unit_volume
 from vedette.filters import DeltaGlmbFilter, LmbFilter
 from vedette.platforms import Courses
 
+_BLIND = models.SensorModel(
+    models.position(),
+    models.constant_noise([1.0, 1.0]),
+    models.constant_detection(0.0),
+    models.measurement_space_clutter(0.0, [-1.0, -1.0], [1.0, 1.0]),
+)
+
+
+def scans_then(sensor: MobileSensor, h: int, settings: PlanningSettings, now: float = 1.0) -> bool:
+    """Whether a sensor scans in the period of the horizon that ends with its step h, from 0; now: of `Situation`."""
+    end = now + (h + 1) * settings.horizon_period
+    times = [end] if sensor.scan_times is None else sensor.scan_times
+    return any(end - settings.horizon_period < time <= end for time in times)
+
 
 def plain_rewards(situation: Situation, unit_volume: Any, seed: int) -> tuple[Any, list[Any]]:
     """Joint rewards (num_joint, num_samples), the last sensor's action fastest, and (num_actions, num_samples) of each
@@ -99,10 +113,13 @@ def _updated(
     if isinstance(belief, GLMB):
         belief = _cut(belief, settings.max_prior_hypotheses)
     belief = replace(belief, tracks=TrackTable.from_gaussians(belief.tracks.labels, *track_moments(belief.tracks)))
-    local = kind(_immortal(own.targets.motion), own.sensor, settings.limits)
+    looking, blind = (kind(_immortal(own.targets.motion), seen, settings.limits) for seen in (own.sensor, _BLIND))
     for h, pose in enumerate(path):
+        if not scans_then(sensor, h, settings):
+            belief, _ = blind.step(belief, [], pose, settings.horizon_period, h + 1, rng=np.random.default_rng(0))
+            continue
         scan = _scan(own.sensor, pose, states[h][m], uniforms[m][h], normals[m][h], settings)
-        belief, _ = local.step(belief, scan, pose, settings.horizon_period, h + 1, rng=np.random.default_rng(0))
+        belief, _ = looking.step(belief, scan, pose, settings.horizon_period, h + 1, rng=np.random.default_rng(0))
     return marginalise(belief, max_components=1) if isinstance(belief, GLMB) else belief
 
 
@@ -125,13 +142,7 @@ def _predicted(fused: Any, motion: models.MotionModel, settings: PlanningSetting
     else:
         belief = marginalise(fused, max_components=1)
     kind: Any = LmbFilter if isinstance(fused, LMB) else DeltaGlmbFilter
-    blind = models.SensorModel(
-        models.position(),
-        models.constant_noise([1.0, 1.0]),
-        models.constant_detection(0.0),
-        models.measurement_space_clutter(0.0, [-1.0, -1.0], [1.0, 1.0]),
-    )
-    local = kind(_immortal(motion), blind, settings.limits)
+    local = kind(_immortal(motion), _BLIND, settings.limits)
     for h in range(settings.horizon_steps):
         belief, _ = local.step(belief, [], np.zeros(3), settings.horizon_period, h + 1, rng=np.random.default_rng(0))
     return belief

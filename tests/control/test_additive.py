@@ -189,10 +189,13 @@ def test_no_joint_action_is_better_than_the_bound(reward: Any) -> None:
             assert np.isinf(untried).all()
 
 
-def test_the_expected_loss_is_what_its_formula_says() -> None:
-    """Plain NumPy over one step, with the detection of the model's own mean over the Gaussian."""
-    settings = replace(KNOWN, horizon_steps=1)
+@pytest.mark.parametrize("steps", [1, 2])
+def test_the_expected_loss_is_what_its_formula_says(steps: int) -> None:
+    """Plain NumPy of one scan, at the last step, with the detection of the model's own mean over the Gaussian."""
+    settings = replace(KNOWN, horizon_steps=steps)
     example = replace(shared(2, 4), settings=settings)
+    last = np.array([example.state.time + steps * settings.horizon_period])
+    example = replace(example, sensors=tuple(replace(own, scan_times=last) for own in example.sensors))
     evaluator = additive_of(example, ExpectedLossReward(60.0))
     prediction, actions = evaluator.prediction, all_joint_actions((3, 3))
     found = evaluator.joint()(actions)[:, 0]
@@ -201,7 +204,7 @@ def test_the_expected_loss_is_what_its_formula_says() -> None:
         for i, (mean, cov) in enumerate(zip(prediction.tracks.means, prediction.tracks.covs, strict=True)):
             missed, information = 1.0, np.zeros((4, 4))
             for s, course in enumerate(joint):
-                own, pose = example.sensors[s].filter.sensor, evaluator.options[s].courses[course, 0]
+                own, pose = example.sensors[s].filter.sensor, evaluator.options[s].courses[course, -1]
                 detection = float(own.mean_detection(mean[None], cov[None], pose)[0])
                 slope = np.empty((2, 4))
                 assert own.measurement.jacobian is not None

@@ -204,7 +204,8 @@ def test_a_sensor_without_a_course_keeps_all_and_the_mask_says_so() -> None:
         [Own((0, 1, 2)), Separation(1.0)], Situation((np.zeros((3, 1, 3)), np.full((4, 1, 3), 9.0)), TIMES[:1])
     )
     assert [own.tolist() for own in mask.single] == [[True] * 3, [False] * 3 + [True]]
-    assert mask.notes == ("sensor 1: no course meets its constraints (own, separation); it may take any",)
+    said = "sensor 1: no course meets its constraints (own, separation); it may take those that violate them least"
+    assert mask.notes == (said,)
 
 
 def test_sensors_that_cannot_all_have_their_way() -> None:

@@ -274,7 +274,9 @@ def test_a_dead_end_is_not_entered(search: Any, budget: int) -> None:
     # Whoever is in it already may go on, and reads so.
     inside = replace(given, poses=np.array([[100.0, 0.0, 0.0]]))
     plan = decide(inside, POCKET, depth=2, search=search, budget=budget)
-    assert plan.notes == ("sensor 1: no course meets its constraints (keep_out, keep_out); it may take any",)
+    assert plan.notes == (
+        "sensor 1: no course meets its constraints (keep_out, keep_out); it may take those that violate them least",
+    )
     assert np.isfinite(plan.tables[0].mean).any()
 
 
@@ -282,7 +284,8 @@ def test_a_dead_end_that_cannot_be_avoided_is_told_of() -> None:
     given = scene([(0.0, 0.0)], [(100.0, 0.0)], (0.0,), stay=False)
     plan = decide(given, POCKET, depth=3)
     assert plan.notes == (
-        "sensor 1, decision 2 of the sequence: no course meets its constraints (keep_out, keep_out); it may take any",
+        "sensor 1, decision 2 of the sequence: no course meets its constraints (keep_out, keep_out); "
+        "it may take those that violate them least",
     )
     assert plan.sequence[0].tolist() == [[100.0, 0.0]] * 3
 

@@ -181,7 +181,8 @@ def test_courses_keep_it_at_every_time() -> None:
     assert [own.tolist() for own in constraint.courses(scene)] == [[False, True], [False]]
     assert VoidProbability(30.0, 0.19).courses(scene)[0].all()
     mask = mask_of([constraint], scene)
-    assert mask.notes == ("sensor 2: no course meets its constraints (void_probability); it may take any",)
+    said = "sensor 2: no course meets its constraints (void_probability); it may take those that violate them least"
+    assert mask.notes == (said,)
     with pytest.raises(
         InputError, match="constraint void_probability: expected 3 predicted beliefs, one a time; got 0"
     ):

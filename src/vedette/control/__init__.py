@@ -40,6 +40,7 @@ from vedette.control.search import (
     SequentialGreedy,
 )
 from vedette.control.settings import MobileSensor, PlanningSettings, planning_limits
+from vedette.control.watched import WatchedPlanner
 
 __all__ = [
     "AdditiveEvaluator",
@@ -90,6 +91,7 @@ __all__ = [
     "TargetGains",
     "TreeSearch",
     "VoidProbability",
+    "WatchedPlanner",
     "mask_of",
     "planning_limits",
     "void_probability",

@@ -37,6 +37,7 @@ class Evaluator:
             what is evaluated.
         prediction: the fused density predicted to the horizon, one Gaussian a track.
         posteriors: the pseudo-posteriors of each sensor.
+        looks: whether each sensor scans within the horizon.
         counts: how many filter steps, fusions and divergences have been evaluated so far.
         notes: what a reader of the decision must know, in the order in which it came up (keys; no values).
     """
@@ -48,6 +49,7 @@ class Evaluator:
     options: tuple[Options, ...]
     prediction: Belief
     posteriors: tuple[LabelledCases, ...]
+    looks: tuple[bool, ...]
     counts: dict[str, int] = field(default_factory=dict)
     notes: dict[str, None] = field(default_factory=dict)
 
@@ -70,13 +72,15 @@ class Evaluator:
         targets = shared_targets([sensor.filter for sensor in sensors])
         prediction = predicted(state.fused, targets.motion, settings.horizon_steps, settings.horizon_period)
         labels, futures = draw_futures(state.fused, sensors, settings, rng=rng)
+        scans = tuple(sensor.scans(state.time, settings) for sensor in sensors)
         posteriors = tuple(
-            pseudo_posteriors(belief, sensor, own.courses, labels, future, settings)
-            for belief, sensor, own, future in zip(state.local, sensors, options, futures, strict=True)
+            pseudo_posteriors(belief, sensor, own.courses, labels, future, settings, when)
+            for belief, sensor, own, future, when in zip(state.local, sensors, options, futures, scans, strict=True)
         )
         steps = sum(len(own.courses) for own in options) * settings.num_samples * settings.horizon_steps
         counts = {"filter_steps": steps, "fusions": 0, "divergences": 0}
-        return cls(tuple(sensors), fusion, settings, reward, tuple(options), prediction, posteriors, counts)
+        looks = tuple(bool(own.any()) for own in scans)
+        return cls(tuple(sensors), fusion, settings, reward, tuple(options), prediction, posteriors, looks, counts)
 
     def joint_shape(self) -> tuple[int, ...]:
         """Number of different courses of each sensor."""
@@ -120,7 +124,7 @@ class Evaluator:
         """What the sensors could see at the end of chosen courses, and what all their updates began with."""
         models = tuple(sensor.filter.sensor for sensor in self.sensors)
         poses = np.stack([own.courses[course, -1] for own, course in zip(self.options, chosen, strict=True)])
-        return Views(models, poses, (True,) * len(models), self.prediction)
+        return Views(models, poses, self.looks, self.prediction)
 
     def sample_rewards(self, which: Sequence[int], fusion: Fusion | None) -> Floats:
         """(num_joint, num_samples) rewards of all joint actions of the sensors `which`, the last one's fastest."""

@@ -136,6 +136,7 @@ class IndependentPlanner:
         settings: horizon, samples, caps.
         reward: one of `vedette.control.rewards`, or of the user's own.
         constraints: what each sensor by itself must not do; those on pairs of sensors are not looked at.
+        notes: what every plan is to say beside what comes up.
 
     Raises:
         InputError: parts of another kind.
@@ -146,10 +147,11 @@ class IndependentPlanner:
     settings: PlanningSettings = field(default_factory=PlanningSettings)
     reward: AnyReward = field(default_factory=CauchySchwarzReward)
     constraints: tuple[Constraint, ...] = ()
+    notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         check_steering(self)
-        check_valuing(self.fusion, self.reward)
+        check_valuing(self.fusion, self.reward, self.notes)
 
     @property
     def name(self) -> str:
@@ -161,7 +163,7 @@ class IndependentPlanner:
         generator(rng)
         prepared = Preparation.of(self.sensors, self.fusion, self.settings, self.reward, state, poses, self.constraints)
         if prepared.races:
-            return _plan_of(self.name, prepared, decide_alone(prepared, rng=rng))
+            return _plan_of(self.name, prepared, decide_alone(prepared, rng=rng), self.notes)
         evaluator = prepared.evaluator(self.settings.num_samples, rng=rng)
         courses: list[int] = []
         tables: list[RewardTable] = []
@@ -173,20 +175,20 @@ class IndependentPlanner:
             courses.append(best)
             tables.extend(evidence.tables((best,)))
             parts.append(Part.alone(evidence, best))
-        counts, notes = evaluator.account()
+        counts, found = evaluator.account()
         return Plan(
             self.name,
             tuple(own.actions for own in evaluator.options),
             tuple(own.first_action(course) for own, course in zip(evaluator.options, courses, strict=True)),
             tuple(tables),
             counts,
-            (*notes, *beyond_cutoff(evaluator, courses)),
+            (*self.notes, *found, *beyond_cutoff(evaluator, courses)),
             certainty=prepared.certainty,
             questions=Questions(self.name, tuple(parts)),
         )
 
 
-def _plan_of(name: str, prepared: Preparation, decided: Decided, notes: tuple[str, ...] = ()) -> Plan:
+def _plan_of(name: str, prepared: Preparation, decided: Decided, notes: tuple[str, ...]) -> Plan:
     """The plan of a decision that took as many samples as it needed, and says so."""
     chosen = tuple(own.first_action(course) for own, course in zip(prepared.options, decided.best, strict=True))
     actions = tuple(own.actions for own in prepared.options)

@@ -109,9 +109,10 @@ class Preparation:
         else:
             fused, local = state.fused, state.local
             evaluator = AdditiveEvaluator.prepare(
-                sensors, own, self.rule, settings, reward, fused, local, state.undetected, rng=rng
+                sensors, own, self.rule, settings, reward, fused, local, state.undetected, time=state.time, rng=rng
             )
         evaluator.notes.update(dict.fromkeys(unsought(settings, state.undetected, sums=self.rule is not None)))
+        evaluator.notes.update(dict.fromkeys(without_scans(sensors, settings, state.time)))
         evaluator.notes.update(dict.fromkeys(self.notes))
         return evaluator
 
@@ -127,6 +128,12 @@ def unsought(settings: PlanningSettings, undetected: UndetectedIntensity | None,
     return (f"targets not found yet are not looked for: {why}",)
 
 
+def without_scans(sensors: Sequence[MobileSensor], settings: PlanningSettings, time: float | None) -> tuple[str, ...]:
+    """Which sensors do not scan within the horizon of a decision at a time, so that it is all one what they do."""
+    found = [s + 1 for s, sensor in enumerate(sensors) if not sensor.scans(time, settings).any()]
+    return tuple(f"sensor {s}: no scan within the horizon; all of its courses are worth the same" for s in found)
+
+
 class Sums(NamedTuple):
     """What decisions that are sums over labels are made on."""
 
@@ -134,6 +141,7 @@ class Sums(NamedTuple):
     fused: LMB
     local: tuple[LMB, ...]
     undetected: UndetectedIntensity | None
+    time: float | None
     notes: tuple[str, ...]
 
 
@@ -149,7 +157,7 @@ def prepare_sums(
     rule = check_sums("sequences of decisions", len(sensors), planned.fusion, settings, reward)
     fused, local = planned.state.fused, planned.state.local
     assert isinstance(fused, LMB)
-    return Sums(rule, fused, tuple(map(as_lmb, local)), state.undetected, planned.notes)
+    return Sums(rule, fused, tuple(map(as_lmb, local)), state.undetected, state.time, planned.notes)
 
 
 def check_sums(

@@ -19,7 +19,7 @@ from vedette.densities.containers import unchecked
 from vedette.densities.label_sets import label_sets, places_of, single_gaussians
 from vedette.filters import shared_targets
 from vedette.filters.inputs import model_errors
-from vedette.kernels.base.types import Floats, Ints
+from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.kernels.planning.ideal import Decision, Futures, Horizon, propagate_samples
 from vedette.kernels.planning.known import pseudo_update_known
 from vedette.kernels.planning.pseudo_glmb import GlmbResults, pseudo_update_glmb
@@ -62,14 +62,21 @@ def draw_futures(
 
 
 def pseudo_posteriors(
-    belief: Belief, sensor: MobileSensor, courses: Floats, labels: Ints, futures: Futures, settings: PlanningSettings
+    belief: Belief,
+    sensor: MobileSensor,
+    courses: Floats,
+    labels: Ints,
+    futures: Futures,
+    settings: PlanningSettings,
+    scans: Bools,
 ) -> LabelledCases:
     """Run the sensor's filter over the horizon for every course and sample, without births or deaths.
 
     courses: (num_courses, horizon_steps, pose_dim) poses at the pseudo-updates. labels: of the targets of `futures`.
-    The belief is one of the filter's kind. Raises `ModelError` and `NumericalError` as the filter.
+    scans: (horizon_steps,) at which of them it scans. The belief is one of the filter's kind. Raises `ModelError` and
+    `NumericalError` as the filter.
     """
-    decision = decision_of(sensor, courses, futures, settings)
+    decision = decision_of(sensor, courses, futures, settings, scans)
     num_cases = len(courses) * settings.num_samples
     if isinstance(belief, GLMB):
         return _run_glmb(belief, decision, settings, num_cases)
@@ -82,11 +89,16 @@ def decision_of(
     courses: Floats,
     futures: Futures,
     settings: PlanningSettings,
+    scans: Bools,
     detection_at: str | None = None,
 ) -> Decision:
-    """What the pseudo-updates of a sensor depend on besides its prior. detection_at: as of `SensorModel.to_kernel`."""
+    """What the pseudo-updates of a sensor depend on besides its prior.
+
+    scans: (horizon_steps,) at which of them it scans. detection_at: as of `SensorModel.to_kernel`.
+    """
     horizon = Horizon(
         np.ascontiguousarray(courses),
+        scans,
         float(settings.horizon_period),
         IDEAL_MODES[settings.ideal_measurements],
         float(settings.detection_threshold),

@@ -10,11 +10,12 @@ import numpy as np
 
 from vedette.errors import InputError
 from vedette.filters import Filter, Limits
-from vedette.kernels.base.types import Floats
+from vedette.kernels.base.types import Bools, Floats
 from vedette.kernels.planning.ideal import EXPECTED, IDEAL, SAMPLED
 from vedette.models.arguments import (
     count,
     dimension,
+    float_array,
     instance,
     non_negative,
     one_of,
@@ -151,15 +152,32 @@ class MobileSensor:
         filter: its local filter, with the models of the targets and of the sensor. The joint and the independent
             planner need one that labels its targets: that believes in a `GLMB`, an `LMB` or a `FactoredGLMB`.
         platform: what it may do, and where that takes it.
+        scan_times: s, increasing, as `State.time`: when it scans; None: whenever a decision looks ahead to. A
+            pseudo-update counts where it scans at least once in the period that ends with it.
 
     Raises:
-        InputError: something else than a filter or a platform.
+        InputError: something else than a filter, a platform, or times in order.
     """
 
     filter: Filter
     platform: Platform
+    scan_times: Floats | None = None
 
     def __post_init__(self) -> None:
         if not isinstance(self.filter, Filter):
             raise reject("filter", "a Filter, with targets, sensor, initial() and step()", self.filter)
         check_platform("platform", self.platform)
+        if self.scan_times is not None:
+            times = float_array("scan_times", self.scan_times, (None,))
+            if (np.diff(times) <= 0.0).any():
+                raise reject("scan_times", "times in increasing order", self.scan_times)
+            object.__setattr__(self, "scan_times", times)
+
+    def scans(self, now: float | None, settings: PlanningSettings) -> Bools:
+        """(horizon_steps,) the pseudo-updates of a decision at time `now` that count; None: not known, all."""
+        num, period = settings.horizon_steps, settings.horizon_period
+        if self.scan_times is None or now is None:
+            return np.ones(num, np.bool_)
+        # A scan at the very time of a decision has been taken in; sums of periods differ from it in the last digit.
+        ends = now + period * (np.arange(num + 1.0) + 1e-6)
+        return np.asarray(np.diff(np.searchsorted(self.scan_times, ends, "right")) > 0)

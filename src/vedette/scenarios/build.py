@@ -5,6 +5,7 @@ Each section builds its own part (`vedette.scenarios.sections`); here they are p
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -21,9 +22,10 @@ from vedette.platforms import Actions
 from vedette.platforms.base import actions_at
 from vedette.scenarios.loading import Scenario
 from vedette.scenarios.sections.custom import NotGiven
-from vedette.scenarios.sections.fusion import OF_SCANS, ONE_BELIEF, CustomFusion
+from vedette.scenarios.sections.fusion import IN_FULL, OF_SCANS, ONE_BELIEF, CustomFusion
 from vedette.scenarios.sections.lookahead import Lookahead
-from vedette.scenarios.sections.planners import STRATEGIES, Parts
+from vedette.scenarios.sections.planners import STRATEGIES, AnyPlanner, NamedIndependent, Parts, Strategy
+from vedette.scenarios.sections.scenario import ScenarioModel
 from vedette.scenarios.sections.sensing import CustomMeasurement
 from vedette.scenarios.sections.sensors import Sensor
 from vedette.scenarios.sections.tracking import CustomFilter
@@ -32,7 +34,16 @@ from vedette.simulation.experiment import Experiment
 from vedette.simulation.oracle import Timetable
 from vedette.simulation.true_sensors import TrueSensor
 from vedette.simulation.truth import TargetSource
-from vedette.tracking import BeliefNetwork, Central, CentralFilter, Distributed, ScanNetwork, Searching, Tracker
+from vedette.tracking import (
+    BeliefNetwork,
+    Central,
+    CentralFilter,
+    Distributed,
+    Network,
+    ScanNetwork,
+    Searching,
+    Tracker,
+)
 
 
 def build_experiment(scenario: Scenario) -> Experiment:
@@ -81,8 +92,21 @@ def build_sensors(scenario: Scenario) -> tuple[MobileSensor, ...]:
         known = sensor.build(region, method, folder, model.filter.detection_at)
         local = model.filter.build(targets, known, folder)
         _check_own(scenario, sensor, known, local)
-        found.append(MobileSensor(local, sensor.platform.build(folder)))
+        found.append(MobileSensor(local, sensor.platform.build(folder), _scan_times(model, sensor)))
     return tuple(found)
+
+
+def _scan_times(model: ScenarioModel, sensor: Sensor) -> Floats | None:
+    """s of the scans of a sensor, as far as decisions look ahead, past the last step too; None: at every step."""
+    if sensor.scans.every == 1:
+        return None
+    control, lookahead = model.control, model.control.lookahead or Lookahead()
+    horizon = control.horizon_steps * control.horizon_period
+    ahead = horizon + (lookahead.depth - 1) * (lookahead.period or horizon)
+    num = model.time.num_steps + math.ceil(ahead / model.time.step_period)
+    times = model.time.model_copy(update={"num_steps": num}).build()
+    found: Floats = times[sensor.scans.build(num)]
+    return found
 
 
 def _check_own(scenario: Scenario, section: Sensor, sensor: SensorModel, local: Filter) -> None:
@@ -213,7 +237,7 @@ def build_planner(scenario: Scenario, name: str, num_threads: int = 0) -> Planne
         control.search.build(folder),
         _first_actions(scenario, sensors),
         control.build_constraints(folder),
-        _notes_of_decisions(scenario, fusion),
+        _notes_of_decisions(scenario, fusion, strategy),
         (control.lookahead or Lookahead()).build(),
         model.estimator.build(folder),
         {"timetable": _timetable(scenario), "cutoff": model.ospa.cutoff},
@@ -240,23 +264,23 @@ def _timetable(scenario: Scenario) -> Timetable:
     )
 
 
-def _notes_of_decisions(scenario: Scenario, fusion: Fusion) -> tuple[str, ...]:
-    """What joint decisions say of their fusion, where the tracks are fused in another way."""
-    section = scenario.model.fusion
-    if isinstance(section, CustomFusion) or (
-        section.kind in ("clmb", "cm_delta_glmb", "none") and not section.by_views
-    ):
-        return ()
-    own = f"{section.kind} by views" if section.by_views else section.kind
-    if isinstance(fusion, ParallelUpdate):
-        exact = section.kind in (*OF_SCANS, "parallel") and not section.by_views
-        return () if exact else (f"joint rewards take all scans in full; tracks are fused by another rule ({own})",)
-    rule = "clmb" if isinstance(fusion, Clmb) else "cm_delta_glmb"
-    return (f"joint rewards are of plain covariance intersection ({rule}); tracks are fused by another rule ({own})",)
+def _notes_of_decisions(scenario: Scenario, fusion: Fusion, strategy: Strategy | AnyPlanner) -> tuple[str, ...]:
+    """What the decisions of a strategy say of their fusion, where the tracks are fused in another way, and of radio."""
+    model, section = scenario.model, scenario.model.fusion
+    reward = getattr(strategy, "reward", None) or model.control.reward
+    alone = strategy is STRATEGIES["idm"] or isinstance(strategy, NamedIndependent)
+    found = []
+    in_full = isinstance(fusion, ParallelUpdate) or reward.kind == "expected_loss"
+    if in_full and not alone and section.kind not in (*IN_FULL, "none"):
+        own = f"{section.kind} by views" if section.kind != "custom" and section.by_views else section.kind
+        found.append(f"joint rewards take all scans in full; tracks are fused by another rule ({own})")
+    if model.network is not None and model.network.build() != Network():
+        found.append("decided by one who hears every sensor at once, whatever the network lets through")
+    return tuple(found)
 
 
 def _fusion_of_decisions(scenario: Scenario, local: Filter) -> Fusion:
-    """A user's own; otherwise plain GCI of the kind of density that is fused, or that the filters have."""
+    """A user's own; otherwise as the section says."""
     section, num_sensors = scenario.model.fusion, len(scenario.model.sensors)
     if isinstance(section, CustomFusion):
         return section.build(num_sensors, scenario.folder)

@@ -58,12 +58,13 @@ class AdditiveEvaluator:
         beliefs: Sequence[LMB],
         undetected: UndetectedIntensity | None = None,
         *,
+        time: float | None = None,
         rng: np.random.Generator,
     ) -> AdditiveEvaluator:
         """Draw the samples, predict, and follow every label over every course that reaches it.
 
         rule: how the sensors' densities become one. beliefs: of each sensor. undetected: targets not found
-        yet. Raises as `JointPlanner.plan`.
+        yet. time: of the decision, s, where it is known. Raises as `JointPlanner.plan`.
         """
         sampled = not isinstance(reward, ExpectedLossReward)
         motion = shared_targets([sensor.filter for sensor in sensors]).motion
@@ -78,6 +79,7 @@ class AdditiveEvaluator:
             samples,
             settings,
             missing_existence=rule.missing_existence,
+            time=time,
             detection_at=None if sampled else "mean",
             rng=rng,
         )

@@ -14,7 +14,7 @@ from vedette.densities.checks import offsets_of
 from vedette.densities.containers import unchecked
 from vedette.densities.label_sets import places_of, single_gaussians, take_tracks
 from vedette.filters.inputs import model_errors
-from vedette.kernels.base.types import Floats, Ints
+from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.kernels.planning.bernoulli_rows import bernoulli_size
 from vedette.kernels.planning.ideal import EXPECTED, IDEAL, Decision, Futures
 from vedette.kernels.planning.known import rows_without_scans
@@ -83,6 +83,7 @@ def starts_of(
     settings: PlanningSettings,
     *,
     missing_existence: float,
+    time: float | None,
     detection_at: str | None = None,
     rng: np.random.Generator,
 ) -> Start:
@@ -90,16 +91,17 @@ def starts_of(
 
     prediction: the fused density at the end of the horizon, of one Gaussian a label. beliefs: of each sensor now.
     courses: of each sensor (num_courses, horizon_steps, pose_dim). missing_existence: of a label that a sensor lacks.
-    detection_at: as of `SensorModel.to_kernel`.
+    time: of the decision. detection_at: as of `SensorModel.to_kernel`.
     """
     with model_errors():
         given = prediction.to_kernel()
         references = given.tracks.means
         prior = rows_without_scans(references, given.tracks.covs, given.existence_logit, references)
+        scans = [sensor.scans(time, settings) for sensor in sensors]
         shared = IDEAL_MODES[settings.ideal_measurements] == IDEAL or detection_at is not None
         groups = tuple(
-            _group(members, prediction, beliefs, sensors, courses, samples, settings, detection_at, rng)
-            for members in _alike(sensors, beliefs, shared=shared)
+            _group(members, prediction, beliefs, sensors, courses, scans, samples, settings, detection_at, rng)
+            for members in _alike(sensors, beliefs, scans, shared=shared)
         )
     bases: list[Floats] = [prior] * len(sensors)
     for group in groups:
@@ -109,11 +111,13 @@ def starts_of(
     return Start(groups, references, prior, tuple(bases))
 
 
-def _alike(sensors: Sequence[MobileSensor], beliefs: Sequence[LMB], *, shared: bool) -> list[tuple[int, ...]]:
-    """Sensors with the same belief and equal models, together; each by itself unless `shared`."""
+def _alike(
+    sensors: Sequence[MobileSensor], beliefs: Sequence[LMB], scans: Sequence[Bools], *, shared: bool
+) -> list[tuple[int, ...]]:
+    """Sensors with the same belief, equal models and scans, together; each by itself unless `shared`."""
     found: dict[object, list[int]] = {}
-    for s, (sensor, belief) in enumerate(zip(sensors, beliefs, strict=True)):
-        bundle = sensor.filter.sensor.to_kernel()
+    for s, (sensor, belief, when) in enumerate(zip(sensors, beliefs, scans, strict=True)):
+        bundle = (*sensor.filter.sensor.to_kernel(), when)
         key = tuple(part.tobytes() if isinstance(part, np.ndarray) else part for part in bundle)
         found.setdefault((id(belief), key) if shared else s, []).append(s)
     return [tuple(members) for members in found.values()]
@@ -125,6 +129,7 @@ def _group(
     beliefs: Sequence[LMB],
     sensors: Sequence[MobileSensor],
     courses: Sequence[Floats],
+    scans: Sequence[Bools],
     samples: Samples,
     settings: PlanningSettings,
     detection_at: str | None,
@@ -135,7 +140,8 @@ def _group(
     own = np.flatnonzero((places >= 0) & (belief.existence_logit > -np.inf))
     prior = unchecked(LMB, single_gaussians(take_tracks(belief.tracks, own)), belief.existence_logit[own]).to_kernel()
     futures = samples.futures(sensor.filter.sensor.meas_dim, settings, rng=rng)
-    decision = decision_of(sensor, np.concatenate([courses[s] for s in members]), futures, settings, detection_at)
+    together = np.concatenate([courses[s] for s in members])
+    decision = decision_of(sensor, together, futures, settings, scans[members[0]], detection_at)
     paths, labels = predict_paths(prior, decision), places[own]
     ends = np.ascontiguousarray(paths.means[:, -1]), np.ascontiguousarray(paths.covs[:, -1])
     rows = rows_without_scans(*ends, prior.existence_logit, prediction.tracks.means[labels])

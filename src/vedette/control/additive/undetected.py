@@ -47,8 +47,9 @@ def cells_of(start: Start, undetected: UndetectedIntensity, worth: float, first_
 
 
 def _view(group: SensorGroup, states: Floats, weights: Floats) -> tuple[Ints, Ints, Floats]:
-    decision = group.decision
+    decision, horizon = group.decision, group.decision.horizon
+    poses = np.ascontiguousarray(horizon.poses[:, horizon.scans])
     found: tuple[Ints, Ints, Floats] = cells_in_view(
-        decision.sensor, decision.horizon.poses, states, weights, LEAST_DETECTION, group.reach
+        decision.sensor, poses, states, weights, LEAST_DETECTION, group.reach
     )
     return found

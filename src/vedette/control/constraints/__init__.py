@@ -2,7 +2,7 @@
 
 from vedette.control.constraints.feasible import opened, repaired
 from vedette.control.constraints.mask import Mask
-from vedette.control.constraints.masks import courses_allowed, mask_of, names_of, pairs_allowed
+from vedette.control.constraints.masks import courses_allowed, mask_of, pairs_allowed, violated, without_course
 from vedette.control.constraints.protocol import Constraint, Situation
 from vedette.control.constraints.regions import KeepOut, StayInside
 from vedette.control.constraints.separation import Separation
@@ -18,9 +18,10 @@ __all__ = [
     "VoidProbability",
     "courses_allowed",
     "mask_of",
-    "names_of",
     "opened",
     "pairs_allowed",
     "repaired",
+    "violated",
     "void_probability",
+    "without_course",
 ]

@@ -14,12 +14,15 @@ from vedette.control.constraints.protocol import Constraint, Situation
 from vedette.errors import InputError
 from vedette.kernels.base.types import Bools, Floats
 
+# Violations that differ by no more, relative to the least of them or to 1, are equal.
+_SAME = 1e-9
+
 
 def mask_of(constraints: Sequence[Constraint], situation: Situation) -> Mask:
     """The courses and pairs of courses that all constraints allow.
 
-    A sensor for which none is left keeps all of its courses, and so do pairs of sensors that no joint action was found
-    to keep apart (`opened`); the mask's notes say of whom.
+    A sensor for which none is left keeps those that violate them least, and pairs of sensors that no joint action was
+    found to keep apart keep all (`opened`); the mask's notes say of whom.
 
     Raises:
         InputError: a constraint that needs beliefs where there are none, or an answer of another shape.
@@ -28,34 +31,72 @@ def mask_of(constraints: Sequence[Constraint], situation: Situation) -> Mask:
         if constraint.needs_beliefs and len(situation.beliefs) != len(situation.times):
             wanted = f"{len(situation.times)} predicted beliefs, one a time"
             raise InputError(f"constraint {constraint.name}: expected {wanted}; got {len(situation.beliefs)}")
-    single = courses_allowed(constraints, situation)
-    blocked = [s for s, own in enumerate(single) if not own.any()]
-    for s in blocked:
-        single[s][:] = True
-    notes = tuple(
-        f"sensor {s + 1}: no course meets its constraints ({names_of(constraints)}); it may take any" for s in blocked
-    )
+    single, blocked = courses_allowed(constraints, situation)
+    notes = tuple(f"sensor {s + 1}: {without_course(constraints)}" for s in blocked)
     return opened(Mask(single, pairs_allowed(constraints, situation), notes))[0]
 
 
-def names_of(constraints: Sequence[Constraint]) -> str:
-    """As notes name them."""
-    return ", ".join(constraint.name for constraint in constraints)
+def without_course(constraints: Sequence[Constraint]) -> str:
+    """What notes say of a sensor that has no course that meets the constraints."""
+    names = ", ".join(constraint.name for constraint in constraints)
+    return f"no course meets its constraints ({names}); it may take those that violate them least"
 
 
-def courses_allowed(constraints: Sequence[Constraint], situation: Situation) -> tuple[Bools, ...]:
-    """(num_courses,) which courses of each sensor all constraints allow; perhaps none. Raises as `mask_of`."""
+def courses_allowed(
+    constraints: Sequence[Constraint], situation: Situation
+) -> tuple[tuple[Bools, ...], tuple[int, ...]]:
+    """(num_courses,) which courses each sensor may take, and the sensors that have none that all constraints allow.
+
+    These may take the courses of least violation. Raises as `mask_of`.
+    """
     shape = [len(own) for own in situation.courses]
-    allowed = [np.ones(num, bool) for num in shape]
+    answers = [_answers(constraint, situation) for constraint in constraints]
+    every = [np.ones(num, bool) for num in shape]
+    allowed = [np.logical_and.reduce(own) for own in zip(every, *answers, strict=True)]
+    blocked = tuple(s for s, own in enumerate(allowed) if len(own) and not own.any())
+    if blocked:
+        total = [np.zeros(num) for num in shape]
+        for constraint, own in zip(constraints, answers, strict=True):
+            for s, violations in enumerate(_violations(constraint, situation, own)):
+                total[s] += violations
+        for s in blocked:
+            least = float(total[s].min())
+            allowed[s] = total[s] <= least + _SAME * max(least, 1.0)
+    return tuple(allowed), blocked
+
+
+def violated(constraints: Sequence[Constraint], situation: Situation) -> tuple[str, ...]:
+    """What constraints forbid of the one course that each sensor has, as notes of a plan; raises as `mask_of`."""
+    found = []
     for constraint in constraints:
-        answer = constraint.courses(situation)
-        if len(answer) != len(shape):
-            raise InputError(
-                f"constraint {constraint.name}: expected courses of {len(shape)} sensors; got {len(answer)}"
-            )
-        for s, own in enumerate(answer):
-            allowed[s] &= _checked(constraint, own, (shape[s],))
-    return tuple(allowed)
+        single, pairs = _answers(constraint, situation), pairs_allowed([constraint], situation)
+        found += [
+            f"sensor {s + 1}: its course violates {constraint.name}" for s, own in enumerate(single) if not own[0]
+        ]
+        found += [f"sensors {i + 1} and {j + 1}: their courses violate {constraint.name}" for i, j in pairs]
+    return tuple(found)
+
+
+def _answers(constraint: Constraint, situation: Situation) -> list[Bools]:
+    """(num_courses,) which courses of each sensor a constraint allows."""
+    answer, num = constraint.courses(situation), len(situation.courses)
+    if len(answer) != num:
+        raise InputError(f"constraint {constraint.name}: expected courses of {num} sensors; got {len(answer)}")
+    return [_checked(constraint, own, (len(each),)) for own, each in zip(answer, situation.courses, strict=True)]
+
+
+def _violations(constraint: Constraint, situation: Situation, answers: Sequence[Bools]) -> Sequence[Floats]:
+    """(num_courses,) how much each course violates a constraint; one that does not say it, by 1 what it forbids."""
+    if not hasattr(constraint, "violations"):
+        return [np.asarray(~own, np.float64) for own in answers]
+    given = [np.asarray(own, np.float64) for own in constraint.violations(situation)]
+    for s, own in enumerate(answers):
+        fits = s < len(given) and given[s].shape == own.shape
+        if not fits or not (np.isfinite(given[s]).all() and ((given[s] > 0.0) == ~own).all()):
+            wanted = f"{len(own)} numbers of sensor {s + 1}, above 0 where a course is not allowed and else 0"
+            got = given[s].tolist() if s < len(given) else "none"
+            raise InputError(f"constraint {constraint.name}: expected violations of {wanted}; got {got}")
+    return given
 
 
 def pairs_allowed(constraints: Sequence[Constraint], situation: Situation) -> dict[tuple[int, int], Bools]:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from itertools import accumulate
-from typing import NamedTuple, Protocol, runtime_checkable
+from typing import NamedTuple, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 
 from vedette.densities import Labelled
 from vedette.kernels.base.types import Bools, Floats
+
+_Values = TypeVar("_Values", Bools, Floats)
 
 
 class Situation(NamedTuple):
@@ -32,7 +34,7 @@ class Situation(NamedTuple):
             return self.courses[sensor][:, :, :2]
         return with_start(self.courses[sensor][:, :, :2], self.poses[sensor, :2])
 
-    def split(self, values: Bools) -> tuple[Bools, ...]:
+    def split(self, values: _Values) -> tuple[_Values, ...]:
         """Values of all sensors' courses (sum of num_courses,), one sensor's after another's, as an array a sensor."""
         ends = list(accumulate(len(own) for own in self.courses))
         return tuple(np.split(values, ends[:-1]))
@@ -42,10 +44,12 @@ class Situation(NamedTuple):
 class Constraint(Protocol):
     """Says which courses a sensor may take, and which courses of two sensors go together.
 
-    A constraint may have two more members. `reach`: `pairs` is then asked only about sensors of which some two courses
-    might come nearer to each other than so many metres; 0: about none. Without it, about all. `timeless`: true where
-    the answers hang on poses and courses alone, neither on times nor on beliefs; of decisions over several periods it
-    is then asked once about each place.
+    A constraint may have three more members. `reach`: `pairs` is then asked only about sensors of which some two
+    courses might come nearer to each other than so many metres; 0: about none. Without it, about all. `timeless`: true
+    where the answers hang on poses and courses alone, neither on times nor on beliefs; of decisions over several
+    periods it is then asked once about each place. `violations(situation)`: how much each course violates it, in arrays
+    as of `courses`, above 0 where it is not allowed; where a sensor has no course that all constraints allow, it may
+    take those of the least sum. Without it a course that is not allowed counts 1.
 
     Such decisions show it one sensor, or two, at a time: the others have no courses then.
     """
@@ -70,10 +74,18 @@ class Constraint(Protocol):
 
 
 class Alone:
-    """A constraint on each sensor by itself: any courses go together."""
+    """A constraint on each sensor: any courses go together. What violates it by more than 0 is forbidden."""
 
     __slots__ = ()
     reach = 0.0
+
+    def violations(self, situation: Situation) -> tuple[Floats, ...]:
+        """(num_courses,) how much each course violates it, one array a sensor."""
+        raise NotImplementedError
+
+    def courses(self, situation: Situation) -> tuple[Bools, ...]:
+        """Those that do not violate it."""
+        return tuple(np.asarray(own == 0.0) for own in self.violations(situation))
 
     def pairs(self, situation: Situation, first: int, second: int) -> Bools | None:
         """All."""

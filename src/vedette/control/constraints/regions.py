@@ -42,10 +42,12 @@ class StayInside(Alone):
         """No."""
         return False
 
-    def courses(self, situation: Situation) -> tuple[Bools, ...]:
-        """Those that never leave it. Between two places in a rectangle the straight way is in it, too."""
+    def violations(self, situation: Situation) -> tuple[Floats, ...]:
+        """m from it, the mean over the times. Between two places in a rectangle the straight way is in it, too."""
         places = np.concatenate([own[:, :, :2] for own in situation.courses])
-        return situation.split(np.asarray(self.region.contains(places).all(axis=1)))
+        low, high = self.region.corners.min(axis=0), self.region.corners.max(axis=0)
+        beyond = np.maximum(np.maximum(low - places, places - high), 0.0)
+        return situation.split(np.asarray(np.hypot(beyond[..., 0], beyond[..., 1]).mean(axis=1)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -83,15 +85,17 @@ class KeepOut(Alone):
         """No."""
         return False
 
-    def courses(self, situation: Situation) -> tuple[Bools, ...]:
-        """Those that never touch it."""
+    def violations(self, situation: Situation) -> tuple[Floats, ...]:
+        """m inside it, the mean over the way's corners; next to nothing where it is only crossed between two."""
         corners = _corners(self.area)
         ways = np.concatenate([situation.ways(s) for s in range(len(situation.courses))])
         inside, crosses = _inside(ways, corners), _cross(ways, corners)
         if situation.poses is not None:
             crosses[:, 0] &= ~inside[:, 0]
             inside[:, 0] = False
-        return situation.split(np.asarray(~(inside.any(axis=1) | crosses.any(axis=1))))
+        depths = np.where(inside, _distances(ways, corners), 0.0).mean(axis=1)
+        touched = inside.any(axis=1) | crosses.any(axis=1)
+        return situation.split(np.where(touched, np.maximum(depths, np.finfo(float).tiny), 0.0))
 
 
 def _corners(area: Any) -> Any:
@@ -107,6 +111,14 @@ def _inside(points: Floats, corners: Floats) -> Bools:
     with np.errstate(divide="ignore", invalid="ignore"):
         crossing = x1 + (y - y1) / (y2 - y1) * (x2 - x1)
     return np.asarray((spans & (x < crossing)).sum(axis=-1) % 2 == 1)
+
+
+def _distances(points: Floats, corners: Floats) -> Floats:
+    """(...) m from points (..., 2) to the edge of a polygon."""
+    along, off = np.roll(corners, -1, axis=0) - corners, points[..., np.newaxis, :] - corners
+    length = np.maximum((along**2).sum(axis=-1), np.finfo(float).tiny)
+    share = np.clip((off * along).sum(axis=-1) / length, 0.0, 1.0)
+    return np.asarray(np.sqrt(((off - share[..., np.newaxis] * along) ** 2).sum(axis=-1)).min(axis=-1))
 
 
 def _cross(ways: Floats, corners: Floats) -> Bools:

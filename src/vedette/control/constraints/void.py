@@ -10,7 +10,7 @@ from vedette.control.constraints.discs import disc_probabilities, near_pairs
 from vedette.control.constraints.protocol import Alone, Situation
 from vedette.densities import GLMB, LMB, FactoredGLMB, Labelled, TrackTable
 from vedette.densities.factored import LABELLED
-from vedette.kernels.base.types import Bools, Floats, Ints
+from vedette.kernels.base.types import Floats, Ints
 from vedette.models.arguments import float_array, positive, probability, reject
 from vedette.probabilities import expit
 
@@ -50,13 +50,13 @@ class VoidProbability(Alone):
         """Yes."""
         return True
 
-    def courses(self, situation: Situation) -> tuple[Bools, ...]:
-        """Those on which the void probability is never less than `probability`."""
+    def violations(self, situation: Situation) -> tuple[Floats, ...]:
+        """By how much the void probability is less than `probability`, the sum over the times."""
         places = np.concatenate([own[:, :, :2] for own in situation.courses])
-        allowed = np.ones(len(places), bool)
+        lacking = np.zeros(len(places))
         for t, belief in enumerate(situation.beliefs):
-            allowed &= void_probability(belief, places[:, t], self.radius) >= self.probability
-        return situation.split(allowed)
+            lacking += np.maximum(self.probability - void_probability(belief, places[:, t], self.radius), 0.0)
+        return situation.split(lacking)
 
 
 def void_probability(belief: Labelled, centres: Floats, radius: float) -> Floats:

@@ -63,13 +63,14 @@ class Ahead:
         """Of the first decision, of all sensors; opened where it has to be. Raises `InputError` as `mask_of`."""
         return mask_of(self.constraints, self._situation(1, places))
 
-    def courses(self, sensor: int, stage: int, place: Place) -> Bools:
-        """(num_courses,) which courses of one sensor are allowed at a decision, perhaps none.
+    def courses(self, sensor: int, stage: int, place: Place) -> tuple[Bools, bool]:
+        """(num_courses,) which courses of one sensor are allowed at a decision, and whether they meet the constraints.
 
-        stage: 1 for the decision now. Other sensors have no courses in what constraints are shown.
-        Raises `InputError` as `mask_of`.
+        Where none does, those that violate them least. stage: 1 for the decision now. Other sensors have no courses in
+        what constraints are shown. Raises `InputError` as `mask_of`.
         """
-        return courses_allowed(self.constraints, self._situation(stage, {sensor: place}))[sensor]
+        allowed, blocked = courses_allowed(self.constraints, self._situation(stage, {sensor: place}))
+        return allowed[sensor], sensor not in blocked
 
     def pairs(self, stage: int, places: Mapping[int, Place]) -> dict[tuple[int, int], Bools]:
         """The tables of pairs of sensors i < j of which something is forbidden; raises `InputError` as `mask_of`."""

@@ -19,9 +19,9 @@ _MOST_PLACES = 10_000
 class ConstrainedTree(CourseTree):
     """Sequences of allowed courses; dead ends are left out.
 
-    Where no course is allowed, all are kept. Of the others those are kept after which there is the least number of
-    further decisions with no course allowed: a beginning after which nothing is allowed is left out, unless that is so
-    after all of them.
+    Where no course is allowed, those that violate constraints least are kept. Of these those are kept after which there
+    is the least number of further decisions with no course allowed: a beginning after which nothing is allowed is left
+    out, unless that is so after all of them.
 
     Attributes:
         name, platform, pose, stages: as of `CourseTree`.
@@ -37,7 +37,7 @@ class ConstrainedTree(CourseTree):
     far_sighted: bool = field(kw_only=True, default=True)
     _places: dict[Sequence, bytes] = field(default_factory=dict)
     _allowed: dict[tuple[bytes, int], Sequence] = field(default_factory=dict)
-    _open: dict[tuple[bytes, int], Sequence] = field(default_factory=dict)
+    _open: dict[tuple[bytes, int], tuple[Sequence, bool]] = field(default_factory=dict)
     _blocked: dict[tuple[bytes, int], int] = field(default_factory=dict)
 
     @classmethod
@@ -50,7 +50,7 @@ class ConstrainedTree(CourseTree):
         """Those that meet the constraints and lead to no dead end; at least one."""
         key = self.place(taken), len(taken)
         if key not in self._allowed:
-            found = self._open_after(taken) or self.different(taken)
+            found, _ = self._open_after(taken)
             if self.far_sighted and len(found) > 1 and len(taken) + 1 < self.stages.depth:
                 blocked = [self._least_blocked((*taken, course)) for course in found]
                 found = tuple(course for course, num in zip(found, blocked, strict=True) if num == min(blocked))
@@ -63,7 +63,7 @@ class ConstrainedTree(CourseTree):
 
     def blocked(self, sequence: Sequence) -> list[int]:
         """The decisions of a sequence but the first, counted from 1, at which no course is allowed."""
-        return [k + 1 for k in range(1, len(sequence)) if not self._open_after(sequence[:k])]
+        return [k + 1 for k in range(1, len(sequence)) if not self._open_after(sequence[:k])[1]]
 
     def place(self, taken: Sequence) -> bytes:
         """What is equal where it decides at one place: there it may do the same."""
@@ -75,14 +75,14 @@ class ConstrainedTree(CourseTree):
         """What is equal where constraints allow the same."""
         return self.place(taken), self.ahead.moment(len(taken) + 1)
 
-    def _open_after(self, taken: Sequence) -> Sequence:
-        """The courses that meet the constraints, perhaps none."""
+    def _open_after(self, taken: Sequence) -> tuple[Sequence, bool]:
+        """The courses that meet the constraints, or violate them least; and whether they meet them."""
         if not taken:
-            return tuple(np.flatnonzero(self.now).tolist())
+            return tuple(np.flatnonzero(self.now).tolist()), True
         key = self._moment(taken)
         if key not in self._open:
-            allowed = self.ahead.courses(self.sensor, len(taken) + 1, Place.after(self, taken))
-            self._open[key] = tuple(np.flatnonzero(allowed).tolist())
+            allowed, met = self.ahead.courses(self.sensor, len(taken) + 1, Place.after(self, taken))
+            self._open[key] = tuple(np.flatnonzero(allowed).tolist()), met
         return self._open[key]
 
     def _least_blocked(self, taken: Sequence) -> int:
@@ -94,8 +94,8 @@ class ConstrainedTree(CourseTree):
             if len(self._blocked) >= _MOST_PLACES:
                 return 0
             self._blocked[key] = 0  # counted among the places from now on
-            found = self._open_after(taken)
-            ways = [(*taken, course) for course in found or self.different(taken)]
+            found, met = self._open_after(taken)
+            ways = [(*taken, course) for course in found]
             if len(taken) + 1 < self.stages.depth:
                 # One way out is enough: first those to places that are known.
                 ways.sort(key=lambda way: self._moment(way) not in self._open)
@@ -104,5 +104,5 @@ class ConstrainedTree(CourseTree):
                 least = min(least, self._least_blocked(way))
                 if least == 0:
                     break
-            self._blocked[key] = least + (not found)
+            self._blocked[key] = least + (not met)
         return self._blocked[key]

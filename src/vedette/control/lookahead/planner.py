@@ -25,7 +25,7 @@ from vedette.control.lookahead.laid_courses import LaidCourses
 from vedette.control.lookahead.problem import Best, JointSequence, Part, SequenceProblem, SequenceSearch
 from vedette.control.lookahead.rules import Rules
 from vedette.control.plan import Plan
-from vedette.control.preparation import AnyReward, Sums, check_sums, prepare_sums, unsought
+from vedette.control.preparation import AnyReward, Sums, check_sums, prepare_sums, unsought, without_scans
 from vedette.control.problem import joint_problem, note_lines
 from vedette.control.rewards import CauchySchwarzReward
 from vedette.control.search import AutomaticSearch
@@ -210,7 +210,16 @@ class HorizonPlanner:
     ) -> AdditiveEvaluator:
         settings = replace(self.settings, horizon_steps=num_steps)
         return AdditiveEvaluator.prepare(
-            self.sensors, options, sums.rule, settings, self.reward, sums.fused, sums.local, sums.undetected, rng=rng
+            self.sensors,
+            options,
+            sums.rule,
+            settings,
+            self.reward,
+            sums.fused,
+            sums.local,
+            sums.undetected,
+            time=sums.time,
+            rng=rng,
         )
 
     def _plan(
@@ -230,6 +239,13 @@ class HorizonPlanner:
         courses = tuple(own[0] for own in sequence)
         constrained = () if rules is None else rules.notes(sequence)
         counts, found = first.account()
+        stages = trees[0].stages
+        ahead = replace(self.settings, horizon_steps=stages.num_steps(stages.depth))
+        found = (
+            *unsought(self.settings, sums.undetected, sums=True),
+            *without_scans(self.sensors, ahead, sums.time),
+            *found,
+        )
         return Plan(
             self.name,
             tuple(own.actions for own in first.options),
@@ -238,11 +254,10 @@ class HorizonPlanner:
             counts,
             (
                 *self.notes,
-                *unsought(self.settings, sums.undetected, sums=True),
                 *constrained,
                 *sums.notes,
                 *found,
-                *self._told(single, courses, trees[0].stages.depth),
+                *self._told(single, courses, stages.depth),
             ),
             evidence.curve() if problem is None else problem.curve(),
             bound_of(evidence, courses) if problem is None else problem.bound(),

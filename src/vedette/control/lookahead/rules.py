@@ -8,7 +8,7 @@ from itertools import combinations
 
 import numpy as np
 
-from vedette.control.constraints import Mask, names_of
+from vedette.control.constraints import Mask, without_course
 from vedette.control.lookahead.ahead import Ahead, Place
 from vedette.control.lookahead.constrained import ConstrainedTree
 from vedette.control.lookahead.courses import CourseTree, Sequence
@@ -102,9 +102,8 @@ class Rules:
 
     def notes(self, sequence: Several[Sequence]) -> tuple[str, ...]:
         """What a reader of a decision for a joint sequence must know."""
-        names = names_of(self.ahead.constraints)
         found = [
-            f"sensor {s + 1}, decision {k} of the sequence: no course meets its constraints ({names}); it may take any"
+            f"sensor {s + 1}, decision {k} of the sequence: {without_course(self.ahead.constraints)}"
             for s, (tree, own) in enumerate(zip(self.trees, sequence, strict=True))
             for k in tree.blocked(own)
         ]

@@ -125,6 +125,12 @@ def predict_rows(tracks: Tracks, scan: ScanInput, motion: Motion, sensor: Sensor
     expect_rows(sensor, scan.pose, rows, scratch)
 
 
+@inlined
+def leave_unseen(rows: Rows) -> None:
+    """Make the scan of the rows one that sees nothing: with no measurements, to update is then to predict."""
+    rows.innovation.prob_detection[:] = 0.0
+
+
 @kernel
 def predicted_rows(tracks: Tracks, scan: ScanInput, motion: Motion, sensor: Sensor) -> Rows:
     """As `predict_rows`, into arrays made for it."""

@@ -64,9 +64,11 @@ def _is_seen(
     """Whether a label is detected with probability `least` or more at some step; the probabilities are written."""
     paths, seen = belief.paths, False
     for h in range(len(detections)):
-        pose, state = decision.horizon.poses[course, h], work.scratch.points[0]
-        detections[h] = detection_probability(decision.sensor, pose, paths.means[label, h], paths.covs[label, h], state)
-        seen |= detections[h] >= least
+        pose, state, detections[h] = decision.horizon.poses[course, h], work.scratch.points[0], 0.0
+        if decision.horizon.scans[h]:
+            mean, cov = paths.means[label, h], paths.covs[label, h]
+            detections[h] = detection_probability(decision.sensor, pose, mean, cov, state)
+            seen |= detections[h] >= least
     return seen
 
 
@@ -84,6 +86,11 @@ def _expected_cov(
                 decision.motion, horizon.dt, paths.means[label, h - 1], out, work.predicted_mean, work.cov, work.scratch
             )
             cov = work.cov
+        if not horizon.scans[h]:
+            for i in range(n):
+                for j in range(n):
+                    out[i, j] = cov[i, j]
+            continue
         expect_measurement(decision.sensor, horizon.poses[course, h], mean, cov, 0, work.seen, work.scratch)
         detection = detections[h]
         missed += log_miss(detection)

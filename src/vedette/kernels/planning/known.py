@@ -257,6 +257,9 @@ def _follow(
             _take_path(belief, label, step, num, lanes)
         else:
             predict_lanes(decision.motion, forms, horizon.dt, out.means, out.covs, num, lanes, own)
+        if not horizon.scans[step]:
+            _keep_predicted(num, lanes, out)
+            continue
         expect_lanes(sensor, forms, pose, num, lanes, own)
         for s in range(num):
             missed[s] = max(1.0 - lanes.prob_detection[s], LEAST_MISS)

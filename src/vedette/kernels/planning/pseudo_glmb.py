@@ -16,7 +16,7 @@ from vedette.kernels.association.assignment import Options
 from vedette.kernels.association.children import Parents
 from vedette.kernels.association.openings import start_search
 from vedette.kernels.association.options import view_options, weigh_options
-from vedette.kernels.association.predicted import Rows, predict_rows, view_rows
+from vedette.kernels.association.predicted import Rows, leave_unseen, predict_rows, view_rows
 from vedette.kernels.association.ranked import add_missing_groups, run_search
 from vedette.kernels.association.search import SearchCaps
 from vedette.kernels.base.compile import borrowing, inlined, kernel
@@ -81,6 +81,8 @@ def _update_cases(
             rows = work.first_rows if step == 0 else view_rows(work.rows, num_tracks)
             if step > 0 or action != prepared:
                 predict_rows(belief.tracks, scan, decision.motion, sensor, rows, work.scratch)
+                if not horizon.scans[step]:
+                    leave_unseen(rows)
             prepared = action
             options = view_options(work.options, num_tracks, num)
             weigh_options(rows, work.near, scan, sensor, caps, work.log_clutter, options)

@@ -18,7 +18,7 @@ from vedette.kernels.association.clusters import MarginalWork, grown_marginal_wo
 from vedette.kernels.association.marginals import fill_marginals
 from vedette.kernels.association.near import Near, all_measurements
 from vedette.kernels.association.options import make_options, view_options, weigh_options
-from vedette.kernels.association.predicted import Rows, make_rows, predict_rows
+from vedette.kernels.association.predicted import Rows, leave_unseen, make_rows, predict_rows
 from vedette.kernels.base.arrays import counted_ints
 from vedette.kernels.base.compile import borrowing, kernel
 from vedette.kernels.base.types import Floats, Ints, Lmb, ScanInput, Tracks
@@ -108,6 +108,8 @@ def _update_cases(prior: Lmb, decision: Decision, first: int, last: int, results
             rows, current = (work.first_rows, prior) if step == 0 else (work.rows, belief)
             if step > 0 or action != prepared:
                 predict_rows(current.tracks, scan, decision.motion, sensor, rows, work.scratch)
+                if not horizon.scans[step]:
+                    leave_unseen(rows)
                 weigh_by_existence(current.existence_logit, rows)
             prepared = action
             options = view_options(work.options, len(rows.log_absent), num)

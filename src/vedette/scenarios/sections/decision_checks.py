@@ -28,13 +28,14 @@ def greedy_of_sums(model: ScenarioModel) -> Iterator[Finding]:
         return
     limits, other = model.control.limits, "coordinate_ascent or another"
     few = len(model.sensors) <= limits.max_glmb_sensors and limits.max_glmb_targets > 0
+    of_lmbs = model.fusion.kind != "custom" and model.fusion.decides_in_full
     for path, search, reward in _joint(model):
         if search.kind != "sequential_greedy" or reward.kind == "expected_loss":
             continue
         if model.control.association == "full":
             why = "as with control.association full decisions are no sums over labels"
             yield (*path, "kind"), f"{other}, {why}", describe(search.kind)
-        elif few and model.filter.kind in ("delta_glmb", "m_delta_glmb"):
+        elif few and not of_lmbs and model.filter.kind in ("delta_glmb", "m_delta_glmb"):
             why = f"as decisions on {model.filter.kind} beliefs are no sums over labels"
             hint = "or control.limits.max_glmb_targets of 0, with which they are"
             yield (*path, "kind"), f"{other}, {why}, {hint}", describe(search.kind)

@@ -26,6 +26,8 @@ FusionKind: TypeAlias = Literal[
 # One belief takes the scans of all sensors: nothing is fused while tracking.
 OF_SCANS: tuple[FusionKind, ...] = ("sequential", "central")
 ONE_BELIEF: tuple[FusionKind, ...] = (*OF_SCANS, "none")
+# What every sensor's scan says counts in full.
+IN_FULL: tuple[FusionKind, ...] = (*OF_SCANS, "parallel")
 # Of beliefs that each sensor keeps for itself, by their labels.
 BY_LABEL: tuple[FusionKind, ...] = ("clmb", "cm_delta_glmb", "arithmetic_average")
 # Of those, the ones whose fused density is an LMB, and which may go by views.
@@ -71,8 +73,9 @@ class Fusion(Section):
         "one belief is predicted, then updated with each sensor's scan in turn. parallel: each sensor updates one "
         "common prediction, and the posteriors are divided by it; the sensors go on from the result (lmb, "
         "factored_glmb). central: one filter takes the scans of all sensors, of GLMBs as sequential. none: of a single "
-        "sensor. Joint decisions are by covariance intersection of the same kind of density, without views, whatever "
-        "the kind [-].",
+        "sensor. Joint decisions by the expected loss take all scans in full whatever the kind; by other rewards they "
+        "do so under sequential, parallel, central, arithmetic_average and by views, and are by plain covariance "
+        "intersection under cm_delta_glmb and clmb [-].",
     )
     filter: CustomCentral | None = Field(
         default=None,
@@ -81,8 +84,8 @@ class Fusion(Section):
     )
     weights: Weights | None = Field(
         default=None,
-        description="Weight of each sensor, with sum 1; none: equal weights. Of sequential, parallel and central, they "
-        "serve the joint decisions alone [-].",
+        description="Weight of each sensor, with sum 1; none: equal weights. Not used by sequential, parallel and "
+        "central [-].",
     )
     by_views: bool = Field(
         default=False,
@@ -139,6 +142,11 @@ class Fusion(Section):
         """Whether the sensors go on from the fused density."""
         return self.feedback or self.kind == "parallel"
 
+    @property
+    def decides_in_full(self) -> bool:
+        """Whether joint decisions count what each sensor's scans say in full, whatever they are to gain."""
+        return self.kind in (*IN_FULL, "arithmetic_average") or self.by_views
+
     def scaled_weights(self, num_sensors: int) -> tuple[float, ...]:
         """Weight of each sensor: equal where none are given; scaled to sum to one beyond the rounding of the file."""
         given = self.weights or (1.0,) * num_sensors
@@ -156,19 +164,18 @@ class Fusion(Section):
         return Matched(rule) if self.matching == "assignment" else rule
 
     def build_of_decisions(self, num_sensors: int, *, of_lmbs: bool) -> FusionRule:
-        """The fusion that joint decisions go by.
+        """The fusion that joint decisions go by: a parallel update, of any density, or plain covariance intersection.
 
-        Where one filter takes all scans, posteriors of one prediction are multiplied, by views or in averages sensors
-        are taken to say all they know: a parallel update. Otherwise, and for GLMBs, plain covariance intersection.
-        of_lmbs: whether the filters keep LMBs; what the fused density is says more, where there is one.
+        Averages and what goes by views are decided on as if each sensor said all it knows.
+        of_lmbs: whether the filters keep LMBs, on which a sensor by itself is then planned.
         """
-        if of_lmbs and (self.kind in ("sequential", "central", "parallel", "arithmetic_average") or self.by_views):
-            from vedette.fusion import ParallelUpdate
+        from vedette.fusion import ParallelUpdate
 
+        if self.decides_in_full:
             return ParallelUpdate()
-        lmbs = self.kind in OF_LMBS or (of_lmbs and self.kind != "cm_delta_glmb")
+        lmbs = self.kind == "clmb" or (of_lmbs and self.kind == "none")
         kind: FusionKind = "clmb" if lmbs else "cm_delta_glmb"
-        return self.model_copy(update={"kind": kind, "by_views": False})._by_label(num_sensors)
+        return self.model_copy(update={"kind": kind})._by_label(num_sensors)
 
     def _by_label(self, num_sensors: int) -> FusionRule:
         from vedette.fusion import ArithmeticAverage, Clmb, CmDeltaGlmb

@@ -32,8 +32,8 @@ class Parts(NamedTuple):
     sensors: the sensors that are steered. fusion: how their densities become one; of one sensor, of it alone. settings:
     horizon, samples, caps, threads. reward: the value of a density. search: which joint actions are evaluated.
     first_actions: what each sensor does where nothing decides. constraints: what they must not do. notes: what plans
-    are to say of the fusion. lookahead: arguments of `vedette.control.HorizonPlanner` by name, about sequences of
-    decisions. estimate: reads the targets off the fused belief. oracle: arguments of
+    are to say of the fusion and of who hears whom. lookahead: arguments of `vedette.control.HorizonPlanner` by name,
+    about sequences of decisions. estimate: reads the targets off the fused belief. oracle: arguments of
     `vedette.simulation.OraclePlanner` by name, about scans and scores.
     """
 
@@ -88,7 +88,10 @@ def _lookahead(parts: Parts) -> Planner:
 def _independent(parts: Parts) -> Planner:
     from vedette.control import IndependentPlanner
 
-    return IndependentPlanner(parts.sensors, parts.fusion, parts.settings, parts.reward, parts.constraints)
+    decides = IndependentPlanner(
+        parts.sensors, parts.fusion, parts.settings, parts.reward, parts.constraints, parts.notes
+    )
+    return _watched(decides, parts)  # of pairs of sensors it knows nothing
 
 
 def _random(parts: Parts) -> Planner:
@@ -100,7 +103,16 @@ def _random(parts: Parts) -> Planner:
 def _fixed(parts: Parts) -> Planner:
     from vedette.control import FixedPlanner
 
-    return FixedPlanner(parts.first_actions)
+    return _watched(FixedPlanner(parts.first_actions), parts)
+
+
+def _watched(decides: Planner, parts: Parts) -> Planner:
+    """A planner that does not keep to all constraints: its plans say which they violate."""
+    from vedette.control import WatchedPlanner
+
+    if not parts.constraints:
+        return decides
+    return WatchedPlanner(decides, parts.sensors, parts.settings, parts.constraints)
 
 
 def _rule(rule: Rule, targets: tuple[int, ...] | None = None) -> Callable[[Parts], Planner]:
@@ -217,7 +229,7 @@ class CustomPlanner(Custom):
 
     def planner(self, name: str, parts: Parts, folder: Path) -> Planner:
         """The user's own, under the name that the scenario gives it."""
-        return Named(name, self.made(folder, **parts._asdict()))
+        return Named(name, _watched(self.made(folder, **parts._asdict()), parts))
 
 
 @dataclass(frozen=True, slots=True)
