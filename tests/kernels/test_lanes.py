@@ -37,6 +37,8 @@ GROWING = models.range_dependent_noise(5.0, 5e-5, 0.02, 2e-5)
 SENSORS: dict[str, Any] = {
     "polar": (POLAR, GROWING, models.gaussian_detection(500.0), "auto", "centre"),
     "position": (PLACE, models.constant_noise([4.0, 7.0]), models.constant_detection(0.7), "auto", "centre"),
+    "wide": (POLAR, GROWING, models.gaussian_detection(500.0), "auto", "centre"),
+    "wide position": (PLACE, models.constant_noise([4.0, 7.0]), models.constant_detection(0.7), "auto", "centre"),
     "one component": (BEARING, models.constant_noise([0.02]), models.gaussian_detection(500.0), "auto", "mean"),
     "own parts": (POLAR, models.NoiseModel(_own_noise, np.empty(0), 2), None, "auto", "centre"),
     "by nodes": (POLAR, GROWING, None, "auto", "mean"),
@@ -51,8 +53,8 @@ def sensor_of(name: str) -> models.SensorModel:
     return models.SensorModel(measurement, noise, own, models.region_clutter(5.0, REGION, kind), method, at)
 
 
-def gaussians(dim: int, seed: int = 0) -> tuple[Any, Any]:
-    rng, std = np.random.default_rng(seed), np.array([20.0, 30.0, 4.0, 5.0, 0.05])[:dim]
+def gaussians(dim: int, wide: float = 1.0) -> tuple[Any, Any]:
+    rng, std = np.random.default_rng(0), np.array([20.0 * wide, 30.0 * wide, 4.0, 5.0, 0.05])[:dim]
     means = rng.normal(size=(NUM, dim)) * np.array([300.0, 300.0, 10.0, 10.0, 0.1])[:dim]
     factors = np.diag(std) @ (np.eye(dim) + 0.3 * rng.normal(size=(NUM, dim, dim)))
     return means, factors @ factors.transpose(0, 2, 1)
@@ -73,7 +75,7 @@ def test_steps_are_those_of_one_gaussian_at_a_time(name: str, motion: models.Mot
     moves, sees = models.kernel_motion(motion, models.constant_survival(1.0)), sensor.to_kernel()
     forms = forms_of(moves, sees, DT, dim)
     assert forms.is_linear == (dim == 4)
-    means, covs = gaussians(dim)
+    means, covs = gaussians(dim, 4.0 if "wide" in name else 1.0)
     lanes, work = make_lanes(dim, sensor.meas_dim, ROOM), make_lane_work(dim, sensor.meas_dim, ROOM)
     predict_lanes(moves, forms, DT, side_by_side(means), side_by_side(covs), NUM, lanes, work)
     expect_lanes(sees, forms, POSE, NUM, lanes, work)

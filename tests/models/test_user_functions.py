@@ -13,7 +13,7 @@ from reference.user_models import my_bearing_range, my_bearing_range_jacobian, u
 from vedette import models
 from vedette.errors import InputError, ModelError
 from vedette.kernels.base.compile import JIT_ENABLED
-from vedette.kernels.gaussian.sigma_points import CUBATURE, LINEARISED, UNSCENTED
+from vedette.kernels.gaussian.sigma_points import CUBATURE, LINEARISED, SWITCHED, UNSCENTED
 
 pytestmark = pytest.mark.lanes
 
@@ -45,7 +45,8 @@ def test_a_copy_of_bearing_range_gives_identical_values():
 
 def test_method_follows_the_jacobian():
     without = user_made_bearing_range(jacobian=False)
-    assert sensor().to_kernel().method == LINEARISED
+    assert sensor().to_kernel().method == SWITCHED
+    assert sensor(method="ekf").to_kernel().method == LINEARISED
     assert sensor(without).to_kernel().method == UNSCENTED
     assert sensor(without, method="ckf").to_kernel().method == CUBATURE
     assert sensor(method="ukf").to_kernel().method == UNSCENTED

@@ -28,4 +28,5 @@ def _places(measurements: Floats, pose: Floats) -> Floats:
 
 def position() -> MeasurementModel:
     """[px, py] of the target in metres, in the frame of the region; the sensor's pose plays no part."""
-    return MeasurementModel(2, _position, np.empty(0), _position_jacobian, np.array([False, False]), _places)
+    angular = np.array([False, False])
+    return MeasurementModel(2, _position, np.empty(0), _position_jacobian, angular, _places, is_linear=True)

@@ -51,6 +51,7 @@ class MeasurementModel:
         least: (meas_dim,) least value of each component without noise, such as 0 of a range; () means none.
         places: plain function of (n, meas_dim) measurements and a pose: the (n, 2) positions where they were taken of a
             target; None where a measurement does not say where. Births from measurements need it.
+        is_linear: whether measurements are linear in the state: a Jacobian then serves however wide a Gaussian is.
 
     Raises:
         InputError: a function of another kind, a bad dimension or parameter, a wrong number of angular flags.
@@ -63,6 +64,7 @@ class MeasurementModel:
     angular: Bools = field(default_factory=lambda: np.empty(0, np.bool_))
     places: Callable[[Floats, Floats], Floats] | None = None
     least: Floats = field(default_factory=lambda: np.empty(0))
+    is_linear: bool = False
 
     def __post_init__(self) -> None:
         dimension("MeasurementModel.meas_dim", self.meas_dim)

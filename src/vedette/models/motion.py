@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vedette.kernels.base.types import Floats, Motion
-from vedette.kernels.gaussian.sigma_points import CUBATURE, LINEARISED, UNSCENTED
+from vedette.kernels.gaussian.sigma_points import CUBATURE, LINEARISED, SWITCHED, UNSCENTED
 from vedette.models.arguments import dimension, one_of, params_vector, positive, probability, real, reject, state_table
 from vedette.models.functions import ModelFunction, model_function, numbers_at, require_kind, write_rows
 from vedette.models.probe import probe_array, probe_covariance, probe_jacobian, probe_probability
@@ -17,14 +17,16 @@ from vedette.models.probe import probe_array, probe_covariance, probe_jacobian, 
 METHODS = {"ekf": LINEARISED, "ukf": UNSCENTED, "ckf": CUBATURE}
 
 
-def resolve_method(name: str, method: str, has_jacobian: bool) -> int:
+def resolve_method(name: str, method: str, has_jacobian: bool, *, bends: bool = False) -> int:
     """The kernel's number of a Gaussian method; "auto" is the EKF where there is a Jacobian, else the UKF.
+
+    bends: whether "auto" takes the UKF of wide Gaussians close to the sensor also where there is a Jacobian.
 
     Raises:
         InputError: unknown method, or "ekf" without a Jacobian.
     """
     if one_of(name, method, ("auto", *METHODS)) == "auto":
-        return LINEARISED if has_jacobian else UNSCENTED
+        return UNSCENTED if not has_jacobian else SWITCHED if bends else LINEARISED
     if method == "ekf" and not has_jacobian:
         raise reject(name, "auto, ukf or ckf, as no Jacobian is given", method)
     return METHODS[method]

@@ -50,7 +50,8 @@ class SensorModel:
 
     Attributes:
         measurement, noise, detection, clutter: the four models.
-        method: "auto" (EKF if the measurement has a Jacobian, else UKF), "ekf", "ukf" or "ckf".
+        method: "ekf", "ukf", "ckf", or "auto": the EKF where a target is far from the sensor for how well its place is
+            known, or measurements are linear; the UKF where it is close, or the measurement has no Jacobian.
         detection_at: of a predicted Gaussian, the filters take the probability of detection at its "centre", as the
             paper does, or its "mean" over the Gaussian: by the model's `mean_function`, or by nodes over the position.
 
@@ -155,7 +156,7 @@ def _bundle_of(model: SensorModel, over_gaussian: bool) -> Sensor:
         model.detection.params,
         model.clutter.params,
         model.measurement.angular,
-        resolve_method("SensorModel.method", model.method, jacobian is not None),
+        resolve_method("SensorModel.method", model.method, jacobian is not None, bends=not model.measurement.is_linear),
         rule,
         _NODES if rule == BY_NODES else _NO_NODES,
     )

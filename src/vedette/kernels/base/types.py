@@ -87,7 +87,7 @@ class Sensor(NamedTuple):
     detection_params: Floats
     clutter_params: Floats
     angular: Bools  # (meas_dim,) true of angles in radians, whose residuals are wrapped to (-pi, pi]
-    method: int  # as of `Motion`
+    method: int  # as of `Motion`, or SWITCHED
     detection_rule: int  # AT_CENTRE, CLOSED_FORM or BY_NODES of `vedette.kernels.gaussian.detection`
     detection_nodes: Floats  # (num, 3) weight and two standard deviates of a node; read BY_NODES alone
 

@@ -13,7 +13,14 @@ from vedette.kernels.gaussian.detection import detection_probability
 from vedette.kernels.gaussian.joseph import posterior_of_squares
 from vedette.kernels.gaussian.linalg import LOG_2PI, cholesky_of_size, log_det_from_factor
 from vedette.kernels.gaussian.scratch import Scratch, wrap_angle
-from vedette.kernels.gaussian.sigma_points import LINEARISED, PointWeights, fill_sigma_points, moments_of_images
+from vedette.kernels.gaussian.sigma_points import (
+    LINEARISED,
+    SWITCHED,
+    PointWeights,
+    fill_sigma_points,
+    is_wide,
+    moments_of_images,
+)
 
 # Where a scan leaves less than this of the volume that was expected of it, cov - cross' cross cancels too many digits.
 LEAST_SHRINKAGE = 1e-8
@@ -154,6 +161,14 @@ def _condition(
 
 
 @inlined
+def _is_linearised(sensor: Sensor, pose: Floats, mean: Floats, cov: Floats) -> bool:
+    if sensor.method != SWITCHED:
+        return sensor.method == LINEARISED
+    dx, dy = mean[0] - pose[0], mean[1] - pose[1]
+    return not is_wide(cov[0, 0] + cov[1, 1], dx * dx + dy * dy)
+
+
+@inlined
 def expect(sensor: Sensor, pose: Floats, mean: Floats, cov: Floats, at: int, out: Innovation, scratch: Scratch) -> None:
     """Fill entry `at` of `out`; noise is taken at the predicted mean (paper-notes 3), detection as the sensor says."""
     expect_measurement(sensor, pose, mean, cov, at, out, scratch)
@@ -168,7 +183,7 @@ def expect_measurement(
     n, m = mean.shape[0], out.predicted.shape[1]
     jacobian, noise, innovation = scratch.measurement_jacobian, scratch.measurement_noise, scratch.innovation_cov
     factor, cross, posterior = out.factor[at], out.whitened_cross[at], out.covs[at]
-    linearised, weights = sensor.method == LINEARISED, PointWeights(0, 0.0, 0.0)
+    linearised, weights = _is_linearised(sensor, pose, mean, cov), PointWeights(0, 0.0, 0.0)
     if linearised:
         sensor.measurement(mean, pose, sensor.measurement_params, out.predicted[at])
         sensor.measurement_jacobian(mean, pose, sensor.measurement_params, jacobian)

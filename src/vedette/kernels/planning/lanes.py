@@ -19,7 +19,7 @@ from vedette.kernels.gaussian.innovation import LEAST_SHRINKAGE, Innovation, exp
 from vedette.kernels.gaussian.linalg import LOG_2PI
 from vedette.kernels.gaussian.prediction import predict
 from vedette.kernels.gaussian.scratch import Scratch, make_scratch
-from vedette.kernels.gaussian.sigma_points import LINEARISED
+from vedette.kernels.gaussian.sigma_points import LINEARISED, SWITCHED, is_wide
 from vedette.kernels.planning.forms import (
     Forms,
     Offsets,
@@ -224,6 +224,14 @@ def _condition(num: int, lanes: Lanes, work: LaneWork) -> None:
 
 
 @inlined
+def _mark_wide(num: int, lanes: Lanes, work: LaneWork) -> None:
+    """Make NaN the volumes of Gaussians for which sigma points are taken."""
+    volume, squares, first, second = work.volume, work.offsets.squares, lanes.covs[0], lanes.covs[place(1, 1)]
+    for s in range(num):
+        volume[s] = math.nan if is_wide(first[s] + second[s], squares[s]) else volume[s]
+
+
+@inlined
 def _mark_cancelled(num: int, lanes: Lanes, work: LaneWork) -> int:
     """Make NaN the volumes of Gaussians that must go by themselves, see `innovation`; returns their number."""
     volume, noise, wrong = work.volume, work.noise, 0
@@ -263,7 +271,7 @@ def _expect_alone(sensor: Sensor, pose: Floats, s: int, lanes: Lanes, work: Lane
 def expect_lanes(sensor: Sensor, forms: Forms, pose: Floats, num: int, lanes: Lanes, work: LaneWork) -> None:
     """Fill in what the first `num` predicted Gaussians expect of a scan from a pose, as `innovation.expect`."""
     meas_dim, scratch, offsets = lanes.predicted.shape[0], work.scratch, work.offsets
-    if sensor.method != LINEARISED or meas_dim > 2:
+    if sensor.method not in (LINEARISED, SWITCHED) or meas_dim > 2:
         for s in range(num):
             _expect_alone(sensor, pose, s, lanes, work)
         return
@@ -274,6 +282,8 @@ def expect_lanes(sensor: Sensor, forms: Forms, pose: Floats, num: int, lanes: La
     fill_noise(sensor, forms.noise, pose, means, offsets, num, scratch, work.noise)
     _project(jacobian_width(forms.measurement, means.shape[0]), num, lanes, work)
     _condition(num, lanes, work)
+    if sensor.method == SWITCHED:
+        _mark_wide(num, lanes, work)
     wrong = _mark_cancelled(num, lanes, work)
     for s in range(num):
         lanes.log_norm[s] = work.volume[s]

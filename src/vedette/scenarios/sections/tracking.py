@@ -124,7 +124,9 @@ class Filter(Section):
     )
     max_factor_labels: Count = Field(default=20, description="Of a factored_glmb: most labels of a factor [-].")
     gaussian_method: GaussianMethod = Field(
-        default="auto", description="Extended, unscented or cubature Kalman; auto: extended where Jacobians exist [-]."
+        default="auto",
+        description="Extended, unscented or cubature Kalman; auto: extended where Jacobians exist, but unscented for a "
+        "target that is close to a sensor for how well its place is known [-].",
     )
     detection_at: DetectionAt = Field(
         default="centre",
@@ -194,7 +196,9 @@ class CustomFilter(Custom):
 
     kind: Literal["custom"] = Field(default="custom", description="Kind of filter [-].")
     gaussian_method: GaussianMethod = Field(
-        default="auto", description="Extended, unscented or cubature Kalman; auto: extended where Jacobians exist [-]."
+        default="auto",
+        description="Extended, unscented or cubature Kalman; auto: extended where Jacobians exist, but unscented for a "
+        "target that is close to a sensor for how well its place is known [-].",
     )
     detection_at: DetectionAt = Field(
         default="centre",
