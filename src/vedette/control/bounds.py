@@ -43,7 +43,8 @@ def most_by_target(evidence: Evidence) -> tuple[float, int] | None:
     evaluator, known = evidence.evaluator, evidence.most_by_target
     if not known and isinstance(evaluator, AdditiveEvaluator) and evaluator.additive.coefficients is not None:
         best = best_values(evaluator.additive, evaluator.settings.max_bound_work)
-        known.append((float(best.sum()) + _most_found(evaluator.additive), int(np.isinf(best).sum())))
+        unknown = np.isinf(best).reshape(evaluator.additive.looks, -1).any(axis=0)
+        known.append((float(best.sum()) + _most_found(evaluator.additive), int(unknown.sum())))
     return known[0] if known else None
 
 

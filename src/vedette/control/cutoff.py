@@ -32,8 +32,9 @@ def beyond_cutoff(evaluator: AnyEvaluator, choice: Sequence[int]) -> Iterator[st
     if not isinstance(evaluator, AdditiveEvaluator) or evaluator.additive.valuation.kind != EXPECTED_LOSS:
         return
     valuation = evaluator.additive.valuation
-    cutoff, existence = math.sqrt(valuation.params[0]), expit(valuation.prior[:, -2])
-    detected, errors = _errors(evaluator, choice)
+    cutoff, num = math.sqrt(valuation.params[0]), len(valuation.prior) // evaluator.additive.looks
+    existence = expit(valuation.prior[:num, -2])
+    detected, errors = (own[:num] for own in _errors(evaluator, choice))
     likely = detected >= 0.5
     lost = likely & (errors > cutoff)
     uncounted, expected = float(existence[lost].sum()), float(existence[likely].sum())
@@ -54,7 +55,7 @@ def _errors(evaluator: AdditiveEvaluator, choice: Sequence[int]) -> tuple[Floats
     labels, changes = table.labels[entries], np.ascontiguousarray(table.changes[entries])
     offsets = offsets_of(np.diff(table.offsets)[courses])
     taken = table._replace(first_courses=np.arange(len(courses) + 1), offsets=offsets, labels=labels, changes=changes)
-    uncut = additive.valuation._replace(own=unseen[:, np.newaxis], params=np.array([math.inf]))
+    uncut = additive.valuation._replace(own=unseen[:, np.newaxis], params=np.array([math.inf, 1.0, 1.0]))
     # Each sensor has one course: the best of all is the loss -r (q tr P+ + (1 - q) tr P) itself.
     losses = -best_values(replace(additive, table=taken, valuation=uncut), max_work=len(courses) + 1)
     detected = -np.expm1(np.bincount(labels, changes[:, -1, 0], len(unseen)))

@@ -17,7 +17,7 @@ from vedette.control.inputs import check_choice, check_poses, check_steering, ch
 from vedette.control.plan import Plan, RewardTable
 from vedette.control.preparation import AnyReward, Preparation, check_sums, stay_glmbs
 from vedette.control.problem import joint_problem, note_lines
-from vedette.control.rewards import CauchySchwarzReward
+from vedette.control.rewards import ExpectedLossReward
 from vedette.control.rounds import Decided, decide_alone, decide_jointly
 from vedette.control.search import AutomaticSearch, JointSearch, SequentialGreedy, all_joint_actions, first_best
 from vedette.control.settings import MobileSensor, PlanningSettings
@@ -62,7 +62,7 @@ class JointPlanner:
     sensors: tuple[MobileSensor, ...]
     fusion: Fusion
     settings: PlanningSettings = field(default_factory=PlanningSettings)
-    reward: AnyReward = field(default_factory=CauchySchwarzReward)
+    reward: AnyReward = field(default_factory=ExpectedLossReward)
     search: JointSearch = field(default_factory=AutomaticSearch)
     constraints: tuple[Constraint, ...] = ()
     notes: tuple[str, ...] = ()
@@ -145,7 +145,7 @@ class IndependentPlanner:
     sensors: tuple[MobileSensor, ...]
     fusion: Fusion
     settings: PlanningSettings = field(default_factory=PlanningSettings)
-    reward: AnyReward = field(default_factory=CauchySchwarzReward)
+    reward: AnyReward = field(default_factory=ExpectedLossReward)
     constraints: tuple[Constraint, ...] = ()
     notes: tuple[str, ...] = ()
 

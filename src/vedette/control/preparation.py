@@ -24,6 +24,7 @@ from vedette.densities import (
     Labelled,
     UndetectedIntensity,
     as_lmb,
+    at_peaks,
     existence_probabilities,
     settled_lmb,
 )
@@ -109,7 +110,17 @@ class Preparation:
         else:
             fused, local = state.fused, state.local
             evaluator = AdditiveEvaluator.prepare(
-                sensors, own, self.rule, settings, reward, fused, local, state.undetected, time=state.time, rng=rng
+                sensors,
+                own,
+                self.rule,
+                settings,
+                reward,
+                fused,
+                local,
+                state.undetected,
+                time=state.time,
+                further=True,
+                rng=rng,
             )
         evaluator.notes.update(dict.fromkeys(unsought(settings, state.undetected, sums=self.rule is not None)))
         evaluator.notes.update(dict.fromkeys(without_scans(sensors, settings, state.time)))
@@ -201,6 +212,8 @@ def _planned(
         state = replace(state, local=local, fused=converted[id(state.fused)])
         notes = (f"planned on the LMBs of the GLMB beliefs: {why}",)
         fusion = _of_lmbs(fusion)
+    if isinstance(reward, ExpectedLossReward) and isinstance(state.fused, LMB):
+        state = replace(state, fused=at_peaks(state.fused))
     if from_one:
         state = replace(state, local=(state.fused,) * num_sensors)
     return _Planned(state, fusion, notes)

@@ -52,6 +52,7 @@ def shares_of(additive: AdditiveRewards, chosen: Ints) -> Shares:
     if coefficients is not None:
         existence = (parts.existence.mean(axis=2) - parts.unseen) @ coefficients
         localisation = (parts.labels.mean(axis=2) - parts.unseen) @ coefficients - existence
+        existence, localisation = (own.reshape(additive.looks, -1).sum(axis=0) for own in (existence, localisation))
     return Shares(start, existence, localisation, total, 0.5 * (first + last), end - without, samples)
 
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from vedette.densities import checks
 from vedette.densities.checks import distinct_labels
+from vedette.densities.containers import unchecked
 from vedette.densities.conversions import settled_lmb
 from vedette.densities.factored import LABELLED, FactoredGLMB, Labelled
 from vedette.densities.glmb import GLMB
@@ -149,6 +150,22 @@ def _peaks(tracks: TrackTable, chosen: Ints, existence: Floats) -> Estimate:
     return Estimate(tracks.labels[chosen], tracks.means[heaviest], tracks.covs[heaviest], existence)
 
 
+def at_peaks(density: LMB) -> LMB:
+    """Each label at the heaviest component of its mixture, the first of several.
+
+    The mean of two rival components may lie where the target cannot be, and their spread is no error that scans make
+    less: no scan tells two targets' names apart that have been together.
+    """
+    tracks, num = density.tracks, density.tracks.num_tracks
+    if len(tracks.log_weights) == num:
+        return density
+    peaks = _heaviest(tracks, np.arange(num))
+    single = unchecked(
+        TrackTable, tracks.labels, np.arange(num + 1), np.zeros(num), tracks.means[peaks], tracks.covs[peaks]
+    )
+    return unchecked(LMB, single, density.existence_logit)
+
+
 def _heaviest(mixtures: TrackTable | MultiBernoulli, chosen: Ints) -> Ints:
     """(len(chosen),) the heaviest component of each chosen mixture, the first of several."""
     starts, sizes = mixtures.offsets[chosen], np.diff(mixtures.offsets)[chosen]
@@ -255,6 +272,7 @@ def track_histories(estimates: Sequence[Estimate], times: Floats) -> tuple[Track
 __all__ = [
     "Estimate",
     "TrackHistory",
+    "at_peaks",
     "best_estimate",
     "map_estimate",
     "marginal_estimate",

@@ -19,12 +19,14 @@ class Options(NamedTuple):
     """What one sensor may do at a decision.
 
     actions: all of them, in the order of tables. courses: (num_courses, num_times, pose_dim) the different courses that
-    they lead to, each in the place of its first action. which: (num_actions,) which course each action takes.
+    they lead to, each in the place of its first action. which: (num_actions,) which course each action takes. pose:
+    (pose_dim,) where it is now.
     """
 
     actions: Actions
     courses: Floats
     which: Ints
+    pose: Floats
 
     def first_action(self, course: int) -> int:
         """The first action that takes a course."""
@@ -40,7 +42,7 @@ def options_at(field: str, platform: Platform, pose: Floats, times: Floats) -> O
     courses = courses_of(field, platform, pose, actions.values, times)
     firsts = _same(courses).argmax(axis=1)  # itself, if none before it
     own, which = np.unique(firsts, return_inverse=True)
-    return Options(actions, courses[own], which)
+    return Options(actions, courses[own], which, pose)
 
 
 def _same(courses: Floats) -> Bools:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any, TypeAlias
 
 import numpy as np
 
+from vedette.control.additive.look_on import at_all, continued, look_on
 from vedette.control.additive.rewards import AdditiveRewards
 from vedette.control.additive.situation import Samples, starts_of
 from vedette.control.additive.table import lay_out_changes
@@ -59,13 +61,48 @@ class AdditiveEvaluator:
         undetected: UndetectedIntensity | None = None,
         *,
         time: float | None = None,
+        further: bool = False,
         rng: np.random.Generator,
     ) -> AdditiveEvaluator:
         """Draw the samples, predict, and follow every label over every course that reaches it.
 
         rule: how the sensors' densities become one. beliefs: of each sensor. undetected: targets not found
-        yet. time: of the decision, s, where it is known. Raises as `JointPlanner.plan`.
+        yet. time: of the decision, s, where it is known. further: whether the expected loss looks on beyond the horizon
+        (`vedette.control.additive.look_on`). Raises as `JointPlanner.plan`.
         """
+        lay_out = partial(
+            cls._lay_out, tuple(sensors), rule, reward, fused, tuple(beliefs), undetected, time=time, rng=rng
+        )
+        evaluator = lay_out(tuple(options), settings)
+        if not further or not isinstance(reward, ExpectedLossReward):
+            return evaluator
+        looks = look_on(sensors, options, evaluator.prediction, settings)
+        if not looks:
+            return evaluator
+        horizon, counts = settings.horizon_times(), dict(evaluator.counts)
+        found = [evaluator.additive]
+        for own in looks:
+            later = lay_out(tuple(continued(each, horizon, own.horizon_times()) for each in options), own)
+            counts["filter_steps"] += later.counts["filter_steps"]
+            found.append(later.additive)
+        return replace(evaluator, additive=at_all(found), counts=counts)
+
+    @classmethod
+    def _lay_out(
+        cls,
+        sensors: tuple[MobileSensor, ...],
+        rule: LinearRule,
+        reward: Any,
+        fused: LMB,
+        beliefs: tuple[LMB, ...],
+        undetected: UndetectedIntensity | None,
+        options: tuple[Options, ...],
+        settings: PlanningSettings,
+        *,
+        time: float | None,
+        rng: np.random.Generator,
+    ) -> AdditiveEvaluator:
+        """Up to the end of the horizon."""
         sampled = not isinstance(reward, ExpectedLossReward)
         motion = shared_targets([sensor.filter for sensor in sensors]).motion
         prediction = predicted(fused, motion, settings.horizon_steps, settings.horizon_period)
@@ -99,7 +136,7 @@ class AdditiveEvaluator:
             settings.threads(),
         )
         counts = {"filter_steps": len(table.labels) * num_samples * settings.horizon_steps, "rewards": 0}
-        return cls(tuple(sensors), settings, tuple(options), prediction, additive, counts)
+        return cls(sensors, settings, options, prediction, additive, counts)
 
     def joint_shape(self) -> tuple[int, ...]:
         """Number of different courses of each sensor."""

@@ -24,8 +24,9 @@ def valuation_of(reward: PowerReward | LabelReward | ExpectedLossReward, predict
     """
     if isinstance(reward, ExpectedLossReward):
         covs = prediction.tracks.covs
-        unseen = np.minimum(covs[:, 0, 0] + covs[:, 1, 1], reward.cutoff**2)[:, np.newaxis]
-        return _valuation(EXPECTED_LOSS, 1, prediction, prior, unseen, params=np.array([reward.cutoff**2]))
+        unseen = np.minimum(covs[:, 0, 0] + covs[:, 1, 1], reward.cutoff**2)[:, np.newaxis] ** (0.5 * reward.order)
+        params = np.array([reward.cutoff**2, 0.5 * reward.order, 1.0])
+        return _valuation(EXPECTED_LOSS, 1, prediction, prior, unseen, params=params)
     if isinstance(reward, PowerReward):
         volume = unit_volume_of(reward, prediction)
         exponents = np.array([[float(a), float(b)] for a, b in reward.exponents])

@@ -109,7 +109,7 @@ class LaidCourses:
 
     def _options(self, tree: CourseTree, courses: list[Floats]) -> Options:
         shape = len(courses), tree.stages.num_steps(self.stage), len(tree.pose)
-        return Options(tree.options(()).actions, np.array(courses).reshape(shape), np.arange(len(courses)))
+        return Options(tree.options(()).actions, np.array(courses).reshape(shape), np.arange(len(courses)), tree.pose)
 
     def _rewards(self) -> AdditiveRewards:
         """Of all courses so far: a sensor might take any of them, and is given its own."""

@@ -27,7 +27,7 @@ from vedette.control.lookahead.rules import Rules
 from vedette.control.plan import Plan
 from vedette.control.preparation import AnyReward, Sums, check_sums, prepare_sums, unsought, without_scans
 from vedette.control.problem import joint_problem, note_lines
-from vedette.control.rewards import CauchySchwarzReward
+from vedette.control.rewards import ExpectedLossReward
 from vedette.control.search import AutomaticSearch
 from vedette.control.settings import MobileSensor, PlanningSettings
 from vedette.errors import NumericalError
@@ -82,7 +82,7 @@ class HorizonPlanner:
     sensors: tuple[MobileSensor, ...]
     fusion: Fusion
     settings: PlanningSettings = field(default_factory=PlanningSettings)
-    reward: AnyReward = field(default_factory=CauchySchwarzReward)
+    reward: AnyReward = field(default_factory=ExpectedLossReward)
     depth: int = 3
     period: float | None = None
     search: SequenceSearch = field(default_factory=BeamSearch)
@@ -173,7 +173,7 @@ class HorizonPlanner:
         """What a `JointPlanner` would decide."""
         options, steps = tuple(tree.options(()) for tree in trees), trees[0].stages.steps
         now = tuple(own._replace(courses=np.ascontiguousarray(own.courses[:, :steps])) for own in options)
-        evaluator = self._lay_out(steps, sums, now, rng)
+        evaluator = self._lay_out(steps, sums, now, rng, further=True)
         evidence = Evidence(evaluator, tuple(range(len(trees))), evaluator.joint())
         mask = None if rules is None else rules.first()
         choice = AutomaticSearch().search(joint_problem(evidence, mask), rng=rng)
@@ -206,7 +206,13 @@ class HorizonPlanner:
         return SequenceProblem(trees, depth, tuple(parts), self.budget, rules)
 
     def _lay_out(
-        self, num_steps: int, sums: Sums, options: tuple[Options, ...], rng: np.random.Generator
+        self,
+        num_steps: int,
+        sums: Sums,
+        options: tuple[Options, ...],
+        rng: np.random.Generator,
+        *,
+        further: bool = False,
     ) -> AdditiveEvaluator:
         settings = replace(self.settings, horizon_steps=num_steps)
         return AdditiveEvaluator.prepare(
@@ -219,6 +225,7 @@ class HorizonPlanner:
             sums.local,
             sums.undetected,
             time=sums.time,
+            further=further,
             rng=rng,
         )
 

@@ -1,7 +1,7 @@
 """The best that each label can hope for: the joint actions of the sensors that may see it, tried one after the other.
 
-Where they are too many, the expected loss -r (q min(tr P+, c^2) + (1 - q) min(tr P, c^2)) of a label has a bound that
-takes as long as the sensors have actions: q is at most 1 - prod_s (1 - max_a q_sa), and as q >= q_s for every sensor,
+Where they are too many, the expected loss -r (q min(tr P+, c^2)^h + (1 - q) min(tr P, c^2)^h) of a label has a bound
+that takes as long as the sensors have actions: q is at most 1 - prod_s (1 - max_a q_sa), and as q >= q_s for every sensor,
 
     sum_s Y_s / q <= sum_s Y_s / q_s <= sum_s J_s,
 
@@ -194,9 +194,10 @@ def losses_at_least(table: Table, valuation: Valuation, choices: Choices, out: F
                 for i in range(n):
                     for j in range(n):
                         join.total[i, j] += join.joined[i, j]
-        seen = min(_trace_at_least(join), valuation.own[label, 0]) if valid else -math.inf
-        existence, detected = 1.0 / (1.0 + math.exp(-prior[last - 2])), -math.expm1(missed)
-        out[label] = -existence * (detected * max(seen, 0.0) + (1.0 - detected) * valuation.own[label, 0])
+        trace = _trace_at_least(join) if valid else -math.inf
+        seen = min(max(trace, 0.0) ** valuation.params[1], valuation.own[label, 0])
+        weight, detected = valuation.params[2] / (1.0 + math.exp(-prior[last - 2])), -math.expm1(missed)
+        out[label] = -weight * (detected * seen + (1.0 - detected) * valuation.own[label, 0])
 
 
 __all__ = ["Choices", "best_of_labels", "losses_at_least"]

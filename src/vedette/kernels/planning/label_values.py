@@ -38,7 +38,7 @@ class Valuation(NamedTuple):
     own: Floats  # (num_labels, num) what of a number depends on the prediction alone
     exponents: Floats  # (num, 2) pairs (a, b) of power integrals
     log_volume: float  # log K
-    params: Floats  # of the function; of the expected loss the squared cutoff
+    params: Floats  # of the function; of the expected loss the squared cutoff c^2, half the order p, and a factor
     function: Any  # of FUNCTION: see `vedette.models.model_function`, kind `label_reward`
     references: Floats  # (num_labels, state_dim) means of the prediction, about which rows are taken
     covs: Floats  # (num_labels, state_dim, state_dim) of the prediction
@@ -126,7 +126,7 @@ def _position_trace(total: Floats, sample: int, prior: Floats, share: float, wor
 
 @inlined
 def _expected_loss(valuation: Valuation, label: int, sample: int, work: ValueWork) -> float:
-    """Less r (q min(tr P+, c^2) + (1 - q) min(tr P, c^2))."""
+    """Less r (q min(tr P+, c^2)^(p/2) + (1 - q) min(tr P, c^2)^(p/2)), times the factor."""
     size, unseen = work.total.shape[0], valuation.own[label, 0]
     prior = valuation.prior[label]
     existence = 1.0 / (1.0 + math.exp(-prior[size - 2]))
@@ -134,7 +134,8 @@ def _expected_loss(valuation: Valuation, label: int, sample: int, work: ValueWor
     seen = unseen
     if detected > 0.0:
         seen = min(_position_trace(work.total, sample, prior, 1.0 / detected, work), valuation.params[0])
-    return float(-existence * (detected * seen + (1.0 - detected) * unseen))
+        seen = seen ** valuation.params[1]
+    return float(-valuation.params[2] * existence * (detected * seen + (1.0 - detected) * unseen))
 
 
 @borrowing

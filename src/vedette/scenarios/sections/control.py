@@ -25,7 +25,7 @@ from vedette.scenarios.sections.base import (
 )
 from vedette.scenarios.sections.constraints import AnyConstraint
 from vedette.scenarios.sections.lookahead import Lookahead
-from vedette.scenarios.sections.rewards import AnyReward, CauchySchwarzReward
+from vedette.scenarios.sections.rewards import AnyReward, ExpectedLossReward
 from vedette.scenarios.sections.search import AnySearch, Automatic
 
 if TYPE_CHECKING:  # with the planners comes the compiler, which a check does without
@@ -106,11 +106,14 @@ class Control(Section):
         "which is fast for any number of targets and sensors; or the filter's own update, which asks which it was "
         "[-].",
     )
-    reward: AnyReward = Field(default=CauchySchwarzReward(), description="Value of a density [-].")
+    reward: AnyReward = Field(
+        default=ExpectedLossReward(),
+        description="Value of a density; none: the expected loss, of the cutoff and the order of ospa [-].",
+    )
     undetected_worth: Annotated[float, Field(ge=0.0)] = Field(
         default=0.0,
         description="What finding a target of `undetected` is worth, in units of the reward; of the expected loss "
-        "m^2, such as its squared cutoff [-].",
+        "m to the power of its order, such as its cutoff to that power [-].",
     )
     search: AnySearch = Field(default=Automatic(), description="Which joint actions a joint decision evaluates [-].")
     constraints: Annotated[tuple[AnyConstraint, ...], Field(strict=False)] = Field(

@@ -111,17 +111,20 @@ class PeecsReward(Section):
 
 
 class ExpectedLossReward(Section):
-    """Less the squared error to be expected of the targets' positions; in closed form, without samples."""
+    """Less the error to be expected of the targets' positions; in closed form, without samples."""
 
     kind: Literal["expected_loss"] = Field(default="expected_loss", description="Kind of reward [-].")
-    words: ClassVar[str] = "minus expected loss, m²"
+    words: ClassVar[str] = "minus expected loss"
     cutoff: Positive = Field(default=100.0, description="Error that counts as a lost target [m].")
+    order: Positive = Field(
+        default=1.0, description="Power of the error, as of the score: 1 of OSPA, 2 of squared errors [-]."
+    )
 
     def build(self, folder: Path) -> Built:
         """The value of the scans."""
         from vedette.control import ExpectedLossReward
 
-        return ExpectedLossReward(self.cutoff)
+        return ExpectedLossReward(self.cutoff, self.order)
 
 
 class CustomReward(Custom):

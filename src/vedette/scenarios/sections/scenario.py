@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from typing import Annotated, Any, Literal
 
@@ -38,6 +39,21 @@ def merge_sensor_defaults(data: Mapping[str, Any]) -> dict[str, Any]:
         given = {key: value for key, value in defaults.items() if value is not None}
         merged["sensors"] = [{**given, **item} if isinstance(item, Mapping) else item for item in sensors]
     return merged
+
+
+def with_reward(data: Mapping[str, Any]) -> Mapping[str, Any]:
+    """A scenario's data in which decisions that name no reward go by the error by which they are scored."""
+    control, score = data.get("control"), data.get("ospa")
+    if not isinstance(control, Mapping) or "reward" in control or not isinstance(score, Mapping):
+        return data
+    given = {name: score[name] for name in ("cutoff", "order") if name in score}
+    if score.get("components", "position") != "position" or not all(map(_is_positive, given.values())):
+        return data
+    return {**data, "control": {**control, "reward": {"kind": "expected_loss", **given}}}
+
+
+def _is_positive(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and 0.0 < value < math.inf
 
 
 class ScenarioModel(Section):
@@ -90,8 +106,8 @@ class ScenarioModel(Section):
 
     @classmethod
     def prepared(cls, data: Mapping[str, Any]) -> Mapping[str, Any]:
-        """With what `sensor_defaults` gives, in every sensor."""
-        return merge_sensor_defaults(data)
+        """With what `sensor_defaults` gives, in every sensor, and a reward where none is named."""
+        return with_reward(merge_sensor_defaults(data))
 
     @field_validator("sensor_defaults")
     @classmethod

@@ -1,0 +1,145 @@
+"""What actions lead to beyond the horizon: where some sensor has no target in its reach, none of its actions is better.
+
+Within the horizon, a sensor that sees 250 m and goes 20 m has nothing to gain from a target 300 m off, and of courses
+that are worth the same the first is taken. So all sensors are taken to go on as they do, until each may have come to a
+target and each target may be reached by one of them, and the loss is the mean of those at the horizon, half way to that
+time, and then.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from vedette.control.additive.rewards import AdditiveRewards
+from vedette.control.settings import MobileSensor, PlanningSettings
+from vedette.densities import LMB
+from vedette.densities.checks import offsets_of
+from vedette.kernels.base.types import Floats, Ints
+from vedette.kernels.planning.ascent import Cells
+from vedette.platforms import Options
+
+# Targets that exist with less probability draw no sensor from afar.
+_LEAST_EXISTENCE = 0.1
+# A sensor goes so much longer than it takes to its target, to see it for a while.
+_STAY = 1.25
+# Where it is asked how far a sensor sees, m, and in how many directions.
+_DISTANCES, _DIRECTIONS = np.geomspace(1.0, 1e6, 121), 8
+# Pseudo-updates on the way. A step is no longer than a sensor sees, so that it does not pass a target unseen.
+_LEAST_STEPS, _MOST_STEPS = 4, 12
+
+
+def seconds_of_horizon(settings: PlanningSettings) -> float:
+    """To the end of the horizon."""
+    return settings.horizon_steps * settings.horizon_period
+
+
+def look_on(
+    sensors: Sequence[MobileSensor], options: Sequence[Options], prediction: LMB, settings: PlanningSettings
+) -> tuple[PlanningSettings, ...]:
+    """The settings of the looks beyond the horizon, half way and at their end; none where all see what there is to see.
+
+    prediction: at the end of the horizon.
+    """
+    horizon, places = seconds_of_horizon(settings), prediction.tracks.means[:, :2]
+    places = places[prediction.existence >= _LEAST_EXISTENCE]
+    speeds = np.array([_speed(own, horizon) for own in options])
+    if len(places) == 0 or not (speeds > 0.0).all():
+        return ()
+    reaches = np.array([_sight(sensor, own.pose) for sensor, own in zip(sensors, options, strict=True)])
+    ends = [own.courses[:, -1, :2] for own in options]
+    gaps = np.stack([np.hypot(*(own[:, np.newaxis] - places).transpose(2, 0, 1)).min(axis=0) for own in ends])
+    seconds = np.maximum(gaps - reaches[:, np.newaxis], 0.0) / speeds[:, np.newaxis]
+    beyond = _STAY * max(float(seconds.min(axis=0).max()), float(seconds.min(axis=1).max()))
+    if beyond == 0.0:
+        return ()
+    rate = float((speeds / reaches).max())
+    total = min(horizon + beyond, max(_MOST_STEPS / rate, 2.0 * horizon))
+    num = min(max(_LEAST_STEPS, math.ceil(total * rate)), _MOST_STEPS)
+    half = max(num // 2, 1)
+    return tuple(_with_horizon(settings, steps, total / num) for steps in (half, num))
+
+
+def continued(own: Options, horizon: Floats, times: Floats) -> Options:
+    """The options with courses (num_courses, num_times, pose_dim) at other times, s, from now on.
+
+    horizon: (num_steps,) s of the poses that there are. Between them a sensor goes straight; after the last it goes on
+    by as much as it went over the whole horizon, again and again, and what else its pose has stays.
+    """
+    start = np.broadcast_to(own.pose, (len(own.courses), 1, len(own.pose)))
+    known = np.concatenate([start, own.courses], axis=1)
+    ends = np.concatenate([[0.0], horizon])
+    rounds = np.maximum(np.ceil(times / ends[-1] - 1e-9) - 1.0, 0.0)
+    within = times - rounds * ends[-1]
+    after = np.searchsorted(ends, within - 1e-9).clip(1, len(horizon))
+    share = ((within - ends[after - 1]) / (ends[after] - ends[after - 1]))[:, np.newaxis]
+    courses = np.where(rounds[:, np.newaxis] > 0.0, known[:, -1:], known[:, after])
+    moved = known[:, -1:, :2] - known[:, :1, :2]
+    straight = known[:, after - 1, :2] * (1.0 - share) + known[:, after, :2] * share
+    courses[:, :, :2] = straight + rounds[:, np.newaxis] * moved
+    return own._replace(courses=np.ascontiguousarray(courses))
+
+
+def at_all(looks: Sequence[AdditiveRewards]) -> AdditiveRewards:
+    """The mean of expected losses at several times, which are as of so many labels more; cells likewise."""
+    first, num = looks[0], len(looks)
+    order, offsets = _in_turn([own.table.offsets for own in looks])
+    num_labels = len(first.table.start)
+    labels = np.concatenate([own.table.labels + k * num_labels for k, own in enumerate(looks)])
+    changes = np.concatenate([own.table.changes for own in looks])
+    start = np.concatenate([own.table.start for own in looks])
+    table = first.table._replace(offsets=offsets, labels=labels[order], changes=changes[order], start=start)
+    several = [own.valuation for own in looks]
+    valuation = first.valuation._replace(
+        params=first.valuation.params * np.array([1.0, 1.0, 1.0 / num]),
+        prior=np.concatenate([own.prior for own in several]),
+        own=np.concatenate([own.own for own in several]),
+        references=np.concatenate([own.references for own in several]),
+        covs=np.concatenate([own.covs for own in several]),
+    )
+    bases: dict[tuple[int, ...], Floats] = {}
+    for each in zip(*(own.bases for own in looks), strict=True):
+        bases.setdefault(tuple(map(id, each)), np.concatenate(each))
+    shared = tuple(bases[tuple(map(id, each))] for each in zip(*(own.bases for own in looks), strict=True))
+    return AdditiveRewards(table, valuation, shared, first.reward, _cells(looks), first.num_threads, num)
+
+
+def _cells(looks: Sequence[AdditiveRewards]) -> Cells:
+    several = [own.cells for own in looks]
+    order, offsets = _in_turn([own.offsets for own in several])
+    num_cells = len(several[0].worth)
+    cells = np.concatenate([own.cells + k * num_cells for k, own in enumerate(several)])
+    log_miss = np.concatenate([own.log_miss for own in several])
+    return Cells(offsets, cells[order], log_miss[order], np.concatenate([own.worth for own in several]) / len(looks))
+
+
+def _in_turn(offsets: Sequence[Ints]) -> tuple[Ints, Ints]:
+    """The order in which entries that stand one list after the other go course by course, and their offsets."""
+    counts = np.stack([np.diff(own) for own in offsets])
+    num_lists, num_courses = counts.shape
+    lists = np.repeat(np.tile(np.arange(num_courses), num_lists), counts.ravel())
+    return np.argsort(lists, kind="stable"), offsets_of(counts.sum(axis=0))
+
+
+def _sight(sensor: MobileSensor, pose: Floats) -> float:
+    """m, the distance up to which it detects at least half as well as it does anywhere, in the best direction."""
+    model, dim = sensor.filter.sensor.detection, sensor.filter.targets.state_dim
+    states = np.zeros((len(_DISTANCES) * _DIRECTIONS, dim))
+    angles = pose[2] + 2.0 * np.pi * np.arange(_DIRECTIONS) / _DIRECTIONS
+    around = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    states[:, :2] = pose[:2] + (_DISTANCES[:, np.newaxis, np.newaxis] * around).reshape(-1, 2)
+    chances = model.prob(states, pose).reshape(-1, _DIRECTIONS).max(axis=1)
+    return float(_DISTANCES[np.flatnonzero(chances >= 0.5 * chances.max())[-1]])
+
+
+def _speed(own: Options, horizon: float) -> float:
+    """m/s of the course that goes farthest."""
+    offsets = own.courses[:, -1, :2] - own.pose[:2]
+    return float(np.hypot(offsets[:, 0], offsets[:, 1]).max()) / horizon
+
+
+def _with_horizon(settings: PlanningSettings, steps: int, period: float) -> PlanningSettings:
+    return replace(settings, horizon_steps=steps, horizon_period=period)
