@@ -1,15 +1,20 @@
-"""Decisions over several periods against single ones, on the scenes where looking ahead might pay.
+"""Decisions over several periods against single ones, on the scenes where looking ahead might pay, and where not.
 
-    python benchmarks/lookahead.py                                             # both scenes, 6 runs
+    python benchmarks/lookahead.py                                             # two scenes, 6 runs
     python benchmarks/lookahead.py beyond-the-gap --runs 50 --out lookahead.jsonl
     python benchmarks/lookahead.py two-searchers --only "depth 3, beam" "depth 5, tree 49"
+    python benchmarks/lookahead.py paper-a paper-e layout-0 layout-1 layout-2 --runs 40 --seed 0
 
 Runs are paired: at the same number every strategy meets the same truth, and random numbers of the same seed. OSPA and
 GOSPA (alpha = 2, under the scene's cutoff and order) are means over scans and runs, with one standard error over the
-runs; "gained" is the GOSPA of the single decision ("depth 1", or another strategy: `--against`) less that of the
-strategy, paired, with its standard error, and "(none)" where it is less than two of these above zero. Times are process
+runs; "gained" is what the single decision ("depth 1", or another strategy: `--against`) has more than the strategy,
+paired, with its standard error, and "(none)" where it is less than two of these above zero. Times are process
 CPU time of planning, the median of a run's decisions and then of the runs, in a process of one thread. With `--out`
 each run is written as it ends, and what is there is not run again.
+
+"defaults" are those of `lookahead`. On `paper-a`, `paper-e` and `layout-N`, which decide every ten scans and see
+everything, tracks are kept by LMB filters under CLMB fusion and decided on by the expected loss; `layout-N` is
+`paper-a` with its targets drawn in a square of 1400 m and its sensors in one of 1800 m.
 
 A single decision is given the time of longer plans in two ways, as more samples cannot better it (the scenes' reward
 needs none, and all its joint actions are evaluated): it has more directions to choose from, and "kept" is about courses
@@ -24,7 +29,7 @@ import json
 import time
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from functools import partial
+from functools import cache, partial
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any, NamedTuple, TypeAlias
@@ -35,11 +40,18 @@ from vedette.control import Plan, Planner
 from vedette.evaluation.metrics import ospa_of_run
 from vedette.evaluation.runs import measure_run
 from vedette.kernels.base.types import Floats
-from vedette.scenarios import load_scenario, with_fields
+from vedette.scenarios import Scenario, load_scenario, with_fields
 from vedette.scenarios.build import build_experiment, build_planner
+from vedette.scenarios.sections.lookahead import Lookahead
 from vedette.simulation import simulate
 
 SCENES = ("beyond-the-gap", "two-searchers")
+SPARSE = {
+    "filter": {"kind": "lmb"},
+    "fusion": {"kind": "clmb", "feedback": False},
+    "control.reward": {"kind": "expected_loss", "cutoff": 100.0},
+}
+SIDE, MARGIN, SPEED, FIRST_LAYOUT = 1400.0, 200.0, 10.0, 1000  # m, m, m/s, seed
 STEPS = {"beyond-the-gap": 30.0, "two-searchers": 15.0}  # m, length of a step in a second
 DEEPEST = 5
 FINE = (48, 96)  # directions
@@ -66,8 +78,44 @@ class Score(NamedTuple):
     seconds: float
 
 
+@cache
+def scenario_of(scene: str) -> Scenario:
+    """A scenario that comes with the library, on its own or with LMB filters; or a layout."""
+    if scene in SCENES:
+        return load_scenario(scene)
+    if not scene.startswith("layout-"):
+        return with_fields(load_scenario(scene), SPARSE)
+    given, rng = scenario_of("paper-a"), np.random.default_rng(FIRST_LAYOUT + int(scene.removeprefix("layout-")))
+    places, courses = rng.uniform(0.0, SIDE, (4, 2)), rng.uniform(0.0, 2.0 * np.pi, 4)
+    sensors = rng.uniform(-MARGIN, SIDE + MARGIN, (2, 2)).tolist()
+    states = np.column_stack([places, SPEED * np.cos(courses), SPEED * np.sin(courses)]).tolist()
+    low, high, std = -2.0 * MARGIN, SIDE + 2.0 * MARGIN, given.model.birth.sites[0].std
+    layout = {
+        "region": {"x_min": low, "x_max": high, "y_min": low, "y_max": high},
+        "birth.sites": [{"existence": 0.9, "mean": state, "std": std} for state in states],
+        "targets.tracks": [{"state": state} for state in states],
+        **{f"sensors.{s}.position": place for s, place in enumerate(sensors)},
+    }
+    return with_fields(given, layout)
+
+
+def ahead(depth: int, discount: float | None) -> dict[str, Any]:
+    """Fields of a `lookahead` that has its defaults else."""
+    return {"control.lookahead": Lookahead(depth=depth, discount=discount).model_dump()}
+
+
 def strategies(scene: str) -> tuple[Strategy, ...]:
     """The rows of a scene; the first is what the others are compared with."""
+    if scene not in SCENES:
+        return (
+            Strategy("depth 1", "jdm", {}),
+            Strategy("depth 2, defaults", "lookahead", ahead(2, Lookahead().discount)),
+            Strategy("depth 3, defaults", "lookahead", {}),
+            Strategy("depth 3, discount 0.5", "lookahead", ahead(3, 0.5)),
+            Strategy("depth 3, discount 1", "lookahead", ahead(3, 1.0)),
+            Strategy("depth 2, only the end", "lookahead", ahead(2, None)),
+            Strategy("depth 3, only the end", "lookahead", ahead(3, None)),
+        )
     directions = load_scenario(scene).model.sensors[0].platform.model_dump()["directions_deg"]
     rows = [Strategy("depth 1", "jdm", {})]
     for num in FINE:
@@ -77,6 +125,7 @@ def strategies(scene: str) -> tuple[Strategy, ...]:
         kept = {"kind": "courses", "speeds": [STEPS[scene], 0.0], "headings_deg": list(headings)}
         fields = {"sensors.*.platform": kept, "control.horizon_steps": DEEPEST}
         rows.append(Strategy(f"kept {DEEPEST} s, {len(headings)} directions", "jdm", fields))
+    rows.append(Strategy("depth 3, defaults", "lookahead", {"control.lookahead": None}))
     for depth in (2, 3, 4):
         fields = {"control.lookahead.depth": depth, "control.lookahead.method": "beam"}
         rows.append(Strategy(f"depth {depth}, beam", "lookahead", fields))
@@ -117,14 +166,15 @@ class Timed:
 
 def score(scene: str, strategy: Strategy, run: int, seed: int) -> Score:
     """One run."""
-    scenario = with_fields(load_scenario(scene), strategy.fields)
+    scenario = with_fields(scenario_of(scene), strategy.fields)
     planner, ospa = build_planner(scenario, strategy.planner, 1), scenario.model.ospa
     assert planner is not None
     timed = Timed(planner)
     ospa_of = partial(ospa_of_run, cutoff=ospa.cutoff, order=ospa.order, components=ospa.components)
     record = simulate(build_experiment(scenario), timed, seed=seed, run=run, score=ospa_of)
+    window = slice(ospa.from_step - 1, ospa.to_step)
     gospa = float(measure_run(record, scenario).gospa_m.mean())
-    return Score(float(record.ospa[:, 0].mean()), gospa, float(np.median(timed.seconds)))
+    return Score(float(record.ospa[window, 0].mean()), gospa, float(np.median(timed.seconds)))
 
 
 def with_error(values: Floats) -> str:
@@ -133,17 +183,21 @@ def with_error(values: Floats) -> str:
     return f"{values.mean():.2f} ± {error:.2f}"
 
 
+def gain(gains: Floats) -> str:
+    """Mean and standard error, and whether that is anything."""
+    error = gains.std(ddof=1) / np.sqrt(len(gains)) if len(gains) > 1 else np.inf
+    return with_error(gains) + ("" if gains.mean() > 2.0 * error else " (none)")
+
+
 def table(scene: str, rows: dict[str, Floats], against: str) -> Iterator[str]:
     """The lines of a scene's table, of scores (num_runs, 3) by strategy."""
-    yield f"| Strategy | OSPA (m) | GOSPA (m) | CPU ms a decision | GOSPA gained on {against} (m) |"
-    yield "| --- | ---: | ---: | ---: | ---: |"
+    yield f"| Strategy | OSPA (m) | GOSPA (m) | CPU ms a decision | OSPA gained on {against} (m) | GOSPA gained (m) |"
+    yield "| --- | ---: | ---: | ---: | ---: | ---: |"
     single = rows[against]
     for name, scores in rows.items():
-        gains = single[:, 1] - scores[:, 1]
-        error = gains.std(ddof=1) / np.sqrt(len(gains)) if len(gains) > 1 else np.inf
-        gain = "" if scores is single else with_error(gains) + ("" if gains.mean() > 2.0 * error else " (none)")
-        cells = [name, with_error(scores[:, 0]), with_error(scores[:, 1]), f"{1e3 * np.median(scores[:, 2]):.0f}", gain]
-        yield "| " + " | ".join(cells) + " |"
+        own = [with_error(scores[:, 0]), with_error(scores[:, 1]), f"{1e3 * np.median(scores[:, 2]):.0f}"]
+        gained = ["", ""] if scores is single else [gain(single[:, i] - scores[:, i]) for i in (0, 1)]
+        yield "| " + " | ".join([name, *own, *gained]) + " |"
     yield ""
     yield f"{len(single)} paired runs of {scene}."
 
@@ -166,7 +220,7 @@ class Store:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("scenes", nargs="*", default=SCENES, help=f"of {', '.join(SCENES)}")
+    parser.add_argument("scenes", nargs="*", default=SCENES, help=f"of {', '.join(SCENES)}, paper-a, paper-e, layout-N")
     parser.add_argument("--runs", type=int, default=6, help="of each strategy")
     parser.add_argument("--first", type=int, default=0, help="number of the first run")
     parser.add_argument("--seed", type=int, default=5)

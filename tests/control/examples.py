@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from vedette import models
-from vedette.control import CauchySchwarzReward, Evaluator, MobileSensor, PlanningSettings, planning_limits
+from vedette.control import CauchySchwarzReward, Evaluator, MobileSensor, Plan, PlanningSettings, planning_limits
 from vedette.control.additive.evaluator import AdditiveEvaluator
 from vedette.control.inputs import options_of
 from vedette.densities import GLMB, LMB, TrackTable
@@ -191,3 +191,8 @@ def additive_of(situation: Situation, reward: Any = None, seed: int = 5) -> Addi
         time=situation.state.time,
         rng=np.random.default_rng(seed),
     )
+
+
+def told(plan: Plan) -> tuple[str, ...]:
+    """The notes of a plan but those on how far it looks ahead."""
+    return tuple(note for note in plan.notes if not note.startswith("depth "))

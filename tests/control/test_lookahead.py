@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -25,8 +26,12 @@ from vedette.control import (
 )
 from vedette.densities import LMB
 from vedette.errors import InputError
+from vedette.evaluation import ospa_of_run
 from vedette.fusion import Clmb
 from vedette.platforms import Courses, Sequences, Steps
+from vedette.scenarios import load_scenario, with_fields
+from vedette.scenarios.build import build_experiment, build_planner
+from vedette.simulation import simulate
 
 KNOWN = replace(SETTINGS, association="known")
 REWARDS = [CauchySchwarzReward(), KullbackLeiblerReward(), ExpectedLossReward()]
@@ -196,6 +201,7 @@ def test_glmbs_are_planned_on_as_lmbs_and_the_plan_says_so() -> None:
     assert plan.notes == (
         "fused otherwise",
         "planned on the LMBs of the GLMB beliefs: so are all sequences of decisions",
+        "depth 2 does not pay: the actions are those of the best single decision",
     )
 
 
@@ -270,3 +276,69 @@ def test_all_joint_sequences_are_counted() -> None:
     plan = decide(planner(given, depth=2), given)
     assert plan.curve is not None
     assert plan.curve.evaluations.tolist() == [len(list(itertools.product(range(9), range(9))))]
+
+
+@pytest.mark.parametrize("search", SEARCHES, ids=repr)
+@pytest.mark.parametrize("discount", [None, 0.25, 1.0])
+def test_the_best_single_decision_stays_inside_the_search(search: Any, discount: float | None) -> None:
+    given, reward = lmbs(num_sensors=3), ExpectedLossReward()
+    single = decide(JointPlanner(given.sensors, given.fusion, given.settings, reward), given)
+    for budget in (1, 20, 300):
+        plan = decide(planner(given, reward, depth=3, search=search, budget=budget, discount=discount), given)
+        kept = float(plan.tables[0].mean[single.chosen])
+        assert np.isfinite(kept)
+        assert plan.expected_rewards[0][0] >= kept
+        told = "depth 3 does not pay: the actions are those of the best single decision" in plan.notes
+        assert told == (plan.chosen == single.chosen)
+
+
+def test_beams_find_the_best_of_all_from_there() -> None:
+    """Of 28,561 joint sequences the best, within a budget of 2000."""
+    sensor = mobile_sensor("lmb", Courses(30.0, tuple(range(-180, 181, 30))))
+    found = []
+    for seed in range(6):
+        given = replace(situation("lmb", 2, seed, KNOWN), sensors=(sensor,) * 2)
+        best, short = (
+            decide(HorizonPlanner(given.sensors, given.fusion, given.settings, ExpectedLossReward(), 2, **more), given)
+            for more in ({"budget": 28_561}, {})
+        )
+        assert short.curve is not None
+        assert short.curve.evaluations[-1] <= 2000
+        assert short.expected_rewards[0][0] == pytest.approx(best.expected_rewards[0][0], rel=1e-9)
+        found.append(short.chosen == best.chosen)
+    assert all(found)
+
+
+def test_decisions_after_the_end_are_not_planned_for() -> None:
+    """The state is of 1 s, decisions are 8 s apart."""
+    given = lmbs()
+    for end, left in ((None, 3), (100.0, 3), (25.0, 3), (24.9, 3), (17.0, 2), (9.0, 1), (1.0, 1), (-5.0, 1)):
+        ended = replace(given, settings=replace(given.settings, end=end))
+        plan = decide(planner(ended, depth=3), ended)
+        assert [len(rows) for rows in plan.sequence] == [left] * 2
+        np.testing.assert_array_equal(plan.tables[0].mean, decide(planner(given, depth=left), given).tables[0].mean)
+        told = f"depth {left} in place of 3: no more decisions come before the end"
+        assert (told in plan.notes) == (left < 3)
+    timeless = replace(ended.state, time=None)
+    plan = planner(ended, depth=2).plan(timeless, ended.poses, rng=np.random.default_rng(1))
+    assert len(plan.sequence[0]) == 2
+    with pytest.raises(InputError, match=r"end: expected .*; got nan"):
+        replace(given.settings, end=np.nan)
+
+
+def test_depth_does_not_harm_where_a_single_decision_is_best() -> None:
+    """On paper-a, whose sensors see all, whatever is decided now can be mended later."""
+    fields = {"filter": {"kind": "lmb"}, "fusion": {"kind": "clmb"}, "control.reward": {"kind": "expected_loss"}}
+    scenario = with_fields(load_scenario("paper-a"), fields)
+    experiment, score = build_experiment(scenario), partial(ospa_of_run, cutoff=100.0, order=1.0)
+    ahead, single = (build_planner(scenario, name, 1) for name in ("lookahead", "jdm"))
+    assert isinstance(ahead, HorizonPlanner)
+    assert (ahead.depth, ahead.settings.end) == (3, 40.0)
+    more = []
+    for run in range(5):
+        records = [simulate(experiment, own, seed=0, run=run, score=score) for own in (ahead, single)]
+        depths = [len(decision.plan.sequence[0]) for decision in records[0].decisions]
+        assert depths == [3, 2, 1]
+        mine, its = (record.ospa[10:, 0].mean() for record in records)
+        more.append(mine - its)
+    assert np.mean(more) < 0.1

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from control.examples import HEADINGS, POSES, SETTINGS, Situation, mobile_sensor, situation
+from control.examples import HEADINGS, POSES, SETTINGS, Situation, mobile_sensor, situation, told
 from vedette import models
 from vedette.control import (
     BeamSearch,
@@ -200,7 +200,7 @@ def test_of_all_sequences_the_best_that_is_allowed(
     assert not allowed.all()
     mean = np.where(allowed, values(given, depth, period, num_steps), -np.inf)
     plan = decide(given, (CONSTRAINTS[name] for name in names), depth=depth, period=period)
-    assert plan.notes == ()
+    assert told(plan) == ()
     assert mean[places(plan)] == pytest.approx(mean.max(), rel=1e-12)
     split = [part for _ in range(num_sensors) for part in (3, 3 ** (depth - 1))]
     best = mean.reshape(split).max(axis=tuple(range(1, 2 * num_sensors, 2)))
@@ -270,11 +270,11 @@ def test_a_dead_end_is_not_entered(search: Any, budget: int) -> None:
     assert single(given, POCKET).chosen_actions[0].tolist() == [100.0, 0.0]
     plan = decide(given, POCKET, depth=3, search=search, budget=budget, discount=0.9)
     assert plan.chosen_actions[0].tolist() == [0.0, 100.0]
-    assert plan.notes == ()
+    assert told(plan) == ()
     # Whoever is in it already may go on, and reads so.
     inside = replace(given, poses=np.array([[100.0, 0.0, 0.0]]))
     plan = decide(inside, POCKET, depth=2, search=search, budget=budget)
-    assert plan.notes == (
+    assert told(plan) == (
         "sensor 1: no course meets its constraints (keep_out, keep_out); it may take those that violate them least",
     )
     assert np.isfinite(plan.tables[0].mean).any()
@@ -283,7 +283,7 @@ def test_a_dead_end_is_not_entered(search: Any, budget: int) -> None:
 def test_a_dead_end_that_cannot_be_avoided_is_told_of() -> None:
     given = scene([(0.0, 0.0)], [(100.0, 0.0)], (0.0,), stay=False)
     plan = decide(given, POCKET, depth=3)
-    assert plan.notes == (
+    assert told(plan) == (
         "sensor 1, decision 2 of the sequence: no course meets its constraints (keep_out, keep_out); "
         "it may take those that violate them least",
     )
@@ -319,7 +319,7 @@ def test_sensors_that_would_lock_each_other_in_keep_apart(search: Any, budget: i
     assert [row.tolist() for row in single(given, constraints).chosen_actions] == [[100.0, 0.0], [100.0, 0.0]]
     ahead = decide(given, constraints, depth=2, search=search, budget=budget, discount=0.9)
     assert sorted(row[0] for row in ahead.chosen_actions) == [-100.0, 100.0]
-    assert ahead.notes == ()
+    assert told(ahead) == ()
 
 
 class OneWay:
@@ -342,7 +342,7 @@ def test_pairs_that_cannot_go_on_are_told_of() -> None:
     """Both can only go east, and at the second step both are in the same rectangle."""
     given = scene([(0.0, 90.0), (0.0, -90.0)], [(100.0, 90.0)], (0.0,), stay=False)
     plan = decide(given, (NotBothAt(250.0, 0.0, 100.0),), depth=3)
-    assert plan.notes == (
+    assert told(plan) == (
         "no joint sequence was found on which the sensors go together after decision 1; from there on that is given up",
     )
 

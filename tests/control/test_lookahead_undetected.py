@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from control.examples import SETTINGS, mobile_sensor, situation
+from control.examples import SETTINGS, mobile_sensor, situation, told
 from vedette import models
 from vedette.control import (
     BeamSearch,
@@ -100,7 +100,7 @@ def test_what_all_scans_are_expected_to_find_counts(depth: int, discount: float 
     plan = planner(depth=depth, discount=discount).plan(state(expected), STARTS, rng=np.random.default_rng(1))
     best = mean.reshape(3, 3 ** (depth - 1), 3, 3 ** (depth - 1)).max(axis=(1, 3))
     np.testing.assert_allclose(plan.tables[0].mean, best, rtol=1e-10)
-    assert plan.notes == ()
+    assert told(plan) == ()
     assert plan.bound is not None
     assert plan.bound.upper == pytest.approx(mean.max(), rel=1e-10)
 
@@ -120,5 +120,5 @@ def test_what_no_single_decision_sees_is_found(search: Any) -> None:
 
 def test_a_state_without_them_is_told_of() -> None:
     nowhere = replace(state(np.zeros(GRID.num_cells)), undetected=None)
-    notes = planner(depth=2).plan(nowhere, STARTS, rng=np.random.default_rng(1)).notes
-    assert notes == ("targets not found yet are not looked for: the state has no intensity of them",)
+    plan = planner(depth=2).plan(nowhere, STARTS, rng=np.random.default_rng(1))
+    assert told(plan) == ("targets not found yet are not looked for: the state has no intensity of them",)

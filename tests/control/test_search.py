@@ -14,9 +14,11 @@ from hypothesis import strategies as st
 
 from control.examples import SETTINGS, Situation, situation
 from vedette.control import (
+    AutomaticSearch,
     CauchySchwarzReward,
     CoordinateAscent,
     ExhaustiveSearch,
+    ExpectedLossReward,
     IndependentPlanner,
     JointPlanner,
     JointProblem,
@@ -94,6 +96,67 @@ def test_restarts_leave_a_local_maximum() -> None:
     problem = Table(rewards).problem()
     assert CoordinateAscent(0).search(problem, rng=rng()) == (0, 0)
     assert CoordinateAscent(40).search(problem, rng=rng()) == (4, 5)
+
+
+def test_automatic_search_goes_on_while_the_bound_is_loose() -> None:
+    """Pairs of four sensors interact: two restarts often end beside the best joint action."""
+    found = {None: 0, "loose": 0, "tight": 0}
+    for seed in range(40):
+        draw = np.random.default_rng(seed)
+        rewards = np.zeros((7,) * 4)
+        for pair in itertools.combinations(range(4), 2):
+            rewards += np.expand_dims(draw.random((7, 7)), tuple({0, 1, 2, 3} - set(pair)))
+        for kind in found:
+            table = Table(rewards)
+            problem, least = table.problem(), CoordinateAscent(2)
+            if kind == "loose":
+                problem = problem._replace(bound=lambda: 6.0)
+            elif kind == "tight":
+                first = rewards[least.search(Table(rewards).problem(), rng=rng())]
+                problem = problem._replace(bound=lambda: 1.005 * first)  # noqa: B023
+            best = AutomaticSearch().search(problem, rng=rng())
+            if kind != "loose":
+                other = Table(rewards)
+                assert best == least.search(other.problem(), rng=rng())
+                assert table.asked == other.asked
+            found[kind] += int(rewards[best] == rewards.max())
+    assert found[None] == found["tight"] < 26
+    assert found["loose"] >= 38
+
+
+def test_many_sensors_do_with_two_restarts() -> None:
+    """Of 500 courses in all, more ascents would take too long."""
+    own, asked = np.random.default_rng(1).random((50, 10)), []
+
+    def evaluate(rows: Any) -> Any:
+        asked[-1] += len(rows)
+        return own[np.arange(50), rows].sum(axis=1)
+
+    for bound in (None, lambda: np.inf):
+        asked.append(0)
+        problem = JointProblem((10,) * 50, evaluate, lambda: (0,) * 50, bound=bound)
+        AutomaticSearch().search(problem, rng=rng())
+    assert asked[0] == asked[1] > 0
+
+
+@pytest.mark.parametrize("reward", [CauchySchwarzReward(), ExpectedLossReward()], ids=lambda own: type(own).__name__)
+def test_no_joint_action_is_beyond_the_bound_that_searches_are_given(reward: Any) -> None:
+    seen: list[JointProblem] = []
+
+    class Watched:
+        def search(self, problem: JointProblem, *, rng: np.random.Generator) -> tuple[int, ...]:
+            seen.append(problem)
+            return ExhaustiveSearch().search(problem, rng=rng)
+
+    for kind in ("lmb", "marginal"):
+        given = situation(kind, 3, settings=replace(SETTINGS, association="known"))
+        planner = JointPlanner(given.sensors, given.fusion, given.settings, reward, Watched())
+        plan = planner.plan(*given.arguments, rng=rng())
+        if seen[-1].bound is not None:
+            assert seen[-1].bound() >= np.nanmax(plan.tables[0].mean) - 1e-12
+    assert seen[0].bound is not None
+    assert np.isfinite(seen[0].bound())
+    assert (seen[1].bound is None) == isinstance(reward, CauchySchwarzReward)  # of GLMBs it is no sum over targets
 
 
 def test_rounding_does_not_decide() -> None:

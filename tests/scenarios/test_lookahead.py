@@ -36,8 +36,12 @@ def planner_of(scenario: Scenario, lookahead: Any) -> HorizonPlanner:
 
 def test_without_a_section_the_defaults_hold(plain: Scenario) -> None:
     planner = planner_of(plain, None)
-    assert (planner.depth, planner.period, planner.budget, planner.discount) == (3, None, 2000, None)
+    assert (planner.depth, planner.period, planner.budget, planner.discount) == (3, None, 2000, 0.25)
     assert planner.search == BeamSearch(8)
+    made = HorizonPlanner(planner.sensors, planner.fusion)
+    names = ("depth", "period", "budget", "discount", "search")
+    assert all(getattr(made, name) == getattr(planner, name) for name in names)
+    assert planner.settings.end == 8.0
 
 
 def test_the_section_says_how(plain: Scenario) -> None:

@@ -119,7 +119,7 @@ class Preparation:
                 local,
                 state.undetected,
                 time=state.time,
-                further=True,
+                looks=None,
                 rng=rng,
             )
         evaluator.notes.update(dict.fromkeys(unsought(settings, state.undetected, sums=self.rule is not None)))

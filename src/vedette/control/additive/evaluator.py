@@ -38,6 +38,7 @@ class AdditiveEvaluator:
         additive: the rewards of joint actions.
         counts: how many filter steps and label values have been evaluated so far.
         notes: what a reader of the decision must know, in the order in which it came up (keys; no values).
+        looks: horizons beyond that of the settings.
     """
 
     sensors: tuple[MobileSensor, ...]
@@ -47,6 +48,7 @@ class AdditiveEvaluator:
     additive: AdditiveRewards
     counts: dict[str, int] = field(default_factory=dict)
     notes: dict[str, None] = field(default_factory=dict)
+    looks: tuple[PlanningSettings, ...] = ()
 
     @classmethod
     def prepare(
@@ -61,22 +63,22 @@ class AdditiveEvaluator:
         undetected: UndetectedIntensity | None = None,
         *,
         time: float | None = None,
-        further: bool = False,
+        looks: tuple[PlanningSettings, ...] | None = (),
         rng: np.random.Generator,
     ) -> AdditiveEvaluator:
         """Draw the samples, predict, and follow every label over every course that reaches it.
 
         rule: how the sensors' densities become one. beliefs: of each sensor. undetected: targets not found
-        yet. time: of the decision, s, where it is known. further: whether the expected loss looks on beyond the horizon
-        (`vedette.control.additive.look_on`). Raises as `JointPlanner.plan`.
+        yet. time: of the decision, s, where it is known. looks: further horizons, at whose ends the expected loss is
+        taken as well; None: those that are due (`vedette.control.additive.look_on`). Raises as `JointPlanner.plan`.
         """
         lay_out = partial(
             cls._lay_out, tuple(sensors), rule, reward, fused, tuple(beliefs), undetected, time=time, rng=rng
         )
         evaluator = lay_out(tuple(options), settings)
-        if not further or not isinstance(reward, ExpectedLossReward):
-            return evaluator
-        looks = look_on(sensors, options, evaluator.prediction, settings)
+        if looks is None:
+            due = isinstance(reward, ExpectedLossReward)
+            looks = look_on(sensors, options, evaluator.prediction, settings) if due else ()
         if not looks:
             return evaluator
         horizon, counts = settings.horizon_times(), dict(evaluator.counts)
@@ -85,7 +87,7 @@ class AdditiveEvaluator:
             later = lay_out(tuple(continued(each, horizon, own.horizon_times()) for each in options), own)
             counts["filter_steps"] += later.counts["filter_steps"]
             found.append(later.additive)
-        return replace(evaluator, additive=at_all(found), counts=counts)
+        return replace(evaluator, additive=at_all(found), counts=counts, looks=looks)
 
     @classmethod
     def _lay_out(

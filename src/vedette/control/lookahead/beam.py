@@ -20,9 +20,10 @@ class BeamSearch:
 
     A beginning is worth what the sequence is worth that keeps to its last action until the end, so that what lies far
     ahead is seen from the first decision on, and whatever is evaluated is a whole sequence; of equal beginnings those
-    drawn at random stay. At first each sensor joins those before it, the ones after it not scanning; then one after the
-    other is searched again until none alone does better; at last, where the budget has room, all combinations of the
-    sensors' beams are tried, and if one is better, it goes on from there.
+    drawn at random stay. From the best that is known (that of a single decision, kept to), one sensor after the other
+    is searched until none alone does better; then, where the budget has room, all combinations of the sensors' beams
+    are tried, and if one is better, it goes on from there. At last the same once more, from where each sensor joins
+    those before it, the ones after it not scanning.
 
     Attributes:
         beam_width: beginnings that are kept at each decision.

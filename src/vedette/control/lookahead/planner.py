@@ -54,14 +54,19 @@ class HorizonPlanner:
 
     The later actions are chosen without regard to what the scans before them will show (open loop), and chosen anew
     when their time comes. Targets move, and pseudo-updates go on, up to the end of the last decision's horizon. With a
-    depth of 1 it is a `JointPlanner` on LMB beliefs.
+    depth of 1 it is a `JointPlanner` on LMB beliefs, as it is where `PlanningSettings.end` leaves one decision.
 
-    A sequence is worth the reward of the belief at the end of that horizon over the prediction for then; or with a
-    `discount` g the sum of g^(d - 1) times the reward at the end of the horizon of decision d, which is how losses on
-    the way count. Of a reward at the end alone what is learnt late counts most, and the same decision taken again and
-    again may put off what it means to do; a divergence measures all that was learnt by then, so that its sum counts
-    what is learnt early several times. Targets not found yet (`PlanningSettings.undetected_worth`) are taken to stay
-    where they may be, and count with the expected number that all scans up to then find.
+    A sequence is worth the sum of g^(d - 1) times the reward at the end of the horizon of decision d, over the
+    prediction for then. The `discount` g is small: the first reward is what is known best, and what it costs is lost,
+    while targets will be elsewhere than is foreseen, and later decisions mend what earlier ones did not see. A
+    divergence measures all that was learnt by then, so that its sum counts what is learnt early several times. Without
+    a discount the reward at the end of the last horizon alone counts, of which what is learnt late has most, and the
+    same decision taken again and again may put off what it means to do. Targets not found yet
+    (`PlanningSettings.undetected_worth`) are taken to stay where they may be, and count with the expected number that
+    all scans up to then find.
+
+    The best single decision, kept to, is the first sequence evaluated, so that no plan is worth less; plans say where
+    nothing better came of the depth.
 
     Attributes:
         sensors, fusion, settings, reward: as of `JointPlanner`; the horizon of the settings is that of one decision.
@@ -173,7 +178,7 @@ class HorizonPlanner:
         """What a `JointPlanner` would decide."""
         options, steps = tuple(tree.options(()) for tree in trees), trees[0].stages.steps
         now = tuple(own._replace(courses=np.ascontiguousarray(own.courses[:, :steps])) for own in options)
-        evaluator = self._lay_out(steps, sums, now, rng, further=True)
+        evaluator = self._lay_out(steps, sums, None, now, rng)
         evidence = Evidence(evaluator, tuple(range(len(trees))), evaluator.joint())
         mask = None if rules is None else rules.first()
         choice = AutomaticSearch().search(joint_problem(evidence, mask), rng=rng)
@@ -194,7 +199,7 @@ class HorizonPlanner:
         def part(weight: float, stage: int) -> Part:
             num_steps = trees[0].stages.num_steps(stage)
             # From one state of the random numbers, and so of the same samples.
-            lay_out = partial(self._lay_out, num_steps, sums)
+            lay_out = partial(self._lay_out, num_steps, sums, first.looks if stage == 1 else ())
             return Part(
                 weight, LaidCourses(trees, stage, lambda own: lay_out(own, copy.deepcopy(samples)), first.counts)
             )
@@ -209,10 +214,9 @@ class HorizonPlanner:
         self,
         num_steps: int,
         sums: Sums,
+        looks: tuple[PlanningSettings, ...] | None,
         options: tuple[Options, ...],
         rng: np.random.Generator,
-        *,
-        further: bool = False,
     ) -> AdditiveEvaluator:
         settings = replace(self.settings, horizon_steps=num_steps)
         return AdditiveEvaluator.prepare(
@@ -225,7 +229,7 @@ class HorizonPlanner:
             sums.local,
             sums.undetected,
             time=sums.time,
-            further=further,
+            looks=looks,
             rng=rng,
         )
 

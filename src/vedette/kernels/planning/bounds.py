@@ -1,7 +1,8 @@
 """The best that each label can hope for: the joint actions of the sensors that may see it, tried one after the other.
 
 Where they are too many, the expected loss -r (q min(tr P+, c^2)^h + (1 - q) min(tr P, c^2)^h) of a label has a bound
-that takes as long as the sensors have actions: q is at most 1 - prod_s (1 - max_a q_sa), and as q >= q_s for every sensor,
+that takes as long as the sensors have actions: q is at most 1 - prod_s (1 - max_a q_sa), and as q >= q_s for every
+sensor,
 
     sum_s Y_s / q <= sum_s Y_s / q_s <= sum_s J_s,
 
