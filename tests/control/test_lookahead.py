@@ -299,8 +299,10 @@ def test_beams_find_the_best_of_all_from_there() -> None:
     for seed in range(6):
         given = replace(situation("lmb", 2, seed, KNOWN), sensors=(sensor,) * 2)
         best, short = (
-            decide(HorizonPlanner(given.sensors, given.fusion, given.settings, ExpectedLossReward(), 2, **more), given)
-            for more in ({"budget": 28_561}, {})
+            decide(
+                HorizonPlanner(given.sensors, given.fusion, given.settings, ExpectedLossReward(), 2, budget=most), given
+            )
+            for most in (28_561, 2000)
         )
         assert short.curve is not None
         assert short.curve.evaluations[-1] <= 2000
