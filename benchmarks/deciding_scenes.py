@@ -126,7 +126,13 @@ def scenes() -> Iterator[Scene]:
     for number, size in enumerate(SIZES):
         title = f"layout {number}"
         yield Scene(title, "layouts", cache(lambda number=number: layout(number)), 1.0 if size <= 5 else 0.3)
-    for name, share in (("eight-mobile", 0.3), ("six-cameras", 1.0), ("two-searchers", 0.2), ("solent", 0.5)):
+    for name, share in (
+        ("eight-mobile", 0.3),
+        ("six-cameras", 1.0),
+        ("beyond-the-gap", 0.3),
+        ("two-searchers", 0.1),
+        ("solent", 0.3),
+    ):
         yield Scene(name, name, cache(lambda name=name: load_scenario(name)), share)
     for view, size, pattern in product(VIEWS, (2, 3, 5, 8, 20), PATTERNS):
         scene = GeneratedScene(num_sensors=size, pattern=pattern, view=view)
