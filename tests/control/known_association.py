@@ -17,11 +17,10 @@ def followed(
     """Logit, mean, covariance at the end of a course, and the probability of never being detected.
 
     target: (horizon_steps, state_dim) states of the sampled target, or None where it is not there. "ideal" measurements
-    of linearised sensors.
+    of sensors with method "auto".
     """
     own, motion = sensor.filter.sensor, sensor.filter.targets.motion
     assert motion.transition_jacobian is not None
-    assert own.measurement.jacobian is not None
     missed = 1.0
     for h, pose in enumerate(course):
         jacobian, noise = np.empty((len(mean), len(mean))), np.empty((len(mean), len(mean)))
@@ -37,15 +36,41 @@ def followed(
             logit += math.log(1.0 - detection)
             continue
         measured = own.measurement.measure(target[h][None], pose)[0]
-        expected = own.measurement.measure(mean[None], pose)[0]
-        slope = np.empty((own.meas_dim, len(mean)))
-        own.measurement.jacobian(mean, pose, own.measurement.params, slope)
-        off = measured - expected
-        off = np.where(own.measurement.angular, np.arctan2(np.sin(off), np.cos(off)), off)
-        innovation = slope @ cov @ slope.T + own.noise.covs(mean[None], pose, own.meas_dim)[0]
-        gain = cov @ slope.T @ np.linalg.inv(innovation)
+        expected, spread, cross = measurement_moments(mean, cov, pose, sensor)
+        off = unwrapped(measured - expected, sensor)
+        innovation = spread + own.noise.covs(mean[None], pose, own.meas_dim)[0]
+        gain = cross @ np.linalg.inv(innovation)
         log_likelihood = -0.5 * (off @ np.linalg.solve(innovation, off) + np.linalg.slogdet(2 * np.pi * innovation)[1])
         clutter = own.clutter.log_intensity(measured, pose, own.clutter.params)
         logit += math.log(1.0 - detection + detection * math.exp(log_likelihood - clutter))
-        mean, cov = mean + gain @ off, cov - gain @ slope @ cov
+        mean, cov = mean + gain @ off, cov - gain @ innovation @ gain.T
     return logit, mean, cov, missed
+
+
+def measurement_moments(mean: Any, cov: Any, pose: Any, sensor: MobileSensor) -> tuple[Any, Any, Any]:
+    """Mean and covariance of a measurement without noise, and its covariance with the state, by method "auto".
+
+    Linearised, but for places that are a fifth of their distance uncertain: there by the 2 n + 1 points of Julier and
+    Uhlmann with kappa = 1.
+    """
+    own, n = sensor.filter.sensor, len(mean)
+    assert own.method == "auto"
+    if np.sqrt(cov[0, 0] + cov[1, 1]) <= 0.2 * np.hypot(*(mean[:2] - pose[:2])):
+        assert own.measurement.jacobian is not None
+        slope = np.empty((own.meas_dim, n))
+        own.measurement.jacobian(mean, pose, own.measurement.params, slope)
+        return own.measurement.measure(mean[None], pose)[0], slope @ cov @ slope.T, cov @ slope.T
+    root = np.sqrt(n + 1.0) * np.linalg.cholesky(cov).T
+    points = np.concatenate([[mean], mean + root, mean - root])
+    weights = np.array([1.0, *[0.5] * (2 * n)]) / (n + 1.0)
+    images = own.measurement.measure(points, pose)
+    base = images[0]
+    expected = unwrapped(base + weights @ unwrapped(images - base, sensor), sensor)
+    off = unwrapped(images - expected, sensor)
+    return expected, (weights * off.T) @ off, (weights * (points - mean).T) @ off
+
+
+def unwrapped(difference: Any, sensor: MobileSensor) -> Any:
+    """With angles between -pi and pi."""
+    wrapped = np.arctan2(np.sin(difference), np.cos(difference))
+    return np.where(sensor.filter.sensor.measurement.angular, wrapped, difference)

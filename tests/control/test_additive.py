@@ -20,7 +20,7 @@ from control.examples import (
     mobile_sensor,
     situation,
 )
-from control.known_association import followed
+from control.known_association import followed, measurement_moments
 from vedette import models
 from vedette.control import CauchySchwarzReward, RenyiReward
 from vedette.control.bounds import best_values
@@ -174,7 +174,9 @@ def test_an_ascent_takes_only_what_is_allowed() -> None:
     np.testing.assert_allclose(reward, table[tuple(end)], rtol=1e-12)
 
 
-@pytest.mark.parametrize("reward", [CauchySchwarzReward("reference"), ExpectedLossReward(60.0)])
+@pytest.mark.parametrize(
+    "reward", [CauchySchwarzReward("reference"), ExpectedLossReward(60.0), ExpectedLossReward(60.0, 2.0)]
+)
 def test_no_joint_action_is_better_than_the_bound(reward: Any) -> None:
     """By target, and for the expected loss also without trying what may be seen."""
     for seed in range(8):
@@ -190,13 +192,14 @@ def test_no_joint_action_is_better_than_the_bound(reward: Any) -> None:
 
 
 @pytest.mark.parametrize("steps", [1, 2])
-def test_the_expected_loss_is_what_its_formula_says(steps: int) -> None:
+@pytest.mark.parametrize("order", [1.0, 2.0, 0.7])
+def test_the_expected_loss_is_what_its_formula_says(steps: int, order: float) -> None:
     """Plain NumPy of one scan, at the last step, with the detection of the model's own mean over the Gaussian."""
     settings = replace(KNOWN, horizon_steps=steps)
     example = replace(shared(2, 4, method="ekf"), settings=settings)
     last = np.array([example.state.time + steps * settings.horizon_period])
     example = replace(example, sensors=tuple(replace(own, scan_times=last) for own in example.sensors))
-    evaluator = additive_of(example, ExpectedLossReward(60.0))
+    evaluator = additive_of(example, ExpectedLossReward(60.0, order))
     prediction, actions = evaluator.prediction, all_joint_actions((3, 3))
     found = evaluator.joint()(actions)[:, 0]
     for joint, value in zip(actions.tolist(), found.tolist(), strict=True):
@@ -206,13 +209,13 @@ def test_the_expected_loss_is_what_its_formula_says(steps: int) -> None:
             for s, course in enumerate(joint):
                 own, pose = example.sensors[s].filter.sensor, evaluator.options[s].courses[course, -1]
                 detection = float(own.mean_detection(mean[None], cov[None], pose)[0])
-                slope = np.empty((2, 4))
-                assert own.measurement.jacobian is not None
-                own.measurement.jacobian(mean, pose, own.measurement.params, slope)
+                _, spread, cross = measurement_moments(mean, cov, pose, example.sensors[s])
+                innovation = spread + own.noise.covs(mean[None], pose, 2)[0]
+                measured = cov - cross @ np.linalg.solve(innovation, cross.T)
                 missed *= 1.0 - detection
-                information += detection * slope.T @ np.linalg.solve(own.noise.covs(mean[None], pose, 2)[0], slope)
+                information += detection * (np.linalg.inv(measured) - np.linalg.inv(cov))
             seen = np.linalg.inv(np.linalg.inv(cov) + information / (1.0 - missed))
-            losses = [min(float(np.trace(each[:2, :2])), 3600.0) for each in (seen, cov)]
+            losses = [min(np.sqrt(np.trace(each[:2, :2])), 60.0) ** order for each in (seen, cov)]
             total -= prediction.existence[i] * ((1.0 - missed) * losses[0] + missed * losses[1])
         np.testing.assert_allclose(value, total, rtol=1e-9)
 

@@ -12,6 +12,7 @@ from control.examples import SETTINGS, A, B, C, Situation, glmb, lmb, mobile_sen
 from vedette import models
 from vedette.control import (
     CauchySchwarzReward,
+    ExpectedLossReward,
     FixedPlanner,
     IndependentPlanner,
     JointPlanner,
@@ -31,6 +32,8 @@ from vedette.platforms import Actions, Courses
 from vedette.tracking import State
 
 PLANNERS = [JointPlanner, IndependentPlanner]
+# By default; and of densities that are fused.
+LOSS, DIVERGENCE = ExpectedLossReward(), CauchySchwarzReward()
 
 
 @models.model_function("prob_detection")
@@ -61,10 +64,10 @@ def no_clutter(measurement: Any, pose: Any, params: Any) -> float:
     return -np.inf
 
 
-def refused(example: Situation, planner: Any, error: type[Exception] = InputError) -> str:
+def refused(example: Situation, planner: Any, error: type[Exception] = InputError, reward: Any = LOSS) -> str:
     """What a planner says of a situation."""
     with pytest.raises(error) as raised:
-        planner(example.sensors, example.fusion, example.settings).plan(
+        planner(example.sensors, example.fusion, example.settings, reward).plan(
             *example.arguments, rng=np.random.default_rng(5)
         )
     return str(raised.value)
@@ -199,12 +202,12 @@ def test_label_spaces_that_share_nothing() -> None:
     example = replace(situation("marginal"), fused=glmb([(C,), (B, C)], rng))
     beliefs = glmb([(A,), (A, B)], rng), glmb([(B,), (A, B)], rng)
     for planner in PLANNERS:
-        message = refused(replace(example, beliefs=beliefs), planner)
+        message = refused(replace(example, beliefs=beliefs), planner, reward=DIVERGENCE)
         assert message == "fused belief: expected a label set in common with the local beliefs; got none"
     # Bernoullis of no shared label leave nothing to compare: no action is worth anything.
     example = replace(situation("lmb"), beliefs=(lmb((A,), rng), lmb((B,), rng)), fused=lmb((C,), rng))
     for planner in PLANNERS:
-        plan = planner(example.sensors, example.fusion, SETTINGS).plan(*example.arguments, rng=rng)
+        plan = planner(example.sensors, example.fusion, SETTINGS, DIVERGENCE).plan(*example.arguments, rng=rng)
         assert all((table.mean == 0.0).all() for table in plan.tables)
         assert plan.chosen == (0, 0)
 
@@ -213,19 +216,20 @@ def test_label_spaces_that_share_nothing() -> None:
 def test_numbers_of_fusion_weights(kind: str) -> None:
     example = situation(kind)
     for weights in ((1.0,), (0.2, 0.3, 0.5)):
-        message = refused(replace(example, fusion=replace(example.fusion, weights=weights)), JointPlanner)
+        given = replace(example, fusion=replace(example.fusion, weights=weights))
+        message = refused(given, JointPlanner, reward=DIVERGENCE)
         assert message == f"beliefs: expected {len(weights)}, one for each fusion weight; got 2"
 
 
 @pytest.mark.filterwarnings("ignore::vedette.errors.SlowRewardWarning")
 def test_a_fusion_of_other_densities() -> None:
     example = situation("lmb")
-    message = refused(replace(example, fusion=CmDeltaGlmb((0.5, 0.5))), JointPlanner)
+    message = refused(replace(example, fusion=CmDeltaGlmb((0.5, 0.5))), JointPlanner, reward=DIVERGENCE)
     assert message == "beliefs[0]: expected GLMB; got LMB"
     # Whereas a CLMB takes GLMBs, and the prediction may be of either kind.
     example = replace(situation("marginal"), fusion=Clmb((0.5, 0.5)))
     for fused in (example.fused, Clmb((0.5, 0.5)).fuse(example.beliefs)[0]):
-        plan = JointPlanner(example.sensors, example.fusion, SETTINGS).plan(
+        plan = JointPlanner(example.sensors, example.fusion, SETTINGS, DIVERGENCE).plan(
             *replace(example, fused=fused).arguments, rng=np.random.default_rng(0)
         )
         plan.validate()
@@ -392,6 +396,7 @@ def test_an_ideal_scan_that_the_models_forbid(kind: str) -> None:
         sure, half = (LMB(lmb((A,), rng).tracks, np.array([logit])) for logit in (np.inf, 0.0))
     else:
         sure, half = glmb([(A,)], rng), glmb([(A,), ()], rng)
-    message = refused(replace(example, beliefs=(sure, half), fused=half), JointPlanner, NumericalError)
+    given = replace(example, beliefs=(sure, half), fused=half)
+    message = refused(given, JointPlanner, NumericalError, DIVERGENCE)
     assert message.startswith("pseudo-update: no ")
     assert message.endswith("do the models forbid the ideal scan?")

@@ -11,7 +11,7 @@ import pytest
 from control.examples import SETTINGS, Situation, situation
 from vedette.control import ExpectedLossReward, HorizonPlanner, IndependentPlanner, JointPlanner, KullbackLeiblerReward
 from vedette.control.priors import predicted
-from vedette.densities import LMB
+from vedette.densities import LMB, at_peaks
 from vedette.probabilities import expit
 
 KNOWN = replace(SETTINGS, association="known")
@@ -37,17 +37,17 @@ def errors(of: Situation, chosen: tuple[int, ...]) -> Any:
     """(num_labels,) existence and error at the end if detected, out of rewards under a cutoff that cuts nothing off."""
     existence = expit(of.fused.existence_logit)
     covs = predicted(
-        of.fused, of.sensors[0].filter.targets.motion, KNOWN.horizon_steps, KNOWN.horizon_period
+        at_peaks(of.fused), of.sensors[0].filter.targets.motion, KNOWN.horizon_steps, KNOWN.horizon_period
     ).tracks.covs
     found = []
     for label, own in enumerate(existence):
-        loss = -plan(JointPlanner, alone(of, label), ExpectedLossReward(1e6)).tables[0].mean[chosen] / own
+        loss = -plan(JointPlanner, alone(of, label), ExpectedLossReward(1e6, 2.0)).tables[0].mean[chosen] / own
         # Where nothing is detected the error is that of the prediction; a cutoff between the two tells them apart.
         unseen = covs[label, 0, 0] + covs[label, 1, 1]
         tiny = -plan(JointPlanner, alone(of, label), ExpectedLossReward(1e-3)).tables[0].mean[chosen] / own
-        assert tiny == pytest.approx(1e-6, rel=1e-6)
+        assert tiny == pytest.approx(1e-3, rel=1e-6)
         between = np.sqrt(0.5 * (loss + unseen))
-        cut = -plan(JointPlanner, alone(of, label), ExpectedLossReward(between)).tables[0].mean[chosen] / own
+        cut = -plan(JointPlanner, alone(of, label), ExpectedLossReward(between, 2.0)).tables[0].mean[chosen] / own
         detected = 1.0 - (loss - cut) / (unseen - between**2)
         found.append(np.sqrt((loss - (1.0 - detected) * unseen) / detected))
     return existence, np.array(found)

@@ -252,7 +252,7 @@ def test_an_independent_decision_is_the_sum_of_the_sensors_own() -> None:
 @pytest.mark.parametrize("planner", [JointPlanner, IndependentPlanner])
 def test_decisions_case_by_case_say_what_they_cannot_tell(kind: str, planner: Any) -> None:
     example = situation(kind, 2, 1, SETTINGS)
-    plan = planner(example.sensors, example.fusion, example.settings).plan(
+    plan = planner(example.sensors, example.fusion, example.settings, CauchySchwarzReward()).plan(
         *example.arguments, rng=np.random.default_rng(2)
     )
     why = plan.explain()

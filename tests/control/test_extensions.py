@@ -95,7 +95,7 @@ def test_a_fusion_of_the_users_own(kind: str) -> None:
     rewards = evaluator.sample_rewards((0, 1), example.fusion)
     alone = evaluator.sample_rewards((0,), None)
     np.testing.assert_allclose(rewards, np.repeat(alone, 3, axis=0), rtol=1e-9)
-    plan = JointPlanner(example.sensors, example.fusion, SETTINGS).plan(
+    plan = JointPlanner(example.sensors, example.fusion, SETTINGS, CauchySchwarzReward()).plan(
         *example.arguments, rng=np.random.default_rng(5)
     )
     assert plan.chosen == (int(alone.mean(axis=1).argmax()), 0)

@@ -267,7 +267,7 @@ def test_random_numbers_are_used_as_by_a_single_decision(other: Any) -> None:
     given = lmbs()
     mine, its = np.random.default_rng(3), np.random.default_rng(3)
     planner(given, depth=1).plan(*given.arguments, rng=mine)
-    other(given.sensors, given.fusion, given.settings).plan(*given.arguments, rng=its)
+    other(given.sensors, given.fusion, given.settings, CauchySchwarzReward()).plan(*given.arguments, rng=its)
     assert mine.random() == its.random()
 
 
