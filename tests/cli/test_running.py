@@ -137,7 +137,11 @@ def test_reproduce(scenario_file, tmp_path):
     ("arguments", "status", "message"),
     [
         (("run", "paper-z"), 1, "paper-z"),
-        (("run", "paper-a", "--planner", "clever"), 2, "jdm, idm, lookahead, random, fixed, still"),
+        (
+            ("run", "paper-a", "--planner", "clever"),
+            2,
+            "jdm, idm, lookahead, nearest, assigned, centroid, oracle, random, fixed, still",
+        ),
         (("reproduce", "--planners", "jdm,jdm"), 2, "each strategy once"),
         (("reproduce", "--runs", "0"), 2, "--runs"),
         (("run", "paper-a", "--seed", "-1"), 2, "--seed"),

@@ -92,8 +92,9 @@ def run(
         str,
         typer.Option(
             "--planner",
-            help="jdm (joint), idm (independent), lookahead (joint, several decisions), random, fixed (first course), "
-            "still, or the scenario's own.",
+            help="jdm (joint), idm (independent), lookahead (joint, several decisions), nearest, assigned, centroid "
+            "(rules of thumb), oracle (who knows the targets), random, fixed (first course), still, or the scenario's "
+            "own.",
             autocompletion=strategies,
         ),
     ] = "jdm",

@@ -83,7 +83,9 @@ class ScenarioModel(Section):
     estimator: AnyEstimator = Field(default=MapEstimator(), description="How estimates are read off [-].")
     control: Control = Field(default=Control(), description="When and how the sensors decide [-].")
     planners: dict[Name, AnyPlanner] = Field(
-        default={}, description="Further strategies by name, beside jdm, idm, lookahead, random, fixed and still [-]."
+        default={},
+        description="Further strategies by name, beside jdm, idm, lookahead, nearest, assigned, "
+        "centroid, oracle, random, fixed and still [-].",
     )
     ospa: Ospa = Field(default=Ospa(), description="How the estimates are scored [-].")
     metrics: dict[Name, AnyMetric] = Field(
