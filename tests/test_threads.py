@@ -91,7 +91,7 @@ import numpy as np
 
 signal.signal(signal.SIGINT, signal.default_int_handler)  # what is started in the background ignores it
 from vedette import models
-from vedette.control import IndependentPlanner, MobileSensor, PlanningSettings, pseudo
+from vedette.control import CauchySchwarzReward, IndependentPlanner, MobileSensor, PlanningSettings, pseudo
 from vedette.densities import LMB
 from vedette.filters import LmbFilter
 from vedette.fusion import Clmb
@@ -121,7 +121,8 @@ def counted(prior, decision, first, last, results):
     done.append(last - first)
 
 pseudo.pseudo_update_lmb = counted
-planner = IndependentPlanner((MobileSensor(tracker, Courses(50.0)),), Clmb((1.0,)), settings)
+sensors = (MobileSensor(tracker, Courses(50.0)),)
+planner = IndependentPlanner(sensors, Clmb((1.0,)), settings, CauchySchwarzReward())
 try:
     planner.plan(State((belief,), belief), [[-700.0, 0.0, 0.0]], rng=np.random.default_rng(1))
 except KeyboardInterrupt:

@@ -94,7 +94,11 @@ def test_ctrl_c_says_how_to_go_on(short: Yardstick, monkeypatch: pytest.MonkeyPa
     ("words", "status", "message"),
     [
         ((NAME, "--planners", "fixed,fixed"), 2, "expected each strategy once; got fixed,fixed"),
-        ((NAME, "--planners", "clever"), 1, "oracle, random, fixed, still, greedy; got 'clever'"),
+        (
+            (NAME, "--planners", "clever"),
+            1,
+            "lookahead, nearest, assigned, centroid, oracle, random, fixed, still, greedy; got 'clever'",
+        ),
         (
             ("deciding-six-camera",),
             1,

@@ -14,6 +14,8 @@ from vedette.densities import (
     LMB,
     Estimate,
     TrackTable,
+    as_lmb,
+    at_peaks,
     cardinality_distribution,
     lmb_to_glmb,
     map_estimate,
@@ -52,6 +54,29 @@ def test_map_estimate_of_an_lmb_is_that_of_its_glmb(lmb):
     assert _labels(estimate) == _labels(other)
     np.testing.assert_allclose(estimate.means, other.means)
     np.testing.assert_allclose(estimate.existence, other.existence, atol=1e-12)
+
+
+@given(glmbs())
+def test_each_label_at_its_heaviest_component(glmb):
+    lmb = as_lmb(glmb)
+    peaks = at_peaks(lmb)
+    peaks.validate()
+    plain = plain_lmb(lmb)
+    assert peaks.tracks.labels.tolist() == lmb.tracks.labels.tolist()
+    np.testing.assert_array_equal(peaks.existence_logit, lmb.existence_logit)
+    assert len(peaks.tracks.means) == len(peaks.tracks.labels)
+    for i, label in enumerate(lmb.tracks.labels.tolist()):
+        _, mean, cov = max(plain[tuple(label)][1], key=lambda component: component[0])
+        np.testing.assert_allclose(peaks.tracks.means[i], mean, atol=1e-12)
+        np.testing.assert_allclose(peaks.tracks.covs[i], cov, atol=1e-12)
+
+
+def test_of_components_of_equal_weight_the_first_is_the_heaviest():
+    mixture = np.full(2, 0.5), np.array([[3.0, 1.0], [-3.0, 1.0]]), np.tile(np.eye(2), (2, 1, 1))
+    rivals = LMB(TrackTable.from_mixtures([(0, 1)], [mixture]), np.zeros(1))
+    np.testing.assert_array_equal(at_peaks(rivals).tracks.means, [[3.0, 1.0]])
+    assert at_peaks(at_peaks(rivals)).tracks.means.tolist() == [[3.0, 1.0]]
+    assert at_peaks(LMB.empty(2)).tracks.num_tracks == 0
 
 
 @given(glmbs(), lmbs(), st.sampled_from([0.0, 0.3, 0.5, 0.9]))

@@ -76,8 +76,8 @@ def test_rewards_are_of_the_sensors_that_have_a_choice(
 def test_rewards_say_what_they_are(scenario: Scenario, records: dict[str, list[RunRecord]]) -> None:
     upper, lower, bar = reward_figure(records["jdm"][0].decisions[0].plan, scene=scene_of(scenario, "jdm")).axes
     assert upper.get_xlabel() == "Heading of Boat Anna (deg)"
-    assert lower.get_ylabel() == "Largest joint reward\n(minus expected loss, m²)"
-    assert bar.get_ylabel() == "Joint reward\n(minus expected loss, m²)"
+    assert lower.get_ylabel() == "Largest joint reward\n(minus expected loss)"
+    assert bar.get_ylabel() == "Joint reward\n(minus expected loss)"
     assert scene_of(load_scenario("paper-a"), "jdm").reward == "CS divergence"
     plain = reward_figure(make_plan("idm", np.random.default_rng(1)))
     assert plain.axes[0].get_ylabel() == "Reward"
@@ -91,8 +91,8 @@ def test_a_strategy_with_a_reward_of_its_own_says_that_one(scenario: Scenario) -
     rewards = {name: scene_of(own, name).reward for name in ("by-gospa", "as-is", "jdm")}
     assert rewards == {
         "by-gospa": "minus squared GOSPA, m²",
-        "as-is": "minus expected loss, m²",
-        "jdm": "minus expected loss, m²",
+        "as-is": "minus expected loss",
+        "jdm": "minus expected loss",
     }
 
 

@@ -13,7 +13,7 @@ Rng = np.random.Generator
 
 REGION = {"x_min": -400.0, "x_max": 400.0, "y_min": -300.0, "y_max": 300.0}
 MEASURED = {"bearing_range": 2, "bearing_only": 1, "range_only": 1, "position": 2, "custom": 1}
-STRATEGIES = ("jdm", "idm", "lookahead", "random", "fixed", "still")
+STRATEGIES = "jdm", "idm", "lookahead", "nearest", "assigned", "centroid", "oracle", "random", "fixed", "still"
 
 
 def combination(rng: Rng) -> Data:
@@ -259,6 +259,8 @@ def _control(rng: Rng, last: int) -> Data:
         "explain": bool(rng.integers(2)),
     }
     if rng.random() < 0.2:
+        del control["reward"]
+    if rng.random() < 0.2:
         control |= {"confidence": 0.6, "max_samples": 24, "indifference": pick(rng, [0.0, 0.1])}
     if rng.random() < 0.2:
         control["undetected_worth"] = 2.0
@@ -329,8 +331,12 @@ def _planner(rng: Rng) -> Data:
     how = rng.random()
     if how < 0.5:
         return {"kind": "joint", **pick(rng, [{}, {"search": _search(rng)}, {"reward": _reward(rng)}])}
-    if how < 0.8:
+    if how < 0.7:
         return {"kind": "independent", **pick(rng, [{}, {"reward": _reward(rng)}])}
+    if how < 0.85:
+        return {"kind": pick(rng, ["nearest", "assigned", "centroid"])}
+    if how < 0.9:
+        return {"kind": "oracle", "depth": int(rng.integers(1, 3))}
     return own_part("Last")
 
 

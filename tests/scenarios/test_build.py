@@ -380,7 +380,8 @@ def targets_of(built: Scenario) -> ScriptedTargets:
 def test_an_unknown_planner() -> None:
     loaded = scenario()
     with pytest.raises(
-        InputError, match="planner: expected one of jdm, idm, lookahead, random, fixed, still; got 'greedy'"
+        InputError,
+        match="planner: expected one of jdm, idm, lookahead, nearest, assigned, centroid, oracle, random, fixed, still; got 'greedy'",
     ):
         build.build_planner(loaded, "greedy")
 

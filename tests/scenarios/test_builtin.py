@@ -137,6 +137,7 @@ def test_every_choice_that_the_paper_leaves_open_is_a_field_with_its_default(row
         "birth": {"sites": [{"existence": 0.1, "mean": [0.0] * 4, "std": [1.0] * 4}]},
         "targets": {"kind": "scripted", "tracks": []},
         "sensors": [{"position": [0.0, 0.0], "platform": {"kind": "courses", "speed": 1.0}}],
+        "control": {"reward": {"kind": "cauchy_schwarz"}},
     }
     assert field_at(ScenarioModel.model_validate(least), path) == default
 

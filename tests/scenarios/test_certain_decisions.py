@@ -14,6 +14,7 @@ from vedette.scenarios.build import build_planner
 from vedette.scenarios.dumping import dump_scenario
 from vedette.scenarios.summary import facts
 
+SAMPLED = "reward: {kind: cauchy_schwarz}"
 SHORT = (("num_steps: 20", "num_steps: 6"), ("to_step: 20", "to_step: 6"), ("end_step: 18", "end_step: 6"))
 
 
@@ -22,7 +23,7 @@ def scenario(control: str) -> Scenario:
 
 
 def test_the_settings_reach_the_planner() -> None:
-    own = scenario("confidence: 0.9, indifference: 0.02, max_samples: 5e2, max_seconds: 3")
+    own = scenario(f"confidence: 0.9, indifference: 0.02, max_samples: 5e2, max_seconds: 3, {SAMPLED}")
     planner: Any = build_planner(own, "jdm")
     told = planner.settings
     assert (told.confidence, told.indifference, told.max_samples, told.max_seconds) == (0.9, 0.02, 500, 3.0)
@@ -33,13 +34,17 @@ def test_the_settings_reach_the_planner() -> None:
     assert again == own.model
     plain: Any = build_planner(Scenario(parse_scenario(MINIMAL), Path("f.yaml")), "jdm")
     assert plain.settings.confidence is None
-    assert "40 samples" in dict(facts(parse_scenario(MINIMAL)))["reward"]
+    assert "40 samples" in dict(facts(scenario(SAMPLED).model))["reward"]
+    assert "no samples" in dict(facts(parse_scenario(MINIMAL)))["reward"]
 
 
 @pytest.mark.parametrize("planner", ["jdm", "idm"])
 def test_a_run_says_how_each_decision_ended(planner: str) -> None:
-    own = scenario("decision_steps: [2, 4], horizon_steps: 2, confidence: 0.9, indifference: 0.1, max_samples: 50")
-    record = run_scenario(own, planner, seed=1, num_threads=1)
+    text = "decision_steps: [2, 4], horizon_steps: 2, confidence: 0.9, indifference: 0.1, max_samples: 50"
+    for decision in run_scenario(scenario(text), planner, seed=1, num_threads=1).decisions:
+        assert decision.plan.certainty is not None
+        assert decision.plan.certainty.reason == "no samples"
+    record = run_scenario(scenario(f"{text}, {SAMPLED}"), planner, seed=1, num_threads=1)
     for decision in record.decisions:
         assert decision.plan.certainty is not None
         assert str(decision.plan.certainty) in decision.plan.notes

@@ -47,15 +47,24 @@ def fault(text: str) -> str:
 
 
 GREEDY = "search: {kind: sequential_greedy}"
+SAMPLED = "reward: {kind: cauchy_schwarz}"
 OWN = "\nplanners: {mine: {kind: joint, search: {kind: sequential_greedy}}}"
 
 
 @pytest.mark.parametrize(
     ("text", "place", "wanted"),
     [
-        (with_control(GREEDY), "22:50: control.search.kind", "as decisions on m_delta_glmb beliefs are no sums over"),
-        (with_control(f"{GREEDY}, association: full", *LMB), "22:50: control.search.kind", "with control.association"),
-        (with_control("num_samples: 2", more=OWN), "23:47: planners.mine.search.kind", "m_delta_glmb beliefs"),
+        (
+            with_control(f"{GREEDY}, {SAMPLED}"),
+            "22:50: control.search.kind",
+            "as decisions on m_delta_glmb beliefs are no sums over",
+        ),
+        (
+            with_control(f"{GREEDY}, association: full, {SAMPLED}", *LMB),
+            "22:50: control.search.kind",
+            "with control.association",
+        ),
+        (with_control(SAMPLED, more=OWN), "23:47: planners.mine.search.kind", "m_delta_glmb beliefs"),
         (
             with_control("constraints: [{kind: void_probability, radius: 5, probability: 0.9}]", *PHD),
             "20:56: control.constraints[0].kind",
@@ -77,11 +86,12 @@ def test_the_check_says_where(text: str, place: str, wanted: str) -> None:
 @pytest.mark.parametrize(
     ("text", "changes"),
     [
-        (GREEDY, LMB),
-        (f"{GREEDY}, limits: {{max_glmb_targets: 0}}", ()),
-        (f"{GREEDY}, limits: {{max_glmb_sensors: 1}}", ()),
+        (f"{GREEDY}, {SAMPLED}", LMB),
+        (f"{GREEDY}, {SAMPLED}, limits: {{max_glmb_targets: 0}}", ()),
+        (f"{GREEDY}, {SAMPLED}, limits: {{max_glmb_sensors: 1}}", ()),
+        (GREEDY, ()),
         (f"{GREEDY}, reward: {{kind: expected_loss}}", ()),
-        (f"{GREEDY}, association: full, reward: {{kind: expected_loss}}", LMB),
+        (f"{GREEDY}, association: full", LMB),
         (GREEDY, PHD),
     ],
 )
@@ -112,7 +122,7 @@ def test_planners_refuse_it_when_they_are_made(settings: PlanningSettings, rewar
 
 def test_a_strategy_that_a_scenario_has_no_part_for_is_named_before_the_run() -> None:
     with pytest.raises(InputError, match=r"planner lookahead: settings.association: expected known, for sequences of"):
-        build_planner(scenario("association: full"), "lookahead")
+        build_planner(scenario(f"association: full, {SAMPLED}"), "lookahead")
 
 
 def test_constraints_that_look_at_beliefs_need_labels() -> None:

@@ -97,8 +97,10 @@ def test_faults(plain: Scenario, fields: dict[str, Any], message: str) -> None:
 
 
 def test_who_looks_ahead_crosses_the_gap(gap: Scenario) -> None:
-    """The single decision has nothing to gain there, and stays among the targets that it sees."""
-    ahead, single = (run_scenario(gap, name, seed=1, num_threads=1) for name in ("lookahead", "jdm"))
+    """A single decision that ends with its horizon has nothing to gain there; one that looks on goes, too."""
+    ends = with_fields(gap, {"control.reward": {"kind": "kullback_leibler"}})
+    ahead, single = run_scenario(gap, "lookahead", seed=1, num_threads=1), run_scenario(ends, "jdm", seed=1)
+    assert run_scenario(gap, "jdm", seed=1, num_threads=1).poses[-1, :, 0].max() > 100.0
     assert {decision.plan.planner for decision in ahead.decisions} == {"lookahead"}
     assert ahead.poses[-1, :, 0].max() > 100.0
     assert single.poses[-1, :, 0].max() < 100.0

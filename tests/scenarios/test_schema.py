@@ -17,6 +17,7 @@ from vedette.control import (
     CoordinateAscent,
     CrossEntropy,
     ExhaustiveSearch,
+    ExpectedLossReward,
     PlanningSettings,
     RenyiReward,
     SequentialGreedy,
@@ -32,9 +33,10 @@ from vedette.scenarios import json_schema
 from vedette.scenarios.diagnostics import kinds_of
 from vedette.scenarios.sections import search
 from vedette.scenarios.sections.base import Section
-from vedette.scenarios.sections.control import CauchySchwarzReward as CauchySchwarzSection
 from vedette.scenarios.sections.control import Control
 from vedette.scenarios.sections.fusion import Fusion, FusionLimits
+from vedette.scenarios.sections.rewards import CauchySchwarzReward as CauchySchwarzSection
+from vedette.scenarios.sections.rewards import ExpectedLossReward as ExpectedLossSection
 from vedette.scenarios.sections.rewards import RenyiReward as RenyiSection
 from vedette.scenarios.sections.scoring import MarginalEstimator
 from vedette.scenarios.sections.targets import RecordedTargets
@@ -114,6 +116,7 @@ DEFAULTS: list[tuple[type[BaseModel], Any, dict[str, str]]] = [
     (RecordedTargets, Cleaning, {"max_gap": "max_gap", "min_speed": "min_speed", "max_speed": "max_speed"}),
     (RecordedTargets, RecordedSource, {"time_origin": "time_origin"}),
     (CauchySchwarzSection, CauchySchwarzReward, {"unit_volume": "unit_volume"}),
+    (ExpectedLossSection, ExpectedLossReward, {"cutoff": "cutoff", "order": "order"}),
     (RenyiSection, RenyiReward, {"order": "order"}),
     (search.Automatic, AutomaticSearch, {"max_joint_actions": "max_joint_actions"}),
     (search.Exhaustive, ExhaustiveSearch, {"max_joint_actions": "max_joint_actions"}),

@@ -58,8 +58,7 @@ class PlanningSettings:
         max_glmb_sensors, max_glmb_targets: with more sensors, or more targets expected, GLMBs are planned on their
             LMBs, which the plan then says.
         undetected_worth: of finding a target of `State.undetected`, in units of the reward (of the expected loss: m to
-            the power of its order); 0: nobody is looked for. Targets not found are taken to stay where they are over
-            the horizon.
+            the power of its order); 0: nobody is looked for. Targets not found are taken to stay where they are.
         end: s, time of the last scan, on the clock of `State.time`: no decision after it is planned for; None: none is.
         max_prior_hypotheses: heaviest hypotheses of each local posterior that enter the pseudo-updates. An LMB enters
             whole.

@@ -89,6 +89,8 @@ def facts(model: ScenarioModel) -> list[tuple[str, str]]:
 
 
 def _samples(control: Control) -> str:
+    if control.reward.kind == "expected_loss":
+        return "no samples"
     if control.confidence is None:
         return counted(control.num_samples, "sample")
     near = f", to {100.0 * control.indifference:g} %" if control.indifference else ""

@@ -84,8 +84,8 @@ class ScenarioModel(Section):
     control: Control = Field(default=Control(), description="When and how the sensors decide [-].")
     planners: dict[Name, AnyPlanner] = Field(
         default={},
-        description="Further strategies by name, beside jdm, idm, lookahead, nearest, assigned, "
-        "centroid, oracle, random, fixed and still [-].",
+        description="Further strategies by name, beside jdm, idm, lookahead, nearest, assigned, centroid, oracle, "
+        "random, fixed and still [-].",
     )
     ospa: Ospa = Field(default=Ospa(), description="How the estimates are scored [-].")
     metrics: dict[Name, AnyMetric] = Field(
