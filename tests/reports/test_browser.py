@@ -273,7 +273,7 @@ def test_a_network_with_names_and_zones_opens_without_complaints(browser: Browse
     page.evaluate("document.getElementById('replay').focus()")
     page.press("End")
     assert page.complaints() == []
-    assert text(page, "reward-title") == "Reward (minus expected loss, m²)"
+    assert text(page, "reward-title") == "Reward (minus expected loss)"
     shown = str(page.evaluate("document.body.innerText"))
     assert all(word in shown for word in (*NAMES, "no-go zone", "sensors stay inside"))
     assert not re.search(r"\bsensor 1\b|\bS1\b", shown)

@@ -111,7 +111,7 @@ def test_a_sensor_that_stands_has_no_rewards_and_zones_are_there(tmp_path: Path)
     assert joint["decisions"][0]["map"]["sensors"] == (1, 2)
     for data in (joint, alone):
         assert [curve["sensor"] for curve in data["decisions"][0]["curves"]] == [1, 2]
-        assert data["reward"] == "minus expected loss, m²"
+        assert data["reward"] == "minus expected loss"
         assert [kind for kind, _ in data["zones"]] == ["region", "no-go zone", "sensors stay inside"]
         assert data["zones"][1][1] == POLYGON
 
