@@ -197,6 +197,7 @@ def test_the_expected_loss_is_what_its_formula_says(steps: int, order: float) ->
     """Plain NumPy of one scan, at the last step, with the detection of the model's own mean over the Gaussian."""
     settings = replace(KNOWN, horizon_steps=steps)
     example = replace(shared(2, 4, method="ekf"), settings=settings)
+    assert example.state.time is not None
     last = np.array([example.state.time + steps * settings.horizon_period])
     example = replace(example, sensors=tuple(replace(own, scan_times=last) for own in example.sensors))
     evaluator = additive_of(example, ExpectedLossReward(60.0, order))

@@ -30,6 +30,9 @@ from vedette.scenarios import load_scenario, with_fields
 from vedette.scenarios.build import build_sensors
 
 # Of two steps of 4 s each, from 1 s on.
+FIRST: Any
+SECOND: Any
+NEVER: Any
 FIRST, SECOND, NEVER = [3.0, 11.0], [1.0, 9.0], [0.5, 1.0, 9.5]
 
 
@@ -48,14 +51,20 @@ def shared() -> Situation:
 
 def test_a_pseudo_update_counts_where_a_scan_is_within_its_period() -> None:
     own = situation("lmb").sensors[0]
-    for times, wanted in ((FIRST, [True, False]), (SECOND, [False, True]), (NEVER, [False, False]), ([], [False] * 2)):
+    cases: tuple[tuple[Any, list[bool]], ...] = (
+        (FIRST, [True, False]),
+        (SECOND, [False, True]),
+        (NEVER, [False, False]),
+        ([], [False] * 2),
+    )
+    for times, wanted in cases:
         assert replace(own, scan_times=times).scans(1.0, SETTINGS).tolist() == wanted
     assert own.scans(1.0, SETTINGS).all()
     assert replace(own, scan_times=NEVER).scans(None, SETTINGS).all()
     # Times that are sums: a tenth of a second is none of binary.
     tenths = PlanningSettings(horizon_steps=50, horizon_period=0.1)
     for now in (0.1 * np.arange(1, 80)).tolist():
-        found = replace(own, scan_times=0.3 * np.arange(100)).scans(now, tenths)
+        found = replace(own, scan_times=0.3 * np.arange(100.0)).scans(now, tenths)
         steps = np.arange(1, 51) + round(now / 0.1)
         np.testing.assert_array_equal(found, steps % 3 == 0)
 

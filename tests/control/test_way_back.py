@@ -33,7 +33,7 @@ WALL = KeepOut(Region(-80.0, 80.0, -500.0, 500.0))
 
 def scene(poses: Any) -> Situation:
     """One belief of sensors that go 100 m within the horizon, in twelve directions; default settings."""
-    platform = Courses(10.0, np.arange(-150.0, 181.0, 30.0))
+    platform = Courses(10.0, np.arange(-150.0, 181.0, 30.0).tolist())
     belief = lmb((A, B, C), np.random.default_rng(3))
     given = situation("lmb", len(poses), settings=PlanningSettings(num_threads=1))
     sensors = (mobile_sensor("lmb", platform),) * len(poses)
@@ -42,7 +42,8 @@ def scene(poses: Any) -> Situation:
 
 
 def planners(given: Situation, constraint: Any) -> list[Any]:
-    parts, shared = (given.sensors, given.fusion, given.settings), {"constraints": (constraint,)}
+    parts = given.sensors, given.fusion, given.settings
+    shared: dict[str, Any] = {"constraints": (constraint,)}
     return [
         JointPlanner(*parts, **shared),
         IndependentPlanner(*parts, **shared),

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from vedette.control import Plan
-from vedette.densities import GLMB, LMB, FactoredGLMB, Labelled, TrackTable, lmb_to_glmb
+from vedette.densities import GLMB, LMB, FactoredGLMB, TrackTable, lmb_to_glmb
 from vedette.scenarios import Scenario, load_scenario, with_fields
 from vedette.scenarios.build import build_experiment, build_planner
 from vedette.tracking import State
@@ -43,9 +43,7 @@ def open_names() -> tuple[LMB, GLMB]:
     return LMB(tracks, np.full(2, np.inf)), swapped
 
 
-def planned(
-    filters: str, fusion: str, planner: str, held: Labelled | None = None, **fields: Any
-) -> tuple[Scenario, Plan]:
+def planned(filters: str, fusion: str, planner: str, held: Any = None, **fields: Any) -> tuple[Scenario, Plan]:
     """A decision of `paper-a` on a belief; without one on that of three targets, as this filter would hold it."""
     changes = {"filter.kind": filters, "fusion.kind": fusion, **fields}
     scenario = with_fields(load_scenario("paper-a"), changes)

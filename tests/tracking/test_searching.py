@@ -236,7 +236,7 @@ def test_what_is_dropped_is_where_scans_have_missed_it() -> None:
 
 
 def test_a_measurement_that_no_track_explains_is_looked_at_again() -> None:
-    birth = models.MeasurementBirth(1.0, 0.04, [5.0] * 4)
+    birth = models.MeasurementBirth(1.0, 0.04, np.full(4, 5.0))
     world = replace(WORLD, birth=replace(WORLD.birth, from_measurements=birth))
     searching = Searching(Central(SequentialLmbFilter(world, SENSORS)), models.UndetectedModel(GRID, 0.0))
     at = np.array([[-170.0, 80.0]])
