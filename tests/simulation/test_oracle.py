@@ -152,6 +152,14 @@ def test_what_is_lost_is_given_up_where_nothing_is_born() -> None:
     assert covs[0].shape == (3, 4, 4)
 
 
+@pytest.mark.parametrize("step", [1, 4, 6])
+def test_where_nobody_can_be_helped_each_takes_its_first_course(step: int) -> None:
+    """No target is tracked; after the last scan there is nothing to follow either."""
+    none = State((LMB.empty(4),) * 2, LMB.empty(4), step=step, time=float(TIMES[step - 1]))
+    plan = OraclePlanner(SENSORS, timetable(), depth=2, truth=truth()).plan(none, POSES, rng=np.random.default_rng(0))
+    assert plan.chosen == (0, 0)
+
+
 def test_it_keeps_to_constraints_and_wants_its_truth() -> None:
     planner = OraclePlanner(SENSORS, timetable(), constraints=(StayInside(Region(-600.0, -100.0, -900.0, 900.0)),))
     with pytest.raises(InputError, match="truth: expected the targets of the run"):

@@ -219,8 +219,8 @@ class OraclePlanner:
                         said[course, k] = scan_information(sensor.filter.sensor, states[k + 1], own[course, k])
             told.append(said)
         return Stretch(
-            np.array([transition_jacobians(motion, own, dt) for own, dt in steps]).reshape(-1, num, dim, dim),
-            np.array([motion.noise_covs(own, dt) for own, dt in steps]).reshape(-1, num, dim, dim),
+            np.array([transition_jacobians(motion, own, dt) for own, dt in steps]).reshape(len(steps), num, dim, dim),
+            np.array([motion.noise_covs(own, dt) for own, dt in steps]).reshape(len(steps), num, dim, dim),
             alive[1:],
             tuple(told),
             table.powers,
