@@ -58,17 +58,19 @@ class Scene:
 
 def strategies(scenario: Scenario) -> dict[str, Fields]:
     """The planners of the table by name, as a scenario's section `planners` has them."""
-    cutoff = scenario.model.ospa.cutoff
+    cutoff, named = scenario.model.ospa.cutoff, scenario.model.control.reward
+    loss = {**REWARDS["loss"], "cutoff": cutoff}
+    if named.kind == "expected_loss":  # which what a target not found is worth goes with
+        loss = named.model_dump(mode="json")
     found: dict[str, Fields] = {}
-    for reward, fields in REWARDS.items():
-        scaled = {**fields, "cutoff": cutoff} if fields["kind"].startswith("expected") else fields
+    for reward, fields in {**REWARDS, "loss": loss}.items():
+        scaled = {**fields, "cutoff": cutoff} if fields["kind"] == "expected_gospa" else fields
         found[f"jdm {reward}"] = {"kind": "joint", "reward": scaled}
         found[f"idm {reward}"] = {"kind": "independent", "reward": scaled}
     given = scenario.model.control.lookahead
     own = {} if given is None else given.model_dump(mode="json", exclude={"depth"})
     for depth in DEPTHS:
-        reward = {**REWARDS["loss"], "cutoff": cutoff}
-        found[f"lookahead {depth}"] = {"kind": "lookahead", **own, "depth": depth, "reward": reward}
+        found[f"lookahead {depth}"] = {"kind": "lookahead", **own, "depth": depth, "reward": loss}
     for rule in RULES:
         found[f"rule {rule}"] = {"kind": rule}
     if len(scenario.model.sensors) == 2:
@@ -126,7 +128,13 @@ def scenes() -> Iterator[Scene]:
     for number, size in enumerate(SIZES):
         title = f"layout {number}"
         yield Scene(title, "layouts", cache(lambda number=number: layout(number)), 1.0 if size <= 5 else 0.3)
-    for name, share in (("eight-mobile", 0.3), ("six-cameras", 1.0), ("two-searchers", 0.2), ("solent", 0.5)):
+    for name, share in (
+        ("eight-mobile", 0.3),
+        ("six-cameras", 1.0),
+        ("beyond-the-gap", 0.3),
+        ("two-searchers", 0.1),
+        ("solent", 0.3),
+    ):
         yield Scene(name, name, cache(lambda name=name: load_scenario(name)), share)
     for view, size, pattern in product(VIEWS, (2, 3, 5, 8, 20), PATTERNS):
         scene = GeneratedScene(num_sensors=size, pattern=pattern, view=view)

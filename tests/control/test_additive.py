@@ -61,7 +61,7 @@ def single(example: Situation) -> Situation:
 @pytest.mark.lanes
 def test_labels_are_followed_as_in_plain_numpy() -> None:
     """Existence, mean, covariance of every course, sample and label, at both sensors."""
-    example = situation("lmb", seed=2, settings=KNOWN)
+    example = situation("lmb", seed=2, settings=KNOWN, method="ekf")
     evaluator = evaluator_of(example)
     labels, futures = draw_futures(example.fused, example.sensors, KNOWN, rng=np.random.default_rng(5))
     for s, (belief, sensor) in enumerate(zip(example.beliefs, example.sensors, strict=True)):
@@ -196,8 +196,9 @@ def test_no_joint_action_is_better_than_the_bound(reward: Any) -> None:
 def test_the_expected_loss_is_what_its_formula_says(steps: int, order: float) -> None:
     """Plain NumPy of one scan, at the last step, with the detection of the model's own mean over the Gaussian."""
     settings = replace(KNOWN, horizon_steps=steps)
-    example = replace(shared(2, 4), settings=settings)
-    last = np.array([1.0 + steps * settings.horizon_period])
+    example = replace(shared(2, 4, method="ekf"), settings=settings)
+    assert example.state.time is not None
+    last = np.array([example.state.time + steps * settings.horizon_period])
     example = replace(example, sensors=tuple(replace(own, scan_times=last) for own in example.sensors))
     evaluator = additive_of(example, ExpectedLossReward(60.0, order))
     prediction, actions = evaluator.prediction, all_joint_actions((3, 3))

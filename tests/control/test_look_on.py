@@ -221,7 +221,7 @@ def test_at_all_is_the_mean_of_evaluators_that_are_prepared_one_by_one(hidden: b
     """Joint actions, lines, sensors alone, with what is not found yet, and sensors that scan at times of their own."""
     of = placed(bernoullis(FAR), POSES, undetected_worth=50.0 if hidden else 0.0)
     if different:  # rows of its own for each sensor
-        scans: Any = None, [3.0, 7.0, 13.0, 17.0, 18.0], [8.0, 12.5, 20.0, 25.0]
+        scans: tuple[Any, ...] = None, [3.0, 7.0, 13.0, 17.0, 18.0], [8.0, 12.5, 20.0, 25.0]
         of = replace(
             of, sensors=tuple(replace(own, scan_times=when) for own, when in zip(of.sensors, scans, strict=True))
         )

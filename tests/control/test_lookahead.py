@@ -295,14 +295,13 @@ def test_the_best_single_decision_stays_inside_the_search(search: Any, discount:
 def test_beams_find_the_best_of_all_from_there() -> None:
     """Of 28,561 joint sequences the best, within a budget of 2000."""
     sensor = mobile_sensor("lmb", Courses(30.0, tuple(range(-180, 181, 30))))
+    budgets: tuple[dict[str, Any], ...] = ({"budget": 28_561}, {})
     found = []
     for seed in range(6):
         given = replace(situation("lmb", 2, seed, KNOWN), sensors=(sensor,) * 2)
         best, short = (
-            decide(
-                HorizonPlanner(given.sensors, given.fusion, given.settings, ExpectedLossReward(), 2, budget=most), given
-            )
-            for most in (28_561, 2000)
+            decide(HorizonPlanner(given.sensors, given.fusion, given.settings, ExpectedLossReward(), 2, **more), given)
+            for more in budgets
         )
         assert short.curve is not None
         assert short.curve.evaluations[-1] <= 2000

@@ -30,6 +30,9 @@ from vedette.scenarios import load_scenario, with_fields
 from vedette.scenarios.build import build_sensors
 
 # Of two steps of 4 s each, from 1 s on.
+FIRST: Any
+SECOND: Any
+NEVER: Any
 FIRST, SECOND, NEVER = [3.0, 11.0], [1.0, 9.0], [0.5, 1.0, 9.5]
 
 
@@ -48,11 +51,16 @@ def shared() -> Situation:
 
 def test_a_pseudo_update_counts_where_a_scan_is_within_its_period() -> None:
     own = situation("lmb").sensors[0]
-    cases: Any = ((FIRST, [True, False]), (SECOND, [False, True]), (NEVER, [False, False]), ([], [False] * 2))
+    cases: tuple[tuple[Any, list[bool]], ...] = (
+        (FIRST, [True, False]),
+        (SECOND, [False, True]),
+        (NEVER, [False, False]),
+        ([], [False] * 2),
+    )
     for times, wanted in cases:
         assert replace(own, scan_times=times).scans(1.0, SETTINGS).tolist() == wanted
     assert own.scans(1.0, SETTINGS).all()
-    assert replace(own, scan_times=np.array(NEVER)).scans(None, SETTINGS).all()
+    assert replace(own, scan_times=NEVER).scans(None, SETTINGS).all()
     # Times that are sums: a tenth of a second is none of binary.
     tenths = PlanningSettings(horizon_steps=50, horizon_period=0.1)
     for now in (0.1 * np.arange(1, 80)).tolist():

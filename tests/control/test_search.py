@@ -126,7 +126,8 @@ def test_automatic_search_goes_on_while_the_bound_is_loose() -> None:
 
 def test_many_sensors_do_with_two_restarts() -> None:
     """Of 500 courses in all, more ascents would take too long."""
-    own, asked = np.random.default_rng(1).random((50, 10)), list[Any]()
+    own = np.random.default_rng(1).random((50, 10))
+    asked: list[Any] = []
 
     def evaluate(rows: Any) -> Any:
         asked[-1] += len(rows)

@@ -265,3 +265,19 @@ def test_scripted_targets_count_while_they_are_there() -> None:
     most = scene.model.targets.expected_number(scene.model.time.num_steps)
     truth = build_targets(scene).truth(scene.model.time.build(), rng=np.random.default_rng(0))
     assert most == max(len(truth.at(scan)[0]) for scan in range(scene.model.time.num_steps))
+
+
+def test_near_births_warn_under_fusion_by_label_and_not_far_ones(tmp_path: Path) -> None:
+    own = load_scenario("paper-a")
+    second = own.model.birth.sites[1].mean
+    for apart, warns in ((200.0, True), (290.0, False)):  # m, of standard deviations of 50 m each
+        place = (second[0], second[1] + apart, 0.0, 0.0)
+        near = with_fields(own, {"birth.sites.0.mean": place, "targets.tracks.0.state": place})
+        found = cautions(near)
+        assert len(found) == warns
+        assert all("sites 0 and 1 are 2.8 standard deviations apart" in line for line in found)
+        assert all(
+            "take fusion.matching: assignment, or fusion.feedback: true, or fusion: {k" in line for line in found
+        )
+        for cure in ({"fusion.matching": "assignment"}, {"fusion.feedback": True}, {"fusion": {"kind": "sequential"}}):
+            assert cautions(with_fields(near, cure)) == ()

@@ -82,7 +82,7 @@ def test_constraints_are_those_of_all_strategies(gap: Scenario) -> None:
         ),
         (
             {"control.lookahead": {"period": 1.5}},
-            "control.lookahead.period: expected a whole multiple of horizon_period, 1, got 1.5",
+            "control.lookahead.period: expected a whole multiple of control.horizon_period, 1, got 1.5",
         ),
         (
             {"control.lookahead": {}, "control.association": "full"},

@@ -10,9 +10,9 @@ import pytest
 
 from tracking.scenes import SURVIVAL, filters, rngs, scans_of, sensor, targets
 from vedette import models
-from vedette.densities import UndetectedIntensity
+from vedette.densities import LMB, UndetectedIntensity
 from vedette.errors import InputError, ModelError
-from vedette.filters import SequentialLmbFilter
+from vedette.filters import Limits, SequentialLmbFilter
 from vedette.fusion import Clmb, Matched
 from vedette.models.functions import model_function
 from vedette.tracking import (
@@ -194,3 +194,53 @@ def test_a_tracker_of_ones_own_is_as_good() -> None:
     (other, _) = follow(Searching(TRACKERS["central"], undetected()))[-1]
     assert state.fused == "nothing"
     assert state.undetected.expected.tobytes() == other.undetected.expected.tobytes()
+
+
+def _without_limits(**limits: Any) -> Searching:
+    own = SequentialLmbFilter(WORLD, SENSORS, Limits(**limits))
+    return Searching(Central(own), models.UndetectedModel(GRID, 0.0))
+
+
+def _state(searching: Searching, mean: Any, std: float, existence: float = 0.7) -> State:
+    belief = LMB.from_bernoullis([[1, 0]], [existence], [[*mean, 0.0, 0.0]], [np.diag([std, std, 1.0, 1.0]) ** 2])
+    return replace(searching.initial(), local=(belief,) * 2, fused=belief, step=1, time=1.0)
+
+
+@pytest.mark.parametrize("scanned", [False, True])
+def test_what_a_filter_drops_is_undetected_again(scanned: bool) -> None:
+    dropping, keeping = _without_limits(min_existence=0.9), _without_limits()
+    state, scans = _state(dropping, (170.0, -80.0), 3.0), [np.empty((0, 2)) if scanned else None] * 2
+    after, _ = dropping.step(state, scans, POSES, 2.0, rngs=rngs(2))
+    kept, _ = keeping.step(state, scans, POSES, 2.0, rngs=rngs(2))
+    assert after.undetected is not None
+    assert kept.undetected is not None
+    assert after.fused.tracks.num_tracks == 0
+    # The expected number of the filter that keeps it, and in the cell where that has it.
+    np.testing.assert_allclose(after.undetected.total, kept.fused.existence.sum(), rtol=1e-9)
+    assert after.undetected.expected.argmax() == GRID.cells_at(kept.fused.tracks.means)[0]
+    assert kept.undetected.total == 0.0
+
+
+def test_what_is_dropped_is_where_scans_have_missed_it() -> None:
+    dropping = _without_limits(max_position_std=20.0)
+    state = _state(dropping, (60.0, 20.0), 30.0)  # the first sensor sees to x = 60, and surely
+    after, _ = dropping.step(state, [np.empty((0, 2)), None], POSES, 2.0, rngs=rngs(2))
+    assert after.undetected is not None
+    draws = np.random.default_rng(1).multivariate_normal([60.0, 20.0], np.eye(2) * (30.0**2 + 1.0), 200_000)
+    missed = 1.0 - SENSORS[0].detection.prob(np.column_stack([draws, draws * 0.0]), POSES[0])
+    alive = 0.7 * SURVIVAL
+    expected = alive * missed.mean() / (1.0 - alive + alive * missed.mean())
+    inside = GRID.cells_at(draws) >= 0
+    share = missed[inside].sum() / missed.sum()
+    np.testing.assert_allclose(after.undetected.total, expected * share, rtol=0.03)
+
+
+def test_a_measurement_that_no_track_explains_is_looked_at_again() -> None:
+    birth = models.MeasurementBirth(1.0, 0.04, np.full(4, 5.0))
+    world = replace(WORLD, birth=replace(WORLD.birth, from_measurements=birth))
+    searching = Searching(Central(SequentialLmbFilter(world, SENSORS)), models.UndetectedModel(GRID, 0.0))
+    at = np.array([[-170.0, 80.0]])
+    after, _ = searching.step(searching.initial(), [at, None], POSES, 1.0, rngs=rngs(2))
+    assert after.undetected is not None
+    np.testing.assert_allclose(after.undetected.expected[GRID.cells_at(at)], 0.04, rtol=1e-6)
+    np.testing.assert_allclose(after.undetected.total, 0.04, rtol=1e-6)

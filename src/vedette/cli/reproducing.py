@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 YARDSTICK = "yardstick.md"
 _RUNS = 30
-_STRATEGIES = ("jdm", "idm", "random")
+_STRATEGIES = ("jdm", "idm", "assigned", "random")
 _FOLDER = "reproduction"
 
 
@@ -43,7 +43,7 @@ def reproduce(
         typer.Option(
             "--planners",
             metavar="LIST",
-            help="Strategies to compare, the first is the reference; else the yardstick's, or jdm,idm,random.",
+            help="Strategies to compare, the first is the reference; else the yardstick's, or jdm,idm,assigned,random.",
             autocompletion=lists_of_strategies,
         ),
     ] = None,

@@ -21,8 +21,9 @@ def run_scenario(scenario: Scenario, planner: str, *, seed: int, run: int = 0, n
 
     Args:
         scenario: as `vedette.scenarios.load_scenario` reads it.
-        planner: "jdm" (joint), "idm" (independent), "lookahead" (joint, over several decisions), "random", "fixed",
-            "still", or one of the scenario's own.
+        planner: "jdm" (joint), "idm" (independent), "lookahead" (joint, over several decisions), "nearest", "assigned"
+            or "centroid" (rules of thumb), "oracle" (who knows the targets), "random", "fixed", "still", or one of the
+            scenario's own.
         seed, run: fix every random number; runs with equal seed and number are paired across strategies.
         num_threads: share a decision (0: one a processor) and change no result.
 

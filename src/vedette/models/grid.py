@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vedette.kernels.base.types import Floats
+from vedette.kernels.base.types import Floats, Ints
 from vedette.models.arguments import dimension, instance, positive, reject
 from vedette.models.region import Region
 
@@ -85,6 +85,13 @@ class CellGrid:
         states[..., 0] = x[None, :, None, :]
         states[..., 1] = y[:, None, :, None]
         return states.reshape(self.num_cells, nodes_a_side**2, state_dim)
+
+    def cells_at(self, states: Floats) -> Ints:
+        """(n,) cells in which (n, 2 or more) states are; -1 of those outside of the region."""
+        corner, size = (self.region.x_min, self.region.y_min), np.array(self.cell_size)
+        column, row = np.floor((states[:, :2] - corner) / size).astype(np.int64).T
+        inside = (column >= 0) & (column < self.columns) & (row >= 0) & (row < self.rows)
+        return np.where(inside, row * self.columns + column, -1)
 
     @staticmethod
     def node_weights(nodes_a_side: int = 3) -> Floats:

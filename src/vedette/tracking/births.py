@@ -87,6 +87,15 @@ def births_from_scans(
     model = birth.from_measurements
     if model is None:
         return None
+    pooled = unexplained(model, belief, sensors, scans, poses)
+    first = birth.num_sites if owner is None else OWN_LABELS * (owner + 1)
+    return _born(pooled, model, step, first)
+
+
+def unexplained(
+    model: MeasurementBirth, belief: Labelled, sensors: Sequence[SensorModel], scans: Sequence[Any], poses: Any
+) -> Unexplained:
+    """What no track explains surely, once for what several sensors measured of one target; see `births_from_scans`."""
     if not isinstance(belief, Labelled):
         raise InputError(f"belief: expected {LABELLED} for births from measurements; got {type(belief).__name__}")
     lmb = as_lmb(belief).to_kernel()
@@ -94,10 +103,8 @@ def births_from_scans(
         _unexplained(lmb, sensor, scans[s], poses[s], s) for s, sensor in enumerate(sensors) if scans[s] is not None
     ]
     if not found:
-        return LMB.empty(birth.state_dim)
-    pooled = _pool(Unexplained(*map(np.concatenate, zip(*found, strict=True))), model)
-    first = birth.num_sites if owner is None else OWN_LABELS * (owner + 1)
-    return _born(pooled, model, step, first)
+        return Unexplained(np.empty((0, 2)), np.empty(0), np.empty(0, np.int64))
+    return _pool(Unexplained(*map(np.concatenate, zip(*found, strict=True))), model)
 
 
 def births_heard(

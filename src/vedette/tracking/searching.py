@@ -15,6 +15,8 @@ from vedette.kernels.steps.undetected import survival_probabilities, take_out_de
 from vedette.models import SensorModel, TargetModel, UndetectedModel, kernel_motion
 from vedette.models.arguments import float_array, reject
 from vedette.tracking.base import State, Tracker, TrackerInfo
+from vedette.tracking.births import unexplained
+from vedette.tracking.losing import expected_in_cells, expected_of_lost, lost_labels
 from vedette.tracking.stages import Stages
 
 
@@ -24,7 +26,10 @@ class Searching:
 
     The beliefs are the other tracker's, to the last bit. A scan takes out of every cell the share that it would have
     detected, expected times the mean over the cell of 1 - P_D; what came of its measurements is the other tracker's
-    to say. All scans are taken as known at once, also where a network brings them late or not at all.
+    to say. Labels that it drops are undetected again (`expected_of_lost`). Where targets are born of measurements, who
+    may be so is undetected until then, as it is found only if it is looked at again: a measurement that no track
+    explains with probability p is one with p times the most that such a birth may have. All scans are taken as known at
+    once, also where a network brings them late or not at all.
 
     Attributes:
         tracker: of the targets that are found.
@@ -74,9 +79,10 @@ class Searching:
         with stages.timing("targets not yet found"):
             expected = self._predicted(state, time)
             at = float_array("poses", poses, (len(self.sensors), None))
-            for sensor, scan, pose in zip(self.sensors, scans, at, strict=True):
-                if scan is not None:
-                    expected = take_out_detected(sensor.to_kernel(), pose, self._nodes, self._node_weights, expected)
+            looks = [own[:2] for own in zip(self.sensors, at, scans, strict=True) if own[2] is not None]
+            for sensor, pose in looks:
+                expected = take_out_detected(sensor.to_kernel(), pose, self._nodes, self._node_weights, expected)
+            expected = expected + self._lost(state, after, looks, float(time)) + self._new(after, scans, at)
         seconds = {**info.seconds, **stages.seconds}
         left = UndetectedIntensity(self.model.grid, expected)
         return replace(after, undetected=left), replace(info, seconds=seconds)
@@ -92,6 +98,23 @@ class Searching:
             return before.expected
         dt = float(time) - state.time
         return self.model.predict(before.expected, dt, self._survival(dt))
+
+    def _lost(
+        self, before: State, after: State, looks: Sequence[tuple[SensorModel, Floats]], time: float
+    ) -> Floats | float:
+        """Expected in each cell of labels that are no longer held."""
+        lost = lost_labels(before.fused, (*after.local, after.fused))
+        if before.time is None or lost is None or lost.tracks.num_tracks == 0:
+            return 0.0
+        return expected_of_lost(lost, self.targets, looks, time - before.time, self.model.grid)
+
+    def _new(self, after: State, scans: Sequence[Any], poses: Floats) -> Floats | float:
+        """Expected in each cell of who may be born of measurements."""
+        birth = self.targets.birth.from_measurements
+        if birth is None:
+            return 0.0
+        found = unexplained(birth, after.fused, self.sensors, scans, poses)
+        return expected_in_cells(found.positions, birth.max_existence * found.probabilities, self.model.grid)
 
     def _survival(self, dt: float) -> Floats | float:
         """Probability of living through `dt` seconds, in each cell or everywhere."""

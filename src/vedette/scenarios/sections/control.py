@@ -150,19 +150,6 @@ class Control(Section):
                 if value != default:
                     yield (name,), "confidence beside it, such as 0.95", describe(value)
 
-    @check
-    def _period_of_lookahead(self) -> Iterator[Finding]:
-        if self.lookahead is not None and self.lookahead.period is not None:
-            steps = self.lookahead.period / self.horizon_period
-            if round(steps) < 1 or abs(steps - round(steps)) > 1e-9 * steps:
-                multiple = f"a whole multiple of horizon_period, {self.horizon_period:g}"
-                yield ("lookahead", "period"), multiple, describe(self.lookahead.period)
-
-    @check
-    def _association_of_lookahead(self) -> Iterator[Finding]:
-        if self.lookahead is not None and self.association != "known":
-            yield ("association",), "known, with a lookahead", describe(self.association)
-
     def build(self, num_threads: int = 0) -> PlanningSettings:
         """Horizon, samples and caps of a decision."""
         from vedette.control import PlanningSettings, planning_limits

@@ -9,6 +9,7 @@ from vedette.scenarios.faults import Finding, Path, describe
 from vedette.scenarios.sections.tracking import UNLABELLED
 
 if TYPE_CHECKING:
+    from vedette.scenarios.sections.lookahead import Lookahead
     from vedette.scenarios.sections.rewards import AnyReward
     from vedette.scenarios.sections.scenario import ScenarioModel
     from vedette.scenarios.sections.search import AnySearch
@@ -51,4 +52,29 @@ def _joint(model: ScenarioModel) -> Iterator[tuple[Path, AnySearch, AnyReward]]:
             yield path, own.search or control.search, own.reward or control.reward
 
 
-DECISION_CHECKS = (constraints_on_labels, greedy_of_sums)
+def longer_plans(model: ScenarioModel) -> Iterator[Finding]:
+    """Decisions over several periods are pseudo-updates apart, and sums over labels."""
+    control = model.control
+    given: dict[Path, Lookahead | None] = {("control", "lookahead"): control.lookahead}
+    given.update({("planners", name): own for name, own in model.planners.items() if own.kind == "lookahead"})
+    for path, own in given.items():
+        if own is None:
+            continue
+        if own.period is not None:
+            steps = own.period / control.horizon_period
+            if round(steps) < 1 or abs(steps - round(steps)) > 1e-9 * steps:
+                multiple = f"a whole multiple of control.horizon_period, {control.horizon_period:g}"
+                yield (*path, "period"), multiple, describe(own.period)
+        if control.association != "known":
+            yield ("control", "association"), "known, with a lookahead", describe(control.association)
+
+
+def targets_of_rules(model: ScenarioModel) -> Iterator[Finding]:
+    """Each sensor heads for a target."""
+    for name, own in model.planners.items():
+        if own.kind == "assigned" and own.targets is not None and len(own.targets) != len(model.sensors):
+            wanted = f"{len(model.sensors)} numbers, one a sensor"
+            yield ("planners", name, "targets"), wanted, describe(list(own.targets))
+
+
+DECISION_CHECKS = (constraints_on_labels, greedy_of_sums, longer_plans, targets_of_rules)

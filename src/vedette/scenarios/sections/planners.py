@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, NamedTuple
@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, NamedTuple
 import numpy as np
 from pydantic import Field
 
-from vedette.scenarios.sections.base import Count, Section
+from vedette.scenarios.faults import Finding, describe
+from vedette.scenarios.sections.base import Count, Section, check
 from vedette.scenarios.sections.custom import Custom
 from vedette.scenarios.sections.lookahead import Lookahead
 from vedette.scenarios.sections.rewards import AnyReward
@@ -145,45 +146,49 @@ STRATEGIES = {
 }
 
 
-class NamedJoint(Section):
+class _Valued(Section):
+    """A strategy that decides by a reward of its own."""
+
+    reward: AnyReward | None = Field(default=None, description="In place of control.reward; none: that one [-].")
+
+    def valued(self, parts: Parts, folder: Path) -> Parts:
+        """With that reward."""
+        return parts if self.reward is None else parts._replace(reward=self.reward.build(folder))
+
+
+class NamedJoint(_Valued):
     """Joint decisions, as of jdm, by a search or a reward of its own: strategies to compare in one campaign."""
 
     kind: Literal["joint"] = Field(default="joint", description="Kind of planner [-].")
     search: AnySearch | None = Field(default=None, description="In place of control.search; none: that one [-].")
-    reward: AnyReward | None = Field(default=None, description="In place of control.reward; none: that one [-].")
     needs_labels: ClassVar[bool] = STRATEGIES["jdm"].needs_labels
 
     def planner(self, name: str, parts: Parts, folder: Path) -> Planner:
         """The planner, under the name that the scenario gives it."""
         search = parts.search if self.search is None else self.search.build(folder)
-        reward = parts.reward if self.reward is None else self.reward.build(folder)
-        return Named(name, _joint(parts._replace(search=search, reward=reward)))
+        return Named(name, _joint(self.valued(parts, folder)._replace(search=search)))
 
 
-class NamedIndependent(Section):
+class NamedIndependent(_Valued):
     """Independent decisions, as of idm, by a reward of its own."""
 
     kind: Literal["independent"] = Field(default="independent", description="Kind of planner [-].")
-    reward: AnyReward | None = Field(default=None, description="In place of control.reward; none: that one [-].")
     needs_labels: ClassVar[bool] = STRATEGIES["idm"].needs_labels
 
     def planner(self, name: str, parts: Parts, folder: Path) -> Planner:
         """The planner, under the name that the scenario gives it."""
-        reward = parts.reward if self.reward is None else self.reward.build(folder)
-        return Named(name, _independent(parts._replace(reward=reward)))
+        return Named(name, _independent(self.valued(parts, folder)))
 
 
-class NamedLookahead(Lookahead):
+class NamedLookahead(_Valued, Lookahead):
     """Decisions over several periods, as of lookahead, by a reward or a depth of its own."""
 
     kind: Literal["lookahead"] = Field(default="lookahead", description="Kind of planner [-].")
-    reward: AnyReward | None = Field(default=None, description="In place of control.reward; none: that one [-].")
     needs_labels: ClassVar[bool] = STRATEGIES["lookahead"].needs_labels
 
     def planner(self, name: str, parts: Parts, folder: Path) -> Planner:
         """The planner, under the name that the scenario gives it."""
-        reward = parts.reward if self.reward is None else self.reward.build(folder)
-        return Named(name, _lookahead(parts._replace(reward=reward, lookahead=self.build())))
+        return Named(name, _lookahead(self.valued(parts, folder)._replace(lookahead=self.build())))
 
 
 class NamedRule(Section):
@@ -197,6 +202,11 @@ class NamedRule(Section):
         default=None, description="Of assigned: the number of each sensor's target instead, counted from 1 [-]."
     )
     needs_labels: ClassVar[bool] = False
+
+    @check
+    def _targets_of_assigned(self) -> Iterator[Finding]:
+        if self.targets is not None and self.kind != "assigned":
+            yield ("targets",), f"none, as the rule is {self.kind}", describe(list(self.targets))
 
     def planner(self, name: str, parts: Parts, folder: Path) -> Planner:
         """The planner, under the name that the scenario gives it."""

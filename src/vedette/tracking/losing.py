@@ -1,0 +1,66 @@
+"""Where the targets are that a tracker has just dropped: undetected ones, as before they were found."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from vedette.densities import GLMB, LMB, FactoredGLMB, as_lmb, existence_probabilities
+from vedette.densities.containers import for_kernel
+from vedette.densities.label_sets import without_labels
+from vedette.filters.inputs import model_errors
+from vedette.kernels.base.types import Floats
+from vedette.kernels.gaussian.position_integrals import spread_nodes
+from vedette.kernels.planning.prediction import predict_tracks
+from vedette.models import CellGrid, SensorModel, TargetModel, kernel_motion
+
+_LABELLED = (GLMB, LMB, FactoredGLMB)
+_NODES = spread_nodes()
+_LEAST = 1e-300  # of a probability that is divided by
+
+
+def lost_labels(before: Any, after: Sequence[Any]) -> LMB | None:
+    """The labels of a belief that none of the beliefs after the next scan holds; None where beliefs have no labels."""
+    if not all(isinstance(belief, _LABELLED) for belief in (before, *after)):
+        return None
+    held = [existence_probabilities(belief)[0] for belief in {id(belief): belief for belief in after}.values()]
+    return as_lmb(without_labels(before, np.concatenate(held))[0])
+
+
+def expected_of_lost(
+    lost: LMB, targets: TargetModel, looks: Sequence[tuple[SensorModel, Floats]], dt: float, grid: CellGrid
+) -> Floats:
+    """(num_cells,) mean number of lost targets in each cell, `dt` seconds after they were believed, none detected.
+
+    A label that exists with r, lives on with p, is predicted as f(x) and missed at x by all scans with q(x) exists with
+
+        r p int q f / (1 - r p + r p int q f)
+
+    and has the density q f. f is taken at nodes, whose shares go to the cells that they lie in; those outside of the
+    grid are lost.
+
+    looks: the sensors that scanned, and where.
+    """
+    tracks = lost.tracks
+    of_component = np.repeat(np.arange(tracks.num_tracks), np.diff(tracks.offsets))
+    with model_errors():
+        motion = kernel_motion(targets.motion, targets.survival)
+        means, covs = predict_tracks(motion, dt, 1, for_kernel(tracks.means), for_kernel(tracks.covs))
+    states = np.repeat(means[:, None], len(_NODES), axis=1)  # (num_components, num_nodes, state_dim)
+    states[..., :2] += np.einsum("cij,nj->cni", np.linalg.cholesky(covs[:, :2, :2]), _NODES[:, 1:])
+    nodes = states.reshape(-1, states.shape[2])
+    living = lost.existence[of_component] * np.exp(tracks.log_weights) * targets.survival.prob(tracks.means, dt)
+    shares = living[:, None] * _NODES[:, 0]
+    for sensor, pose in looks:
+        shares = shares * (1.0 - sensor.detection.prob(nodes, pose)).reshape(shares.shape)
+    alive, missed = (np.bincount(of_component, each, tracks.num_tracks) for each in (living, shares.sum(axis=1)))
+    shares /= np.maximum(1.0 - alive + missed, _LEAST)[of_component, None]
+    return expected_in_cells(nodes, shares.ravel(), grid)
+
+
+def expected_in_cells(states: Floats, shares: Floats, grid: CellGrid) -> Floats:
+    """(num_cells,) sums of the shares (n,) of states (n, 2 or more) in each cell; nobody counts those outside."""
+    cells = grid.cells_at(states)
+    return np.bincount(cells[cells >= 0], shares[cells >= 0], grid.num_cells).astype(np.float64)
