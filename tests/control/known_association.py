@@ -17,7 +17,7 @@ def followed(
     """Logit, mean, covariance at the end of a course, and the probability of never being detected.
 
     target: (horizon_steps, state_dim) states of the sampled target, or None where it is not there. "ideal" measurements
-    of sensors with method "auto".
+    of sensors with method "ekf" or "auto".
     """
     own, motion = sensor.filter.sensor, sensor.filter.targets.motion
     assert motion.transition_jacobian is not None
@@ -48,14 +48,14 @@ def followed(
 
 
 def measurement_moments(mean: Any, cov: Any, pose: Any, sensor: MobileSensor) -> tuple[Any, Any, Any]:
-    """Mean and covariance of a measurement without noise, and its covariance with the state, by method "auto".
+    """Mean and covariance of a measurement without noise, and its covariance with the state, by "ekf" or "auto".
 
-    Linearised, but for places that are a fifth of their distance uncertain: there by the 2 n + 1 points of Julier and
+    Linearised, but with "auto" for places that are a fifth of their distance uncertain: there by the 2 n + 1 points of Julier and
     Uhlmann with kappa = 1.
     """
     own, n = sensor.filter.sensor, len(mean)
-    assert own.method == "auto"
-    if np.sqrt(cov[0, 0] + cov[1, 1]) <= 0.2 * np.hypot(*(mean[:2] - pose[:2])):
+    assert own.method in ("ekf", "auto")
+    if own.method == "ekf" or np.sqrt(cov[0, 0] + cov[1, 1]) <= 0.2 * np.hypot(*(mean[:2] - pose[:2])):
         assert own.measurement.jacobian is not None
         slope = np.empty((own.meas_dim, n))
         own.measurement.jacobian(mean, pose, own.measurement.params, slope)

@@ -59,9 +59,10 @@ def single(example: Situation) -> Situation:
 
 
 @pytest.mark.lanes
-def test_labels_are_followed_as_in_plain_numpy() -> None:
+@pytest.mark.parametrize("method", ["auto", "ekf"])
+def test_labels_are_followed_as_in_plain_numpy(method: str) -> None:
     """Existence, mean, covariance of every course, sample and label, at both sensors."""
-    example = situation("lmb", seed=2, settings=KNOWN, method="ekf")
+    example = situation("lmb", seed=2, settings=KNOWN, method=method)
     evaluator = evaluator_of(example)
     labels, futures = draw_futures(example.fused, example.sensors, KNOWN, rng=np.random.default_rng(5))
     for s, (belief, sensor) in enumerate(zip(example.beliefs, example.sensors, strict=True)):
@@ -192,11 +193,11 @@ def test_no_joint_action_is_better_than_the_bound(reward: Any) -> None:
 
 
 @pytest.mark.parametrize("steps", [1, 2])
-@pytest.mark.parametrize("order", [1.0, 2.0, 0.7])
-def test_the_expected_loss_is_what_its_formula_says(steps: int, order: float) -> None:
+@pytest.mark.parametrize(("order", "method"), [(1.0, "auto"), (2.0, "auto"), (0.7, "auto"), (1.0, "ekf")])
+def test_the_expected_loss_is_what_its_formula_says(steps: int, order: float, method: str) -> None:
     """Plain NumPy of one scan, at the last step, with the detection of the model's own mean over the Gaussian."""
     settings = replace(KNOWN, horizon_steps=steps)
-    example = replace(shared(2, 4, method="ekf"), settings=settings)
+    example = replace(shared(2, 4, method=method), settings=settings)
     assert example.state.time is not None
     last = np.array([example.state.time + steps * settings.horizon_period])
     example = replace(example, sensors=tuple(replace(own, scan_times=last) for own in example.sensors))
