@@ -50,8 +50,8 @@ def followed(
 def measurement_moments(mean: Any, cov: Any, pose: Any, sensor: MobileSensor) -> tuple[Any, Any, Any]:
     """Mean and covariance of a measurement without noise, and its covariance with the state, by "ekf" or "auto".
 
-    Linearised, but with "auto" for places that are a fifth of their distance uncertain: there by the 2 n + 1 points of Julier and
-    Uhlmann with kappa = 1.
+    Linearised, but with "auto" for places that are a fifth of their distance uncertain: there by the 2 n + 1 points of
+    Julier and Uhlmann with kappa = 1.
     """
     own, n = sensor.filter.sensor, len(mean)
     assert own.method in ("ekf", "auto")
