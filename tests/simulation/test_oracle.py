@@ -10,13 +10,14 @@ import numpy as np
 import pytest
 
 from control.examples import mobile_sensor
-from vedette.control import FixedPlanner, Plan, StayInside
+from vedette.control import FixedPlanner, Plan, PlanningSettings, StayInside
+from vedette.control.watched import WatchedPlanner
 from vedette.densities import LMB
 from vedette.errors import InputError
 from vedette.models import Region
 from vedette.platforms import Actions, Courses
 from vedette.scenarios import load_scenario, with_fields
-from vedette.scenarios.build import build_experiment, build_planner
+from vedette.scenarios.build import build_experiment, build_planner, build_sensors
 from vedette.simulation import KnowsTruth, OraclePlanner, Timetable, Truth, simulate
 from vedette.simulation.cramer_rao import scan_information, transition_jacobians
 from vedette.tracking import State
@@ -191,11 +192,14 @@ def test_own_planners_may_be_told_it_too() -> None:
         def plan(self, state: State, poses: Any, *, rng: np.random.Generator) -> Plan:
             return FixedPlanner((Actions.of(heading_deg=0.0),) * 2).plan(state, poses, rng=rng)
 
-    scenario, own = with_fields(load_scenario("paper-a"), SHORT), Told()
-    assert isinstance(own, KnowsTruth)
-    record = simulate(build_experiment(scenario), own, seed=1, run=0, score=no_score)
-    assert own.truth is not None
-    np.testing.assert_array_equal(own.truth.states, record.truth.states)
+    scenario, plain, inside = with_fields(load_scenario("paper-a"), SHORT), Told(), Told()
+    sensors = build_sensors(scenario)
+    watched = WatchedPlanner(inside, sensors, PlanningSettings(), (StayInside(Region(-9e3, 9e3, -9e3, 9e3)),))
+    for planner, own in ((plain, plain), (watched, inside)):
+        assert isinstance(planner, KnowsTruth)
+        record = simulate(build_experiment(scenario), planner, seed=1, run=0, score=no_score)
+        assert own.truth is not None
+        np.testing.assert_array_equal(own.truth.states, record.truth.states)
 
 
 def no_score(truth: Truth, estimates: Any) -> Any:

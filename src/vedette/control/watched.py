@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -46,6 +46,11 @@ class WatchedPlanner:
     def name(self) -> str:
         """Of the planner."""
         return self.planner.name
+
+    def told(self, truth: Any) -> WatchedPlanner:
+        """The same, where the planner is one that is told the targets of a run (`vedette.simulation.KnowsTruth`)."""
+        tell = getattr(self.planner, "told", None)
+        return self if tell is None else replace(self, planner=tell(truth))
 
     def plan(self, state: State, poses: Floats, *, rng: np.random.Generator) -> Plan:
         """What the planner decides; raises what it raises, and `InputError` as `mask_of`."""

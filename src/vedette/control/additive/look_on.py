@@ -32,11 +32,6 @@ _DISTANCES, _DIRECTIONS = np.geomspace(1.0, 1e6, 121), 8
 _LEAST_STEPS, _MOST_STEPS = 4, 12
 
 
-def seconds_of_horizon(settings: PlanningSettings) -> float:
-    """To the end of the horizon."""
-    return settings.horizon_steps * settings.horizon_period
-
-
 def look_on(
     sensors: Sequence[MobileSensor], options: Sequence[Options], prediction: LMB, settings: PlanningSettings
 ) -> tuple[PlanningSettings, ...]:
@@ -44,8 +39,8 @@ def look_on(
 
     prediction: at the end of the horizon.
     """
-    horizon, places = seconds_of_horizon(settings), prediction.tracks.means[:, :2]
-    places = places[prediction.existence >= _LEAST_EXISTENCE]
+    horizon = settings.horizon_steps * settings.horizon_period
+    places = prediction.tracks.means[prediction.existence >= _LEAST_EXISTENCE, :2]
     speeds = np.array([_speed(own, horizon) for own in options])
     if len(places) == 0 or not (speeds > 0.0).all():
         return ()
@@ -59,8 +54,8 @@ def look_on(
     rate = float((speeds / reaches).max())
     total = min(horizon + beyond, max(_MOST_STEPS / rate, 2.0 * horizon))
     num = min(max(_LEAST_STEPS, math.ceil(total * rate)), _MOST_STEPS)
-    half = max(num // 2, 1)
-    return tuple(_with_horizon(settings, steps, total / num) for steps in (half, num))
+    looks = (num // 2, num)
+    return tuple(replace(settings, horizon_steps=steps, horizon_period=total / num) for steps in looks)
 
 
 def continued(own: Options, horizon: Floats, times: Floats) -> Options:
@@ -139,7 +134,3 @@ def _speed(own: Options, horizon: float) -> float:
     """m/s of the course that goes farthest."""
     offsets = own.courses[:, -1, :2] - own.pose[:2]
     return float(np.hypot(offsets[:, 0], offsets[:, 1]).max()) / horizon
-
-
-def _with_horizon(settings: PlanningSettings, steps: int, period: float) -> PlanningSettings:
-    return replace(settings, horizon_steps=steps, horizon_period=period)
