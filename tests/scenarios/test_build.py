@@ -12,7 +12,14 @@ import numpy as np
 import pytest
 
 from scenarios.minimal import MINIMAL, changed
-from vedette.control import CoordinateAscent, IndependentPlanner, JointPlanner, RenyiReward
+from vedette.control import (
+    CauchySchwarzReward,
+    CoordinateAscent,
+    ExpectedLossReward,
+    IndependentPlanner,
+    JointPlanner,
+    RenyiReward,
+)
 from vedette.densities import GLMB, LMB
 from vedette.errors import InputError
 from vedette.filters import (
@@ -377,12 +384,30 @@ def targets_of(built: Scenario) -> ScriptedTargets:
     return source
 
 
+@pytest.mark.parametrize(
+    ("score", "reward"),
+    [
+        ("ospa: {cutoff: 50.0,", ExpectedLossReward(50.0)),
+        ("ospa: {cutoff: 50.0, order: 2.0,", ExpectedLossReward(50.0, 2.0)),
+        ("ospa: {order: 2.0,", ExpectedLossReward(100.0, 2.0)),
+        ("ospa: {cutoff: 5.0, order: 2.0, components: state,", ExpectedLossReward()),
+    ],
+)
+def test_decisions_that_name_no_reward_go_by_the_error_that_is_scored(score: str, reward: ExpectedLossReward) -> None:
+    """Where that is of positions."""
+    text = changed(("ospa: {cutoff: 50.0,", score))
+    for name in ("jdm", "idm", "lookahead"):
+        built: Any = build.build_planner(Scenario(parse_scenario(text), Path("f.yaml")), name)
+        assert built.reward == reward
+        named = text.replace("decision_steps: [4, 8]", "decision_steps: [4, 8], reward: {kind: cauchy_schwarz}")
+        other: Any = build.build_planner(Scenario(parse_scenario(named), Path("f.yaml")), name)
+        assert other.reward == CauchySchwarzReward()
+
+
 def test_an_unknown_planner() -> None:
     loaded = scenario()
-    with pytest.raises(
-        InputError,
-        match="planner: expected one of jdm, idm, lookahead, nearest, assigned, centroid, oracle, random, fixed, still; got 'greedy'",
-    ):
+    known = "jdm, idm, lookahead, nearest, assigned, centroid, oracle, random, fixed, still"
+    with pytest.raises(InputError, match=f"planner: expected one of {known}; got 'greedy'"):
         build.build_planner(loaded, "greedy")
 
 
