@@ -164,7 +164,7 @@ def test_a_decision_of_matched_beliefs_goes_by_common_labels() -> None:
     ],
 )
 def test_a_joint_decision_says_where_it_goes_by_another_rule_than_the_tracks(fusion: str, said: str | None) -> None:
-    loaded = scene(fusion)
+    loaded = with_fields(scene(fusion), {"control.reward": {"kind": "cauchy_schwarz"}})
     experiment, planner = build_experiment(loaded), build_planner(loaded, "jdm", 1)
     assert planner is not None
     plan = planner.plan(experiment.tracker.initial(), experiment.poses, rng=np.random.default_rng(0))
