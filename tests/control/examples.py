@@ -12,6 +12,7 @@ import numpy as np
 from vedette import models
 from vedette.control import CauchySchwarzReward, Evaluator, MobileSensor, Plan, PlanningSettings, planning_limits
 from vedette.control.additive.evaluator import AdditiveEvaluator
+from vedette.control.additive.situation import Sums
 from vedette.control.inputs import options_of
 from vedette.densities import GLMB, LMB, TrackTable
 from vedette.filters import DeltaGlmbFilter, LmbFilter
@@ -180,15 +181,13 @@ def additive_of(situation: Situation, reward: Any = None, seed: int = 5) -> Addi
     """The evaluator by sums over labels, of LMB beliefs; by default with K = 1."""
     rule = situation.fusion.linear_rule(len(situation.sensors))
     shared = getattr(situation.fusion, "shares_prediction", False)
+    local = (situation.fused,) * len(situation.sensors) if shared else situation.beliefs
     return AdditiveEvaluator.prepare(
         situation.sensors,
         options_of(situation.sensors, situation.poses, situation.settings),
-        rule,
+        Sums(rule, situation.fused, tuple(local), time=situation.state.time),
         situation.settings,
         CauchySchwarzReward() if reward is None else reward,
-        situation.fused,
-        (situation.fused,) * len(situation.sensors) if shared else situation.beliefs,
-        time=situation.state.time,
         rng=np.random.default_rng(seed),
     )
 

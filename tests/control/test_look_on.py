@@ -15,6 +15,7 @@ from vedette import models
 from vedette.control import ExpectedLossReward, HorizonPlanner, IndependentPlanner, JointPlanner, KullbackLeiblerReward
 from vedette.control.additive.evaluator import AdditiveEvaluator
 from vedette.control.additive.look_on import at_all, continued, look_on
+from vedette.control.additive.situation import Sums
 from vedette.control.bounds import best_values, bound_of
 from vedette.control.evidence import Evidence
 from vedette.control.inputs import options_of
@@ -203,13 +204,9 @@ def prepared(of: Situation, horizon: Any = None, later: Any = (), hidden: Any = 
     return AdditiveEvaluator.prepare(
         of.sensors,
         options,
-        ParallelUpdate().linear_rule(len(of.sensors)),
+        Sums(ParallelUpdate().linear_rule(len(of.sensors)), of.fused, of.beliefs, hidden, 1.0),
         settings,
         REWARD,
-        of.fused,
-        of.beliefs,
-        hidden,
-        time=1.0,
         looks=later,
         rng=np.random.default_rng(0),
     )

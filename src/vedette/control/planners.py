@@ -13,10 +13,10 @@ from vedette.control.constraints import Constraint, repaired
 from vedette.control.cutoff import beyond_cutoff
 from vedette.control.evidence import Evidence
 from vedette.control.explaining import Part, Questions
-from vedette.control.inputs import check_choice, check_poses, check_steering, check_valuing, options_of
+from vedette.control.inputs import check_poses, check_steering, check_valuing, options_of
 from vedette.control.plan import Plan, RewardTable
 from vedette.control.preparation import AnyReward, Preparation, check_sums, stay_glmbs
-from vedette.control.problem import joint_problem, note_lines
+from vedette.control.problem import searched
 from vedette.control.rewards import ExpectedLossReward
 from vedette.control.rounds import Decided, decide_alone, decide_jointly
 from vedette.control.search import AutomaticSearch, JointSearch, SequentialGreedy, all_joint_actions, first_best
@@ -105,9 +105,7 @@ class JointPlanner:
             return _plan_of(self.name, prepared, decide_jointly(prepared, self.search, rng=rng), self.notes)
         evaluator = prepared.evaluator(self.settings.num_samples, rng=rng)
         evidence = Evidence(evaluator, tuple(range(len(self.sensors))), evaluator.joint())
-        problem = joint_problem(evidence, prepared.mask)
-        best = check_choice("search", self.search.search(problem, rng=rng), evidence.shape)
-        note_lines(evidence, best, prepared.mask)
+        best = searched(self.search, evidence, prepared.mask, rng=rng)
         chosen = tuple(own.first_action(course) for own, course in zip(evaluator.options, best, strict=True))
         actions = tuple(own.actions for own in evaluator.options)
         tables, (counts, found), bound = evidence.tables(best), evaluator.account(), bound_of(evidence, best)

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 
 from vedette.control.additive.evaluator import AdditiveEvaluator
+from vedette.control.additive.situation import Sums
 from vedette.control.allowed import mask_of_decision
 from vedette.control.constraints import Constraint, Mask
 from vedette.control.evaluator import Evaluator
@@ -108,20 +109,8 @@ class Preparation:
             assert not isinstance(reward, ExpectedLossReward)
             evaluator: AnyEvaluator = Evaluator.prepare(sensors, own, self.fusion, settings, reward, state, rng=rng)
         else:
-            fused, local = state.fused, state.local
-            evaluator = AdditiveEvaluator.prepare(
-                sensors,
-                own,
-                self.rule,
-                settings,
-                reward,
-                fused,
-                local,
-                state.undetected,
-                time=state.time,
-                looks=None,
-                rng=rng,
-            )
+            sums = Sums(self.rule, state.fused, state.local, state.undetected, state.time)
+            evaluator = AdditiveEvaluator.prepare(sensors, own, sums, settings, reward, looks=None, rng=rng)
         evaluator.notes.update(dict.fromkeys(unsought(settings, state.undetected, sums=self.rule is not None)))
         evaluator.notes.update(dict.fromkeys(without_scans(sensors, settings, state.time)))
         evaluator.notes.update(dict.fromkeys(self.notes))
@@ -143,17 +132,6 @@ def without_scans(sensors: Sequence[MobileSensor], settings: PlanningSettings, t
     """Which sensors do not scan within the horizon of a decision at a time, so that it is all one what they do."""
     found = [s + 1 for s, sensor in enumerate(sensors) if not sensor.scans(time, settings).any()]
     return tuple(f"sensor {s}: no scan within the horizon; all of its courses are worth the same" for s in found)
-
-
-class Sums(NamedTuple):
-    """What decisions that are sums over labels are made on."""
-
-    rule: LinearRule
-    fused: LMB
-    local: tuple[LMB, ...]
-    undetected: UndetectedIntensity | None
-    time: float | None
-    notes: tuple[str, ...]
 
 
 def prepare_sums(

@@ -11,8 +11,21 @@ from vedette.control.allowed import allowed_of, single_mask
 from vedette.control.bounds import most_by_target
 from vedette.control.constraints import Mask
 from vedette.control.evidence import Evidence
-from vedette.control.search import JointProblem, all_joint_actions, first_best
+from vedette.control.inputs import check_choice
+from vedette.control.search import JointProblem, JointSearch, all_joint_actions, first_best
 from vedette.kernels.base.types import Floats, Ints
+
+
+def searched(
+    search: JointSearch, evidence: Evidence, mask: Mask | None, *, rng: np.random.Generator
+) -> tuple[int, ...]:
+    """The joint action that a search chooses, which the evidence then holds with the lines through it.
+
+    Raises `InputError` for what is no joint action.
+    """
+    choice = check_choice("search", search.search(joint_problem(evidence, mask), rng=rng), evidence.shape)
+    note_lines(evidence, choice, mask)
+    return choice
 
 
 def joint_problem(evidence: Evidence, mask: Mask | None) -> JointProblem:

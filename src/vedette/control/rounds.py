@@ -14,10 +14,9 @@ from vedette.control.allowed import single_mask
 from vedette.control.bounds import bound_of
 from vedette.control.evaluator import SampleRewards
 from vedette.control.evidence import Evidence
-from vedette.control.inputs import check_choice
 from vedette.control.plan import Bound, Certainty, RewardTable, SearchCurve
 from vedette.control.preparation import AnyEvaluator, Preparation
-from vedette.control.problem import joint_problem, note_lines
+from vedette.control.problem import searched
 from vedette.control.racing import FIRST_ROUND, Race, next_total
 from vedette.control.search import JointSearch, all_joint_actions
 from vedette.kernels.base.types import Floats, Ints
@@ -142,8 +141,7 @@ def decide_jointly(preparation: Preparation, search: JointSearch, *, rng: np.ran
     rounds = Rounds.begin(preparation, size, rng=rng)
     heard = _Heard(rounds.evaluator.joint())
     evidence = Evidence(rounds.evaluator, tuple(range(len(shape))), heard)
-    found = check_choice("search", search.search(joint_problem(evidence, preparation.mask), rng=rng), shape)
-    note_lines(evidence, found, preparation.mask)
+    found = searched(search, evidence, preparation.mask, rng=rng)
     complete = preparation.mask is None and all_at_once and heard.num == math.prod(shape) and evidence.is_complete()
     candidates = all_joint_actions(shape) if complete else evidence.foremost(found, _MOST_OF_SEARCH)
     race = Race(candidates, float(settings.confidence or 0.0), settings.indifference)

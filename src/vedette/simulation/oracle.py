@@ -138,11 +138,11 @@ class OraclePlanner:
 
     def _tracked(self, state: State, ids: Ints, states: Floats) -> tuple[Ints, tuple[Floats, ...]]:
         """The targets that can be helped, and their covariances in each belief."""
-        beliefs = (state.fused,) if self.timetable.one_belief else state.local
-        kept = np.ones(len(ids), bool)
-        if not self.timetable.rebirths:
-            kept = self._covs(state.fused, state.step, states)[1]
-        return ids[kept], tuple(self._covs(own, state.step, states)[0][kept] for own in beliefs)
+        table, (covs, found) = self.timetable, self._covs(state.fused, state.step, states)
+        kept = found | table.rebirths
+        if table.one_belief:
+            return ids[kept], (covs[kept],)
+        return ids[kept], tuple(self._covs(own, state.step, states)[0][kept] for own in state.local)
 
     def _covs(self, belief: object, step: int, states: Floats) -> tuple[Floats, Bools]:
         """(num, dim, dim) of the estimates nearest to targets, and whether there is one within the cutoff."""

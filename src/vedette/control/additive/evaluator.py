@@ -11,16 +11,15 @@ import numpy as np
 
 from vedette.control.additive.look_on import at_all, continued, look_on
 from vedette.control.additive.rewards import AdditiveRewards
-from vedette.control.additive.situation import Samples, starts_of
+from vedette.control.additive.situation import Samples, Sums, starts_of
 from vedette.control.additive.table import lay_out_changes
 from vedette.control.additive.undetected import cells_of, no_cells
 from vedette.control.additive.valuations import valuation_of
 from vedette.control.priors import predicted
 from vedette.control.rewards.loss import ExpectedLossReward
 from vedette.control.settings import MobileSensor, PlanningSettings
-from vedette.densities import LMB, UndetectedIntensity
+from vedette.densities import LMB
 from vedette.filters import shared_targets
-from vedette.fusion import LinearRule
 from vedette.kernels.base.types import Floats, Ints
 from vedette.platforms import Options
 
@@ -55,26 +54,19 @@ class AdditiveEvaluator:
         cls,
         sensors: Sequence[MobileSensor],
         options: Sequence[Options],
-        rule: LinearRule,
+        sums: Sums,
         settings: PlanningSettings,
         reward: Any,
-        fused: LMB,
-        beliefs: Sequence[LMB],
-        undetected: UndetectedIntensity | None = None,
         *,
-        time: float | None = None,
         looks: tuple[PlanningSettings, ...] | None = (),
         rng: np.random.Generator,
     ) -> AdditiveEvaluator:
         """Draw the samples, predict, and follow every label over every course that reaches it.
 
-        rule: how the sensors' densities become one. beliefs: of each sensor. undetected: targets not found
-        yet. time: of the decision, s, where it is known. looks: further horizons, at whose ends the expected loss is
-        taken as well; None: those that are due (`vedette.control.additive.look_on`). Raises as `JointPlanner.plan`.
+        looks: further horizons, at whose ends the expected loss is taken as well; None: those that are due
+        (`vedette.control.additive.look_on`). Raises as `JointPlanner.plan`.
         """
-        lay_out = partial(
-            cls._lay_out, tuple(sensors), rule, reward, fused, tuple(beliefs), undetected, time=time, rng=rng
-        )
+        lay_out = partial(cls._lay_out, tuple(sensors), sums, reward, rng=rng)
         evaluator = lay_out(tuple(options), settings)
         if looks is None:
             due = isinstance(reward, ExpectedLossReward)
@@ -93,18 +85,15 @@ class AdditiveEvaluator:
     def _lay_out(
         cls,
         sensors: tuple[MobileSensor, ...],
-        rule: LinearRule,
+        sums: Sums,
         reward: Any,
-        fused: LMB,
-        beliefs: tuple[LMB, ...],
-        undetected: UndetectedIntensity | None,
         options: tuple[Options, ...],
         settings: PlanningSettings,
         *,
-        time: float | None,
         rng: np.random.Generator,
     ) -> AdditiveEvaluator:
         """Up to the end of the horizon."""
+        rule, fused, undetected = sums.rule, sums.fused, sums.undetected
         sampled = not isinstance(reward, ExpectedLossReward)
         motion = shared_targets([sensor.filter for sensor in sensors]).motion
         prediction = predicted(fused, motion, settings.horizon_steps, settings.horizon_period)
@@ -112,13 +101,13 @@ class AdditiveEvaluator:
         samples = Samples.draw(fused, sensors, settings, rng=rng) if sampled else Samples.none(fused, settings)
         start = starts_of(
             prediction,
-            beliefs,
+            sums.local,
             sensors,
             [own.courses for own in options],
             samples,
             settings,
             missing_existence=rule.missing_existence,
-            time=time,
+            time=sums.time,
             detection_at=None if sampled else "mean",
             rng=rng,
         )

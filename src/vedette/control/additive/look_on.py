@@ -95,11 +95,12 @@ def at_all(looks: Sequence[AdditiveRewards]) -> AdditiveRewards:
         references=np.concatenate([own.references for own in several]),
         covs=np.concatenate([own.covs for own in several]),
     )
-    bases: dict[tuple[int, ...], Floats] = {}
-    for each in zip(*(own.bases for own in looks), strict=True):
-        bases.setdefault(tuple(map(id, each)), np.concatenate(each))
-    shared = tuple(bases[tuple(map(id, each))] for each in zip(*(own.bases for own in looks), strict=True))
-    return AdditiveRewards(table, valuation, shared, first.reward, _cells(looks), first.num_threads, num)
+    of_sensors = list(zip(*(own.bases for own in looks), strict=True))
+    # Sensors that share their rows go on sharing them.
+    distinct = {tuple(map(id, each)): each for each in of_sensors}
+    joined = {key: np.concatenate(each) for key, each in distinct.items()}
+    bases = tuple(joined[tuple(map(id, each))] for each in of_sensors)
+    return replace(first, table=table, valuation=valuation, bases=bases, cells=_cells(looks), looks=num)
 
 
 def _cells(looks: Sequence[AdditiveRewards]) -> Cells:

@@ -9,17 +9,29 @@ import numpy as np
 
 from vedette.control.pseudo import decision_of, draw_paths, targets_of
 from vedette.control.settings import IDEAL_MODES, MobileSensor, PlanningSettings
-from vedette.densities import LMB
+from vedette.densities import LMB, UndetectedIntensity
 from vedette.densities.checks import offsets_of
 from vedette.densities.containers import unchecked
 from vedette.densities.label_sets import places_of, single_gaussians, take_tracks
 from vedette.filters.inputs import model_errors
+from vedette.fusion import LinearRule
 from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.kernels.planning.bernoulli_rows import bernoulli_size
 from vedette.kernels.planning.ideal import EXPECTED, IDEAL, Decision, Futures
 from vedette.kernels.planning.known import rows_without_scans
 from vedette.kernels.planning.reach import Belief, label_radii, predict_paths
 from vedette.probabilities import logit
+
+
+class Sums(NamedTuple):
+    """What decisions that are sums over labels are made on."""
+
+    rule: LinearRule  # how the sensors' densities become one
+    fused: LMB
+    local: tuple[LMB, ...]  # of each sensor
+    undetected: UndetectedIntensity | None = None  # targets not found yet
+    time: float | None = None  # of the decision, s, where it is known
+    notes: tuple[str, ...] = ()  # what a reader must know of their form
 
 
 class Samples(NamedTuple):

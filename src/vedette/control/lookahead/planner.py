@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vedette.control.additive.evaluator import AdditiveEvaluator
+from vedette.control.additive.situation import Sums
 from vedette.control.bounds import bound_of
 from vedette.control.constraints import Constraint
 from vedette.control.cutoff import beyond_cutoff
@@ -25,8 +26,8 @@ from vedette.control.lookahead.laid_courses import LaidCourses
 from vedette.control.lookahead.problem import Best, JointSequence, Part, SequenceProblem, SequenceSearch
 from vedette.control.lookahead.rules import Rules
 from vedette.control.plan import Plan
-from vedette.control.preparation import AnyReward, Sums, check_sums, prepare_sums, unsought, without_scans
-from vedette.control.problem import joint_problem, note_lines
+from vedette.control.preparation import AnyReward, check_sums, prepare_sums, unsought, without_scans
+from vedette.control.problem import searched
 from vedette.control.rewards import ExpectedLossReward
 from vedette.control.search import AutomaticSearch
 from vedette.control.settings import MobileSensor, PlanningSettings
@@ -181,9 +182,7 @@ class HorizonPlanner:
         evaluator = self._lay_out(steps, sums, None, now, rng)
         evidence = Evidence(evaluator, tuple(range(len(trees))), evaluator.joint())
         mask = None if rules is None else rules.first()
-        choice = AutomaticSearch().search(joint_problem(evidence, mask), rng=rng)
-        note_lines(evidence, choice, mask)
-        return _Single(evaluator, evidence, choice)
+        return _Single(evaluator, evidence, searched(AutomaticSearch(), evidence, mask, rng=rng))
 
     def _problem(
         self,
@@ -219,19 +218,7 @@ class HorizonPlanner:
         rng: np.random.Generator,
     ) -> AdditiveEvaluator:
         settings = replace(self.settings, horizon_steps=num_steps)
-        return AdditiveEvaluator.prepare(
-            self.sensors,
-            options,
-            sums.rule,
-            settings,
-            self.reward,
-            sums.fused,
-            sums.local,
-            sums.undetected,
-            time=sums.time,
-            looks=looks,
-            rng=rng,
-        )
+        return AdditiveEvaluator.prepare(self.sensors, options, sums, settings, self.reward, looks=looks, rng=rng)
 
     def _plan(
         self,
