@@ -185,6 +185,16 @@ def test_a_camera_sees_as_far_as_it_does_ahead(heading: float) -> None:
     assert len(looks(bernoullis([[445.0, 0.0]]), [[0.0, 0.0, heading]], sensors)) == 2
 
 
+@pytest.mark.parametrize("pointing", [0.0, 0.35, 2.0])
+def test_a_carried_camera_sees_as_far_as_it_does_where_it_points(pointing: float) -> None:
+    """11 degrees wide, between the eight directions from its heading."""
+    camera = Carried(Courses(SPEED, (0.0,)), Pointing([0.0], relative=True))
+    sensors = (mobile_sensor("lmb", camera, detection=models.camera(0.9, SIGHT)),)
+    pose = [0.0, 0.0, 0.0, pointing, 0.1]
+    assert looks(bernoullis([[415.0, 0.0]]), [pose], sensors) == ()
+    assert len(looks(bernoullis([[445.0, 0.0]]), [pose], sensors)) == 2
+
+
 # at_all
 
 FAR = [[-60.0, 250.0], [900.0, -120.0], [-220.0, -900.0]]

@@ -18,12 +18,11 @@ from vedette.densities import Estimator, best_estimate
 from vedette.kernels.base.types import Floats
 from vedette.models.arguments import dimension, generator, instance, one_of, reject, sequence
 from vedette.platforms import Options
+from vedette.platforms.camera import HALF_WIDTH, POINTING
 from vedette.tracking import State
 
 Rule: TypeAlias = Literal["nearest", "assigned", "centroid"]
 
-# Of a camera's pose: where it points, and half the width of what it sees, which other sensors do not have.
-_POINTING, _HALF_WIDTH = 3, 4
 # Weight of how well it points, relative to distances: above rounding, below what tells places apart.
 _AIM = 1e-6
 
@@ -134,7 +133,7 @@ def _merits(own: Options, goal: Floats | None) -> Floats:
         return np.zeros(len(own.courses))
     offsets = goal - own.courses[..., :2]
     near: Floats = -np.hypot(offsets[..., 0], offsets[..., 1]).mean(axis=1)
-    if own.courses.shape[2] <= _HALF_WIDTH or not (own.courses[..., _HALF_WIDTH] > 0.0).any():
+    if own.courses.shape[2] <= HALF_WIDTH or not (own.courses[..., HALF_WIDTH] > 0.0).any():
         return near
-    turn = np.arctan2(offsets[..., 1], offsets[..., 0]) - own.courses[..., _POINTING]
+    turn = np.arctan2(offsets[..., 1], offsets[..., 0]) - own.courses[..., POINTING]
     return np.asarray(near + _AIM * max(1.0, float(-near.min())) * np.cos(turn).mean(axis=1))

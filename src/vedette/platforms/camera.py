@@ -15,6 +15,14 @@ from vedette.models.measurement import wrap_angles
 from vedette.platforms.base import Platform, check_platform
 
 POSE_DIM = 5
+# Of its pose; sensors that are no cameras have no half width, or one of 0.
+POINTING, HALF_WIDTH = 3, 4
+
+
+def line_of_sight(pose: Floats) -> float:
+    """rad, along which a sensor looks: where a camera points, the heading of any other."""
+    is_camera = len(pose) > HALF_WIDTH and pose[HALF_WIDTH] > 0.0
+    return float(pose[POINTING] if is_camera else pose[2])
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +66,7 @@ class Pointing:
         _check(pose)
         degrees = np.array(self.pointings_deg)
         if self.relative:
-            degrees = np.degrees(wrap_angles(pose[3] + np.radians(degrees)))
+            degrees = np.degrees(wrap_angles(pose[POINTING] + np.radians(degrees)))
         if not self.half_widths_deg:
             return degrees[:, np.newaxis]
         num = len(self.half_widths_deg)
@@ -68,22 +76,22 @@ class Pointing:
         """Position and heading stay."""
         _check(pose)
         poses = np.tile(pose, (len(times), 1))
-        turn = float(wrap_angles(np.radians(action[0]) - pose[3]))
+        turn = float(wrap_angles(np.radians(action[0]) - pose[POINTING]))
         if self.turn_rate_deg is None:
-            poses[:, 3] = wrap_angles(np.radians(action[0]))
+            poses[:, POINTING] = wrap_angles(np.radians(action[0]))
         else:
             most = np.radians(self.turn_rate_deg) * times
-            poses[:, 3] = wrap_angles(pose[3] + math.copysign(1.0, turn) * np.minimum(abs(turn), most))
+            poses[:, POINTING] = wrap_angles(pose[POINTING] + math.copysign(1.0, turn) * np.minimum(abs(turn), most))
         if self.half_widths_deg:
-            poses[:, 4] = math.radians(action[1])
+            poses[:, HALF_WIDTH] = math.radians(action[1])
         return poses
 
 
 def _check(pose: Floats) -> None:
     if len(pose) < POSE_DIM:
         raise InputError(f"pose: expected {POSE_DIM} components, with pointing_rad and half_width_rad; got {len(pose)}")
-    if not 0.0 < pose[4] <= math.pi:
-        raise InputError(f"pose: expected half_width_rad in (0, pi]; got {pose[4]:g} (is it in degrees?)")
+    if not 0.0 < pose[HALF_WIDTH] <= math.pi:
+        raise InputError(f"pose: expected half_width_rad in (0, pi]; got {pose[HALF_WIDTH]:g} (is it in degrees?)")
 
 
 @dataclass(frozen=True, slots=True)

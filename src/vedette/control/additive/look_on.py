@@ -21,6 +21,7 @@ from vedette.densities.checks import offsets_of
 from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.planning.ascent import Cells
 from vedette.platforms import Options
+from vedette.platforms.camera import line_of_sight
 
 # Targets that exist with less probability draw no sensor from afar.
 _LEAST_EXISTENCE = 0.1
@@ -124,7 +125,7 @@ def _sight(sensor: MobileSensor, pose: Floats) -> float:
     """m, the distance up to which it detects at least half as well as it does anywhere, in the best direction."""
     model, dim = sensor.filter.sensor.detection, sensor.filter.targets.state_dim
     states = np.zeros((len(_DISTANCES) * _DIRECTIONS, dim))
-    angles = pose[2] + 2.0 * np.pi * np.arange(_DIRECTIONS) / _DIRECTIONS
+    angles = line_of_sight(pose) + 2.0 * np.pi * np.arange(_DIRECTIONS) / _DIRECTIONS
     around = np.stack([np.cos(angles), np.sin(angles)], axis=1)
     states[:, :2] = pose[:2] + (_DISTANCES[:, np.newaxis, np.newaxis] * around).reshape(-1, 2)
     chances = model.prob(states, pose).reshape(-1, _DIRECTIONS).max(axis=1)
