@@ -20,25 +20,24 @@ from __future__ import annotations
 
 import argparse
 import csv
-import time
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from deciding_scenes import RULES, Scene, scenes, strategies
 from pages import write_between
+from timed_planner import Timed
 
-from vedette.control import Plan, Planner
 from vedette.evaluation.metrics import ospa_of_run
 from vedette.evaluation.statistics import paired_difference, summarise
 from vedette.kernels.base.types import Floats
 from vedette.scenarios import Scenario, with_fields
 from vedette.scenarios.build import build_experiment, build_planner
-from vedette.simulation import KnowsTruth, Truth, simulate
+from vedette.simulation import simulate
 
 SEED, FIRST, ORACLE, LEVEL = 0, "jdm loss", "oracle 1", 0.05
 BEFORE = ("random", "fixed")
@@ -59,35 +58,6 @@ class Score(NamedTuple):
 
 
 Runs = dict[str, dict[int, Score]]  # by strategy and run
-
-
-class Timed:
-    """A planner with a clock of the process's CPU time, that keeps the bounds of its plans."""
-
-    def __init__(self, planner: Planner) -> None:
-        self.planner = planner
-        self.seconds: list[float] = []
-        self.short: list[float] = []
-
-    @property
-    def name(self) -> str:
-        """As of the planner."""
-        return self.planner.name
-
-    def told(self, truth: Truth) -> Timed:
-        """As of the planner."""
-        if isinstance(self.planner, KnowsTruth):
-            self.planner = self.planner.told(truth)
-        return self
-
-    def plan(self, *situation: Any, rng: np.random.Generator) -> Plan:
-        """As of the planner."""
-        begin = time.process_time()
-        plan = self.planner.plan(*situation, rng=rng)
-        self.seconds.append(time.process_time() - begin)
-        if plan.bound is not None and not plan.bound.unbounded:
-            self.short.append(plan.bound.relative)
-        return plan
 
 
 def prepared(scene: Scene) -> Scenario:

@@ -26,7 +26,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import time
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from functools import cache, partial
@@ -35,8 +34,8 @@ from pathlib import Path
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
+from timed_planner import Timed
 
-from vedette.control import Plan, Planner
 from vedette.evaluation.metrics import ospa_of_run
 from vedette.evaluation.runs import measure_run
 from vedette.kernels.base.types import Floats
@@ -142,26 +141,6 @@ def strategies(scene: str) -> tuple[Strategy, ...]:
 def around(num: int) -> list[float]:
     """So many directions, in degrees."""
     return [360.0 * i / num for i in range(num)]
-
-
-class Timed:
-    """A planner with a clock of the process's CPU time."""
-
-    def __init__(self, planner: Planner) -> None:
-        self.planner = planner
-        self.seconds: list[float] = []
-
-    @property
-    def name(self) -> str:
-        """As of the planner."""
-        return self.planner.name
-
-    def plan(self, *situation: Any, rng: np.random.Generator) -> Plan:
-        """As of the planner."""
-        begin = time.process_time()
-        plan = self.planner.plan(*situation, rng=rng)
-        self.seconds.append(time.process_time() - begin)
-        return plan
 
 
 def score(scene: str, strategy: Strategy, run: int, seed: int) -> Score:
