@@ -16,10 +16,10 @@ from waiting import PATIENCE
 
 pytestmark = pytest.mark.skipif(not JIT_ENABLED, reason="nothing is compiled")
 
-# The next interrupt is sent when the one before was caught: each must be. A filter's step returns bundles within
-# bundles, and a model function of the user's own is called from machine code.
+# The next interrupt is due some CPU time after the one before was caught: each must be, however busy the machine is. A
+# filter's step returns bundles within bundles, and a model function of the user's own is called from machine code.
 PROGRAM = """
-import os, random, signal, sys, threading, time
+import random, signal, sys
 import numpy as np
 from vedette import models
 from vedette.densities import map_estimate
@@ -52,21 +52,12 @@ def follow():
         state, _ = tracker.step(state, scans, poses, time, rngs=[rng, rng])
         map_estimate(state.fused)
 
-def interrupt():
-    moment = random.Random(1)
-    for _ in range(NUM):
-        caught.wait()
-        caught.clear()
-        time.sleep(0.02 * moment.random())
-        os.kill(os.getpid(), signal.SIGINT)
-
-NUM = int(sys.argv[1])
+NUM, moment = int(sys.argv[1]), random.Random(1)
 follow()
-caught = threading.Event()
-threading.Thread(target=interrupt, daemon=True).start()
+signal.signal(signal.SIGPROF, signal.getsignal(signal.SIGINT))
 for _ in range(NUM):
     try:
-        caught.set()
+        signal.setitimer(signal.ITIMER_PROF, 1e-4 + 0.01 * moment.random())
         while True:
             follow()
     except KeyboardInterrupt:
