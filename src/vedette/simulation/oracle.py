@@ -180,11 +180,11 @@ class OraclePlanner:
         best = self.search.search(problem, rng=rng)
         if depth == 1 or last >= len(self.timetable.times):
             return best, known[best]
-        totals = {}
+        totals, stay = {}, np.isin(ids, truth.at(last - 1)[0])
         for joint in sorted(known, key=lambda joint: (known[joint], joint))[: self.beam_width]:
             ends = np.stack([own[course, -1] for own, course in zip(courses, joint, strict=True)])
-            covs = tuple(own[0] for own in stretch.follow(moment.covs, np.array([joint]))[1])
-            later = self._decide(_Moment(last, ends, covs), truth, ids, depth - 1, None, rng)
+            covs = tuple(own[0][stay] for own in stretch.follow(moment.covs, np.array([joint]))[1])
+            later = self._decide(_Moment(last, ends, covs), truth, ids[stay], depth - 1, None, rng)
             totals[joint] = known[joint] + later[1]
         best = min(totals, key=lambda joint: (totals[joint], joint))
         return best, totals[best]
@@ -199,11 +199,11 @@ class OraclePlanner:
         return tuple(found)
 
     def _stretch(self, first: int, last: int, courses: tuple[Floats, ...], truth: Truth, ids: Ints) -> Stretch:
-        """The scans after scan `first` up to scan `last`; a target that has ended stays where it was."""
+        """The scans after scan `first`, when all of `ids` are there, to scan `last`; who ends stays where it was."""
         table, times = self.timetable, self.timetable.times
         motion = shared_targets([sensor.filter for sensor in self.sensors]).motion
         dim, num = motion.state_dim, len(ids)
-        states, alive = np.empty((last - first + 1, num, dim)), np.zeros((last - first + 1, num))
+        states, alive = np.full((last - first + 1, num, dim), np.nan), np.zeros((last - first + 1, num))
         for k in range(len(states)):
             now, own = truth.at(first - 1 + k)
             _, places, rows = np.intersect1d(ids, now, assume_unique=True, return_indices=True)
