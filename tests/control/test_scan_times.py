@@ -168,7 +168,7 @@ def test_scenarios_tell_planners_when_their_sensors_scan() -> None:
     first, second = build_sensors(scenario)
     assert first.scan_times is None
     assert second.scan_times is not None
-    start, control = scenario.model.time.build(), scenario.model.control
+    start, horizon = scenario.model.time.build(), np.prod(scenario.model.horizon)
     np.testing.assert_allclose(second.scan_times[:3], start[[1, 5, 9]])
     # Decisions near the end look past it, as far as three in a row.
-    assert second.scan_times[-1] >= start[-1] + 3 * control.horizon_steps * control.horizon_period - 4.0
+    assert second.scan_times[-1] >= start[-1] + 3 * horizon - 4.0

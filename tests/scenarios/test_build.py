@@ -342,7 +342,7 @@ planners:
 def test_named_strategies_replace_their_own_parts_alone() -> None:
     named = Scenario(parse_scenario(MINIMAL + NAMED))
     plain = build.build_planner(named, "jdm")
-    settings = replace(named.model.control.build(), end=float(named.model.time.build()[-1]))
+    settings = replace(named.model.control.build(named.model.horizon), end=float(named.model.time.build()[-1]))
     assert isinstance(plain, JointPlanner)
     found: dict[str, Any] = {name: build.build_planner(named, name) for name in named.model.planners}
     assert [planner.name for planner in found.values()] == ["ascent", "bhattacharyya", "alone", "as it is"]

@@ -44,7 +44,6 @@ NOTE_ROWS = {
     7: ("fusion.missing_weight", 1e-6),
     8: ("fusion.mixture_power", "auto"),
     9: ("fusion.feedback", False),
-    10: ("control.horizon_period", 2.0),
     12: ("control.ideal_measurements", "ideal"),
     14: ("sensors.0.platform.relative", False),
     15: ("control.reward.unit_volume", 1.0),

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from scenarios.minimal import changed
+from scenarios.minimal import MINIMAL, changed
 from vedette import models
 from vedette.control import (
     AutomaticSearch,
@@ -25,7 +25,8 @@ from vedette.control import (
 )
 from vedette.errors import ScenarioError
 from vedette.evaluation import run_scenario
-from vedette.scenarios import Scenario, load_scenario
+from vedette.scenarios import Scenario, load_scenario, parse_scenario, with_fields
+from vedette.scenarios.build import build_planner
 from vedette.scenarios.dumping import dump_scenario
 
 
@@ -126,3 +127,31 @@ def test_a_run_with_a_search(tmp_path: Path, kind: str) -> None:
         for text in (control, control.split(", search")[0])
     ]
     assert plans[0].chosen == plans[1].chosen
+
+
+@pytest.mark.parametrize(
+    ("fields", "horizon"),
+    [
+        ({}, (10, 0.5)),  # decisions after 10 and 20 of 27 scans
+        ({"control.decision_steps": [20]}, (7, 0.5)),  # up to the last scan
+        ({"control.decision_steps": [4, 8, 12, 16, 26]}, (4, 0.5)),  # what is most often so
+        ({"control.decision_steps": [7, 20]}, (13, 0.5)),  # of as many the longer
+        ({"control.decision_steps": None, "control.decision_times": [3.0, 5.0, 7.0]}, (4, 0.5)),
+        ({"control.decision_steps": list(range(1, 28))}, (1, 0.5)),
+        ({"control.decision_steps": []}, (1, 0.5)),
+        ({"time.num_steps": 1000}, (100, 0.5)),
+        ({"control.horizon_period": 2.0}, (2, 2.0)),
+        ({"control.horizon_period": 1e-30}, (100, 1e-30)),
+        ({"control.horizon_period": 1e9}, (1, 1e9)),
+        ({"control.horizon_steps": 5}, (5, 0.5)),
+        ({"control.horizon_steps": 5, "control.horizon_period": 2.0}, (5, 2.0)),
+    ],
+)
+def test_who_names_no_horizon_looks_to_the_next_decision_scan_by_scan(
+    fields: dict[str, Any], horizon: tuple[int, float]
+) -> None:
+    given = {"time.num_steps": 27, "time.step_period": 0.5, "control.decision_steps": [10, 20], "ospa.to_step": None}
+    scenario = with_fields(Scenario(parse_scenario(MINIMAL)), given | fields)
+    assert scenario.model.horizon == horizon
+    planner: Any = build_planner(scenario, "jdm")
+    assert (planner.settings.horizon_steps, planner.settings.horizon_period) == horizon

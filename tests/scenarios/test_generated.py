@@ -66,7 +66,7 @@ def test_a_scene_says_the_settings_that_differ_from_the_usual() -> None:
     model = parse_scenario(text)
     assert len(model.birth.sites) == 7
     assert model.decision_steps == (5, 10, 15, 20, 25, 30, 35, 40, 45, 50, 55)
-    assert (model.control.horizon_steps, model.sensors[0].platform.top_speed) == (5, 20.0)
+    assert (model.horizon[0], model.sensors[0].platform.top_speed) == (5, 20.0)
 
 
 def test_equal_settings_give_equal_files_and_other_seeds_other_ones() -> None:

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from scenarios.minimal import changed
+from scenarios.minimal import MINIMAL, changed
 from vedette import models
 from vedette.cli import app
 from vedette.control import JointPlanner, KeepOut, MobileSensor, StayInside
@@ -20,7 +20,7 @@ from vedette.errors import ImplausibleWarning, InputError, ScenarioError
 from vedette.filters import LmbFilter, PhdFilter, SequentialLmbFilter
 from vedette.fusion import Clmb
 from vedette.platforms import Courses, Pointing
-from vedette.scenarios import Scenario, list_builtin, load_scenario, parse_scenario
+from vedette.scenarios import Scenario, list_builtin, load_scenario, parse_scenario, with_fields
 from vedette.scenarios.build import build_experiment, build_planner
 from vedette.scenarios.plausibility import implausible
 from vedette.tracking import State
@@ -226,3 +226,19 @@ def test_areas_in_degrees_are_told() -> None:
 def test_areas_in_metres_are_not(scale: float) -> None:
     KeepOut(scale * np.array([[4.0, 3.0], [5.0, 3.0], [5.0, 4.0]]))
     KeepOut(scale * np.array([[0.0, 0.0], [0.02, 0.0], [0.02, 0.02]]))
+
+
+@pytest.mark.parametrize(
+    ("fields", "told"),
+    [
+        ({"control.horizon_period": 3.0}, True),
+        ({"control.horizon_period": 2.0}, False),
+        ({"control.horizon_period": 3.0, "control.decision_steps": []}, False),
+        ({"control.horizon_period": 3.0, "motion": {"kind": "constant_velocity", "acceleration": "continuous"}}, False),
+        ({"control.horizon_period": 3.0, "motion": {"kind": "constant_velocity", "sigma_v": 0.0}}, False),
+        ({"time.step_period": 0.1}, False),  # the horizon goes scan by scan
+    ],
+)
+def test_pseudo_updates_far_apart_are_told(fields: dict[str, Any], told: bool) -> None:
+    scenario = with_fields(Scenario(parse_scenario(MINIMAL)), {"time.step_period": 1.0} | fields)
+    assert [path for path, _ in implausible(scenario.model)] == [("control", "horizon_period")] * told

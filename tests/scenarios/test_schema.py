@@ -75,7 +75,7 @@ def test_default_limits_are_those_of_the_library() -> None:
 
 
 def test_default_planning_settings_are_those_of_the_library() -> None:
-    assert Control().build() == PlanningSettings()
+    assert Control().build((5, 2.0)) == PlanningSettings()
 
 
 DEFAULT_FUSIONS = [

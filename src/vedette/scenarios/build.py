@@ -100,8 +100,7 @@ def _scan_times(model: ScenarioModel, sensor: Sensor) -> Floats | None:
     """s of the scans of a sensor, as far as decisions look ahead, past the last step too; None: at every step."""
     if sensor.scans.every == 1:
         return None
-    control, lookahead = model.control, model.control.lookahead or Lookahead()
-    horizon = control.horizon_steps * control.horizon_period
+    lookahead, horizon = model.control.lookahead or Lookahead(), math.prod(model.horizon)
     ahead = horizon + (lookahead.depth - 1) * (lookahead.period or horizon)
     num = model.time.num_steps + math.ceil(ahead / model.time.step_period)
     times = model.time.model_copy(update={"num_steps": num}).build()
@@ -232,7 +231,7 @@ def build_planner(scenario: Scenario, name: str, num_threads: int = 0) -> Planne
     parts = Parts(
         sensors,
         fusion,
-        replace(control.build(num_threads), end=float(model.time.build()[-1])),
+        replace(control.build(model.horizon, num_threads), end=float(model.time.build()[-1])),
         control.reward.build(folder),
         control.search.build(folder),
         _first_actions(scenario, sensors),

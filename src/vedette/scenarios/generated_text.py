@@ -32,7 +32,6 @@ def scene_text(scene: GeneratedScene) -> str:
         sensing=_SENSING[scene.view],
         sensors="\n".join(f"  - {{position: {_row(place)}}}" for place in sensors),
         decisions=_folded(range(scene.decide_every, NUM_STEPS, scene.decide_every)),
-        horizon=scene.decide_every,
         limits="" if scene.max_labels is None else f", limits: {{max_labels: {scene.max_labels}}}",
     )
 
@@ -142,8 +141,6 @@ estimator: {{kind: marginal, threshold: 0.5}}
 
 control:
   decision_steps: {decisions}
-  horizon_steps: {horizon}
-  horizon_period: 1.0
 
 ospa: {{cutoff: 100.0, order: 1.0}}
 

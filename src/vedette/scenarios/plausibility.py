@@ -20,6 +20,8 @@ from vedette.scenarios.sections.world import ConstantSurvival, RegionSection, gr
 
 # Standard deviations from every birth site at which a target begins that filters never find.
 _FAR_FROM_SITES = 8.0
+# Scans in a period of the horizon; the paper's scenarios have 2.
+_MANY_SCANS = 3.0
 
 
 def implausible(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
@@ -28,6 +30,7 @@ def implausible(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
     yield from _areas(model)
     yield from _beyond_sites(model)
     yield from _per_scan(model)
+    yield from _held(model)
 
 
 def _bearings(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
@@ -118,4 +121,16 @@ def _per_scan(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
             (section,),
             f"its probabilities are those of a step of {model.time.step_period:g} s, and count {every} times from one "
             f"scan of {name} to the next; say with {section}.period for what stretch of time they are meant",
+        )
+
+
+def _held(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
+    """Horizons whose steps are longer than those of tracking, over which accelerations are held."""
+    motion, scans = model.motion, model.horizon[1] / model.time.step_period
+    held = getattr(motion, "acceleration", "held") == "held" and getattr(motion, "sigma_v", 0.0) > 0.0
+    if held and model.decision_steps and scans >= _MANY_SCANS:
+        yield (
+            ("control", "horizon_period"),
+            f"pseudo-updates are {scans:.3g} scans apart: motion.sigma_v is held over each such step, so that plans "
+            "take targets to spread farther than tracking does; leave it out, and they go scan by scan",
         )

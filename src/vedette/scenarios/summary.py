@@ -77,7 +77,7 @@ def facts(model: ScenarioModel) -> list[tuple[str, str]]:
         *(() if model.undetected is None else (("not yet found", _undetected(model.undetected)),)),
         ("estimate", settings(model.estimator)),
         ("decisions", _decisions(model.decision_steps)),
-        ("horizon", f"{counted(control.horizon_steps, 'step')} of {control.horizon_period:g} s"),
+        ("horizon", f"{counted(model.horizon[0], 'step')} of {model.horizon[1]:g} s"),
         ("reward", f"{settings(control.reward)}, {_samples(control)}"),
         ("search", settings(control.search)),
         *(("constraint", settings(section)) for section in control.constraints),

@@ -72,8 +72,14 @@ class Control(Section):
     decision_times: Numbers | None = Field(
         default=None, description="The same as times, instead of decision_steps; each the time of a scan [s]."
     )
-    horizon_steps: Count = Field(default=5, description="Pseudo-updates over the horizon, H [-].")
-    horizon_period: Positive = Field(default=2.0, description="Time between pseudo-updates, T [s].")
+    horizon_steps: Count | None = Field(
+        default=None, description="Pseudo-updates over the horizon, H; none: up to the next decision, at most 100 [-]."
+    )
+    horizon_period: Positive | None = Field(
+        default=None,
+        description="Time between pseudo-updates, T; none: time.step_period. In longer steps than scans the "
+        "acceleration of motion is held longer, and predictions spread too far [s].",
+    )
     num_samples: Count = Field(default=40, description="Multi-target samples of the expected reward, M [-].")
     confidence: Chance | None = Field(
         default=None,
@@ -150,13 +156,13 @@ class Control(Section):
                 if value != default:
                     yield (name,), "confidence beside it, such as 0.95", describe(value)
 
-    def build(self, num_threads: int = 0) -> PlanningSettings:
-        """Horizon, samples and caps of a decision."""
+    def build(self, horizon: tuple[int, float], num_threads: int = 0) -> PlanningSettings:
+        """Samples and caps of a decision with this horizon, H and T."""
         from vedette.control import PlanningSettings, planning_limits
 
         return PlanningSettings(
-            horizon_steps=self.horizon_steps,
-            horizon_period=self.horizon_period,
+            horizon_steps=horizon[0],
+            horizon_period=horizon[1],
             num_samples=self.num_samples,
             confidence=self.confidence,
             indifference=self.indifference,

@@ -61,9 +61,10 @@ def longer_plans(model: ScenarioModel) -> Iterator[Finding]:
         if own is None:
             continue
         if own.period is not None:
-            steps = own.period / control.horizon_period
+            horizon_period = model.horizon[1]
+            steps = own.period / horizon_period
             if round(steps) < 1 or abs(steps - round(steps)) > 1e-9 * steps:
-                multiple = f"a whole multiple of control.horizon_period, {control.horizon_period:g}"
+                multiple = f"a whole multiple of control.horizon_period, {horizon_period:g}"
                 yield (*path, "period"), multiple, describe(own.period)
         if control.association != "known":
             yield ("control", "association"), "known, with a lookahead", describe(control.association)

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterator, Mapping
+from itertools import pairwise
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, field_validator
@@ -29,6 +31,9 @@ from vedette.scenarios.sections.world import (
     Survival,
     Time,
 )
+
+# Of a horizon that is as long as it is to the next decision.
+_MOST_STEPS = 100
 
 
 def merge_sensor_defaults(data: Mapping[str, Any]) -> dict[str, Any]:
@@ -129,3 +134,14 @@ class ScenarioModel(Section):
         time = self.time
         steps = (step_of_time(moment, time.start, time.step_period) for moment in self.control.decision_times)
         return tuple(step for step in steps if step is not None)
+
+    @property
+    def horizon(self) -> tuple[int, float]:
+        """H and T, s, of decisions: what is said, else scan by scan for as long as mostly is to the next decision."""
+        control, scan = self.control, self.time.step_period
+        period = control.horizon_period or scan
+        if control.horizon_steps is not None:
+            return control.horizon_steps, period
+        gaps = Counter(after - before for before, after in pairwise((*self.decision_steps, self.time.num_steps)))
+        gap = max(gaps, key=lambda scans: (gaps[scans], scans), default=1)
+        return round(min(max(gap * scan / period, 1.0), _MOST_STEPS)), period
