@@ -34,7 +34,7 @@ SCENES = {
     "paper-a": ("paper-a", None, None),
     "eight-mobile": ("eight-mobile", None, None),
     "six-cameras": ("six-cameras", None, None),
-    "solent": ("solent", None, None),
+    "solent": ("solent", "m_delta_glmb", "cm_delta_glmb"),
 }
 SEED, CONFIDENCE, BLOCK = 1, 0.95, 500
 

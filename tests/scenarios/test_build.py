@@ -235,7 +235,7 @@ def test_a_filter_without_labels_runs_alone_and_names_its_estimates_by_the_scan(
 
 
 def test_fusions_of_each_kind_have_weights_that_sum_to_one() -> None:
-    cm = Fusion(weights=(0.3333333, 0.3333333, 0.3333333), missing_weight=1e-3).build(3, Path())
+    cm = Fusion(kind="cm_delta_glmb", weights=(0.3333333, 0.3333333, 0.3333333), missing_weight=1e-3).build(3, Path())
     assert isinstance(cm, CmDeltaGlmb)
     assert math.fsum(cm.weights) == pytest.approx(1.0, abs=1e-12)
     assert cm.missing_log_weight == math.log(1e-3)
@@ -243,6 +243,16 @@ def test_fusions_of_each_kind_have_weights_that_sum_to_one() -> None:
     assert isinstance(clmb, Clmb)
     assert (clmb.weights, clmb.missing_existence) == ((0.25,) * 4, 0.01)
     assert Fusion(kind="none").build(1, Path()) is None
+
+
+@pytest.mark.parametrize("local", ["factored_glmb", "lmb", "delta_glmb"])
+def test_who_names_no_fusion_gets_all_scans_in_one_belief(local: str) -> None:
+    plain = changed(
+        ("fusion: {kind: cm_delta_glmb, weights: [0.5, 0.5]}\n", ""), ("kind: m_delta_glmb", f"kind: {local}")
+    )
+    loaded = Scenario(parse_scenario(plain))
+    assert loaded.model.fusion.kind == "sequential"
+    assert isinstance(build.build_experiment(loaded).tracker, Central)
 
 
 def of_decisions(loaded: Scenario) -> Any:

@@ -75,6 +75,14 @@ CASES = [
         ["f.yaml:20:40: fusion.weights: expected weights with sum 1, got a sum of 0.9"],
     ),
     (
+        "{kind: cm_delta_glmb, weights: [0.5, 0.5]}",
+        "{weights: [0.5, 0.5]}",
+        [
+            "f.yaml:20:9: fusion: expected a mapping with kind: one of sequential, parallel, clmb, cm_delta_glmb, "
+            "arithmetic_average, central, none, custom, got no kind"
+        ],
+    ),
+    (
         "weights: [0.5, 0.5]",
         "weights: [1.0]",
         ["f.yaml:20:40: fusion.weights: expected as many weights as sensors, 2, got a list of 1"],

@@ -67,7 +67,7 @@ class Fusion(Section):
     """How what the sensors believe, or their scans, become one."""
 
     kind: FusionKind = Field(
-        default="cm_delta_glmb",
+        default="sequential",
         description="cm_delta_glmb, clmb: generalised covariance intersection of marginalised delta-GLMB or of LMB "
         "densities (paper section II-D). arithmetic_average: of LMB densities; other ones are converted. sequential: "
         "one belief is predicted, then updated with each sensor's scan in turn. parallel: each sensor updates one "
