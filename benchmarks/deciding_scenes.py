@@ -12,18 +12,24 @@ import numpy as np
 
 from vedette.scenarios import GeneratedScene, Scenario, load_scenario, parse_scenario, scene_text, with_fields
 from vedette.scenarios.generated import PATTERNS, VIEWS
+from vedette.scenarios.sections.fusion import Fusion
 from vedette.scenarios.sections.tracking import Filter
 
 Fields = dict[str, Any]
 
-# What runs where nothing is said.
+# The filter where nothing is said.
 NOTHING_SAID = Filter().model_dump(mode="json")
 
-OWN, LMB, USUAL = "own filter", "LMB", "default filter"
+OWN, LMB, USUAL, SILENT = "own filter", "LMB", "default filter", "nothing said"
 FILTERS: dict[str, Fields] = {
     OWN: {},
     LMB: {"filter": {"kind": "lmb"}, "fusion": {"kind": "clmb"}},
     USUAL: {"filter": NOTHING_SAID, "fusion": {"kind": "cm_delta_glmb"}},
+    SILENT: {
+        "filter": NOTHING_SAID,
+        "fusion": Fusion().model_dump(mode="json"),
+        **dict.fromkeys(("control.horizon_steps", "control.horizon_period")),
+    },
 }
 # Numbers of sensors of the random layouts; of each the next of these motions, views, times between decisions.
 SIZES = (2, 2, 2, 2, 2, 2, 3, 3, 3, 4, 4, 5, 5, 6, 8, 8, 10, 12, 16, 20)
