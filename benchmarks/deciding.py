@@ -11,9 +11,9 @@ again, so that it goes on after a Ctrl-C; `--runs 0` prints the tables of the fi
 A table a scene. "more" is the paired mean difference to the first strategy, joint decisions by the expected loss, with
 its standard error; it is marked * where Holm's correction over the scene's strategies leaves it told from zero at 95 %.
 "won" is the share of runs in which the first strategy is better. "lost" is the part of OSPA that is of lost and false
-targets. "score" is 0 for the best rule of thumb, 1 for the oracle of one decision. "short" is how far the choices may
-be from the best joint ones, by the plans' own bounds. "ms" is CPU time of a decision on one thread, the mean over
-decisions and runs.
+targets. "score" is 0 for the best rule of thumb, 1 for the oracle of one decision, none where that is no better.
+"short" is how far the choices may be from the best joint ones, by the plans' own bounds. "ms" is CPU time of a decision
+on one thread, the mean over decisions and runs.
 """
 
 from __future__ import annotations
@@ -136,7 +136,26 @@ def paired(runs: Runs, strategy: str, other: str) -> tuple[Floats, Floats]:
 def best_rule(runs: Runs) -> str | None:
     """The rule of thumb, of those that ask for no luck, of least mean error."""
     known = [f"rule {rule}" for rule in RULES if runs.get(f"rule {rule}")]
-    return min(known, key=lambda name: float(np.mean([own.ospa for own in runs[name].values()])), default=None)
+    return min(known, key=lambda name: mean(runs, name), default=None)
+
+
+def place(runs: Runs, name: str) -> str:
+    """Where a strategy stands between the best rule of thumb, 0, and the oracle, 1, where that is the better one."""
+    ends = [mean(runs, end) for end in (best_rule(runs), ORACLE) if end in runs]
+    if len(ends) < 2 or ends[0] - ends[1] <= LEAST_GAP:
+        return ""
+    return f"{(ends[0] - mean(runs, name)) / (ends[0] - ends[1]):.2f}"
+
+
+def mean(runs: Runs, name: str) -> float:
+    """Mean OSPA of a strategy."""
+    return float(np.mean([own.ospa for own in runs[name].values()]))
+
+
+def shortfall(runs: Runs, name: str) -> str:
+    """How far the choices of a strategy may be from the best, by its plans' own bounds."""
+    short = np.array([own.short for own in runs[name].values()])
+    return f"{np.nanmean(short):.1%}" if np.isfinite(short).any() else ""
 
 
 def table(runs: Runs) -> Iterator[str]:
@@ -146,9 +165,7 @@ def table(runs: Runs) -> Iterator[str]:
     names = [name for name in runs if len(runs[name]) > 1]
     differences = {name: np.subtract(*paired(runs, name, FIRST)) for name in names}
     clear = dict(zip(names, holm([p_value(own) for own in differences.values()]), strict=True))
-    rule = best_rule(runs)
-    ends = [summarise([own.ospa for own in runs[end].values()]).mean for end in (rule, ORACLE) if end in runs]
-    for name in sorted(names, key=lambda name: np.mean([own.ospa for own in runs[name].values()])):
+    for name in sorted(names, key=lambda name: mean(runs, name)):
         scores = np.array(list(runs[name].values()))
         total = summarise(scores[:, 0])
         more = summarise(differences[name]) if len(differences[name]) > 1 else None
@@ -158,24 +175,21 @@ def table(runs: Runs) -> Iterator[str]:
         else:
             star = "*" if clear[name] else ""
             cells += [f"{more.mean:+.2f} ± {more.standard_error:.2f}{star}", f"{np.mean(differences[name] > 0):.0%}"]
-        apart = len(ends) == 2 and abs(ends[0] - ends[1]) > LEAST_GAP
-        place = (ends[0] - total.mean) / (ends[0] - ends[1]) if apart else np.nan
-        short = np.nanmean(scores[:, 3]) if np.isfinite(scores[:, 3]).any() else np.nan
-        cells += [f"{scores[:, 1].mean():.2f}", "" if np.isnan(place) else f"{place:.2f}"]
-        cells += ["" if np.isnan(short) else f"{short:.1%}", f"{scores[:, 2].mean():.1f}", str(len(scores))]
+        cells += [f"{scores[:, 1].mean():.2f}", place(runs, name), shortfall(runs, name)]
+        cells += [f"{scores[:, 2].mean():.1f}", str(len(scores))]
         yield "| " + " | ".join(cells) + " |"
 
 
 def overview(found: dict[str, Runs], names: Iterable[str]) -> Iterator[str]:
-    """One row a scene: the first strategy, and how much more others have."""
-    yield f"| Scene | {FIRST} | " + " | ".join(COLUMNS) + " | runs |"
-    yield "| --- |" + " ---: |" * (len(COLUMNS) + 2)
+    """One row a scene: the first strategy, its score, how far from the best it may be, how much more others have."""
+    yield f"| Scene | {FIRST} | score | short | " + " | ".join(COLUMNS) + " | runs |"
+    yield "| --- |" + " ---: |" * (len(COLUMNS) + 4)
     for name in names:
         runs = found[name]
         if len(runs.get(FIRST, {})) < 2:
             continue
         total = summarise([own.ospa for own in runs[FIRST].values()])
-        cells = [name, f"{total.mean:.2f} ± {total.standard_error:.2f}"]
+        cells = [name, f"{total.mean:.2f} ± {total.standard_error:.2f}", place(runs, FIRST), shortfall(runs, FIRST)]
         for column in COLUMNS:
             own = best_rule(runs) if column == "best rule" else column
             first, second = paired(runs, own or "", FIRST)
