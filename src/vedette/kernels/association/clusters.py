@@ -20,6 +20,7 @@ class MarginalWork(NamedTuple):
     leaders: Ints  # (num_rows,) a row of the same cluster, not after this one; the first of a cluster leads itself
     followers: Ints  # (num_rows,) the next row of the same cluster, -1 for none
     members: Ints  # (num_rows,) rows of the cluster at hand
+    known: Ints  # (num_rows + 1,) how many of its measurements the members before each gate
     owners: Ints  # (num_measurements,) the first row that each measurement is gated by, or -1
     bits: Ints  # (num_measurements,) number of each measurement within its cluster, or -1
     tables: Floats  # of the exact sum
@@ -37,6 +38,7 @@ def make_marginal_work(num_rows: int, num_measurements: int) -> MarginalWork:
         np.empty(num_rows, np.int64),
         np.empty(num_rows, np.int64),
         np.empty(num_rows, np.int64),
+        np.empty(num_rows + 1, np.int64),
         np.empty(num_measurements, np.int64),
         np.empty(num_measurements, np.int64),
         np.empty(512),
@@ -55,6 +57,7 @@ def grown_marginal_work(work: MarginalWork) -> MarginalWork:
         work.leaders,
         work.followers,
         work.members,
+        work.known,
         work.owners,
         work.bits,
         grown_floats(work.tables, work.needed[0]),
@@ -116,10 +119,10 @@ def root_of(leaders: Ints, item: int) -> int:
 
 @inlined
 def gather_cluster(options: Options, leader: int, work: MarginalWork) -> tuple[int, int]:
-    """Write the rows of a cluster and number its measurements; how many there are of both."""
+    """Write the rows of a cluster and number its measurements, in order; how many there are of both."""
     count, num_bits, row = 0, 0, leader
     while row >= 0:
-        work.members[count] = row
+        work.members[count], work.known[count] = row, num_bits
         count += 1
         for option in range(options.offsets[row], options.offsets[row + 1]):
             column = options.columns[option]
@@ -127,4 +130,5 @@ def gather_cluster(options: Options, leader: int, work: MarginalWork) -> tuple[i
                 work.bits[column] = num_bits
                 num_bits += 1
         row = work.followers[row]
+    work.known[count] = num_bits
     return count, num_bits

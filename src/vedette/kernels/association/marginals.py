@@ -56,15 +56,18 @@ def _single_row(options: Options, row: int, out: Floats) -> float:
 
 @borrowing
 def _transfer(options: Options, row: int, bit_of: Ints, source: Floats, target: Floats, forward: bool) -> None:
-    """One row's step of the pass over sets of taken measurements; weights relative to the row's heaviest option."""
+    """One row's step of the pass over sets of taken measurements; weights relative to the row's heaviest option.
+
+    source, target: forward of the sets of what rows before it gate, and with what it gates; backward the other way.
+    """
     for mask in range(len(target)):
         target[mask] = 0.0
-    start = options.offsets[row]
+    start, num_before = options.offsets[row], min(len(source), len(target))
     for option in range(start, options.offsets[row + 1]):
         weight = math.exp(options.log_weights[option] - options.log_weights[start])
         column = options.columns[option]
         bit = 1 << bit_of[column] if column >= 0 else 0
-        for mask in range(len(source)):
+        for mask in range(num_before):
             if mask & bit == 0:
                 if forward:
                     target[mask | bit] += weight * source[mask]
@@ -73,24 +76,26 @@ def _transfer(options: Options, row: int, bit_of: Ints, source: Floats, target: 
 
 
 @borrowing
-def _exact_cluster(options: Options, rows: Ints, bit_of: Ints, num_bits: int, tables: Floats, out: Floats) -> float:
-    """Marginals of a cluster by forward-backward; returns its log total weight, -inf if that underflows."""
-    num, size = len(rows), 1 << num_bits
+def _exact_cluster(options: Options, rows: Ints, bit_of: Ints, known: Ints, tables: Floats, out: Floats) -> float:
+    """Marginals of a cluster by forward-backward; returns its log total weight, -inf if that underflows.
+
+    Before a row, only measurements that rows before it gate can be taken, the first `known` ones.
+    """
+    num, size = len(rows), 1 << known[len(rows)]
     backwards = (num + 1) * size
     for mask in range(size):
-        tables[mask] = 1.0 if mask == 0 else 0.0
         tables[backwards + num * size + mask] = 1.0
-    scale = 0.0
+    tables[0], scale = 1.0, 0.0
     for i in range(num):
         if options.offsets[rows[i]] == options.offsets[rows[i] + 1]:
             return -math.inf
         scale += options.log_weights[options.offsets[rows[i]]]
-        at = i * size
-        _transfer(options, rows[i], bit_of, tables[at : at + size], tables[at + size : at + 2 * size], True)
+        before, after, at = 1 << known[i], 1 << known[i + 1], i * size
+        _transfer(options, rows[i], bit_of, tables[at : at + before], tables[at + size : at + size + after], True)
     # Backwards: weight of all that later rows can do once a set of measurements is taken.
     for i in range(num - 1, -1, -1):
-        at = backwards + i * size
-        _transfer(options, rows[i], bit_of, tables[at + size : at + 2 * size], tables[at : at + size], False)
+        before, after, at = 1 << known[i], 1 << known[i + 1], backwards + i * size
+        _transfer(options, rows[i], bit_of, tables[at + size : at + size + after], tables[at : at + before], False)
     total = tables[backwards]
     # Relative weights have underflowed: the caller ranks the cluster's joint choices in logs instead.
     if not total > 1e-250:
@@ -102,7 +107,7 @@ def _exact_cluster(options: Options, rows: Ints, bit_of: Ints, num_bits: int, ta
             bit = 1 << bit_of[column] if column >= 0 else 0
             # P(option) is proportional to the sum over sets of forward(before) weight(option) backward(after).
             joint = 0.0
-            for mask in range(size):
+            for mask in range(1 << known[i]):
                 if mask & bit == 0:
                     joint += tables[i * size + mask] * tables[backwards + (i + 1) * size + (mask | bit)]
             log_joint = math.log(joint / total) if joint > 0.0 else -math.inf
@@ -186,7 +191,7 @@ def fill_marginals(options: Options, caps: SearchCaps, work: MarginalWork, out: 
             work.needed[0] = 2 * (count + 1) << num_bits
             if work.needed[0] > len(work.tables):
                 return MarginalSums(0.0, 0, 0.0), False
-            total = _exact_cluster(options, rows, work.bits, num_bits, work.tables, out)
+            total = _exact_cluster(options, rows, work.bits, work.known[: count + 1], work.tables, out)
         if total > -math.inf:
             has_room = _open_exact(options, rows, total, work, out)
         else:
