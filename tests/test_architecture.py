@@ -5,9 +5,11 @@ from __future__ import annotations
 import importlib.util
 import re
 import sys
+from graphlib import TopologicalSorter
 from pathlib import Path
 from types import ModuleType
 
+import grimp
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -51,3 +53,10 @@ def test_the_page_has_the_order_of_the_contracts(tool: ModuleType) -> None:
 
 def test_the_drawing_is_of_the_present_source(tool: ModuleType) -> None:
     assert tool.drawing() == tool.PLACE.read_text("utf-8"), "have it drawn: python3 tools/draw_imports.py"
+
+
+def test_no_file_imports_what_imports_it() -> None:
+    """At run time, within functions too; what is imported for its type alone may go round."""
+    graph = grimp.build_graph("vedette", exclude_type_checking_imports=True)
+    order = TopologicalSorter({name: graph.find_modules_directly_imported_by(name) for name in graph.modules})
+    order.prepare()  # raises CycleError, which names the files

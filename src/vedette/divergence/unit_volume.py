@@ -16,8 +16,7 @@ def reference_unit_volume(density: Labelled | Poisson) -> float:
     """(4 pi)^(d / 2) sqrt(det P_ref): the K under which K <p, p> is 1 for a Gaussian p of covariance P_ref.
 
     P_ref is the arithmetic mean of the track covariances (of a mixture's moments), each weighted by the probability
-    of its
-    track: GLMB, the weights of the hypotheses that hold it; LMB, its existence. Poisson: of the components'
+    of its track: GLMB, the weights of the hypotheses that hold it; LMB, its existence. Poisson: of the components'
     covariances, weighted by their expected numbers. With K = 1 in SI units K <p, p> is 1e-6 to 1e-8 for a 4-D state,
     and a divergence is then about whether targets exist more than about where they are.
 

@@ -26,10 +26,9 @@ def fifth_degree_rule(dim: int) -> tuple[Floats, Floats]:
     """Points and weights that integrate all polynomials of degree 5 and less under the standard normal of `dim` <= 7.
 
     The centre, the corners of a regular simplex and its opposite, and the midpoints of their edges pushed out to the
-    same
-    sphere: dim^2 + 3 dim + 3 points (Lu and Darmofal 2004, "Higher-dimensional integration with Gaussian weight for
-    applications in probabilistic design", after Mysovskikh). No weight is negative, so a covariance taken with these
-    points is never indefinite; for larger `dim` one would be.
+    same sphere: dim^2 + 3 dim + 3 points (Lu and Darmofal 2004, "Higher-dimensional integration with Gaussian weight
+    for applications in probabilistic design", after Mysovskikh). No weight is negative, so a covariance taken with
+    these points is never indefinite; for larger `dim` one would be.
     """
     corners = _simplex(dim)
     first, second = np.triu_indices(dim + 1, 1)

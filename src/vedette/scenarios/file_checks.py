@@ -13,6 +13,9 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path as FilePath
 from typing import Any
 
+import numpy as np
+
+from vedette.errors import InputError
 from vedette.scenarios.faults import Finding, Path, describe, named
 from vedette.scenarios.sections import ScenarioModel
 from vedette.scenarios.sections.base import Section, attempt, is_whole
@@ -47,11 +50,10 @@ def _content(recorded: RecordedTargets, model: ScenarioModel, folder: FilePath) 
     """What is wrong with the rows, or with the scans or the region for them; where these are faulty, nothing."""
     if not all(map(is_whole, (recorded, model.region, model.time))):
         return
-    from vedette.scenarios.records import record_fault  # with it comes the compiler, which most checks do without
-
-    fault = record_fault(recorded, model.region, model.time, folder)
-    if fault is not None:
-        yield ("targets", "path"), "a file of recorded targets that a run can use", fault
+    try:
+        recorded.source(model.region, folder).truth(model.time.build(), rng=np.random.default_rng(0))
+    except InputError as error:
+        yield ("targets", "path"), "a file of recorded targets that a run can use", str(error)
 
 
 def _columns(recorded: RecordedTargets, file: FilePath) -> Iterator[Finding]:

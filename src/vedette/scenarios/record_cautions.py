@@ -9,7 +9,6 @@ import numpy as np
 from vedette.recorded import RecordedTargets as RecordedSource
 from vedette.scenarios.faults import Path, format_path
 from vedette.scenarios.loading import Scenario
-from vedette.scenarios.records import recorded_source
 from vedette.scenarios.sections.sensors import Sensor
 from vedette.scenarios.sections.targets import RecordedTargets
 from vedette.scenarios.sections.world import Time
@@ -22,7 +21,7 @@ def record_cautions(scenario: Scenario) -> Iterator[tuple[Path, str]]:
     model, folder = scenario.model, scenario.folder
     if not isinstance(model.targets, RecordedTargets):
         return
-    source = recorded_source(model.targets, model.region, folder)
+    source = model.targets.source(model.region, folder)
     yield from _repeats(model.targets, source)
     for index, sensor in enumerate(model.sensors):
         path: Path = ("sensors", index, "position")

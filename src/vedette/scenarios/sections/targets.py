@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Sequence
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal, Protocol
 
 import numpy as np
 from pydantic import Field
 
+from vedette.errors import InputError
 from vedette.scenarios.faults import Finding, describe
 from vedette.scenarios.sections.base import Point, Positive, Probability, Section, SomeNumbers, Step, check
 from vedette.scenarios.sections.world import Motion, RegionSection, Time, grouped_order
@@ -147,9 +150,34 @@ class RecordedTargets(Section):
 
     def build(self, world: _World, motion: MotionModel, folder: Path) -> RecordedSource:
         """The targets, as they were recorded. Raises `InputError` for a file that cannot be read, or gives none."""
-        from vedette.scenarios.records import recorded_source
+        return self.source(world.region, folder)
 
-        return recorded_source(self, world.region, folder)
+    def source(self, region: RegionSection, folder: Path) -> RecordedSource:
+        """The same; a file that stays as it was is read once."""
+        file = folder / self.path
+        try:
+            state = os.stat(file)
+        except (OSError, ValueError):
+            raise InputError(f"{self.path}: expected a readable file of recorded targets; got none") from None
+        return _read(str(file.resolve()), state.st_mtime_ns, state.st_size, self, region)
+
+
+@lru_cache(maxsize=16)
+def _read(
+    file: str, changed_ns: int, num_bytes: int, section: RecordedTargets, region: RegionSection
+) -> RecordedSource:
+    from vedette.models import Region
+    from vedette.recorded import Cleaning
+    from vedette.recorded import RecordedTargets as RecordedSource
+
+    edges = Region(region.x_min, region.x_max, region.y_min, region.y_max)
+    return RecordedSource.from_file(
+        file,
+        columns=section.columns.given(),
+        origin_deg=section.origin_deg,
+        time_origin=section.time_origin,
+        cleaning=Cleaning(section.max_gap, section.min_speed, section.max_speed, edges if section.crop else None),
+    )
 
 
 class PoissonTargets(Section):
