@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, ClassVar, Generic, Protocol, TypeAlias, TypeVar, runtime_checkable
 
 import numpy as np
 
-from vedette.densities import LMB, Labelled
+from vedette.densities import GLMB, LMB, FactoredGLMB, Labelled
 from vedette.errors import InputError
+from vedette.filters.blind import NO_POSE, NO_SCAN
 from vedette.filters.info import FilterInfo
-from vedette.filters.inputs import births_for, check_scan
+from vedette.filters.inputs import births_for, check_belief, check_scan, model_errors
 from vedette.filters.limits import Limits
 from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.types import Floats, Motion, ScanInput, Sensor
 from vedette.models import SensorModel, TargetModel, kernel_motion
 from vedette.models.arguments import generator, pose_vector, positive
 
-StepArguments = tuple[ScanInput, Motion, Sensor, Truncation]
+StepArguments: TypeAlias = tuple[ScanInput, Motion, Sensor, Truncation]
+UpdateArguments: TypeAlias = tuple[ScanInput, Sensor, Truncation]
+_Belief = TypeVar("_Belief", bound=Labelled)
 
 
 @runtime_checkable
@@ -135,7 +139,7 @@ class SingleSensorFilter:
     def _own(self) -> tuple[Sensor, Truncation]:
         return self.sensor.to_kernel(), self.limits.truncation(self.sensor.meas_dim)
 
-    def _update_arguments(self, scan: Floats, pose: Any) -> tuple[ScanInput, Sensor, Truncation]:
+    def _update_arguments(self, scan: Floats, pose: Any) -> UpdateArguments:
         """As `_arguments`, of a scan of the prior's own time."""
         nobody = LMB.empty(self.targets.state_dim).to_kernel()
         return (ScanInput(nobody, scan, pose_vector("pose", pose), 0.0), *self._own())
@@ -143,3 +147,96 @@ class SingleSensorFilter:
     def _check_scan(self, scan: Any, rng: Any) -> tuple[Floats, int]:
         generator(rng)
         return check_scan(scan, self.sensor)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LabelledFilter(SingleSensorFilter, ABC, Generic[_Belief]):
+    """A filter of one sensor that labels its targets: what its step, its prediction and its update have in common.
+
+    Attributes and errors: as `SingleSensorFilter`.
+    """
+
+    kind: ClassVar[type[GLMB] | type[LMB] | type[FactoredGLMB]]  # of the belief
+
+    def initial(self) -> _Belief:
+        """The belief before the first scan: no target."""
+        return self.kind.empty(self.targets.state_dim)  # type: ignore[return-value]
+
+    def step(
+        self,
+        belief: Labelled,
+        scan: Any,
+        pose: Any,
+        dt: float,
+        step: int,
+        *,
+        rng: np.random.Generator,
+        births: LMB | None = None,
+    ) -> tuple[_Belief, FilterInfo]:
+        """Predict over `dt` seconds and update with a scan.
+
+        Args:
+            belief: posterior of the previous step.
+            scan: (num, meas_dim) measurements in any order; angles in radians, in (-pi, pi].
+            pose: (3 or more,) [px, py, heading_rad, ...] of the sensor.
+            dt: seconds since the previous step.
+            step: number of this step, from 1 on; births at the sites of the targets' model are labelled with it.
+            rng: drawn from only by Gibbs sampling; taken by all so that filters are interchangeable.
+            births: who may have been born since the previous step, instead of at those sites; labels later than the
+                belief's.
+
+        Returns:
+            The posterior, of a GLMB the hypotheses by descending weight, and a report.
+
+        Raises:
+            InputError: a scan, pose, belief or births of the wrong shape or kind, an angle beyond a full turn, a step
+                below 1.
+            ModelError: a model function raised or gave a value that is none of its kind.
+            NumericalError: no hypothesis has positive weight.
+        """
+        measurements, num_duplicates = self._check_scan(scan, rng)
+        prior = self._prior(belief)
+        arguments = self._arguments(measurements, pose, dt, step, prior, births)
+        with model_errors():
+            posterior, report = self._stepped(prior.to_kernel(), arguments, rng)
+        return self._concluded(posterior, report, num_duplicates, f"step {step}: ")
+
+    def predict(
+        self, belief: Labelled, dt: float, step: int, *, births: LMB | None = None
+    ) -> tuple[_Belief, FilterInfo]:
+        """The belief `dt` seconds later, births included: a step without sight. Arguments and errors as of `step`.
+
+        What is cut here is cut as it weighs before the scan is seen, which in `step` is not so.
+        """
+        prior, blind = self._prior(belief), self._blind()
+        arguments = blind._arguments(NO_SCAN, NO_POSE, dt, step, prior, births)
+        with model_errors():
+            posterior, report = blind._stepped(prior.to_kernel(), arguments, None)
+        return blind._concluded(posterior, report, 0, f"step {step}: ")
+
+    def update(self, belief: Labelled, scan: Any, pose: Any, *, rng: np.random.Generator) -> tuple[_Belief, FilterInfo]:
+        """The belief after a scan of its own time; nobody moves, dies or is born. Arguments and errors as of `step`."""
+        measurements, num_duplicates = self._check_scan(scan, rng)
+        prior, arguments = self._prior(belief), self._update_arguments(measurements, pose)
+        with model_errors():
+            posterior, report = self._updated(prior.to_kernel(), arguments)
+        return self._concluded(posterior, report, num_duplicates, "")
+
+    def _prior(self, belief: object) -> _Belief:
+        return check_belief(belief, self.kind, self.targets.state_dim)  # type: ignore[type-var,return-value]
+
+    @abstractmethod
+    def _blind(self) -> LabelledFilter[_Belief]:
+        """The filter whose step is the prediction; its sensor sees nothing."""
+
+    @abstractmethod
+    def _stepped(self, prior: Any, arguments: StepArguments, rng: np.random.Generator | None) -> tuple[Any, Any]:
+        """Posterior and report of kernels. rng: None of a prediction."""
+
+    @abstractmethod
+    def _updated(self, prior: Any, arguments: UpdateArguments) -> tuple[Any, Any]:
+        """Likewise, of the prior's own time."""
+
+    @abstractmethod
+    def _concluded(self, posterior: Any, report: Any, num_duplicates: int, place: str) -> tuple[_Belief, FilterInfo]:
+        """As they are given back; `NumericalError`, after `place`, where nothing has positive weight."""

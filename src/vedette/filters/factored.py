@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
-from vedette.densities import LMB, FactoredGLMB, Labelled
+from vedette.densities import FactoredGLMB
 from vedette.errors import InputError, NumericalError
-from vedette.filters.base import SingleSensorFilter
-from vedette.filters.blind import NO_POSE, NO_SCAN, blind_sensor
+from vedette.filters.base import LabelledFilter, StepArguments, UpdateArguments
+from vedette.filters.blind import blind_sensor
 from vedette.filters.info import FilterInfo
-from vedette.filters.inputs import check_belief, model_errors
 from vedette.filters.posteriors import factored_posterior
 from vedette.kernels.base.types import FactoredGlmb
 from vedette.kernels.steps.factored import FactoredReport, Factoring, step_factored, update_factored
@@ -29,7 +28,7 @@ _FACTORS_TOGETHER = 4
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class FactoredGlmbFilter(SingleSensorFilter):
+class FactoredGlmbFilter(LabelledFilter[FactoredGLMB]):
     """delta-GLMB filter of one sensor whose density is a product of independent factors.
 
     At a scan, factors that lay claim to the same measurements are multiplied out and updated together, exactly as a
@@ -38,7 +37,8 @@ class FactoredGlmbFilter(SingleSensorFilter):
     known of a far target does not depend on how long the list is, and the cost grows with the number of targets, not
     with that of their combinations. With a `max_split_error` of 2 every label is a factor of its own, as in an LMB
     filter; with 0, and `max_factor_labels` as large as the number of targets, none is split that depends on another, as
-    in a delta-GLMB filter.
+    in a delta-GLMB filter. It draws nothing; its predictions are cut as a delta-GLMB filter's, factor by factor, but
+    drop no label.
 
     Attributes:
         targets: how targets move, live on and appear.
@@ -62,59 +62,23 @@ class FactoredGlmbFilter(SingleSensorFilter):
     max_split_error: float = 0.01
     max_factor_labels: int = 20
     scans_together: int = 1
+    kind: ClassVar[type[FactoredGLMB]] = FactoredGLMB
 
     def __post_init__(self) -> None:
-        SingleSensorFilter.__post_init__(self)  # slots replace the class that super() looks for
+        LabelledFilter.__post_init__(self)  # slots replace the class that super() looks for
         check_factoring(self.max_split_error, self.max_factor_labels)
         dimension("scans_together", self.scans_together)
 
-    def initial(self) -> FactoredGLMB:
-        """The belief before the first scan: no target."""
-        return FactoredGLMB.empty(self.targets.state_dim)
+    def _blind(self) -> FactoredGlmbFilter:
+        return replace(self, sensor=blind_sensor(), limits=self.limits.keeping_labels())
 
-    def step(
-        self,
-        belief: Labelled,
-        scan: Any,
-        pose: Any,
-        dt: float,
-        step: int,
-        *,
-        rng: np.random.Generator,
-        births: LMB | None = None,
-    ) -> tuple[FactoredGLMB, FilterInfo]:
-        """Predict over `dt` seconds and update with a scan; arguments, results and errors as `DeltaGlmbFilter.step`.
+    def _stepped(
+        self, prior: FactoredGlmb, arguments: StepArguments, rng: np.random.Generator | None
+    ) -> tuple[FactoredGlmb, FactoredReport]:
+        return step_factored(prior, *arguments, *self._reduction())
 
-        Nothing is drawn from `rng`; it is taken so that filters are interchangeable.
-        """
-        measurements, num_duplicates = self._check_scan(scan, rng)
-        prior = check_belief(belief, FactoredGLMB, self.targets.state_dim)
-        arguments = self._arguments(measurements, pose, dt, step, prior, births)
-        with model_errors():
-            posterior, report = step_factored(prior.to_kernel(), *arguments, *self._reduction())
-        return self._concluded(posterior, report, num_duplicates, f"step {step}: ")
-
-    def predict(
-        self, belief: Labelled, dt: float, step: int, *, births: LMB | None = None
-    ) -> tuple[FactoredGLMB, FilterInfo]:
-        """The belief `dt` seconds later, births included; as `DeltaGlmbFilter.predict`, factor by factor."""
-        prior = check_belief(belief, FactoredGLMB, self.targets.state_dim)
-        blind = replace(self, sensor=blind_sensor(), limits=self.limits.keeping_labels())
-        arguments = blind._arguments(NO_SCAN, NO_POSE, dt, step, prior, births)
-        with model_errors():
-            posterior, report = step_factored(prior.to_kernel(), *arguments, *blind._reduction())
-        return blind._concluded(posterior, report, 0, f"step {step}: ")
-
-    def update(
-        self, belief: Labelled, scan: Any, pose: Any, *, rng: np.random.Generator
-    ) -> tuple[FactoredGLMB, FilterInfo]:
-        """The belief after a scan of its own time; as `DeltaGlmbFilter.update`."""
-        measurements, num_duplicates = self._check_scan(scan, rng)
-        prior = check_belief(belief, FactoredGLMB, self.targets.state_dim)
-        arguments = self._update_arguments(measurements, pose)
-        with model_errors():
-            posterior, report = update_factored(prior.to_kernel(), *arguments, *self._reduction())
-        return self._concluded(posterior, report, num_duplicates, "")
+    def _updated(self, prior: FactoredGlmb, arguments: UpdateArguments) -> tuple[FactoredGlmb, FactoredReport]:
+        return update_factored(prior, *arguments, *self._reduction())
 
     def _reduction(self) -> tuple[Reduction, Factoring]:
         return self.limits.reduction(), factoring_of(self.max_split_error, self.max_factor_labels, self.scans_together)

@@ -57,12 +57,15 @@ class MultiSensorLmbFilter(MultiSensorFilter[LMB]):
         if not math.isfinite(joint.sums.log_total):
             raise NumericalError(f"{place}: no association has positive weight; do the models forbid these scans?")
         sums = joint.sums._replace(log_kept=joint.sums.log_kept + sum(report.log_kept for report in reports))
-        whole = joint._replace(sums=sums, num_raised=sum(report.num_raised for report in reports))
+        whole = joint._replace(
+            sums=sums,
+            num_raised=sum(report.num_raised for report in reports),
+            cut=any(report.log_kept < 0.0 for report in reports),
+        )
         return lmb_posterior(
             posterior,
             [whole],
             limits,
             log_likelihood=looks.log_likelihood(joint.sums.log_total, [report.log_clutter for report in reports]),
             num_duplicates=looks.num_duplicates,
-            search_cut=any(report.log_kept < 0.0 for report in reports),
         )

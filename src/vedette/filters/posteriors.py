@@ -22,7 +22,6 @@ def lmb_posterior(
     *,
     log_likelihood: float,
     num_duplicates: int,
-    search_cut: bool = False,
 ) -> tuple[LMB, FilterInfo]:
     """An LMB after updates, one report each; see `FilterInfo` for what is not of them."""
     kept, spread = limits.without_spread(LMB.from_kernel(posterior))
@@ -35,7 +34,7 @@ def lmb_posterior(
         num_clutter_raised=sum(int(report.num_raised) for report in reports),
         num_duplicates=num_duplicates,
         num_inexact_clusters=sum(int(report.sums.num_ranked) for report in reports),
-        search_cut=search_cut,
+        search_cut=any(bool(report.cut) for report in reports),
         cap_met=len(posterior.existence_logit) >= limits.max_labels,
     )
 

@@ -41,7 +41,7 @@ class SequentialLmbFilter(MultiSensorFilter[LMB]):
 
     def _updated(self, prior: LMB, born: LMB, looks: Looks, dt: float, place: str) -> tuple[LMB, FilterInfo]:
         motion, posterior = kernel_motion(self.targets.motion, self.targets.survival), prior.to_kernel()
-        keeping, reports, search_cut = self.limits.keeping_labels(), list[LmbReport](), False
+        keeping, reports = self.limits.keeping_labels(), list[LmbReport]()
         given = zip(looks.names, looks.sensors, looks.inputs_in_turn(born, dt), strict=True)
         settled = np.zeros(0, np.bool_)
         for s, (name, sensor, scan) in enumerate(given):
@@ -50,17 +50,16 @@ class SequentialLmbFilter(MultiSensorFilter[LMB]):
             own = (scan, sensor.to_kernel(), limits.truncation(sensor.meas_dim), limits.reduction())
             with model_errors():
                 if s == 0:
-                    posterior, report, cut = update_lmb(predict_combinations(posterior, scan, 1, motion), *own)
+                    posterior, report = update_lmb(predict_combinations(posterior, scan, 1, motion), *own)
                 elif is_last:  # of which every label is told whether it stays
-                    posterior, report, cut = update_lmb(standing_combinations(posterior), *own)
+                    posterior, report = update_lmb(standing_combinations(posterior), *own)
                 else:
-                    posterior, report, cut, settled = _updated_in_view(posterior, settled, *own)
+                    posterior, report, settled = _updated_in_view(posterior, settled, *own)
             if not math.isfinite(report.sums.log_total):
                 raise NumericalError(
                     f"{place}, {name}: no association has positive weight; do the models forbid these scans?"
                 )
             reports.append(report)
-            search_cut = search_cut or bool(cut)
         log_total = sum(report.sums.log_total for report in reports)
         return lmb_posterior(
             posterior,
@@ -68,16 +67,15 @@ class SequentialLmbFilter(MultiSensorFilter[LMB]):
             self.limits,
             log_likelihood=looks.log_likelihood(log_total, [report.log_clutter for report in reports]),
             num_duplicates=looks.num_duplicates,
-            search_cut=search_cut,
         )
 
 
 def _updated_in_view(
     prior: Lmb, settled: Bools, scan: ScanInput, sensor: Sensor, truncation: Truncation, reduction: Reduction
-) -> tuple[Lmb, LmbReport, bool, Bools]:
+) -> tuple[Lmb, LmbReport, Bools]:
     """As `update_lmb`, of the labels that the scan may say anything of; settled: as of `put_back`, empty of none."""
     num, marks = len(prior.existence_logit), in_view(prior.tracks, scan, sensor, truncation)
-    updated, report, cut = update_lmb(standing_combinations(marked(prior, marks)), scan, sensor, truncation, reduction)
+    updated, report = update_lmb(standing_combinations(marked(prior, marks)), scan, sensor, truncation, reduction)
     before = settled if len(settled) else np.zeros(num, np.bool_)
     posterior, settled = put_back(prior, marks, updated, reduction.mixture, before)
-    return posterior, report, cut, settled
+    return posterior, report, settled

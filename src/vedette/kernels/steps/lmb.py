@@ -50,6 +50,7 @@ class LmbReport(NamedTuple):
     log_clutter: float  # sum of the log clutter intensities of the scan
     num_raised: int  # measurements whose clutter intensity was raised to the floor
     dropped_existence: float  # summed existence of dropped labels
+    cut: bool  # whether a track had more options than a cap has left
 
 
 @inlined
@@ -209,4 +210,4 @@ def step_lmb(
     kept_logits = np.empty(len(kept))
     for i in range(len(kept)):
         kept_logits[i] = logits[kept[i]]
-    return Lmb(tracks, kept_logits), LmbReport(sums, log_clutter, num_raised, dropped)
+    return Lmb(tracks, kept_logits), LmbReport(sums, log_clutter, num_raised, dropped, False)

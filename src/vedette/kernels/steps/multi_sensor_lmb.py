@@ -123,19 +123,16 @@ def lmb_of_combinations(
     for i in range(len(chosen)):
         chosen_logits[i] = logits[chosen[i]]
     sums = MarginalSums(log_total, num_inexact, log_kept + log_summed)
-    return Lmb(tracks, chosen_logits), LmbReport(sums, 0.0, 0, dropped)
+    return Lmb(tracks, chosen_logits), LmbReport(sums, 0.0, 0, dropped, False)
 
 
 @kernel
 def update_lmb(
     combinations: Combinations, scan: ScanInput, sensor: Sensor, truncation: Truncation, reduction: Reduction
-) -> tuple[Lmb, LmbReport, bool]:
-    """The LMB after one sensor's scan of the time that `combinations`, before it, are of.
-
-    Also whether a track had more combinations than the cap on hypotheses leaves.
-    """
+) -> tuple[Lmb, LmbReport]:
+    """The LMB after one sensor's scan of the time that `combinations`, before it, are of."""
     taken, seen = extend_combinations(combinations, 0, 0, scan, sensor, truncation)
     posterior, report = lmb_of_combinations(taken, len(scan.measurements), truncation, reduction)
     sums = MarginalSums(report.sums.log_total, report.sums.num_ranked, report.sums.log_kept + seen.log_kept)
-    whole = LmbReport(sums, seen.log_clutter, seen.num_raised, report.dropped_existence)
-    return posterior, whole, seen.log_kept < 0.0
+    cut = seen.log_kept < 0.0
+    return posterior, LmbReport(sums, seen.log_clutter, seen.num_raised, report.dropped_existence, cut)
