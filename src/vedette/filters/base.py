@@ -22,7 +22,7 @@ from vedette.models.arguments import generator, pose_vector, positive
 
 StepArguments: TypeAlias = tuple[ScanInput, Motion, Sensor, Truncation]
 UpdateArguments: TypeAlias = tuple[ScanInput, Sensor, Truncation]
-_Belief = TypeVar("_Belief", bound=Labelled)
+BeliefT = TypeVar("BeliefT", bound=Labelled)
 
 
 @runtime_checkable
@@ -149,18 +149,27 @@ class SingleSensorFilter:
         return check_scan(scan, self.sensor)
 
 
+class OfKind(ABC, Generic[BeliefT]):
+    """What filters of one kind of labelled belief have in common, whatever the number of their sensors."""
+
+    __slots__ = ()
+    kind: ClassVar[type[GLMB] | type[LMB] | type[FactoredGLMB]]  # of the belief
+    targets: TargetModel
+
+    def initial(self) -> BeliefT:
+        """The belief before the first scan: no target."""
+        return self.kind.empty(self.targets.state_dim)  # type: ignore[return-value]
+
+    def _prior(self, belief: object) -> BeliefT:
+        return check_belief(belief, self.kind, self.targets.state_dim)  # type: ignore[type-var,return-value]
+
+
 @dataclass(frozen=True, slots=True, eq=False)
-class LabelledFilter(SingleSensorFilter, ABC, Generic[_Belief]):
+class LabelledFilter(SingleSensorFilter, OfKind[BeliefT]):
     """A filter of one sensor that labels its targets: what its step, its prediction and its update have in common.
 
     Attributes and errors: as `SingleSensorFilter`.
     """
-
-    kind: ClassVar[type[GLMB] | type[LMB] | type[FactoredGLMB]]  # of the belief
-
-    def initial(self) -> _Belief:
-        """The belief before the first scan: no target."""
-        return self.kind.empty(self.targets.state_dim)  # type: ignore[return-value]
 
     def step(
         self,
@@ -172,7 +181,7 @@ class LabelledFilter(SingleSensorFilter, ABC, Generic[_Belief]):
         *,
         rng: np.random.Generator,
         births: LMB | None = None,
-    ) -> tuple[_Belief, FilterInfo]:
+    ) -> tuple[BeliefT, FilterInfo]:
         """Predict over `dt` seconds and update with a scan.
 
         Args:
@@ -203,7 +212,7 @@ class LabelledFilter(SingleSensorFilter, ABC, Generic[_Belief]):
 
     def predict(
         self, belief: Labelled, dt: float, step: int, *, births: LMB | None = None
-    ) -> tuple[_Belief, FilterInfo]:
+    ) -> tuple[BeliefT, FilterInfo]:
         """The belief `dt` seconds later, births included: a step without sight. Arguments and errors as of `step`.
 
         What is cut here is cut as it weighs before the scan is seen, which in `step` is not so.
@@ -214,7 +223,7 @@ class LabelledFilter(SingleSensorFilter, ABC, Generic[_Belief]):
             posterior, report = blind._stepped(prior.to_kernel(), arguments, None)
         return blind._concluded(posterior, report, 0, f"step {step}: ")
 
-    def update(self, belief: Labelled, scan: Any, pose: Any, *, rng: np.random.Generator) -> tuple[_Belief, FilterInfo]:
+    def update(self, belief: Labelled, scan: Any, pose: Any, *, rng: np.random.Generator) -> tuple[BeliefT, FilterInfo]:
         """The belief after a scan of its own time; nobody moves, dies or is born. Arguments and errors as of `step`."""
         measurements, num_duplicates = self._check_scan(scan, rng)
         prior, arguments = self._prior(belief), self._update_arguments(measurements, pose)
@@ -222,11 +231,8 @@ class LabelledFilter(SingleSensorFilter, ABC, Generic[_Belief]):
             posterior, report = self._updated(prior.to_kernel(), arguments)
         return self._concluded(posterior, report, num_duplicates, "")
 
-    def _prior(self, belief: object) -> _Belief:
-        return check_belief(belief, self.kind, self.targets.state_dim)  # type: ignore[type-var,return-value]
-
     @abstractmethod
-    def _blind(self) -> LabelledFilter[_Belief]:
+    def _blind(self) -> LabelledFilter[BeliefT]:
         """The filter whose step is the prediction; its sensor sees nothing."""
 
     @abstractmethod
@@ -238,5 +244,5 @@ class LabelledFilter(SingleSensorFilter, ABC, Generic[_Belief]):
         """Likewise, of the prior's own time."""
 
     @abstractmethod
-    def _concluded(self, posterior: Any, report: Any, num_duplicates: int, place: str) -> tuple[_Belief, FilterInfo]:
+    def _concluded(self, posterior: Any, report: Any, num_duplicates: int, place: str) -> tuple[BeliefT, FilterInfo]:
         """As they are given back; `NumericalError`, after `place`, where nothing has positive weight."""

@@ -2,24 +2,23 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, Generic, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from vedette.densities import GLMB, LMB, FactoredGLMB, Labelled
+from vedette.densities import LMB, Labelled
 from vedette.errors import InputError
+from vedette.filters.base import BeliefT, OfKind
 from vedette.filters.blind import NO_POSE, NO_SCAN, blind_sensor
 from vedette.filters.info import FilterInfo
-from vedette.filters.inputs import births_for, check_belief, check_scan
+from vedette.filters.inputs import births_for, check_scan
 from vedette.filters.limits import Limits
 from vedette.kernels.base.types import Floats, ScanInput
 from vedette.models import SensorModel, TargetModel
 from vedette.models.arguments import generator, one_a_sensor, pose_vector, positive, reject
-
-_Belief = TypeVar("_Belief", GLMB, LMB, FactoredGLMB)
 
 
 class Looks(NamedTuple):
@@ -49,7 +48,7 @@ class Looks(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class MultiSensorFilter(ABC, Generic[_Belief]):
+class MultiSensorFilter(OfKind[BeliefT]):
     """The parts of a filter of several sensors.
 
     Attributes:
@@ -64,7 +63,6 @@ class MultiSensorFilter(ABC, Generic[_Belief]):
     targets: TargetModel
     sensors: tuple[SensorModel, ...]
     limits: Limits = field(default_factory=Limits)
-    kind: ClassVar[type[GLMB] | type[LMB] | type[FactoredGLMB]]  # of the belief
 
     def __post_init__(self) -> None:
         for name, kind in (("targets", TargetModel), ("limits", Limits)):
@@ -78,10 +76,6 @@ class MultiSensorFilter(ABC, Generic[_Belief]):
                 raise InputError(f"sensors[{s}]: expected a SensorModel; got {type(sensor).__name__}")
         object.__setattr__(self, "sensors", tuple(self.sensors))
 
-    def initial(self) -> _Belief:
-        """The belief before the first scans: no target."""
-        return self.kind.empty(self.targets.state_dim)  # type: ignore[return-value]
-
     def step(
         self,
         belief: Labelled,
@@ -92,7 +86,7 @@ class MultiSensorFilter(ABC, Generic[_Belief]):
         *,
         rng: np.random.Generator,
         births: LMB | None = None,
-    ) -> tuple[_Belief, FilterInfo]:
+    ) -> tuple[BeliefT, FilterInfo]:
         """Predict over `dt` seconds and update with the scans of all sensors.
 
         Args:
@@ -115,13 +109,13 @@ class MultiSensorFilter(ABC, Generic[_Belief]):
             NumericalError: no association has positive weight.
         """
         looks = self._looks(scans, poses, rng)
-        prior = check_belief(belief, self.kind, self.targets.state_dim)  # type: ignore[type-var]
+        prior = self._prior(belief)
         period = positive("dt", dt)
         born = births_for(self.targets.birth, period, step, prior, births)
-        return self._updated(prior, born, looks, period, f"step {step}")  # type: ignore[arg-type]
+        return self._updated(prior, born, looks, period, f"step {step}")
 
     @abstractmethod
-    def _updated(self, prior: _Belief, born: LMB, looks: Looks, dt: float, place: str) -> tuple[_Belief, FilterInfo]:
+    def _updated(self, prior: BeliefT, born: LMB, looks: Looks, dt: float, place: str) -> tuple[BeliefT, FilterInfo]:
         """The prediction of the prior, with those who may be born, after all looks. place: of errors."""
 
     def _looks(self, scans: Any, poses: Any, rng: Any) -> Looks:

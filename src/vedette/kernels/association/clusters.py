@@ -20,7 +20,7 @@ class MarginalWork(NamedTuple):
     leaders: Ints  # (num_rows,) a row of the same cluster, not after this one; the first of a cluster leads itself
     followers: Ints  # (num_rows,) the next row of the same cluster, -1 for none
     members: Ints  # (num_rows,) rows of the cluster at hand
-    known: Ints  # (num_rows + 1,) how many of its measurements the members before each gate
+    gated_before: Ints  # (num_rows + 1,) how many of its measurements the members before each gate
     owners: Ints  # (num_measurements,) the first row that each measurement is gated by, or -1
     bits: Ints  # (num_measurements,) number of each measurement within its cluster, or -1
     tables: Floats  # of the exact sum
@@ -57,7 +57,7 @@ def grown_marginal_work(work: MarginalWork) -> MarginalWork:
         work.leaders,
         work.followers,
         work.members,
-        work.known,
+        work.gated_before,
         work.owners,
         work.bits,
         grown_floats(work.tables, work.needed[0]),
@@ -122,7 +122,7 @@ def gather_cluster(options: Options, leader: int, work: MarginalWork) -> tuple[i
     """Write the rows of a cluster and number its measurements, in order; how many there are of both."""
     count, num_bits, row = 0, 0, leader
     while row >= 0:
-        work.members[count], work.known[count] = row, num_bits
+        work.members[count], work.gated_before[count] = row, num_bits
         count += 1
         for option in range(options.offsets[row], options.offsets[row + 1]):
             column = options.columns[option]
@@ -130,5 +130,5 @@ def gather_cluster(options: Options, leader: int, work: MarginalWork) -> tuple[i
                 work.bits[column] = num_bits
                 num_bits += 1
         row = work.followers[row]
-    work.known[count] = num_bits
+    work.gated_before[count] = num_bits
     return count, num_bits

@@ -76,12 +76,14 @@ def _transfer(options: Options, row: int, bit_of: Ints, source: Floats, target: 
 
 
 @borrowing
-def _exact_cluster(options: Options, rows: Ints, bit_of: Ints, known: Ints, tables: Floats, out: Floats) -> float:
+def _exact_cluster(
+    options: Options, rows: Ints, bit_of: Ints, gated_before: Ints, tables: Floats, out: Floats
+) -> float:
     """Marginals of a cluster by forward-backward; returns its log total weight, -inf if that underflows.
 
-    Before a row, only measurements that rows before it gate can be taken, the first `known` ones.
+    Before a row, only measurements that rows before it gate can be taken, the first `gated_before` ones.
     """
-    num, size = len(rows), 1 << known[len(rows)]
+    num, size = len(rows), 1 << gated_before[len(rows)]
     backwards = (num + 1) * size
     for mask in range(size):
         tables[backwards + num * size + mask] = 1.0
@@ -90,11 +92,11 @@ def _exact_cluster(options: Options, rows: Ints, bit_of: Ints, known: Ints, tabl
         if options.offsets[rows[i]] == options.offsets[rows[i] + 1]:
             return -math.inf
         scale += options.log_weights[options.offsets[rows[i]]]
-        before, after, at = 1 << known[i], 1 << known[i + 1], i * size
+        before, after, at = 1 << gated_before[i], 1 << gated_before[i + 1], i * size
         _transfer(options, rows[i], bit_of, tables[at : at + before], tables[at + size : at + size + after], True)
     # Backwards: weight of all that later rows can do once a set of measurements is taken.
     for i in range(num - 1, -1, -1):
-        before, after, at = 1 << known[i], 1 << known[i + 1], backwards + i * size
+        before, after, at = 1 << gated_before[i], 1 << gated_before[i + 1], backwards + i * size
         _transfer(options, rows[i], bit_of, tables[at + size : at + size + after], tables[at : at + before], False)
     total = tables[backwards]
     # Relative weights have underflowed: the caller ranks the cluster's joint choices in logs instead.
@@ -107,7 +109,7 @@ def _exact_cluster(options: Options, rows: Ints, bit_of: Ints, known: Ints, tabl
             bit = 1 << bit_of[column] if column >= 0 else 0
             # P(option) is proportional to the sum over sets of forward(before) weight(option) backward(after).
             joint = 0.0
-            for mask in range(1 << known[i]):
+            for mask in range(1 << gated_before[i]):
                 if mask & bit == 0:
                     joint += tables[i * size + mask] * tables[backwards + (i + 1) * size + (mask | bit)]
             log_joint = math.log(joint / total) if joint > 0.0 else -math.inf
@@ -191,7 +193,7 @@ def fill_marginals(options: Options, caps: SearchCaps, work: MarginalWork, out: 
             work.needed[0] = 2 * (count + 1) << num_bits
             if work.needed[0] > len(work.tables):
                 return MarginalSums(0.0, 0, 0.0), False
-            total = _exact_cluster(options, rows, work.bits, work.known[: count + 1], work.tables, out)
+            total = _exact_cluster(options, rows, work.bits, work.gated_before[: count + 1], work.tables, out)
         if total > -math.inf:
             has_room = _open_exact(options, rows, total, work, out)
         else:
