@@ -33,8 +33,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 ROOT = Path(__file__).resolve().parents[1]
-OWN = ROOT / "tests" / "scenarios"
-SHIPS = "time,id,x,y\n" + "".join(f"{2.0 * k},{ship},{9.0 * k},{50.0 * ship}\n" for k in range(12) for ship in (1, 2))
 WITHIN = 1e-12
 Arrays = dict[str, np.ndarray]
 
@@ -162,14 +160,13 @@ def _run(case: Case, folder: Path) -> Arrays:
 
 def _random(number: int, folder: Path) -> str:
     """Write a random scenario, and what it names, into a folder; the strategy for it."""
-    sys.path.insert(0, str(ROOT / "tests"))
+    if (tests := str(ROOT / "tests")) not in sys.path:
+        sys.path.insert(0, tests)
     from vedette.errors import ScenarioError
     from vedette.scenarios import load_scenario
 
     combinations = import_module("fuzz.combinations")
-    for name in ("own_parts.py", "own_models.py"):
-        (folder / name).write_text((OWN / name).read_text(encoding="utf-8"), encoding="utf-8")
-    (folder / "ships.csv").write_text(SHIPS)
+    combinations.lay_beside(folder)
     rng = np.random.default_rng([20, number])
     for _ in range(_MOST_DRAWS):
         (folder / "scenario.yaml").write_text(json.dumps(combinations.combination(rng)))
@@ -250,8 +247,9 @@ def compare(before: Path, after: Path, within: float) -> int:
         if key in missing:
             continue
         case, _, what = key.partition(": ")
-        apart = difference(first[key], second[key])
-        same = first[key].tobytes() == second[key].tobytes() and first[key].shape == second[key].shape
+        one, other = first[key], second[key]  # unpacked whenever they are asked for
+        apart = difference(one, other)
+        same = apart == 0.0 and one.tobytes() == other.tobytes()
         counts["equal in every bit" if same else f"within {within:g}" if apart <= within else "different"] += 1
         if apart > within:
             worst[case] = max(worst.get(case, (0.0, "")), (apart, what))

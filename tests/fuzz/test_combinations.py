@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shutil
 import warnings
 from collections.abc import Callable
 from pathlib import Path
@@ -11,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fuzz.combinations import STRATEGIES, combination
+from fuzz.combinations import STRATEGIES, combination, lay_beside
 from fuzz.mutations import pick
 from fuzz.outcomes import bounded, check_message, outcome
 from vedette.errors import InputError, ScenarioError, SlowRewardWarning
@@ -26,17 +25,13 @@ Check = Callable[[np.random.Generator], object]
 
 _MOST_DRAWS = 8
 SECONDS = 900  # a first run compiles kernels
-OWN = Path(__file__).parents[1] / "scenarios"
-SHIPS = "time,id,x,y\n" + "".join(f"{2.0 * k},{ship},{9.0 * k},{50.0 * ship}\n" for k in range(12) for ship in (1, 2))
 
 pytestmark = [pytest.mark.fuzz, pytest.mark.filterwarnings("ignore::vedette.errors.ImplausibleWarning")]
 
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    for name in ("own_parts.py", "own_models.py"):
-        shutil.copy(OWN / name, tmp_path)
-    (tmp_path / "ships.csv").write_text(SHIPS)
+    lay_beside(tmp_path)
     return tmp_path
 
 
