@@ -39,7 +39,7 @@ class GeneratedScene:
         pattern: "spread" or "crowd".
         view: "full": every sensor sees everything, the worse the farther it is; "limited": 250 m, with a soft edge.
         num_targets: 1 to 2000; None: two a sensor.
-        decide_every: scans between decisions, 1 to 59; the horizon is as long.
+        decide_every: scans between decisions, 1 to 59; the horizon goes to the next one, or to the last scan.
         seed: of places and courses, at least 0.
 
     Raises:

@@ -132,5 +132,6 @@ def _held(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
         yield (
             ("control", "horizon_period"),
             f"pseudo-updates are {scans:.3g} scans apart: motion.sigma_v is held over each such step, so that plans "
-            "take targets to spread farther than tracking does; leave it out, and they go scan by scan",
+            "take targets to spread farther than tracking does; leave it and control.horizon_steps out, and plans go "
+            "scan by scan to the next decision",
         )
