@@ -82,15 +82,22 @@ class WholeLibrary(JITCodeLibrary):  # type: ignore[misc]
 
 
 def _all_of(libraries: list[Any]) -> list[Any]:
-    """These, and all the libraries that parts among them reach, each once."""
-    found: dict[Any, None] = {}
-    pending = list(reversed(libraries))
+    """These, and all the libraries that parts among them reach, each once and after all that call it.
+
+    What nothing asks for when it is taken in is left out by LLVM, though something that is taken in later calls it.
+    """
+    left: dict[Any, None] = {}  # in the order in which all that they call has been found
+    pending = [(library, False) for library in libraries]
+    entered = set()
     while pending:
-        library = pending.pop()
-        if library not in found:
-            found[library] = None
-            pending.extend(library.called if isinstance(library, PartLibrary) else ())
-    return list(found)
+        library, is_left = pending.pop()
+        if is_left:
+            left[library] = None
+        elif library not in entered:
+            entered.add(library)
+            pending.append((library, True))
+            pending += [(called, False) for called in (library.called if isinstance(library, PartLibrary) else ())]
+    return list(reversed(left))
 
 
 def _code_of(library: Any) -> Any:
