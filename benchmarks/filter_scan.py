@@ -50,11 +50,16 @@ def variants(tracker: DeltaGlmbFilter) -> dict[str, Filter]:
     parts = (tracker.targets, tracker.sensor, tracker.limits)
     # Versions that are timed beside this one need not have it.
     newer = {"factored GLMB": filters.FactoredGlmbFilter(*parts)} if hasattr(filters, "FactoredGlmbFilter") else {}
+    ranked: Any = "ranked"
+    gibbs: Any = "gibbs"
+    if hasattr(filters, "BeliefPropagation"):
+        ranked, gibbs = filters.Ranked(), filters.Gibbs()
+        newer["LMB, belief propagation"] = LmbFilter(*parts, filters.BeliefPropagation())
     return {
         **newer,
-        "delta-GLMB, ranked": replace(tracker, assignment="ranked", marginalised=False),
-        "delta-GLMB, Gibbs": replace(tracker, assignment="gibbs", marginalised=False),
-        "M-delta-GLMB, ranked": replace(tracker, assignment="ranked", marginalised=True),
+        "delta-GLMB, ranked": replace(tracker, assignment=ranked, marginalised=False),
+        "delta-GLMB, Gibbs": replace(tracker, assignment=gibbs, marginalised=False),
+        "M-delta-GLMB, ranked": replace(tracker, assignment=ranked, marginalised=True),
         "LMB": LmbFilter(*parts),
         "LMB, UKF": LmbFilter(*_unscented(tracker), tracker.limits),
         "PHD": PhdFilter(*parts),

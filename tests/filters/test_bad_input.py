@@ -18,6 +18,7 @@ from vedette.filters import (
     CphdFilter,
     DeltaGlmbFilter,
     FactoredGlmbFilter,
+    Gibbs,
     Limits,
     LmbFilter,
     PhdFilter,
@@ -450,8 +451,9 @@ def test_parts_that_do_not_fit(kind: Any) -> None:
 
 def test_options_of_the_delta_glmb_filter() -> None:
     tracker = make(DeltaGlmbFilter)
-    with pytest.raises(InputError, match="assignment: expected one of ranked, gibbs; got murty"):
+    with pytest.raises(InputError, match="assignment: expected one of Ranked, Gibbs; got str"):
         dataclasses.replace(tracker, assignment="murty")
+    value: Any
     for value in (0, -3, math.nan):
-        with pytest.raises(InputError, match=r"num_gibbs_samples: expected .*at least 1"):
-            dataclasses.replace(tracker, num_gibbs_samples=value)
+        with pytest.raises(InputError, match=r"num_samples: expected .*at least 1"):
+            Gibbs(value)

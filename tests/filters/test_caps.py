@@ -5,14 +5,14 @@ from __future__ import annotations
 import os
 import tracemalloc
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import pytest
 
 from vedette import models
 from vedette.densities import GLMB, LMB, map_estimate
-from vedette.filters import DeltaGlmbFilter, FilterInfo, Limits, LmbFilter
+from vedette.filters import DeltaGlmbFilter, FilterInfo, Gibbs, Limits, LmbFilter, Ranked
 from vedette.kernels.base.compile import JIT_ENABLED
 
 POSE = np.array([900.0, 900.0, 0.0])
@@ -34,8 +34,8 @@ def make(kind: str, limits: Limits = LIMITS) -> Any:
     targets = models.TargetModel(MOTION, models.constant_survival(0.99), birth)
     if kind == "lmb":
         return LmbFilter(targets, SENSOR, limits)
-    assignment: Literal["gibbs", "ranked"] = "gibbs" if kind == "gibbs" else "ranked"
-    return DeltaGlmbFilter(targets, SENSOR, limits, assignment, 300, kind == "marginalised")
+    assignment = Gibbs(300) if kind == "gibbs" else Ranked()
+    return DeltaGlmbFilter(targets, SENSOR, limits, assignment, kind == "marginalised")
 
 
 class Scene:

@@ -17,7 +17,7 @@ from densities.examples import plain_glmb, plain_lmb, plain_moments
 from reference import glmb as oracle
 from vedette import models
 from vedette.densities import GLMB, LMB, cardinality_distribution
-from vedette.filters import DeltaGlmbFilter, FilterInfo, Limits, LmbFilter
+from vedette.filters import DeltaGlmbFilter, FilterInfo, Gibbs, Limits, LmbFilter
 
 DT = 1.5
 SURVIVAL = 0.9
@@ -247,7 +247,7 @@ def test_each_hypothesis_is_the_enumerated_one(name: str) -> None:
 def test_plenty_of_gibbs_samples_are_the_enumeration(name: str) -> None:
     example = EXAMPLES[name]()
     posteriors, log_likelihoods = enumerated(name)
-    tracker = example.filter(Limits.none(), assignment="gibbs", num_gibbs_samples=300_000)
+    tracker = example.filter(Limits.none(), assignment=Gibbs(300_000))
     beliefs, infos = run(tracker, example)
     for belief, info, hypotheses, log_likelihood in zip(beliefs, infos, posteriors, log_likelihoods, strict=True):
         # What a sampler never came across in so many sweeps has next to no weight, and what it found has its own.
@@ -258,7 +258,7 @@ def test_plenty_of_gibbs_samples_are_the_enumeration(name: str) -> None:
 def test_gibbs_finds_every_hypothesis_of_an_even_scene() -> None:
     example = EXAMPLES["linear"]()
     for scan in (np.empty((0, 2)), np.array([[81.0, 40.0]])):
-        tracker = example.filter(Limits.none(), assignment="gibbs", num_gibbs_samples=20_000)
+        tracker = example.filter(Limits.none(), assignment=Gibbs(20_000))
         belief, _ = tracker.step(tracker.initial(), scan, POSE, DT, 1, rng=np.random.default_rng(1))
         hypotheses, _ = oracle.step(oracle.no_target(), plain_births(1), list(scan), example.model)
         assert_same_density(plain_glmb(belief), oracle.as_glmb(hypotheses))

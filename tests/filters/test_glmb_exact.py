@@ -19,6 +19,7 @@ from filters.examples import (
 )
 from reference import glmb as oracle
 from vedette.densities import GLMB, TrackTable
+from vedette.filters import Gibbs
 from vedette.kernels.base.compile import JIT_ENABLED
 
 pytestmark = pytest.mark.lanes
@@ -49,7 +50,7 @@ def test_ranked_equals_enumeration(name):
 @pytest.mark.skipif(not JIT_ENABLED, reason="two million sweeps in plain Python")
 def test_gibbs_with_plenty_of_samples_equals_enumeration():
     scene = linear_scene(existence=0.5, prob_survival=0.5, prob_detection=0.6)  # no hypothesis is rare
-    tracker = scene.glmb_filter(assignment="gibbs", num_gibbs_samples=2_000_000)
+    tracker = scene.glmb_filter(assignment=Gibbs(2_000_000))
     rng, belief = np.random.default_rng(3), tracker.initial()
     for step, (expected, log_likelihood) in enumerate(enumerate_scene(scene, oracle.no_target(), 2)):
         belief, info = tracker.step(belief, scene.scans[step], scene.pose, DT, step + 1, rng=rng)

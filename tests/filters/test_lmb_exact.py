@@ -45,7 +45,7 @@ def marginals_of(options):
 
 
 def assert_marginals(options, num_ranked=None):
-    got, (total, ranked, _) = option_marginals(options, UNLIMITED)
+    got, (total, ranked, _) = option_marginals(options, UNLIMITED, None)
     expected_total, expected = marginals_of(options)
     if expected_total == -math.inf:
         assert total == -math.inf
@@ -86,7 +86,7 @@ def test_weights_beyond_the_range_of_floats():
 def test_a_row_without_options_forbids_all():
     tables_without_choice: list[list[list[tuple[int, float]]]] = [[[]], [[(0, 1.0)], []], [[(0, 0.0)], [(0, 0.0)]]]
     for rows in tables_without_choice:
-        _, sums = option_marginals(make_options(rows, 1), UNLIMITED)
+        _, sums = option_marginals(make_options(rows, 1), UNLIMITED, None)
         assert sums.log_total == -math.inf
 
 

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from filters import record, recorded
-from vedette.filters import DeltaGlmbFilter, LmbFilter, MultiSensorGlmbFilter, MultiSensorLmbFilter
+from vedette.filters import DeltaGlmbFilter, Gibbs, LmbFilter, MultiSensorGlmbFilter, MultiSensorLmbFilter
 from vedette.fusion import Clmb, CmDeltaGlmb
 from vedette.kernels.base.compile import JIT_ENABLED
 
@@ -42,7 +42,7 @@ def mean_over_files(family, source, kind, method, **options):
     ("kind", "options", "most"),
     [
         (DeltaGlmbFilter, {}, {"own": 11.8, "others": 11.9}),
-        (DeltaGlmbFilter, {"assignment": "gibbs"}, {"own": 11.8, "others": 11.9}),
+        (DeltaGlmbFilter, {"assignment": Gibbs()}, {"own": 11.8, "others": 11.9}),
         (DeltaGlmbFilter, {"marginalised": True}, {"own": 11.8, "others": 11.9}),
         (LmbFilter, {}, {"own": 11.8, "others": 12.3}),
     ],

@@ -46,7 +46,7 @@ def test_marginals_are_within_the_share_left_out(scale: float, most: int, gap: f
         options = crowd(np.random.default_rng(seed), scale)
         log_all, expected = enumerated(options)
         weights_before = options.log_weights.copy()
-        got, (log_summed, num_ranked, log_kept) = option_marginals(options, SearchCaps(most, gap, 2**62))
+        got, (log_summed, num_ranked, log_kept) = option_marginals(options, SearchCaps(most, gap, 2**62), None)
         assert num_ranked == 1
         np.testing.assert_array_equal(options.log_weights, weights_before)
         left_out = -math.expm1(log_summed - log_all)
@@ -77,7 +77,7 @@ def test_what_two_rows_contend_for_is_not_counted_as_left_out(num_rows: int, mos
     for seed in range(3):
         options = contended(np.random.default_rng(seed), num_rows)
         log_all, _ = enumerated(options)
-        _, (log_summed, num_ranked, log_kept) = option_marginals(options, SearchCaps(most, math.inf, 2**62))
+        _, (log_summed, num_ranked, log_kept) = option_marginals(options, SearchCaps(most, math.inf, 2**62), None)
         assert num_ranked == 1
         rows = itertools.pairwise(options.offsets.tolist())
         log_shared = sum(math.log(np.exp(options.log_weights[low:high]).sum()) for low, high in rows)
@@ -93,7 +93,7 @@ def test_what_two_rows_contend_for_is_not_counted_as_left_out(num_rows: int, mos
 
 def test_a_sum_of_all_choices_leaves_nothing_out() -> None:
     options = crowd(np.random.default_rng(0), 1.0)
-    got, (log_summed, num_ranked, log_kept) = option_marginals(options, SearchCaps(2**62, math.inf, 2**62))
+    got, (log_summed, num_ranked, log_kept) = option_marginals(options, SearchCaps(2**62, math.inf, 2**62), None)
     log_all, expected = enumerated(options)
     assert (num_ranked, log_kept) == (1, 0.0)
     assert log_summed == pytest.approx(log_all, abs=1e-10)
@@ -102,7 +102,7 @@ def test_a_sum_of_all_choices_leaves_nothing_out() -> None:
 
 def test_an_exact_sum_that_falls_below_the_smallest_number_leaves_both_sides_open() -> None:
     rows = [[(0, 0.0), (MISSED, -1.0), (ABSENT, -900.0)], [(0, 0.0), (MISSED, -2.0)]]
-    got, (_, num_ranked, log_kept) = option_marginals(make_options(rows, 1), SearchCaps(2**62, math.inf, 2**62))
+    got, (_, num_ranked, log_kept) = option_marginals(make_options(rows, 1), SearchCaps(2**62, math.inf, 2**62), None)
     assert (num_ranked, log_kept) == (0, 0.0)
     assert got[2] == pytest.approx(-900.0 - math.log(math.exp(-1.0) + math.exp(-2.0) + math.exp(-3.0)), abs=0.4)
 

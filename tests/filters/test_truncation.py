@@ -13,7 +13,7 @@ from filters.examples import DT, SCENES, assert_same_glmb, linear_scene, plain_g
 from reference import glmb as oracle
 from vedette.densities import GLMB, TrackTable
 from vedette.evaluation.runs import run_scenario
-from vedette.filters import Limits
+from vedette.filters import Gibbs, Limits, Ranked
 from vedette.scenarios import load_scenario
 from vedette.scenarios.build import build_experiment, build_sensors
 from vedette.scenarios.overrides import with_fields
@@ -27,7 +27,7 @@ def step(tracker, belief, scene, at, seed=0):
 
 
 @pytest.mark.parametrize("name", SCENES)
-@pytest.mark.parametrize("assignment", ["ranked", "gibbs"])
+@pytest.mark.parametrize("assignment", [Ranked(), Gibbs(30)], ids=["ranked", "gibbs"])
 def test_the_bound_covers_what_was_discarded(name, assignment):
     scene = SCENES[name]()
     exact, belief = scene.glmb_filter(), scene.glmb_filter().initial()
@@ -35,7 +35,7 @@ def test_the_bound_covers_what_was_discarded(name, assignment):
         _, whole = step(exact, belief, scene, at)
         for most in (1, 2, 5, 20):
             limits = replace(Limits.none(), max_hypotheses=most)
-            tracker = scene.glmb_filter(limits=limits, assignment=assignment, num_gibbs_samples=30)
+            tracker = scene.glmb_filter(limits=limits, assignment=assignment)
             kept, info = step(tracker, belief, scene, at)
             kept.validate()
             assert kept.num_hyps <= most
@@ -78,7 +78,7 @@ def test_capped_is_the_head_of_the_whole(most):
     assert_same_glmb(plain_glmb(head), [(weight / total, tracks) for weight, tracks in expected])
 
 
-@pytest.mark.parametrize("assignment", ["ranked", "gibbs"])
+@pytest.mark.parametrize("assignment", [Ranked(), Gibbs(30)], ids=["ranked", "gibbs"])
 def test_light_hypotheses_are_dropped(assignment):
     scene = linear_scene()
     limits = replace(Limits.none(), min_relative_weight=0.05, min_track_weight=1.0)
@@ -90,7 +90,7 @@ def test_light_hypotheses_are_dropped(assignment):
     assert info.discarded_weight_bound > 0.0
 
 
-@pytest.mark.parametrize("assignment", ["ranked", "gibbs"])
+@pytest.mark.parametrize("assignment", [Ranked(), Gibbs(30)], ids=["ranked", "gibbs"])
 def test_every_way_a_target_may_be_seen_is_kept(assignment):
     scene = linear_scene(existence=0.02, prob_detection=0.6)
     few = replace(Limits.none(), max_hypotheses=12, min_track_weight=1.0)
@@ -125,7 +125,7 @@ def test_gibbs_converges_to_ranked():
     weights = oracle.label_set_weights(plain_glmb(ranked))
     distances = []
     for num_samples in (1, 30, 3000):
-        tracker = scene.glmb_filter(assignment="gibbs", num_gibbs_samples=num_samples)
+        tracker = scene.glmb_filter(assignment=Gibbs(num_samples))
         got = oracle.label_set_weights(plain_glmb(step(tracker, tracker.initial(), scene, 0, seed=4)[0]))
         distances.append(sum(abs(weights.get(labels, 0.0) - got.get(labels, 0.0)) for labels in weights | got))
     assert distances[0] > distances[1] > distances[2]

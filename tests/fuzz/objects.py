@@ -100,7 +100,7 @@ def _filters() -> Iterator[tuple[str, Made]]:
     scan = {"scan": [[0.1, 20.0]], "pose": POSES[0], "dt": 1.0, "step": 3, "rng": np.random.default_rng(1)}
     for kind in ("DeltaGlmbFilter", "FactoredGlmbFilter", "LmbFilter", "PhdFilter", "CphdFilter", "CbMemberFilter"):
         make = getattr(filters, kind)
-        more: Data = {"assignment": "ranked", "num_gibbs_samples": 10, "marginalised": True} if kind[0] == "D" else {}
+        more: Data = {"assignment": filters.Gibbs(10), "marginalised": True} if kind[0] == "D" else {}
         more |= {"max_split_error": 0.1, "max_factor_labels": 5} if kind[0] == "F" else {}
         arguments = {"targets": targets(), "sensor": sensor(), "limits": filters.Limits(), **more}
         belief = make(**arguments).initial()

@@ -8,7 +8,17 @@ import numpy as np
 
 from vedette import models
 from vedette.densities import GLMB, LMB, IidCluster, MultiBernoulli, Poisson
-from vedette.filters import CbMemberFilter, CphdFilter, DeltaGlmbFilter, Limits, LmbFilter, PhdFilter
+from vedette.filters import (
+    BeliefPropagation,
+    CbMemberFilter,
+    CphdFilter,
+    DeltaGlmbFilter,
+    Gibbs,
+    Limits,
+    LmbFilter,
+    PhdFilter,
+    Ranked,
+)
 
 Rng = np.random.Generator
 
@@ -129,9 +139,13 @@ def make_filter(rng: Rng, kind: str, targets: models.TargetModel) -> Any:
     """A filter of the kind, with a sensor and limits of its own."""
     args = (targets, _sensor(rng), Limits() if rng.random() < 0.3 else _limits(rng))
     if kind in ("ranked", "gibbs", "marginalised"):
-        assignment: Any = "gibbs" if kind == "gibbs" else one_of(rng, "ranked", "ranked", "gibbs")
-        return DeltaGlmbFilter(*args, assignment, int(rng.integers(1, 40)), kind == "marginalised")
-    return {"lmb": LmbFilter, "phd": PhdFilter, "cphd": CphdFilter, "cbmember": CbMemberFilter}[kind](*args)
+        drawn = Gibbs(int(rng.integers(1, 40)))
+        return DeltaGlmbFilter(
+            *args, drawn if kind == "gibbs" else one_of(rng, Ranked(), drawn), kind == "marginalised"
+        )
+    if kind == "lmb":
+        return LmbFilter(*args, one_of(rng, Ranked(), Ranked(), BeliefPropagation()))
+    return {"phd": PhdFilter, "cphd": CphdFilter, "cbmember": CbMemberFilter}[kind](*args)
 
 
 def first_belief(rng: Rng, kind: str, local: Any) -> Any:

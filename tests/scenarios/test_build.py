@@ -26,10 +26,12 @@ from vedette.filters import (
     CbMemberFilter,
     CphdFilter,
     DeltaGlmbFilter,
+    Gibbs,
     LmbFilter,
     MultiSensorGlmbFilter,
     MultiSensorLmbFilter,
     PhdFilter,
+    Ranked,
 )
 from vedette.fusion import ArithmeticAverage, Clmb, CmDeltaGlmb, Matched, ParallelUpdate
 from vedette.scenarios import Scenario, build, list_builtin, load_scenario, parse_scenario
@@ -194,11 +196,11 @@ def test_a_state_dimension_that_is_not_the_models() -> None:
 def test_filters_of_each_kind() -> None:
     ranked, _ = filters_of(scenario())
     assert isinstance(ranked, DeltaGlmbFilter)
-    assert (ranked.marginalised, ranked.assignment) == (True, "ranked")
+    assert (ranked.marginalised, ranked.assignment) == (True, Ranked())
     text = "kind: delta_glmb, gaussian_method: ckf, assignment: {kind: gibbs, num_samples: 77}, limits: {max_hypotheses: 9}"
     gibbs, _ = filters_of(scenario(("kind: m_delta_glmb", text)))
     assert isinstance(gibbs, DeltaGlmbFilter)
-    assert (gibbs.marginalised, gibbs.assignment, gibbs.num_gibbs_samples) == (False, "gibbs", 77)
+    assert (gibbs.marginalised, gibbs.assignment) == (False, Gibbs(77))
     assert (gibbs.targets.motion.method, gibbs.sensor.method, gibbs.limits.max_hypotheses) == ("ckf", "ckf", 9)
     lmb, _ = filters_of(scenario(("kind: m_delta_glmb", "kind: lmb"), ("kind: cm_delta_glmb", "kind: clmb")))
     assert isinstance(lmb, LmbFilter)

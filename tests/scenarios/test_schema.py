@@ -24,7 +24,7 @@ from vedette.control import (
 )
 from vedette.control.settings import IDEAL_MODES
 from vedette.densities import marginal_estimate
-from vedette.filters import DeltaGlmbFilter, Limits
+from vedette.filters import BeliefPropagation, Gibbs, Limits
 from vedette.fusion import ArithmeticAverage, Clmb, CmDeltaGlmb, ParallelUpdate
 from vedette.fusion.base import _MERGE_DISTANCE
 from vedette.recorded import Cleaning
@@ -40,7 +40,7 @@ from vedette.scenarios.sections.rewards import ExpectedLossReward as ExpectedLos
 from vedette.scenarios.sections.rewards import RenyiReward as RenyiSection
 from vedette.scenarios.sections.scoring import MarginalEstimator
 from vedette.scenarios.sections.targets import RecordedTargets
-from vedette.scenarios.sections.tracking import FilterLimits, GibbsAssignment
+from vedette.scenarios.sections.tracking import FilterLimits, GibbsAssignment, PropagatedAssignment
 
 
 def sections(base: type[BaseModel] = Section) -> list[type[BaseModel]]:
@@ -127,7 +127,8 @@ DEFAULTS: list[tuple[type[BaseModel], Any, dict[str, str]]] = [
         CrossEntropy,
         {name: name for name in ("num_samples", "elite_share", "smoothing", "max_rounds")},
     ),
-    (GibbsAssignment, DeltaGlmbFilter, {"num_samples": "num_gibbs_samples"}),
+    (GibbsAssignment, Gibbs, {"num_samples": "num_samples"}),
+    (PropagatedAssignment, BeliefPropagation, {"max_sweeps": "max_sweeps", "tolerance": "tolerance"}),
     (Fusion, Clmb, {"mixture_power": "mixture_power", "missing_existence": "missing_existence"}),
     (MarginalEstimator, marginal_estimate, {"threshold": "threshold"}),
 ]

@@ -19,6 +19,7 @@ from vedette.densities.containers import unchecked
 from vedette.densities.label_sets import label_sets, places_of, single_gaussians
 from vedette.filters import shared_targets
 from vedette.filters.inputs import model_errors
+from vedette.filters.lmb import association_of
 from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.kernels.planning.ideal import Decision, Futures, Horizon, propagate_samples
 from vedette.kernels.planning.known import pseudo_update_known
@@ -113,6 +114,7 @@ def decision_of(
         horizon,
         futures,
         settings.limits.truncation(own.meas_dim),
+        association_of(sensor.filter),
     )
 
 

@@ -3,6 +3,7 @@
 from typing import TypeAlias
 
 from vedette.densities import IidCluster, Labelled, MultiBernoulli, Poisson
+from vedette.filters.assignment import Assignment, BeliefPropagation, Gibbs, Marginals, Ranked
 from vedette.filters.base import Filter, TwoStepFilter, labels_targets, shared_targets
 from vedette.filters.cbmember import CbMemberFilter
 from vedette.filters.cphd import CphdFilter
@@ -20,18 +21,23 @@ from vedette.filters.sequential_lmb import SequentialLmbFilter
 Belief: TypeAlias = Labelled | Poisson | IidCluster | MultiBernoulli
 
 __all__ = [
+    "Assignment",
     "Belief",
+    "BeliefPropagation",
     "CbMemberFilter",
     "CphdFilter",
     "DeltaGlmbFilter",
     "FactoredGlmbFilter",
     "Filter",
     "FilterInfo",
+    "Gibbs",
     "Limits",
     "LmbFilter",
+    "Marginals",
     "MultiSensorGlmbFilter",
     "MultiSensorLmbFilter",
     "PhdFilter",
+    "Ranked",
     "SequentialFactoredFilter",
     "SequentialLmbFilter",
     "TwoStepFilter",

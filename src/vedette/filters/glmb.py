@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import ClassVar, Literal
+from dataclasses import dataclass, field, replace
+from typing import ClassVar
 
 import numpy as np
 
 from vedette.densities import GLMB
 from vedette.errors import NumericalError
+from vedette.filters.assignment import Gibbs, OfChoices, Ranked, check_assignment
 from vedette.filters.base import LabelledFilter, StepArguments, UpdateArguments
 from vedette.filters.blind import blind_sensor
 from vedette.filters.info import FilterInfo
 from vedette.filters.posteriors import glmb_posterior
 from vedette.kernels.base.types import Glmb
 from vedette.kernels.steps.glmb import StepReport, step_gibbs, step_ranked, update_ranked
-from vedette.models.arguments import dimension, flag, one_of
+from vedette.models.arguments import flag
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -28,8 +29,7 @@ class DeltaGlmbFilter(LabelledFilter[GLMB]):
         targets: how targets move, live on and appear.
         sensor: what the sensor sees of them.
         limits: caps and thresholds.
-        assignment: "ranked" finds the heaviest hypotheses in exact order, "gibbs" samples them.
-        num_gibbs_samples: sweeps in all, shared out over the prior hypotheses.
+        assignment: how joint choices are found: `Ranked`, the heaviest in exact order, or drawn, `Gibbs`.
         marginalised: collapse the posterior to one hypothesis a label set after each step (M-delta-GLMB filter,
             Fantacci and Vo 2015); track mixtures are then reduced to `limits.max_components`.
 
@@ -37,26 +37,24 @@ class DeltaGlmbFilter(LabelledFilter[GLMB]):
         InputError: a part of another kind, or a field out of range.
     """
 
-    assignment: Literal["ranked", "gibbs"] = "ranked"
-    num_gibbs_samples: int = 1000
+    assignment: OfChoices = field(default_factory=Ranked)
     marginalised: bool = False
     kind: ClassVar[type[GLMB]] = GLMB
 
     def __post_init__(self) -> None:
         LabelledFilter.__post_init__(self)  # slots replace the class that super() looks for
-        one_of("assignment", self.assignment, ("ranked", "gibbs"))
+        check_assignment(self.assignment, OfChoices)
         flag("marginalised", self.marginalised)
-        dimension("num_gibbs_samples", self.num_gibbs_samples)
 
     def _blind(self) -> DeltaGlmbFilter:
-        return replace(self, sensor=blind_sensor(), assignment="ranked")
+        return replace(self, sensor=blind_sensor(), assignment=Ranked())
 
     def _stepped(
         self, prior: Glmb, arguments: StepArguments, rng: np.random.Generator | None
     ) -> tuple[Glmb, StepReport]:
-        if self.assignment == "gibbs":
+        if isinstance(self.assignment, Gibbs):
             assert rng is not None  # predictions are ranked
-            return step_gibbs(prior, *arguments, int(self.num_gibbs_samples), rng)
+            return step_gibbs(prior, *arguments, int(self.assignment.num_samples), rng)
         return step_ranked(prior, *arguments)
 
     def _updated(self, prior: Glmb, arguments: UpdateArguments) -> tuple[Glmb, StepReport]:

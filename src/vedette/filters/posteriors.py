@@ -29,7 +29,7 @@ def lmb_posterior(
         log_likelihood=log_likelihood,
         num_hypotheses=1,
         num_tracks=kept.tracks.num_tracks,
-        discarded_weight_bound=max(0.0, -math.expm1(sum(report.sums.log_kept for report in reports))),
+        discarded_weight_bound=max(-math.expm1(sum(report.sums.log_kept for report in reports)), 0.0),  # NaN stays
         dropped_existence=sum(float(report.dropped_existence) for report in reports) + spread,
         num_clutter_raised=sum(int(report.num_raised) for report in reports),
         num_duplicates=num_duplicates,

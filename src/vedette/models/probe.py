@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from vedette.errors import ModelError
+from vedette.kernels.association.assignment import ABSENT, MISSED
 from vedette.kernels.base.compile import SIGNATURES
 from vedette.kernels.base.types import Floats
 from vedette.models.functions import ModelFunction, call, describe
@@ -94,6 +95,20 @@ def probe_log_intensity(function: ModelFunction, args: tuple[Any, ...]) -> float
     if math.isnan(value) or value == math.inf:
         raise _fault(function, args, "a log intensity below +inf", value)
     return value
+
+
+def probe_marginals(function: ModelFunction, params: Floats) -> None:
+    """What an association function writes of two rows that contend for a measurement: distributions over options."""
+    offsets, columns = np.array([0, 3, 7]), np.array([0, MISSED, ABSENT, 1, 0, MISSED, ABSENT])
+    args = (offsets, columns, np.log([4.0, 0.5, 0.1, 3.0, 2.0, 0.3, 0.2]), params)
+    out = np.full(len(columns), np.nan)
+    log_total = float(_checked_call(function, *args, out))
+    sums = np.add.reduceat(np.exp(out), offsets[:-1])
+    if not (math.isfinite(log_total) and np.allclose(sums, 1.0, rtol=0.0, atol=1e-6)):
+        got = f"{out.tolist()} and {log_total}"
+        raise _fault(
+            function, args, "log probabilities that sum to 1 in each row, and the log of the total weight", got
+        )
 
 
 def probe_jacobian(

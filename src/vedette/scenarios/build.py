@@ -178,7 +178,8 @@ def _central_filter(scenario: Scenario, filters: tuple[Filter, ...]) -> CentralF
     if own is not None:
         made: CentralFilter = own.made(scenario.folder, targets=targets, sensors=sensors)
         return made
-    return model.filter.build_central(targets, sensors, in_turn=model.fusion.kind == "sequential")
+    in_turn = model.fusion.kind == "sequential"
+    return model.filter.build_central(targets, sensors, scenario.folder, in_turn=in_turn)
 
 
 def build_poses(scenario: Scenario) -> Floats:

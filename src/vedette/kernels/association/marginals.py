@@ -1,17 +1,19 @@
 """Marginal probability of every option of every row, by clusters of rows that contend for the same measurements.
 
-Within a cluster the sum over all joint choices is exact: a forward-backward pass over the rows whose state is the set
-of measurements already taken. A cluster too large for that is summed over its heaviest joint choices, in exact order;
-what it leaves out is bounded, and no row is certain for want of a choice (`vedette.kernels.association.left_out`).
+This is what an LMB asks of a scan; who else may give it is an `Association`. Within a cluster the sum over all joint
+choices is exact: a forward-backward pass over the rows whose state is the set of measurements already taken. A cluster
+too large for that is summed over its heaviest joint choices, in exact order; what it leaves out is bounded, and no row
+is certain for want of a choice (`vedette.kernels.association.left_out`).
 """
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from vedette.errors import ModelError
 from vedette.kernels.association.assignment import Options
 from vedette.kernels.association.children import Parents
 from vedette.kernels.association.clusters import (
@@ -25,6 +27,7 @@ from vedette.kernels.association.left_out import has_closed_side, log_left_out_b
 from vedette.kernels.association.openings import size_search, start_search
 from vedette.kernels.association.ranked import run_search
 from vedette.kernels.association.search import HEAP, SearchCaps
+from vedette.kernels.base.bundle_types import typed_by_fields
 from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.gaussian.linalg import log_add
@@ -37,7 +40,36 @@ class MarginalSums(NamedTuple):
 
     log_total: float  # log total weight of all joint choices that were summed; -inf where none is possible
     num_ranked: int  # clusters summed over their heaviest choices only
-    log_kept: float  # log of the least share of all weight that is in the sum; 0 without such clusters
+    log_kept: float  # log of the least share of all weight that is in the sum; 0 without such clusters, NaN: unknown
+
+
+@typed_by_fields
+class Association(NamedTuple):
+    """Who else gives the marginals, in place of the sums over clusters."""
+
+    marginals: Any  # see `vedette.models.model_function`, kind `association_marginals`
+    params: Floats
+
+
+# Of the probabilities of a row, from 1: what rounding may leave.
+_SUM_TOLERANCE = 1e-6
+
+
+@inlined
+def _told(options: Options, association: Association, out: Floats) -> MarginalSums:
+    """The marginals that `association` gives, once they are known to be distributions."""
+    offsets, num = options.offsets, options.offsets[-1]
+    columns, log_weights = options.columns[:num], options.log_weights[:num]
+    log_total = association.marginals(offsets, columns, log_weights, association.params, out[:num])
+    if log_total == -math.inf:
+        return MarginalSums(log_total, 0, math.nan)
+    for row in range(len(offsets) - 1):
+        total = 0.0
+        for option in range(offsets[row], offsets[row + 1]):
+            total += math.exp(out[option])
+        if not abs(total - 1.0) <= _SUM_TOLERANCE:
+            raise ModelError("association_marginals function: the probabilities of a row's options do not sum to 1")
+    return MarginalSums(log_total, 0, math.nan)
 
 
 @inlined
@@ -167,12 +199,16 @@ def _open_exact(options: Options, rows: Ints, log_total: float, work: MarginalWo
 
 
 @inlined
-def fill_marginals(options: Options, caps: SearchCaps, work: MarginalWork, out: Floats) -> tuple[MarginalSums, bool]:
+def fill_marginals(
+    options: Options, caps: SearchCaps, association: Association | None, work: MarginalWork, out: Floats
+) -> tuple[MarginalSums, bool]:
     """Write the log marginal probability of each option into `out`; false where `work` must be grown for that.
 
     Where clusters were ranked, 1 less the share of all weight that is in the sum bounds the error of each marginal.
     Inlined because `work` is a large bundle, of which the usual small clusters need little.
     """
+    if association is not None:
+        return _told(options, association, out), True
     log_total, num_ranked, log_kept = 0.0, 0, 0.0
     if not find_clusters(options, work):
         for row in range(len(options.offsets) - 1):
@@ -207,12 +243,14 @@ def fill_marginals(options: Options, caps: SearchCaps, work: MarginalWork, out: 
 
 
 @kernel
-def option_marginals(options: Options, caps: SearchCaps) -> tuple[Floats, MarginalSums]:
+def option_marginals(
+    options: Options, caps: SearchCaps, association: Association | None
+) -> tuple[Floats, MarginalSums]:
     """As `fill_marginals`, into arrays made for it."""
     marginals = np.empty(options.offsets[-1])
     work = make_marginal_work(len(options.offsets) - 1, options.num_measurements)
     while True:
-        sums, has_room = fill_marginals(options, caps, work, marginals)
+        sums, has_room = fill_marginals(options, caps, association, work, marginals)
         if has_room:
             return marginals, sums
         work = grown_marginal_work(work)

@@ -105,7 +105,7 @@ class Kernel:
         return self.part._numba_type_
 
 
-_VECTOR, _MATRIX = "float64[::1]", "float64[:,::1]"
+_VECTOR, _MATRIX, _INTEGERS = "float64[::1]", "float64[:,::1]", "int64[::1]"
 
 # kind -> (argument names that a user's function is checked against, compiled signature)
 SIGNATURES: dict[str, tuple[tuple[str, ...], str]] = {
@@ -124,6 +124,10 @@ SIGNATURES: dict[str, tuple[tuple[str, ...], str]] = {
     "label_reward": (
         ("existence", "mean", "cov", "new_existence", "new_mean", "new_cov", "params", "out"),
         f"void(float64, {_VECTOR}, {_MATRIX}, float64, {_VECTOR}, {_MATRIX}, {_VECTOR}, {_VECTOR})",
+    ),
+    "association_marginals": (
+        ("offsets", "columns", "log_weights", "params", "out"),
+        f"float64({_INTEGERS}, {_INTEGERS}, {_VECTOR}, {_VECTOR}, {_VECTOR})",
     ),
     "log_clutter_intensity": (("measurement", "pose", "params"), f"float64({_VECTOR}, {_VECTOR}, {_VECTOR})"),
 }

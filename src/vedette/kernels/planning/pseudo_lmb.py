@@ -114,7 +114,7 @@ def _update_cases(prior: Lmb, decision: Decision, first: int, last: int, results
             prepared = action
             options = view_options(work.options, len(rows.log_absent), num)
             weigh_options(rows, work.near, scan, sensor, caps, work.log_clutter, options)
-            sums, has_room = fill_marginals(options, caps.search, work.clusters, work.marginals)
+            sums, has_room = fill_marginals(options, caps.search, decision.association, work.clusters, work.marginals)
             if not has_room:
                 return case
             if sums.log_total == -math.inf:

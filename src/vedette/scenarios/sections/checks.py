@@ -106,8 +106,9 @@ def _central(model: ScenarioModel) -> Iterator[Finding]:
         if model.fusion.kind in OF_SCANS:
             wanted = "a fusion of densities, as each sensor has a filter of your own"
             yield ("fusion", "kind"), wanted, describe(model.fusion.kind)
-    elif model.fusion.kind == "central" and model.filter.assignment.kind == "gibbs":
-        yield ("filter", "assignment", "kind"), "ranked, as one filter takes the scans of all sensors", '"gibbs"'
+    elif model.fusion.kind == "central" and model.filter.assignment.kind != "ranked":
+        wanted = "ranked, as one filter takes the scans of all sensors"
+        yield ("filter", "assignment", "kind"), wanted, describe(model.filter.assignment.kind)
 
 
 def _estimator(model: ScenarioModel) -> Iterator[Finding]:

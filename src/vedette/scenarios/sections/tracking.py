@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from pydantic import Field
 
-from vedette.scenarios.faults import Finding
+from vedette.scenarios.faults import Finding, describe
 from vedette.scenarios.sections.base import (
     Chance,
     Count,
@@ -24,26 +24,68 @@ from vedette.scenarios.sections.base import (
 from vedette.scenarios.sections.custom import Custom
 
 if TYPE_CHECKING:  # with the filters comes the compiler, which a check does without
+    from vedette.filters import BeliefPropagation, Gibbs, Limits, Marginals, Ranked
     from vedette.filters import Filter as LocalFilter
-    from vedette.filters import Limits
     from vedette.models import SensorModel, TargetModel
     from vedette.tracking import CentralFilter
 
 
 class RankedAssignment(Section):
-    """The best associations of each hypothesis, in order (exact)."""
+    """The best associations of each hypothesis, in order (exact); for an lmb the exact sum over all."""
 
-    kind: Literal["ranked"] = Field(default="ranked", description="Kind of truncation [-].")
+    kind: Literal["ranked"] = Field(default="ranked", description="Kind of association [-].")
+
+    def build(self, folder: Path) -> Ranked:
+        """How the filter associates."""
+        from vedette.filters import Ranked
+
+        return Ranked()
 
 
 class GibbsAssignment(Section):
     """Associations drawn by a Gibbs sampler; for scenes too busy to rank."""
 
-    kind: Literal["gibbs"] = Field(default="gibbs", description="Kind of truncation [-].")
+    kind: Literal["gibbs"] = Field(default="gibbs", description="Kind of association [-].")
     num_samples: Count = Field(default=1000, description="Number of draws a scan, over all hypotheses [-].")
 
+    def build(self, folder: Path) -> Gibbs:
+        """How the filter associates."""
+        from vedette.filters import Gibbs
 
-Assignment = Annotated[RankedAssignment | GibbsAssignment, Field(discriminator="kind")]
+        return Gibbs(self.num_samples)
+
+
+class PropagatedAssignment(Section):
+    """Probabilities of associations by loopy belief propagation; for an lmb with very many contending tracks."""
+
+    kind: Literal["belief_propagation"] = Field(default="belief_propagation", description="Kind of association [-].")
+    max_sweeps: Count = Field(default=1000, description="Most sweeps over all options a scan [-].")
+    tolerance: float = Field(
+        default=1e-6, ge=0.0, description="Relative change of a message below which it stands still [-]."
+    )
+
+    def build(self, folder: Path) -> BeliefPropagation:
+        """How the filter associates."""
+        from vedette.filters import BeliefPropagation
+
+        return BeliefPropagation(self.max_sweeps, self.tolerance)
+
+
+class CustomAssignment(Custom):
+    """A user's own `vedette.filters.Marginals`, for an lmb."""
+
+    kind: Literal["custom"] = Field(default="custom", description="Kind of association [-].")
+    gives: ClassVar[str] = "vedette.filters:Marginals"
+
+    def build(self, folder: Path) -> Marginals:
+        """How the filter associates."""
+        made: Marginals = self.made(folder)
+        return made
+
+
+Assignment = Annotated[
+    RankedAssignment | GibbsAssignment | PropagatedAssignment | CustomAssignment, Field(discriminator="kind")
+]
 
 
 class FilterLimits(Section):
@@ -103,7 +145,13 @@ class FilterLimits(Section):
 
 # Filters that keep no identity of their targets.
 UNLABELLED = ("phd", "cphd", "cb_member")
+# How filters can associate; others rank.
 # Filters of which `max_labels` bounds how many targets there can be.
+ASSIGNMENTS = {
+    "delta_glmb": ("ranked", "gibbs"),
+    "m_delta_glmb": ("ranked", "gibbs"),
+    "lmb": ("ranked", "belief_propagation", "custom"),
+}
 LABELS_CAPPED = ("lmb", "factored_glmb", "cb_member")
 
 
@@ -133,13 +181,22 @@ class Filter(Section):
         description="Of a predicted Gaussian, the probability of detection at its centre, as in the paper, or its mean "
         "over the Gaussian: for sensors whose view ends [-].",
     )
-    assignment: Assignment = Field(default=RankedAssignment(), description="How associations are truncated [-].")
+    assignment: Assignment = Field(default=RankedAssignment(), description="How measurements are associated [-].")
     limits: FilterLimits = Field(default=FilterLimits(), description="What is thrown away [-].")
 
     @check
     def _assignment_fits(self) -> Iterator[Finding]:
-        if self.kind in ("lmb", "factored_glmb", *UNLABELLED) and self.assignment.kind == "gibbs":
-            yield ("assignment", "kind"), f"ranked, as the filter is {self.kind}", '"gibbs"'
+        fitting = ASSIGNMENTS.get(self.kind, ("ranked",))
+        if self.assignment.kind not in fitting:
+            yield (
+                ("assignment", "kind"),
+                f"{' or '.join(fitting)}, as the filter is {self.kind}",
+                describe(self.assignment.kind),
+            )
+
+    def _assignment(self, folder: Path) -> Any:
+        """Of a kind that the filter takes."""
+        return self.assignment.build(folder)
 
     def build(self, targets: TargetModel, sensor: SensorModel, folder: Path) -> LocalFilter:
         """The filter of one sensor."""
@@ -152,10 +209,10 @@ class Filter(Section):
             PhdFilter,
         )
 
-        limits = self.limits.build()
+        limits, assignment = self.limits.build(), self._assignment(folder)
         match self.kind:
             case "lmb":
-                return LmbFilter(targets, sensor, limits)
+                return LmbFilter(targets, sensor, limits, assignment)
             case "factored_glmb":
                 return FactoredGlmbFilter(targets, sensor, limits, self.max_split_error, self.max_factor_labels)
             case "phd":
@@ -164,17 +221,11 @@ class Filter(Section):
                 return CphdFilter(targets, sensor, limits)
             case "cb_member":
                 return CbMemberFilter(targets, sensor, limits)
-        gibbs = self.assignment if isinstance(self.assignment, GibbsAssignment) else GibbsAssignment()
-        return DeltaGlmbFilter(
-            targets,
-            sensor,
-            limits,
-            assignment=self.assignment.kind,
-            num_gibbs_samples=gibbs.num_samples,
-            marginalised=self.kind == "m_delta_glmb",
-        )
+        return DeltaGlmbFilter(targets, sensor, limits, assignment, self.kind == "m_delta_glmb")
 
-    def build_central(self, targets: TargetModel, sensors: tuple[SensorModel, ...], *, in_turn: bool) -> CentralFilter:
+    def build_central(
+        self, targets: TargetModel, sensors: tuple[SensorModel, ...], folder: Path, *, in_turn: bool
+    ) -> CentralFilter:
         """The filter of all sensors' scans; in_turn: whether they are taken one after the other, else jointly."""
         from vedette.filters import (
             MultiSensorGlmbFilter,
@@ -187,7 +238,9 @@ class Filter(Section):
         if self.kind == "factored_glmb":
             return SequentialFactoredFilter(targets, sensors, limits, self.max_split_error, self.max_factor_labels)
         if self.kind == "lmb":
-            return (SequentialLmbFilter if in_turn else MultiSensorLmbFilter)(targets, sensors, limits)
+            if in_turn:
+                return SequentialLmbFilter(targets, sensors, limits, self._assignment(folder))
+            return MultiSensorLmbFilter(targets, sensors, limits)
         return MultiSensorGlmbFilter(targets, sensors, limits, marginalised=self.kind == "m_delta_glmb")
 
 
