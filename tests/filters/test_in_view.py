@@ -10,7 +10,7 @@ import pytest
 
 from vedette import models
 from vedette.densities import LMB, as_lmb
-from vedette.filters import Limits, SequentialFactoredFilter, SequentialLmbFilter, sequential_factored, sequential_lmb
+from vedette.filters import Limits, SequentialFactoredFilter, SequentialLmbFilter, factored, lmb
 from vedette.kernels.base.types import ScanInput
 from vedette.kernels.steps.in_view import in_view
 from vedette.kernels.steps.multi_sensor_combinations import standing_combinations
@@ -18,8 +18,8 @@ from vedette.kernels.steps.multi_sensor_lmb import update_lmb
 
 # Every label alone: lists of hypotheses are cut anew by each scan, also by one that says nothing of them.
 KINDS = [
-    (SequentialLmbFilter, sequential_lmb),
-    (partial(SequentialFactoredFilter, max_split_error=2.0), sequential_factored),
+    (SequentialLmbFilter, lmb),
+    (partial(SequentialFactoredFilter, max_split_error=2.0), factored),
 ]
 SPACING, NUM = 150.0, 12  # m, sensors in a row, of which each sees up to its neighbours
 REGION = models.Region(-500.0, NUM * SPACING + 500.0, -500.0, 500.0)

@@ -7,16 +7,13 @@ from vedette.filters.assignment import Assignment, BeliefPropagation, Gibbs, Mar
 from vedette.filters.base import Filter, TwoStepFilter, labels_targets, shared_targets
 from vedette.filters.cbmember import CbMemberFilter
 from vedette.filters.cphd import CphdFilter
-from vedette.filters.factored import FactoredGlmbFilter
-from vedette.filters.glmb import DeltaGlmbFilter
+from vedette.filters.factored import FactoredGlmbFilter, SequentialFactoredFilter
+from vedette.filters.glmb import DeltaGlmbFilter, MultiSensorGlmbFilter
 from vedette.filters.info import FilterInfo
 from vedette.filters.limits import Limits
-from vedette.filters.lmb import LmbFilter
-from vedette.filters.multi_sensor_glmb import MultiSensorGlmbFilter
+from vedette.filters.lmb import LmbFilter, SequentialLmbFilter
 from vedette.filters.multi_sensor_lmb import MultiSensorLmbFilter
 from vedette.filters.phd import PhdFilter
-from vedette.filters.sequential_factored import SequentialFactoredFilter
-from vedette.filters.sequential_lmb import SequentialLmbFilter
 
 Belief: TypeAlias = Labelled | Poisson | IidCluster | MultiBernoulli
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, Generic, Protocol, TypeAlias, TypeVar, runtime_checkable
+from typing import Any, ClassVar, Generic, NamedTuple, Protocol, TypeAlias, TypeVar, runtime_checkable
 
 import numpy as np
 
@@ -20,9 +20,23 @@ from vedette.kernels.base.types import Floats, Motion, ScanInput, Sensor
 from vedette.models import SensorModel, TargetModel, kernel_motion
 from vedette.models.arguments import generator, pose_vector, positive
 
-StepArguments: TypeAlias = tuple[ScanInput, Motion, Sensor, Truncation]
-UpdateArguments: TypeAlias = tuple[ScanInput, Sensor, Truncation]
 BeliefT = TypeVar("BeliefT", bound=Labelled)
+
+
+StepInputs: TypeAlias = tuple[ScanInput, Motion | None, Sensor, Truncation]
+
+
+class SensorStep(NamedTuple):
+    """One sensor's scan, as it meets a belief.
+
+    inputs: as kernels take them; the motion is None of a scan of the belief's own time. limits: caps and thresholds.
+    num_scans: of that time, which go into one belief. rng: None where nothing is drawn.
+    """
+
+    inputs: StepInputs
+    limits: Limits
+    num_scans: int = 1
+    rng: np.random.Generator | None = None
 
 
 @runtime_checkable
@@ -122,9 +136,9 @@ class SingleSensorFilter:
             if not isinstance(value, kind):
                 raise InputError(f"{name}: expected a {kind.__name__}; got {type(value).__name__}")
 
-    def _arguments(
+    def _inputs(
         self, scan: Floats, pose: Any, dt: Any, step: Any, prior: Labelled | None = None, births: LMB | None = None
-    ) -> StepArguments:
+    ) -> tuple[ScanInput, Motion, Sensor, Truncation]:
         """Scan, models and truncation as the kernels take them, in their order.
 
         prior: whose labels those of the births must not repeat; None where there are none. births: instead of those of
@@ -136,13 +150,13 @@ class SingleSensorFilter:
         motion = kernel_motion(targets.motion, targets.survival)
         return (ScanInput(birth, scan, pose_vector("pose", pose), period), motion, *self._own())
 
+    def _update_inputs(self, scan: Floats, pose: Any) -> tuple[ScanInput, None, Sensor, Truncation]:
+        """As `_inputs`, of a scan of the prior's own time."""
+        nobody = LMB.empty(self.targets.state_dim).to_kernel()
+        return (ScanInput(nobody, scan, pose_vector("pose", pose), 0.0), None, *self._own())
+
     def _own(self) -> tuple[Sensor, Truncation]:
         return self.sensor.to_kernel(), self.limits.truncation(self.sensor.meas_dim)
-
-    def _update_arguments(self, scan: Floats, pose: Any) -> UpdateArguments:
-        """As `_arguments`, of a scan of the prior's own time."""
-        nobody = LMB.empty(self.targets.state_dim).to_kernel()
-        return (ScanInput(nobody, scan, pose_vector("pose", pose), 0.0), *self._own())
 
     def _check_scan(self, scan: Any, rng: Any) -> tuple[Floats, int]:
         generator(rng)
@@ -162,6 +176,16 @@ class OfKind(ABC, Generic[BeliefT]):
 
     def _prior(self, belief: object) -> BeliefT:
         return check_belief(belief, self.kind, self.targets.state_dim)  # type: ignore[type-var,return-value]
+
+    @abstractmethod
+    def _check(self, posterior: Any, report: Any, place: str) -> float:
+        """The log total weight; `NumericalError`, after `place`, where nothing has positive weight."""
+
+    @abstractmethod
+    def _concluded(
+        self, posterior: Any, reports: Sequence[Any], *, log_likelihood: float, num_duplicates: int
+    ) -> tuple[BeliefT, FilterInfo]:
+        """As they are given back, after updates with one report each."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -205,10 +229,8 @@ class LabelledFilter(SingleSensorFilter, OfKind[BeliefT]):
         """
         measurements, num_duplicates = self._check_scan(scan, rng)
         prior = self._prior(belief)
-        arguments = self._arguments(measurements, pose, dt, step, prior, births)
-        with model_errors():
-            posterior, report = self._stepped(prior.to_kernel(), arguments, rng)
-        return self._concluded(posterior, report, num_duplicates, f"step {step}: ")
+        inputs = self._inputs(measurements, pose, dt, step, prior, births)
+        return self._taken(prior, inputs, rng, num_duplicates, f"step {step}: ")
 
     def predict(
         self, belief: Labelled, dt: float, step: int, *, births: LMB | None = None
@@ -218,31 +240,32 @@ class LabelledFilter(SingleSensorFilter, OfKind[BeliefT]):
         What is cut here is cut as it weighs before the scan is seen, which in `step` is not so.
         """
         prior, blind = self._prior(belief), self._blind()
-        arguments = blind._arguments(NO_SCAN, NO_POSE, dt, step, prior, births)
-        with model_errors():
-            posterior, report = blind._stepped(prior.to_kernel(), arguments, None)
-        return blind._concluded(posterior, report, 0, f"step {step}: ")
+        inputs = blind._inputs(NO_SCAN, NO_POSE, dt, step, prior, births)
+        return blind._taken(prior, inputs, None, 0, f"step {step}: ")
 
     def update(self, belief: Labelled, scan: Any, pose: Any, *, rng: np.random.Generator) -> tuple[BeliefT, FilterInfo]:
         """The belief after a scan of its own time; nobody moves, dies or is born. Arguments and errors as of `step`."""
         measurements, num_duplicates = self._check_scan(scan, rng)
-        prior, arguments = self._prior(belief), self._update_arguments(measurements, pose)
+        prior, inputs = self._prior(belief), self._update_inputs(measurements, pose)
+        return self._taken(prior, inputs, rng, num_duplicates, "")
+
+    def _taken(
+        self,
+        prior: BeliefT,
+        inputs: StepInputs,
+        rng: np.random.Generator | None,
+        num_duplicates: int,
+        place: str,
+    ) -> tuple[BeliefT, FilterInfo]:
         with model_errors():
-            posterior, report = self._updated(prior.to_kernel(), arguments)
-        return self._concluded(posterior, report, num_duplicates, "")
+            posterior, report = self._stepped(prior.to_kernel(), SensorStep(inputs, self.limits, rng=rng))
+        log_likelihood = self._check(posterior, report, place) + report.log_clutter - self.sensor.clutter.rate
+        return self._concluded(posterior, [report], log_likelihood=log_likelihood, num_duplicates=num_duplicates)
+
+    @abstractmethod
+    def _stepped(self, prior: Any, step: SensorStep) -> tuple[Any, Any]:
+        """Posterior and report of kernels."""
 
     @abstractmethod
     def _blind(self) -> LabelledFilter[BeliefT]:
         """The filter whose step is the prediction; its sensor sees nothing."""
-
-    @abstractmethod
-    def _stepped(self, prior: Any, arguments: StepArguments, rng: np.random.Generator | None) -> tuple[Any, Any]:
-        """Posterior and report of kernels. rng: None of a prediction."""
-
-    @abstractmethod
-    def _updated(self, prior: Any, arguments: UpdateArguments) -> tuple[Any, Any]:
-        """Likewise, of the prior's own time."""
-
-    @abstractmethod
-    def _concluded(self, posterior: Any, report: Any, num_duplicates: int, place: str) -> tuple[BeliefT, FilterInfo]:
-        """As they are given back; `NumericalError`, after `place`, where nothing has positive weight."""

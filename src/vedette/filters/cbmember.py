@@ -40,11 +40,11 @@ class CbMemberFilter(SingleSensorFilter):
         """
         measurements, num_duplicates = self._check_scan(scan, rng)
         prior = check_belief(belief, MultiBernoulli, self.targets.state_dim)
-        arguments = self._arguments(measurements, pose, dt, step)
+        inputs = self._inputs(measurements, pose, dt, step)
         limits = self.limits
         with model_errors():
             posterior, report = step_cb_member(
-                prior.to_kernel(), *arguments, limits.reduction(), limits.max_existence_logit
+                prior.to_kernel(), *inputs, limits.reduction(), limits.max_existence_logit
             )
         info = FilterInfo(
             log_likelihood=math.nan,

@@ -41,11 +41,9 @@ class CphdFilter(SingleSensorFilter):
         measurements, num_duplicates = self._check_scan(scan, rng)
         prior = check_belief(belief, IidCluster, self.targets.state_dim)
         log_cardinality, mixture = prior.to_kernel()
-        arguments = self._arguments(measurements, pose, dt, step)
+        inputs = self._inputs(measurements, pose, dt, step)
         with model_errors():
-            cardinality, posterior, report = step_cphd(
-                log_cardinality, mixture, *arguments, self.limits.intensity_caps()
-            )
+            cardinality, posterior, report = step_cphd(log_cardinality, mixture, *inputs, self.limits.intensity_caps())
         if report.log_total == -math.inf:
             raise NumericalError(
                 f"step {step}: no number of targets can have given this scan; do the models forbid it?"

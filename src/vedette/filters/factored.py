@@ -3,20 +3,25 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
 
 from vedette.densities import FactoredGLMB
+from vedette.densities.checks import offsets_of
+from vedette.densities.label_sets import take_factors
 from vedette.errors import InputError, NumericalError
-from vedette.filters.base import LabelledFilter, StepArguments, UpdateArguments
+from vedette.filters.base import LabelledFilter, OfKind, SensorStep
 from vedette.filters.blind import blind_sensor
 from vedette.filters.info import FilterInfo
+from vedette.filters.limits import Limits
+from vedette.filters.multi_sensor import InTurn, MultiSensorFilter
 from vedette.filters.posteriors import factored_posterior
-from vedette.kernels.base.types import FactoredGlmb
-from vedette.kernels.steps.factored import FactoredReport, Factoring, step_factored, update_factored
-from vedette.kernels.steps.lmb import Reduction
+from vedette.kernels.base.types import Bools, FactoredGlmb
+from vedette.kernels.steps.factored import FactoredReport, Factoring, step_factored
+from vedette.kernels.steps.in_view import in_view
 from vedette.models.arguments import dimension, non_negative
 
 # Two claims to a measurement make a link where both hold with a probability above this times the error of a split, or
@@ -27,8 +32,36 @@ _LINK_PER_ERROR, _WEAKEST_LINK = 2.0, 0.02
 _FACTORS_TOGETHER = 4
 
 
+class _OfFactors(OfKind[FactoredGLMB]):
+    """What both have in common."""
+
+    __slots__ = ()
+    kind: ClassVar[type[FactoredGLMB]] = FactoredGLMB
+    limits: Limits
+    max_split_error: float
+    max_factor_labels: int
+
+    def _stepped(self, prior: FactoredGlmb, step: SensorStep) -> tuple[FactoredGlmb, FactoredReport]:
+        factoring = _factoring(self.max_split_error, self.max_factor_labels, step.num_scans)
+        return step_factored(prior, *step.inputs, step.limits.reduction(), factoring)
+
+    def _check(self, posterior: FactoredGlmb, report: FactoredReport, place: str) -> float:
+        if report.log_total > -math.inf:
+            return report.log_total
+        if report.cut:
+            raise NumericalError(f"{place}no hypothesis was found within Limits.max_search_nodes; raise it")
+        raise NumericalError(f"{place}no hypothesis has positive weight; do the models forbid this scan?")
+
+    def _concluded(
+        self, posterior: FactoredGlmb, reports: Sequence[FactoredReport], *, log_likelihood: float, num_duplicates: int
+    ) -> tuple[FactoredGLMB, FilterInfo]:
+        return factored_posterior(
+            posterior, reports, self.limits, log_likelihood=log_likelihood, num_duplicates=num_duplicates
+        )
+
+
 @dataclass(frozen=True, slots=True, eq=False)
-class FactoredGlmbFilter(LabelledFilter[FactoredGLMB]):
+class FactoredGlmbFilter(_OfFactors, LabelledFilter[FactoredGLMB]):
     """delta-GLMB filter of one sensor whose density is a product of independent factors.
 
     At a scan, factors that lay claim to the same measurements are multiplied out and updated together, exactly as a
@@ -62,55 +95,59 @@ class FactoredGlmbFilter(LabelledFilter[FactoredGLMB]):
     max_split_error: float = 0.01
     max_factor_labels: int = 20
     scans_together: int = 1
-    kind: ClassVar[type[FactoredGLMB]] = FactoredGLMB
 
     def __post_init__(self) -> None:
         LabelledFilter.__post_init__(self)  # slots replace the class that super() looks for
-        check_factoring(self.max_split_error, self.max_factor_labels)
+        _check_factoring(self.max_split_error, self.max_factor_labels)
         dimension("scans_together", self.scans_together)
 
     def _blind(self) -> FactoredGlmbFilter:
         return replace(self, sensor=blind_sensor(), limits=self.limits.keeping_labels())
 
-    def _stepped(
-        self, prior: FactoredGlmb, arguments: StepArguments, rng: np.random.Generator | None
-    ) -> tuple[FactoredGlmb, FactoredReport]:
-        return step_factored(prior, *arguments, *self._reduction())
-
-    def _updated(self, prior: FactoredGlmb, arguments: UpdateArguments) -> tuple[FactoredGlmb, FactoredReport]:
-        return update_factored(prior, *arguments, *self._reduction())
-
-    def _reduction(self) -> tuple[Reduction, Factoring]:
-        return self.limits.reduction(), factoring_of(self.max_split_error, self.max_factor_labels, self.scans_together)
-
-    def _concluded(
-        self, posterior: FactoredGlmb, report: FactoredReport, num_duplicates: int, place: str
-    ) -> tuple[FactoredGLMB, FilterInfo]:
-        check_found(report, place)
-        log_likelihood = report.log_total + report.log_clutter - self.sensor.clutter.rate
-        return factored_posterior(
-            posterior, [report], self.limits, log_likelihood=log_likelihood, num_duplicates=num_duplicates
-        )
+    def _stepped(self, prior: FactoredGlmb, step: SensorStep) -> tuple[FactoredGlmb, FactoredReport]:
+        return _OfFactors._stepped(self, prior, step._replace(num_scans=self.scans_together))
 
 
-def check_found(report: FactoredReport, place: str) -> None:
-    """Raise `NumericalError` where no joint choice was found. place: of the error."""
-    if report.log_total > -math.inf:
-        return
-    if report.cut:
-        raise NumericalError(f"{place}no hypothesis was found within Limits.max_search_nodes; raise it")
-    raise NumericalError(f"{place}no hypothesis has positive weight; do the models forbid this scan?")
+@dataclass(frozen=True, slots=True, eq=False)
+class SequentialFactoredFilter(_OfFactors, InTurn[FactoredGLMB]):
+    """Factored GLMB filter of several sensors that takes their scans in turn.
+
+    As `SequentialLmbFilter`, with the density of `FactoredGlmbFilter`: which of contending labels is which stays open
+    from one sensor to the next. Of one sensor it is the `FactoredGlmbFilter`.
+
+    Attributes and errors: as `MultiSensorGlmbFilter`, and `max_split_error` and `max_factor_labels` as of
+    `FactoredGlmbFilter`.
+    """
+
+    max_split_error: float = 0.01
+    max_factor_labels: int = 20
+
+    def __post_init__(self) -> None:
+        MultiSensorFilter.__post_init__(self)  # slots replace the class that super() looks for
+        _check_factoring(self.max_split_error, self.max_factor_labels)
+
+    def _updated_in_view(
+        self, prior: FactoredGlmb, settled: Bools, step: SensorStep
+    ) -> tuple[FactoredGlmb, FactoredReport, Bools]:
+        """As `_stepped`, of the factors that the scan may say anything of; the others come first, as they were."""
+        scan, _, sensor, truncation = step.inputs
+        density, marks = FactoredGLMB.from_kernel(prior), in_view(prior.tracks, scan, sensor, truncation)
+        seen = np.diff(offsets_of(marks.astype(np.int64))[prior.track_offsets]) > 0
+        near, far = (take_factors(density, np.flatnonzero(places)) for places in (seen, ~seen))
+        posterior, report = self._stepped(near.to_kernel(), step)
+        both = [far, FactoredGLMB.from_kernel(posterior)]
+        return FactoredGLMB.product(both, density.state_dim).to_kernel(), report, settled
 
 
-def check_factoring(max_split_error: Any, max_factor_labels: Any) -> None:
+def _check_factoring(max_split_error: Any, max_factor_labels: Any) -> None:
     """`InputError` for a field out of its range."""
     if non_negative("max_split_error", max_split_error) > 2.0:
         raise InputError(f"max_split_error: expected at most 2; got {max_split_error!r}")
     dimension("max_factor_labels", max_factor_labels)
 
 
-def factoring_of(max_split_error: float, max_factor_labels: int, scans_together: int) -> Factoring:
+def _factoring(max_split_error: float, max_factor_labels: int, num_scans: int) -> Factoring:
     """The fields of a filter as kernels take them."""
     error, most = float(max_split_error), int(max_factor_labels)
-    link = min(_LINK_PER_ERROR * error, _WEAKEST_LINK) / scans_together**2
+    link = min(_LINK_PER_ERROR * error, _WEAKEST_LINK) / num_scans**2
     return Factoring(error, link, most, _FACTORS_TOGETHER * most)

@@ -1,26 +1,56 @@
-"""The delta-GLMB ("Vo-Vo") filter: joint prediction and update, exactly ranked or Gibbs sampled."""
+"""The delta-GLMB ("Vo-Vo") filter, of one sensor and of several whose scans it takes in turn."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import ClassVar
-
-import numpy as np
 
 from vedette.densities import GLMB
 from vedette.errors import NumericalError
 from vedette.filters.assignment import Gibbs, OfChoices, Ranked, check_assignment
-from vedette.filters.base import LabelledFilter, StepArguments, UpdateArguments
+from vedette.filters.base import LabelledFilter, OfKind, SensorStep
 from vedette.filters.blind import blind_sensor
 from vedette.filters.info import FilterInfo
+from vedette.filters.limits import Limits
+from vedette.filters.multi_sensor import InTurn
 from vedette.filters.posteriors import glmb_posterior
 from vedette.kernels.base.types import Glmb
-from vedette.kernels.steps.glmb import StepReport, step_gibbs, step_ranked, update_ranked
+from vedette.kernels.steps.glmb import StepReport, step_gibbs, step_ranked
 from vedette.models.arguments import flag
 
 
+class _OfGlmb(OfKind[GLMB]):
+    """What both have in common."""
+
+    __slots__ = ()
+    kind: ClassVar[type[GLMB]] = GLMB
+    limits: Limits
+    marginalised: bool
+
+    def _stepped(self, prior: Glmb, step: SensorStep) -> tuple[Glmb, StepReport]:
+        return step_ranked(prior, *step.inputs)
+
+    def _check(self, posterior: Glmb, report: StepReport, place: str) -> float:
+        if len(posterior.hyp_log_weights) == 0:
+            raise NumericalError(f"{place}no hypothesis has positive weight; do the models forbid this scan?")
+        return report.log_total
+
+    def _concluded(
+        self, posterior: Glmb, reports: Sequence[StepReport], *, log_likelihood: float, num_duplicates: int
+    ) -> tuple[GLMB, FilterInfo]:
+        return glmb_posterior(
+            posterior,
+            reports,
+            self.limits,
+            log_likelihood=log_likelihood,
+            num_duplicates=num_duplicates,
+            marginalised=self.marginalised,
+        )
+
+
 @dataclass(frozen=True, slots=True, eq=False)
-class DeltaGlmbFilter(LabelledFilter[GLMB]):
+class DeltaGlmbFilter(_OfGlmb, LabelledFilter[GLMB]):
     """delta-GLMB filter of one sensor (Vo, Vo, Hoang 2017; paper, Algorithm 1, local prediction and update).
 
     Predictions and updates apart are ranked, whatever `assignment`; a prediction is cut by `limits` as after a scan.
@@ -39,7 +69,6 @@ class DeltaGlmbFilter(LabelledFilter[GLMB]):
 
     assignment: OfChoices = field(default_factory=Ranked)
     marginalised: bool = False
-    kind: ClassVar[type[GLMB]] = GLMB
 
     def __post_init__(self) -> None:
         LabelledFilter.__post_init__(self)  # slots replace the class that super() looks for
@@ -49,28 +78,33 @@ class DeltaGlmbFilter(LabelledFilter[GLMB]):
     def _blind(self) -> DeltaGlmbFilter:
         return replace(self, sensor=blind_sensor(), assignment=Ranked())
 
-    def _stepped(
-        self, prior: Glmb, arguments: StepArguments, rng: np.random.Generator | None
-    ) -> tuple[Glmb, StepReport]:
-        if isinstance(self.assignment, Gibbs):
-            assert rng is not None  # predictions are ranked
-            return step_gibbs(prior, *arguments, int(self.assignment.num_samples), rng)
-        return step_ranked(prior, *arguments)
+    def _stepped(self, prior: Glmb, step: SensorStep) -> tuple[Glmb, StepReport]:
+        scan, motion, sensor, truncation = step.inputs
+        if isinstance(self.assignment, Gibbs) and motion is not None and step.rng is not None:
+            return step_gibbs(prior, scan, motion, sensor, truncation, int(self.assignment.num_samples), step.rng)
+        return step_ranked(prior, *step.inputs)
 
-    def _updated(self, prior: Glmb, arguments: UpdateArguments) -> tuple[Glmb, StepReport]:
-        return update_ranked(prior, *arguments)
 
-    def _concluded(
-        self, posterior: Glmb, report: StepReport, num_duplicates: int, place: str
-    ) -> tuple[GLMB, FilterInfo]:
-        if len(posterior.hyp_log_weights) == 0:
-            raise NumericalError(f"{place}no hypothesis has positive weight; do the models forbid this scan?")
-        return glmb_posterior(
-            posterior,
-            [report],
-            self.limits,
-            log_likelihood=report.log_total + report.log_clutter - self.sensor.clutter.rate,
-            num_duplicates=num_duplicates,
-            marginalised=self.marginalised,
-            cap_met=len(posterior.hyp_log_weights) >= self.limits.max_hypotheses,
-        )
+@dataclass(frozen=True, slots=True, eq=False)
+class MultiSensorGlmbFilter(_OfGlmb, InTurn[GLMB]):
+    """delta-GLMB filter of several sensors: one prediction, then an update by each sensor's scan in turn.
+
+    Without caps the posterior is the multi-sensor delta-GLMB (Vo, Vo and Beard 2019), whatever the order of the
+    sensors, where models are linear and neither noise nor detection depends on the state; else a later sensor's model
+    is linearised, and its noise and detection are taken, at what the earlier ones have left.
+
+    With caps, hypotheses are cut after every sensor as they weigh then. One that the first sensors make unlikely is
+    gone even where a later one would have raised it, so that the order of the sensors matters a little.
+    `discarded_weight_bound` counts what is left out at each sensor by its weight there.
+
+    Attributes:
+        targets: how targets move, live on and appear.
+        sensors: what each sensor sees of them; they may measure different things.
+        limits: caps and thresholds.
+        marginalised: collapse the posterior to one hypothesis a label set after each step, as `DeltaGlmbFilter`.
+
+    Raises:
+        InputError: a part of another kind, or no sensor.
+    """
+
+    marginalised: bool = False

@@ -1,8 +1,9 @@
-"""The labelled multi-Bernoulli filter: one Bernoulli track a label, with exact association marginals by clusters."""
+"""The labelled multi-Bernoulli filter, of one sensor and of several whose scans it takes in turn."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import ClassVar
 
@@ -11,20 +12,42 @@ import numpy as np
 from vedette.densities import LMB
 from vedette.errors import NumericalError
 from vedette.filters.assignment import OfMarginals, Ranked, check_assignment, kernel_association
-from vedette.filters.base import Filter, LabelledFilter, StepArguments, UpdateArguments
+from vedette.filters.base import Filter, LabelledFilter, OfKind, SensorStep
 from vedette.filters.blind import blind_sensor
 from vedette.filters.info import FilterInfo
 from vedette.filters.limits import Limits
+from vedette.filters.multi_sensor import InTurn, MultiSensorFilter
 from vedette.filters.posteriors import lmb_posterior
 from vedette.kernels.association.marginals import Association
-from vedette.kernels.base.types import Lmb
-from vedette.kernels.steps.lmb import LmbReport, step_lmb, update_lmb_by
-from vedette.kernels.steps.multi_sensor_combinations import standing_combinations
+from vedette.kernels.base.types import Bools, Lmb
+from vedette.kernels.steps.in_view import in_view, marked, put_back
+from vedette.kernels.steps.lmb import LmbReport, step_lmb
+from vedette.kernels.steps.multi_sensor_combinations import predict_combinations, standing_combinations
 from vedette.kernels.steps.multi_sensor_lmb import update_lmb
 
 
+class OfLmb(OfKind[LMB]):
+    """What filters of an LMB have in common."""
+
+    __slots__ = ()
+    kind: ClassVar[type[LMB]] = LMB
+    limits: Limits
+
+    def _check(self, posterior: Lmb, report: LmbReport, place: str) -> float:
+        if not math.isfinite(report.sums.log_total):
+            raise NumericalError(f"{place}no association has positive weight; do the models forbid this scan?")
+        return report.sums.log_total
+
+    def _concluded(
+        self, posterior: Lmb, reports: Sequence[LmbReport], *, log_likelihood: float, num_duplicates: int
+    ) -> tuple[LMB, FilterInfo]:
+        return lmb_posterior(
+            posterior, reports, self.limits, log_likelihood=log_likelihood, num_duplicates=num_duplicates
+        )
+
+
 @dataclass(frozen=True, slots=True, eq=False)
-class LmbFilter(LabelledFilter[LMB]):
+class LmbFilter(OfLmb, LabelledFilter[LMB]):
     """LMB filter of one sensor (Reuter, Vo, Vo, Dietmayer 2014), cheaper than the delta-GLMB filter.
 
     It draws nothing, and its predictions drop nothing.
@@ -40,7 +63,6 @@ class LmbFilter(LabelledFilter[LMB]):
     """
 
     assignment: OfMarginals = field(default_factory=Ranked)
-    kind: ClassVar[type[LMB]] = LMB
 
     def __post_init__(self) -> None:
         LabelledFilter.__post_init__(self)  # slots replace the class that super() looks for
@@ -49,25 +71,54 @@ class LmbFilter(LabelledFilter[LMB]):
     def _blind(self) -> LmbFilter:
         return LmbFilter(self.targets, blind_sensor(), Limits.none())
 
-    def _stepped(self, prior: Lmb, arguments: StepArguments, rng: np.random.Generator | None) -> tuple[Lmb, LmbReport]:
-        return step_lmb(prior, *arguments, self.limits.reduction(), kernel_association(self.assignment))
+    def _stepped(self, prior: Lmb, step: SensorStep) -> tuple[Lmb, LmbReport]:
+        association, (_, motion, _, _) = kernel_association(self.assignment), step.inputs
+        if association is None and motion is None:
+            return _by_combinations(prior, step)
+        return step_lmb(prior, *step.inputs, step.limits.reduction(), association)
 
-    def _updated(self, prior: Lmb, arguments: UpdateArguments) -> tuple[Lmb, LmbReport]:
-        association, reduction = kernel_association(self.assignment), self.limits.reduction()
-        if association is not None:
-            return update_lmb_by(prior, *arguments, reduction, association)
-        return update_lmb(standing_combinations(prior), *arguments, reduction)
 
-    def _concluded(self, posterior: Lmb, report: LmbReport, num_duplicates: int, place: str) -> tuple[LMB, FilterInfo]:
-        if not math.isfinite(report.sums.log_total):
-            raise NumericalError(f"{place}no association has positive weight; do the models forbid this scan?")
-        return lmb_posterior(
-            posterior,
-            [report],
-            self.limits,
-            log_likelihood=report.sums.log_total + report.log_clutter - self.sensor.clutter.rate,
-            num_duplicates=num_duplicates,
-        )
+@dataclass(frozen=True, slots=True, eq=False)
+class SequentialLmbFilter(OfLmb, InTurn[LMB]):
+    """LMB filter of several sensors that takes their scans in turn ("iterated corrector").
+
+    After each scan the posterior is projected to an LMB again, so that the order of the sensors matters a little. In
+    return the cost grows in proportion to the number of sensors, whatever they see, where that of
+    `MultiSensorLmbFilter` grows exponentially; a scan costs what it may say anything of, not all labels. Of one sensor
+    it is the `LmbFilter`. Labels are dropped, by `Limits.min_existence`, `max_labels` and `max_position_std`, after the
+    last scan alone: one sensor's missed detection does not lose a target that the next one sees. What is cut is counted
+    as by `MultiSensorLmbFilter`.
+
+    Attributes and errors: as `MultiSensorGlmbFilter`, and `assignment` as of `LmbFilter`.
+    """
+
+    assignment: OfMarginals = field(default_factory=Ranked)
+
+    def __post_init__(self) -> None:
+        MultiSensorFilter.__post_init__(self)  # slots replace the class that super() looks for
+        check_assignment(self.assignment, OfMarginals)
+
+    def _stepped(self, prior: Lmb, step: SensorStep) -> tuple[Lmb, LmbReport]:
+        association = kernel_association(self.assignment)
+        if association is None:
+            return _by_combinations(prior, step)
+        return step_lmb(prior, *step.inputs, step.limits.reduction(), association)
+
+    def _updated_in_view(self, prior: Lmb, settled: Bools, step: SensorStep) -> tuple[Lmb, LmbReport, Bools]:
+        """As `_stepped`, of the labels that the scan may say anything of; settled: as of `put_back`, empty of none."""
+        scan, _, sensor, truncation = step.inputs
+        marks = in_view(prior.tracks, scan, sensor, truncation)
+        updated, report = self._stepped(marked(prior, marks), step)
+        before = settled if len(settled) else np.zeros(len(marks), np.bool_)
+        posterior, settled = put_back(prior, marks, updated, step.limits.track_caps(), before)
+        return posterior, report, settled
+
+
+def _by_combinations(prior: Lmb, step: SensorStep) -> tuple[Lmb, LmbReport]:
+    """Exact sums as of several sensors, which cut what is surely improbable (docs/decisions/0014)."""
+    scan, motion, sensor, truncation = step.inputs
+    before = standing_combinations(prior) if motion is None else predict_combinations(prior, scan, 1, motion)
+    return update_lmb(before, scan, sensor, truncation, step.limits.reduction())
 
 
 def association_of(tracker: Filter) -> Association | None:

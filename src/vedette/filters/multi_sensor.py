@@ -11,17 +11,17 @@ import numpy as np
 
 from vedette.densities import LMB, Labelled
 from vedette.errors import InputError
-from vedette.filters.base import BeliefT, OfKind
+from vedette.filters.base import BeliefT, OfKind, SensorStep
 from vedette.filters.blind import NO_POSE, NO_SCAN, blind_sensor
 from vedette.filters.info import FilterInfo
-from vedette.filters.inputs import births_for, check_scan
+from vedette.filters.inputs import births_for, check_scan, model_errors
 from vedette.filters.limits import Limits
-from vedette.kernels.base.types import Floats, ScanInput
-from vedette.models import SensorModel, TargetModel
+from vedette.kernels.base.types import Bools, Floats, ScanInput
+from vedette.models import SensorModel, TargetModel, kernel_motion
 from vedette.models.arguments import generator, one_a_sensor, pose_vector, positive, reject
 
 
-class Looks(NamedTuple):
+class SensorScans(NamedTuple):
     """The scans of one time, by the sensors that scanned."""
 
     names: list[str]
@@ -108,17 +108,19 @@ class MultiSensorFilter(OfKind[BeliefT]):
             ModelError: a model function raised or gave a value that is none of its kind.
             NumericalError: no association has positive weight.
         """
-        looks = self._looks(scans, poses, rng)
+        taken = self._checked_scans(scans, poses, rng)
         prior = self._prior(belief)
         period = positive("dt", dt)
         born = births_for(self.targets.birth, period, step, prior, births)
-        return self._updated(prior, born, looks, period, f"step {step}")
+        return self._updated(prior, born, taken, period, f"step {step}")
 
     @abstractmethod
-    def _updated(self, prior: BeliefT, born: LMB, looks: Looks, dt: float, place: str) -> tuple[BeliefT, FilterInfo]:
-        """The prediction of the prior, with those who may be born, after all looks. place: of errors."""
+    def _updated(
+        self, prior: BeliefT, born: LMB, taken: SensorScans, dt: float, place: str
+    ) -> tuple[BeliefT, FilterInfo]:
+        """The prediction of the prior, with those who may be born, after all scans. place: of errors."""
 
-    def _looks(self, scans: Any, poses: Any, rng: Any) -> Looks:
+    def _checked_scans(self, scans: Any, poses: Any, rng: Any) -> SensorScans:
         """What each sensor that scanned saw and from where.
 
         Where none scanned, a blind look, with which an update is the prediction.
@@ -126,7 +128,7 @@ class MultiSensorFilter(OfKind[BeliefT]):
         generator(rng)
         one_a_sensor("scans", scans, len(self.sensors))
         one_a_sensor("poses", poses, len(self.sensors))
-        looks = Looks([], [], [], [], 0)
+        taken = SensorScans([], [], [], [], 0)
         for s, sensor in enumerate(self.sensors):
             if scans[s] is None:
                 continue
@@ -134,9 +136,46 @@ class MultiSensorFilter(OfKind[BeliefT]):
                 scan, num = check_scan(scans[s], sensor)
             except InputError as error:
                 raise InputError(f"scans[{s}]: {error}") from None
-            looks.names.append(f"sensor {s}")
-            looks.sensors.append(sensor)
-            looks.scans.append(scan)
-            looks.poses.append(pose_vector(f"poses[{s}]", poses[s]))
-            looks = looks._replace(num_duplicates=looks.num_duplicates + num)
-        return looks if looks.names else Looks(["no sensor"], [blind_sensor()], [NO_SCAN], [NO_POSE], 0)
+            taken.names.append(f"sensor {s}")
+            taken.sensors.append(sensor)
+            taken.scans.append(scan)
+            taken.poses.append(pose_vector(f"poses[{s}]", poses[s]))
+            taken = taken._replace(num_duplicates=taken.num_duplicates + num)
+        return taken if taken.names else SensorScans(["no sensor"], [blind_sensor()], [NO_SCAN], [NO_POSE], 0)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class InTurn(MultiSensorFilter[BeliefT]):
+    """One prediction, then an update by each sensor's scan in turn.
+
+    Attributes and errors: as `MultiSensorFilter`.
+    """
+
+    def _updated(
+        self, prior: BeliefT, born: LMB, taken: SensorScans, dt: float, place: str
+    ) -> tuple[BeliefT, FilterInfo]:
+        motion, posterior = kernel_motion(self.targets.motion, self.targets.survival), prior.to_kernel()
+        keeping, settled = self.limits.keeping_labels(), np.zeros(0, np.bool_)
+        reports, log_total, last = list[Any](), 0.0, len(taken.names) - 1
+        given = zip(taken.names, taken.sensors, taken.inputs_in_turn(born, dt), strict=True)
+        for s, (name, sensor, scan) in enumerate(given):
+            limits = self.limits if s == last else keeping
+            own = sensor.to_kernel(), limits.truncation(sensor.meas_dim)
+            step = SensorStep((scan, motion if s == 0 else None, *own), limits, len(taken.names))
+            with model_errors():
+                if s in (0, last):  # by the last one every label is told whether it stays
+                    posterior, report = self._stepped(posterior, step)
+                else:
+                    posterior, report, settled = self._updated_in_view(posterior, settled, step)
+            log_total += self._check(posterior, report, f"{place}, {name}: ")
+            reports.append(report)
+        log_likelihood = taken.log_likelihood(log_total, [report.log_clutter for report in reports])
+        return self._concluded(posterior, reports, log_likelihood=log_likelihood, num_duplicates=taken.num_duplicates)
+
+    @abstractmethod
+    def _stepped(self, prior: Any, step: SensorStep) -> tuple[Any, Any]:
+        """Posterior and report of kernels."""
+
+    def _updated_in_view(self, prior: Any, settled: Bools, step: SensorStep) -> tuple[Any, Any, Bools]:
+        """As `_stepped`; it may leave alone what the scan says nothing of. settled: what it left behind before."""
+        return (*self._stepped(prior, step), settled)

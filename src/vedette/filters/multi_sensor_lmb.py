@@ -2,23 +2,20 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
-from typing import ClassVar
 
 from vedette.densities import LMB
-from vedette.errors import NumericalError
 from vedette.filters.info import FilterInfo
 from vedette.filters.inputs import model_errors
-from vedette.filters.multi_sensor import Looks, MultiSensorFilter
-from vedette.filters.posteriors import lmb_posterior
+from vedette.filters.lmb import OfLmb
+from vedette.filters.multi_sensor import MultiSensorFilter, SensorScans
 from vedette.kernels.steps.multi_sensor_combinations import extend_combinations, predict_combinations
 from vedette.kernels.steps.multi_sensor_lmb import lmb_of_combinations
 from vedette.models import kernel_motion
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class MultiSensorLmbFilter(MultiSensorFilter[LMB]):
+class MultiSensorLmbFilter(OfLmb, MultiSensorFilter[LMB]):
     """LMB filter of several sensors: the existences and densities of the exact posterior given all scans of a time.
 
     Every track is weighed under each combination of a miss or a gated measurement at every sensor, and the combinations
@@ -37,16 +34,14 @@ class MultiSensorLmbFilter(MultiSensorFilter[LMB]):
     Attributes and errors: as `MultiSensorGlmbFilter`.
     """
 
-    kind: ClassVar[type[LMB]] = LMB
-
-    def _updated(self, prior: LMB, born: LMB, looks: Looks, dt: float, place: str) -> tuple[LMB, FilterInfo]:
+    def _updated(self, prior: LMB, born: LMB, taken: SensorScans, dt: float, place: str) -> tuple[LMB, FilterInfo]:
         limits, num_columns, reports = self.limits, 0, []
         motion = kernel_motion(self.targets.motion, self.targets.survival)
         reduction = limits.reduction()
         with model_errors():
-            inputs = looks.inputs(born, dt)
+            inputs = taken.inputs(born, dt)
             combinations = predict_combinations(prior.to_kernel(), inputs[0], len(inputs), motion)
-            for s, (sensor, scan) in enumerate(zip(looks.sensors, inputs, strict=True)):
+            for s, (sensor, scan) in enumerate(zip(taken.sensors, inputs, strict=True)):
                 truncation = limits.truncation(sensor.meas_dim)
                 combinations, report = extend_combinations(
                     combinations, s, num_columns, scan, sensor.to_kernel(), truncation
@@ -54,18 +49,12 @@ class MultiSensorLmbFilter(MultiSensorFilter[LMB]):
                 num_columns += len(scan.measurements)
                 reports.append(report)
             posterior, joint = lmb_of_combinations(combinations, num_columns, truncation, reduction)
-        if not math.isfinite(joint.sums.log_total):
-            raise NumericalError(f"{place}: no association has positive weight; do the models forbid these scans?")
         sums = joint.sums._replace(log_kept=joint.sums.log_kept + sum(report.log_kept for report in reports))
         whole = joint._replace(
             sums=sums,
             num_raised=sum(report.num_raised for report in reports),
             cut=any(report.log_kept < 0.0 for report in reports),
         )
-        return lmb_posterior(
-            posterior,
-            [whole],
-            limits,
-            log_likelihood=looks.log_likelihood(joint.sums.log_total, [report.log_clutter for report in reports]),
-            num_duplicates=looks.num_duplicates,
-        )
+        log_total = self._check(posterior, whole, f"{place}: ")
+        log_likelihood = taken.log_likelihood(log_total, [report.log_clutter for report in reports])
+        return self._concluded(posterior, [whole], log_likelihood=log_likelihood, num_duplicates=taken.num_duplicates)

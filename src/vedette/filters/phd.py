@@ -37,9 +37,9 @@ class PhdFilter(SingleSensorFilter):
         """
         measurements, num_duplicates = self._check_scan(scan, rng)
         prior = check_belief(belief, Poisson, self.targets.state_dim)
-        arguments = self._arguments(measurements, pose, dt, step)
+        inputs = self._inputs(measurements, pose, dt, step)
         with model_errors():
-            posterior, report = step_phd(prior.to_kernel(), *arguments, self.limits.intensity_caps())
+            posterior, report = step_phd(prior.to_kernel(), *inputs, self.limits.intensity_caps())
         info = FilterInfo(
             log_likelihood=report.log_total + report.log_clutter - self.sensor.clutter.rate,
             num_hypotheses=1,

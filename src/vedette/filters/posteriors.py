@@ -47,9 +47,8 @@ def glmb_posterior(
     log_likelihood: float,
     num_duplicates: int,
     marginalised: bool,
-    cap_met: bool,
 ) -> tuple[GLMB, FilterInfo]:
-    """A delta-GLMB after updates, one report each, `marginalised` or not; cap_met: whether any of them met it."""
+    """A delta-GLMB after updates, one report each, `marginalised` or not."""
     if marginalised:
         posterior = marginalise(posterior, limits.track_caps())
     kept, spread = limits.without_spread(GLMB.from_kernel(posterior))
@@ -64,7 +63,7 @@ def glmb_posterior(
         num_duplicates=num_duplicates,
         num_inexact_clusters=0,
         search_cut=any(bool(report.cut) for report in reports),
-        cap_met=cap_met,
+        cap_met=any(bool(report.full) for report in reports),
     )
 
 

@@ -132,9 +132,13 @@ def leave_unseen(rows: Rows) -> None:
 
 
 @kernel
-def predicted_rows(tracks: Tracks, scan: ScanInput, motion: Motion, sensor: Sensor) -> Rows:
-    """As `predict_rows`, into arrays made for it."""
+def rows_of_scan(tracks: Tracks, scan: ScanInput, motion: Motion | None, sensor: Sensor) -> Rows:
+    """As `predict_rows`, into arrays made for it. motion: None where the tracks are of the scan's own time."""
     sites, state_dim, meas_dim = scan.birth.tracks, tracks.means.shape[1], len(sensor.angular)
+    if motion is None:
+        standing = standing_rows(tracks, meas_dim)
+        expect_rows(sensor, scan.pose, standing, make_scratch(state_dim, meas_dim))
+        return standing
     # Every component has its innovation here once, whatever number of hypotheses hold its track.
     num_rows = len(tracks.labels) + len(sites.labels)
     rows = make_rows(num_rows, len(tracks.log_weights) + len(sites.log_weights), state_dim, meas_dim)

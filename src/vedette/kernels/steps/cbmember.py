@@ -12,7 +12,7 @@ import numpy as np
 
 from vedette.kernels.association.assignment import MISSED, Options
 from vedette.kernels.association.options import weighed_options
-from vedette.kernels.association.predicted import Rows, predicted_rows
+from vedette.kernels.association.predicted import Rows, rows_of_scan
 from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.compile import kernel
 from vedette.kernels.base.types import Floats, Ints, Lmb, Motion, ScanInput, Sensor, Tracks
@@ -161,7 +161,7 @@ def step_cb_member(
     max_existence_logit: float,
 ) -> tuple[Lmb, CbMemberReport]:
     """One scan. max_existence_logit: prior existences are taken as at most this."""
-    rows = predicted_rows(prior.tracks, scan, motion, sensor)
+    rows = rows_of_scan(prior.tracks, scan, motion, sensor)
     existence_logit, lost = _bounded(prior.existence_logit, max_existence_logit)
     weigh_by_existence(existence_logit, rows)
     options, _, num_raised = weighed_options(rows, scan, sensor, truncation)

@@ -48,7 +48,7 @@ def is_single(factors: Factors, factor: int) -> bool:
 
 @kernel
 def factors_of(prior: FactoredGlmb, num_births: int) -> Factors:
-    """The factors of a scan, with their rows in the order of `predicted_rows`."""
+    """The factors of a scan, with their rows in the order of `rows_of_scan`."""
     num_prior = len(prior.factor_offsets) - 1
     row_offsets, num_labels = np.zeros(num_prior + num_births + 1, np.int64), np.empty(num_prior + num_births, np.int64)
     for factor in range(num_prior):

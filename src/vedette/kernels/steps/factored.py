@@ -12,15 +12,14 @@ from typing import NamedTuple
 
 from vedette.kernels.association.links import linked_factors
 from vedette.kernels.association.options import weighed_options
-from vedette.kernels.association.predicted import Rows, expect_rows, predicted_rows, standing_rows
+from vedette.kernels.association.predicted import rows_of_scan
 from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.compile import kernel
 from vedette.kernels.base.types import FactoredGlmb, Motion, ScanInput, Sensor
 from vedette.kernels.gaussian.mixtures import require_gaussians
-from vedette.kernels.gaussian.scratch import make_scratch
 from vedette.kernels.labelled.factor_store import make_store, stored
 from vedette.kernels.labelled.labels import group_members
-from vedette.kernels.steps.factor_groups import Factors, factors_of, gathered_group, is_single, weigh_singles
+from vedette.kernels.steps.factor_groups import factors_of, gathered_group, is_single, weigh_singles
 from vedette.kernels.steps.factor_updates import (
     CUT,
     DROPPED,
@@ -56,16 +55,18 @@ class FactoredReport(NamedTuple):
 
 
 @kernel
-def _finish(
-    factors: Factors,
-    rows: Rows,
+def step_factored(
+    prior: FactoredGlmb,
     scan: ScanInput,
+    motion: Motion | None,
     sensor: Sensor,
     truncation: Truncation,
     reduction: Reduction,
     factoring: Factoring,
 ) -> tuple[FactoredGlmb, FactoredReport]:
-    """Weigh, link, update and split, once there are rows."""
+    """One scan: weigh, link, update and split. motion: None of a scan of the prior's own time, which has no births."""
+    rows = rows_of_scan(prior.tracks, scan, motion, sensor)
+    factors = factors_of(prior, len(rows.log_absent) - len(prior.tracks.labels))
     weigh_singles(factors, rows)
     options, log_clutter, num_raised = weighed_options(rows, scan, sensor, truncation)
     sizes = factors.num_labels.copy()
@@ -103,35 +104,4 @@ def _finish(
     )
 
 
-@kernel
-def step_factored(
-    prior: FactoredGlmb,
-    scan: ScanInput,
-    motion: Motion,
-    sensor: Sensor,
-    truncation: Truncation,
-    reduction: Reduction,
-    factoring: Factoring,
-) -> tuple[FactoredGlmb, FactoredReport]:
-    """One scan."""
-    rows = predicted_rows(prior.tracks, scan, motion, sensor)
-    factors = factors_of(prior, len(scan.birth.existence_logit))
-    return _finish(factors, rows, scan, sensor, truncation, reduction, factoring)
-
-
-@kernel
-def update_factored(
-    prior: FactoredGlmb,
-    scan: ScanInput,
-    sensor: Sensor,
-    truncation: Truncation,
-    reduction: Reduction,
-    factoring: Factoring,
-) -> tuple[FactoredGlmb, FactoredReport]:
-    """After a scan of the prior's own time; `scan` has no births and no period."""
-    rows = standing_rows(prior.tracks, len(sensor.angular))
-    expect_rows(sensor, scan.pose, rows, make_scratch(prior.tracks.means.shape[1], len(sensor.angular)))
-    return _finish(factors_of(prior, 0), rows, scan, sensor, truncation, reduction, factoring)
-
-
-__all__ = ["FactoredReport", "Factoring", "step_factored", "update_factored"]
+__all__ = ["FactoredReport", "Factoring", "step_factored"]

@@ -22,7 +22,7 @@ from vedette.kernels.association.children import Children, Parents
 from vedette.kernels.association.coverage import Associations, add_uncovered, associations_of_options, mark_heaviest
 from vedette.kernels.association.gibbs import sample_children
 from vedette.kernels.association.options import weighed_options
-from vedette.kernels.association.predicted import Rows, expect_rows, predicted_rows, standing_rows
+from vedette.kernels.association.predicted import Rows, rows_of_scan
 from vedette.kernels.association.ranked import rank_children
 from vedette.kernels.association.truncation import Truncation, heaviest_first, keep_heaviest, merge_equal
 from vedette.kernels.base.arrays import filled_ints
@@ -30,7 +30,6 @@ from vedette.kernels.base.compile import kernel
 from vedette.kernels.base.types import Floats, Glmb, Ints, Motion, ScanInput, Sensor
 from vedette.kernels.gaussian.linalg import log_sum
 from vedette.kernels.gaussian.mixtures import require_gaussians
-from vedette.kernels.gaussian.scratch import make_scratch
 from vedette.kernels.steps.assembly import assemble
 
 
@@ -42,6 +41,7 @@ class StepReport(NamedTuple):
     log_clutter: float  # sum of the log clutter intensities of the scan
     num_raised: int  # measurements whose clutter intensity was raised to the floor
     cut: bool  # the ranking stopped at its bound on nodes
+    full: bool  # there are as many hypotheses as there may be
 
 
 class Associated(NamedTuple):
@@ -73,7 +73,11 @@ def parents_with_births(prior: Glmb, num_births: int) -> Parents:
 
 
 @kernel
-def _associate(prior: Glmb, rows: Rows, scan: ScanInput, sensor: Sensor, truncation: Truncation) -> Associated:
+def _associate(
+    prior: Glmb, scan: ScanInput, motion: Motion | None, sensor: Sensor, truncation: Truncation
+) -> Associated:
+    """Weigh what may happen to each row: the tracks of the prior, then birth sites."""
+    rows = rows_of_scan(prior.tracks, scan, motion, sensor)
     options, log_clutter, num_raised = weighed_options(rows, scan, sensor, truncation)
     parents = parents_with_births(prior, len(rows.labels) - len(prior.tracks.labels))
     return Associated(rows, options, parents, log_clutter, num_raised)
@@ -135,35 +139,23 @@ def _conclude(
     posterior, log_total = assemble(children, kept, found.parents, found.rows, found.options)
     require_gaussians(posterior.tracks.means, posterior.tracks.covs)
     bound = log_total_bound(log_row_totals(found.options), found.parents)
-    return posterior, StepReport(log_total, bound, found.log_clutter, found.num_raised, cut)
-
-
-@kernel
-def _finish_ranked(
-    prior: Glmb, rows: Rows, scan: ScanInput, sensor: Sensor, truncation: Truncation
-) -> tuple[Glmb, StepReport]:
-    """Weigh, rank, truncate and assemble once there are rows: the tracks of the prior, then birth sites."""
-    found = _associate(prior, rows, scan, sensor, truncation)
-    children, cut = rank_children(found.options, found.parents, truncation.search)
-    # A search that ran dry has left nothing out.
-    is_covered = children.filled[0] < truncation.search.max_hypotheses and not cut
-    return _conclude(found, children, truncation, cut, is_covered)
+    full = len(kept) >= truncation.search.max_hypotheses
+    return posterior, StepReport(log_total, bound, found.log_clutter, found.num_raised, cut, full)
 
 
 @kernel
 def step_ranked(
-    prior: Glmb, scan: ScanInput, motion: Motion, sensor: Sensor, truncation: Truncation
+    prior: Glmb, scan: ScanInput, motion: Motion | None, sensor: Sensor, truncation: Truncation
 ) -> tuple[Glmb, StepReport]:
-    """One scan with the exactly ranked hypotheses."""
-    return _finish_ranked(prior, predicted_rows(prior.tracks, scan, motion, sensor), scan, sensor, truncation)
+    """One scan with the exactly ranked hypotheses.
 
-
-@kernel
-def update_ranked(prior: Glmb, scan: ScanInput, sensor: Sensor, truncation: Truncation) -> tuple[Glmb, StepReport]:
-    """The exactly ranked hypotheses after a scan of the prior's own time; `scan` has no births and no period."""
-    rows = standing_rows(prior.tracks, len(sensor.angular))
-    expect_rows(sensor, scan.pose, rows, make_scratch(prior.tracks.means.shape[1], len(sensor.angular)))
-    return _finish_ranked(prior, rows, scan, sensor, truncation)
+    motion: None of a scan of the prior's own time, which has no births.
+    """
+    found = _associate(prior, scan, motion, sensor, truncation)
+    children, cut = rank_children(found.options, found.parents, truncation.search)
+    # A search that ran dry has left nothing out.
+    is_covered = children.filled[0] < truncation.search.max_hypotheses and not cut
+    return _conclude(found, children, truncation, cut, is_covered)
 
 
 @kernel
@@ -177,7 +169,6 @@ def step_gibbs(
     rng: np.random.Generator,
 ) -> tuple[Glmb, StepReport]:
     """One scan with hypotheses found by Gibbs sampling."""
-    rows = predicted_rows(prior.tracks, scan, motion, sensor)
-    found = _associate(prior, rows, scan, sensor, truncation)
+    found = _associate(prior, scan, motion, sensor, truncation)
     children = sample_children(found.options, found.parents, num_samples, rng)
     return _conclude(found, children, truncation, False, False)

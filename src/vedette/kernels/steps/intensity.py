@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vedette.kernels.association.assignment import Options
-from vedette.kernels.association.predicted import Rows, predicted_rows
+from vedette.kernels.association.predicted import Rows, rows_of_scan
 from vedette.kernels.base.compile import kernel
 from vedette.kernels.base.types import Floats, Mixture, Motion, ScanInput, Sensor, Tracks
 from vedette.kernels.gaussian.mixtures import MixtureCaps, make_components, reduce_mixture, require_gaussians
@@ -38,7 +38,7 @@ def predict_intensity(prior: Mixture, scan: ScanInput, motion: Motion, sensor: S
     offsets = np.zeros(2, np.int64)
     offsets[1] = num
     one_track = Tracks(np.zeros((1, 2), np.int64), offsets, prior.log_weights, prior.means, prior.covs)
-    rows = predicted_rows(one_track, scan, motion, sensor)
+    rows = rows_of_scan(one_track, scan, motion, sensor)
     log_died = rows.log_absent[0]
     all_components = np.zeros(2, np.int64)
     all_components[1] = len(rows.log_weights)

@@ -18,7 +18,7 @@ import numpy as np
 from vedette.kernels.association.assignment import ABSENT, Options
 from vedette.kernels.association.marginals import Association, MarginalSums, option_marginals
 from vedette.kernels.association.options import weighed_options
-from vedette.kernels.association.predicted import Rows, expect_rows, predicted_rows, standing_rows
+from vedette.kernels.association.predicted import Rows, rows_of_scan
 from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Floats, Ints, Lmb, Mixture, Motion, ScanInput, Sensor, Tracks
@@ -31,7 +31,6 @@ from vedette.kernels.gaussian.mixtures import (
     reduce_mixture,
     require_gaussians,
 )
-from vedette.kernels.gaussian.scratch import make_scratch
 from vedette.kernels.steps.assembly import write_updated
 from vedette.kernels.steps.matching import make_mixture, match_rows
 
@@ -192,16 +191,20 @@ def append_reduced(wide: Mixture, width: int, caps: MixtureCaps, out: Mixture, f
 
 
 @kernel
-def _finish(
+def step_lmb(
     prior: Lmb,
-    rows: Rows,
     scan: ScanInput,
+    motion: Motion | None,
     sensor: Sensor,
     truncation: Truncation,
     reduction: Reduction,
     association: Association | None,
 ) -> tuple[Lmb, LmbReport]:
-    """Weigh, associate and reduce once there are rows."""
+    """One scan.
+
+    motion: None of a scan of the prior's own time, which has no births. association: None for the sums over clusters.
+    """
+    rows = rows_of_scan(prior.tracks, scan, motion, sensor)
     weigh_by_existence(prior.existence_logit, rows)
     options, log_clutter, num_raised = weighed_options(rows, scan, sensor, truncation)
     marginals, sums = option_marginals(options, truncation.search, association)
@@ -217,33 +220,3 @@ def _finish(
     for i in range(len(kept)):
         kept_logits[i] = logits[kept[i]]
     return Lmb(tracks, kept_logits), LmbReport(sums, log_clutter, num_raised, dropped, False)
-
-
-@kernel
-def step_lmb(
-    prior: Lmb,
-    scan: ScanInput,
-    motion: Motion,
-    sensor: Sensor,
-    truncation: Truncation,
-    reduction: Reduction,
-    association: Association | None,
-) -> tuple[Lmb, LmbReport]:
-    """One scan. association: in place of the sums over clusters."""
-    rows = predicted_rows(prior.tracks, scan, motion, sensor)
-    return _finish(prior, rows, scan, sensor, truncation, reduction, association)
-
-
-@kernel
-def update_lmb_by(
-    prior: Lmb,
-    scan: ScanInput,
-    sensor: Sensor,
-    truncation: Truncation,
-    reduction: Reduction,
-    association: Association,
-) -> tuple[Lmb, LmbReport]:
-    """After a scan of the prior's own time; `scan` has no births and no period."""
-    rows = standing_rows(prior.tracks, len(sensor.angular))
-    expect_rows(sensor, scan.pose, rows, make_scratch(prior.tracks.means.shape[1], len(sensor.angular)))
-    return _finish(prior, rows, scan, sensor, truncation, reduction, association)
