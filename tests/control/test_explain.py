@@ -298,8 +298,7 @@ def test_what_is_kept_has_left_its_evidence_behind() -> None:
         kept.explain().had(0, 0)
 
 
-def test_threads_change_no_explanation(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("vedette.control.shares._MANY", 0)
+def test_threads_change_no_explanation() -> None:
     found = []
     for num_threads in (1, 3):
         example = replace(shared(3, 2), settings=replace(KNOWN, num_threads=num_threads, num_samples=7))

@@ -11,7 +11,7 @@ from vedette.control.rewards.base import combined
 from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.planning.ascent import Allowed, Cells, Trace, ascend
 from vedette.kernels.planning.bernoulli_rows import Table
-from vedette.kernels.planning.joint_values import alone_values, joint_values, line_values
+from vedette.kernels.planning.joint_values import alone_values, joint_values, line_values, start_totals
 from vedette.kernels.planning.label_values import Valuation
 from vedette.threads import run_chunks
 
@@ -72,8 +72,20 @@ class AdditiveRewards:
             joint_values(self.table, self.valuation, actions, first, last, sums)
 
         run_chunks(work, len(actions), self.num_threads, first_piece=8)
-        found = np.array([self._found(joint) for joint in actions]) if len(self.cells.worth) else 0.0
+        found = np.array([self.found(joint) for joint in actions]) if len(self.cells.worth) else 0.0
         return np.asarray(self.of_sums(sums) + np.reshape(found, (-1, 1)))
+
+    def without_scans(self) -> Floats:
+        """(num_labels, bernoulli_size, num_samples) joint rows without any scan."""
+        return start_totals(self.table)
+
+    def with_scans(self, chosen: Ints) -> Floats:
+        """The same with the scans of a joint action (num_sensors,)."""
+        table, rows = self.table, self.without_scans()
+        for power, course in zip(table.powers, (table.first_courses[:-1] + chosen).tolist(), strict=True):
+            entries = slice(table.offsets[course], table.offsets[course + 1])
+            rows[table.labels[entries]] += power * table.changes[entries]
+        return rows
 
     def line(self, chosen: Ints, sensor: int) -> Floats:
         """(num_courses, num_samples) rewards of all courses of one sensor, the others as chosen."""
@@ -97,7 +109,7 @@ class AdditiveRewards:
                 begin, end = (self.table.first_courses[s : s + 2] - start).tolist()
                 joint = np.tile(chosen, (end - begin, 1))
                 joint[:, s] = np.arange(end - begin)
-                rewards[begin:end] += np.array([[self._found(each)] for each in joint])
+                rewards[begin:end] += np.array([[self.found(each)] for each in joint])
         return rewards
 
     def each_alone(self) -> Floats:
@@ -134,7 +146,7 @@ class AdditiveRewards:
         course = np.repeat(np.arange(len(cells.offsets) - 1), np.diff(cells.offsets))
         return np.asarray(np.bincount(course, shares, len(cells.offsets) - 1), np.float64)
 
-    def _found(self, chosen: Ints) -> float:
+    def found(self, chosen: Ints) -> float:
         """What the reward has for targets that are expected to be found."""
         cells, totals = self.cells, np.zeros(len(self.cells.worth))
         for s in np.flatnonzero(chosen >= 0).tolist():

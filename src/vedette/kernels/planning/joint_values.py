@@ -5,11 +5,14 @@ A label that no chosen course reaches keeps its value without scans, which is ta
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Floats, Ints
-from vedette.kernels.planning.bernoulli_rows import Table
+from vedette.kernels.gaussian.integrals import integrate_rows, make_integrals
+from vedette.kernels.planning.bernoulli_rows import Table, unscale
 from vedette.kernels.planning.label_values import Valuation, ValueWork, make_value_work, value_label
 
 
@@ -53,13 +56,34 @@ def value_rows(valuation: Valuation, label: int, rows: Floats, work: ValueWork, 
 
 
 @kernel
+def label_values(rows: Floats, valuation: Valuation) -> Floats:
+    """(num_labels, num, num_samples) values of rows (num_labels, bernoulli_size, num_samples), label by label."""
+    num_labels, _, num_samples = rows.shape
+    work, out = make_value_work(valuation, num_samples), np.empty((num_labels, valuation.num, num_samples))
+    for label in range(num_labels):
+        value_rows(valuation, label, rows[label], work, out[label])
+    return out
+
+
+@kernel
 def values_without_scans(rows: Floats, valuation: Valuation) -> Floats:
     """(num_labels, num) values of rows (num_labels, bernoulli_size)."""
-    work, out = make_value_work(valuation, 1), np.empty((len(rows), valuation.num, 1))
-    for label in range(len(rows)):
-        spread_row(rows[label], work.total)
-        value_label(valuation, label, work, out[label])
-    return out[:, :, 0].copy()
+    return label_values(rows.reshape((rows.shape[0], rows.shape[1], 1)), valuation)[:, :, 0].copy()
+
+
+@kernel
+def existence_logits(rows: Floats, dim: int) -> Floats:
+    """(num_labels, num_samples) of the existence that rows stand for; 0 where nobody who counts knows the label."""
+    num_labels, size, num_samples = rows.shape
+    out, integrals = np.zeros((num_labels, num_samples)), make_integrals(num_samples)
+    for label in range(num_labels):
+        total = rows[label].copy()
+        unscale(total)
+        integrate_rows(total, dim, integrals)
+        for s in range(num_samples):
+            if total[size - 3, s] > 0.0:
+                out[label, s] = total[size - 2, s] + integrals.exponents[s] + math.log(integrals.factors[s])
+    return out
 
 
 @kernel
