@@ -10,7 +10,7 @@ import numpy as np
 from vedette.control.additive.evaluator import AdditiveEvaluator
 from vedette.control.additive.rewards import AdditiveRewards
 from vedette.control.evidence import Evidence
-from vedette.control.plan import Bound
+from vedette.control.explanation import Bound
 from vedette.densities.checks import offsets_of
 from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.planning.bernoulli_rows import Table

@@ -13,8 +13,7 @@ import numpy as np
 from vedette.control.additive.evaluator import AdditiveEvaluator
 from vedette.control.additive.rewards import AdditiveRewards
 from vedette.control.evidence import Evidence
-from vedette.control.explanation import Explanation, Had, RunnerUp, TargetGains
-from vedette.control.plan import Bound
+from vedette.control.explanation import Bound, Explanation, Had, RunnerUp, TargetGains
 from vedette.control.shares import Shares, shares_of
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats, Ints
@@ -66,9 +65,12 @@ class Questions:
     def __reduce__(self) -> Any:
         return type(None), ()
 
-    @cached_property
-    def explanation(self) -> Explanation:
+    def __call__(self) -> Explanation:
         """The answer to `Plan.explain`."""
+        return self._explanation
+
+    @cached_property
+    def _explanation(self) -> Explanation:
         chosen = tuple(own.text(action) for own, action in zip(self._actions, self._chosen_actions, strict=True))
         reward = sum(part.evidence.mean_of(part.chosen) for part in self.parts)
         runner_up = self._runner_up()
@@ -176,9 +178,9 @@ class Questions:
         other[part.evidence.which.index(int(sensor))] = int(self._options[sensor].which[index])
         difference = part.evidence.rewards(np.array([other]))[0] - self._samples[place]
         off = float(difference.mean())
-        assert self.explanation.reward is not None
+        assert self._explanation.reward is not None
         return Had(
-            int(sensor), self._actions[sensor].text(index), self.explanation.reward + off, off, _error(difference)
+            int(sensor), self._actions[sensor].text(index), self._explanation.reward + off, off, _error(difference)
         )
 
     def _index(self, sensor: int, action: int | None, columns: dict[str, float]) -> int:

@@ -14,7 +14,8 @@ from vedette.control.allowed import single_mask
 from vedette.control.bounds import bound_of
 from vedette.control.evaluator import SampleRewards
 from vedette.control.evidence import Evidence
-from vedette.control.plan import Bound, Certainty, RewardTable, SearchCurve
+from vedette.control.explanation import Bound
+from vedette.control.plan import Certainty, RewardTable, SearchCurve
 from vedette.control.preparation import AnyEvaluator, Preparation
 from vedette.control.problem import searched
 from vedette.control.racing import FIRST_ROUND, Race, next_total

@@ -10,10 +10,11 @@ from typing import NamedTuple, Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
 
+from vedette.control.explanation import Bound
 from vedette.control.lookahead.courses import CourseTree, Sequence
 from vedette.control.lookahead.laid_courses import LaidCourses, Taken
 from vedette.control.lookahead.rules import Rules
-from vedette.control.plan import Bound, SearchCurve
+from vedette.control.plan import SearchCurve
 from vedette.control.search import first_best
 from vedette.kernels.base.types import Floats
 
