@@ -1,6 +1,5 @@
 """Where to send the sensors next: ideal measurements, rewards, joint action search, constraints, planners."""
 
-from vedette.control.additive.evaluator import AdditiveEvaluator
 from vedette.control.baselines import FixedPlanner, Planner, RandomPlanner, WatchedPlanner
 from vedette.control.constraints import (
     Constraint,
@@ -43,7 +42,6 @@ from vedette.control.search import (
 from vedette.control.settings import MobileSensor, PlanningSettings, planning_limits
 
 __all__ = [
-    "AdditiveEvaluator",
     "AutomaticSearch",
     "BeamSearch",
     "Bound",

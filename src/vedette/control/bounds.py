@@ -7,7 +7,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from vedette.control.additive.evaluator import AdditiveEvaluator
 from vedette.control.additive.rewards import AdditiveRewards
 from vedette.control.evidence import Evidence
 from vedette.control.explanation import Bound
@@ -41,10 +40,11 @@ def most_by_target(evidence: Evidence) -> tuple[float, int] | None:
     None of rewards that are no sums over targets.
     """
     evaluator, known = evidence.evaluator, evidence.most_by_target
-    if not known and isinstance(evaluator, AdditiveEvaluator) and evaluator.additive.coefficients is not None:
-        best = best_values(evaluator.additive, evaluator.settings.max_bound_work)
-        unknown = np.isinf(best).reshape(evaluator.additive.looks, -1).any(axis=0)
-        known.append((float(best.sum()) + _most_found(evaluator.additive), int(unknown.sum())))
+    additive = evaluator.additive
+    if not known and additive is not None and additive.coefficients is not None:
+        best = best_values(additive, evaluator.settings.max_bound_work)
+        unknown = np.isinf(best).reshape(additive.looks, -1).any(axis=0)
+        known.append((float(best.sum()) + _most_found(additive), int(unknown.sum())))
     return known[0] if known else None
 
 

@@ -8,9 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from vedette.control.additive.evaluator import AdditiveEvaluator
+from vedette.control.additive.rewards import AdditiveRewards
 from vedette.control.bounds import best_values
-from vedette.control.preparation import AnyEvaluator
+from vedette.control.evaluator import Evaluator
 from vedette.densities.checks import offsets_of
 from vedette.kernels.base.types import Floats
 from vedette.kernels.planning.label_values import EXPECTED_LOSS
@@ -21,7 +21,7 @@ from vedette.probabilities import expit
 _SHARE = 0.1
 
 
-def beyond_cutoff(evaluator: AnyEvaluator, choice: Sequence[int]) -> Iterator[str]:
+def beyond_cutoff(evaluator: Evaluator, choice: Sequence[int]) -> Iterator[str]:
     """What a reader of a decision must know of targets beyond the cutoff, of which the loss counts no more.
 
     They are likely to be detected, and though they are, their errors at the end of the horizon are expected to be
@@ -29,12 +29,13 @@ def beyond_cutoff(evaluator: AnyEvaluator, choice: Sequence[int]) -> Iterator[st
 
     choice: the course of each sensor.
     """
-    if not isinstance(evaluator, AdditiveEvaluator) or evaluator.additive.valuation.kind != EXPECTED_LOSS:
+    additive = evaluator.additive
+    if additive is None or additive.valuation.kind != EXPECTED_LOSS:
         return
-    valuation = evaluator.additive.valuation
-    cutoff, num = math.sqrt(valuation.params[0]), len(valuation.prior) // evaluator.additive.looks
+    valuation = additive.valuation
+    cutoff, num = math.sqrt(valuation.params[0]), len(valuation.prior) // additive.looks
     existence = expit(valuation.prior[:num, -2])
-    detected, errors = (own[:num] for own in _errors(evaluator, choice))
+    detected, errors = (own[:num] for own in _errors(additive, choice))
     likely = detected >= 0.5
     lost = likely & (errors > cutoff)
     uncounted, expected = float(existence[lost].sum()), float(existence[likely].sum())
@@ -46,9 +47,9 @@ def beyond_cutoff(evaluator: AnyEvaluator, choice: Sequence[int]) -> Iterator[st
         )
 
 
-def _errors(evaluator: AdditiveEvaluator, choice: Sequence[int]) -> tuple[Floats, Floats]:
+def _errors(additive: AdditiveRewards, choice: Sequence[int]) -> tuple[Floats, Floats]:
     """(num_labels,) probability that any scan detects each label, and its error then, m."""
-    additive, covs = evaluator.additive, evaluator.additive.valuation.covs
+    covs = additive.valuation.covs
     table, unseen = additive.table, covs[:, 0, 0] + covs[:, 1, 1]
     courses = table.first_courses[:-1] + np.array(choice)
     entries = np.concatenate([np.arange(*table.offsets[[course, course + 1]]) for course in courses])

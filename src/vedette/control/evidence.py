@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from vedette.control.evaluator import SampleRewards
+from vedette.control.cases import SampleRewards
+from vedette.control.evaluator import Evaluator
 from vedette.control.plan import RewardTable, SearchCurve
-from vedette.control.preparation import AnyEvaluator
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats, Ints
 
@@ -33,14 +33,17 @@ class Evidence:
         which: the sensors.
         rewards: their sample rewards.
         shape: number of different courses of each of the sensors.
+        keeps: whether `evaluate` keeps the rewards of all samples.
         most_by_target: what `vedette.control.bounds` found, where it was asked.
     """
 
-    evaluator: AnyEvaluator
+    evaluator: Evaluator
     which: tuple[int, ...]
     rewards: SampleRewards
+    keeps: bool = False
     shape: tuple[int, ...] = field(init=False)
     _actions: list[Ints] = field(default_factory=list)
+    _samples: list[tuple[Ints, Floats]] = field(default_factory=list)
     _means: list[Floats] = field(default_factory=list)
     _errors: list[Floats] = field(default_factory=list)
     _evaluations: list[int] = field(default_factory=list)
@@ -62,10 +65,21 @@ class Evidence:
             raise InputError(f"joint actions: expected rows of whole numbers below {self.shape}; got {actions!r}")
         checked = checked.astype(np.int64)
         size = max(1, _BLOCK // self.evaluator.settings.num_samples)
-        means = [
-            self.note(checked[i : i + size], self.rewards(checked[i : i + size])) for i in range(0, len(checked), size)
-        ]
-        return np.asarray(np.concatenate([np.empty(0), *means]))
+        means = [np.empty(0)]
+        for part in (checked[i : i + size] for i in range(0, len(checked), size)):
+            rewards = self.rewards(part)
+            if self.keeps:
+                self._samples.append((part, rewards))
+            means.append(self.note(part, rewards))
+        return np.asarray(np.concatenate(means))
+
+    def samples(self) -> Floats | None:
+        """(num_joint, num_samples) rewards that were kept, in printed order; None unless each was asked for once."""
+        num = sum(len(actions) for actions, _ in self._samples)
+        if num != math.prod(self.shape) or not self.is_complete():
+            return None
+        places = np.concatenate([np.ravel_multi_index(tuple(actions.T), self.shape) for actions, _ in self._samples])
+        return np.asarray(np.concatenate([rewards for _, rewards in self._samples])[np.argsort(places)])
 
     def note(self, actions: Ints, rewards: Floats) -> Floats:
         """Keep what was evaluated, (num, num_samples) rewards; returns their means, -inf where one is no number."""

@@ -10,7 +10,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vedette.control.additive.evaluator import AdditiveEvaluator
 from vedette.control.additive.rewards import AdditiveRewards
 from vedette.control.evidence import Evidence
 from vedette.control.explanation import Bound, Explanation, Had, RunnerUp, TargetGains
@@ -37,15 +36,13 @@ class Part(NamedTuple):
     @classmethod
     def together(cls, evidence: Evidence, chosen: Sequence[int]) -> Part:
         """Of all sensors."""
-        evaluator = evidence.evaluator
-        return cls(evidence, tuple(chosen), evaluator.additive if isinstance(evaluator, AdditiveEvaluator) else None)
+        return cls(evidence, tuple(chosen), evidence.evaluator.additive)
 
     @classmethod
     def alone(cls, evidence: Evidence, course: int) -> Part:
         """Of the one sensor of the evidence."""
-        evaluator, (sensor,) = evidence.evaluator, evidence.which
-        additive = evaluator.additive.alone(sensor) if isinstance(evaluator, AdditiveEvaluator) else None
-        return cls(evidence, (course,), additive)
+        additive, (sensor,) = evidence.evaluator.additive, evidence.which
+        return cls(evidence, (course,), None if additive is None else additive.alone(sensor))
 
 
 @dataclass(frozen=True, eq=False)

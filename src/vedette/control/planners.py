@@ -1,4 +1,4 @@
-"""Planners: joint and independent decision making (paper, Algorithms 2 and 3), random and fixed actions."""
+"""Planners: joint and independent decision making (paper, Algorithms 2 and 3)."""
 
 from __future__ import annotations
 
@@ -6,19 +6,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from vedette.control.allowed import single_mask
-from vedette.control.bounds import bound_of
 from vedette.control.constraints import Constraint
-from vedette.control.cutoff import beyond_cutoff
-from vedette.control.evidence import Evidence
-from vedette.control.explaining import Part, Questions
+from vedette.control.deciding import decide_alone, decide_jointly
 from vedette.control.inputs import check_steering, check_valuing
-from vedette.control.plan import Plan, RewardTable
+from vedette.control.plan import Plan
 from vedette.control.preparation import AnyReward, Preparation, check_sums, stay_glmbs
-from vedette.control.problem import searched
 from vedette.control.rewards import ExpectedLossReward
-from vedette.control.rounds import Decided, decide_alone, decide_jointly
-from vedette.control.search import AutomaticSearch, JointSearch, SequentialGreedy, all_joint_actions, first_best
+from vedette.control.search import AutomaticSearch, JointSearch, SequentialGreedy
 from vedette.control.settings import MobileSensor, PlanningSettings
 from vedette.fusion import Fusion
 from vedette.kernels.base.types import Floats
@@ -85,27 +79,7 @@ class JointPlanner:
         """
         generator(rng)
         prepared = Preparation.of(self.sensors, self.fusion, self.settings, self.reward, state, poses, self.constraints)
-        if prepared.races:
-            return _plan_of(self.name, prepared, decide_jointly(prepared, self.search, rng=rng), self.notes)
-        evaluator = prepared.evaluator(self.settings.num_samples, rng=rng)
-        evidence = Evidence(evaluator, tuple(range(len(self.sensors))), evaluator.joint())
-        best = searched(self.search, evidence, prepared.mask, rng=rng)
-        chosen = tuple(own.first_action(course) for own, course in zip(evaluator.options, best, strict=True))
-        actions = tuple(own.actions for own in evaluator.options)
-        tables, (counts, found), bound = evidence.tables(best), evaluator.account(), bound_of(evidence, best)
-        notes = (*self.notes, *found, *beyond_cutoff(evaluator, best))
-        return Plan(
-            self.name,
-            actions,
-            chosen,
-            tables,
-            counts,
-            notes,
-            evidence.curve(),
-            bound,
-            prepared.certainty,
-            questions=Questions(self.name, (Part.together(evidence, best),), bound),
-        )
+        return decide_jointly(self.name, prepared, self.search, self.notes, rng=rng)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -144,35 +118,4 @@ class IndependentPlanner:
         """Each sensor's action of largest mean reward; arguments, ties and errors as `JointPlanner.plan`."""
         generator(rng)
         prepared = Preparation.of(self.sensors, self.fusion, self.settings, self.reward, state, poses, self.constraints)
-        if prepared.races:
-            return _plan_of(self.name, prepared, decide_alone(prepared, rng=rng), self.notes)
-        evaluator = prepared.evaluator(self.settings.num_samples, rng=rng)
-        courses: list[int] = []
-        tables: list[RewardTable] = []
-        parts: list[Part] = []
-        for s, own in enumerate(evaluator.options):
-            evidence = Evidence(evaluator, (s,), evaluator.alone(s))
-            allowed = all_joint_actions((len(own.courses),))[single_mask(prepared.mask, s, len(own.courses))]
-            best = int(allowed[first_best(evidence.evaluate(allowed)), 0])
-            courses.append(best)
-            tables.extend(evidence.tables((best,)))
-            parts.append(Part.alone(evidence, best))
-        counts, found = evaluator.account()
-        return Plan(
-            self.name,
-            tuple(own.actions for own in evaluator.options),
-            tuple(own.first_action(course) for own, course in zip(evaluator.options, courses, strict=True)),
-            tuple(tables),
-            counts,
-            (*self.notes, *found, *beyond_cutoff(evaluator, courses)),
-            certainty=prepared.certainty,
-            questions=Questions(self.name, tuple(parts)),
-        )
-
-
-def _plan_of(name: str, prepared: Preparation, decided: Decided, notes: tuple[str, ...]) -> Plan:
-    """The plan of a decision that took as many samples as it needed, and says so."""
-    chosen = tuple(own.first_action(course) for own, course in zip(prepared.options, decided.best, strict=True))
-    actions = tuple(own.actions for own in prepared.options)
-    told, certainty = (*notes, *decided.notes, str(decided.certainty)), decided.certainty
-    return Plan(name, actions, chosen, decided.tables, decided.counts, told, decided.curve, decided.bound, certainty)
+        return decide_alone(self.name, prepared, self.notes, rng=rng)

@@ -8,8 +8,8 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from vedette.control.additive.evaluator import AdditiveEvaluator
 from vedette.control.additive.rewards import AdditiveRewards
+from vedette.control.evaluator import Evaluator
 from vedette.control.lookahead.courses import CourseTree, Sequence
 from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.planning.ascent import Cells
@@ -72,7 +72,7 @@ class LaidCourses:
 
     trees: tuple[CourseTree, ...]
     stage: int
-    lay_out: Callable[[tuple[Options, ...]], AdditiveEvaluator]
+    lay_out: Callable[[tuple[Options, ...]], Evaluator]
     counts: dict[str, int]
     _places: dict[tuple[int, Sequence], int] = field(default_factory=dict)
     _additive: AdditiveRewards | None = None
@@ -98,6 +98,7 @@ class LaidCourses:
             courses[s].append(self.trees[s].course(taken))
         laid = self.lay_out(tuple(self._options(*own) for own in zip(self.trees, courses, strict=True)))
         self.counts["filter_steps"] += laid.counts["filter_steps"]
+        assert laid.additive is not None
         table, cells = laid.additive.table, laid.additive.cells
         changes = table.offsets, table.labels, table.changes
         found = cells.offsets, cells.cells, cells.log_miss

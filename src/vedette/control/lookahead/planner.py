@@ -12,11 +12,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vedette.control.additive.evaluator import AdditiveEvaluator
-from vedette.control.additive.situation import Sums
 from vedette.control.bounds import bound_of
 from vedette.control.constraints import Constraint
 from vedette.control.cutoff import beyond_cutoff
+from vedette.control.evaluator import Evaluator
 from vedette.control.evidence import Evidence
 from vedette.control.inputs import check_poses, check_sensors, check_steering, check_valuing
 from vedette.control.lookahead.ahead import Ahead
@@ -26,7 +25,7 @@ from vedette.control.lookahead.laid_courses import LaidCourses
 from vedette.control.lookahead.problem import Best, JointSequence, Part, SequenceProblem, SequenceSearch
 from vedette.control.lookahead.rules import Rules
 from vedette.control.plan import Plan
-from vedette.control.preparation import AnyReward, check_sums, prepare_sums, unsought, without_scans
+from vedette.control.preparation import AnyReward, Planned, check_sums, planned_on, unsought, without_scans
 from vedette.control.problem import searched
 from vedette.control.rewards import ExpectedLossReward
 from vedette.control.search import AutomaticSearch
@@ -44,7 +43,7 @@ MOST_DECISIONS, MOST_STEPS = 100, 10_000  # of a sequence, and of pseudo-updates
 class _Single(NamedTuple):
     """The best single decision, and what it was made on."""
 
-    evaluator: AdditiveEvaluator
+    evaluator: Evaluator
     evidence: Evidence
     choice: tuple[int, ...]
 
@@ -135,7 +134,8 @@ class HorizonPlanner:
             ModelError, NumericalError: as the filters; no sequence whose reward is a number.
         """
         generator(rng)
-        sums = prepare_sums(self.sensors, self.fusion, self.settings, self.reward, state)
+        why = "so are all sequences of decisions"
+        sums = planned_on(self.sensors, self.fusion, self.settings, self.reward, state, why)
         trees = self._trees(poses, self._stages(state))
         rules, samples = self._rules(trees, state), copy.deepcopy(rng)
         trees = trees if rules is None else rules.trees
@@ -174,7 +174,7 @@ class HorizonPlanner:
         return Rules.of(trees, Ahead(self.constraints, self.sensors, self.settings, state.fused, poses, stages))
 
     def _single(
-        self, trees: tuple[CourseTree, ...], rules: Rules | None, sums: Sums, rng: np.random.Generator
+        self, trees: tuple[CourseTree, ...], rules: Rules | None, sums: Planned, rng: np.random.Generator
     ) -> _Single:
         """What a `JointPlanner` would decide."""
         options, steps = tuple(tree.options(()) for tree in trees), trees[0].stages.steps
@@ -188,8 +188,8 @@ class HorizonPlanner:
         self,
         trees: tuple[CourseTree, ...],
         rules: Rules | None,
-        sums: Sums,
-        first: AdditiveEvaluator,
+        sums: Planned,
+        first: Evaluator,
         samples: np.random.Generator,
     ) -> SequenceProblem:
         """What is searched; samples: draws them. first: whose account it goes on with."""
@@ -212,13 +212,16 @@ class HorizonPlanner:
     def _lay_out(
         self,
         num_steps: int,
-        sums: Sums,
+        sums: Planned,
         looks: tuple[PlanningSettings, ...] | None,
         options: tuple[Options, ...],
         rng: np.random.Generator,
-    ) -> AdditiveEvaluator:
+    ) -> Evaluator:
+        assert sums.rule is not None
         settings = replace(self.settings, horizon_steps=num_steps)
-        return AdditiveEvaluator.prepare(self.sensors, options, sums, settings, self.reward, looks=looks, rng=rng)
+        return Evaluator.of_sums(
+            self.sensors, options, sums.rule, settings, self.reward, sums.state, looks=looks, rng=rng
+        )
 
     def _plan(
         self,
@@ -226,7 +229,7 @@ class HorizonPlanner:
         problem: SequenceProblem | None,
         trees: tuple[CourseTree, ...],
         rules: Rules | None,
-        sums: Sums,
+        sums: Planned,
     ) -> Plan:
         """Of the best sequence that was found; problem: None where a single decision is all."""
         first, evidence = single.evaluator, single.evidence
@@ -236,12 +239,12 @@ class HorizonPlanner:
             evidence.note(np.array(list(problem.found)), np.array([own.rewards for own in problem.found.values()]))
         courses = tuple(own[0] for own in sequence)
         constrained = () if rules is None else rules.notes(sequence)
-        counts, found = first.account()
+        counts, found = dict(first.counts), tuple(first.notes)
         stages = trees[0].stages
         ahead = replace(self.settings, horizon_steps=stages.num_steps(stages.depth))
         found = (
-            *unsought(self.settings, sums.undetected, sums=True),
-            *without_scans(self.sensors, ahead, sums.time),
+            *unsought(self.settings, sums.state.undetected, sums=True),
+            *without_scans(self.sensors, ahead, sums.state.time),
             *found,
         )
         return Plan(
