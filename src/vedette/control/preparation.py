@@ -93,7 +93,9 @@ class Preparation:
         self, num_samples: int, options: tuple[Options, ...] | None = None, *, rng: np.random.Generator
     ) -> Evaluator:
         """The evaluator on samples drawn now; options: fewer of them. Raises as `JointPlanner.plan`."""
-        own, settings = options or self.options, replace(self.settings, num_samples=num_samples)
+        own, settings = options or self.options, self.settings
+        if num_samples != settings.num_samples:
+            settings = replace(settings, num_samples=num_samples)
         sensors, reward, (state, fusion, rule, notes) = self.sensors, self.reward, self.planned
         if rule is None:
             assert not isinstance(reward, ExpectedLossReward)
