@@ -11,8 +11,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from vedette.control.allowed import single_mask
-from vedette.control.bounds import bound_of
-from vedette.control.cutoff import beyond_cutoff
+from vedette.control.bounds import beyond_cutoff, bound_of
 from vedette.control.evaluator import Evaluator
 from vedette.control.evidence import Evidence
 from vedette.control.explaining import Part, Questions

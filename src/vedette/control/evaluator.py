@@ -15,7 +15,7 @@ from vedette.control.cases import CaseRewards, SampleRewards
 from vedette.control.inputs import Belief
 from vedette.control.priors import predicted
 from vedette.control.rewards.base import LabelReward, PowerReward, Reward
-from vedette.control.rewards.loss import ExpectedLossReward
+from vedette.control.rewards.power import ExpectedLossReward
 from vedette.control.settings import MobileSensor, PlanningSettings
 from vedette.filters import shared_targets
 from vedette.fusion import Fusion, LinearRule

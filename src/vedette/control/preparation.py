@@ -14,7 +14,7 @@ from vedette.control.evaluator import Evaluator
 from vedette.control.inputs import check_state, options_of
 from vedette.control.plan import Certainty
 from vedette.control.rewards.base import LabelReward, PowerReward, Reward, speaks_for
-from vedette.control.rewards.loss import ExpectedLossReward
+from vedette.control.rewards.power import ExpectedLossReward
 from vedette.control.settings import MobileSensor, PlanningSettings
 from vedette.densities import (
     GLMB,

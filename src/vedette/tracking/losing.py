@@ -13,7 +13,7 @@ from vedette.densities.label_sets import without_labels
 from vedette.filters.inputs import model_errors
 from vedette.kernels.base.types import Floats
 from vedette.kernels.gaussian.position_integrals import spread_nodes
-from vedette.kernels.planning.prediction import predict_tracks
+from vedette.kernels.planning.reach import predict_tracks
 from vedette.models import CellGrid, SensorModel, TargetModel, kernel_motion
 
 _LABELLED = (GLMB, LMB, FactoredGLMB)

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from vedette.control.rewards.base import LabelReward, PowerReward, combined, unit_volume_of
-from vedette.control.rewards.label_functions import cardinality_variance_of_label
-from vedette.control.rewards.loss import ExpectedLossReward
+from vedette.control.rewards.labels import cardinality_variance_of_label
+from vedette.control.rewards.power import ExpectedLossReward
 from vedette.densities import LMB
 from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.gaussian.linalg import LOG_2PI

@@ -9,7 +9,7 @@ import numpy as np
 
 from vedette.control.additive.rewards import AdditiveRewards, valuation_of
 from vedette.control.additive.situation import SensorGroup, Start, starts_of
-from vedette.control.rewards.loss import ExpectedLossReward
+from vedette.control.rewards.power import ExpectedLossReward
 from vedette.control.settings import MobileSensor, PlanningSettings
 from vedette.densities import UndetectedIntensity
 from vedette.densities.checks import offsets_of

@@ -12,14 +12,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vedette.control.bounds import bound_of
+from vedette.control.bounds import beyond_cutoff, bound_of
 from vedette.control.constraints import Constraint
-from vedette.control.cutoff import beyond_cutoff
 from vedette.control.evaluator import Evaluator
 from vedette.control.evidence import Evidence
 from vedette.control.inputs import check_poses, check_sensors, check_steering, check_valuing
-from vedette.control.lookahead.ahead import Ahead
 from vedette.control.lookahead.beam import BeamSearch
+from vedette.control.lookahead.constrained import Ahead
 from vedette.control.lookahead.courses import CourseTree, Stages
 from vedette.control.lookahead.laid_courses import LaidCourses
 from vedette.control.lookahead.problem import Best, JointSequence, Part, SequenceProblem, SequenceSearch
