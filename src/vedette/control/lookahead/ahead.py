@@ -1,0 +1,105 @@
+"""What constraints judge by at a later decision: where courses after earlier ones lead, and what is believed then."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from vedette.control.allowed import beliefs_ahead
+from vedette.control.constraints import Constraint, Mask, Situation, courses_allowed, mask_of, pairs_allowed
+from vedette.control.settings import MobileSensor, PlanningSettings
+from vedette.densities import Labelled
+from vedette.kernels.base.types import Bools, Floats
+
+
+class Stages(NamedTuple):
+    """Decisions `stride` pseudo-updates apart; after the last, the horizon of a single decision."""
+
+    depth: int
+    stride: int  # pseudo-updates from a decision to the next
+    steps: int  # pseudo-updates of the horizon of a decision
+    period: float  # s between pseudo-updates
+
+    def num_steps(self, stage: int) -> int:
+        """Pseudo-updates to the end of the horizon of a decision, counted from 1."""
+        return (stage - 1) * self.stride + self.steps
+
+    def times(self, stage: int) -> Floats:
+        """s from a decision to the pseudo-updates that its courses are told apart by."""
+        num = self.steps if stage == self.depth else max(self.stride, self.steps)
+        return self.period * np.arange(1.0, num + 1)
+
+
+class Place(NamedTuple):
+    """Where a sensor decides, and what it may do there."""
+
+    pose: Floats  # (pose_dim,)
+    courses: Floats  # (num_courses, num_times, pose_dim)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Ahead:
+    """Constraints on several decisions: each is tested from where its courses begin to the end of its horizon, or to
+    the next decision where that is later.
+
+    Attributes:
+        constraints: at least one.
+        sensors, settings: as of the planner.
+        fused: the fused belief now.
+        poses: (num_sensors, pose_dim) where the sensors are now.
+        stages: the decisions.
+        on_pairs: whether any constraint has to do with pairs of sensors.
+    """
+
+    constraints: tuple[Constraint, ...]
+    sensors: tuple[MobileSensor, ...]
+    settings: PlanningSettings
+    fused: Labelled
+    poses: Floats
+    stages: Stages
+    on_pairs: bool = field(init=False)
+    _timeless: bool = field(init=False)
+    _beliefs: dict[int, tuple[Labelled, ...]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        reaches = [getattr(constraint, "reach", math.inf) for constraint in self.constraints]
+        object.__setattr__(self, "on_pairs", max(reaches) > 0.0)
+        timeless = all(getattr(constraint, "timeless", False) for constraint in self.constraints)
+        object.__setattr__(self, "_timeless", timeless)
+
+    def mask(self, places: Mapping[int, Place]) -> Mask:
+        """Of the first decision, of all sensors; opened where it has to be. Raises `InputError` as `mask_of`."""
+        return mask_of(self.constraints, self._situation(1, places))
+
+    def courses(self, sensor: int, stage: int, place: Place) -> tuple[Bools, bool]:
+        """(num_courses,) which courses of one sensor are allowed at a decision, and whether they meet the constraints.
+
+        Where none does, those that violate them least. stage: 1 for the decision now. Other sensors have no courses in
+        what constraints are shown. Raises `InputError` as `mask_of`.
+        """
+        allowed, blocked = courses_allowed(self.constraints, self._situation(stage, {sensor: place}))
+        return allowed[sensor], sensor not in blocked
+
+    def pairs(self, stage: int, places: Mapping[int, Place]) -> dict[tuple[int, int], Bools]:
+        """The tables of pairs of sensors i < j of which something is forbidden; raises `InputError` as `mask_of`."""
+        return pairs_allowed(self.constraints, self._situation(stage, places))
+
+    def moment(self, stage: int) -> int:
+        """What is equal for decisions at which the same courses are allowed as far as constraints tell."""
+        return -len(self.stages.times(stage)) if self._timeless else stage
+
+    def _situation(self, stage: int, places: Mapping[int, Place]) -> Situation:
+        done, num = (stage - 1) * self.stages.stride, len(self.stages.times(stage))
+        if stage not in self._beliefs:
+            ahead = beliefs_ahead(self.constraints, self.sensors, self.fused, self.settings, done + 1, done + num)
+            self._beliefs[stage] = ahead
+        poses = self.poses.copy()
+        courses = [np.empty((0, num, self.poses.shape[1]))] * len(poses)
+        for s, place in places.items():
+            poses[s], courses[s] = place.pose, place.courses
+        times = self.stages.period * np.arange(done + 1.0, done + num + 1.0)
+        return Situation(tuple(courses), times, self._beliefs[stage], poses)
