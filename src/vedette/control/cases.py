@@ -148,32 +148,16 @@ class CaseRewards:
             )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class LaidRewards:
-    """What `PlainRewards` computes, for all joint actions and samples at once.
-
-    Attributes:
-        laid: the sensors' cases and the prediction.
-        reward: what is made of their power integrals.
-        unit_volume: K.
-    """
-
-    laid: LaidOut
-    reward: PowerReward
-    unit_volume: float
-
-    def __call__(self, actions: Ints) -> Floats:
-        """(num_joint, num_samples) rewards of joint actions (num_joint, num_sensors)."""
-        return combined(self.reward, self.laid.z(actions, self.reward.exponents, self.unit_volume))
-
-
 def lay_out_rewards(
     cases: Sequence[LabelledCases],
     prediction: Belief,
     fusion: Fusion | None,
     reward: Reward | PowerReward | LabelReward,
-) -> LaidRewards | str:
-    """The rewards laid out, or why they cannot be. fusion: None for a sensor alone."""
+) -> SampleRewards | str:
+    """What `PlainRewards` computes, for all joint actions and samples at once; or why it cannot be laid out.
+
+    fusion: None for a sensor alone.
+    """
     if not isinstance(reward, PowerReward) or not speaks_for(reward, "combine", "__call__"):
         return f"{_name(reward)} is a function of two densities"
     laid: LaidOut | None = None
@@ -183,7 +167,8 @@ def lay_out_rewards(
         laid = fusion.lay_out(cases, prediction)
     if laid is None:
         return f"{'a sensor alone' if fusion is None else _name(fusion)} cannot lay out these beliefs"
-    return LaidRewards(laid, reward, unit_volume_of(reward, prediction))
+    z, volume = laid.z, unit_volume_of(reward, prediction)
+    return lambda actions: combined(reward, z(actions, reward.exponents, volume))
 
 
 def _name(thing: Any) -> str:
@@ -203,7 +188,7 @@ def warn_slow(why: str) -> None:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlainRewards:
-    """What `LaidRewards` computes, and every other reward, by `fusion.fuse` and the reward itself.
+    """Every reward, by `fusion.fuse` and the reward itself, one joint action and sample after the other.
 
     Attributes:
         posteriors: one a sensor.

@@ -19,7 +19,7 @@ from vedette.densities.label_sets import take_hypotheses, take_tracks
 from vedette.filters.inputs import model_errors
 from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.gaussian.linalg import log_sum
-from vedette.kernels.planning.reach import predict_tracks
+from vedette.kernels.planning.reach import predict_paths
 from vedette.models import MotionModel, constant_survival, kernel_motion
 
 _Labelled = TypeVar("_Labelled", bound=Labelled)
@@ -49,9 +49,9 @@ def predicted(fused: _Labelled, motion: MotionModel, num_steps: int, period: flo
         single = take_hypotheses(single, np.flatnonzero(single.hyp_log_weights > -np.inf))
     means, covs = track_moments(single.tracks)
     with model_errors():
-        means, covs = predict_tracks(kernel_motion(motion, ALWAYS_SURVIVES), float(period), int(num_steps), means, covs)
-    num = single.tracks.num_tracks
-    tracks = unchecked(TrackTable, single.tracks.labels, np.arange(num + 1), np.zeros(num), means, covs)
+        paths = predict_paths(kernel_motion(motion, ALWAYS_SURVIVES), float(period), int(num_steps), means, covs)
+    num, ends = single.tracks.num_tracks, (np.ascontiguousarray(own[:, -1]) for own in paths)
+    tracks = unchecked(TrackTable, single.tracks.labels, np.arange(num + 1), np.zeros(num), *ends)
     return unchecked(type(fused), tracks, *single.to_kernel()[1:])
 
 

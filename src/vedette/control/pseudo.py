@@ -186,7 +186,8 @@ def _run_lmb(
 
     with model_errors():
         if settings.association == "known":
-            paths = predict_paths(prior, decision)
+            horizon, tracks = decision.horizon, prior.tracks
+            paths = predict_paths(decision.motion, horizon.dt, settings.horizon_steps, tracks.means, tracks.covs)
             own = KnownBelief(prior, paths, targets, label_radii(paths, targets, decision.futures.states))
             num_courses = len(decision.horizon.poses)
             run_chunks(

@@ -143,7 +143,8 @@ def _group(
     futures = samples.futures(sensor.filter.sensor.meas_dim, settings, rng=rng)
     together = np.concatenate([courses[s] for s in members])
     decision = decision_of(sensor, together, futures, settings, scans[members[0]], None if sampled else "mean")
-    paths, labels = predict_paths(prior, decision), places[own]
+    labels, tracks, horizon = places[own], prior.tracks, decision.horizon
+    paths = predict_paths(decision.motion, horizon.dt, horizon.poses.shape[1], tracks.means, tracks.covs)
     ends = np.ascontiguousarray(paths.means[:, -1]), np.ascontiguousarray(paths.covs[:, -1])
     rows = rows_without_scans(*ends, prior.existence_logit, prediction.tracks.means[labels])
     targets = np.ascontiguousarray(samples.targets[labels])

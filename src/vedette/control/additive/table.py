@@ -22,7 +22,7 @@ from vedette.kernels.planning.bernoulli_rows import Table
 from vedette.kernels.planning.cells import cells_in_view
 from vedette.kernels.planning.expected import fill_expected_changes
 from vedette.kernels.planning.known import Entries, fill_changes
-from vedette.kernels.planning.reach import fill_near, fill_reach
+from vedette.kernels.planning.reach import fill_reach
 from vedette.platforms import Options
 from vedette.threads import run_chunks
 from vedette.tracking import State
@@ -112,14 +112,11 @@ def _seen(table: Table) -> Table:
 
 def _reach(group: SensorGroup, num_threads: int, *, sampled: bool) -> Ints:
     """(num_courses, num_own) 1 where a course reaches a label; without samples, where it might."""
-    num_courses = int(group.course_offsets[-1])
+    num_courses, least = int(group.course_offsets[-1]), LEAST_DETECTION if sampled else 0.0
     out = np.empty((num_courses, len(group.labels)), np.int64)
 
     def work(first: int, last: int) -> None:
-        if sampled:
-            fill_reach(group.belief, group.decision, LEAST_DETECTION, group.reach, first, last, out)
-        else:
-            fill_near(group.belief, group.decision, group.reach, first, last, out)
+        fill_reach(group.belief, group.decision, least, group.reach, first, last, out)
 
     run_chunks(work, num_courses, num_threads, first_piece=_QUICK)
     return out
