@@ -79,24 +79,20 @@ def _beyond(belief: Belief, decision: Decision, course: int, label: int, step: i
 
 
 @borrowing
-def _in_reach(
-    belief: Belief, decision: Decision, course: int, label: int, least: float, reach: float, state: Floats
+def _detects(
+    belief: Belief, decision: Decision, course: int, label: int, step: int, least: float, state: Floats
 ) -> bool:
-    sensor, paths = decision.sensor, belief.paths
-    for h in range(decision.horizon.poses.shape[1]):
-        if _beyond(belief, decision, course, label, h, reach):
-            continue
-        pose, mean = decision.horizon.poses[course, h], paths.means[label, h]
-        if least == 0.0:
-            return True
-        if detection_probability(sensor, pose, mean, paths.covs[label, h], state) >= least:
-            return True
-        for sample in range(belief.targets.shape[1]):
-            target = belief.targets[label, sample]
-            if target >= 0:
-                at = decision.futures.states[h, target]
-                if sensor.prob_detection(at, pose, sensor.detection_params) >= least:
-                    return True
+    """Whether a label, or one of its samples, is detected with probability `least` or more at a step of a course."""
+    sensor, pose = decision.sensor, decision.horizon.poses[course, step]
+    mean, cov = belief.paths.means[label, step], belief.paths.covs[label, step]
+    if detection_probability(sensor, pose, mean, cov, state) >= least:
+        return True
+    for sample in range(belief.targets.shape[1]):
+        target = belief.targets[label, sample]
+        if target >= 0:
+            at = decision.futures.states[step, target]
+            if sensor.prob_detection(at, pose, sensor.detection_params) >= least:
+                return True
     return False
 
 
@@ -112,4 +108,10 @@ def fill_reach(
     state = np.empty(belief.prior.tracks.means.shape[1])
     for course in range(first, last):
         for label in range(out.shape[1]):
-            out[course, label] = 1 if _in_reach(belief, decision, course, label, least, reach, state) else 0
+            out[course, label] = 0
+            for h in range(decision.horizon.poses.shape[1]):
+                if not _beyond(belief, decision, course, label, h, reach) and (
+                    least == 0.0 or _detects(belief, decision, course, label, h, least, state)
+                ):
+                    out[course, label] = 1
+                    break
