@@ -186,7 +186,7 @@ def warn_slow(why: str) -> None:
     )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(slots=True, eq=False)
 class PlainRewards:
     """Every reward, by `fusion.fuse` and the reward itself, one joint action and sample after the other.
 

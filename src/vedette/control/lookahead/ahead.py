@@ -41,7 +41,7 @@ class Place(NamedTuple):
     courses: Floats  # (num_courses, num_times, pose_dim)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(slots=True, eq=False)
 class Ahead:
     """Constraints on several decisions: each is tested from where its courses begin to the end of its horizon, or to
     the next decision where that is later.
@@ -67,9 +67,8 @@ class Ahead:
 
     def __post_init__(self) -> None:
         reaches = [getattr(constraint, "reach", math.inf) for constraint in self.constraints]
-        object.__setattr__(self, "on_pairs", max(reaches) > 0.0)
-        timeless = all(getattr(constraint, "timeless", False) for constraint in self.constraints)
-        object.__setattr__(self, "_timeless", timeless)
+        self.on_pairs = max(reaches) > 0.0
+        self._timeless = all(getattr(constraint, "timeless", False) for constraint in self.constraints)
 
     def mask(self, places: Mapping[int, Place]) -> Mask:
         """Of the first decision, of all sensors; opened where it has to be. Raises `InputError` as `mask_of`."""

@@ -24,7 +24,7 @@ _SAME_DIGITS = 9
 _MOST_PLACES = 10_000
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(slots=True, eq=False)
 class CourseTree:
     """The sequences of one sensor: of all courses, or of those that constraints allow.
 
