@@ -17,8 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vedette.control import CauchySchwarzReward, RenyiReward
-from vedette.control.laid_rewards import lay_out_rewards
-from vedette.control.plain import PlainRewards
+from vedette.control.cases import PlainRewards, lay_out_rewards
 from vedette.control.search import all_joint_actions
 from vedette.densities import GLMB, LMB, TrackTable, glmb_to_lmb
 from vedette.densities.cases import LabelledCases

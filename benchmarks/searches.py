@@ -40,7 +40,7 @@ from vedette.control.evidence import Evidence
 from vedette.control.preparation import Preparation
 from vedette.control.problem import joint_problem
 from vedette.control.search import all_joint_actions
-from vedette.control.search.known import Known
+from vedette.control.search.problem import Known
 from vedette.densities import LMB
 from vedette.filters import LmbFilter
 from vedette.fusion import ParallelUpdate

@@ -60,3 +60,10 @@ def test_no_file_imports_what_imports_it() -> None:
     graph = grimp.build_graph("vedette", exclude_type_checking_imports=True)
     order = TopologicalSorter({name: graph.find_modules_directly_imported_by(name) for name in graph.modules})
     order.prepare()  # raises CycleError, which names the files
+
+
+def test_no_file_of_control_does_so_for_a_type_either() -> None:
+    graph = grimp.build_graph("vedette")
+    names = graph.find_descendants("vedette.control")
+    imports = {name: graph.find_modules_directly_imported_by(name) & names for name in names}
+    TopologicalSorter(imports).prepare()

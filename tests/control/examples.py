@@ -11,9 +11,10 @@ import numpy as np
 
 from vedette import models
 from vedette.control import CauchySchwarzReward, Evaluator, MobileSensor, Plan, PlanningSettings, planning_limits
-from vedette.control.additive.evaluator import AdditiveEvaluator
-from vedette.control.additive.situation import Sums
+from vedette.control.additive.rewards import AdditiveRewards
+from vedette.control.cases import CaseRewards
 from vedette.control.inputs import options_of
+from vedette.control.search import all_joint_actions
 from vedette.densities import GLMB, LMB, TrackTable
 from vedette.filters import DeltaGlmbFilter, LmbFilter
 from vedette.fusion import Clmb, CmDeltaGlmb
@@ -166,7 +167,7 @@ def crowded(num_targets: int) -> Situation:
 
 def evaluator_of(situation: Situation, reward: Any = None, seed: int = 5) -> Evaluator:
     """The evaluator of a situation, by default with K = 1."""
-    return Evaluator.prepare(
+    return Evaluator.of_cases(
         situation.sensors,
         options_of(situation.sensors, situation.poses, situation.settings),
         situation.fusion,
@@ -177,17 +178,36 @@ def evaluator_of(situation: Situation, reward: Any = None, seed: int = 5) -> Eva
     )
 
 
-def additive_of(situation: Situation, reward: Any = None, seed: int = 5) -> AdditiveEvaluator:
+def sample_rewards(evaluator: Evaluator, which: Sequence[int], fusion: Any) -> Any:
+    """(num_joint, num_samples) rewards of all joint actions of the sensors `which`, the last one's fastest."""
+    shape = evaluator.joint_shape()
+    return cases_of(evaluator).rewards(which, fusion)(all_joint_actions(tuple(shape[s] for s in which)))
+
+
+def cases_of(evaluator: Evaluator) -> CaseRewards:
+    """What an evaluator makes rewards of, case by case."""
+    assert isinstance(evaluator.source, CaseRewards)
+    return evaluator.source
+
+
+def sums_of(evaluator: Evaluator) -> AdditiveRewards:
+    """What an evaluator makes rewards of, by sums over labels."""
+    assert evaluator.additive is not None
+    return evaluator.additive
+
+
+def additive_of(situation: Situation, reward: Any = None, seed: int = 5) -> Evaluator:
     """The evaluator by sums over labels, of LMB beliefs; by default with K = 1."""
-    rule = situation.fusion.linear_rule(len(situation.sensors))
-    shared = getattr(situation.fusion, "shares_prediction", False)
-    local = (situation.fused,) * len(situation.sensors) if shared else situation.beliefs
-    return AdditiveEvaluator.prepare(
+    rule, state = situation.fusion.linear_rule(len(situation.sensors)), situation.state
+    if getattr(situation.fusion, "shares_prediction", False):
+        state = replace(state, local=(situation.fused,) * len(situation.sensors))
+    return Evaluator.of_sums(
         situation.sensors,
         options_of(situation.sensors, situation.poses, situation.settings),
-        Sums(rule, situation.fused, tuple(local), time=situation.state.time),
+        rule,
         situation.settings,
         CauchySchwarzReward() if reward is None else reward,
+        state,
         rng=np.random.default_rng(seed),
     )
 

@@ -15,10 +15,12 @@ from control.examples import (
     C,
     Situation,
     additive_of,
+    cases_of,
     evaluator_of,
     lmb,
     mobile_sensor,
     situation,
+    sums_of,
 )
 from control.known_association import followed, measurement_moments
 from vedette import models
@@ -66,7 +68,7 @@ def test_labels_are_followed_as_in_plain_numpy(method: str) -> None:
     evaluator = evaluator_of(example)
     labels, futures = draw_futures(example.fused, example.sensors, KNOWN, rng=np.random.default_rng(5))
     for s, (belief, sensor) in enumerate(zip(example.beliefs, example.sensors, strict=True)):
-        tracks, cases = single_gaussians(belief.tracks), evaluator.posteriors[s]
+        tracks, cases = single_gaussians(belief.tracks), cases_of(evaluator).posteriors[s]
         for course, sample in np.ndindex(len(evaluator.options[s].courses), KNOWN.num_samples):
             ends = cases.density(course * KNOWN.num_samples + sample)
             assert isinstance(ends, LMB)
@@ -127,8 +129,8 @@ def test_known_association_is_the_full_update_where_labels_are_apart_and_always_
     """Nothing else can have given the measurement, and nothing else can have been measured."""
     example = single(situation("lmb", 2, 6, SETTINGS, detection=models.constant_detection(1.0 - 1e-13)))
     for full, known in zip(
-        evaluator_of(example).posteriors,
-        evaluator_of(replace(example, settings=KNOWN)).posteriors,
+        cases_of(evaluator_of(example)).posteriors,
+        cases_of(evaluator_of(replace(example, settings=KNOWN))).posteriors,
         strict=True,
     ):
         # Who is not in a sample can only have given another's measurement, with next to no existence.
@@ -143,7 +145,7 @@ def test_lines_and_ascents_give_what_joint_actions_give() -> None:
     """The same numbers, whichever way they are asked for; and no sensor alone can improve the end of an ascent."""
     for seed in range(5):
         evaluator = additive_of(shared(3, seed), CauchySchwarzReward("reference"))
-        additive, actions = evaluator.additive, all_joint_actions((3, 3, 3))
+        additive, actions = sums_of(evaluator), all_joint_actions((3, 3, 3))
         table = additive(actions).mean(axis=1).reshape(3, 3, 3)
         chosen = np.array([1, 2, 0])
         for s in range(3):
@@ -162,7 +164,7 @@ def test_lines_and_ascents_give_what_joint_actions_give() -> None:
 
 def test_an_ascent_takes_only_what_is_allowed() -> None:
     """A course that may not be taken, and two that may not be taken together."""
-    additive = additive_of(shared(3, 1), CauchySchwarzReward("reference")).additive
+    additive = sums_of(additive_of(shared(3, 1), CauchySchwarzReward("reference")))
     table = additive(all_joint_actions((3, 3, 3))).mean(axis=1).reshape(3, 3, 3)
     best = np.unravel_index(table.argmax(), table.shape)
     single_mask, together = np.ones(9, np.bool_), np.ones((9, 9), np.bool_)
@@ -181,7 +183,7 @@ def test_an_ascent_takes_only_what_is_allowed() -> None:
 def test_no_joint_action_is_better_than_the_bound(reward: Any) -> None:
     """By target, and for the expected loss also without trying what may be seen."""
     for seed in range(8):
-        additive = additive_of(shared(3, seed), reward).additive
+        additive = sums_of(additive_of(shared(3, seed), reward))
         best = additive(all_joint_actions((3, 3, 3))).mean(axis=1).max()
         tried = best_values(additive, 10**6)
         assert best <= tried.sum() + 1e-9 * abs(best)
@@ -202,7 +204,8 @@ def test_the_expected_loss_is_what_its_formula_says(steps: int, order: float, me
     last = np.array([example.state.time + steps * settings.horizon_period])
     example = replace(example, sensors=tuple(replace(own, scan_times=last) for own in example.sensors))
     evaluator = additive_of(example, ExpectedLossReward(60.0, order))
-    prediction, actions = evaluator.prediction, all_joint_actions((3, 3))
+    prediction: Any = evaluator.prediction
+    actions = all_joint_actions((3, 3))
     found = evaluator.joint()(actions)[:, 0]
     for joint, value in zip(actions.tolist(), found.tolist(), strict=True):
         total = 0.0

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy.special import expit
 
-from control.examples import SETTINGS, Situation, additive_of, evaluator_of, situation
+from control.examples import SETTINGS, Situation, additive_of, cases_of, evaluator_of, situation, sums_of
 from control.test_additive import KNOWN, shared, single
 from vedette.control import (
     CauchySchwarzReward,
@@ -53,7 +53,7 @@ def planned(example: Situation, reward: Any, kind: Any = JointPlanner) -> tuple[
     plan = kind(example.sensors, example.fusion, example.settings, reward).plan(
         *example.arguments, rng=np.random.default_rng(5)
     )
-    return plan, additive_of(example, reward).additive
+    return plan, sums_of(additive_of(example, reward))
 
 
 def near(found: Any, expected: Any, scale: float) -> None:
@@ -128,8 +128,9 @@ def test_existence_in_plain_numpy() -> None:
     """The expected GOSPA of the updated existence with the predicted covariance, sample by sample."""
     example, square = shared(2, 7), 50.0**2
     plan, _ = planned(example, ExpectedGospaReward(50.0))
-    gains, prediction = plan.explain().of_targets, additive_of(example).prediction
-    posteriors = [evaluator_of(example).posteriors[s] for s in range(2)]
+    gains = plan.explain().of_targets
+    prediction: Any = additive_of(example).prediction
+    posteriors = [cases_of(evaluator_of(example)).posteriors[s] for s in range(2)]
     assert gains is not None
     num = example.settings.num_samples
     for i, cov in enumerate(prediction.tracks.covs):
@@ -165,7 +166,7 @@ def _log_gaussian(off: Any, cov: Any) -> float:
 def test_targets_not_found_before_are_one_contribution() -> None:
     """Sensors share in it by what each finds before and after the others."""
     example = shared(3, 2)
-    additive = additive_of(example, ExpectedLossReward(60.0)).additive
+    additive = sums_of(additive_of(example, ExpectedLossReward(60.0)))
     rng = np.random.default_rng(0)
     offsets = np.arange(10) * 4
     cells = Cells(offsets, np.tile(np.arange(4), 9), np.log(rng.uniform(0.2, 1.0, 36)), rng.uniform(1.0, 100.0, 4))
@@ -298,8 +299,7 @@ def test_what_is_kept_has_left_its_evidence_behind() -> None:
         kept.explain().had(0, 0)
 
 
-def test_threads_change_no_explanation(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("vedette.control.shares._MANY", 0)
+def test_threads_change_no_explanation() -> None:
     found = []
     for num_threads in (1, 3):
         example = replace(shared(3, 2), settings=replace(KNOWN, num_threads=num_threads, num_samples=7))

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from control.examples import SETTINGS, evaluator_of, situation
+from control.examples import SETTINGS, cases_of, evaluator_of, sample_rewards, situation
 from vedette.control import CauchySchwarzReward, IndependentPlanner, JointPlanner, RenyiReward
-from vedette.control.laid_rewards import warn_slow
+from vedette.control.cases import warn_slow
 from vedette.densities import cardinality_distribution
 from vedette.divergence import cauchy_schwarz
 from vedette.errors import InputError, NumericalError, SlowRewardWarning
@@ -37,7 +37,7 @@ def test_a_reward_of_the_users_own(kind: str) -> None:
     evaluator = evaluator_of(example)
     densities = [
         [own.density(action * SETTINGS.num_samples + m) for action in range(3) for m in range(SETTINGS.num_samples)]
-        for own in evaluator.posteriors
+        for own in cases_of(evaluator).posteriors
     ]
     for s, table in enumerate(alone.tables):
         rewards = np.reshape([minus_cardinality_variance(None, one) for one in densities[s]], (3, -1))
@@ -92,8 +92,8 @@ class TrustsTheFirst:
 def test_a_fusion_of_the_users_own(kind: str) -> None:
     example = replace(situation(kind), fusion=TrustsTheFirst())
     evaluator = evaluator_of(example)
-    rewards = evaluator.sample_rewards((0, 1), example.fusion)
-    alone = evaluator.sample_rewards((0,), None)
+    rewards = sample_rewards(evaluator, (0, 1), example.fusion)
+    alone = sample_rewards(evaluator, (0,), None)
     np.testing.assert_allclose(rewards, np.repeat(alone, 3, axis=0), rtol=1e-9)
     plan = JointPlanner(example.sensors, example.fusion, SETTINGS, CauchySchwarzReward()).plan(
         *example.arguments, rng=np.random.default_rng(5)
@@ -117,10 +117,10 @@ class LaidOutBefore:
 
 def test_a_fusion_of_the_users_own_that_lays_out() -> None:
     example = situation("marginal")
-    expected = evaluator_of(example).sample_rewards((0, 1), example.fusion)
+    expected = sample_rewards(evaluator_of(example), (0, 1), example.fusion)
     fusion = LaidOutBefore(example.fusion.weights)
     evaluator = evaluator_of(replace(example, fusion=fusion))
-    np.testing.assert_array_equal(evaluator.sample_rewards((0, 1), fusion), expected)
+    np.testing.assert_array_equal(sample_rewards(evaluator, (0, 1), fusion), expected)
     assert (fusion.fused, evaluator.notes) == (0, {})
 
 

@@ -10,12 +10,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from control.examples import HEADINGS, SETTINGS, Situation, mobile_sensor, target_model
+from control.examples import HEADINGS, SETTINGS, Situation, mobile_sensor, sums_of, target_model
 from vedette import models
-from vedette.control import ExpectedLossReward, HorizonPlanner, IndependentPlanner, JointPlanner, KullbackLeiblerReward
-from vedette.control.additive.evaluator import AdditiveEvaluator
+from vedette.control import (
+    Evaluator,
+    ExpectedLossReward,
+    HorizonPlanner,
+    IndependentPlanner,
+    JointPlanner,
+    KullbackLeiblerReward,
+)
 from vedette.control.additive.look_on import at_all, continued, look_on
-from vedette.control.additive.situation import Sums
 from vedette.control.bounds import best_values, bound_of
 from vedette.control.evidence import Evidence
 from vedette.control.inputs import options_of
@@ -206,17 +211,18 @@ def undetected() -> UndetectedIntensity:
     return UndetectedIntensity(GRID, np.random.default_rng(3).uniform(0.0, 0.05, GRID.num_cells))
 
 
-def prepared(of: Situation, horizon: Any = None, later: Any = (), hidden: Any = None) -> AdditiveEvaluator:
+def prepared(of: Situation, horizon: Any = None, later: Any = (), hidden: Any = None) -> Evaluator:
     """By itself, with another horizon, or with later ones."""
     options, settings = options_of(of.sensors, of.poses, KNOWN), of.settings
     if horizon is not None:
         settings, options = horizon, tuple(continued(own, HORIZON, horizon.horizon_times()) for own in options)
-    return AdditiveEvaluator.prepare(
+    return Evaluator.of_sums(
         of.sensors,
         options,
-        Sums(ParallelUpdate().linear_rule(len(of.sensors)), of.fused, of.beliefs, hidden, 1.0),
+        ParallelUpdate().linear_rule(len(of.sensors)),
         settings,
         REWARD,
+        replace(of.state, undetected=hidden),
         looks=later,
         rng=np.random.default_rng(0),
     )
@@ -235,16 +241,16 @@ def test_at_all_is_the_mean_of_evaluators_that_are_prepared_one_by_one(hidden: b
     searched = undetected() if hidden else None
     later = tuple(replace(own, undetected_worth=of.settings.undetected_worth) for own in OTHERS)
     found, single = prepared(of, None, later, searched), [prepared(of, own, (), searched) for own in (None, *later)]
-    assert len({id(own) for own in found.additive.bases}) == (3 if different else 1)
+    assert len({id(own) for own in sums_of(found).bases}) == (3 if different else 1)
     actions = np.concatenate([all_joint_actions((3, 3, 3)), [[-1, 0, 1], [2, -1, -1], [-1, -1, -1]]])
 
     def mean(of_one: Any) -> Any:
-        return np.mean([of_one(own.additive) for own in single], axis=0)
+        return np.mean([of_one(sums_of(own)) for own in single], axis=0)
 
     def same(first: Any, second: Any) -> None:
         np.testing.assert_allclose(first, second, rtol=1e-12, atol=1e-12)
 
-    additive = found.additive
+    additive = sums_of(found)
     same(additive(actions), mean(lambda own: own(actions)))
     assert np.ptp(additive(actions)) > 0.01
     for s in range(3):
@@ -253,7 +259,7 @@ def test_at_all_is_the_mean_of_evaluators_that_are_prepared_one_by_one(hidden: b
         same(additive.line(np.array([1, 2, 0]), s), mean(lambda own, s=s: own.line(np.array([1, 2, 0]), s)))
     same(additive.lines(np.array([2, 0, 1])), mean(lambda own: own.lines(np.array([2, 0, 1]))))
     same(additive.each_alone(), mean(lambda own: own.each_alone()))
-    same(at_all([own.additive for own in single])(actions), additive(actions))
+    same(at_all([sums_of(own) for own in single])(actions), additive(actions))
     assert found.counts["filter_steps"] == sum(own.counts["filter_steps"] for own in single)
     assert (additive.looks, found.looks) == (3, later)
 
@@ -273,7 +279,7 @@ def test_the_bound_stays_one(hidden: bool) -> None:
         assert bound is not None
         assert (bound.kind, bound.unbounded) == ("by target", 0)
         assert every.max() <= bound.upper + 1e-9
-        tried, untried = (best_values(evaluator.additive, work) for work in (10**6, 0))
+        tried, untried = (best_values(sums_of(evaluator), work) for work in (10**6, 0))
         assert (tried <= untried + 1e-9).all()
 
 

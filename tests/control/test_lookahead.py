@@ -133,14 +133,14 @@ def test_nothing_is_evaluated_twice(search: Any) -> None:
 
     class Watched:
         def search(self, problem: Any, *, rng: np.random.Generator) -> None:
-            inner = problem.parts[0].rewards
+            inner = problem.parts[0]
 
             def rewards(joints: list[Any]) -> Any:
                 calls.extend(joints)
                 return inner(joints)
 
-            rewards.stage = inner.stage  # type: ignore[attr-defined]
-            problem.parts = (problem.parts[0]._replace(rewards=rewards),)
+            rewards.stage, rewards.weight = inner.stage, inner.weight  # type: ignore[attr-defined]
+            problem.parts = (rewards,)
             search.search(problem, rng=rng)
 
     decide(planner(given, depth=3, search=Watched(), budget=26), given)

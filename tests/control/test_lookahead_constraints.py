@@ -26,10 +26,9 @@ from vedette.control import (
     VoidProbability,
     void_probability,
 )
-from vedette.control.lookahead import constrained as constrained_module
+from vedette.control.lookahead import courses as courses_module
 from vedette.control.lookahead import rules as rules_module
-from vedette.control.lookahead import start as start_module
-from vedette.control.lookahead.courses import Stages
+from vedette.control.lookahead.ahead import Stages
 from vedette.densities import LMB, track_moments
 from vedette.fusion import Clmb
 from vedette.platforms import Sequences, Steps
@@ -359,10 +358,9 @@ def test_two_that_must_not_both_avoid_a_dead_end() -> None:
 
 
 def test_bounds_on_tries_leave_a_plan(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(start_module, "_MOST_TRIES", 3)
-    monkeypatch.setattr(rules_module, "_MOST_TRIES", 1)
-    monkeypatch.setattr(constrained_module, "_MOST_PLACES", 1)
-    for search in SEARCHES:
+    monkeypatch.setattr(courses_module, "_MOST_PLACES", 1)
+    for search, tries in itertools.product(SEARCHES, (1, 3)):
+        monkeypatch.setattr(rules_module, "_MOST_TRIES", tries)
         plan = decide(lmbs(3), [CONSTRAINTS["separation"]], depth=3, search=search, budget=20)
         assert plan.curve is not None
         assert plan.curve.evaluations[-1] <= 20

@@ -15,17 +15,19 @@ from control.examples import (
     B,
     C,
     Situation,
+    cases_of,
     crowded,
     evaluator_of,
     glmb,
     lmb,
     mobile_sensor,
+    sample_rewards,
     situation,
 )
 from control.plain_loop import plain_rewards
 from vedette import models
 from vedette.control import CauchySchwarzReward, RenyiReward
-from vedette.control.plain import PlainRewards
+from vedette.control.cases import PlainRewards
 from vedette.control.search import all_joint_actions
 from vedette.densities import GLMB, LMB
 from vedette.fusion import Clmb, CmDeltaGlmb, FusionLimits
@@ -46,10 +48,10 @@ def assert_equals_plain_loop(example: Situation, unit_volume: Any = 1.0, *, laid
     joint, alone = plain_rewards(example, unit_volume, SEED)
     evaluator = evaluator_of(example, CauchySchwarzReward(unit_volume), SEED)
     everyone = range(len(example.sensors))
-    np.testing.assert_allclose(evaluator.sample_rewards(everyone, example.fusion), joint, rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(sample_rewards(evaluator, everyone, example.fusion), joint, rtol=1e-9, atol=1e-9)
     assert laid_out == (not evaluator.notes)
     for s, expected in enumerate(alone):
-        np.testing.assert_allclose(evaluator.sample_rewards((s,), None), expected, rtol=1e-9, atol=1e-9)
+        np.testing.assert_allclose(sample_rewards(evaluator, (s,), None), expected, rtol=1e-9, atol=1e-9)
     assert np.ptp(joint, axis=0).max() > 1e-5
     return joint
 
@@ -111,14 +113,14 @@ def test_caps_of_the_pseudo_updates_are_the_filters_own() -> None:
     example = replace(example, beliefs=beliefs, fused=example.fusion.fuse(beliefs)[0])
     capped = assert_equals_plain_loop(example, "reference")
     free = evaluator_of(replace(example, settings=SETTINGS), CauchySchwarzReward("reference"), SEED)
-    assert not np.allclose(free.sample_rewards((0, 1), example.fusion), capped, rtol=1e-6)
+    assert not np.allclose(sample_rewards(free, (0, 1), example.fusion), capped, rtol=1e-6)
 
 
 def test_an_lmb_keeps_all_its_labels() -> None:
     example = situation("lmb")
-    expected = evaluator_of(example).sample_rewards((0, 1), example.fusion)
+    expected = sample_rewards(evaluator_of(example), (0, 1), example.fusion)
     few = replace(example, settings=replace(SETTINGS, limits=replace(EXACT_LIMITS, max_labels=1)))
-    np.testing.assert_array_equal(evaluator_of(few).sample_rewards((0, 1), example.fusion), expected)
+    np.testing.assert_array_equal(sample_rewards(evaluator_of(few), (0, 1), example.fusion), expected)
 
 
 @pytest.mark.parametrize("kind", ["delta", "marginal", "lmb"])
@@ -182,7 +184,7 @@ def test_mixtures_of_glmb_filters_are_fused_to_an_lmb_by_the_plain_path() -> Non
     example = situation("delta")
     example = replace(example, fusion=fusion, fused=fusion.fuse(example.beliefs)[0])
     joint, _ = plain_rewards(example, 1.0, SEED)
-    np.testing.assert_allclose(evaluator_of(example).sample_rewards((0, 1), fusion), joint, rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(sample_rewards(evaluator_of(example), (0, 1), fusion), joint, rtol=1e-9, atol=1e-9)
 
 
 def test_a_prediction_may_have_sets_of_weight_zero() -> None:
@@ -218,11 +220,17 @@ def test_the_general_path_gives_the_same_rewards(kind: str, num_sensors: int) ->
     evaluator = evaluator_of(example)
     for which, fusion in ((tuple(range(num_sensors)), example.fusion), ((0,), None)):
         actions = all_joint_actions(tuple(evaluator.joint_shape()[s] for s in which))
-        posteriors = [evaluator.posteriors[s] for s in which]
+        cases = cases_of(evaluator)
+        posteriors = [cases.posteriors[s] for s in which]
         general = PlainRewards(
-            posteriors, evaluator.prediction, fusion, evaluator.reward, SETTINGS.num_samples, evaluator.views
+            posteriors,
+            evaluator.prediction,
+            fusion,
+            cases_of(evaluator).reward,
+            SETTINGS.num_samples,
+            cases_of(evaluator).views,
         )
-        laid_out = evaluator.rewards(which, fusion)
+        laid_out = cases.rewards(which, fusion)
         np.testing.assert_allclose(laid_out(actions), general(actions), rtol=1e-9, atol=1e-9)
 
 
@@ -250,12 +258,15 @@ def test_rewards_of_power_integrals(reward: Any, kind: str, num_sensors: int) ->
         example = replace(example, fusion=clmb, fused=clmb.fuse(example.beliefs)[0])
     evaluator = evaluator_of(example, reward)
     if kind == "certain":
-        assert any(np.isneginf(own.log_weights).any() for own in evaluator.posteriors)
+        assert any(np.isneginf(own.log_weights).any() for own in cases_of(evaluator).posteriors)
     for which, fusion in ((tuple(range(num_sensors)), example.fusion), ((0,), None)):
         actions = all_joint_actions(tuple(evaluator.joint_shape()[s] for s in which))[-4:]
-        posteriors = [evaluator.posteriors[s] for s in which]
-        plain = PlainRewards(posteriors, evaluator.prediction, fusion, reward, SETTINGS.num_samples, evaluator.views)
-        np.testing.assert_allclose(evaluator.rewards(which, fusion)(actions), plain(actions), rtol=1e-9, atol=1e-9)
+        cases = cases_of(evaluator)
+        posteriors = [cases.posteriors[s] for s in which]
+        plain = PlainRewards(
+            posteriors, evaluator.prediction, fusion, reward, SETTINGS.num_samples, cases_of(evaluator).views
+        )
+        np.testing.assert_allclose(cases.rewards(which, fusion)(actions), plain(actions), rtol=1e-9, atol=1e-9)
     assert not evaluator.notes
 
 
@@ -265,9 +276,9 @@ def test_a_crowd_that_is_summed_in_part_is_still_laid_out(most: int) -> None:
     example = crowded(18)
     settings = replace(example.settings, limits=replace(example.settings.limits, max_hypotheses=most))
     evaluator = evaluator_of(replace(example, settings=settings))
-    assert all(np.isfinite(own.log_weights).all() for own in evaluator.posteriors)
-    assert np.isfinite(evaluator.sample_rewards((0, 1), example.fusion)).all()
-    assert np.isfinite(evaluator.sample_rewards((0,), None)).all()
+    assert all(np.isfinite(own.log_weights).all() for own in cases_of(evaluator).posteriors)
+    assert np.isfinite(sample_rewards(evaluator, (0, 1), example.fusion)).all()
+    assert np.isfinite(sample_rewards(evaluator, (0,), None)).all()
     assert not evaluator.notes
 
 
@@ -286,18 +297,18 @@ def test_a_subclass_is_asked_itself() -> None:
 
     example = situation("marginal")
     evaluator = evaluator_of(example)
-    expected = evaluator.sample_rewards((0, 1), example.fusion)
+    expected = sample_rewards(evaluator, (0, 1), example.fusion)
     assert not evaluator.notes
     for reward, factor, laid_out in ((Doubled(), 2.0, False), (Tripled(), 3.0, True)):
         other = evaluator_of(example, reward)
         for fusion, rewards in ((example.fusion, expected), (Fused((0.5, 0.5)), None)):
-            found = other.sample_rewards((0, 1), fusion)
-            rewards = factor * (evaluator.sample_rewards((0, 1), fusion) if rewards is None else rewards)
+            found = sample_rewards(other, (0, 1), fusion)
+            rewards = factor * (sample_rewards(evaluator, (0, 1), fusion) if rewards is None else rewards)
             np.testing.assert_allclose(found, rewards, rtol=1e-9, atol=1e-9)
             if fusion is example.fusion:
                 assert laid_out == (not other.notes)
-    fused = evaluator.sample_rewards((0, 1), Fused((0.5, 0.5)))
-    first = evaluator.sample_rewards((0,), None)
+    fused = sample_rewards(evaluator, (0, 1), Fused((0.5, 0.5)))
+    first = sample_rewards(evaluator, (0,), None)
     np.testing.assert_allclose(fused, np.repeat(first, 3, axis=0), rtol=1e-9, atol=1e-9)
 
 
@@ -308,6 +319,6 @@ def test_a_prediction_may_be_certain_of_a_label_that_a_glmb_filter_lacks() -> No
         fused = LMB(tracks, np.array([0.0, 0.0, existence_logit]))
         example = replace(situation("delta"), fusion=Clmb((0.5, 0.5), "moment_matched"), fused=fused)
         evaluator = evaluator_of(example)
-        assert not any(C in labels for labels in evaluator.posteriors[0].sets)
-        rewards.append(evaluator.sample_rewards((0,), None))
+        assert not any(C in labels for labels in cases_of(evaluator).posteriors[0].sets)
+        rewards.append(sample_rewards(evaluator, (0,), None))
     assert all(np.isfinite(values).all() for values in rewards)

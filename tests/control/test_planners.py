@@ -8,7 +8,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from control.examples import HEADINGS, SETTINGS, A, B, Situation, evaluator_of, glmb, mobile_sensor, situation
+from control.examples import (
+    HEADINGS,
+    SETTINGS,
+    A,
+    B,
+    Situation,
+    evaluator_of,
+    glmb,
+    mobile_sensor,
+    sample_rewards,
+    situation,
+)
 from vedette import models
 from vedette.control import (
     CauchySchwarzReward,
@@ -58,13 +69,13 @@ def test_tables_hold_mean_and_standard_error_over_the_samples(kind: str) -> None
     example = situation(kind)
     joint, independent = plans(example)
     evaluator = evaluator_of(example, CauchySchwarzReward("reference"))
-    samples = evaluator.sample_rewards((0, 1), example.fusion).reshape(3, 3, SETTINGS.num_samples)
+    samples = sample_rewards(evaluator, (0, 1), example.fusion).reshape(3, 3, SETTINGS.num_samples)
     np.testing.assert_allclose(joint.tables[0].mean, samples.mean(axis=2), rtol=1e-12)
     np.testing.assert_allclose(
         joint.tables[0].standard_error, samples.std(axis=2, ddof=1) / np.sqrt(SETTINGS.num_samples), rtol=1e-12
     )
     for s, table in enumerate(independent.tables):
-        own = evaluator.sample_rewards((s,), None)
+        own = sample_rewards(evaluator, (s,), None)
         np.testing.assert_allclose(table.mean, own.mean(axis=1), rtol=1e-12)
         np.testing.assert_allclose(
             table.standard_error, own.std(axis=1, ddof=1) / np.sqrt(SETTINGS.num_samples), rtol=1e-12

@@ -8,7 +8,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from control.examples import EXACT_LIMITS, POSES, SETTINGS, crowded, evaluator_of, mobile_sensor, situation
+from control.examples import (
+    EXACT_LIMITS,
+    POSES,
+    SETTINGS,
+    cases_of,
+    crowded,
+    evaluator_of,
+    mobile_sensor,
+    sample_rewards,
+    situation,
+)
 from control.plain_loop import plain_rewards
 from vedette import models
 from vedette.control.pseudo import draw_futures, pseudo_posteriors
@@ -26,7 +36,7 @@ def test_every_label_set_keeps_its_heaviest_hypothesis_beyond_the_caps() -> None
     example = situation("delta", seed=1, settings=replace(SETTINGS, limits=limits))
     evaluator = evaluator_of(example)
     for belief, sensor, pose, own in zip(
-        example.beliefs, example.sensors, example.poses, evaluator.posteriors, strict=True
+        example.beliefs, example.sensors, example.poses, cases_of(evaluator).posteriors, strict=True
     ):
         sets, groups = label_sets(belief)
         assert set(own.sets) == set(sets)
@@ -124,6 +134,6 @@ def test_targets_may_contend_for_more_measurements_than_there_was_room_for(num_t
         assert sizes.min() <= MAX_EXACT_MEASUREMENTS < sizes.max()
     joint, alone = plain_rewards(example, 1.0, seed=5)
     evaluator = evaluator_of(example, seed=5)
-    np.testing.assert_allclose(evaluator.sample_rewards((0, 1), example.fusion), joint, rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(sample_rewards(evaluator, (0, 1), example.fusion), joint, rtol=1e-9, atol=1e-9)
     for s, expected in enumerate(alone):
-        np.testing.assert_allclose(evaluator.sample_rewards((s,), None), expected, rtol=1e-9, atol=1e-9)
+        np.testing.assert_allclose(sample_rewards(evaluator, (s,), None), expected, rtol=1e-9, atol=1e-9)

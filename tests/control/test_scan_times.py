@@ -8,7 +8,19 @@ from typing import Any
 import numpy as np
 import pytest
 
-from control.examples import SETTINGS, A, B, C, Situation, additive_of, evaluator_of, lmb, situation
+from control.examples import (
+    SETTINGS,
+    A,
+    B,
+    C,
+    Situation,
+    additive_of,
+    cases_of,
+    evaluator_of,
+    lmb,
+    sample_rewards,
+    situation,
+)
 from control.known_association import followed
 from control.plain_loop import plain_rewards
 from vedette.control import (
@@ -82,9 +94,9 @@ def test_case_by_case_as_the_filters_themselves(kind: str, times: Any) -> None:
     example = scanning(situation(kind), *times)
     joint, alone = plain_rewards(example, 1.0, 5)
     evaluator = evaluator_of(example, CauchySchwarzReward())
-    np.testing.assert_allclose(evaluator.sample_rewards((0, 1), example.fusion), joint, rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(sample_rewards(evaluator, (0, 1), example.fusion), joint, rtol=1e-9, atol=1e-9)
     for s, expected in enumerate(alone):
-        np.testing.assert_allclose(evaluator.sample_rewards((s,), None), expected, rtol=1e-9, atol=1e-9)
+        np.testing.assert_allclose(sample_rewards(evaluator, (s,), None), expected, rtol=1e-9, atol=1e-9)
 
 
 @pytest.mark.parametrize("times", [FIRST, SECOND, NEVER])
@@ -93,7 +105,7 @@ def test_by_sums_as_in_plain_numpy(times: Any) -> None:
     example = scanning(situation("lmb", seed=2, settings=known), times, None)
     evaluator = evaluator_of(example)
     labels, (futures, _) = draw_futures(example.fused, example.sensors, known, rng=np.random.default_rng(5))
-    belief, sensor, cases = example.beliefs[0], example.sensors[0], evaluator.posteriors[0]
+    belief, sensor, cases = example.beliefs[0], example.sensors[0], cases_of(evaluator).posteriors[0]
     tracks = single_gaussians(belief.tracks)
     for course, sample in np.ndindex(len(evaluator.options[0].courses), known.num_samples):
         ends = cases.density(course * known.num_samples + sample)

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from control.examples import SETTINGS, A, B, Situation, evaluator_of, glmb, situation
-from vedette.control.versions import share_versions
+from control.examples import SETTINGS, A, B, Situation, evaluator_of, glmb, sample_rewards, situation
+from vedette.control.priors import share_versions
 from vedette.densities import GLMB, TrackTable, existence_probabilities
 
 SETS = [(A, B), (A, B), (A,), (B,), ()]
@@ -71,7 +71,7 @@ def test_rewards_change_by_little(divergence: float, change: float) -> None:
     for most in (0.0, 2.0 * divergence):
         settings = replace(SETTINGS, max_version_divergence=most)
         own = Situation(example.sensors, example.fusion, settings, beliefs, belief, example.poses)
-        found.append(evaluator_of(own).sample_rewards((0, 1), example.fusion))
+        found.append(sample_rewards(evaluator_of(own), (0, 1), example.fusion))
     whole, shared = found
     assert not np.array_equal(whole, shared)
     assert np.abs(shared - whole).max() <= change * np.ptp(whole)

@@ -11,7 +11,7 @@ import pytest
 
 from control.examples import mobile_sensor
 from vedette.control import FixedPlanner, Plan, PlanningSettings, StayInside
-from vedette.control.watched import WatchedPlanner
+from vedette.control.baselines import WatchedPlanner
 from vedette.densities import LMB
 from vedette.errors import InputError
 from vedette.models import Region

@@ -1,6 +1,6 @@
 """Where to send the sensors next: ideal measurements, rewards, joint action search, constraints, planners."""
 
-from vedette.control.additive.evaluator import AdditiveEvaluator
+from vedette.control.baselines import FixedPlanner, Planner, RandomPlanner, WatchedPlanner
 from vedette.control.constraints import (
     Constraint,
     KeepOut,
@@ -13,10 +13,10 @@ from vedette.control.constraints import (
     void_probability,
 )
 from vedette.control.evaluator import Evaluator
-from vedette.control.explanation import Explanation, Had, RunnerUp, TargetGains
+from vedette.control.explanation import Bound, Explanation, Had, RunnerUp, TargetGains
 from vedette.control.lookahead import BeamSearch, HorizonPlanner, SequenceProblem, SequenceSearch, TreeSearch
-from vedette.control.plan import Bound, Certainty, Plan, RewardTable, SearchCurve
-from vedette.control.planners import FixedPlanner, IndependentPlanner, JointPlanner, Planner, RandomPlanner
+from vedette.control.plan import Certainty, Plan, RewardTable, SearchCurve
+from vedette.control.planners import IndependentPlanner, JointPlanner
 from vedette.control.rewards import (
     CardinalityVarianceReward,
     CauchySchwarzReward,
@@ -40,10 +40,8 @@ from vedette.control.search import (
     SequentialGreedy,
 )
 from vedette.control.settings import MobileSensor, PlanningSettings, planning_limits
-from vedette.control.watched import WatchedPlanner
 
 __all__ = [
-    "AdditiveEvaluator",
     "AutomaticSearch",
     "BeamSearch",
     "Bound",

@@ -1,60 +1,54 @@
-"""The one evaluator behind all planners: expected rewards of actions, from the same pseudo-updates."""
+"""The one evaluator behind all planners: expected rewards of actions, and an account of what they took."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TypeAlias
+from typing import Any
 
 import numpy as np
 
+from vedette.control.additive.look_on import at_all, continued, look_on
+from vedette.control.additive.rewards import AdditiveRewards
+from vedette.control.additive.table import lay_out
+from vedette.control.cases import CaseRewards, SampleRewards
 from vedette.control.inputs import Belief
-from vedette.control.laid_rewards import lay_out_rewards, warn_slow
-from vedette.control.plain import PlainRewards
 from vedette.control.priors import predicted
-from vedette.control.pseudo import draw_futures, pseudo_posteriors
 from vedette.control.rewards.base import LabelReward, PowerReward, Reward
-from vedette.control.search import all_joint_actions
+from vedette.control.rewards.power import ExpectedLossReward
 from vedette.control.settings import MobileSensor, PlanningSettings
-from vedette.densities.cases import LabelledCases
-from vedette.errors import NumericalError
 from vedette.filters import shared_targets
-from vedette.fusion import Fusion, Views
+from vedette.fusion import Fusion, LinearRule
 from vedette.kernels.base.types import Floats, Ints
 from vedette.platforms import Options
 from vedette.tracking import State
 
-SampleRewards: TypeAlias = Callable[[Ints], Floats]
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Evaluator:
-    """Everything that the rewards of one decision depend on; the pseudo-updates are run once, in `prepare`.
+    """Everything that the rewards of one decision depend on; what takes long is done once, when it is prepared.
 
     Attributes:
-        sensors, fusion, settings, reward: as in the planners.
+        settings: as in the planners.
         options: for each sensor, its actions in printed order and the different courses that they lead to, which are
             what is evaluated.
         prediction: the fused density predicted to the horizon, one Gaussian a track.
-        posteriors: the pseudo-posteriors of each sensor.
-        looks: whether each sensor scans within the horizon.
-        counts: how many filter steps, fusions and divergences have been evaluated so far.
+        source: which rewards come from: the sensors' pseudo-posteriors, or sums over labels.
+        counts: how much of each thing has been evaluated so far.
         notes: what a reader of the decision must know, in the order in which it came up (keys; no values).
+        looks: horizons beyond that of the settings.
     """
 
-    sensors: tuple[MobileSensor, ...]
-    fusion: Fusion
     settings: PlanningSettings
-    reward: Reward | PowerReward | LabelReward
     options: tuple[Options, ...]
     prediction: Belief
-    posteriors: tuple[LabelledCases, ...]
-    looks: tuple[bool, ...]
-    counts: dict[str, int] = field(default_factory=dict)
+    source: CaseRewards | AdditiveRewards
+    counts: dict[str, int]
     notes: dict[str, None] = field(default_factory=dict)
+    looks: tuple[PlanningSettings, ...] = ()
 
     @classmethod
-    def prepare(
+    def of_cases(
         cls,
         sensors: Sequence[MobileSensor],
         options: Sequence[Options],
@@ -65,86 +59,76 @@ class Evaluator:
         *,
         rng: np.random.Generator,
     ) -> Evaluator:
-        """Draw the samples, predict, and run the pseudo-updates of every sensor (paper section III-B, steps 1 to 4).
+        """By the sensors' own filters; raises as `JointPlanner.plan`."""
+        prediction = _prediction(sensors, state, settings)
+        cases = CaseRewards.prepare(sensors, options, fusion, settings, reward, state, prediction, rng=rng)
+        return cls(settings, tuple(options), prediction, cases, cases.counts, cases.notes)
 
-        Raises as `JointPlanner.plan`.
+    @classmethod
+    def of_sums(
+        cls,
+        sensors: Sequence[MobileSensor],
+        options: Sequence[Options],
+        rule: LinearRule,
+        settings: PlanningSettings,
+        reward: Any,
+        state: State,
+        *,
+        looks: tuple[PlanningSettings, ...] | None = (),
+        rng: np.random.Generator,
+    ) -> Evaluator:
+        """By sums over labels, each followed over every course that reaches it; beliefs are LMBs.
+
+        looks: further horizons, at whose ends the expected loss is taken as well; None: those that are due
+        (`vedette.control.additive.look_on`). Raises as `JointPlanner.plan`.
         """
-        targets = shared_targets([sensor.filter for sensor in sensors])
-        prediction = predicted(state.fused, targets.motion, settings.horizon_steps, settings.horizon_period)
-        labels, futures = draw_futures(state.fused, sensors, settings, rng=rng)
-        scans = tuple(sensor.scans(state.time, settings) for sensor in sensors)
-        posteriors = tuple(
-            pseudo_posteriors(belief, sensor, own.courses, labels, future, settings, when)
-            for belief, sensor, own, future, when in zip(state.local, sensors, options, futures, scans, strict=True)
-        )
-        steps = sum(len(own.courses) for own in options) * settings.num_samples * settings.horizon_steps
-        counts = {"filter_steps": steps, "fusions": 0, "divergences": 0}
-        looks = tuple(bool(own.any()) for own in scans)
-        return cls(tuple(sensors), fusion, settings, reward, tuple(options), prediction, posteriors, looks, counts)
+        prediction = _prediction(sensors, state, settings)
+        found = [lay_out(sensors, options, rule, settings, reward, state, prediction, rng=rng)]
+        if looks is None:
+            due = isinstance(reward, ExpectedLossReward)
+            looks = look_on(sensors, options, prediction, settings) if due else ()
+        for own in looks:
+            later = [continued(each, settings.horizon_times(), own.horizon_times()) for each in options]
+            ahead = _prediction(sensors, state, own)
+            found.append(lay_out(sensors, later, rule, own, reward, state, ahead, rng=rng))
+        steps = [len(each.table.labels) * each.num_samples for each in found]
+        horizons = [own.horizon_steps for own in (settings, *looks)]
+        counts = {"filter_steps": int(np.dot(steps, horizons)), "rewards": 0}
+        source = at_all(found) if looks else found[0]
+        return cls(settings, tuple(options), prediction, source, counts, looks=looks)
+
+    @property
+    def additive(self) -> AdditiveRewards | None:
+        """The sums over labels that rewards are made of; None where they are not: then there are no lines or bounds."""
+        return self.source.additive
 
     def joint_shape(self) -> tuple[int, ...]:
         """Number of different courses of each sensor."""
         return tuple(len(own.courses) for own in self.options)
 
     def joint(self) -> SampleRewards:
-        """Of all sensors, fused: the function that gives (num_joint, num_samples) rewards; see `rewards`."""
-        return self.rewards(range(len(self.sensors)), self.fusion)
+        """The function that gives (num_joint, num_samples) rewards of joint actions (num_joint, num_sensors).
+
+        Their actions are numbers of different courses. NaN, or a `NumericalError`, where a reward is not finite.
+        """
+        return self._counted(self.source.joint())
 
     def alone(self, sensor: int) -> SampleRewards:
-        """Of one sensor's own density, actions (num, 1)."""
-        return self.rewards((sensor,), None)
+        """The same of one sensor's own density, actions (num, 1)."""
+        return self._counted(self.source.alone(sensor))
 
-    def rewards(self, which: Sequence[int], fusion: Fusion | None) -> SampleRewards:
-        """The function that gives (num_joint, num_samples) rewards of joint actions (num_joint, num of `which`).
-
-        which: the sensors that act. Their actions are numbers of different courses. fusion: None for a single sensor,
-        whose own density is then compared with the prediction. The function raises `NumericalError` where a reward is
-        not finite, which names the action and the sample.
-        """
-        compute = self._compute([self.posteriors[s] for s in which], fusion)
+    def _counted(self, rewards: SampleRewards) -> SampleRewards:
+        if self.additive is None:
+            return rewards
 
         def evaluate(actions: Ints) -> Floats:
-            rewards = compute(actions)
-            self.counts["divergences"] += rewards.size
-            self.counts["fusions"] += rewards.size if fusion is not None else 0
-            self._check_finite(which, actions, rewards)
-            return rewards
+            found = rewards(actions)
+            self.counts["rewards"] += found.size
+            return found
 
         return evaluate
 
-    def _compute(self, posteriors: Sequence[LabelledCases], fusion: Fusion | None) -> SampleRewards:
-        laid = lay_out_rewards(posteriors, self.prediction, fusion, self.reward)
-        if not isinstance(laid, str):
-            return laid
-        self.notes[f"rewards were computed one by one: {laid}"] = None
-        warn_slow(laid)
-        return PlainRewards(posteriors, self.prediction, fusion, self.reward, self.settings.num_samples, self.views)
 
-    def views(self, chosen: Sequence[int]) -> Views:
-        """What the sensors could see at the end of chosen courses, and what all their updates began with."""
-        models = tuple(sensor.filter.sensor for sensor in self.sensors)
-        poses = np.stack([own.courses[course, -1] for own, course in zip(self.options, chosen, strict=True)])
-        return Views(models, poses, self.looks, self.prediction)
-
-    def sample_rewards(self, which: Sequence[int], fusion: Fusion | None) -> Floats:
-        """(num_joint, num_samples) rewards of all joint actions of the sensors `which`, the last one's fastest."""
-        shape = self.joint_shape()
-        return self.rewards(which, fusion)(all_joint_actions(tuple(shape[s] for s in which)))
-
-    def account(self) -> tuple[dict[str, int], tuple[str, ...]]:
-        """Counts and notes so far, as a plan holds them."""
-        return dict(self.counts), tuple(self.notes)
-
-    def _check_finite(self, which: Sequence[int], actions: Ints, rewards: Floats) -> None:
-        bad = np.argwhere(~np.isfinite(rewards))
-        if len(bad):
-            joint, sample = bad[0].tolist()
-            courses = zip(which, actions[joint].tolist(), strict=True)
-            named = (
-                f"action {self.options[s].actions.text(self.options[s].first_action(course))} of sensor {s + 1}"
-                for s, course in courses
-            )
-            raise NumericalError(
-                f"reward of {' and '.join(named)}, sample {sample}: expected a finite number; "
-                f"got {rewards[joint, sample]}"
-            )
+def _prediction(sensors: Sequence[MobileSensor], state: State, settings: PlanningSettings) -> Any:
+    motion = shared_targets([sensor.filter for sensor in sensors]).motion
+    return predicted(state.fused, motion, settings.horizon_steps, settings.horizon_period)

@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from vedette.control.evaluator import SampleRewards
+from vedette.control.cases import SampleRewards
+from vedette.control.evaluator import Evaluator
 from vedette.control.plan import RewardTable, SearchCurve
-from vedette.control.preparation import AnyEvaluator
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats, Ints
 
@@ -24,7 +24,7 @@ _MAX_AXES = 32
 _BLOCK = 4_000_000
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(slots=True, eq=False)
 class Evidence:
     """Mean rewards of the joint actions of some sensors, and every one that was ever asked for.
 
@@ -33,23 +33,24 @@ class Evidence:
         which: the sensors.
         rewards: their sample rewards.
         shape: number of different courses of each of the sensors.
+        keeps: whether `evaluate` keeps the rewards of all samples.
         most_by_target: what `vedette.control.bounds` found, where it was asked.
     """
 
-    evaluator: AnyEvaluator
+    evaluator: Evaluator
     which: tuple[int, ...]
     rewards: SampleRewards
+    keeps: bool = False
     shape: tuple[int, ...] = field(init=False)
-    _actions: list[Ints] = field(default_factory=list)
-    _means: list[Floats] = field(default_factory=list)
-    _errors: list[Floats] = field(default_factory=list)
+    _noted: list[tuple[Ints, Floats, Floats]] = field(default_factory=list)  # joint actions, means, errors
+    _samples: list[tuple[Ints, Floats]] = field(default_factory=list)
     _evaluations: list[int] = field(default_factory=list)
     _best: list[float] = field(default_factory=list)
     most_by_target: list[tuple[float, int]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         shape = self.evaluator.joint_shape()
-        object.__setattr__(self, "shape", tuple(shape[s] for s in self.which))
+        self.shape = tuple(shape[s] for s in self.which)
 
     def evaluate(self, actions: Ints) -> Floats:
         """(num,) mean rewards of joint actions (num, num_sensors); -inf where one is no number.
@@ -62,10 +63,21 @@ class Evidence:
             raise InputError(f"joint actions: expected rows of whole numbers below {self.shape}; got {actions!r}")
         checked = checked.astype(np.int64)
         size = max(1, _BLOCK // self.evaluator.settings.num_samples)
-        means = [
-            self.note(checked[i : i + size], self.rewards(checked[i : i + size])) for i in range(0, len(checked), size)
-        ]
-        return np.asarray(np.concatenate([np.empty(0), *means]))
+        means = [np.empty(0)]
+        for part in (checked[i : i + size] for i in range(0, len(checked), size)):
+            rewards = self.rewards(part)
+            if self.keeps:
+                self._samples.append((part, rewards))
+            means.append(self.note(part, rewards))
+        return np.asarray(np.concatenate(means))
+
+    def samples(self) -> Floats | None:
+        """(num_joint, num_samples) rewards that were kept, in printed order; None unless each was asked for once."""
+        num = sum(len(actions) for actions, _ in self._samples)
+        if num != math.prod(self.shape) or not self.is_complete():
+            return None
+        places = np.concatenate([np.ravel_multi_index(tuple(actions.T), self.shape) for actions, _ in self._samples])
+        return np.asarray(np.concatenate([rewards for _, rewards in self._samples])[np.argsort(places)])
 
     def note(self, actions: Ints, rewards: Floats) -> Floats:
         """Keep what was evaluated, (num, num_samples) rewards; returns their means, -inf where one is no number."""
@@ -78,9 +90,7 @@ class Evidence:
             mean, error = np.where(bad, math.nan, mean), np.where(bad, math.nan, error)
             first = self._named(actions[int(np.flatnonzero(bad)[0])])
             self.evaluator.notes[f"joint actions without a finite reward were left out, the first: {first}"] = None
-        self._actions.append(actions)
-        self._means.append(mean)
-        self._errors.append(error)
+        self._noted.append((actions, mean, error))
         ranked = np.where(bad, -math.inf, mean)
         self.progress(len(actions), float(ranked.max(initial=-math.inf)))
         return ranked
@@ -95,17 +105,21 @@ class Evidence:
         """The largest mean reward that was found."""
         return self._best[-1]
 
+    def _all(self) -> tuple[Ints, Floats, Floats]:
+        """Joint actions, means and errors in the order in which they were evaluated."""
+        actions, means, errors = zip(*self._noted, strict=True)
+        return np.concatenate(actions), np.concatenate(means), np.concatenate(errors)
+
     def is_complete(self) -> bool:
         """Whether every joint action was evaluated."""
         num = math.prod(self.shape)
-        if sum(map(len, self._actions)) < num:
+        if sum(len(actions) for actions, _, _ in self._noted) < num:
             return False
-        places = [np.ravel_multi_index(tuple(actions.T), self.shape) for actions in self._actions]
-        return len(np.unique(np.concatenate(places))) == num
+        return len(np.unique(np.ravel_multi_index(tuple(self._all()[0].T), self.shape))) == num
 
     def mean_of(self, choice: Sequence[int]) -> float:
         """Mean reward of a joint action that was evaluated."""
-        for actions, means in zip(self._actions, self._means, strict=True):
+        for actions, means, _ in self._noted:
             at = np.flatnonzero((actions == np.array(choice)).all(axis=1))
             if len(at):
                 return float(means[at[0]])
@@ -121,22 +135,19 @@ class Evidence:
 
         Of equal ones the first that was evaluated.
         """
-        found: tuple[tuple[int, ...], float] | None = None
-        for actions, means in zip(self._actions, self._means, strict=True):
-            same = (actions == np.array(choice)).all(axis=1)
-            others = np.where(same | np.isnan(means), -math.inf, means)
-            at = int(np.argmax(others)) if len(others) else 0
-            if len(others) and others[at] > (-math.inf if found is None else found[1]):
-                found = tuple(actions[at].tolist()), float(others[at])
-        return found
+        actions, means, _ = self._all()
+        others = np.where((actions == np.array(choice)).all(axis=1) | np.isnan(means), -math.inf, means)
+        at = int(np.argmax(others))
+        return (tuple(actions[at].tolist()), float(others[at])) if others[at] > -math.inf else None
 
     def foremost(self, choice: Sequence[int], most: int) -> Ints:
         """(num, num_sensors) up to `most` joint actions of the largest means found, the choice first among equals.
 
         In printed order, those without a finite mean left out but for the choice.
         """
-        actions, places = np.unique(np.concatenate(self._actions), axis=0, return_index=True)
-        means = np.concatenate(self._means)[places]
+        noted, means, _ = self._all()
+        actions, places = np.unique(noted, axis=0, return_index=True)
+        means = means[places]
         own = (actions == np.array(choice)).all(axis=1)
         order = np.lexsort((~own, np.where(np.isnan(means), math.inf, -means)))
         order = order[own[order] | np.isfinite(means[order])][:most]
@@ -156,7 +167,7 @@ class Evidence:
 
     def holds(self, choice: Sequence[int]) -> bool:
         """Whether this joint action has been evaluated."""
-        return any((actions == np.array(choice)).all(axis=1).any() for actions in self._actions)
+        return any((actions == np.array(choice)).all(axis=1).any() for actions, _, _ in self._noted)
 
     def tables(self, choice: Sequence[int]) -> tuple[RewardTable, ...]:
         """One table of all that was evaluated, gaps elsewhere; or, where it would be too large, a line a sensor.
@@ -164,11 +175,7 @@ class Evidence:
         A line holds one sensor's actions with the others at their `choice`.
         """
         num_entries = math.prod(len(self.evaluator.options[s].actions) for s in self.which)
-        actions, means, errors = (
-            np.concatenate(self._actions),
-            np.concatenate(self._means),
-            np.concatenate(self._errors),
-        )
+        actions, means, errors = self._all()
         if num_entries <= MAX_TABLE and len(self.which) <= _MAX_AXES:
             return (self._table(self.which, actions, means, errors),)
         off = actions != np.array(choice, np.int64)

@@ -10,11 +10,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vedette.control.additive.evaluator import AdditiveEvaluator
 from vedette.control.additive.rewards import AdditiveRewards
 from vedette.control.evidence import Evidence
-from vedette.control.explanation import Explanation, Had, RunnerUp, TargetGains
-from vedette.control.plan import Bound
+from vedette.control.explanation import Bound, Explanation, Had, RunnerUp, TargetGains
 from vedette.control.shares import Shares, shares_of
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats, Ints
@@ -38,15 +36,13 @@ class Part(NamedTuple):
     @classmethod
     def together(cls, evidence: Evidence, chosen: Sequence[int]) -> Part:
         """Of all sensors."""
-        evaluator = evidence.evaluator
-        return cls(evidence, tuple(chosen), evaluator.additive if isinstance(evaluator, AdditiveEvaluator) else None)
+        return cls(evidence, tuple(chosen), evidence.evaluator.additive)
 
     @classmethod
     def alone(cls, evidence: Evidence, course: int) -> Part:
         """Of the one sensor of the evidence."""
-        evaluator, (sensor,) = evidence.evaluator, evidence.which
-        additive = evaluator.additive.alone(sensor) if isinstance(evaluator, AdditiveEvaluator) else None
-        return cls(evidence, (course,), additive)
+        additive, (sensor,) = evidence.evaluator.additive, evidence.which
+        return cls(evidence, (course,), None if additive is None else additive.alone(sensor))
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,9 +62,12 @@ class Questions:
     def __reduce__(self) -> Any:
         return type(None), ()
 
-    @cached_property
-    def explanation(self) -> Explanation:
+    def __call__(self) -> Explanation:
         """The answer to `Plan.explain`."""
+        return self._explanation
+
+    @cached_property
+    def _explanation(self) -> Explanation:
         chosen = tuple(own.text(action) for own, action in zip(self._actions, self._chosen_actions, strict=True))
         reward = sum(part.evidence.mean_of(part.chosen) for part in self.parts)
         runner_up = self._runner_up()
@@ -176,9 +175,9 @@ class Questions:
         other[part.evidence.which.index(int(sensor))] = int(self._options[sensor].which[index])
         difference = part.evidence.rewards(np.array([other]))[0] - self._samples[place]
         off = float(difference.mean())
-        assert self.explanation.reward is not None
+        assert self._explanation.reward is not None
         return Had(
-            int(sensor), self._actions[sensor].text(index), self.explanation.reward + off, off, _error(difference)
+            int(sensor), self._actions[sensor].text(index), self._explanation.reward + off, off, _error(difference)
         )
 
     def _index(self, sensor: int, action: int | None, columns: dict[str, float]) -> int:

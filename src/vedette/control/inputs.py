@@ -9,7 +9,7 @@ import numpy as np
 
 from vedette.control.constraints.protocol import Constraint
 from vedette.control.rewards.base import LabelReward, PowerReward
-from vedette.control.rewards.loss import ExpectedLossReward
+from vedette.control.rewards.power import ExpectedLossReward
 from vedette.control.settings import MobileSensor, PlanningSettings
 from vedette.densities import GLMB, LMB, FactoredGLMB, Labelled
 from vedette.errors import InputError

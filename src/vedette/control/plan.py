@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
-from vedette.control.explanation import Explanation
+from vedette.control.explanation import Bound, Explanation
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats, Ints
 from vedette.platforms import Actions
-
-if TYPE_CHECKING:
-    from vedette.control.explaining import Questions
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,42 +43,6 @@ class RewardTable:
                 f"reward table of sensors {self.sensors}: expected finite rewards with errors of 0 or more, "
                 "NaN in both where nothing was evaluated, and at least one that was"
             )
-
-
-@dataclass(frozen=True, slots=True)
-class Bound:
-    """How good the best joint action can be at most, on the same samples.
-
-    Attributes:
-        upper: no joint action has a larger mean reward; inf where nothing is known of some target.
-        reward: mean reward of the choice.
-        kind: "exhaustive": every joint action was evaluated; "by target": every target is given the joint action that
-            is best for it.
-        unbounded: labels of which nothing is known, as too many sensors may see them.
-    """
-
-    upper: float
-    reward: float
-    kind: str
-    unbounded: int = 0
-
-    @property
-    def gap(self) -> float:
-        """How much better the best can be, in units of the reward."""
-        return self.upper - self.reward
-
-    @property
-    def relative(self) -> float:
-        """The gap relative to the magnitude of the bound or of the reward, the larger one; 0 for no gap."""
-        scale = max(abs(self.upper), abs(self.reward))
-        return self.gap / scale if self.gap > 0.0 else 0.0
-
-    def __str__(self) -> str:
-        if self.kind == "exhaustive":
-            return "the best of all joint actions"
-        if self.unbounded:
-            return f"no bound: {self.unbounded} targets may be seen in too many ways"
-        return f"at most {self.gap:.4g} ({100.0 * self.relative:.2g} %) below the best"
 
 
 class Certainty(NamedTuple):
@@ -142,7 +104,7 @@ class Plan:
             actions that were chosen, the first of which is to be taken; else empty.
         certainty: how the decision ended where it takes as many samples as it needs; else None.
         explanation: why it is what it is, where that has been worked out to be kept; see `explain`.
-        questions: the evidence, which `explain` works on; None once it is left behind (`settled`, a pickle, a record).
+        questions: what `explain` asks, with the evidence; None once it is left behind (`settled`, a pickle, a record).
     """
 
     planner: str
@@ -155,7 +117,7 @@ class Plan:
     bound: Bound | None = None
     certainty: Certainty | None = None
     explanation: Explanation | None = None
-    questions: Questions | None = field(default=None, repr=False, compare=False)
+    questions: Callable[[], Explanation] | None = field(default=None, repr=False, compare=False)
     sequence: tuple[Floats, ...] = ()
 
     def explain(self) -> Explanation:
@@ -167,7 +129,7 @@ class Plan:
             InputError: a plan that was kept or sent without its explanation, or made by a planner that gives none.
         """
         if self.questions is not None:
-            return self.questions.explanation
+            return self.questions()
         if self.explanation is not None:
             return self.explanation
         chosen = tuple(own.text(index) for own, index in zip(self.actions, self.chosen, strict=True))
@@ -184,7 +146,7 @@ class Plan:
         """The plan to be kept: without its evidence, which takes memory; with its explanation where that is wanted."""
         kept = self.explanation
         if explained and self.questions is not None:
-            kept = self.questions.explanation.without_evidence()
+            kept = self.questions().without_evidence()
         return replace(self, explanation=kept, questions=None)
 
     @property

@@ -1,45 +1,23 @@
-"""Planners: joint and independent decision making (paper, Algorithms 2 and 3), random and fixed actions."""
+"""Planners: joint and independent decision making (paper, Algorithms 2 and 3)."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Protocol
 
 import numpy as np
 
-from vedette.control.allowed import mask_of_decision, single_mask
-from vedette.control.bounds import bound_of
-from vedette.control.constraints import Constraint, repaired
-from vedette.control.cutoff import beyond_cutoff
-from vedette.control.evidence import Evidence
-from vedette.control.explaining import Part, Questions
-from vedette.control.inputs import check_poses, check_steering, check_valuing, options_of
-from vedette.control.plan import Plan, RewardTable
+from vedette.control.constraints import Constraint
+from vedette.control.deciding import decide_alone, decide_jointly
+from vedette.control.inputs import check_steering, check_valuing
+from vedette.control.plan import Plan
 from vedette.control.preparation import AnyReward, Preparation, check_sums, stay_glmbs
-from vedette.control.problem import searched
 from vedette.control.rewards import ExpectedLossReward
-from vedette.control.rounds import Decided, decide_alone, decide_jointly
-from vedette.control.search import AutomaticSearch, JointSearch, SequentialGreedy, all_joint_actions, first_best
+from vedette.control.search import AutomaticSearch, JointSearch, SequentialGreedy
 from vedette.control.settings import MobileSensor, PlanningSettings
-from vedette.filters import labels_targets
 from vedette.fusion import Fusion
 from vedette.kernels.base.types import Floats
-from vedette.models.arguments import generator, instance, reject, sequence
-from vedette.platforms import Actions
+from vedette.models.arguments import generator, instance, reject
 from vedette.tracking import State
-
-
-class Planner(Protocol):
-    """Chooses an action for every sensor."""
-
-    @property
-    def name(self) -> str:
-        """Name of the strategy, as in `Plan.planner`."""
-        ...
-
-    def plan(self, state: State, poses: Floats, *, rng: np.random.Generator) -> Plan:
-        """Decide from what a tracker believes after a scan and the poses (num_sensors, 3 or more)."""
-        ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -101,27 +79,7 @@ class JointPlanner:
         """
         generator(rng)
         prepared = Preparation.of(self.sensors, self.fusion, self.settings, self.reward, state, poses, self.constraints)
-        if prepared.races:
-            return _plan_of(self.name, prepared, decide_jointly(prepared, self.search, rng=rng), self.notes)
-        evaluator = prepared.evaluator(self.settings.num_samples, rng=rng)
-        evidence = Evidence(evaluator, tuple(range(len(self.sensors))), evaluator.joint())
-        best = searched(self.search, evidence, prepared.mask, rng=rng)
-        chosen = tuple(own.first_action(course) for own, course in zip(evaluator.options, best, strict=True))
-        actions = tuple(own.actions for own in evaluator.options)
-        tables, (counts, found), bound = evidence.tables(best), evaluator.account(), bound_of(evidence, best)
-        notes = (*self.notes, *found, *beyond_cutoff(evaluator, best))
-        return Plan(
-            self.name,
-            actions,
-            chosen,
-            tables,
-            counts,
-            notes,
-            evidence.curve(),
-            bound,
-            prepared.certainty,
-            questions=Questions(self.name, (Part.together(evidence, best),), bound),
-        )
+        return decide_jointly(self.name, prepared, self.search, self.notes, rng=rng)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -160,108 +118,4 @@ class IndependentPlanner:
         """Each sensor's action of largest mean reward; arguments, ties and errors as `JointPlanner.plan`."""
         generator(rng)
         prepared = Preparation.of(self.sensors, self.fusion, self.settings, self.reward, state, poses, self.constraints)
-        if prepared.races:
-            return _plan_of(self.name, prepared, decide_alone(prepared, rng=rng), self.notes)
-        evaluator = prepared.evaluator(self.settings.num_samples, rng=rng)
-        courses: list[int] = []
-        tables: list[RewardTable] = []
-        parts: list[Part] = []
-        for s, own in enumerate(evaluator.options):
-            evidence = Evidence(evaluator, (s,), evaluator.alone(s))
-            allowed = all_joint_actions((len(own.courses),))[single_mask(prepared.mask, s, len(own.courses))]
-            best = int(allowed[first_best(evidence.evaluate(allowed)), 0])
-            courses.append(best)
-            tables.extend(evidence.tables((best,)))
-            parts.append(Part.alone(evidence, best))
-        counts, found = evaluator.account()
-        return Plan(
-            self.name,
-            tuple(own.actions for own in evaluator.options),
-            tuple(own.first_action(course) for own, course in zip(evaluator.options, courses, strict=True)),
-            tuple(tables),
-            counts,
-            (*self.notes, *found, *beyond_cutoff(evaluator, courses)),
-            certainty=prepared.certainty,
-            questions=Questions(self.name, tuple(parts)),
-        )
-
-
-def _plan_of(name: str, prepared: Preparation, decided: Decided, notes: tuple[str, ...]) -> Plan:
-    """The plan of a decision that took as many samples as it needed, and says so."""
-    chosen = tuple(own.first_action(course) for own, course in zip(prepared.options, decided.best, strict=True))
-    actions = tuple(own.actions for own in prepared.options)
-    told, certainty = (*notes, *decided.notes, str(decided.certainty)), decided.certainty
-    return Plan(name, actions, chosen, decided.tables, decided.counts, told, decided.curve, decided.bound, certainty)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class RandomPlanner:
-    """Every sensor takes one of its different courses at random, each as likely (the paper's baseline).
-
-    Attributes:
-        sensors: the sensors.
-        settings: the horizon, over which courses are told apart.
-        constraints: what the sensors must not do; a joint action that is drawn and not allowed is moved to one near it.
-
-    Raises:
-        InputError: parts of another kind, or constraints that look at beliefs with filters that have no labels.
-    """
-
-    sensors: tuple[MobileSensor, ...]
-    settings: PlanningSettings = field(default_factory=PlanningSettings)
-    constraints: tuple[Constraint, ...] = ()
-
-    def __post_init__(self) -> None:
-        check_steering(self)
-        asking = [own.name for own in self.constraints if own.needs_beliefs]
-        if asking and not all(labels_targets(sensor.filter) for sensor in self.sensors):
-            raise reject("constraints", "none that asks where targets will be, as filters have no labels", asking[0])
-
-    @property
-    def name(self) -> str:
-        """The strategy "random"."""
-        return "random"
-
-    def plan(self, state: State, poses: Floats, *, rng: np.random.Generator) -> Plan:
-        """Drawn from `rng`; the beliefs are not looked at, but by constraints."""
-        generator(rng)
-        options, fused = options_of(self.sensors, poses, self.settings), None
-        if self.constraints:
-            instance("state", state, State)
-            fused = state.fused
-        mask = mask_of_decision(self.constraints, self.sensors, options, fused, np.asarray(poses), self.settings)
-        drawn = tuple(int(rng.integers(len(own.courses))) for own in options)
-        joint = drawn if mask is None else repaired(mask, drawn)
-        chosen = tuple(own.first_action(course) for own, course in zip(options, joint, strict=True))
-        return Plan(self.name, tuple(own.actions for own in options), chosen, (), {}, mask.notes if mask else ())
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class FixedPlanner:
-    """Every sensor keeps to an action set beforehand.
-
-    Attributes:
-        actions: for each sensor its one action, in the columns of its platform: `Actions.of(heading_deg=30.0)`.
-
-    Raises:
-        InputError: no sensor, or not one action of each.
-    """
-
-    actions: tuple[Actions, ...]
-
-    def __post_init__(self) -> None:
-        expected = "one action of each sensor, such as Actions.of(heading_deg=30.0)"
-        given = sequence("actions", self.actions, expected)
-        if not given or not all(isinstance(own, Actions) and len(own) == 1 for own in given):
-            raise reject("actions", expected, self.actions)
-
-    @property
-    def name(self) -> str:
-        """The strategy "fixed"."""
-        return "fixed"
-
-    def plan(self, state: State, poses: Floats, *, rng: np.random.Generator) -> Plan:
-        """The set actions, whatever is believed."""
-        generator(rng)
-        check_poses(poses, len(self.actions))
-        return Plan(self.name, self.actions, (0,) * len(self.actions), (), {})
+        return decide_alone(self.name, prepared, self.notes, rng=rng)

@@ -8,15 +8,13 @@ from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-from vedette.control.additive.evaluator import AdditiveEvaluator
-from vedette.control.additive.situation import Sums
 from vedette.control.allowed import mask_of_decision
 from vedette.control.constraints import Constraint, Mask
 from vedette.control.evaluator import Evaluator
 from vedette.control.inputs import check_state, options_of
 from vedette.control.plan import Certainty
 from vedette.control.rewards.base import LabelReward, PowerReward, Reward, speaks_for
-from vedette.control.rewards.loss import ExpectedLossReward
+from vedette.control.rewards.power import ExpectedLossReward
 from vedette.control.settings import MobileSensor, PlanningSettings
 from vedette.densities import (
     GLMB,
@@ -34,16 +32,16 @@ from vedette.models.arguments import reject
 from vedette.platforms import Options
 from vedette.tracking import State
 
-AnyEvaluator: TypeAlias = Evaluator | AdditiveEvaluator
 AnyReward: TypeAlias = Reward | PowerReward | LabelReward | ExpectedLossReward
 
 
-class _Planned(NamedTuple):
-    """What is planned on, and what a reader must know of it."""
+class Planned(NamedTuple):
+    """What is planned on."""
 
     state: State
     fusion: Fusion
-    notes: tuple[str, ...]
+    rule: LinearRule | None  # how densities are summed; None where the decision is no sum
+    notes: tuple[str, ...]  # what a reader must know of the form
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,22 +50,17 @@ class Preparation:
 
     Attributes:
         sensors, settings, reward: as in the planners.
-        state, fusion: in the form in which they are planned on.
+        planned: beliefs and fusion in the form in which they are planned on.
         options: of each sensor.
-        rule: how densities are summed; None where the decision is no sum.
         mask: what constraints allow; None: everything.
-        notes: what a reader must know of the form, and of constraints that cannot be met.
     """
 
     sensors: tuple[MobileSensor, ...]
     settings: PlanningSettings
     reward: AnyReward
-    state: State
-    fusion: Fusion
+    planned: Planned
     options: tuple[Options, ...]
-    rule: LinearRule | None
     mask: Mask | None
-    notes: tuple[str, ...]
 
     @classmethod
     def of(
@@ -82,12 +75,9 @@ class Preparation:
     ) -> Preparation:
         """Raises `InputError` for inputs that do not fit."""
         options = options_of(sensors, poses, settings)
-        check_state(sensors, state)
-        planned = _planned(len(sensors), fusion, settings, reward, state)
-        rule = _rule(len(sensors), planned.fusion, settings, reward, planned.state)
+        planned = planned_on(sensors, fusion, settings, reward, state)
         mask = mask_of_decision(constraints, sensors, options, state.fused, np.asarray(poses), settings)
-        notes = (*(mask.notes if mask is not None else ()), *planned.notes)
-        return cls(tuple(sensors), settings, reward, planned.state, planned.fusion, options, rule, mask, notes)
+        return cls(tuple(sensors), settings, reward, planned, options, mask)
 
     @property
     def races(self) -> bool:
@@ -101,19 +91,24 @@ class Preparation:
 
     def evaluator(
         self, num_samples: int, options: tuple[Options, ...] | None = None, *, rng: np.random.Generator
-    ) -> AnyEvaluator:
+    ) -> Evaluator:
         """The evaluator on samples drawn now; options: fewer of them. Raises as `JointPlanner.plan`."""
-        own, settings = options or self.options, replace(self.settings, num_samples=num_samples)
-        sensors, reward, state = self.sensors, self.reward, self.state
-        if self.rule is None:
+        own, settings = options or self.options, self.settings
+        if num_samples != settings.num_samples:
+            settings = replace(settings, num_samples=num_samples)
+        sensors, reward, (state, fusion, rule, notes) = self.sensors, self.reward, self.planned
+        if rule is None:
             assert not isinstance(reward, ExpectedLossReward)
-            evaluator: AnyEvaluator = Evaluator.prepare(sensors, own, self.fusion, settings, reward, state, rng=rng)
+            evaluator = Evaluator.of_cases(sensors, own, fusion, settings, reward, state, rng=rng)
         else:
-            sums = Sums(self.rule, state.fused, state.local, state.undetected, state.time)
-            evaluator = AdditiveEvaluator.prepare(sensors, own, sums, settings, reward, looks=None, rng=rng)
-        evaluator.notes.update(dict.fromkeys(unsought(settings, state.undetected, sums=self.rule is not None)))
-        evaluator.notes.update(dict.fromkeys(without_scans(sensors, settings, state.time)))
-        evaluator.notes.update(dict.fromkeys(self.notes))
+            evaluator = Evaluator.of_sums(sensors, own, rule, settings, reward, state, looks=None, rng=rng)
+        told = (
+            *unsought(settings, state.undetected, sums=rule is not None),
+            *without_scans(sensors, settings, state.time),
+            *(self.mask.notes if self.mask is not None else ()),
+            *notes,
+        )
+        evaluator.notes.update(dict.fromkeys(told))
         return evaluator
 
 
@@ -132,21 +127,6 @@ def without_scans(sensors: Sequence[MobileSensor], settings: PlanningSettings, t
     """Which sensors do not scan within the horizon of a decision at a time, so that it is all one what they do."""
     found = [s + 1 for s, sensor in enumerate(sensors) if not sensor.scans(time, settings).any()]
     return tuple(f"sensor {s}: no scan within the horizon; all of its courses are worth the same" for s in found)
-
-
-def prepare_sums(
-    sensors: Sequence[MobileSensor], fusion: Fusion, settings: PlanningSettings, reward: AnyReward, state: State
-) -> Sums:
-    """For decisions that can be nothing else; GLMB beliefs are planned on as LMBs.
-
-    Raises `InputError` for inputs that do not fit, and as `check_sums`.
-    """
-    check_state(sensors, state)
-    planned = _planned(len(sensors), fusion, settings, reward, state, why="so are all sequences of decisions")
-    rule = check_sums("sequences of decisions", len(sensors), planned.fusion, settings, reward)
-    fused, local = planned.state.fused, planned.state.local
-    assert isinstance(fused, LMB)
-    return Sums(rule, fused, tuple(map(as_lmb, local)), state.undetected, state.time, planned.notes)
 
 
 def check_sums(
@@ -174,10 +154,20 @@ def stay_glmbs(sensors: Sequence[MobileSensor], fusion: Fusion, settings: Planni
     )
 
 
-def _planned(
-    num_sensors: int, fusion: Fusion, settings: PlanningSettings, reward: AnyReward, state: State, why: str = ""
-) -> _Planned:
-    """The beliefs in the form in which they are planned on. why: GLMBs are LMBs there in any case."""
+def planned_on(
+    sensors: Sequence[MobileSensor],
+    fusion: Fusion,
+    settings: PlanningSettings,
+    reward: AnyReward,
+    state: State,
+    why: str = "",
+) -> Planned:
+    """The beliefs in the form in which they are planned on. why: GLMBs are LMBs there in any case.
+
+    Raises `InputError` for a state that does not fit.
+    """
+    check_state(sensors, state)
+    num_sensors = len(sensors)
     beliefs = (*state.local, state.fused)
     notes: tuple[str, ...] = ()
     # What divides by the common prediction needs beliefs that have one.
@@ -194,7 +184,8 @@ def _planned(
         state = replace(state, fused=at_peaks(state.fused))
     if from_one:
         state = replace(state, local=(state.fused,) * num_sensors)
-    return _Planned(state, fusion, notes)
+    summed = isinstance(reward, ExpectedLossReward) or not _has_glmb((*state.local, state.fused))
+    return Planned(state, fusion, _rule_of_lmbs(num_sensors, fusion, settings, reward) if summed else None, notes)
 
 
 def _of_lmbs(fusion: Fusion) -> Fusion:
@@ -223,17 +214,8 @@ def _why_lmbs(
     return ""
 
 
-def _rule(
-    num_sensors: int, fusion: Fusion, settings: PlanningSettings, reward: AnyReward, state: State
-) -> LinearRule | None:
-    """How densities are summed, None where the decision is no sum."""
-    if not isinstance(reward, ExpectedLossReward) and _has_glmb((*state.local, state.fused)):
-        return None
-    return _rule_of_lmbs(num_sensors, fusion, settings, reward)
-
-
 def _rule_of_lmbs(num_sensors: int, fusion: Fusion, settings: PlanningSettings, reward: AnyReward) -> LinearRule | None:
-    """The same of LMBs, whatever they are."""
+    """How densities are summed where they are LMBs; None where the decision is no sum."""
     if isinstance(reward, ExpectedLossReward):
         return ParallelUpdate().linear_rule(num_sensors)
     if settings.association != "known":

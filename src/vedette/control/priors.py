@@ -1,4 +1,10 @@
-"""Where a decision starts: local posteriors cut to their heaviest hypotheses, and the fused density predicted ahead."""
+"""Where a decision starts: local posteriors cut to what a planner asks, and the fused density predicted ahead.
+
+A filter keeps a density for each label of each hypothesis. What one hypothesis says of a label differs from what
+another says by how they explain other labels' measurements, which is often nothing to speak of: of the 26 tracks that
+ten label sets of `paper-a` hold under an M-delta-GLMB, each label's are within 1e-3 nats of one another. A planner that
+predicts and updates all of them does the same work six times.
+"""
 
 from __future__ import annotations
 
@@ -7,11 +13,13 @@ from typing import Any, TypeVar
 import numpy as np
 
 from vedette.densities import GLMB, LMB, Labelled, TrackTable, marginalise, track_moments
+from vedette.densities.checks import offsets_of
 from vedette.densities.containers import for_kernel, unchecked
-from vedette.densities.label_sets import take_hypotheses
+from vedette.densities.label_sets import take_hypotheses, take_tracks
 from vedette.filters.inputs import model_errors
+from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.gaussian.linalg import log_sum
-from vedette.kernels.planning.prediction import predict_tracks
+from vedette.kernels.planning.reach import predict_paths
 from vedette.models import MotionModel, constant_survival, kernel_motion
 
 _Labelled = TypeVar("_Labelled", bound=Labelled)
@@ -41,7 +49,55 @@ def predicted(fused: _Labelled, motion: MotionModel, num_steps: int, period: flo
         single = take_hypotheses(single, np.flatnonzero(single.hyp_log_weights > -np.inf))
     means, covs = track_moments(single.tracks)
     with model_errors():
-        means, covs = predict_tracks(kernel_motion(motion, ALWAYS_SURVIVES), float(period), int(num_steps), means, covs)
-    num = single.tracks.num_tracks
-    tracks = unchecked(TrackTable, single.tracks.labels, np.arange(num + 1), np.zeros(num), means, covs)
+        paths = predict_paths(kernel_motion(motion, ALWAYS_SURVIVES), float(period), int(num_steps), means, covs)
+    num, ends = single.tracks.num_tracks, (np.ascontiguousarray(own[:, -1]) for own in paths)
+    tracks = unchecked(TrackTable, single.tracks.labels, np.arange(num + 1), np.zeros(num), *ends)
     return unchecked(type(fused), tracks, *single.to_kernel()[1:])
+
+
+def share_versions(belief: GLMB, most: float) -> GLMB:
+    """The belief with tracks of one label replaced by one from which they diverge by at most `most` nats.
+
+    belief: of one Gaussian a track, its hypotheses heaviest first. The tracks of heavier hypotheses stay, and lighter
+    ones' go to the first of them that is near enough. Hypotheses that then hold the same tracks become one, of the sum
+    of their weights. most: 0 leaves everything as it is.
+    """
+    if most == 0.0 or len(belief.hyp_tracks) == 0:
+        return belief
+    leaders = _leaders(belief, _divergences(belief.tracks.means, belief.tracks.covs), most)
+    weights: dict[tuple[int, ...], float] = {}
+    for hyp, log_weight in enumerate(belief.hyp_log_weights.tolist()):
+        members = tuple(leaders[belief.hyp_tracks[belief.hyp_offsets[hyp] : belief.hyp_offsets[hyp + 1]]].tolist())
+        weights[members] = float(np.logaddexp(weights[members], log_weight)) if members in weights else log_weight
+    kept, renumbered = np.unique(leaders, return_inverse=True)
+    places = dict(zip(leaders.tolist(), renumbered.tolist(), strict=True))
+    return unchecked(
+        GLMB,
+        take_tracks(belief.tracks, kept),
+        offsets_of([len(members) for members in weights]),
+        np.array([places[track] for members in weights for track in members], np.int64),
+        np.array(list(weights.values())),
+    )
+
+
+def _divergences(means: Floats, covs: Floats) -> Floats:
+    """(num, num) Kullback-Leibler divergence of Gaussian i from Gaussian j, in nats."""
+    precisions, log_dets = np.linalg.inv(covs), np.linalg.slogdet(covs)[1]
+    offsets = means[:, np.newaxis] - means
+    traces = np.einsum("iab,jba->ij", covs, precisions)
+    squares = np.einsum("ija,jab,ijb->ij", offsets, precisions, offsets, optimize=True)
+    return np.asarray(0.5 * (traces + squares - means.shape[1] + log_dets - log_dets[:, np.newaxis]))
+
+
+def _leaders(belief: GLMB, divergences: Floats, most: float) -> Ints:
+    """(num_tracks,) the track that each is replaced by; its own number where it stays, or where nobody holds it."""
+    labels, leaders = belief.tracks.labels.tolist(), np.arange(belief.tracks.num_tracks)
+    known: dict[tuple[int, ...], list[int]] = {}
+    for track in dict.fromkeys(belief.hyp_tracks.tolist()):
+        own = known.setdefault(tuple(labels[track]), [])
+        near = [leader for leader in own if divergences[track, leader] <= most]
+        if near:
+            leaders[track] = near[0]
+        else:
+            own.append(track)
+    return leaders

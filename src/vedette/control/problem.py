@@ -6,7 +6,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from vedette.control.additive.evaluator import AdditiveEvaluator
 from vedette.control.allowed import allowed_of, single_mask
 from vedette.control.bounds import most_by_target
 from vedette.control.constraints import Mask
@@ -32,9 +31,9 @@ def joint_problem(evidence: Evidence, mask: Mask | None) -> JointProblem:
     """The search problem of a joint decision; what it evaluates is kept in the evidence."""
     evaluator = evidence.evaluator
     plain = JointProblem(evidence.shape, evidence.evaluate, lambda: _independent(evidence, mask), mask)
-    if not isinstance(evaluator, AdditiveEvaluator):
-        return plain
     additive, allowed = evaluator.additive, allowed_of(mask, evidence.shape)
+    if additive is None:
+        return plain
 
     def line(through: tuple[int, ...], sensor: int) -> Floats:
         rewards = additive.line(np.array(through), sensor)
@@ -66,7 +65,7 @@ def note_lines(evidence: Evidence, choice: Sequence[int], mask: Mask | None) -> 
     evaluator, chosen = evidence.evaluator, np.array(choice, np.int64)
     if not evidence.holds(choice):
         evidence.evaluate(chosen[np.newaxis])
-    if isinstance(evaluator, AdditiveEvaluator) and not evidence.is_complete():
+    if evaluator.additive is not None and not evidence.is_complete():
         rewards = evaluator.additive.lines(chosen)
         for s, own in enumerate(np.split(rewards, np.cumsum(evidence.shape)[:-1])):
             _note_line(evidence, mask, choice, s, own)
@@ -82,7 +81,7 @@ def _note_line(evidence: Evidence, mask: Mask | None, through: Sequence[int], se
 def _independent(evidence: Evidence, mask: Mask | None) -> tuple[int, ...]:
     """The course that is best for each sensor alone (paper, Algorithm 3), of those it may take."""
     evaluator, shape = evidence.evaluator, evidence.shape
-    if isinstance(evaluator, AdditiveEvaluator):
+    if evaluator.additive is not None:
         means = np.split(evaluator.additive.each_alone().mean(axis=1), np.cumsum(shape)[:-1])
     else:
         means = [evaluator.alone(s)(all_joint_actions((num,))).mean(axis=1) for s, num in enumerate(shape)]

@@ -7,11 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from vedette.control.forms import forms_of
 from vedette.control.inputs import Belief
-from vedette.control.priors import ALWAYS_SURVIVES, heaviest_hypotheses
+from vedette.control.priors import ALWAYS_SURVIVES, heaviest_hypotheses, share_versions
 from vedette.control.settings import IDEAL_MODES, MobileSensor, PlanningSettings
-from vedette.control.versions import share_versions
 from vedette.densities import GLMB, LMB, MultiTargetSamples, sample_glmb, sample_lmb
 from vedette.densities.cases import LabelledCases
 from vedette.densities.checks import offsets_of
@@ -20,15 +18,42 @@ from vedette.densities.label_sets import label_sets, places_of, single_gaussians
 from vedette.filters import shared_targets
 from vedette.filters.inputs import model_errors
 from vedette.filters.lmb import association_of
-from vedette.kernels.base.types import Bools, Floats, Ints
+from vedette.kernels.base.types import Bools, Floats, Ints, Motion, Sensor
+from vedette.kernels.gaussian.sigma_points import LINEARISED
+from vedette.kernels.planning.forms import ANY, BEARING_RANGE, CONSTANT, GAUSSIAN, GROWING, POSITION, SAME, Forms
 from vedette.kernels.planning.ideal import Decision, Futures, Horizon, propagate_samples
 from vedette.kernels.planning.known import pseudo_update_known
 from vedette.kernels.planning.pseudo_glmb import GlmbResults, pseudo_update_glmb
 from vedette.kernels.planning.pseudo_lmb import LmbResults, pseudo_update_lmb
 from vedette.kernels.planning.reach import Belief as KnownBelief
 from vedette.kernels.planning.reach import label_radii, predict_paths
-from vedette.models import kernel_motion
+from vedette.models import (
+    bearing_range,
+    constant_detection,
+    constant_noise,
+    constant_velocity,
+    gaussian_detection,
+    kernel_motion,
+    position,
+    range_dependent_noise,
+)
+from vedette.models.detection_functions import MAX_PROB_DETECTION
 from vedette.threads import run_chunks
+
+# By the functions themselves: a model of a user's own is none of these.
+_LINEAR = {
+    (own.transition, own.process_noise_cov)
+    for own in (constant_velocity(1.0, acceleration=kind) for kind in ("held", "continuous"))
+}
+
+_MEASUREMENTS = {bearing_range().function: BEARING_RANGE, position().function: POSITION}
+
+_NOISES = {
+    range_dependent_noise(1.0, 0.0, 1.0, 0.0).function: GROWING,
+    constant_noise([1.0]).function: CONSTANT,
+}
+
+_DETECTIONS = {gaussian_detection(1.0).function: GAUSSIAN, constant_detection(0.5).function: SAME}
 
 
 def draw_paths(
@@ -163,7 +188,8 @@ def _run_lmb(
 
     with model_errors():
         if settings.association == "known":
-            paths = predict_paths(prior, decision)
+            horizon, tracks = decision.horizon, prior.tracks
+            paths = predict_paths(decision.motion, horizon.dt, settings.horizon_steps, tracks.means, tracks.covs)
             own = KnownBelief(prior, paths, targets, label_radii(paths, targets, decision.futures.states))
             num_courses = len(decision.horizon.poses)
             run_chunks(
@@ -183,3 +209,22 @@ def _run_lmb(
 
 def _counts(settings: PlanningSettings) -> dict[str, int]:
     return {"num_samples": settings.num_samples, "num_threads": settings.threads()}
+
+
+def forms_of(motion: Motion, sensor: Sensor, dt: float, state_dim: int) -> Forms:
+    """The forms of models as kernels take them, over steps of `dt` seconds."""
+    transition, noise = np.zeros((state_dim, state_dim)), np.zeros((state_dim, state_dim))
+    is_linear = motion.method == LINEARISED and (motion.transition, motion.process_noise_cov) in _LINEAR
+    if is_linear:
+        anywhere = np.zeros(state_dim)
+        motion.transition_jacobian(anywhere, dt, motion.transition_params, transition)
+        motion.process_noise_cov(anywhere, dt, motion.noise_params, noise)
+    return Forms(
+        int(is_linear),
+        transition,
+        noise,
+        _MEASUREMENTS.get(sensor.measurement, ANY),
+        _NOISES.get(sensor.measurement_noise_cov, ANY),
+        _DETECTIONS.get(sensor.prob_detection, ANY),
+        MAX_PROB_DETECTION,
+    )

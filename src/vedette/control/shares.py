@@ -7,13 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from vedette.control.additive.rewards import AdditiveRewards
-from vedette.densities.checks import offsets_of
 from vedette.kernels.base.types import Floats, Ints
-from vedette.kernels.planning.explained import Reached, ValueParts, fill_value_parts, no_value_parts
-from vedette.threads import run_chunks
-
-# Values of labels from which on they are shared between threads.
-_MANY = 100_000
+from vedette.kernels.planning.joint_values import existence_logits, label_values
 
 
 class Shares(NamedTuple):
@@ -34,76 +29,35 @@ class Shares(NamedTuple):
 def shares_of(additive: AdditiveRewards, chosen: Ints) -> Shares:
     """The shares in the reward of courses (num_sensors,), one a sensor.
 
-    A sensor's share is its Shapley value on two orders, the printed and the reverse one. A target's gain by existence
-    is that of the existence after all scans with the density without any; the rest is localisation.
+    A sensor's share is its Shapley value on two orders, the printed and the reverse one: rewards of the first sensors,
+    of the last ones, and of all but one, while the others do not scan.
     """
-    parts = _value_parts(additive, chosen)
-    found = _found(additive, chosen)
-    base = np.broadcast_to(parts.unseen.sum(axis=0)[:, np.newaxis], parts.ahead.shape[1:])
-    whole = parts.labels.sum(axis=0)
-    ahead = _means(additive, base + np.cumsum(parts.ahead, axis=0)) + found.ahead
-    behind = (_means(additive, base + np.cumsum(parts.behind[::-1], axis=0)) + found.behind[::-1])[::-1]
-    total, samples = float(found.ahead[-1]), additive.of_sums(whole) + found.ahead[-1]
-    start, end = float(_means(additive, base)), float(samples.mean())
-    first, last = np.diff(ahead, prepend=start), -np.diff(behind, append=start)
-    without = _means(additive, whole - parts.last) + found.without
-    coefficients = additive.coefficients
-    existence = localisation = None
-    if coefficients is not None:
-        existence = (parts.existence.mean(axis=2) - parts.unseen) @ coefficients
-        localisation = (parts.labels.mean(axis=2) - parts.unseen) @ coefficients - existence
-        existence, localisation = (own.reshape(additive.looks, -1).sum(axis=0) for own in (existence, localisation))
-    return Shares(start, existence, localisation, total, 0.5 * (first + last), end - without, samples)
+    num, sensors = len(chosen), np.arange(len(chosen))
+    begun = sensors < np.arange(num + 1)[:, np.newaxis]
+    scanning = np.concatenate([begun, ~begun, ~np.eye(num, dtype=bool)])
+    rewards = additive(np.where(scanning, chosen, -1))
+    means = rewards.mean(axis=1)
+    ahead, behind, without = np.split(means, [num + 1, 2 * num + 2])
+    existence, localisation = _of_labels(additive, chosen)
+    found = additive.found(chosen)
+    shares = 0.5 * (np.diff(ahead) - np.diff(behind))
+    return Shares(float(means[0]), existence, localisation, found, shares, ahead[num] - without, rewards[num])
 
 
-def _value_parts(additive: AdditiveRewards, chosen: Ints) -> ValueParts:
-    reached = _reached(additive, chosen)
-    table, valuation, num_samples = additive.table, additive.valuation, additive.num_samples
-    parts = no_value_parts(len(table.start), len(chosen), num_samples, valuation.num)
+def _of_labels(additive: AdditiveRewards, chosen: Ints) -> tuple[Floats, Floats] | tuple[None, None]:
+    """(num_labels,) gains by existence, and by localisation; None where the reward is not linear in its sums.
 
-    def work(first: int, last: int) -> None:
-        fill_value_parts(table, valuation, reached, first, last, parts)
-
-    if len(reached.entries) * num_samples < _MANY:
-        work(0, num_samples)
-    else:
-        run_chunks(work, num_samples, additive.num_threads)
-    return parts
-
-
-def _reached(additive: AdditiveRewards, chosen: Ints) -> Reached:
-    table = additive.table
-    courses = table.first_courses[:-1] + chosen
-    spans = [np.arange(table.offsets[course], table.offsets[course + 1]) for course in courses.tolist()]
-    entries = np.concatenate([np.empty(0, np.int64), *spans])
-    sensors = np.repeat(np.arange(len(spans)), [len(span) for span in spans])
-    labels = table.labels[entries]
-    order = np.argsort(labels, kind="stable")
-    return Reached(offsets_of(np.bincount(labels, minlength=len(table.start))), sensors[order], entries[order])
-
-
-class _Found(NamedTuple):
-    """What is found by the first sensors, by the last ones, and by all but one; each (num_sensors,)."""
-
-    ahead: Floats
-    behind: Floats
-    without: Floats
-
-
-def _found(additive: AdditiveRewards, chosen: Ints) -> _Found:
-    cells, num_sensors = additive.cells, len(chosen)
-    if len(cells.worth) == 0:
-        return _Found(*np.zeros((3, num_sensors)))
-    missed = np.zeros((num_sensors, len(cells.worth)))
-    for s, course in enumerate((additive.table.first_courses[:-1] + chosen).tolist()):
-        entries = slice(cells.offsets[course], cells.offsets[course + 1])
-        missed[s, cells.cells[entries]] = cells.log_miss[entries]
-    none = np.zeros((1, len(cells.worth)))
-    ahead = np.concatenate([none, np.cumsum(missed, axis=0)])
-    behind = np.concatenate([np.cumsum(missed[::-1], axis=0)[::-1], none])
-    return _Found(*(-np.expm1(each) @ cells.worth for each in (ahead[1:], behind[:-1], ahead[:-1] + behind[1:])))
-
-
-def _means(additive: AdditiveRewards, sums: Floats) -> Floats:
-    """Mean rewards (...) of sums (..., num, num_samples)."""
-    return np.asarray(additive.of_sums(sums).mean(axis=-1))
+    That by existence is the gain of the existence after all scans with the density without any; the rest is
+    localisation.
+    """
+    valuation, coefficients, unseen = additive.valuation, additive.coefficients, additive.without_scans()
+    if coefficients is None:
+        return None, None
+    seen, dim = additive.with_scans(chosen), valuation.references.shape[1]
+    known = unseen.copy()
+    known[:, -2] += existence_logits(seen, dim) - existence_logits(unseen, dim)
+    before, partly, whole = (
+        (label_values(rows, valuation).mean(axis=2) @ coefficients).reshape(additive.looks, -1).sum(axis=0)
+        for rows in (unseen, known, seen)
+    )
+    return partly - before, whole - partly

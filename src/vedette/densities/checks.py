@@ -33,8 +33,9 @@ def check_array(field: str, array: Any, dtype: type, shape: Sequence[int | None]
 
 def check_shape(field: str, array: NDArray[Any], shape: Sequence[int | None]) -> None:
     """Raise `InputError` unless `array` has this shape (None: any length)."""
-    fits = array.ndim == len(shape) and all(want in (None, have) for want, have in zip(shape, array.shape, strict=True))
-    if not fits:
+    if array.shape != tuple(shape) and (
+        array.ndim != len(shape) or any(want not in (None, have) for want, have in zip(shape, array.shape, strict=True))
+    ):
         wanted = ", ".join("any" if length is None else str(length) for length in shape)
         raise InputError(f"{field}: expected shape ({wanted}); got {array.shape}")
 

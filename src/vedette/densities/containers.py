@@ -30,7 +30,7 @@ class Container:
         for name in self.__match_args__:  # type: ignore[attr-defined]
             value = getattr(self, name)
             if type(value) is np.ndarray:
-                object.__setattr__(self, name, _read_only(np.array(value, order="C")))
+                object.__setattr__(self, name, _held(np.array(value, order="C")))
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Through the constructor and its checks: what is unpickled may have been written by anybody."""
@@ -62,14 +62,11 @@ def _held(array: NDArray[Any]) -> NDArray[Any]:
     """An array as a field: as it is where it is one already, and without a copy where it stands alone."""
     base, flags = array.base, array.flags
     if type(base) is not np.ndarray:
-        return _read_only(array if flags.carray else np.array(array, order="C"))
-    if not flags.writeable and array.size == base.size and array.strides == base.strides:
+        view = array.view() if flags.carray else np.array(array, order="C").view()
+    elif not flags.writeable and array.size == base.size and array.strides == base.strides:
         return array
-    return _read_only(np.array(array, order="C"))  # a part of another, whose base is not of its shape
-
-
-def _read_only(array: NDArray[Any]) -> NDArray[Any]:
-    view = array.view()
+    else:  # a part of another, whose base is not of its shape
+        view = np.array(array, order="C").view()
     view.setflags(False)  # type: ignore[call-arg]  # by name, or as an attribute, it takes three times as long
     return view
 

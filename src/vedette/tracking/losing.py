@@ -13,7 +13,7 @@ from vedette.densities.label_sets import without_labels
 from vedette.filters.inputs import model_errors
 from vedette.kernels.base.types import Floats
 from vedette.kernels.gaussian.position_integrals import spread_nodes
-from vedette.kernels.planning.prediction import predict_tracks
+from vedette.kernels.planning.reach import predict_paths
 from vedette.models import CellGrid, SensorModel, TargetModel, kernel_motion
 
 _LABELLED = (GLMB, LMB, FactoredGLMB)
@@ -47,7 +47,8 @@ def expected_of_lost(
     of_component = np.repeat(np.arange(tracks.num_tracks), np.diff(tracks.offsets))
     with model_errors():
         motion = kernel_motion(targets.motion, targets.survival)
-        means, covs = predict_tracks(motion, dt, 1, for_kernel(tracks.means), for_kernel(tracks.covs))
+        paths = predict_paths(motion, dt, 1, for_kernel(tracks.means), for_kernel(tracks.covs))
+    means, covs = paths.means[:, 0], paths.covs[:, 0]
     states = np.repeat(means[:, None], len(_NODES), axis=1)  # (num_components, num_nodes, state_dim)
     states[..., :2] += np.einsum("cij,nj->cni", np.linalg.cholesky(covs[:, :2, :2]), _NODES[:, 1:])
     nodes = states.reshape(-1, states.shape[2])

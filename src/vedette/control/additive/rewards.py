@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from vedette.control.rewards.base import combined
+from vedette.control.rewards.base import LabelReward, PowerReward, combined, unit_volume_of
+from vedette.control.rewards.labels import cardinality_variance_of_label
+from vedette.control.rewards.power import ExpectedLossReward
+from vedette.densities import LMB
 from vedette.kernels.base.types import Floats, Ints
+from vedette.kernels.gaussian.linalg import LOG_2PI
 from vedette.kernels.planning.ascent import Allowed, Cells, Trace, ascend
 from vedette.kernels.planning.bernoulli_rows import Table
-from vedette.kernels.planning.joint_values import alone_values, joint_values, line_values
-from vedette.kernels.planning.label_values import Valuation
+from vedette.kernels.planning.joint_values import alone_values, joint_values, line_values, start_totals
+from vedette.kernels.planning.label_values import EXPECTED_LOSS, FUNCTION, POWER_INTEGRALS, Valuation
+from vedette.models.functions import ModelFunction
+from vedette.probabilities import log_expit
 from vedette.threads import run_chunks
 
 # Lines after which an ascent is stopped, a hundred sweeps of a hundred sensors.
@@ -54,6 +61,15 @@ class AdditiveRewards:
         found = getattr(self.reward, "coefficients", None)
         return None if found is None else np.asarray(found, np.float64)
 
+    @property
+    def additive(self) -> AdditiveRewards:
+        """Themselves."""
+        return self
+
+    def joint(self) -> AdditiveRewards:
+        """Of all sensors, fused: themselves."""
+        return self
+
     def alone(self, sensor: int) -> AdditiveRewards:
         """Of one sensor, compared by itself with the prediction."""
         first, last = self.table.first_courses[sensor : sensor + 2].tolist()
@@ -72,8 +88,20 @@ class AdditiveRewards:
             joint_values(self.table, self.valuation, actions, first, last, sums)
 
         run_chunks(work, len(actions), self.num_threads, first_piece=8)
-        found = np.array([self._found(joint) for joint in actions]) if len(self.cells.worth) else 0.0
+        found = np.array([self.found(joint) for joint in actions]) if len(self.cells.worth) else 0.0
         return np.asarray(self.of_sums(sums) + np.reshape(found, (-1, 1)))
+
+    def without_scans(self) -> Floats:
+        """(num_labels, bernoulli_size, num_samples) joint rows without any scan."""
+        return start_totals(self.table)
+
+    def with_scans(self, chosen: Ints) -> Floats:
+        """The same with the scans of a joint action (num_sensors,)."""
+        table, rows = self.table, self.without_scans()
+        for power, course in zip(table.powers, (table.first_courses[:-1] + chosen).tolist(), strict=True):
+            entries = slice(table.offsets[course], table.offsets[course + 1])
+            rows[table.labels[entries]] += power * table.changes[entries]
+        return rows
 
     def line(self, chosen: Ints, sensor: int) -> Floats:
         """(num_courses, num_samples) rewards of all courses of one sensor, the others as chosen."""
@@ -97,7 +125,7 @@ class AdditiveRewards:
                 begin, end = (self.table.first_courses[s : s + 2] - start).tolist()
                 joint = np.tile(chosen, (end - begin, 1))
                 joint[:, s] = np.arange(end - begin)
-                rewards[begin:end] += np.array([[self._found(each)] for each in joint])
+                rewards[begin:end] += np.array([[self.found(each)] for each in joint])
         return rewards
 
     def each_alone(self) -> Floats:
@@ -134,7 +162,7 @@ class AdditiveRewards:
         course = np.repeat(np.arange(len(cells.offsets) - 1), np.diff(cells.offsets))
         return np.asarray(np.bincount(course, shares, len(cells.offsets) - 1), np.float64)
 
-    def _found(self, chosen: Ints) -> float:
+    def found(self, chosen: Ints) -> float:
         """What the reward has for targets that are expected to be found."""
         cells, totals = self.cells, np.zeros(len(self.cells.worth))
         for s in np.flatnonzero(chosen >= 0).tolist():
@@ -142,3 +170,60 @@ class AdditiveRewards:
             entries = slice(cells.offsets[course], cells.offsets[course + 1])
             totals[cells.cells[entries]] += cells.log_miss[entries]
         return float(-(cells.worth @ np.expm1(totals)))
+
+
+def valuation_of(reward: PowerReward | LabelReward | ExpectedLossReward, prediction: LMB, prior: Floats) -> Valuation:
+    """How a reward values the labels of a prediction, of one Gaussian each.
+
+    prior: (num_labels, bernoulli_size) rows of the prediction.
+    """
+    if isinstance(reward, ExpectedLossReward):
+        covs = prediction.tracks.covs
+        unseen = np.minimum(covs[:, 0, 0] + covs[:, 1, 1], reward.cutoff**2)[:, np.newaxis] ** (0.5 * reward.order)
+        params = np.array([reward.cutoff**2, 0.5 * reward.order, 1.0])
+        return _valuation(EXPECTED_LOSS, 1, prediction, prior, unseen, params=params)
+    if isinstance(reward, PowerReward):
+        volume = unit_volume_of(reward, prediction)
+        exponents = np.array([[float(a), float(b)] for a, b in reward.exponents])
+        own = _of_prediction(prediction, exponents, math.log(volume), prior[:, -2])
+        found = _valuation(POWER_INTEGRALS, len(exponents), prediction, prior, own, exponents=exponents)
+        return found._replace(log_volume=math.log(volume))
+    own, params = np.zeros((len(prior), reward.num_terms)), np.ascontiguousarray(reward.params, np.float64)
+    return _valuation(FUNCTION, reward.num_terms, prediction, prior, own, params=params, function=reward.function)
+
+
+def _valuation(
+    kind: int,
+    num: int,
+    prediction: LMB,
+    prior: Floats,
+    own: Floats,
+    *,
+    exponents: Floats | None = None,
+    params: Floats | None = None,
+    function: ModelFunction = cardinality_variance_of_label,  # not asked but by FUNCTION
+) -> Valuation:
+    return Valuation(
+        kind,
+        num,
+        prior,
+        own,
+        np.empty((0, 2)) if exponents is None else exponents,
+        0.0,
+        np.empty(0) if params is None else params,
+        function,
+        *prediction.tracks.to_kernel()[3:],
+    )
+
+
+def _of_prediction(prediction: LMB, exponents: Floats, log_volume: float, logits: Floats) -> Floats:
+    """(num_labels, num_exponents) a log(1 - r), and of pairs (a, 0) the whole of their term."""
+    dim = prediction.state_dim
+    log_dets = np.linalg.slogdet(prediction.tracks.covs)[1] + dim * LOG_2PI
+    terms = np.outer(log_expit(-logits), exponents[:, 0])
+    for e, (a, b) in enumerate(exponents.tolist()):
+        if b == 0.0 and a != 0.0:
+            # log integral N(m, P)^a = -((a - 1) log|2 pi P| + d log a) / 2.
+            integral = -0.5 * ((a - 1.0) * log_dets + dim * math.log(a)) if a > 0.0 else np.full(len(logits), np.inf)
+            terms[:, e] += np.logaddexp(0.0, a * logits + integral + (a - 1.0) * log_volume)
+    return terms

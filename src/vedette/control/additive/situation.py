@@ -3,35 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from vedette.control.pseudo import decision_of, draw_paths, targets_of
 from vedette.control.settings import IDEAL_MODES, MobileSensor, PlanningSettings
-from vedette.densities import LMB, UndetectedIntensity
+from vedette.densities import LMB
 from vedette.densities.checks import offsets_of
 from vedette.densities.containers import unchecked
 from vedette.densities.label_sets import places_of, single_gaussians, take_tracks
 from vedette.filters.inputs import model_errors
-from vedette.fusion import LinearRule
 from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.kernels.planning.bernoulli_rows import bernoulli_size
 from vedette.kernels.planning.ideal import EXPECTED, IDEAL, Decision, Futures
 from vedette.kernels.planning.known import rows_without_scans
 from vedette.kernels.planning.reach import Belief, label_radii, predict_paths
 from vedette.probabilities import logit
-
-
-class Sums(NamedTuple):
-    """What decisions that are sums over labels are made on."""
-
-    rule: LinearRule  # how the sensors' densities become one
-    fused: LMB
-    local: tuple[LMB, ...]  # of each sensor
-    undetected: UndetectedIntensity | None = None  # targets not found yet
-    time: float | None = None  # of the decision, s, where it is known
-    notes: tuple[str, ...] = ()  # what a reader must know of their form
+from vedette.tracking import State
 
 
 class Samples(NamedTuple):
@@ -43,14 +32,14 @@ class Samples(NamedTuple):
 
     @classmethod
     def draw(
-        cls, fused: LMB, sensors: Sequence[MobileSensor], settings: PlanningSettings, *, rng: np.random.Generator
+        cls, fused: Any, sensors: Sequence[MobileSensor], settings: PlanningSettings, *, rng: np.random.Generator
     ) -> Samples:
         """`num_samples` of them, carried over the horizon without noise."""
         drawn, states = draw_paths(fused, sensors, settings, rng=rng)
         return cls(states, drawn.offsets, targets_of(fused.tracks.labels, drawn.labels, drawn.offsets))
 
     @classmethod
-    def none(cls, fused: LMB, settings: PlanningSettings) -> Samples:
+    def none(cls, fused: Any, settings: PlanningSettings) -> Samples:
         """One sample in which nobody is there, for what needs no samples."""
         states = np.empty((settings.horizon_steps, 0, fused.state_dim))
         return cls(states, np.zeros(2, np.int64), np.full((fused.tracks.num_tracks, 1), -1))
@@ -84,47 +73,47 @@ class Start(NamedTuple):
     references: Floats  # (num_labels, state_dim) means of the prediction, about which all rows are taken
     prior: Floats  # (num_labels, bernoulli_size)
     bases: tuple[Floats, ...]  # for each sensor (num_labels, bernoulli_size) of its own belief without scans
+    num_samples: int
 
 
 def starts_of(
     prediction: LMB,
-    beliefs: Sequence[LMB],
+    state: State,
     sensors: Sequence[MobileSensor],
     courses: Sequence[Floats],
-    samples: Samples,
     settings: PlanningSettings,
     *,
     missing_existence: float,
-    time: float | None,
-    detection_at: str | None = None,
+    sampled: bool,
     rng: np.random.Generator,
 ) -> Start:
     """What the changes of the sensors' scans are added to.
 
-    prediction: the fused density at the end of the horizon, of one Gaussian a label. beliefs: of each sensor now.
-    courses: of each sensor (num_courses, horizon_steps, pose_dim). missing_existence: of a label that a sensor lacks.
-    time: of the decision. detection_at: as of `SensorModel.to_kernel`.
+    prediction: the fused density at the end of the horizon, of one Gaussian a label. courses: of each sensor
+    (num_courses, horizon_steps, pose_dim). missing_existence: of a label that a sensor lacks. sampled: false for what
+    needs no samples, and takes the mean P_D over the predicted Gaussian.
     """
+    samples = Samples.draw(state.fused, sensors, settings, rng=rng) if sampled else Samples.none(state.fused, settings)
     with model_errors():
         given = prediction.to_kernel()
         references = given.tracks.means
         prior = rows_without_scans(references, given.tracks.covs, given.existence_logit, references)
-        scans = [sensor.scans(time, settings) for sensor in sensors]
-        shared = IDEAL_MODES[settings.ideal_measurements] == IDEAL or detection_at is not None
+        scans = [sensor.scans(state.time, settings) for sensor in sensors]
+        shared = IDEAL_MODES[settings.ideal_measurements] == IDEAL or not sampled
         groups = tuple(
-            _group(members, prediction, beliefs, sensors, courses, scans, samples, settings, detection_at, rng)
-            for members in _alike(sensors, beliefs, scans, shared=shared)
+            _group(members, prediction, state.local, sensors, courses, scans, samples, settings, sampled, rng)
+            for members in _alike(sensors, state.local, scans, shared=shared)
         )
     bases: list[Floats] = [prior] * len(sensors)
     for group in groups:
         row = _spread(group, len(prior), prediction.state_dim, missing_existence)
         for s in group.members:
             bases[s] = row
-    return Start(groups, references, prior, tuple(bases))
+    return Start(groups, references, prior, tuple(bases), samples.targets.shape[1])
 
 
 def _alike(
-    sensors: Sequence[MobileSensor], beliefs: Sequence[LMB], scans: Sequence[Bools], *, shared: bool
+    sensors: Sequence[MobileSensor], beliefs: Sequence[Any], scans: Sequence[Bools], *, shared: bool
 ) -> list[tuple[int, ...]]:
     """Sensors with the same belief, equal models and scans, together; each by itself unless `shared`."""
     found: dict[object, list[int]] = {}
@@ -138,13 +127,13 @@ def _alike(
 def _group(
     members: tuple[int, ...],
     prediction: LMB,
-    beliefs: Sequence[LMB],
+    beliefs: Sequence[Any],
     sensors: Sequence[MobileSensor],
     courses: Sequence[Floats],
     scans: Sequence[Bools],
     samples: Samples,
     settings: PlanningSettings,
-    detection_at: str | None,
+    sampled: bool,
     rng: np.random.Generator,
 ) -> SensorGroup:
     sensor, belief = sensors[members[0]], beliefs[members[0]]
@@ -153,8 +142,9 @@ def _group(
     prior = unchecked(LMB, single_gaussians(take_tracks(belief.tracks, own)), belief.existence_logit[own]).to_kernel()
     futures = samples.futures(sensor.filter.sensor.meas_dim, settings, rng=rng)
     together = np.concatenate([courses[s] for s in members])
-    decision = decision_of(sensor, together, futures, settings, scans[members[0]], detection_at)
-    paths, labels = predict_paths(prior, decision), places[own]
+    decision = decision_of(sensor, together, futures, settings, scans[members[0]], None if sampled else "mean")
+    labels, tracks, horizon = places[own], prior.tracks, decision.horizon
+    paths = predict_paths(decision.motion, horizon.dt, horizon.poses.shape[1], tracks.means, tracks.covs)
     ends = np.ascontiguousarray(paths.means[:, -1]), np.ascontiguousarray(paths.covs[:, -1])
     rows = rows_without_scans(*ends, prior.existence_logit, prediction.tracks.means[labels])
     targets = np.ascontiguousarray(samples.targets[labels])

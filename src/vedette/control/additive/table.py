@@ -1,25 +1,37 @@
-"""The changes of a decision: what the scans of every course say of every label in its reach."""
+"""The changes of a decision: what the scans of every course say of every label in its reach, and of every cell."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 
-from vedette.control.additive.situation import SensorGroup, Start
+from vedette.control.additive.rewards import AdditiveRewards, valuation_of
+from vedette.control.additive.situation import SensorGroup, Start, starts_of
+from vedette.control.rewards.power import ExpectedLossReward
+from vedette.control.settings import MobileSensor, PlanningSettings
+from vedette.densities import UndetectedIntensity
 from vedette.densities.checks import offsets_of
 from vedette.errors import InputError
 from vedette.filters.inputs import model_errors
 from vedette.fusion import LinearRule
 from vedette.kernels.base.types import Floats, Ints
+from vedette.kernels.planning.ascent import Cells
 from vedette.kernels.planning.bernoulli_rows import Table
+from vedette.kernels.planning.cells import cells_in_view
 from vedette.kernels.planning.expected import fill_expected_changes
 from vedette.kernels.planning.known import Entries, fill_changes
-from vedette.kernels.planning.reach import fill_near, fill_reach
+from vedette.kernels.planning.reach import fill_reach
+from vedette.platforms import Options
 from vedette.threads import run_chunks
+from vedette.tracking import State
 
 # A label that no sample and no prediction gives a higher probability of detection is out of reach.
 LEAST_DETECTION = 1e-6
+
+# No cell is searched so well that nothing can be left in it.
+_LEAST_LOG_MISS = float(np.log(1e-12))
 
 # Courses that a thread works on before it looks at the clock.
 _QUICK = 16
@@ -28,14 +40,41 @@ _QUICK = 16
 _MOST_BYTES = 8e9
 
 
-def lay_out_changes(start: Start, rule: LinearRule, num_samples: int, num_threads: int, *, sampled: bool) -> Table:
+def lay_out(
+    sensors: Sequence[MobileSensor],
+    options: Sequence[Options],
+    rule: LinearRule,
+    settings: PlanningSettings,
+    reward: Any,
+    state: State,
+    prediction: Any,
+    *,
+    rng: np.random.Generator,
+) -> AdditiveRewards:
+    """The rewards at the end of the horizon: each label followed over every course that reaches it."""
+    sampled = not isinstance(reward, ExpectedLossReward)
+    courses, missing = [own.courses for own in options], rule.missing_existence
+    start = starts_of(
+        prediction, state, sensors, courses, settings, missing_existence=missing, sampled=sampled, rng=rng
+    )
+    table = lay_out_changes(start, rule, settings.threads(), sampled=sampled)
+    valuation = valuation_of(reward, prediction, start.prior)
+    if state.undetected is None or settings.undetected_worth == 0.0:
+        cells = no_cells(len(table.offsets) - 1)
+    else:
+        cells = cells_of(start, state.undetected, settings.undetected_worth, table.first_courses, prediction.state_dim)
+    own = reward if sampled else None
+    return AdditiveRewards(table, valuation, start.bases, own, cells, settings.threads())
+
+
+def lay_out_changes(start: Start, rule: LinearRule, num_threads: int, *, sampled: bool) -> Table:
     """The changes of all sensors' courses, by samples or, without, as they are expected.
 
     Raises:
         InputError: more changes than memory should be asked for.
         ModelError, NumericalError: as the models and the filters.
     """
-    num_sensors, size = len(start.bases), start.prior.shape[1]
+    num_sensors, num_samples, size = len(start.bases), start.num_samples, start.prior.shape[1]
     with model_errors():
         reached = [_reach(group, num_threads, sampled=sampled) for group in start.groups]
     sizes, first_courses = _sizes(start.groups, reached, num_sensors)
@@ -73,14 +112,11 @@ def _seen(table: Table) -> Table:
 
 def _reach(group: SensorGroup, num_threads: int, *, sampled: bool) -> Ints:
     """(num_courses, num_own) 1 where a course reaches a label; without samples, where it might."""
-    num_courses = int(group.course_offsets[-1])
+    num_courses, least = int(group.course_offsets[-1]), LEAST_DETECTION if sampled else 0.0
     out = np.empty((num_courses, len(group.labels)), np.int64)
 
     def work(first: int, last: int) -> None:
-        if sampled:
-            fill_reach(group.belief, group.decision, LEAST_DETECTION, group.reach, first, last, out)
-        else:
-            fill_near(group.belief, group.decision, group.reach, first, last, out)
+        fill_reach(group.belief, group.decision, least, group.reach, first, last, out)
 
     run_chunks(work, num_courses, num_threads, first_piece=_QUICK)
     return out
@@ -114,3 +150,41 @@ def _filling(
     return lambda first, last: fill_changes(
         group.belief, group.decision, entries, references, group.rows, first, last, changes
     )
+
+
+def no_cells(num_courses: int) -> Cells:
+    """Nothing to be found."""
+    none = np.empty(0)
+    return Cells(np.zeros(num_courses + 1, np.int64), np.empty(0, np.int64), none, none)
+
+
+def cells_of(start: Start, undetected: UndetectedIntensity, worth: float, first_courses: Ints, state_dim: int) -> Cells:
+    """The cells that each course sees, of a grid of targets not found yet that are taken to stay where they are.
+
+    worth: of finding a target, in units of the reward. first_courses: (num_sensors + 1,) of each sensor.
+    Raises `ModelError` as the sensors.
+    """
+    num_courses = int(first_courses[-1])
+    found: list[tuple[Ints, Floats]] = [(np.empty(0, np.int64), np.empty(0))] * num_courses
+    states, weights = undetected.grid.states(state_dim), undetected.grid.node_weights()
+    with model_errors():
+        for group in start.groups:
+            offsets, cells, log_miss = _view(group, states, weights)
+            for i, course in enumerate(places_of_courses(group, first_courses).tolist()):
+                own = slice(offsets[i], offsets[i + 1])
+                found[course] = (cells[own], np.maximum(log_miss[own], _LEAST_LOG_MISS))
+    return Cells(
+        offsets_of([len(cells) for cells, _ in found]),
+        np.concatenate([np.empty(0, np.int64), *(cells for cells, _ in found)]),
+        np.concatenate([np.empty(0), *(log_miss for _, log_miss in found)]),
+        worth * undetected.expected,
+    )
+
+
+def _view(group: SensorGroup, states: Floats, weights: Floats) -> tuple[Ints, Ints, Floats]:
+    decision, horizon = group.decision, group.decision.horizon
+    poses = np.ascontiguousarray(horizon.poses[:, horizon.scans])
+    found: tuple[Ints, Ints, Floats] = cells_in_view(
+        decision.sensor, poses, states, weights, LEAST_DETECTION, group.reach
+    )
+    return found

@@ -1,7 +1,6 @@
 """What sensors must not do: which of their courses, and which pairs of courses, are allowed."""
 
-from vedette.control.constraints.feasible import opened, repaired
-from vedette.control.constraints.mask import Mask
+from vedette.control.constraints.mask import Mask, opened, repaired
 from vedette.control.constraints.masks import courses_allowed, mask_of, pairs_allowed, violated, without_course
 from vedette.control.constraints.protocol import Constraint, Situation
 from vedette.control.constraints.regions import KeepOut, StayInside

@@ -1,4 +1,4 @@
-"""Which joint actions are allowed, by course and by pair of courses."""
+"""Which joint actions are allowed, by course and by pair of courses; and one that is, near a given one."""
 
 from __future__ import annotations
 
@@ -9,6 +9,12 @@ import numpy as np
 
 from vedette.errors import InputError
 from vedette.kernels.base.types import Bools, Ints
+
+# Courses that are tried for a group of sensors that hold each other up. With more, a decision would wait for the proof
+# that nothing is allowed; what is found in so many is as good as known.
+_TRIES = 1000
+
+_GIVEN = "the constraint is given up"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -77,3 +83,120 @@ class Mask:
             if at[other] >= 0:
                 found += clash[at[other]]
         return found
+
+
+def repaired(mask: Mask, start: Sequence[int]) -> tuple[int, ...]:
+    """A joint action of few violations near `start`: none wherever that is found, `start` itself if it has none.
+
+    One sensor after the other takes its course of fewest violations, as long as any has fewer. What is left is
+    searched by branch and bound, for each group of sensors that hold each other up, with a bound on its tries:
+    within it the fewest violations are found, beyond it perhaps not.
+    """
+    at = list(start)
+    _descend(mask, at)
+    troubled = [s for s in range(len(at)) if mask.clashes(at, s)[at[s]]]
+    settled: set[int] = set()
+    for sensor in troubled:
+        if sensor not in settled:
+            group = _group(mask, sensor)
+            settled.update(group)
+            _Branching(mask, at, group).settle()
+    return tuple(at)
+
+
+def opened(mask: Mask) -> tuple[Mask, tuple[int, ...]]:
+    """The mask with a joint action that it allows; where none was found, opened as little as that takes.
+
+    A sensor without an allowed course may take any. Of what is then left, the violations of the joint action that has
+    fewest are forgiven: its courses that are forbidden, and all courses of its pairs of sensors that do not go
+    together. So no joint action that the opened mask allows has more of them. The notes say of whom.
+    """
+    blocked = [s for s, own in enumerate(mask.single) if not own.any()]
+    mask = _forgiven(mask, {s: slice(None) for s in blocked}, set())
+    start = repaired(mask, [int(own.argmax()) for own in mask.single])
+    courses = {s: course for s, course in enumerate(start) if not mask.single[s][course]}
+    pairs = {pair for pair, table in mask.together.items() if not table[start[pair[0]], start[pair[1]]]}
+    return _forgiven(mask, courses, pairs), start
+
+
+def _forgiven(mask: Mask, courses: Mapping[int, int | slice], pairs: set[tuple[int, int]]) -> Mask:
+    """The mask with these courses of sensors allowed, and with any of these pairs of sensors."""
+    if not courses and not pairs:
+        return mask
+    single = [own.copy() for own in mask.single]
+    for s, allowed in courses.items():
+        single[s][allowed] = True
+    together = {pair: table for pair, table in mask.together.items() if pair not in pairs}
+    notes = [f"sensor {s + 1}: no course was found that is allowed; {_GIVEN}" for s in courses]
+    notes += [
+        f"sensors {i + 1} and {j + 1}: no courses were found that go together; {_GIVEN}" for i, j in sorted(pairs)
+    ]
+    return Mask(tuple(single), together, (*mask.notes, *notes))
+
+
+def _descend(mask: Mask, at: list[int]) -> None:
+    """Each sensor to its course of fewest violations, of equal ones the first, as long as one has fewer than now."""
+    moved = True
+    while moved:
+        moved = False
+        for s in range(len(at)):
+            clashes = mask.clashes(at, s)
+            best = int(clashes.argmin())
+            if clashes[best] < clashes[at[s]]:
+                at[s], moved = best, True
+
+
+def _group(mask: Mask, sensor: int) -> list[int]:
+    """The sensors that one clashes with, directly or not, in printed order."""
+    found, waiting = {sensor}, [sensor]
+    while waiting:
+        new = set(mask.others(waiting.pop())) - found
+        found |= new
+        waiting.extend(new)
+    return sorted(found)
+
+
+class _Branching:
+    """Branch and bound for the fewest violations in one group; better joint actions are written into `at`."""
+
+    def __init__(self, mask: Mask, at: list[int], group: list[int]) -> None:
+        self.mask, self.at, self.tries = mask, at, _TRIES
+        # What is certain to be violated by each course, given the courses decided so far.
+        self.costs: dict[int, Ints] = {s: (~mask.single[s]).astype(np.int64) for s in group}
+        self.decided: dict[int, int] = {}
+        alone = sum(int(self.costs[s][at[s]]) for s in group)
+        every = sum(int(mask.clashes(at, s)[at[s]]) for s in group)
+        self.fewest = (every + alone) // 2  # each pair is counted at both its ends
+
+    def settle(self) -> None:
+        """Search the group, unless it is so large that one dive would take all tries."""
+        if len(self.costs) <= _TRIES // 2:
+            self._branch(0)
+
+    def _branch(self, violated: int) -> None:
+        free = [s for s in self.costs if s not in self.decided]
+        least = {s: int(self.costs[s].min()) for s in free}
+        if violated + sum(least.values()) >= self.fewest:
+            return
+        if not free:
+            self.fewest = violated
+            for s, course in self.decided.items():
+                self.at[s] = course
+            return
+        sensor = min(free, key=lambda s: (-least[s], int((self.costs[s] == least[s]).sum())))
+        for course in np.argsort(self.costs[sensor], kind="stable").tolist():
+            self.tries -= 1
+            if self.tries < 0 or self.fewest == 0:
+                return
+            self._decide(sensor, course, violated + int(self.costs[sensor][course]))
+
+    def _decide(self, sensor: int, course: int, violated: int) -> None:
+        free = [other for other in self.mask.others(sensor) if other not in self.decided]
+        rows = [self.mask.others(other)[sensor][course] for other in free]
+        self.decided[sensor] = course
+        for other, row in zip(free, rows, strict=True):
+            self.costs[other] += row
+        self._branch(violated)
+        for other, row in zip(free, rows, strict=True):
+            self.costs[other] -= row
+        del self.decided[sensor]

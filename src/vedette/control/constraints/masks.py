@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from vedette.control.constraints.feasible import opened
-from vedette.control.constraints.mask import Mask
+from vedette.control.constraints.mask import Mask, opened
 from vedette.control.constraints.protocol import Constraint, Situation
 from vedette.errors import InputError
 from vedette.kernels.base.types import Bools, Floats

@@ -11,10 +11,27 @@ import numpy as np
 
 from vedette.control.allowed import beliefs_ahead
 from vedette.control.constraints import Constraint, Mask, Situation, courses_allowed, mask_of, pairs_allowed
-from vedette.control.lookahead.courses import CourseTree, Sequence, Stages
 from vedette.control.settings import MobileSensor, PlanningSettings
 from vedette.densities import Labelled
 from vedette.kernels.base.types import Bools, Floats
+
+
+class Stages(NamedTuple):
+    """Decisions `stride` pseudo-updates apart; after the last, the horizon of a single decision."""
+
+    depth: int
+    stride: int  # pseudo-updates from a decision to the next
+    steps: int  # pseudo-updates of the horizon of a decision
+    period: float  # s between pseudo-updates
+
+    def num_steps(self, stage: int) -> int:
+        """Pseudo-updates to the end of the horizon of a decision, counted from 1."""
+        return (stage - 1) * self.stride + self.steps
+
+    def times(self, stage: int) -> Floats:
+        """s from a decision to the pseudo-updates that its courses are told apart by."""
+        num = self.steps if stage == self.depth else max(self.stride, self.steps)
+        return self.period * np.arange(1.0, num + 1)
 
 
 class Place(NamedTuple):
@@ -23,13 +40,8 @@ class Place(NamedTuple):
     pose: Floats  # (pose_dim,)
     courses: Floats  # (num_courses, num_times, pose_dim)
 
-    @classmethod
-    def after(cls, tree: CourseTree, taken: Sequence) -> Place:
-        """The courses taken so far."""
-        return cls(tree.pose_after(taken), tree.options(taken).courses)
 
-
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(slots=True, eq=False)
 class Ahead:
     """Constraints on several decisions: each is tested from where its courses begin to the end of its horizon, or to
     the next decision where that is later.
@@ -55,9 +67,8 @@ class Ahead:
 
     def __post_init__(self) -> None:
         reaches = [getattr(constraint, "reach", math.inf) for constraint in self.constraints]
-        object.__setattr__(self, "on_pairs", max(reaches) > 0.0)
-        timeless = all(getattr(constraint, "timeless", False) for constraint in self.constraints)
-        object.__setattr__(self, "_timeless", timeless)
+        self.on_pairs = max(reaches) > 0.0
+        self._timeless = all(getattr(constraint, "timeless", False) for constraint in self.constraints)
 
     def mask(self, places: Mapping[int, Place]) -> Mask:
         """Of the first decision, of all sensors; opened where it has to be. Raises `InputError` as `mask_of`."""

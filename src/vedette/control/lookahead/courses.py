@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
-from typing import NamedTuple, TypeAlias
+from dataclasses import dataclass, field, replace
+from typing import TypeAlias
 
 import numpy as np
 
-from vedette.kernels.base.types import Floats
+from vedette.control.lookahead.ahead import Ahead, Place, Stages
+from vedette.kernels.base.types import Bools, Floats
 from vedette.models.measurement import wrap_angles
 from vedette.platforms import Options, Platform, options_at
 
@@ -18,42 +19,50 @@ Sequence: TypeAlias = tuple[int, ...]
 # Poses that are equal to so many decimals, in metres and radians, are one.
 _SAME_DIGITS = 9
 
-
-class Stages(NamedTuple):
-    """Decisions `stride` pseudo-updates apart; after the last, the horizon of a single decision."""
-
-    depth: int
-    stride: int  # pseudo-updates from a decision to the next
-    steps: int  # pseudo-updates of the horizon of a decision
-    period: float  # s between pseudo-updates
-
-    def num_steps(self, stage: int) -> int:
-        """Pseudo-updates to the end of the horizon of a decision, counted from 1."""
-        return (stage - 1) * self.stride + self.steps
-
-    def times(self, stage: int) -> Floats:
-        """s from a decision to the pseudo-updates that its courses are told apart by."""
-        num = self.steps if stage == self.depth else max(self.stride, self.steps)
-        return self.period * np.arange(1.0, num + 1)
+# Places that are looked at, for the dead ends of one sensor. What lies beyond is taken to be open: a decision must not
+# wait for the proof that there is no way out.
+_MOST_PLACES = 10_000
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(slots=True, eq=False)
 class CourseTree:
-    """The sequences of one sensor.
+    """The sequences of one sensor: of all courses, or of those that constraints allow.
+
+    Where no course is allowed, those that violate constraints least are kept. Of these those are kept after which there
+    is the least number of further decisions with no course allowed: a beginning after which nothing is allowed is left
+    out, unless that is so after all of them.
 
     Attributes:
-        name: of the platform in errors.
+        sensor: its number.
         platform: what it may do.
         pose: where it is now.
         stages: the decisions.
+        ahead: the constraints; None: there are none.
+        now: (num_courses,) which courses are allowed at the first decision, at least one.
+        far_sighted: whether dead ends are left out.
     """
 
-    name: str
+    sensor: int
     platform: Platform
     pose: Floats
     stages: Stages
+    ahead: Ahead | None = None
+    now: Bools = field(default_factory=lambda: np.empty(0, np.bool_))
+    far_sighted: bool = True
     _found: dict[Sequence, Options] = field(default_factory=dict)
     _at_poses: dict[tuple[bytes, int], Options] = field(default_factory=dict)
+    _spots: dict[Sequence, bytes] = field(default_factory=dict)
+    _allowed: dict[tuple[bytes, int], Sequence] = field(default_factory=dict)
+    _open: dict[tuple[bytes, int], tuple[Sequence, bool]] = field(default_factory=dict)
+    _blocked: dict[tuple[bytes, int], int] = field(default_factory=dict)
+
+    def short_sighted(self) -> CourseTree:
+        """The same with its dead ends."""
+        return replace(self, far_sighted=False, _allowed={})
+
+    def place(self, taken: Sequence) -> Place:
+        """Where it decides after the courses taken so far, and between what."""
+        return Place(self.pose_after(taken), self.options(taken).courses)
 
     def pose_after(self, taken: Sequence) -> Floats:
         """Where it decides after the courses taken so far."""
@@ -65,19 +74,24 @@ class CourseTree:
             at = self.pose_after(taken)
             times = self.stages.times(len(taken) + 1)
             # Many ways lead to one pose, up to rounding: there it may do the same.
-            key = place_of(at), len(times)
+            key = _spot_of(at), len(times)
             if key not in self._at_poses:
-                self._at_poses[key] = options_at(self.name, self.platform, at, times)
+                self._at_poses[key] = options_at(f"sensors[{self.sensor}].platform", self.platform, at, times)
             self._found[taken] = self._at_poses[key]
         return self._found[taken]
 
-    def different(self, taken: Sequence) -> Sequence:
-        """The different courses that there are after those taken so far."""
-        return tuple(range(len(self.options(taken).courses)))
-
     def allowed(self, taken: Sequence) -> Sequence:
-        """Those of them that it may take; at least one."""
-        return self.different(taken)
+        """The different courses that it may take after those taken so far, at least one."""
+        if self.ahead is None:
+            return tuple(range(len(self.options(taken).courses)))
+        key = self.spot(taken), len(taken)
+        if key not in self._allowed:
+            found, _ = self._open_after(taken)
+            if self.far_sighted and len(found) > 1 and len(taken) + 1 < self.stages.depth:
+                blocked = [self._least_blocked((*taken, course)) for course in found]
+                found = tuple(course for course, num in zip(found, blocked, strict=True) if num == min(blocked))
+            self._allowed[key] = found
+        return self._allowed[key]
 
     def course(self, sequence: Sequence) -> Floats:
         """(num_steps, pose_dim) poses at the pseudo-updates, up to the end of the last decision's horizon."""
@@ -130,8 +144,55 @@ class CourseTree:
             level = [(*taken, k) for taken in level for k in self.allowed(taken)]
         return iter(level)
 
+    def blocked(self, sequence: Sequence) -> list[int]:
+        """The decisions of a sequence but the first, counted from 1, at which no course is allowed."""
+        return [k + 1 for k in range(1, len(sequence)) if not self._open_after(sequence[:k])[1]]
 
-def place_of(pose: Floats) -> bytes:
+    def spot(self, taken: Sequence) -> bytes:
+        """What is equal where it decides at one place: there it may do the same."""
+        if taken not in self._spots:
+            self._spots[taken] = _spot_of(self.pose_after(taken))
+        return self._spots[taken]
+
+    def _moment(self, taken: Sequence) -> tuple[bytes, int]:
+        """What is equal where constraints allow the same."""
+        assert self.ahead is not None
+        return self.spot(taken), self.ahead.moment(len(taken) + 1)
+
+    def _open_after(self, taken: Sequence) -> tuple[Sequence, bool]:
+        """The courses that meet the constraints, or violate them least; and whether they meet them."""
+        if not taken or self.ahead is None:
+            return tuple(np.flatnonzero(self.now).tolist()), True
+        key = self._moment(taken)
+        if key not in self._open:
+            allowed, met = self.ahead.courses(self.sensor, len(taken) + 1, self.place(taken))
+            self._open[key] = tuple(np.flatnonzero(allowed).tolist()), met
+        return self._open[key]
+
+    def _least_blocked(self, taken: Sequence) -> int:
+        """The least number of decisions from here on at which no course is allowed."""
+        if len(taken) == self.stages.depth:
+            return 0
+        key = self.spot(taken), len(taken)
+        if key not in self._blocked:
+            if len(self._blocked) >= _MOST_PLACES:
+                return 0
+            self._blocked[key] = 0  # counted among the places from now on
+            found, met = self._open_after(taken)
+            ways = [(*taken, course) for course in found]
+            if len(taken) + 1 < self.stages.depth:
+                # One way out is enough: first those to places that are known.
+                ways.sort(key=lambda way: self._moment(way) not in self._open)
+            least = self.stages.depth
+            for way in ways:
+                least = min(least, self._least_blocked(way))
+                if least == 0:
+                    break
+            self._blocked[key] = least + (not met)
+        return self._blocked[key]
+
+
+def _spot_of(pose: Floats) -> bytes:
     """What is equal for poses that are one."""
     return (np.round(pose, _SAME_DIGITS) + 0.0).tobytes()  # -0 is 0
 

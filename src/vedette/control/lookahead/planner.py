@@ -7,26 +7,24 @@ import itertools
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
-from vedette.control.additive.evaluator import AdditiveEvaluator
-from vedette.control.additive.situation import Sums
 from vedette.control.bounds import bound_of
 from vedette.control.constraints import Constraint
-from vedette.control.cutoff import beyond_cutoff
+from vedette.control.deciding import plan_of
+from vedette.control.evaluator import Evaluator
 from vedette.control.evidence import Evidence
-from vedette.control.inputs import check_poses, check_sensors, check_steering, check_valuing
-from vedette.control.lookahead.ahead import Ahead
+from vedette.control.explaining import Part
+from vedette.control.inputs import check_poses, check_steering, check_valuing
+from vedette.control.lookahead.ahead import Ahead, Stages
 from vedette.control.lookahead.beam import BeamSearch
-from vedette.control.lookahead.courses import CourseTree, Stages
-from vedette.control.lookahead.laid_courses import LaidCourses
-from vedette.control.lookahead.problem import Best, JointSequence, Part, SequenceProblem, SequenceSearch
+from vedette.control.lookahead.courses import CourseTree
+from vedette.control.lookahead.problem import Best, JointSequence, LaidCourses, SequenceProblem, SequenceSearch
 from vedette.control.lookahead.rules import Rules
 from vedette.control.plan import Plan
-from vedette.control.preparation import AnyReward, check_sums, prepare_sums, unsought, without_scans
+from vedette.control.preparation import AnyReward, Planned, check_sums, planned_on, unsought, without_scans
 from vedette.control.problem import searched
 from vedette.control.rewards import ExpectedLossReward
 from vedette.control.search import AutomaticSearch
@@ -41,12 +39,13 @@ from vedette.tracking import State
 MOST_DECISIONS, MOST_STEPS = 100, 10_000  # of a sequence, and of pseudo-updates from one to the next
 
 
-class _Single(NamedTuple):
-    """The best single decision, and what it was made on."""
+class _Given(NamedTuple):
+    """What one plan is made on."""
 
-    evaluator: AdditiveEvaluator
-    evidence: Evidence
-    choice: tuple[int, ...]
+    stages: Stages
+    trees: tuple[CourseTree, ...]
+    rules: Rules | None  # None: there are no constraints
+    planned: Planned
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -135,20 +134,19 @@ class HorizonPlanner:
             ModelError, NumericalError: as the filters; no sequence whose reward is a number.
         """
         generator(rng)
-        sums = prepare_sums(self.sensors, self.fusion, self.settings, self.reward, state)
-        trees = self._trees(poses, self._stages(state))
-        rules, samples = self._rules(trees, state), copy.deepcopy(rng)
-        trees = trees if rules is None else rules.trees
-        single = self._single(trees, rules, sums, rng)
-        if trees[0].stages.depth == 1:
-            return self._plan(single, None, trees, rules, sums)
-        problem = self._problem(trees, rules, sums, single.evaluator, samples)
-        if math.prod(tree.count(self.budget) for tree in trees) <= self.budget:
-            problem.evaluate(itertools.product(*(tree.all() for tree in trees)))
+        why = "so are all sequences of decisions"
+        planned = planned_on(self.sensors, self.fusion, self.settings, self.reward, state, why)
+        given, samples = self._given(state, poses, planned), copy.deepcopy(rng)
+        evidence, choice = self._single(given, rng)
+        if given.stages.depth == 1:
+            return self._plan(given, evidence, choice, None)
+        problem = self._problem(given, evidence.evaluator, samples)
+        if math.prod(tree.count(self.budget) for tree in given.trees) <= self.budget:
+            problem.evaluate(itertools.product(*(tree.all() for tree in given.trees)))
         else:
-            problem.begin(single.choice)
+            problem.begin(choice)
             self.search.search(problem, rng=rng)
-        return self._plan(single, problem, trees, rules, sums)
+        return self._plan(given, evidence, choice, problem)
 
     def _stages(self, state: State) -> Stages:
         """`depth` decisions, or those that are still to come."""
@@ -159,118 +157,92 @@ class HorizonPlanner:
             depth = min(depth, max(1, math.ceil(still - 1e-9)))
         return Stages(depth, stride, settings.horizon_steps, float(settings.horizon_period))
 
-    def _trees(self, poses: Floats, stages: Stages) -> tuple[CourseTree, ...]:
-        check_sensors(self.sensors)
-        at = check_poses(poses, len(self.sensors))
-        return tuple(
-            CourseTree(f"sensors[{s}].platform", sensor.platform, pose, stages)
-            for s, (sensor, pose) in enumerate(zip(self.sensors, at, strict=True))
-        )
-
-    def _rules(self, trees: tuple[CourseTree, ...], state: State) -> Rules | None:
+    def _given(self, state: State, poses: Floats, planned: Planned) -> _Given:
+        at, stages = check_poses(poses, len(self.sensors)), self._stages(state)
+        trees = tuple(CourseTree(s, own.platform, at[s], stages) for s, own in enumerate(self.sensors))
         if not self.constraints:
-            return None
-        poses, stages = np.array([tree.pose for tree in trees]), trees[0].stages
-        return Rules.of(trees, Ahead(self.constraints, self.sensors, self.settings, state.fused, poses, stages))
+            return _Given(stages, trees, None, planned)
+        at = np.array([tree.pose for tree in trees])
+        rules = Rules.of(trees, Ahead(self.constraints, self.sensors, self.settings, state.fused, at, stages))
+        return _Given(stages, rules.trees, rules, planned)
 
-    def _single(
-        self, trees: tuple[CourseTree, ...], rules: Rules | None, sums: Sums, rng: np.random.Generator
-    ) -> _Single:
-        """What a `JointPlanner` would decide."""
-        options, steps = tuple(tree.options(()) for tree in trees), trees[0].stages.steps
+    def _single(self, given: _Given, rng: np.random.Generator) -> tuple[Evidence, tuple[int, ...]]:
+        """What a `JointPlanner` would decide, and on what."""
+        options, steps = tuple(tree.options(()) for tree in given.trees), given.stages.steps
         now = tuple(own._replace(courses=np.ascontiguousarray(own.courses[:, :steps])) for own in options)
-        evaluator = self._lay_out(steps, sums, None, now, rng)
-        evidence = Evidence(evaluator, tuple(range(len(trees))), evaluator.joint())
-        mask = None if rules is None else rules.first()
-        return _Single(evaluator, evidence, searched(AutomaticSearch(), evidence, mask, rng=rng))
+        evaluator = self._lay_out(given, 1, None, now, rng)
+        evidence = Evidence(evaluator, tuple(range(len(now))), evaluator.joint())
+        mask = None if given.rules is None else given.rules.first()
+        return evidence, searched(AutomaticSearch(), evidence, mask, rng=rng)
 
-    def _problem(
-        self,
-        trees: tuple[CourseTree, ...],
-        rules: Rules | None,
-        sums: Sums,
-        first: AdditiveEvaluator,
-        samples: np.random.Generator,
-    ) -> SequenceProblem:
+    def _problem(self, given: _Given, first: Evaluator, samples: np.random.Generator) -> SequenceProblem:
         """What is searched; samples: draws them. first: whose account it goes on with."""
-        depth = trees[0].stages.depth
+        depth = given.stages.depth
 
-        def part(weight: float, stage: int) -> Part:
-            num_steps = trees[0].stages.num_steps(stage)
+        def part(weight: float, stage: int) -> LaidCourses:
             # From one state of the random numbers, and so of the same samples.
-            lay_out = partial(self._lay_out, num_steps, sums, first.looks if stage == 1 else ())
-            return Part(
-                weight, LaidCourses(trees, stage, lambda own: lay_out(own, copy.deepcopy(samples)), first.counts)
-            )
+            def lay_out(options: tuple[Options, ...]) -> Evaluator:
+                looks = first.looks if stage == 1 else ()
+                return self._lay_out(given, stage, looks, options, copy.deepcopy(samples))
+
+            return LaidCourses(given.trees, stage, lay_out, weight, first.counts)
 
         if self.discount is None:
             parts = [part(1.0, depth)]
         else:
             parts = [part(self.discount**d, d + 1) for d in range(depth) if self.discount > 0.0 or d == 0]
-        return SequenceProblem(trees, depth, tuple(parts), self.budget, rules)
+        return SequenceProblem(given.trees, depth, tuple(parts), self.budget, given.rules)
 
     def _lay_out(
         self,
-        num_steps: int,
-        sums: Sums,
+        given: _Given,
+        stage: int,
         looks: tuple[PlanningSettings, ...] | None,
         options: tuple[Options, ...],
         rng: np.random.Generator,
-    ) -> AdditiveEvaluator:
-        settings = replace(self.settings, horizon_steps=num_steps)
-        return AdditiveEvaluator.prepare(self.sensors, options, sums, settings, self.reward, looks=looks, rng=rng)
+    ) -> Evaluator:
+        """Rewards at the end of the horizon of a decision, counted from 1."""
+        rule, settings = given.planned.rule, replace(self.settings, horizon_steps=given.stages.num_steps(stage))
+        assert rule is not None
+        state = given.planned.state
+        return Evaluator.of_sums(self.sensors, options, rule, settings, self.reward, state, looks=looks, rng=rng)
 
     def _plan(
-        self,
-        single: _Single,
-        problem: SequenceProblem | None,
-        trees: tuple[CourseTree, ...],
-        rules: Rules | None,
-        sums: Sums,
+        self, given: _Given, evidence: Evidence, choice: tuple[int, ...], problem: SequenceProblem | None
     ) -> Plan:
         """Of the best sequence that was found; problem: None where a single decision is all."""
-        first, evidence = single.evaluator, single.evidence
-        sequence: JointSequence = tuple((course,) for course in single.choice)
+        sequence: JointSequence = tuple((course,) for course in choice)
         if problem is not None:
-            sequence, evidence = _best(problem).sequence, Evidence(first, evidence.which, evidence.rewards)
+            sequence, evidence = _best(problem).sequence, Evidence(evidence.evaluator, evidence.which, evidence.rewards)
             evidence.note(np.array(list(problem.found)), np.array([own.rewards for own in problem.found.values()]))
+        stages, (state, *_, formed) = given.stages, given.planned
         courses = tuple(own[0] for own in sequence)
-        constrained = () if rules is None else rules.notes(sequence)
-        counts, found = first.account()
-        stages = trees[0].stages
         ahead = replace(self.settings, horizon_steps=stages.num_steps(stages.depth))
-        found = (
-            *unsought(self.settings, sums.undetected, sums=True),
-            *without_scans(self.sensors, ahead, sums.time),
-            *found,
-        )
-        return Plan(
+        plan = plan_of(
             self.name,
-            tuple(own.actions for own in first.options),
-            tuple(own.first_action(course) for own, course in zip(first.options, courses, strict=True)),
-            evidence.tables(courses),
-            counts,
+            (Part.together(evidence, courses),),
             (
                 *self.notes,
-                *constrained,
-                *sums.notes,
-                *found,
-                *self._told(single, courses, stages.depth),
+                *(() if given.rules is None else given.rules.notes(sequence)),
+                *formed,
+                *unsought(self.settings, state.undetected, sums=True),
+                *without_scans(self.sensors, ahead, state.time),
             ),
-            evidence.curve() if problem is None else problem.curve(),
-            bound_of(evidence, courses) if problem is None else problem.bound(),
-            sequence=tuple(tree.rows(own) for tree, own in zip(trees, sequence, strict=True)),
+            tuple(self._told(choice, courses, stages.depth)),
+            curve=evidence.curve() if problem is None else problem.curve(),
+            bound=bound_of(evidence, courses) if problem is None else problem.bound(),
+            sequence=tuple(tree.rows(own) for tree, own in zip(given.trees, sequence, strict=True)),
         )
+        return plan if problem is None else replace(plan, questions=None)
 
-    def _told(self, single: _Single, courses: tuple[int, ...], depth: int) -> Iterator[str]:
+    def _told(self, choice: tuple[int, ...], courses: tuple[int, ...], depth: int) -> Iterator[str]:
         """What a reader must know of the depth and of the samples."""
         if depth < self.depth:
             yield f"depth {depth} in place of {self.depth}: no more decisions come before the end"
-        if depth > 1 and courses == single.choice:
+        if depth > 1 and courses == choice:
             yield f"depth {depth} does not pay: the actions are those of the best single decision"
         if self.settings.confidence is not None:
             yield "decided on num_samples samples, whatever the confidence: sequences are not raced"
-        yield from beyond_cutoff(single.evaluator, courses)
 
 
 def _best(problem: SequenceProblem) -> Best:

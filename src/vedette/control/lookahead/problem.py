@@ -4,28 +4,116 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable
-from dataclasses import dataclass, field
-from typing import NamedTuple, Protocol, TypeAlias, runtime_checkable
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field, replace
+from typing import Any, NamedTuple, Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
 
+from vedette.control.additive.rewards import AdditiveRewards
+from vedette.control.evaluator import Evaluator
+from vedette.control.explanation import Bound
 from vedette.control.lookahead.courses import CourseTree, Sequence
-from vedette.control.lookahead.laid_courses import LaidCourses, Taken
 from vedette.control.lookahead.rules import Rules
-from vedette.control.plan import Bound, SearchCurve
+from vedette.control.plan import SearchCurve
 from vedette.control.search import first_best
-from vedette.kernels.base.types import Floats
+from vedette.kernels.base.types import Floats, Ints
+from vedette.kernels.planning.ascent import Cells
+from vedette.platforms import Options
 
 # A whole sequence of each sensor.
 JointSequence: TypeAlias = tuple[Sequence, ...]
+# Of each sensor the courses that it takes; None: it does not scan.
+Taken: TypeAlias = tuple[Sequence | None, ...]
 
 
-class Part(NamedTuple):
-    """What the belief at the end of one decision's horizon adds to the value of a sequence."""
+class _Lists:
+    """Lists that grow at their end, of entries in several columns; list i is offsets[i]:offsets[i + 1].
 
+    What is there is copied each time that the room doubles.
+    """
+
+    def __init__(self, offsets: Ints, *columns: np.ndarray[Any, Any]) -> None:
+        self._rooms, self._nums = [offsets, *columns], [len(offsets), *map(len, columns)]
+
+    def append(self, offsets: Ints, *columns: np.ndarray[Any, Any]) -> None:
+        """Put lists behind those that are there."""
+        last = self._rooms[0][self._nums[0] - 1]
+        for i, more in enumerate((offsets[1:] + last, *columns)):
+            room, num, end = self._rooms[i], self._nums[i], self._nums[i] + len(more)
+            if end > len(room):
+                self._rooms[i] = np.empty((max(end, 2 * len(room)), *room.shape[1:]), room.dtype)
+                self._rooms[i][:num] = room[:num]
+            self._rooms[i][num:end], self._nums[i] = more, end
+
+    @property
+    def values(self) -> tuple[np.ndarray[Any, Any], ...]:
+        """Offsets and columns."""
+        return tuple(room[:num] for room, num in zip(self._rooms, self._nums, strict=True))
+
+
+@dataclass(slots=True, eq=False)
+class LaidCourses:
+    """Rewards at the end of the horizon of one decision, the `stage`-th from now.
+
+    Attributes:
+        trees: what each sensor may do.
+        stage: number of courses that each sensor has taken by then.
+        lay_out: makes the changes of some courses of each sensor; with the same samples each time.
+        weight: of these rewards in the value of a sequence.
+        counts: filter steps and rewards so far.
+    """
+
+    trees: tuple[CourseTree, ...]
+    stage: int
+    lay_out: Callable[[tuple[Options, ...]], Evaluator]
     weight: float
-    rewards: LaidCourses
+    counts: dict[str, int]
+    _places: dict[tuple[int, Sequence], int] = field(default_factory=dict)
+    _additive: AdditiveRewards | None = None
+    _lists: tuple[_Lists, ...] = ()
+
+    def __call__(self, joints: list[Taken]) -> Floats:
+        """(num, num_samples) rewards of joint actions."""
+        wanted = {(s, taken) for joint in joints for s, taken in enumerate(joint) if taken is not None}
+        # Sensor after sensor, as they are laid out.
+        new = sorted(wanted - self._places.keys())
+        if new or self._additive is None:
+            self._add(new)
+        actions = [[-1 if own is None else self._places[s, own] for s, own in enumerate(joint)] for joint in joints]
+        rewards = self._rewards()(np.array(actions, np.int64))
+        self.counts["rewards"] += rewards.size
+        return rewards
+
+    def _add(self, new: list[tuple[int, Sequence]]) -> None:
+        courses: list[list[Floats]] = [[] for _ in self.trees]
+        for s, taken in new:
+            self._places[s, taken] = len(self._places)
+            courses[s].append(self.trees[s].course(taken))
+        laid = self.lay_out(tuple(self._options(*own) for own in zip(self.trees, courses, strict=True)))
+        self.counts["filter_steps"] += laid.counts["filter_steps"]
+        assert laid.additive is not None
+        table, cells = laid.additive.table, laid.additive.cells
+        changes = table.offsets, table.labels, table.changes
+        found = cells.offsets, cells.cells, cells.log_miss
+        if self._additive is None:
+            self._additive, self._lists = laid.additive, (_Lists(*changes), _Lists(*found))
+        else:
+            for lists, more in zip(self._lists, (changes, found), strict=True):
+                lists.append(*more)
+
+    def _options(self, tree: CourseTree, courses: list[Floats]) -> Options:
+        shape = len(courses), tree.stages.num_steps(self.stage), len(tree.pose)
+        return Options(tree.options(()).actions, np.array(courses).reshape(shape), np.arange(len(courses)), tree.pose)
+
+    def _rewards(self) -> AdditiveRewards:
+        """Of all courses so far: a sensor might take any of them, and is given its own."""
+        old = self._additive
+        assert old is not None
+        (offsets, labels, changes), (cell_offsets, cells, log_miss) = (own.values for own in self._lists)
+        firsts = np.zeros(len(self.trees) + 1, np.int64)
+        table = old.table._replace(first_courses=firsts, offsets=offsets, labels=labels, changes=changes)
+        return replace(old, table=table, cells=Cells(cell_offsets, cells, log_miss, old.cells.worth))
 
 
 class Best(NamedTuple):
@@ -51,7 +139,7 @@ class SequenceProblem:
 
     trees: tuple[CourseTree, ...]
     depth: int
-    parts: tuple[Part, ...]
+    parts: tuple[LaidCourses, ...]
     budget: int
     rules: Rules | None = None
     found: dict[tuple[int, ...], Best] = field(default_factory=dict)
@@ -106,10 +194,10 @@ class SequenceProblem:
 
     def _rewards(self, joints: list[Taken]) -> Floats:
         total: Floats | float = 0.0
-        for weight, rewards in self.parts:
-            cut = [tuple(None if own is None else own[: rewards.stage] for own in joint) for joint in joints]
+        for part in self.parts:
+            cut = [tuple(None if own is None else own[: part.stage] for own in joint) for joint in joints]
             distinct = {joint: i for i, joint in enumerate(dict.fromkeys(cut))}
-            total = total + weight * rewards(list(distinct))[[distinct[joint] for joint in cut]]
+            total = total + part.weight * part(list(distinct))[[distinct[joint] for joint in cut]]
         return np.asarray(total)
 
     def _keep(self, joints: list[Taken], rewards: Floats, values: Floats) -> None:

@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from collections.abc import Sequence as Several
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import combinations
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from vedette.control.constraints import Mask, without_course
-from vedette.control.lookahead.ahead import Ahead, Place
-from vedette.control.lookahead.constrained import ConstrainedTree
+from vedette.control.constraints import Mask, opened, repaired, without_course
+from vedette.control.lookahead.ahead import Ahead
 from vedette.control.lookahead.courses import CourseTree, Sequence
-from vedette.control.lookahead.start import furthest
 from vedette.kernels.base.types import Bools
 
-# Beginnings that are tried for a sequence of one sensor that is allowed beside those of the others.
+# Courses that are tried. With more, a decision would wait for the proof that nothing is allowed; what is found in so
+# many is as good as known.
 _MOST_TRIES = 10_000
+
+_Node = TypeVar("_Node")
+_OVER: Any = object()  # of an iterator
 
 
 @dataclass(slots=True, eq=False)
@@ -31,7 +35,7 @@ class Rules:
         start: a joint sequence that is allowed.
     """
 
-    trees: tuple[ConstrainedTree, ...]
+    trees: tuple[CourseTree, ...]
     ahead: Ahead
     mask: Mask
     until: int
@@ -48,14 +52,14 @@ class Rules:
         sequence is found on which all pairs are as they must be, that holds for as many decisions as one was found for;
         see `notes`. Raises `InputError` as `mask_of`.
         """
-        mask = ahead.mask({s: Place.after(tree, ()) for s, tree in enumerate(trees)})
-        own = tuple(ConstrainedTree.of(tree, ahead, s, mask.single[s]) for s, tree in enumerate(trees))
-        found = furthest(own, ahead, mask)
+        mask = ahead.mask({s: tree.place(()) for s, tree in enumerate(trees)})
+        bound = tuple(replace(tree, ahead=ahead, now=own) for tree, own in zip(trees, mask.single, strict=True))
+        found = _furthest(bound, ahead, mask)
         if not found[0]:
-            own = tuple(tree.short_sighted() for tree in own)
-            found = furthest(own, ahead, mask)
-        start = tuple(tree.kept(taken) for tree, taken in zip(own, found, strict=True))
-        return cls(own, ahead, mask, len(found[0]), start)
+            bound = tuple(tree.short_sighted() for tree in bound)
+            found = _furthest(bound, ahead, mask)
+        start = tuple(tree.kept(taken) for tree, taken in zip(bound, found, strict=True))
+        return cls(bound, ahead, mask, len(found[0]), start)
 
     def first(self) -> Mask:
         """Of the first decision, without dead ends."""
@@ -89,16 +93,12 @@ class Rules:
 
         At once from decision to decision, back where there is no way on.
         """
-        tree, waiting = self.trees[sensor], [iter([taken])]
-        for _ in range(_MOST_TRIES):
-            while (own := next(waiting[-1], None)) is None:
-                waiting.pop()
-                if not waiting:
-                    return None
-            if len(own) == tree.stages.depth:
-                return own
-            waiting.append(iter([(*own, k) for k in tree.nearest(own, self.after(sensor, own, others))]))
-        return None
+        tree = self.trees[sensor]
+
+        def ways(own: Sequence) -> Iterator[Sequence]:
+            return ((*own, k) for k in tree.nearest(own, self.after(sensor, own, others)))
+
+        return depth_first(taken, ways, lambda own: len(own) == tree.stages.depth, _MOST_TRIES)
 
     def notes(self, sequence: Several[Sequence]) -> tuple[str, ...]:
         """What a reader of a decision for a joint sequence must know."""
@@ -140,8 +140,81 @@ class Rules:
         if stage == 1:
             return self.mask.together.get((first, second))
         mine, its = self.trees[first], self.trees[second]
-        key = (first, second, mine.place(one), its.place(other), self.ahead.moment(stage))
+        key = (first, second, mine.spot(one), its.spot(other), self.ahead.moment(stage))
         if key not in self._tables:
-            places = {first: Place.after(mine, one), second: Place.after(its, other)}
+            places = {first: mine.place(one), second: its.place(other)}
             self._tables[key] = self.ahead.pairs(stage, places).get((first, second))
         return self._tables[key]
+
+
+def depth_first(
+    start: _Node, ways: Callable[[_Node], Iterator[_Node | None]], is_end: Callable[[_Node], bool], tries: int
+) -> _Node | None:
+    """The first end that is come to, way by way, back where there is no way on; None: none in so many tries.
+
+    ways: on from a node; None for one that is closed, which is a try all the same.
+    """
+    waiting: list[Iterator[_Node | None]] = [iter((start,))]
+    for _ in range(tries):
+        while (node := next(waiting[-1], _OVER)) is _OVER:
+            waiting.pop()
+            if not waiting:
+                return None
+        if node is not None:
+            if is_end(node):
+                return node
+            waiting.append(ways(node))
+    return None
+
+
+class _Begun(NamedTuple):
+    """A joint beginning, and the courses of the first sensors at the decision after it."""
+
+    joint: tuple[Sequence, ...]
+    mask: Mask
+    orders: list[list[int]]  # of each sensor the courses there, in the order in which they are tried
+    at: tuple[int, ...] = ()
+
+
+def _furthest(trees: tuple[CourseTree, ...], ahead: Ahead, mask: Mask) -> tuple[Sequence, ...]:
+    """Courses that all sensors may take together, for as many decisions as such were found; perhaps for none.
+
+    Decision after decision the courses that keep to the last action, repaired, are tried first; depth first, with a
+    bound on the tries. mask: of the first decision; allows a joint action.
+    """
+    num, depth = len(trees), trees[0].stages.depth
+    furthest: tuple[Sequence, ...] = ((),) * num
+
+    def begun(joint: tuple[Sequence, ...]) -> _Begun:
+        orders = [tree.nearest(own, tree.allowed(own)) for tree, own in zip(trees, joint, strict=True)]
+        single = tuple(np.zeros(len(tree.options(own).courses), bool) for tree, own in zip(trees, joint, strict=True))
+        for own, courses in zip(single, orders, strict=True):
+            own[courses] = True
+        places = {s: tree.place(own) for s, (tree, own) in enumerate(zip(trees, joint, strict=True))}
+        together = ahead.pairs(len(joint[0]) + 1, places) if joint[0] else mask.together
+        here = Mask(single, together)
+        first = repaired(here, [own[0] for own in orders] if joint[0] else opened(mask)[1])
+        if not here.allows(np.array([first]))[0]:
+            return _Begun(joint, here, [[]] * num)
+        return _Begun(
+            joint, here, [[best, *(k for k in own if k != best)] for own, best in zip(orders, first, strict=True)]
+        )
+
+    def ways(node: _Begun) -> Iterator[_Begun | None]:
+        if len(node.at) == num:
+            node = begun(joined(node))
+        sensor = len(node.at)
+        clashes = node.mask.clashes((*node.at, *[-1] * (num - sensor)), sensor)
+        return (node._replace(at=(*node.at, k)) if clashes[k] == 0 else None for k in node.orders[sensor])
+
+    def joined(node: _Begun) -> tuple[Sequence, ...]:
+        return tuple((*own, course) for own, course in zip(node.joint, node.at, strict=True))
+
+    def is_end(node: _Begun) -> bool:
+        nonlocal furthest
+        if len(node.at) == num and len(node.joint[0]) == len(furthest[0]):
+            furthest = joined(node)
+        return len(furthest[0]) == depth
+
+    depth_first(begun(furthest), ways, is_end, _MOST_TRIES + 1)
+    return furthest

@@ -7,8 +7,7 @@ from vedette.control.rewards.labels import (
     KullbackLeiblerReward,
     PeecsReward,
 )
-from vedette.control.rewards.loss import ExpectedLossReward
-from vedette.control.rewards.power import CauchySchwarzReward, RenyiReward
+from vedette.control.rewards.power import CauchySchwarzReward, ExpectedLossReward, RenyiReward
 
 __all__ = [
     "CardinalityVarianceReward",

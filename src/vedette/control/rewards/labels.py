@@ -1,21 +1,24 @@
-"""Rewards that are sums over targets, each valued by its Bernoulli before and after the scans."""
+"""Rewards that are sums over targets, each valued by its Bernoulli before and after the scans.
+
+Model functions take existence, mean (state_dim,), covariance (state_dim, state_dim) of the prediction; the same of the
+update; the function's own vector; and the numbers to be written. Positions are the first two components of a state.
+"""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 
-from vedette.control.rewards.label_functions import (
-    cardinality_variance_of_label,
-    gospa_of_label,
-    kullback_leibler_of_label,
-    peecs_of_label,
-)
 from vedette.kernels.base.types import Floats
+from vedette.kernels.gaussian.linalg import cholesky, log_det_from_factor, solve_lower
 from vedette.models.arguments import positive, probability
-from vedette.models.functions import ModelFunction
+from vedette.models.functions import ModelFunction, model_function
+
+# A probability below this is taken as this in a quotient.
+_LEAST = 1e-300
 
 
 class _OneSum:
@@ -52,7 +55,7 @@ class KullbackLeiblerReward(_OneSum):
 
     @property
     def function(self) -> ModelFunction:
-        """See `vedette.control.rewards.label_functions`."""
+        """See `vedette.control.rewards.labels`."""
         return kullback_leibler_of_label
 
 
@@ -62,7 +65,7 @@ class CardinalityVarianceReward(_OneSum):
 
     @property
     def function(self) -> ModelFunction:
-        """See `vedette.control.rewards.label_functions`."""
+        """See `vedette.control.rewards.labels`."""
         return cardinality_variance_of_label
 
 
@@ -87,7 +90,7 @@ class ExpectedGospaReward(_OneSum):
 
     @property
     def function(self) -> ModelFunction:
-        """See `vedette.control.rewards.label_functions`."""
+        """See `vedette.control.rewards.labels`."""
         return gospa_of_label
 
     @property
@@ -122,7 +125,7 @@ class PeecsReward:
 
     @property
     def function(self) -> ModelFunction:
-        """See `vedette.control.rewards.label_functions`."""
+        """See `vedette.control.rewards.labels`."""
         return peecs_of_label
 
     @property
@@ -137,3 +140,92 @@ class PeecsReward:
             cardinality = np.where(num > 0.0, 4.0 * variance / num, 0.0)
             state = np.where(existence > 0.0, error / existence, 0.0)
         return np.asarray(-(self.share * cardinality + (1.0 - self.share) * state))
+
+
+@model_function("label_reward")
+def kullback_leibler_of_label(
+    existence: float,
+    mean: Floats,
+    cov: Floats,
+    new_existence: float,
+    new_mean: Floats,
+    new_cov: Floats,
+    params: Floats,
+    out: Floats,
+) -> None:
+    """Kullback-Leibler divergence of the update from the prediction, of Bernoulli and Gaussian.
+
+    (1 - r') ln((1 - r') / (1 - r)) + r' (ln(r' / r) + (tr(P^-1 P') + d'P^-1 d - n + ln|P| - ln|P'|) / 2), d = m' - m.
+    """
+    n, total = mean.shape[0], 0.0
+    if new_existence < 1.0:
+        total += (1.0 - new_existence) * math.log((1.0 - new_existence) / max(1.0 - existence, _LEAST))
+    if new_existence > 0.0:
+        factor, new_factor, column = np.zeros((n, n)), np.zeros((n, n)), np.empty(n)
+        if not (cholesky(cov, factor) and cholesky(new_cov, new_factor)):
+            out[0] = math.nan
+            return
+        gaussian = log_det_from_factor(factor) - log_det_from_factor(new_factor) - n
+        for j in range(n + 1):
+            for i in range(n):
+                # tr(P^-1 P') is the sum of squares of L^-1 L'.
+                column[i] = new_factor[i, j] if j < n else new_mean[i] - mean[i]
+            solve_lower(factor, column, column)
+            for i in range(n):
+                gaussian += column[i] * column[i]
+        total += new_existence * (math.log(new_existence / max(existence, _LEAST)) + 0.5 * gaussian)
+    out[0] = total
+
+
+@model_function("label_reward")
+def cardinality_variance_of_label(
+    existence: float,
+    mean: Floats,
+    cov: Floats,
+    new_existence: float,
+    new_mean: Floats,
+    new_cov: Floats,
+    params: Floats,
+    out: Floats,
+) -> None:
+    """r' (1 - r')."""
+    out[0] = new_existence * (1.0 - new_existence)
+
+
+@model_function("label_reward")
+def gospa_of_label(
+    existence: float,
+    mean: Floats,
+    cov: Floats,
+    new_existence: float,
+    new_mean: Floats,
+    new_cov: Floats,
+    params: Floats,
+    out: Floats,
+) -> None:
+    """Mean squared GOSPA (alpha = 2, p = 2) of the better of reporting the target and not; params: squared cutoff.
+
+    min(r' min(tr P', c^2) + (1 - r') c^2 / 2, r' c^2 / 2).
+    """
+    square = params[0]
+    error = min(new_cov[0, 0] + new_cov[1, 1], square)
+    reported = new_existence * error + 0.5 * (1.0 - new_existence) * square
+    out[0] = min(reported, 0.5 * new_existence * square)
+
+
+@model_function("label_reward")
+def peecs_of_label(
+    existence: float,
+    mean: Floats,
+    cov: Floats,
+    new_existence: float,
+    new_mean: Floats,
+    new_cov: Floats,
+    params: Floats,
+    out: Floats,
+) -> None:
+    """r' (1 - r'); r' times the share of its position's variance in the squared cutoff, params[0]; r'; and 1."""
+    out[0] = new_existence * (1.0 - new_existence)
+    out[1] = new_existence * min((new_cov[0, 0] + new_cov[1, 1]) / params[0], 1.0)
+    out[2] = new_existence
+    out[3] = 1.0

@@ -1,10 +1,8 @@
 """Searching the joint actions of all sensors for the one of largest mean reward."""
 
-from vedette.control.search.ascent import CoordinateAscent
-from vedette.control.search.automatic import AutomaticSearch
+from vedette.control.search.ascent import AutomaticSearch, CoordinateAscent
 from vedette.control.search.cross_entropy import CrossEntropy
-from vedette.control.search.exhaustive import ExhaustiveSearch
-from vedette.control.search.greedy import SequentialGreedy
+from vedette.control.search.exhaustive import ExhaustiveSearch, SequentialGreedy
 from vedette.control.search.problem import JointProblem, JointSearch, all_joint_actions, first_best, tie_of
 
 __all__ = [

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vedette.control.constraints import Mask
-from vedette.control.search.known import Known
-from vedette.control.search.problem import JointProblem
+from vedette.control.search.problem import JointProblem, Known
 from vedette.kernels.base.types import Floats, Ints
 from vedette.models.arguments import chance, dimension, real, reject
 

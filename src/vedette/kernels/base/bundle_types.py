@@ -27,17 +27,21 @@ _HELD: dict[int, tuple[Any, Any]] = {}
 _MOST_HELD = 1000
 
 
-def _key(value: Any) -> Any:
-    """All that the type of a bundle's field depends on."""
-    if isinstance(value, np.ndarray):
-        return value.dtype, value.ndim, value.flags.num
-    if type(value) in _HELD_KINDS:
-        return type_of_bundle(value)
-    if isinstance(value, tuple):
-        return (type(value), *map(_key, value))
-    if hasattr(value, "numba_type"):  # asking for it compiles the function, where that is still to do
-        return value.kind
-    return type(value)
+def _key(bundle: tuple[Any, ...]) -> tuple[Any, ...]:
+    """All that the type of a bundle depends on; what is found by it is kept, so that a type stands for itself."""
+    found: list[Any] = [type(bundle)]
+    for value in bundle:
+        if isinstance(value, np.ndarray):
+            found.append((value.dtype, value.ndim, value.flags.num))
+        elif type(value) in _HELD_KINDS:
+            found.append(id(type_of_bundle(value)))  # Numba would hash all of its fields
+        elif isinstance(value, tuple):
+            found.append(_key(value))
+        elif hasattr(value, "numba_type"):  # asking for it compiles the function, where that is still to do
+            found.append(value.kind)
+        else:
+            found.append(type(value))
+    return tuple(found)
 
 
 def type_of_bundle(value: tuple[Any, ...], context: Any = None) -> Any:
@@ -45,7 +49,7 @@ def type_of_bundle(value: tuple[Any, ...], context: Any = None) -> Any:
     held = _HELD.get(id(value))
     if held is not None:
         return held[1]
-    key = (type(value), *map(_key, value))
+    key = _key(value)
     found = _FOUND.get(key)
     if found is None:
         from numba import typeof, types

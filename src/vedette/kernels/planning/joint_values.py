@@ -5,11 +5,14 @@ A label that no chosen course reaches keeps its value without scans, which is ta
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from vedette.kernels.base.compile import borrowing, inlined, kernel
-from vedette.kernels.base.types import Floats, Ints
-from vedette.kernels.planning.bernoulli_rows import Table
+from vedette.kernels.base.types import Bools, Floats, Ints
+from vedette.kernels.gaussian.integrals import integrate_rows, make_integrals
+from vedette.kernels.planning.bernoulli_rows import Table, unscale
 from vedette.kernels.planning.label_values import Valuation, ValueWork, make_value_work, value_label
 
 
@@ -53,13 +56,34 @@ def value_rows(valuation: Valuation, label: int, rows: Floats, work: ValueWork, 
 
 
 @kernel
+def label_values(rows: Floats, valuation: Valuation) -> Floats:
+    """(num_labels, num, num_samples) values of rows (num_labels, bernoulli_size, num_samples), label by label."""
+    num_labels, _, num_samples = rows.shape
+    work, out = make_value_work(valuation, num_samples), np.empty((num_labels, valuation.num, num_samples))
+    for label in range(num_labels):
+        value_rows(valuation, label, rows[label], work, out[label])
+    return out
+
+
+@kernel
 def values_without_scans(rows: Floats, valuation: Valuation) -> Floats:
     """(num_labels, num) values of rows (num_labels, bernoulli_size)."""
-    work, out = make_value_work(valuation, 1), np.empty((len(rows), valuation.num, 1))
-    for label in range(len(rows)):
-        spread_row(rows[label], work.total)
-        value_label(valuation, label, work, out[label])
-    return out[:, :, 0].copy()
+    return label_values(rows.reshape((rows.shape[0], rows.shape[1], 1)), valuation)[:, :, 0].copy()
+
+
+@kernel
+def existence_logits(rows: Floats, dim: int) -> Floats:
+    """(num_labels, num_samples) of the existence that rows stand for; 0 where nobody who counts knows the label."""
+    num_labels, size, num_samples = rows.shape
+    out, integrals = np.zeros((num_labels, num_samples)), make_integrals(num_samples)
+    for label in range(num_labels):
+        total = rows[label].copy()
+        unscale(total)
+        integrate_rows(total, dim, integrals)
+        for s in range(num_samples):
+            if total[size - 3, s] > 0.0:
+                out[label, s] = total[size - 2, s] + integrals.exponents[s] + math.log(integrals.factors[s])
+    return out
 
 
 @kernel
@@ -72,32 +96,60 @@ def start_totals(table: Table) -> Floats:
     return totals
 
 
+@inlined
+def _start_again(table: Table, course: int, totals: Floats, stale: Bools) -> None:
+    """The labels in reach of a course have other scans than in the joint action before: their rows start again."""
+    for entry in range(table.offsets[course], table.offsets[course + 1]):
+        label = table.labels[entry]
+        if not stale[label]:
+            stale[label] = True
+            spread_row(table.start[label], totals[label])
+
+
+@borrowing
+def _gather(table: Table, actions: Ints, stale: Bools, touched: Bools, totals: Floats) -> None:
+    """Add what the scans of a joint action (num_sensors,) say of stale labels, and note which labels they reach."""
+    touched[:] = False
+    for s in range(len(actions)):
+        if actions[s] >= 0:
+            course = table.first_courses[s] + actions[s]
+            for entry in range(table.offsets[course], table.offsets[course + 1]):
+                label = table.labels[entry]
+                touched[label] = True
+                if stale[label]:
+                    add_rows(totals[label], table.powers[s], table.changes[entry], totals[label])
+
+
 @kernel
 def joint_values(table: Table, valuation: Valuation, actions: Ints, first: int, last: int, out: Floats) -> None:
     """Sums over labels (num_joint, num, num_samples), of joint actions `first:last`.
 
-    actions: (num_joint, num_sensors) number of the course of each sensor; -1 for a sensor that does not scan.
+    actions: (num_joint, num_sensors) number of the course of each sensor; -1 for a sensor that does not scan. A label
+    of which no scan is another than in the joint action before keeps its values: rows that differ in one sensor cost
+    what that one can reach.
     """
     totals, unseen = start_totals(table), values_without_scans(table.start, valuation)
     num_labels, num_samples = totals.shape[0], totals.shape[2]
-    values, work = np.empty((valuation.num, num_samples)), make_value_work(valuation, num_samples)
-    touched = np.empty(num_labels, np.int64)
+    values, work = np.empty((num_labels, valuation.num, num_samples)), make_value_work(valuation, num_samples)
+    stale, touched = np.ones(num_labels, np.bool_), np.empty(num_labels, np.bool_)
     for joint in range(first, last):
-        touched[:] = 0
         for s in range(actions.shape[1]):
-            if actions[joint, s] >= 0:
-                course = table.first_courses[s] + actions[joint, s]
-                for entry in range(table.offsets[course], table.offsets[course + 1]):
-                    touched[table.labels[entry]] = 1
-                add_course(table, s, course, 1.0, totals)
+            before = actions[joint - 1, s] if joint > first else -1
+            if actions[joint, s] != before:
+                if before >= 0:
+                    _start_again(table, table.first_courses[s] + before, totals, stale)
+                if actions[joint, s] >= 0:
+                    _start_again(table, table.first_courses[s] + actions[joint, s], totals, stale)
+        _gather(table, actions[joint], stale, touched, totals)
         out[joint] = 0.0
         for label in range(num_labels):
-            if touched[label] == 1:
-                value_rows(valuation, label, totals[label], work, values)
-                spread_row(table.start[label], totals[label])
-            for e in range(valuation.num):
-                for sample in range(num_samples):
-                    out[joint, e, sample] += values[e, sample] if touched[label] == 1 else unseen[label, e]
+            if stale[label]:
+                stale[label] = False
+                if touched[label]:
+                    value_rows(valuation, label, totals[label], work, values[label])
+                else:
+                    values[label] = unseen[label].reshape(-1, 1)
+            out[joint] += values[label]
 
 
 @inlined

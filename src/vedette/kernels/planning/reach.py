@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vedette.kernels.base.compile import borrowing, inlined, kernel
-from vedette.kernels.base.types import Floats, Ints, Lmb
+from vedette.kernels.base.types import Floats, Ints, Lmb, Motion
 from vedette.kernels.gaussian.detection import detection_probability
 from vedette.kernels.gaussian.prediction import predict
 from vedette.kernels.gaussian.scratch import make_scratch
@@ -32,17 +32,19 @@ class Belief(NamedTuple):
 
 
 @kernel
-def predict_paths(prior: Lmb, decision: Decision) -> Paths:
-    """Every label after each step, without births, deaths or scans."""
-    num, dim = prior.tracks.means.shape
-    steps, scratch = decision.horizon.poses.shape[1], make_scratch(dim, len(decision.sensor.angular))
-    means, covs = np.empty((num, steps, dim)), np.empty((num, steps, dim, dim))
+def predict_paths(motion: Motion, dt: float, num_steps: int, means: Floats, covs: Floats) -> Paths:
+    """Gaussians of means (num, state_dim) after each of so many steps, without births or deaths."""
+    num, dim = means.shape
+    scratch, paths = (
+        make_scratch(dim, dim),
+        Paths(np.empty((num, num_steps, dim)), np.empty((num, num_steps, dim, dim))),
+    )
     for i in range(num):
-        for h in range(steps):
-            mean = prior.tracks.means[i] if h == 0 else means[i, h - 1]
-            cov = prior.tracks.covs[i] if h == 0 else covs[i, h - 1]
-            predict(decision.motion, decision.horizon.dt, mean, cov, means[i, h], covs[i, h], scratch)
-    return Paths(means, covs)
+        for h in range(num_steps):
+            mean = means[i] if h == 0 else paths.means[i, h - 1]
+            cov = covs[i] if h == 0 else paths.covs[i, h - 1]
+            predict(motion, dt, mean, cov, paths.means[i, h], paths.covs[i, h], scratch)
+    return paths
 
 
 @kernel
@@ -77,22 +79,20 @@ def _beyond(belief: Belief, decision: Decision, course: int, label: int, step: i
 
 
 @borrowing
-def _in_reach(
-    belief: Belief, decision: Decision, course: int, label: int, least: float, reach: float, state: Floats
+def _detects(
+    belief: Belief, decision: Decision, course: int, label: int, step: int, least: float, state: Floats
 ) -> bool:
-    sensor, paths = decision.sensor, belief.paths
-    for h in range(decision.horizon.poses.shape[1]):
-        if _beyond(belief, decision, course, label, h, reach):
-            continue
-        pose, mean = decision.horizon.poses[course, h], paths.means[label, h]
-        if detection_probability(sensor, pose, mean, paths.covs[label, h], state) >= least:
-            return True
-        for sample in range(belief.targets.shape[1]):
-            target = belief.targets[label, sample]
-            if target >= 0:
-                at = decision.futures.states[h, target]
-                if sensor.prob_detection(at, pose, sensor.detection_params) >= least:
-                    return True
+    """Whether a label, or one of its samples, is detected with probability `least` or more at a step of a course."""
+    sensor, pose = decision.sensor, decision.horizon.poses[course, step]
+    mean, cov = belief.paths.means[label, step], belief.paths.covs[label, step]
+    if detection_probability(sensor, pose, mean, cov, state) >= least:
+        return True
+    for sample in range(belief.targets.shape[1]):
+        target = belief.targets[label, sample]
+        if target >= 0:
+            at = decision.futures.states[step, target]
+            if sensor.prob_detection(at, pose, sensor.detection_params) >= least:
+                return True
     return False
 
 
@@ -102,21 +102,16 @@ def fill_reach(
 ) -> None:
     """Set out[course, label] to 1 where a course may detect a label with probability `least` or more, else to 0.
 
-    Judged by the samples and by the prediction, at every step. reach: m, beyond which the sensor detects nothing.
+    Judged by the samples and by the prediction, at every step; with a `least` of 0 by distance alone. reach: m, beyond
+    which the sensor detects nothing.
     """
     state = np.empty(belief.prior.tracks.means.shape[1])
     for course in range(first, last):
         for label in range(out.shape[1]):
-            out[course, label] = 1 if _in_reach(belief, decision, course, label, least, reach, state) else 0
-
-
-@kernel
-def fill_near(belief: Belief, decision: Decision, reach: float, first: int, last: int, out: Ints) -> None:
-    """As `fill_reach`, by distance alone: of all that are not farther than `reach` at every step."""
-    for course in range(first, last):
-        for label in range(out.shape[1]):
             out[course, label] = 0
             for h in range(decision.horizon.poses.shape[1]):
-                if not _beyond(belief, decision, course, label, h, reach):
+                if not _beyond(belief, decision, course, label, h, reach) and (
+                    least == 0.0 or _detects(belief, decision, course, label, h, least, state)
+                ):
                     out[course, label] = 1
                     break

@@ -1,24 +1,26 @@
-"""Decisions that take as many samples as they need: rounds of fresh samples for the candidates that are left."""
+"""Decisions: rewards on samples and a search of them; and rounds of fresh samples where a decision is to be certain."""
 
 from __future__ import annotations
 
 import math
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, field
-from typing import Literal, NamedTuple
+from dataclasses import dataclass, replace
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
 from vedette.control.allowed import single_mask
-from vedette.control.bounds import bound_of
-from vedette.control.evaluator import SampleRewards
+from vedette.control.bounds import beyond_cutoff, bound_of
+from vedette.control.evaluator import Evaluator
 from vedette.control.evidence import Evidence
-from vedette.control.plan import Bound, Certainty, RewardTable, SearchCurve
-from vedette.control.preparation import AnyEvaluator, Preparation
+from vedette.control.explaining import Part, Questions
+from vedette.control.explanation import Bound
+from vedette.control.plan import Certainty, Plan
+from vedette.control.preparation import Preparation
 from vedette.control.problem import searched
 from vedette.control.racing import FIRST_ROUND, Race, next_total
-from vedette.control.search import JointSearch, all_joint_actions
+from vedette.control.search import JointSearch, all_joint_actions, first_best
 from vedette.kernels.base.types import Floats, Ints
 from vedette.platforms import Actions, Options
 
@@ -32,18 +34,6 @@ _SEARCHED = 2 * FIRST_ROUND
 
 # Samples are drawn at most so many at a time, to bound the memory of their pseudo-updates.
 _BLOCK = 250
-
-
-class Decided(NamedTuple):
-    """What became of a decision."""
-
-    best: tuple[int, ...]  # the course of each sensor
-    tables: tuple[RewardTable, ...]
-    counts: dict[str, int]
-    notes: tuple[str, ...]
-    certainty: Certainty
-    curve: SearchCurve | None = None
-    bound: Bound | None = None
 
 
 class Entrant(NamedTuple):
@@ -66,7 +56,7 @@ class Rounds:
     """
 
     preparation: Preparation
-    evaluator: AnyEvaluator
+    evaluator: Evaluator
     num_samples: int
     rng: np.random.Generator
     began: float
@@ -77,7 +67,7 @@ class Rounds:
         began = time.perf_counter()
         return cls(preparation, preparation.evaluator(num_samples, rng=rng), num_samples, rng, began)
 
-    def run(self, entrants: Sequence[Entrant]) -> Literal["max_samples", "max_seconds"] | None:
+    def _run(self, entrants: Sequence[Entrant]) -> Literal["max_samples", "max_seconds"] | None:
         """Rounds until all races are over, or why they were stopped before; the first round is always run."""
         settings = self.preparation.settings
         most = settings.max_samples - self.num_samples + entrants[0].race.num_samples
@@ -116,11 +106,9 @@ class Rounds:
         self.evaluator.notes.update(evaluator.notes)
         return rewards
 
-    def certainty(
-        self, entrants: Sequence[Entrant], stopped: Literal["max_samples", "max_seconds"] | None
-    ) -> Certainty:
-        """How all races ended; what may go wrong in any of them adds up."""
-        races = [each.race for each in entrants]
+    def certainty(self, entrants: Sequence[Entrant]) -> Certainty:
+        """Run all races: how they ended. What may go wrong in any of them adds up."""
+        stopped, races = self._run(entrants), [each.race for each in entrants]
         over: Literal["one left", "indifferent"] = "indifferent"
         if all(race.verdict == "one left" for race in races):
             over = "one left"
@@ -129,80 +117,89 @@ class Rounds:
         return Certainty(stopped or over, confidence, self.num_samples, left, started)
 
 
-def decide_jointly(preparation: Preparation, search: JointSearch, *, rng: np.random.Generator) -> Decided:
-    """The joint action that is best with confidence, of all or, where a search leaves some out, of its best ones.
+def decide_jointly(
+    name: str, preparation: Preparation, search: JointSearch, notes: Sequence[str], *, rng: np.random.Generator
+) -> Plan:
+    """The joint action that a search finds; where it is to be certain, of all or of its best ones the best by races.
 
     All joint actions race from the first sample on. What a search has picked is raced on fresh samples, as those that
     it was picked by speak for it; so are those that a mask allows.
     """
-    settings, shape = preparation.settings, tuple(len(own.courses) for own in preparation.options)
-    all_at_once = math.prod(shape) <= _MOST_OF_ALL
-    size = FIRST_ROUND if all_at_once else _SEARCHED
-    rounds = Rounds.begin(preparation, size, rng=rng)
-    heard = _Heard(rounds.evaluator.joint())
-    evidence = Evidence(rounds.evaluator, tuple(range(len(shape))), heard)
-    found = searched(search, evidence, preparation.mask, rng=rng)
-    complete = preparation.mask is None and all_at_once and heard.num == math.prod(shape) and evidence.is_complete()
-    candidates = all_joint_actions(shape) if complete else evidence.foremost(found, _MOST_OF_SEARCH)
-    race = Race(candidates, float(settings.confidence or 0.0), settings.indifference)
-    if complete:
-        race.add(heard.in_printed_order(shape))
-    entrants = (Entrant(race, None),)
-    certainty = rounds.certainty(entrants, rounds.run(entrants))
+    settings, races, mask = preparation.settings, preparation.races, preparation.mask
+    num_joint = math.prod(len(own.courses) for own in preparation.options)
+    size = FIRST_ROUND if num_joint <= _MOST_OF_ALL else _SEARCHED
+    rounds = Rounds.begin(preparation, size if races else settings.num_samples, rng=rng)
+    evaluator, keeps = rounds.evaluator, races and num_joint <= _MOST_OF_ALL
+    evidence = Evidence(evaluator, tuple(range(len(preparation.options))), evaluator.joint(), keeps=keeps)
+    best = searched(search, evidence, mask, rng=rng)
     curve = evidence.curve()
-    bound = None if complete else bound_of(evidence, race.best)
-    record = Evidence(evidence.evaluator, evidence.which, heard) if complete else evidence
-    race.note(record)
-    if complete:
-        bound = Bound(record.mean_of(race.best), record.mean_of(race.best), "exhaustive")
-    return Decided(race.best, record.tables(race.best), *rounds.evaluator.account(), certainty, curve, bound)
-
-
-def decide_alone(preparation: Preparation, *, rng: np.random.Generator) -> Decided:
-    """For every sensor its own best course of those it may take; that all are, has the confidence asked for."""
-    settings, options = preparation.settings, preparation.options
-    rounds = Rounds.begin(preparation, FIRST_ROUND, rng=rng)
-    each_sure = 1.0 - (1.0 - float(settings.confidence or 0.0)) / len(options)
-    entrants = []
-    for s, own in enumerate(options):
-        allowed = all_joint_actions((len(own.courses),))[single_mask(preparation.mask, s, len(own.courses))]
-        race = Race(allowed, each_sure, settings.indifference)
-        race.add(rounds.evaluator.alone(s)(race.actions))
-        entrants.append(Entrant(race, s))
-    certainty = rounds.certainty(entrants, rounds.run(entrants))
-    tables: list[RewardTable] = []
-    for s, (race, _) in enumerate(entrants):
-        evidence = Evidence(rounds.evaluator, (s,), rounds.evaluator.alone(s))
+    if not races:
+        parts, bound = (Part.together(evidence, best),), bound_of(evidence, best)
+        return plan_of(name, parts, notes, curve=curve, bound=bound, certainty=preparation.certainty)
+    samples = evidence.samples() if mask is None else None
+    candidates = evidence.foremost(best, _MOST_OF_SEARCH) if samples is None else all_joint_actions(evidence.shape)
+    race = Race(candidates, float(settings.confidence or 0.0), settings.indifference)
+    if samples is not None:
+        race.add(samples)
+    certainty = rounds.certainty([Entrant(race, None)])
+    if samples is None:
+        bound = bound_of(evidence, race.best)
         race.note(evidence)
-        tables.extend(evidence.tables(race.best))
-    best = tuple(race.best[0] for race, _ in entrants)
-    return Decided(best, tuple(tables), *rounds.evaluator.account(), certainty)
+    else:
+        evidence = Evidence(evaluator, evidence.which, evidence.rewards)
+        race.note(evidence)
+        mean = evidence.mean_of(race.best)
+        bound = Bound(mean, mean, "exhaustive")
+    return _raced_plan(name, (Part.together(evidence, race.best),), notes, certainty, curve=curve, bound=bound)
 
 
-@dataclass(slots=True, eq=False)
-class _Heard:
-    """Sample rewards, kept as they are asked for."""
+def decide_alone(name: str, preparation: Preparation, notes: Sequence[str], *, rng: np.random.Generator) -> Plan:
+    """For every sensor its own best course of those it may take; that all are, has the confidence asked for."""
+    settings, options, races = preparation.settings, preparation.options, preparation.races
+    rounds = Rounds.begin(preparation, FIRST_ROUND if races else settings.num_samples, rng=rng)
+    each_sure = 1.0 - (1.0 - float(settings.confidence or 0.0)) / len(options)
+    parts, entrants = [], []
+    for s, own in enumerate(options):
+        evidence = Evidence(rounds.evaluator, (s,), rounds.evaluator.alone(s))
+        allowed = all_joint_actions((len(own.courses),))[single_mask(preparation.mask, s, len(own.courses))]
+        if races:
+            entrants.append(Entrant(Race(allowed, each_sure, settings.indifference), s))
+            entrants[s].race.add(evidence.rewards(allowed))
+        best = 0 if races else int(allowed[first_best(evidence.evaluate(allowed)), 0])
+        parts.append(Part.alone(evidence, best))
+    if not races:
+        return plan_of(name, parts, notes, certainty=preparation.certainty)
+    certainty = rounds.certainty(entrants)
+    for s, (race, _) in enumerate(entrants):
+        race.note(parts[s].evidence)
+        parts[s] = parts[s]._replace(chosen=race.best)
+    return _raced_plan(name, parts, notes, certainty)
 
-    rewards: SampleRewards
-    actions: list[Ints] = field(default_factory=list)
-    found: list[Floats] = field(default_factory=list)
 
-    def __call__(self, actions: Ints) -> Floats:
-        found = self.rewards(actions)
-        if self.num <= _MOST_OF_ALL:
-            self.actions.append(actions)
-            self.found.append(found)
-        return found
+def _raced_plan(name: str, parts: Sequence[Part], notes: Sequence[str], certainty: Certainty, **fields: Any) -> Plan:
+    """Of what took part in fewer rounds the samples are not those of the choice, so that it cannot be questioned."""
+    return replace(plan_of(name, parts, notes, (str(certainty),), certainty=certainty, **fields), questions=None)
 
-    @property
-    def num(self) -> int:
-        """Joint actions kept."""
-        return sum(map(len, self.actions))
 
-    def in_printed_order(self, shape: tuple[int, ...]) -> Floats:
-        """(num_joint, num_samples) rewards, where every joint action was asked for once."""
-        places = np.ravel_multi_index(tuple(np.concatenate(self.actions).T), shape)
-        return np.asarray(np.concatenate(self.found)[np.argsort(places)])
+def plan_of(
+    name: str, parts: Sequence[Part], notes: Sequence[str], more_notes: Sequence[str] = (), **fields: Any
+) -> Plan:
+    """The plan of decisions that were made together or each by itself, one after the other of all sensors.
+
+    notes, more_notes: what is told before and after what came up. fields: further ones of the plan.
+    """
+    evaluator = parts[0].evidence.evaluator
+    courses = tuple(course for part in parts for course in part.chosen)
+    return Plan(
+        name,
+        tuple(own.actions for own in evaluator.options),
+        tuple(own.first_action(course) for own, course in zip(evaluator.options, courses, strict=True)),
+        tuple(table for part in parts for table in part.evidence.tables(part.chosen)),
+        dict(evaluator.counts),
+        (*notes, *evaluator.notes, *more_notes, *beyond_cutoff(evaluator, courses)),
+        questions=Questions(name, tuple(parts), fields.get("bound")),
+        **fields,
+    )
 
 
 def _wanted(going: Sequence[Entrant], sensor: int) -> Ints:

@@ -1,0 +1,224 @@
+"""Rewards of joint actions from the sensors' pseudo-posteriors: any reward, any fusion, any density.
+
+Where fusion and reward allow it they are laid out and made of power integrals; else the public functions are called for
+one joint action and sample at a time.
+"""
+
+from __future__ import annotations
+
+import functools
+import warnings
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from vedette.control.inputs import Belief
+from vedette.control.pseudo import draw_futures, pseudo_posteriors
+from vedette.control.rewards.base import (
+    LabelReward,
+    PowerReward,
+    Reward,
+    combined,
+    reward_value,
+    speaks_for,
+    unit_volume_of,
+)
+from vedette.control.settings import MobileSensor, PlanningSettings
+from vedette.densities.cases import LabelledCases
+from vedette.errors import NumericalError, SlowRewardWarning
+from vedette.fusion import Fusion, LaidOut, LaysOut, Views, lay_out_alone
+from vedette.kernels.base.types import Floats, Ints
+from vedette.platforms import Options
+from vedette.tracking import State
+
+SampleRewards: TypeAlias = Callable[[Ints], Floats]
+
+# Of decisions of paper-a, two sensors of 13 actions each: benchmarks/planning.py --one-by-one.
+SLOWER_BY = "a joint decision of two sensors takes 40 to 70 times as long, an independent one 4 to 6 times,"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CaseRewards:
+    """Rewards by the sensors' own filters, of which the pseudo-updates are run once, in `prepare`.
+
+    Attributes:
+        sensors, fusion, settings, reward: as in the planners.
+        options: of each sensor.
+        prediction: the fused density predicted to the horizon, one Gaussian a track.
+        posteriors: the pseudo-posteriors of each sensor.
+        looks: whether each sensor scans within the horizon.
+        counts: how many filter steps, fusions and divergences have been evaluated so far.
+        notes: what a reader of the decision must know, in the order in which it came up (keys; no values).
+    """
+
+    sensors: tuple[MobileSensor, ...]
+    fusion: Fusion
+    settings: PlanningSettings
+    reward: Reward | PowerReward | LabelReward
+    options: tuple[Options, ...]
+    prediction: Belief
+    posteriors: tuple[LabelledCases, ...]
+    looks: tuple[bool, ...]
+    counts: dict[str, int]
+    notes: dict[str, None]
+
+    @classmethod
+    def prepare(
+        cls,
+        sensors: Sequence[MobileSensor],
+        options: Sequence[Options],
+        fusion: Fusion,
+        settings: PlanningSettings,
+        reward: Reward | PowerReward | LabelReward,
+        state: State,
+        prediction: Belief,
+        *,
+        rng: np.random.Generator,
+    ) -> CaseRewards:
+        """Draw the samples and run the pseudo-updates of every sensor (paper section III-B, steps 1 to 4)."""
+        labels, futures = draw_futures(state.fused, sensors, settings, rng=rng)
+        scans = tuple(sensor.scans(state.time, settings) for sensor in sensors)
+        posteriors = tuple(
+            pseudo_posteriors(belief, sensor, own.courses, labels, future, settings, when)
+            for belief, sensor, own, future, when in zip(state.local, sensors, options, futures, scans, strict=True)
+        )
+        steps = sum(len(own.courses) for own in options) * settings.num_samples * settings.horizon_steps
+        counts = {"filter_steps": steps, "fusions": 0, "divergences": 0}
+        looks = tuple(bool(own.any()) for own in scans)
+        return cls(tuple(sensors), fusion, settings, reward, tuple(options), prediction, posteriors, looks, counts, {})
+
+    @property
+    def additive(self) -> None:
+        """They are no sums over labels."""
+
+    def joint(self) -> SampleRewards:
+        """Of all sensors, fused."""
+        return self.rewards(range(len(self.sensors)), self.fusion)
+
+    def alone(self, sensor: int) -> SampleRewards:
+        """Of one sensor's own density, actions (num, 1)."""
+        return self.rewards((sensor,), None)
+
+    def rewards(self, which: Sequence[int], fusion: Fusion | None) -> SampleRewards:
+        """The function that gives (num_joint, num_samples) rewards of joint actions (num_joint, num of `which`).
+
+        which: the sensors that act. Their actions are numbers of different courses. fusion: None for a single sensor,
+        whose own density is then compared with the prediction. The function raises `NumericalError` where a reward is
+        not finite, which names the action and the sample.
+        """
+        compute = self._compute([self.posteriors[s] for s in which], fusion)
+
+        def evaluate(actions: Ints) -> Floats:
+            rewards = compute(actions)
+            self.counts["divergences"] += rewards.size
+            self.counts["fusions"] += rewards.size if fusion is not None else 0
+            self._check_finite(which, actions, rewards)
+            return rewards
+
+        return evaluate
+
+    def _compute(self, posteriors: Sequence[LabelledCases], fusion: Fusion | None) -> SampleRewards:
+        laid = lay_out_rewards(posteriors, self.prediction, fusion, self.reward)
+        if not isinstance(laid, str):
+            return laid
+        self.notes[f"rewards were computed one by one: {laid}"] = None
+        warn_slow(laid)
+        return PlainRewards(posteriors, self.prediction, fusion, self.reward, self.settings.num_samples, self.views)
+
+    def views(self, chosen: Sequence[int]) -> Views:
+        """What the sensors could see at the end of chosen courses, and what all their updates began with."""
+        models = tuple(sensor.filter.sensor for sensor in self.sensors)
+        poses = np.stack([own.courses[course, -1] for own, course in zip(self.options, chosen, strict=True)])
+        return Views(models, poses, self.looks, self.prediction)
+
+    def _check_finite(self, which: Sequence[int], actions: Ints, rewards: Floats) -> None:
+        bad = np.argwhere(~np.isfinite(rewards))
+        if len(bad):
+            joint, sample = bad[0].tolist()
+            courses = zip(which, actions[joint].tolist(), strict=True)
+            named = (
+                f"action {self.options[s].actions.text(self.options[s].first_action(course))} of sensor {s + 1}"
+                for s, course in courses
+            )
+            raise NumericalError(
+                f"reward of {' and '.join(named)}, sample {sample}: expected a finite number; "
+                f"got {rewards[joint, sample]}"
+            )
+
+
+def lay_out_rewards(
+    cases: Sequence[LabelledCases],
+    prediction: Belief,
+    fusion: Fusion | None,
+    reward: Reward | PowerReward | LabelReward,
+) -> SampleRewards | str:
+    """What `PlainRewards` computes, for all joint actions and samples at once; or why it cannot be laid out.
+
+    fusion: None for a sensor alone.
+    """
+    if not isinstance(reward, PowerReward) or not speaks_for(reward, "combine", "__call__"):
+        return f"{_name(reward)} is a function of two densities"
+    laid: LaidOut | None = None
+    if fusion is None:
+        laid = lay_out_alone(cases[0], prediction)
+    elif isinstance(fusion, LaysOut) and speaks_for(fusion, "lay_out", "fuse"):
+        laid = fusion.lay_out(cases, prediction)
+    if laid is None:
+        return f"{'a sensor alone' if fusion is None else _name(fusion)} cannot lay out these beliefs"
+    z, volume = laid.z, unit_volume_of(reward, prediction)
+    return lambda actions: combined(reward, z(actions, reward.exponents, volume))
+
+
+def _name(thing: Any) -> str:
+    named = getattr(thing, "func", thing)  # of a partial
+    return str(getattr(named, "__name__", type(named).__name__))
+
+
+@functools.cache
+def warn_slow(why: str) -> None:
+    """Warn, once in a process, that rewards are computed one by one."""
+    warnings.warn(
+        f"rewards are computed one by one: {SLOWER_BY} as by a PowerReward under a fusion that lays out; {why}",
+        SlowRewardWarning,
+        stacklevel=2,
+    )
+
+
+@dataclass(slots=True, eq=False)
+class PlainRewards:
+    """Every reward, by `fusion.fuse` and the reward itself, one joint action and sample after the other.
+
+    Attributes:
+        posteriors: one a sensor.
+        prediction: the fused density at the horizon.
+        fusion: None for a single sensor, whose own density is then compared with the prediction.
+        reward, num_samples: as in the planners.
+        views: what the sensors could see at the end of a joint action, which a fusion may ask for.
+    """
+
+    posteriors: Sequence[LabelledCases]
+    prediction: Belief
+    fusion: Fusion | None
+    reward: Reward | PowerReward | LabelReward
+    num_samples: int
+    views: Callable[[Sequence[int]], Views]
+    _densities: dict[tuple[int, int], Belief] = field(default_factory=dict)
+
+    def __call__(self, actions: Ints) -> Floats:
+        """(num_joint, num_samples) rewards of joint actions (num_joint, num_sensors)."""
+        rewards = np.empty((len(actions), self.num_samples))
+        for joint, chosen in enumerate(actions.tolist()):
+            views = None if self.fusion is None else self.views(chosen)
+            for sample in range(self.num_samples):
+                densities = [self._density(s, action, sample) for s, action in enumerate(chosen)]
+                updated = densities[0] if self.fusion is None else self.fusion.fuse(densities, views)[0]
+                rewards[joint, sample] = reward_value(self.reward, self.prediction, updated)
+        return rewards
+
+    def _density(self, sensor: int, action: int, sample: int) -> Belief:
+        key = sensor, action * self.num_samples + sample
+        if key not in self._densities:
+            self._densities[key] = self.posteriors[sensor].density(key[1])
+        return self._densities[key]
