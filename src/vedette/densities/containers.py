@@ -44,7 +44,13 @@ def unchecked(container: type[_Container], *fields: Any) -> _Container:
     """
     made = object.__new__(container)
     for name, value in zip(container.__match_args__, fields, strict=True):  # type: ignore[attr-defined]
-        object.__setattr__(made, name, _held(value) if type(value) is np.ndarray else value)
+        if type(value) is np.ndarray:
+            if type(value.base) is not np.ndarray and value.flags.carray:  # most: without the call
+                value = value.view()
+                value.setflags(False)  # type: ignore[call-arg]  # by name it takes three times as long
+            else:
+                value = _held(value)
+        object.__setattr__(made, name, value)
     return made
 
 

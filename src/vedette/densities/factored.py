@@ -78,7 +78,7 @@ class FactoredGLMB(Container):
     @property
     def state_dim(self) -> int:
         """Length of a target's state."""
-        return self.tracks.state_dim
+        return int(self.tracks.means.shape[1])
 
     def factor(self, index: int) -> GLMB:
         """One factor, as a GLMB."""

@@ -54,7 +54,7 @@ class GLMB(Container):
     @property
     def state_dim(self) -> int:
         """Length of a target's state."""
-        return self.tracks.state_dim
+        return int(self.tracks.means.shape[1])
 
     @property
     def is_marginalised(self) -> bool:

@@ -48,7 +48,7 @@ class LMB(Container):
     @property
     def state_dim(self) -> int:
         """Length of a target's state."""
-        return self.tracks.state_dim
+        return int(self.tracks.means.shape[1])
 
     def to_kernel(self) -> kt.Lmb:
         """The same arrays as the bundle that kernels take."""

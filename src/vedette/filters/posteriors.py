@@ -25,16 +25,18 @@ def lmb_posterior(
 ) -> tuple[LMB, FilterInfo]:
     """An LMB after updates, one report each; see `FilterInfo` for what is not of them."""
     kept, spread = limits.without_spread(LMB.from_kernel(posterior))
+    sums, _, num_raised, dropped, cut = zip(*reports, strict=True)
+    _, num_ranked, log_kept = zip(*sums, strict=True)
     return kept, FilterInfo(
         log_likelihood=log_likelihood,
         num_hypotheses=1,
         num_tracks=kept.tracks.num_tracks,
-        discarded_weight_bound=max(-math.expm1(sum(report.sums.log_kept for report in reports)), 0.0),  # NaN stays
-        dropped_existence=sum(float(report.dropped_existence) for report in reports) + spread,
-        num_clutter_raised=sum(int(report.num_raised) for report in reports),
+        discarded_weight_bound=max(-math.expm1(sum(log_kept)), 0.0),  # NaN stays
+        dropped_existence=sum(dropped) + spread,
+        num_clutter_raised=sum(num_raised),
         num_duplicates=num_duplicates,
-        num_inexact_clusters=sum(int(report.sums.num_ranked) for report in reports),
-        search_cut=any(bool(report.cut) for report in reports),
+        num_inexact_clusters=sum(num_ranked),
+        search_cut=any(cut),
         cap_met=len(posterior.existence_logit) >= limits.max_labels,
     )
 
@@ -52,18 +54,18 @@ def glmb_posterior(
     if marginalised:
         posterior = marginalise(posterior, limits.track_caps())
     kept, spread = limits.without_spread(GLMB.from_kernel(posterior))
-    log_kept = sum(min(0.0, report.log_total - report.log_bound) for report in reports)
+    _, log_kept, _, num_raised, cut, full = zip(*reports, strict=True)
     return kept, FilterInfo(
         log_likelihood=log_likelihood,
         num_hypotheses=kept.num_hyps,
         num_tracks=kept.tracks.num_tracks,
-        discarded_weight_bound=max(0.0, -math.expm1(log_kept)),
+        discarded_weight_bound=max(0.0, -math.expm1(sum(log_kept))),
         dropped_existence=spread,
-        num_clutter_raised=sum(int(report.num_raised) for report in reports),
+        num_clutter_raised=sum(num_raised),
         num_duplicates=num_duplicates,
         num_inexact_clusters=0,
-        search_cut=any(bool(report.cut) for report in reports),
-        cap_met=any(bool(report.full) for report in reports),
+        search_cut=any(cut),
+        cap_met=any(full),
     )
 
 

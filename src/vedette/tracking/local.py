@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,7 @@ from vedette.models import SensorModel, TargetModel
 from vedette.models.arguments import reject, sequence
 from vedette.tracking.births import check_measured_births
 
+_SENSOR = attrgetter("sensor")
 _BORN = "targets are born of measurements"
 
 
@@ -57,7 +59,7 @@ class LocalFilters:
     @property
     def sensors(self) -> tuple[SensorModel, ...]:
         """What each sensor sees."""
-        return tuple(local.sensor for local in self.filters)
+        return tuple(map(_SENSOR, self.filters))
 
     def _stepped(
         self,

@@ -20,24 +20,16 @@ def join_offsets(offsets: Sequence[Ints]) -> Ints:
 
 def stack_tracks(tables: Sequence[Tracks]) -> Tracks:
     """One track table of all the tracks, in the order given."""
-    return Tracks(
-        np.concatenate([table.labels for table in tables]),
-        join_offsets([table.offsets for table in tables]),
-        np.concatenate([table.log_weights for table in tables]),
-        np.concatenate([table.means for table in tables]),
-        np.concatenate([table.covs for table in tables]),
-    )
+    labels, offsets, *components = zip(*tables, strict=True)
+    return Tracks(np.concatenate(labels), join_offsets(offsets), *map(np.concatenate, components))
 
 
 def stack_glmbs(glmbs: Sequence[Glmb]) -> Glmb:
     """One bundle of all the hypotheses over one track table, in the order given; the weights stay as they are."""
-    starts = np.cumsum([0] + [len(glmb.tracks.labels) for glmb in glmbs])
-    return Glmb(
-        stack_tracks([glmb.tracks for glmb in glmbs]),
-        join_offsets([glmb.hyp_offsets for glmb in glmbs]),
-        np.concatenate([glmb.hyp_tracks + start for glmb, start in zip(glmbs, starts, strict=False)]),
-        np.concatenate([glmb.hyp_log_weights for glmb in glmbs]),
-    )
+    tracks, offsets, members, log_weights = zip(*glmbs, strict=True)
+    starts = np.cumsum([0, *(len(table.labels) for table in tracks[:-1])])
+    shifted = np.concatenate(members) + np.repeat(starts, [*map(len, members)])
+    return Glmb(stack_tracks(tracks), join_offsets(offsets), shifted, np.concatenate(log_weights))
 
 
 __all__ = ["join_offsets", "stack_glmbs", "stack_tracks"]

@@ -37,7 +37,7 @@ class StepReport(NamedTuple):
     """What a step found and what it left out."""
 
     log_total: float  # log of the sum of the kept weights, relative to all measurements being clutter
-    log_bound: float  # log of an upper bound on the sum of all weights, relative to the same
+    log_kept: float  # log of the least share that this is of the sum of all weights
     log_clutter: float  # sum of the log clutter intensities of the scan
     num_raised: int  # measurements whose clutter intensity was raised to the floor
     cut: bool  # the ranking stopped at its bound on nodes
@@ -138,9 +138,9 @@ def _conclude(
     children, kept = kept_children(found, children, truncation, is_covered)
     posterior, log_total = assemble(children, kept, found.parents, found.rows, found.options)
     require_gaussians(posterior.tracks.means, posterior.tracks.covs)
-    bound = log_total_bound(log_row_totals(found.options), found.parents)
+    log_kept = min(0.0, log_total - log_total_bound(log_row_totals(found.options), found.parents))
     full = len(kept) >= truncation.search.max_hypotheses
-    return posterior, StepReport(log_total, bound, found.log_clutter, found.num_raised, cut, full)
+    return posterior, StepReport(log_total, log_kept, found.log_clutter, found.num_raised, cut, full)
 
 
 @kernel
