@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from vedette.control import CauchySchwarzReward, RenyiReward
 from vedette.control.cases import PlainRewards, lay_out_rewards
 from vedette.control.search import all_joint_actions
-from vedette.densities import GLMB, LMB, TrackTable, glmb_to_lmb
+from vedette.densities import GLMB, LMB, TrackTable, as_lmb
 from vedette.densities.cases import LabelledCases
 from vedette.divergence import cauchy_schwarz
 from vedette.fusion import Clmb, CmDeltaGlmb
@@ -77,7 +77,7 @@ def main() -> None:
     repeats = parser.parse_args().repeats
     rng = np.random.default_rng(0)
     glmbs = [belief(rng) for _ in range(2)]
-    lmbs: list[LMB] = [glmb_to_lmb(glmb) for glmb in glmbs]
+    lmbs: list[LMB] = [as_lmb(glmb) for glmb in glmbs]
     halves = (0.5, 0.5)
     public: dict[str, Callable[[], object]] = {
         "fuse two GLMBs, moment matched": lambda: CmDeltaGlmb(halves).fuse(glmbs),

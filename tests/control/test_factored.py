@@ -18,7 +18,7 @@ from vedette.control import (
     void_probability,
 )
 from vedette.control.priors import predicted
-from vedette.densities import FactoredGLMB, factored_to_glmb, factored_to_lmb
+from vedette.densities import FactoredGLMB, as_glmb, as_lmb
 from vedette.errors import InputError
 from vedette.filters import DeltaGlmbFilter
 from vedette.fusion import Clmb, CmDeltaGlmb
@@ -55,7 +55,7 @@ def test_decisions_are_those_on_the_lmbs(association: Any, reward: Any) -> None:
     plan = planner.plan(*example.arguments, rng=np.random.default_rng(1))
     assert any(note.startswith("planned on the LMBs of the GLMB beliefs") for note in plan.notes)
     plain = situation("lmb")
-    lmbs = tuple(factored_to_lmb(belief) for belief in (*example.beliefs, example.fused))
+    lmbs = tuple(as_lmb(belief) for belief in (*example.beliefs, example.fused))
     own = JointPlanner(plain.sensors, Clmb((0.5, 0.5)), settings, reward)
     expected = own.plan(replace(plain, beliefs=lmbs[:2], fused=lmbs[2]).state, POSES[:2], rng=np.random.default_rng(1))
     assert plan.chosen == expected.chosen
@@ -65,7 +65,7 @@ def test_decisions_are_those_on_the_lmbs(association: Any, reward: Any) -> None:
 def test_beliefs_of_another_kind_are_refused() -> None:
     example = factored()
     planner = JointPlanner(example.sensors, example.fusion, SETTINGS)
-    mixed = replace(example, beliefs=(example.beliefs[0], factored_to_lmb(example.beliefs[1])))
+    mixed = replace(example, beliefs=(example.beliefs[0], as_lmb(example.beliefs[1])))
     with pytest.raises(InputError, match=r"state.local\[1\]: expected FactoredGLMB; got LMB"):
         planner.plan(*mixed.arguments, rng=np.random.default_rng(1))
 
@@ -75,7 +75,7 @@ def test_constraints_look_at_the_product() -> None:
     example, motion = factored(), situation("delta").sensors[0].filter.targets.motion
     ahead = predicted(example.fused, motion, 2, 4.0)
     ahead.validate()
-    whole = predicted(factored_to_glmb(example.fused, max_hypotheses=10**6)[0], motion, 2, 4.0)
+    whole = predicted(as_glmb(example.fused, max_hypotheses=10**6)[0], motion, 2, 4.0)
     centres = POSES[:, :2]
     np.testing.assert_allclose(
         void_probability(ahead, centres, 300.0), void_probability(whole, centres, 300.0), rtol=1e-10

@@ -15,7 +15,7 @@ from scipy.special import ndtr
 from control.examples import A, B, C, glmb, lmb
 from vedette.control import Situation, VoidProbability, mask_of, void_probability
 from vedette.control.constraints.discs import disc_probabilities, near_pairs
-from vedette.densities import GLMB, LMB, FactoredGLMB, factored_to_glmb
+from vedette.densities import GLMB, LMB, FactoredGLMB, as_glmb
 from vedette.errors import InputError
 
 
@@ -141,7 +141,7 @@ def test_of_a_product_of_glmbs_it_is_that_of_all_combinations() -> None:
     found = void_probability(belief, CENTRES, 80.0)
     expected = void_probability(factors[0], CENTRES, 80.0) * void_probability(factors[1], CENTRES, 80.0)
     np.testing.assert_allclose(found, expected, rtol=1e-13)
-    whole, _ = factored_to_glmb(belief, max_hypotheses=100)
+    whole, _ = as_glmb(belief, max_hypotheses=100)
     np.testing.assert_allclose(found, void_probability(whole, CENTRES, 80.0), rtol=1e-12)
     np.testing.assert_array_equal(void_probability(FactoredGLMB.empty(4), CENTRES, 80.0), 1.0)
 

@@ -25,10 +25,10 @@ from vedette.densities import (
     GLMB,
     LMB,
     TrackTable,
+    as_glmb,
+    as_lmb,
     cardinality_distribution,
     existence_probabilities,
-    glmb_to_lmb,
-    lmb_to_glmb,
     marginalise,
 )
 from vedette.errors import InputError
@@ -113,7 +113,7 @@ def test_a_label_set_of_weight_zero_is_kept():
     marginal.validate()
     assert marginal.hyp_log_weights.tolist() == [0.0, -np.inf]
     _close(marginal.tracks.means, [[1.0, 0.0]])
-    lmb = glmb_to_lmb(GLMB.from_hypotheses(tracks, [[0], [1], []], [0.0, 0.0, 1.0]))
+    lmb = as_lmb(GLMB.from_hypotheses(tracks, [[0], [1], []], [0.0, 0.0, 1.0]))
     lmb.validate()
     assert lmb.existence_logit.tolist() == [-np.inf]
 
@@ -130,7 +130,7 @@ def test_relabelling_changes_nothing(glmb, random):
     other = GLMB.from_hypotheses(tracks, hypotheses, np.exp(glmb.hyp_log_weights))
     _close(cardinality_distribution(other), cardinality_distribution(glmb))
     _close(marginalise(other).hyp_log_weights, marginalise(glmb).hyp_log_weights)
-    before, after = plain_lmb(glmb_to_lmb(glmb)), plain_lmb(glmb_to_lmb(other))
+    before, after = plain_lmb(as_lmb(glmb)), plain_lmb(as_lmb(other))
     assert {renamed[label] for label in before} == set(after)
     for label, (existence, mixture) in before.items():
         assert after[renamed[label]][0] == pytest.approx(existence, rel=1e-12)
@@ -139,7 +139,7 @@ def test_relabelling_changes_nothing(glmb, random):
 
 @given(glmbs())
 def test_glmb_to_lmb_equals_enumeration(glmb):
-    lmb = glmb_to_lmb(glmb, **EXACT)
+    lmb = as_lmb(glmb, **EXACT)
     lmb.validate()
     expected, got = oracle.to_lmb(plain_glmb(glmb)), plain_lmb(lmb)
     assert list(got) == list(expected)
@@ -156,18 +156,18 @@ def test_existence_near_one_keeps_its_precision():
     tracks = TrackTable.from_gaussians([[0, 0]], [[0.0, 0.0]], [np.eye(2)])
     for log_absent in (-50.0, -900.0):
         glmb = GLMB(tracks, np.array([0, 1, 1]), np.array([0]), np.array([0.0, log_absent]))
-        assert glmb_to_lmb(glmb).existence_logit[0] == pytest.approx(-log_absent, rel=1e-14)
+        assert as_lmb(glmb).existence_logit[0] == pytest.approx(-log_absent, rel=1e-14)
         rare = GLMB(tracks, np.array([0, 1, 1]), np.array([0]), np.array([log_absent, 0.0]))
-        assert glmb_to_lmb(rare).existence_logit[0] == pytest.approx(log_absent, rel=1e-14)
+        assert as_lmb(rare).existence_logit[0] == pytest.approx(log_absent, rel=1e-14)
 
 
 @given(lmbs())
 def test_lmb_to_glmb_and_back_is_the_identity(lmb):
-    glmb, discarded = lmb_to_glmb(lmb, max_hypotheses=10**6)
+    glmb, discarded = as_glmb(lmb, max_hypotheses=10**6)
     glmb.validate()
     assert discarded == 0.0
     assert glmb.num_hyps == 2**lmb.tracks.num_tracks
-    back = glmb_to_lmb(glmb)
+    back = as_lmb(glmb)
     assert np.array_equal(back.tracks.labels, lmb.tracks.labels)
     _close(back.existence_logit, lmb.existence_logit)
     _close(back.tracks.means, lmb.tracks.means)
@@ -176,7 +176,7 @@ def test_lmb_to_glmb_and_back_is_the_identity(lmb):
 
 @given(lmbs(), st.integers(1, 70))
 def test_lmb_to_glmb_lists_the_heaviest_subsets_in_order(lmb, max_hypotheses):
-    glmb, discarded = lmb_to_glmb(lmb, max_hypotheses=max_hypotheses)
+    glmb, discarded = as_glmb(lmb, max_hypotheses=max_hypotheses)
     glmb.validate()
     exact = oracle.label_set_weights(oracle.expand_lmb(plain_lmb(lmb)))
     heaviest = np.sort(list(exact.values()))[::-1][:max_hypotheses]
@@ -188,7 +188,7 @@ def test_lmb_to_glmb_lists_the_heaviest_subsets_in_order(lmb, max_hypotheses):
 
 def test_certain_and_impossible_labels_are_not_doubted():
     lmb = LMB.from_bernoullis([[0, 0], [0, 1], [0, 2]], [1.0, 0.0, 0.25], np.zeros((3, 2)), [np.eye(2)] * 3)
-    glmb, discarded = lmb_to_glmb(lmb, max_hypotheses=100)
+    glmb, discarded = as_glmb(lmb, max_hypotheses=100)
     assert discarded == 0.0
     assert oracle.label_set_weights(plain_glmb(glmb)) == pytest.approx(
         {((0, 0),): 0.75, ((0, 0), (0, 2)): 0.25}, rel=1e-12
@@ -201,7 +201,7 @@ def test_many_labels_and_few_hypotheses():
     lmb = LMB.from_bernoullis(
         [(0, i) for i in range(num)], rng.uniform(0.9, 0.99, num), np.zeros((num, 2)), random_covs(rng, num)
     )
-    glmb, discarded = lmb_to_glmb(lmb, max_hypotheses=500)
+    glmb, discarded = as_glmb(lmb, max_hypotheses=500)
     glmb.validate()
     assert glmb.num_hyps == 500
     assert 0.0 < discarded < 1.0
@@ -209,7 +209,7 @@ def test_many_labels_and_few_hypotheses():
     assert np.all(np.diff(glmb.hyp_log_weights) <= 1e-12)
 
 
-@pytest.mark.parametrize("convert", [marginalise, glmb_to_lmb])
+@pytest.mark.parametrize("convert", [marginalise, as_lmb])
 @pytest.mark.parametrize(
     ("field", "value"),
     [("max_components", 0), ("log_min_weight", 0.1), ("merge_distance", -1.0), ("merge_distance", np.nan)],
@@ -222,14 +222,14 @@ def test_limits_outside_their_range_are_refused(convert, field, value):
 
 def test_no_hypothesis_at_all_is_refused():
     with pytest.raises(InputError, match="max_hypotheses"):
-        lmb_to_glmb(LMB.empty(2), max_hypotheses=0)
+        as_glmb(LMB.empty(2), max_hypotheses=0)
 
 
 @pytest.mark.lanes
 def test_densities_of_no_target():
     assert marginalise(GLMB.empty(4)).num_hyps == 1
-    assert glmb_to_lmb(GLMB.empty(4)).tracks.num_tracks == 0
-    glmb, discarded = lmb_to_glmb(LMB.empty(4), max_hypotheses=5)
+    assert as_lmb(GLMB.empty(4)).tracks.num_tracks == 0
+    glmb, discarded = as_glmb(LMB.empty(4), max_hypotheses=5)
     glmb.validate()
     assert (glmb.num_hyps, discarded) == (1, 0.0)
 
@@ -240,6 +240,6 @@ def test_conversions_leave_their_input_alone(limits):
     glmb = random_glmb(np.random.default_rng(1), 4, 12, 3)
     before = [array.copy() for array in (*glmb.tracks.to_kernel(), *glmb.to_kernel()[1:])]
     marginalise(glmb, **limits)
-    lmb_to_glmb(glmb_to_lmb(glmb, **limits), max_hypotheses=5)
+    as_glmb(as_lmb(glmb, **limits), max_hypotheses=5)
     for array, copy in zip((*glmb.tracks.to_kernel(), *glmb.to_kernel()[1:]), before, strict=True):
         assert np.array_equal(array, copy)

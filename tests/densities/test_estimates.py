@@ -14,10 +14,10 @@ from vedette.densities import (
     LMB,
     Estimate,
     TrackTable,
+    as_glmb,
     as_lmb,
     at_peaks,
     cardinality_distribution,
-    lmb_to_glmb,
     map_estimate,
     marginal_estimate,
     settled_lmb,
@@ -49,7 +49,7 @@ def test_map_estimate_of_a_glmb(glmb):
 
 @given(lmbs())
 def test_map_estimate_of_an_lmb_is_that_of_its_glmb(lmb):
-    estimate, other = map_estimate(lmb), map_estimate(lmb_to_glmb(lmb, max_hypotheses=10**6)[0])
+    estimate, other = map_estimate(lmb), map_estimate(as_glmb(lmb, max_hypotheses=10**6)[0])
     estimate.validate()
     assert _labels(estimate) == _labels(other)
     np.testing.assert_allclose(estimate.means, other.means)

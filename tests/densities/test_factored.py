@@ -26,12 +26,10 @@ from vedette.densities import (
     GLMB,
     LMB,
     FactoredGLMB,
+    as_glmb,
     as_lmb,
     cardinality_distribution,
     existence_probabilities,
-    factored_to_glmb,
-    factored_to_lmb,
-    glmb_to_lmb,
     load_density,
     map_estimate,
     marginal_estimate,
@@ -71,7 +69,7 @@ def _same_lmb(got: LMB, expected: LMB):
 
 @given(factoreds(3))
 def test_products_in_order(density):
-    glmb, discarded = factored_to_glmb(density, max_hypotheses=ALL)
+    glmb, discarded = as_glmb(density, max_hypotheses=ALL)
     glmb.validate()
     assert discarded == 0.0
     assert (np.diff(glmb.hyp_log_weights) <= 1e-12).all()
@@ -85,7 +83,7 @@ def test_products_in_order(density):
 
 @given(factoreds(), st.integers(1, 20))
 def test_the_heaviest_products_are_kept(density, most):
-    glmb, discarded = factored_to_glmb(density, max_hypotheses=most)
+    glmb, discarded = as_glmb(density, max_hypotheses=most)
     glmb.validate()
     weights = np.sort([weight for weight, _ in plain_product(density)])[::-1]
     kept = weights[:most]
@@ -97,32 +95,32 @@ def test_products_of_no_weight_are_not_listed():
     certain = FactoredGLMB.from_lmb(
         LMB.from_bernoullis([[0, 1], [0, 2]], [1.0, 0.0], np.zeros((2, 2)), [np.eye(2)] * 2)
     )
-    glmb, discarded = factored_to_glmb(certain, max_hypotheses=ALL)
+    glmb, discarded = as_glmb(certain, max_hypotheses=ALL)
     assert glmb.num_hyps == 1
     assert discarded == 0.0
     assert glmb.tracks.labels[glmb.hyp_tracks].tolist() == [[0, 1]]
-    nothing, discarded = factored_to_glmb(FactoredGLMB.empty(2), max_hypotheses=3)
+    nothing, discarded = as_glmb(FactoredGLMB.empty(2), max_hypotheses=3)
     assert (nothing.num_hyps, len(nothing.hyp_tracks), discarded) == (1, 0, 0.0)
     with pytest.raises(InputError, match="max_hypotheses: expected at least 1; got 0"):
-        factored_to_glmb(certain, max_hypotheses=0)
+        as_glmb(certain, max_hypotheses=0)
 
 
 def test_many_factors_of_many_products():
     rng = np.random.default_rng(5)
     labels = np.stack([np.zeros(300, np.int64), rng.permutation(300)], axis=1)
     density = random_factored(rng, [1] * 150 + [3] * 50, labels=labels)
-    glmb, discarded = factored_to_glmb(density, max_hypotheses=500)
+    glmb, discarded = as_glmb(density, max_hypotheses=500)
     glmb.validate()
     assert 0.99 < discarded <= 1.0
-    few, _ = factored_to_glmb(density, max_hypotheses=100)
+    few, _ = as_glmb(density, max_hypotheses=100)
     _close(glmb.hyp_log_weights[1:100] - glmb.hyp_log_weights[0], few.hyp_log_weights[1:] - few.hyp_log_weights[0])
 
 
 @given(factoreds(3), st.sampled_from([{}, EXACT, {"max_components": 2}]))
 def test_the_lmb_is_that_of_all_combinations(density, caps):
-    lmb = factored_to_lmb(density, **caps)
+    lmb = as_lmb(density, **caps)
     lmb.validate()
-    _same_lmb(lmb, glmb_to_lmb(_all_of(density), **caps) if caps != {"max_components": 2} else as_lmb(density, **caps))
+    _same_lmb(lmb, as_lmb(_all_of(density), **caps) if caps != {"max_components": 2} else as_lmb(density, **caps))
     expected = oracle.to_lmb(plain_product(density))
     assert list(plain_lmb(lmb)) == sorted(expected)
     for label, (existence, mixture) in plain_lmb(lmb).items():
@@ -136,7 +134,7 @@ def test_an_lmb_comes_back(lmb):
     density = FactoredGLMB.from_lmb(lmb)
     density.validate()
     assert density.is_bernoulli.all()
-    _same_lmb(factored_to_lmb(density), lmb)
+    _same_lmb(as_lmb(density), lmb)
     _same_lmb(as_lmb(lmb), lmb)
 
 

@@ -15,9 +15,9 @@ from vedette.densities import (
     MultiTargetSamples,
     Poisson,
     TrackTable,
+    as_lmb,
     cardinality_distribution,
     existence_probabilities,
-    glmb_to_lmb,
     mixture_moments,
     sample_glmb,
     sample_lmb,
@@ -48,7 +48,7 @@ def _check_label_statistics(samples: MultiTargetSamples, lmb: LMB) -> None:
 def test_distribution_of_glmb_samples():
     glmb = random_glmb(np.random.default_rng(11), 3, 8, 3)
     samples = sample_glmb(glmb, MANY, rng=np.random.default_rng(1))
-    _check_label_statistics(samples, glmb_to_lmb(glmb))
+    _check_label_statistics(samples, as_lmb(glmb))
     sets: dict = {}
     for i in range(MANY):
         key = tuple(tuple(label) for label in samples.sample(i)[0].tolist())

@@ -13,9 +13,9 @@ from vedette.densities import (
     LMB,
     Poisson,
     TrackTable,
+    as_glmb,
     cardinality_distribution,
     existence_probabilities,
-    lmb_to_glmb,
     mixture_moments,
     track_moments,
 )
@@ -42,7 +42,7 @@ def test_cardinality_of_an_lmb(lmb):
     for weight, tracks in oracle.expand_lmb(plain_lmb(lmb)):
         expected[len(tracks)] += weight
     np.testing.assert_allclose(distribution, expected, atol=1e-12)
-    np.testing.assert_allclose(cardinality_distribution(lmb_to_glmb(lmb, max_hypotheses=100)[0]), expected, atol=1e-12)
+    np.testing.assert_allclose(cardinality_distribution(as_glmb(lmb, max_hypotheses=100)[0]), expected, atol=1e-12)
 
 
 @pytest.mark.parametrize("mean", [0.0, 1e-9, 0.7, 30.0, 4000.0])

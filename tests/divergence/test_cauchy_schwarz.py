@@ -23,7 +23,7 @@ from densities.examples import (
 from fusion.examples import A, B, C, full_glmbs, glmb, lmb
 from reference import set_integral as oracle
 from reference.grid import Grid
-from vedette.densities import GLMB, LMB, Poisson, TrackTable, lmb_to_glmb, marginalise
+from vedette.densities import GLMB, LMB, Poisson, TrackTable, as_glmb, marginalise
 from vedette.densities.containers import unchecked
 from vedette.divergence import cauchy_schwarz, log_inner_product, reference_unit_volume
 from vedette.errors import InputError, NumericalError
@@ -75,7 +75,7 @@ def test_poisson_equals_the_set_integral(unit_volume):
 
 @given(lmbs(), lmbs(), st.sampled_from(UNIT_VOLUMES))
 def test_lmbs_equal_their_expanded_glmbs(a, b, unit_volume):
-    wide_a, wide_b = (lmb_to_glmb(density, max_hypotheses=1000)[0] for density in (a, b))
+    wide_a, wide_b = (as_glmb(density, max_hypotheses=1000)[0] for density in (a, b))
     expected = cauchy_schwarz(wide_a, wide_b, unit_volume=unit_volume)
     for pair in ((a, b), (a, wide_b), (wide_a, b)):
         assert cauchy_schwarz(*pair, unit_volume=unit_volume) == pytest.approx(expected, abs=1e-10)
@@ -86,7 +86,7 @@ def test_lmbs_equal_their_expanded_glmbs(a, b, unit_volume):
 def test_an_lmb_against_a_glmb_that_lacks_sets():
     rng = np.random.default_rng(4)
     a, b = lmb((A, B), (0.6, 0.7), rng), glmb({(A,): 0.5, (A, C): 0.3, (): 0.2}, rng)
-    expanded = lmb_to_glmb(a, max_hypotheses=100)[0]
+    expanded = as_glmb(a, max_hypotheses=100)[0]
     for support in ("full", "common"):
         expected = cauchy_schwarz(expanded, b, unit_volume=3.0, support=support)
         assert cauchy_schwarz(a, b, unit_volume=3.0, support=support) == pytest.approx(expected, abs=1e-11)
@@ -230,7 +230,7 @@ def test_reference_volume_weighs_covariances_by_existence():
     mean_cov = (0.9 * density.tracks.covs[0, 0, 0] + 0.3 * density.tracks.covs[1, 0, 0]) / 1.2
     expected = math.sqrt(4.0 * math.pi * mean_cov)
     assert reference_unit_volume(density) == pytest.approx(expected, rel=1e-12)
-    assert reference_unit_volume(lmb_to_glmb(density, max_hypotheses=10)[0]) == pytest.approx(expected, rel=1e-12)
+    assert reference_unit_volume(as_glmb(density, max_hypotheses=10)[0]) == pytest.approx(expected, rel=1e-12)
     with pytest.raises(InputError, match="expects a target"):
         reference_unit_volume(GLMB.empty(4))
     with pytest.raises(InputError, match="density: expected a GLMB"):

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from densities.examples import random_factored, random_glmb, random_lmb
-from vedette.densities import GLMB, LMB, FactoredGLMB, factored_to_lmb, marginalise
+from vedette.densities import GLMB, LMB, FactoredGLMB, as_lmb, marginalise
 from vedette.divergence import cauchy_schwarz, log_inner_product, power_integrals, reference_unit_volume, renyi
 from vedette.divergence.parts import MAX_PRODUCTS
 from vedette.errors import InputError
@@ -85,7 +85,7 @@ def test_of_mixtures_those_in_closed_form(seed: int, sizes: Any) -> None:
 def test_products_of_single_labels_are_lmbs(seed: int, support: Any) -> None:
     rng = np.random.default_rng(seed)
     a, b = drawn(rng, [1] * 4), drawn(rng, [1] * 5)
-    lmbs = factored_to_lmb(a), factored_to_lmb(b)
+    lmbs = as_lmb(a), as_lmb(b)
     got = cauchy_schwarz(a, b, unit_volume=K, support=support)
     assert got == pytest.approx(cauchy_schwarz(*lmbs, unit_volume=K, support=support), abs=1e-10)
     np.testing.assert_allclose(

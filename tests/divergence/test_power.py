@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from densities.examples import random_glmb, random_lmb
-from vedette.densities import GLMB, LMB, Poisson, lmb_to_glmb, marginalise
+from vedette.densities import GLMB, LMB, Poisson, as_glmb, marginalise
 from vedette.divergence import cauchy_schwarz, power_integral, power_integrals, renyi
 from vedette.errors import InputError
 
@@ -124,8 +124,8 @@ def test_orders_above_one() -> None:
     assert renyi(q, p, 2.0) == pytest.approx(math.log(0.5 + 0.5 * integral), rel=1e-12)
     assert renyi(LMB.empty(2), q, 2.0) == pytest.approx(math.log(2.0))
     assert renyi(q, LMB.empty(2), 2.0) == math.inf
-    glmb, _ = lmb_to_glmb(q, max_hypotheses=2)
-    only, _ = lmb_to_glmb(q, max_hypotheses=1)
+    glmb, _ = as_glmb(q, max_hypotheses=2)
+    only, _ = as_glmb(q, max_hypotheses=1)
     assert renyi(q, glmb, 2.0) == pytest.approx(0.0, abs=1e-12)
     assert renyi(q, only, 2.0) == math.inf
 

@@ -23,6 +23,7 @@ from reference.test_iterated_corrector import SENSORS, world
 from scenarios.minimal import changed
 from scenarios.own_association import exact
 from vedette.campaigns import parse_spec, resolve, run_campaign
+from vedette.control.search.problem import all_joint_actions
 from vedette.errors import InputError, ModelError, VedetteError
 from vedette.evaluation import run_scenario
 from vedette.filters import (
@@ -167,7 +168,8 @@ def rewards_of(assignment: Any) -> Floats:
         replace(sensor, filter=LmbFilter(sensor.filter.targets, sensor.filter.sensor, assignment=assignment))
         for sensor in example.sensors
     )
-    return evaluator_of(replace(example, sensors=sensors)).sample_rewards((0, 1), example.fusion)
+    evaluator = evaluator_of(replace(example, sensors=sensors))
+    return evaluator.joint()(all_joint_actions(evaluator.joint_shape()))
 
 
 def test_pseudo_updates_associate_as_the_filter_does() -> None:

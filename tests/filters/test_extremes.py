@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from vedette import models
-from vedette.densities import GLMB, LMB, IidCluster, MultiBernoulli, Poisson, glmb_to_lmb, marginalise
+from vedette.densities import GLMB, LMB, IidCluster, MultiBernoulli, Poisson, as_lmb, marginalise
 from vedette.errors import NumericalError
 from vedette.filters import CbMemberFilter, CphdFilter, DeltaGlmbFilter, Limits, LmbFilter, PhdFilter
 from vedette.fusion import CmDeltaGlmb
@@ -123,7 +123,7 @@ def test_targets_too_far_apart_for_one_gaussian() -> None:
     tracks = target(LmbFilter, [[0.0, 0.0, 0.0, 0.0], [1e9, 1e9, 0.0, 0.0]], 1e-4 * np.eye(4)).tracks
     one_label = type(tracks)(np.zeros((2, 2), np.int64), *[getattr(tracks, name) for name in tracks.__slots__[1:]])
     glmb = GLMB.from_hypotheses(one_label, [[0], [1]], [0.5, 0.5])
-    for convert in (marginalise, glmb_to_lmb):
+    for convert in (marginalise, as_lmb):
         with pytest.raises(NumericalError, match="positive definite within the precision"):
             convert(glmb)
         convert(glmb, max_components=2).validate()

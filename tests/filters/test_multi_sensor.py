@@ -22,7 +22,7 @@ from filters.examples import (
 from reference import glmb as oracle
 from reference import multi_sensor
 from vedette import models
-from vedette.densities import LMB, TrackTable, lmb_to_glmb, marginalise
+from vedette.densities import LMB, TrackTable, as_glmb, marginalise
 from vedette.errors import InputError, NumericalError
 from vedette.filters import DeltaGlmbFilter, Limits, LmbFilter, MultiSensorGlmbFilter, MultiSensorLmbFilter
 from vedette.kernels.base.compile import JIT_ENABLED
@@ -225,6 +225,6 @@ def test_scans_that_the_models_forbid(kind):
     tracks = TrackTable.from_gaussians([[-2, 0]], BIRTH.means[:1], BIRTH.covs[:1])
     belief: Any = LMB(tracks, np.array([math.inf]))
     if kind is MultiSensorGlmbFilter:
-        belief, _ = lmb_to_glmb(belief, max_hypotheses=2)
+        belief, _ = as_glmb(belief, max_hypotheses=2)
     with pytest.raises(NumericalError, match="positive weight"):
         tracker.step(belief, [[], []], POSES[:2], DT, 5, rng=np.random.default_rng(0))

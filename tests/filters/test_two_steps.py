@@ -12,7 +12,7 @@ import pytest
 from filters.examples import assert_same_glmb, plain_glmb, plain_lmb
 from filters.test_multi_sensor import DT, POSES, SCANS, SENSORS, TARGETS
 from vedette import models
-from vedette.densities import GLMB, LMB, existence_probabilities, glmb_to_lmb, track_moments
+from vedette.densities import GLMB, LMB, as_lmb, existence_probabilities, track_moments
 from vedette.errors import InputError
 from vedette.filters import (
     DeltaGlmbFilter,
@@ -131,7 +131,7 @@ def test_sequential_is_exact_for_one_target() -> None:
         beliefs = [belief for belief, _ in results]
         for _, info in results[1:]:
             assert info.log_likelihood == pytest.approx(results[0][1].log_likelihood, rel=1e-10)
-    lmbs = [belief if isinstance(belief, LMB) else glmb_to_lmb(belief) for belief in beliefs]
+    lmbs = [belief if isinstance(belief, LMB) else as_lmb(belief) for belief in beliefs]
     singles = [(lmb.existence, *track_moments(lmb.tracks)) for lmb in lmbs]
     for existence, mean, cov in singles[1:]:
         np.testing.assert_allclose(existence, singles[0][0], rtol=1e-10)

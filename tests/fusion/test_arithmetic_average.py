@@ -8,7 +8,7 @@ from scipy.special import expit
 
 from densities.examples import random_glmb, random_lmb
 from fusion.sights import LABELS, belief, informed, views
-from vedette.densities import LMB, Poisson, glmb_to_lmb
+from vedette.densities import LMB, Poisson, as_lmb
 from vedette.densities.statistics import track_moments
 from vedette.errors import InputError
 from vedette.fusion import ArithmeticAverage, FusionLimits
@@ -56,7 +56,7 @@ def test_mixtures_are_reduced_by_the_caps_and_glmbs_converted() -> None:
     fused, _ = ArithmeticAverage((0.2, 0.3, 0.5), limits=limits).fuse(beliefs)
     fused.validate()
     assert np.diff(fused.tracks.offsets).max() <= 2
-    rs = [dict(zip(map(tuple, b.tracks.labels.tolist()), b.existence, strict=True)) for b in map(glmb_to_lmb, beliefs)]
+    rs = [dict(zip(map(tuple, b.tracks.labels.tolist()), b.existence, strict=True)) for b in map(as_lmb, beliefs)]
     for label, r in zip(fused.tracks.labels.tolist(), fused.existence, strict=True):
         shares = zip((0.2, 0.3, 0.5), rs, strict=True)
         assert r == pytest.approx(sum(weight * own.get(tuple(label), 0.0) for weight, own in shares))

@@ -12,7 +12,7 @@ from scipy.special import logit
 
 from densities.examples import lmbs, random_glmb, random_lmb
 from fusion.examples import A, B, C, lmb, mixture_track
-from vedette.densities import LMB, Poisson, TrackTable, glmb_to_lmb
+from vedette.densities import LMB, Poisson, TrackTable, as_lmb
 from vedette.densities.containers import unchecked
 from vedette.errors import InputError
 from vedette.fusion import Clmb
@@ -104,7 +104,7 @@ def test_a_glmb_is_converted_first():
     beliefs = [random_glmb(rng, 3, 10, 2) for _ in range(2)]
     for rule, most in ((Clmb(HALVES, "moment_matched"), 1), (Clmb(HALVES), 4)):
         fused, _ = rule.fuse(beliefs)
-        _assert_same(fused, rule.fuse([glmb_to_lmb(belief, max_components=most) for belief in beliefs])[0], 1e-10)
+        _assert_same(fused, rule.fuse([as_lmb(belief, max_components=most) for belief in beliefs])[0], 1e-10)
 
 
 def test_auto_keeps_components_apart_while_the_number_of_sensors_allows_it():

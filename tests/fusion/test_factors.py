@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from densities.examples import random_covs, random_factor, random_factored
 from fusion.examples import assert_same_glmb, by_label_set
-from vedette.densities import GLMB, LMB, FactoredGLMB, TrackTable, factored_to_glmb, factored_to_lmb, settled_lmb
+from vedette.densities import GLMB, LMB, FactoredGLMB, TrackTable, as_glmb, as_lmb, settled_lmb
 from vedette.errors import InputError, NumericalError
 from vedette.fusion import ArithmeticAverage, Clmb, CmDeltaGlmb, FusionLimits, Matched, match_labels
 
@@ -41,7 +41,7 @@ def full(rng, partition):
 
 
 def all_of(density):
-    return factored_to_glmb(density, max_hypotheses=ALL)[0]
+    return as_glmb(density, max_hypotheses=ALL)[0]
 
 
 A, B, C, D, E = LABELS
@@ -158,7 +158,7 @@ def test_a_cap_of_one_takes_the_likelier_for_each_label():
     fused.validate()
     likelier = [own for own, _ in one_by_one(beliefs, rule) if own.tracks.num_tracks]
     assert fused.tracks.labels.tolist() == [own.tracks.labels[0].tolist() for own in likelier]
-    assert (factored_to_lmb(fused).existence == 1.0).all()
+    assert (as_lmb(fused).existence == 1.0).all()
     kept = np.prod([1.0 - own.discarded_weight for _, own in one_by_one(beliefs, rule)])
     assert info.discarded_weight == pytest.approx(1.0 - kept, abs=1e-12)
 
@@ -168,7 +168,7 @@ def test_products_beyond_the_cap_are_counted():
     beliefs = [full(rng, [[A], [B], [C]]), full(rng, [[A, B, C]])]
     rule = CmDeltaGlmb((0.5, 0.5), limits=FusionLimits(max_hypotheses=5))
     fused, info = rule.fuse(beliefs)
-    product, discarded = factored_to_glmb(beliefs[0], max_hypotheses=5)
+    product, discarded = as_glmb(beliefs[0], max_hypotheses=5)
     expected, wanted = rule.fuse([product, beliefs[1].factor(0)])
     assert_same_glmb(fused.factor(0), expected, 1e-12)
     assert fused.num_factors == 1
@@ -207,13 +207,10 @@ def test_fusions_of_lmbs_take_the_lmbs(rule):
     fused, info = rule.fuse(beliefs)
     expected, wanted = (
         rule.fuse(
-            [
-                factored_to_lmb(belief, max_components=10**9, log_min_weight=-np.inf, merge_distance=0.0)
-                for belief in beliefs
-            ]
+            [as_lmb(belief, max_components=10**9, log_min_weight=-np.inf, merge_distance=0.0) for belief in beliefs]
         )
         if isinstance(rule, ArithmeticAverage)
-        else rule.fuse([factored_to_lmb(belief) for belief in beliefs])
+        else rule.fuse([as_lmb(belief) for belief in beliefs])
     )
     np.testing.assert_array_equal(fused.tracks.labels, expected.tracks.labels)
     np.testing.assert_allclose(fused.existence, expected.existence, rtol=1e-12)

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vedette import control, divergence, filters, fusion, models, platforms, simulation, tracking
-from vedette.densities import LMB, lmb_to_glmb
+from vedette.densities import LMB, as_glmb
 from vedette.fusion import FusionLimits, Views
 
 Data = dict[str, Any]
@@ -122,7 +122,7 @@ def _views() -> Views:
 
 def _fusions() -> Iterator[tuple[str, Made]]:
     fuse = ("fuse", {"beliefs": [lmb(), lmb()], "views": _views()})
-    glmbs = ("fuse", {"beliefs": [lmb_to_glmb(lmb(), max_hypotheses=10)[0]] * 2, "views": None})
+    glmbs = ("fuse", {"beliefs": [as_glmb(lmb(), max_hypotheses=10)[0]] * 2, "views": None})
     weights = (0.5, 0.5)
     yield (
         "Clmb",

@@ -108,7 +108,7 @@ def one_case(rng: np.random.Generator) -> None:
     if kind < 2:
         uses += [lambda: d.map_estimate(spoilt), lambda: d.marginal_estimate(spoilt)]
         uses.append(lambda: (CmDeltaGlmb if kind == 0 else Clmb)((0.5, 0.5)).fuse([spoilt, belief])[0])
-        uses.append(lambda: d.glmb_to_lmb(spoilt) if kind == 0 else d.lmb_to_glmb(spoilt, max_hypotheses=5)[0])
+        uses.append(lambda: d.as_lmb(spoilt) if kind == 0 else d.as_glmb(spoilt, max_hypotheses=5)[0])
     if kind < 3:
         with contextlib.suppress(VedetteError):
             assert cauchy_schwarz(spoilt, spoilt) >= 0.0
@@ -145,8 +145,8 @@ def one_product(rng: np.random.Generator) -> None:
     uses: list[Any] = [
         lambda: d.map_estimate(spoilt),
         lambda: d.marginal_estimate(spoilt),
-        lambda: d.factored_to_lmb(spoilt),
-        lambda: d.factored_to_glmb(spoilt, max_hypotheses=5)[0],
+        lambda: d.as_lmb(spoilt),
+        lambda: d.as_glmb(spoilt, max_hypotheses=5)[0],
         lambda: d.marginalise(spoilt),
         lambda: without_labels(spoilt, np.array([[1, 1], [3, 0]]))[0],
         lambda: CmDeltaGlmb((0.5, 0.5)).fuse([spoilt, belief])[0],

@@ -22,8 +22,8 @@ from vedette.densities import (
     IidCluster,
     MultiBernoulli,
     Poisson,
-    glmb_to_lmb,
-    lmb_to_glmb,
+    as_glmb,
+    as_lmb,
     map_estimate,
     marginal_estimate,
     marginalise,
@@ -70,9 +70,9 @@ def _check_readings(rng: np.random.Generator, belief: Any) -> None:
     if isinstance(belief, GLMB):
         most = int(scenes.one_of(rng, 1, 4))
         marginalise(belief, max_components=most).validate()
-        glmb_to_lmb(belief, max_components=most).validate()
+        as_lmb(belief, max_components=most).validate()
     elif isinstance(belief, LMB):
-        listed, left_out = lmb_to_glmb(belief, max_hypotheses=int(scenes.one_of(rng, 1, 50)))
+        listed, left_out = as_glmb(belief, max_hypotheses=int(scenes.one_of(rng, 1, 50)))
         listed.validate()
         assert 0.0 <= left_out <= 1.0
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from vedette.control import Plan
-from vedette.densities import GLMB, LMB, FactoredGLMB, TrackTable, lmb_to_glmb
+from vedette.densities import GLMB, LMB, FactoredGLMB, TrackTable, as_glmb
 from vedette.scenarios import Scenario, load_scenario, with_fields
 from vedette.scenarios.build import build_experiment, build_planner
 from vedette.tracking import State
@@ -17,8 +17,8 @@ NUM_LABELS = 3
 FILTERS = {
     "lmb": lambda lmb: lmb,
     "factored_glmb": FactoredGLMB.from_lmb,
-    "delta_glmb": lambda lmb: lmb_to_glmb(lmb, max_hypotheses=2**NUM_LABELS)[0],
-    "m_delta_glmb": lambda lmb: lmb_to_glmb(lmb, max_hypotheses=2**NUM_LABELS)[0],
+    "delta_glmb": lambda lmb: as_glmb(lmb, max_hypotheses=2**NUM_LABELS)[0],
+    "m_delta_glmb": lambda lmb: as_glmb(lmb, max_hypotheses=2**NUM_LABELS)[0],
 }
 
 

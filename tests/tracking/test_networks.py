@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tracking.scenes import assert_same_lmb, filters, lmb, rngs, scans_of, sensor, targets
-from vedette.densities import LMB, FactoredGLMB, lmb_to_glmb
+from vedette.densities import LMB, FactoredGLMB, as_glmb
 from vedette.errors import InputError
 from vedette.filters import MultiSensorGlmbFilter, SequentialLmbFilter
 from vedette.fusion import ArithmeticAverage, Clmb, CmDeltaGlmb, FusionLimits, Matched, ParallelUpdate
@@ -308,7 +308,7 @@ def test_what_the_others_have_already_is_not_sent() -> None:
 def test_parts_have_the_bytes_of_the_whole(factored: bool) -> None:
     belief: Any = line_of_labels(0, 1, 2)
     if factored:
-        pair, _ = lmb_to_glmb(line_of_labels(7, 8), max_hypotheses=10)
+        pair, _ = as_glmb(line_of_labels(7, 8), max_hypotheses=10)
         belief = FactoredGLMB.product([FactoredGLMB.from_lmb(belief), FactoredGLMB.from_glmb(pair)], 4)
     parts = parts_of_belief(belief)
     assert len(parts) == (4 if factored else 3)

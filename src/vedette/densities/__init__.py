@@ -1,11 +1,8 @@
 """What is believed about the targets: labelled and unlabelled multi-target densities with Gaussian-mixture tracks."""
 
 from vedette.densities.conversions import (
+    as_glmb,
     as_lmb,
-    factored_to_glmb,
-    factored_to_lmb,
-    glmb_to_lmb,
-    lmb_to_glmb,
     marginalise,
     settled_lmb,
 )
@@ -58,15 +55,12 @@ __all__ = [
     "TrackHistory",
     "TrackTable",
     "UndetectedIntensity",
+    "as_glmb",
     "as_lmb",
     "at_peaks",
     "best_estimate",
     "cardinality_distribution",
     "existence_probabilities",
-    "factored_to_glmb",
-    "factored_to_lmb",
-    "glmb_to_lmb",
-    "lmb_to_glmb",
     "load_density",
     "map_estimate",
     "marginal_estimate",

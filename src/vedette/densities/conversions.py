@@ -10,7 +10,7 @@ import numpy as np
 
 from vedette.densities.checks import distinct_labels, offsets_of, take_runs
 from vedette.densities.containers import unchecked
-from vedette.densities.factored import FactoredGLMB, Labelled
+from vedette.densities.factored import FactoredGLMB, Labelled, as_factored
 from vedette.densities.glmb import GLMB
 from vedette.densities.label_sets import sets_of_factors, take_factors, take_tracks
 from vedette.densities.lmb import LMB
@@ -113,7 +113,11 @@ def as_lmb(
     log_min_weight: float = DEFAULT_LOG_MIN_WEIGHT,
     merge_distance: float = DEFAULT_MERGE_DISTANCE,
 ) -> LMB:
-    """An LMB as it is; the LMB of GLMBs, see `glmb_to_lmb` and `factored_to_lmb`."""
+    """LMB with the existence probability and track density of every label (Reuter et al. 2014, eq. 43-45).
+
+    Keeps the existence probabilities and so the mean cardinality, not its whole distribution. Mixtures are reduced as
+    by `marginalise`; an LMB is as it was. Raises `InputError` for a limit outside its range.
+    """
     if isinstance(density, LMB):
         return density
     caps = _checked_caps(max_components, log_min_weight, merge_distance)
@@ -139,34 +143,6 @@ def reduced_lmb(density: GLMB | FactoredGLMB, caps: MixtureCaps, *, settled: boo
     return kernels.factors_to_lmb(density.as_hypotheses(), all_labels[used], label_of, firsts, ends, caps)
 
 
-def glmb_to_lmb(
-    glmb: GLMB,
-    *,
-    max_components: int = 1,
-    log_min_weight: float = DEFAULT_LOG_MIN_WEIGHT,
-    merge_distance: float = DEFAULT_MERGE_DISTANCE,
-) -> LMB:
-    """LMB with the existence probability and track density of every label of a GLMB (Reuter et al. 2014, eq. 43-45).
-
-    Keeps the existence probabilities and so the mean cardinality, not its whole distribution. Mixtures are reduced as
-    by `marginalise`. Raises `InputError` for a limit outside its range.
-    """
-    caps = _checked_caps(max_components, log_min_weight, merge_distance)
-    return LMB.from_kernel(reduced_lmb(glmb, caps))
-
-
-def factored_to_lmb(
-    density: FactoredGLMB,
-    *,
-    max_components: int = 1,
-    log_min_weight: float = DEFAULT_LOG_MIN_WEIGHT,
-    merge_distance: float = DEFAULT_MERGE_DISTANCE,
-) -> LMB:
-    """As `glmb_to_lmb`, of a product of GLMBs, all its factors at once."""
-    caps = _checked_caps(max_components, log_min_weight, merge_distance)
-    return LMB.from_kernel(reduced_lmb(density, caps))
-
-
 def settled_lmb(
     density: Labelled,
     *,
@@ -189,32 +165,19 @@ def settled_lmb(
     return LMB.from_kernel(reduced_lmb(density, caps, settled=True))
 
 
-def lmb_to_glmb(lmb: LMB, *, max_hypotheses: int) -> tuple[GLMB, float]:
-    """GLMB of the `max_hypotheses` most probable label subsets of an LMB, and the weight of those left out.
-
-    The GLMB shares the LMB's track table, and its weights are normalised over the subsets kept, which come by
-    descending weight. Subsets of probability zero are not listed. Raises `InputError` for a `max_hypotheses` below 1.
-    """
-    glmb, discarded_weight = kernels.lmb_to_glmb(lmb.to_kernel(), _at_least_one(max_hypotheses))
-    return GLMB.from_kernel(glmb), float(discarded_weight)
-
-
-def factored_to_glmb(density: FactoredGLMB, *, max_hypotheses: int) -> tuple[GLMB, float]:
+def as_glmb(density: Labelled, *, max_hypotheses: int) -> tuple[GLMB, float]:
     """GLMB of the `max_hypotheses` heaviest products of one hypothesis of each factor, and the weight of the others.
 
-    The GLMB shares the track table, and its weights are normalised over what is kept, which comes by descending weight.
-    Products of weight zero are not listed. Raises `InputError` for a `max_hypotheses` below 1.
+    Of an LMB these are its most probable label subsets; a GLMB is one factor. The GLMB shares the track table, and its
+    weights are normalised over what is kept, which comes by descending weight. Products of weight zero are not listed.
+    Raises `InputError` for a `max_hypotheses` below 1.
     """
-    labels, label_of = distinct_labels(density.tracks.labels)
-    most = _at_least_one(max_hypotheses)
-    glmb, discarded_weight = kernels.factored_to_glmb(density.to_kernel(), label_of, len(labels), most)
-    return GLMB.from_kernel(glmb), float(discarded_weight)
-
-
-def _at_least_one(max_hypotheses: int) -> int:
     if max_hypotheses < 1:
         raise InputError(f"max_hypotheses: expected at least 1; got {max_hypotheses}")
-    return int(max_hypotheses)
+    labels, label_of = distinct_labels(density.tracks.labels)
+    factors = as_factored(density).to_kernel()
+    glmb, discarded_weight = kernels.factored_to_glmb(factors, label_of, len(labels), int(max_hypotheses))
+    return GLMB.from_kernel(glmb), float(discarded_weight)
 
 
 def lmb_on_label_sets(lmb: LMB, sets: Sequence[Sequence[tuple[int, ...]]]) -> GLMB:
@@ -233,12 +196,9 @@ def lmb_on_label_sets(lmb: LMB, sets: Sequence[Sequence[tuple[int, ...]]]) -> GL
 __all__ = [
     "DEFAULT_LOG_MIN_WEIGHT",
     "DEFAULT_MERGE_DISTANCE",
+    "as_glmb",
     "as_lmb",
-    "factored_to_glmb",
-    "factored_to_lmb",
-    "glmb_to_lmb",
     "lmb_on_label_sets",
-    "lmb_to_glmb",
     "marginalise",
     "marginalised_factors",
     "reduced_lmb",

@@ -229,3 +229,10 @@ class FactoredGLMB(Container):
 # A density that names its targets, and how messages call it.
 Labelled: TypeAlias = GLMB | LMB | FactoredGLMB
 LABELLED = "a GLMB, an LMB or a FactoredGLMB"
+
+
+def as_factored(density: Labelled) -> FactoredGLMB:
+    """A GLMB as one factor, an LMB as one a label."""
+    if isinstance(density, LMB):
+        return FactoredGLMB.from_lmb(density)
+    return FactoredGLMB.from_glmb(density) if isinstance(density, GLMB) else density

@@ -9,10 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from vedette.densities.checks import distinct_labels, offsets_of
-from vedette.densities.factored import FactoredGLMB, Labelled
-from vedette.densities.glmb import GLMB
+from vedette.densities.factored import FactoredGLMB
 from vedette.densities.label_sets import take_factors
-from vedette.densities.lmb import LMB
 from vedette.kernels.base.types import Bools, Ints
 
 
@@ -47,13 +45,6 @@ class JoinedFactors(NamedTuple):
         ]
 
 
-def as_factored(density: Labelled) -> FactoredGLMB:
-    """A GLMB as one factor, an LMB as one a label."""
-    if isinstance(density, LMB):
-        return FactoredGLMB.from_lmb(density)
-    return FactoredGLMB.from_glmb(density) if isinstance(density, GLMB) else density
-
-
 def join_factors(densities: Sequence[FactoredGLMB]) -> JoinedFactors:
     """The factors of densities of one state dimension, at least one, gathered."""
     distinct, place = distinct_labels(np.concatenate([density.tracks.labels for density in densities]))
@@ -80,4 +71,4 @@ def join_factors(densities: Sequence[FactoredGLMB]) -> JoinedFactors:
     return JoinedFactors(tuple(densities), tuple(groups), alone)
 
 
-__all__ = ["JoinedFactors", "as_factored", "join_factors"]
+__all__ = ["JoinedFactors", "join_factors"]

@@ -9,8 +9,9 @@ import numpy as np
 
 from vedette.densities import GLMB, LMB, FactoredGLMB, Labelled
 from vedette.densities.containers import unchecked
-from vedette.densities.conversions import factored_to_glmb
-from vedette.densities.joining import as_factored, join_factors
+from vedette.densities.conversions import as_glmb
+from vedette.densities.factored import as_factored
+from vedette.densities.joining import join_factors
 from vedette.densities.label_sets import in_label_order, take_factors
 from vedette.errors import InputError
 
@@ -56,7 +57,7 @@ def _part(product: FactoredGLMB) -> Part:
             f"p, q: expected factors that share labels with at most {MAX_PRODUCTS} products of their hypotheses; got "
             f"{num_products}"
         )
-    return factored_to_glmb(product, max_hypotheses=MAX_PRODUCTS)[0]
+    return as_glmb(product, max_hypotheses=MAX_PRODUCTS)[0]
 
 
 def _as_lmb(product: FactoredGLMB) -> LMB:

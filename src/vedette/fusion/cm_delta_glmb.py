@@ -14,7 +14,7 @@ from vedette.densities.cases import LabelledCases
 from vedette.densities.checks import offsets_of, take_runs
 from vedette.densities.containers import unchecked
 from vedette.densities.conversions import marginalised_factors
-from vedette.densities.joining import as_factored
+from vedette.densities.factored import as_factored
 from vedette.densities.label_sets import take_tracks
 from vedette.densities.products import PowerProducts, Share
 from vedette.errors import NumericalError

@@ -9,7 +9,7 @@ import numpy as np
 from vedette.densities import LMB, FactoredGLMB, TrackTable
 from vedette.densities.checks import offsets_of, take_runs
 from vedette.densities.containers import unchecked
-from vedette.densities.conversions import factored_to_glmb
+from vedette.densities.conversions import as_glmb
 from vedette.densities.joining import join_factors
 from vedette.densities.label_sets import in_label_order, take_factors, take_tracks
 from vedette.kernels.base.types import Floats, Ints
@@ -41,7 +41,7 @@ def _one_a_group(belief: FactoredGLMB, groups: Ints, num_groups: int, max_produc
     several = np.flatnonzero(counts > 1)
     for group in several.tolist():
         factors = take_factors(belief, order[ends[group] : ends[group + 1]])
-        product, lost = factored_to_glmb(factors, max_hypotheses=max_products)
+        product, lost = as_glmb(factors, max_hypotheses=max_products)
         with np.errstate(divide="ignore"):
             log_kept[group] = np.log1p(-lost)
         parts.append(FactoredGLMB.from_glmb(product))

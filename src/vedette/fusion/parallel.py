@@ -13,7 +13,8 @@ from vedette.densities import LMB, FactoredGLMB, TrackTable
 from vedette.densities.checks import offsets_of
 from vedette.densities.containers import unchecked
 from vedette.densities.conversions import marginalised_factors
-from vedette.densities.joining import as_factored, join_factors
+from vedette.densities.factored import as_factored
+from vedette.densities.joining import join_factors
 from vedette.densities.label_sets import WHOLE, in_label_order, places_of
 from vedette.errors import InputError, NumericalError
 from vedette.fusion.base import (

@@ -11,7 +11,7 @@ import numpy as np
 from vedette.densities import GLMB, LMB, FactoredGLMB, TrackTable, existence_probabilities
 from vedette.densities.checks import offsets_of
 from vedette.densities.containers import unchecked
-from vedette.densities.conversions import factored_to_glmb
+from vedette.densities.conversions import as_glmb
 from vedette.densities.joining import JoinedFactors
 from vedette.densities.label_sets import laid_out, places_of, take_tracks
 from vedette.errors import InputError, NumericalError
@@ -79,7 +79,7 @@ def grouped_sets(
 
 def _predicted_sets(joined: JoinedFactors, group: int, labels: Ints, max_sets: int) -> tuple[Bools, Floats, float]:
     """(num_sets, num_labels) who is in each set of the prediction, log weights, and log of what the cap left."""
-    product, lost = factored_to_glmb(joined.parts(group)[0], max_hypotheses=max_sets)
+    product, lost = as_glmb(joined.parts(group)[0], max_hypotheses=max_sets)
     return _members(product, labels), product.hyp_log_weights.copy(), float(np.log1p(-lost))
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from vedette.densities import LMB
-from vedette.densities.joining import as_factored
+from vedette.densities.factored import as_factored
 from vedette.errors import InputError
 from vedette.filters import FactoredGlmbFilter, Filter, FilterInfo, LmbFilter, TwoStepFilter, shared_targets
 from vedette.filters.base import SingleSensorFilter

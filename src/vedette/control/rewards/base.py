@@ -9,7 +9,7 @@ from typing import Any, Literal, Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
 
-from vedette.densities import GLMB, LMB, existence_probabilities, glmb_to_lmb, track_moments
+from vedette.densities import GLMB, LMB, as_lmb, existence_probabilities, track_moments
 from vedette.densities.label_sets import places_of
 from vedette.divergence import power_integrals, reference_unit_volume
 from vedette.errors import InputError
@@ -119,7 +119,7 @@ def speaks_for(thing: Any, method: str, other: str) -> bool:
 
 def _of_labels(reward: LabelReward, predicted: GLMB | LMB, updated: GLMB | LMB) -> float:
     """The reward of two densities, GLMBs taken as their LMBs; a label that the update lacks is not there any more."""
-    before, after = (density if isinstance(density, LMB) else glmb_to_lmb(density) for density in (predicted, updated))
+    before, after = (as_lmb(density) for density in (predicted, updated))
     places = places_of(before.tracks.labels, after.tracks.labels)
     old, new = track_moments(before.tracks), track_moments(after.tracks)
     sums, out = np.zeros(reward.num_terms), np.empty(reward.num_terms)

@@ -1,4 +1,4 @@
-"""Conversions between labelled densities: delta-GLMB to marginalised GLMB and to LMB, LMB and products to GLMB."""
+"""Conversions between labelled densities: delta-GLMB to marginalised GLMB and to LMB, products to GLMB."""
 
 from __future__ import annotations
 
@@ -146,44 +146,6 @@ def factors_to_lmb(glmb: Glmb, labels: Ints, label_of: Ints, firsts: Ints, ends:
 
 
 @kernel
-def lmb_to_glmb(lmb: Lmb, max_hypotheses: int) -> tuple[Glmb, float]:
-    """GLMB of the `max_hypotheses` most probable label subsets of an LMB, by descending weight, and the
-    weight left out.
-
-    The GLMB shares the LMB's track table; its weights are normalised. Subsets of weight zero are never listed, so with
-    a large `max_hypotheses` all the others are there and the weight left out is zero. Equal weights come in the order
-    in which the search finds them, which is the same every time.
-    """
-    num = len(lmb.existence_logit)
-    costs, offsets, base = np.zeros(2 * num), np.empty(num + 1, np.int64), 0.0
-    for i in range(num):
-        costs[2 * i + 1] = abs(lmb.existence_logit[i])
-        base -= math.log1p(math.exp(-costs[2 * i + 1]))
-        offsets[i] = 2 * i
-    offsets[num] = 2 * num
-    flips, _, previous, order, complete = smallest_sums(costs, offsets, max_hypotheses)
-    num_hyps = len(order)
-    hyp_offsets, hyp_log_weights = np.zeros(num_hyps + 1, np.int64), np.empty(num_hyps)
-    hyp_tracks, flipped = np.empty(num_hyps * num, np.int64), np.zeros(num, np.int64)
-    end = 0
-    for h in range(num_hyps):
-        hyp_log_weights[h] = base
-        node = order[h]
-        while node > 0:
-            flipped[flips[node]] = h + 1
-            hyp_log_weights[h] -= costs[2 * flips[node] + 1]
-            node = previous[node]
-        for i in range(num):
-            # The likeliest subset has every label that is likelier there than not; others flip some of them.
-            if (lmb.existence_logit[i] > 0.0) != (flipped[i] == h + 1):
-                hyp_tracks[end] = i
-                end += 1
-        hyp_offsets[h + 1] = end
-    discarded = _normalise_kept(hyp_log_weights, complete)
-    return Glmb(lmb.tracks, hyp_offsets, hyp_tracks[:end].copy(), hyp_log_weights), discarded
-
-
-@kernel
 def _normalise_kept(log_weights: Floats, complete: bool) -> float:
     """Normalise the log weights of the hypotheses kept; the weight of those left out, 0 if all are there."""
     log_kept = log_sum(log_weights)
@@ -196,7 +158,10 @@ def _normalise_kept(log_weights: Floats, complete: bool) -> float:
 def factored_to_glmb(density: FactoredGlmb, label_of: Ints, num_labels: int, max_hypotheses: int) -> tuple[Glmb, float]:
     """GLMB of the `max_hypotheses` heaviest products of one hypothesis of each factor, and the weight left out.
 
-    As `lmb_to_glmb`. label_of: (num_tracks,) place of the label of each track among all labels, `num_labels`.
+    The GLMB shares the track table; its weights are normalised. Products of weight zero are never listed, so with a
+    large `max_hypotheses` all the others are there and the weight left out is zero. Equal weights come in the order in
+    which the search finds them, which is the same every time. label_of: (num_tracks,) place of the label of each track
+    among all labels, `num_labels`.
     """
     num, sorted_hyps = len(density.factor_offsets) - 1, np.empty(len(density.hyp_log_weights), np.int64)
     costs, base = np.empty(len(sorted_hyps)), 0.0
@@ -235,4 +200,4 @@ def factored_to_glmb(density: FactoredGlmb, label_of: Ints, num_labels: int, max
     return Glmb(density.tracks, hyp_offsets, hyp_tracks[:end].copy(), hyp_log_weights), discarded
 
 
-__all__ = ["factored_to_glmb", "factors_to_lmb", "glmb_to_lmb", "lmb_to_glmb", "marginalise", "marginalise_sets"]
+__all__ = ["factored_to_glmb", "factors_to_lmb", "glmb_to_lmb", "marginalise", "marginalise_sets"]
