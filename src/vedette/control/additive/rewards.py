@@ -36,7 +36,7 @@ class AdditiveRewards:
         reward: whose `combine` makes rewards of the sums; None: the sum itself.
         cells: where targets may be that were not found yet.
         num_threads: threads that may share the work; the result does not depend on it.
-        looks: times at which labels are valued, each as of labels of its own, one time after the other.
+        num_horizons: at whose ends labels are valued, each as of labels of its own, one horizon after the other.
     """
 
     table: Table
@@ -45,7 +45,7 @@ class AdditiveRewards:
     reward: Any
     cells: Cells
     num_threads: int
-    looks: int = 1
+    num_horizons: int = 1
 
     @property
     def num_samples(self) -> int:
