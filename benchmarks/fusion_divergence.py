@@ -12,6 +12,7 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +27,11 @@ from vedette.fusion import Clmb, CmDeltaGlmb
 
 Floats = NDArray[np.float64]
 DIM, NUM_LABELS, NUM_ACTIONS, NUM_SAMPLES = 4, 4, 12, 40
+
+
+def no_views(_: object) -> Any:
+    """These fusions ask for none."""
+    return None
 
 
 def median_seconds(work: Callable[[], object], repeats: int) -> float:
@@ -99,7 +105,7 @@ def main() -> None:
             seconds = median_seconds(lambda t=table: t(actions), repeats)  # type: ignore[misc]
             each = 1e9 * seconds / (len(actions) * NUM_SAMPLES)
             print(f"joint rewards, {kind:<4} {name:<19} {1e3 * seconds:.2f} ms, {each:.0f} ns an entry")
-            plain = PlainRewards(sensors, prediction, fusion, reward, NUM_SAMPLES)
+            plain = PlainRewards(sensors, prediction, fusion, reward, NUM_SAMPLES, no_views)
             slow = median_seconds(lambda p=plain: p(actions[:2]), 5) / 2 * len(actions)  # type: ignore[misc]
             print(f"  one by one {slow / seconds:.0f} times as long")
 

@@ -162,6 +162,18 @@ def test_lines_and_ascents_give_what_joint_actions_give() -> None:
             assert table[tuple(index)].max() <= reward + 1e-8
 
 
+@pytest.mark.parametrize("reward", [CauchySchwarzReward("reference"), ExpectedLossReward(60.0)])
+def test_a_joint_action_has_its_rewards_whatever_was_asked_before(reward: Any) -> None:
+    """To the last bit: labels that no scan is another of keep their values from row to row."""
+    rng = np.random.default_rng(0)
+    for example in (shared(3, 2), single(situation("lmb", 3, 6, KNOWN))):
+        additive = sums_of(additive_of(example, reward))
+        actions = rng.integers(-1, 3, (60, 3))
+        actions[::7] = actions[1::7][: len(actions[::7])]
+        each = np.concatenate([additive(actions[i : i + 1]) for i in range(len(actions))])
+        np.testing.assert_array_equal(additive(actions), each)
+
+
 def test_an_ascent_takes_only_what_is_allowed() -> None:
     """A course that may not be taken, and two that may not be taken together."""
     additive = sums_of(additive_of(shared(3, 1), CauchySchwarzReward("reference")))

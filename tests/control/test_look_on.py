@@ -223,7 +223,7 @@ def prepared(of: Situation, horizon: Any = None, later: Any = (), hidden: Any = 
         settings,
         REWARD,
         replace(of.state, undetected=hidden),
-        looks=later,
+        horizons=later,
         rng=np.random.default_rng(0),
     )
 
@@ -261,7 +261,7 @@ def test_at_all_is_the_mean_of_evaluators_that_are_prepared_one_by_one(hidden: b
     same(additive.each_alone(), mean(lambda own: own.each_alone()))
     same(at_all([sums_of(own) for own in single])(actions), additive(actions))
     assert found.counts["filter_steps"] == sum(own.counts["filter_steps"] for own in single)
-    assert (additive.looks, found.looks) == (3, later)
+    assert (additive.num_horizons, found.horizons) == (3, later)
 
 
 @pytest.mark.parametrize("hidden", [False, True])

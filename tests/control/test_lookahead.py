@@ -77,6 +77,15 @@ def test_one_decision_is_that_of_the_joint_planner(reward: Any, mode: Any) -> No
     assert [rows.tolist() for rows in ahead.sequence] == [[row.tolist()] for row in joint.chosen_actions]
 
 
+def test_one_decision_is_explained_as_that_of_the_joint_planner() -> None:
+    given, reward = lmbs(), ExpectedLossReward()
+    one = decide(planner(given, reward, depth=1), given).explain()
+    joint = decide(JointPlanner(given.sensors, given.fusion, given.settings, reward), given).explain()
+    assert str(one).removeprefix("lookahead") == str(joint).removeprefix("jdm")
+    with pytest.raises(InputError, match="left its evidence behind"):
+        decide(planner(given, reward, depth=2), given).explain()
+
+
 @pytest.mark.parametrize("reward", REWARDS, ids=lambda reward: type(reward).__name__)
 @pytest.mark.parametrize(("period", "num_steps"), [(None, 4), (4.0, 3)])
 def test_values_are_those_of_sequences_as_joint_actions(reward: Any, period: float | None, num_steps: int) -> None:

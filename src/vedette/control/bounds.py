@@ -50,7 +50,7 @@ def most_by_target(evidence: Evidence) -> tuple[float, int] | None:
     additive = evaluator.additive
     if not known and additive is not None and additive.coefficients is not None:
         best = best_values(additive, evaluator.settings.max_bound_work)
-        unknown = np.isinf(best).reshape(additive.looks, -1).any(axis=0)
+        unknown = np.isinf(best).reshape(additive.num_horizons, -1).any(axis=0)
         known.append((float(best.sum()) + _most_found(additive), int(unknown.sum())))
     return known[0] if known else None
 
@@ -131,7 +131,7 @@ def beyond_cutoff(evaluator: Evaluator, choice: Sequence[int]) -> Iterator[str]:
     if additive is None or additive.valuation.kind != EXPECTED_LOSS:
         return
     valuation = additive.valuation
-    cutoff, num = math.sqrt(valuation.params[0]), len(valuation.prior) // additive.looks
+    cutoff, num = math.sqrt(valuation.params[0]), len(valuation.prior) // additive.num_horizons
     existence = expit(valuation.prior[:num, -2])
     detected, errors = (own[:num] for own in _errors(additive, choice))
     likely = detected >= 0.5

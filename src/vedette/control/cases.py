@@ -48,7 +48,7 @@ class CaseRewards:
         options: of each sensor.
         prediction: the fused density predicted to the horizon, one Gaussian a track.
         posteriors: the pseudo-posteriors of each sensor.
-        looks: whether each sensor scans within the horizon.
+        scanned: whether each sensor scans within the horizon.
         counts: how many filter steps, fusions and divergences have been evaluated so far.
         notes: what a reader of the decision must know, in the order in which it came up (keys; no values).
     """
@@ -60,7 +60,7 @@ class CaseRewards:
     options: tuple[Options, ...]
     prediction: Belief
     posteriors: tuple[LabelledCases, ...]
-    looks: tuple[bool, ...]
+    scanned: tuple[bool, ...]
     counts: dict[str, int]
     notes: dict[str, None]
 
@@ -86,8 +86,10 @@ class CaseRewards:
         )
         steps = sum(len(own.courses) for own in options) * settings.num_samples * settings.horizon_steps
         counts = {"filter_steps": steps, "fusions": 0, "divergences": 0}
-        looks = tuple(bool(own.any()) for own in scans)
-        return cls(tuple(sensors), fusion, settings, reward, tuple(options), prediction, posteriors, looks, counts, {})
+        scanned = tuple(bool(own.any()) for own in scans)
+        return cls(
+            tuple(sensors), fusion, settings, reward, tuple(options), prediction, posteriors, scanned, counts, {}
+        )
 
     @property
     def additive(self) -> None:
@@ -131,7 +133,7 @@ class CaseRewards:
         """What the sensors could see at the end of chosen courses, and what all their updates began with."""
         models = tuple(sensor.filter.sensor for sensor in self.sensors)
         poses = np.stack([own.courses[course, -1] for own, course in zip(self.options, chosen, strict=True)])
-        return Views(models, poses, self.looks, self.prediction)
+        return Views(models, poses, self.scanned, self.prediction)
 
     def _check_finite(self, which: Sequence[int], actions: Ints, rewards: Floats) -> None:
         bad = np.argwhere(~np.isfinite(rewards))

@@ -6,7 +6,7 @@ import math
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal
 
 import numpy as np
 
@@ -36,13 +36,6 @@ _SEARCHED = 2 * FIRST_ROUND
 _BLOCK = 250
 
 
-class Entrant(NamedTuple):
-    """A race, and whose joint actions run."""
-
-    race: Race
-    sensor: int | None  # of one sensor alone; None: of all sensors, fused
-
-
 @dataclass(slots=True, eq=False)
 class Rounds:
     """Fresh samples, round after round, and an account of all.
@@ -67,12 +60,12 @@ class Rounds:
         began = time.perf_counter()
         return cls(preparation, preparation.evaluator(num_samples, rng=rng), num_samples, rng, began)
 
-    def _run(self, entrants: Sequence[Entrant]) -> Literal["max_samples", "max_seconds"] | None:
+    def _run(self, races: Sequence[Race]) -> Literal["max_samples", "max_seconds"] | None:
         """Rounds until all races are over, or why they were stopped before; the first round is always run."""
         settings = self.preparation.settings
-        most = settings.max_samples - self.num_samples + entrants[0].race.num_samples
-        while going := [each for each in entrants if each.race.verdict is None or each.race.num_samples == 0]:
-            num = going[0].race.num_samples
+        most = settings.max_samples - self.num_samples + races[0].num_samples
+        while going := [race for race in races if race.verdict is None or race.num_samples == 0]:
+            num = going[0].num_samples
             if num >= most:
                 return "max_samples"
             late = settings.max_seconds is not None and time.perf_counter() - self.began >= settings.max_seconds
@@ -81,24 +74,24 @@ class Rounds:
             self._run_one(going, next_total(num, most) - num)
         return None
 
-    def _run_one(self, going: Sequence[Entrant], num: int) -> None:
+    def _run_one(self, going: Sequence[Race], num: int) -> None:
         """One round of so many samples."""
         sizes = [min(_BLOCK, num - first) for first in range(0, num, _BLOCK)]
         blocks = [self._rewards(going, size) for size in sizes]
-        for place, each in enumerate(going):
-            each.race.add(np.concatenate([block[place] for block in blocks], axis=1))
+        for place, race in enumerate(going):
+            race.add(np.concatenate([block[place] for block in blocks], axis=1))
         self.num_samples += num
 
-    def _rewards(self, going: Sequence[Entrant], num: int) -> list[Floats]:
+    def _rewards(self, going: Sequence[Race], num: int) -> list[Floats]:
         """Of each race (num_left, num) rewards on samples drawn now, of the courses that are still wanted."""
         options = self.preparation.options
         wanted = [_wanted(going, s) for s in range(len(options))]
         few = tuple(_only(own, courses) for own, courses in zip(options, wanted, strict=True))
         evaluator = self.preparation.evaluator(num, few, rng=self.rng)
         rewards = []
-        for race, sensor in going:
-            evaluate = evaluator.joint() if sensor is None else evaluator.alone(sensor)
-            those = wanted if sensor is None else [wanted[sensor]]
+        for race in going:
+            evaluate = evaluator.joint() if race.sensor is None else evaluator.alone(race.sensor)
+            those = wanted if race.sensor is None else [wanted[race.sensor]]
             columns = [np.searchsorted(own, race.candidates[:, axis]) for axis, own in enumerate(those)]
             rewards.append(evaluate(np.stack(columns, axis=1)))
         for name, count in evaluator.counts.items():
@@ -106,9 +99,9 @@ class Rounds:
         self.evaluator.notes.update(evaluator.notes)
         return rewards
 
-    def certainty(self, entrants: Sequence[Entrant]) -> Certainty:
+    def certainty(self, races: Sequence[Race]) -> Certainty:
         """Run all races: how they ended. What may go wrong in any of them adds up."""
-        stopped, races = self._run(entrants), [each.race for each in entrants]
+        stopped = self._run(races)
         over: Literal["one left", "indifferent"] = "indifferent"
         if all(race.verdict == "one left" for race in races):
             over = "one left"
@@ -141,7 +134,7 @@ def decide_jointly(
     race = Race(candidates, float(settings.confidence or 0.0), settings.indifference)
     if samples is not None:
         race.add(samples)
-    certainty = rounds.certainty([Entrant(race, None)])
+    certainty = rounds.certainty([race])
     if samples is None:
         bound = bound_of(evidence, race.best)
         race.note(evidence)
@@ -158,19 +151,19 @@ def decide_alone(name: str, preparation: Preparation, notes: Sequence[str], *, r
     settings, options, races = preparation.settings, preparation.options, preparation.races
     rounds = Rounds.begin(preparation, FIRST_ROUND if races else settings.num_samples, rng=rng)
     each_sure = 1.0 - (1.0 - float(settings.confidence or 0.0)) / len(options)
-    parts, entrants = [], []
+    parts, entered = [], []
     for s, own in enumerate(options):
         evidence = Evidence(rounds.evaluator, (s,), rounds.evaluator.alone(s))
         allowed = all_joint_actions((len(own.courses),))[single_mask(preparation.mask, s, len(own.courses))]
         if races:
-            entrants.append(Entrant(Race(allowed, each_sure, settings.indifference), s))
-            entrants[s].race.add(evidence.rewards(allowed))
+            entered.append(Race(allowed, each_sure, settings.indifference, s))
+            entered[s].add(evidence.rewards(allowed))
         best = 0 if races else int(allowed[first_best(evidence.evaluate(allowed)), 0])
         parts.append(Part.alone(evidence, best))
     if not races:
         return plan_of(name, parts, notes, certainty=preparation.certainty)
-    certainty = rounds.certainty(entrants)
-    for s, (race, _) in enumerate(entrants):
+    certainty = rounds.certainty(entered)
+    for s, race in enumerate(entered):
         race.note(parts[s].evidence)
         parts[s] = parts[s]._replace(chosen=race.best)
     return _raced_plan(name, parts, notes, certainty)
@@ -202,9 +195,10 @@ def plan_of(
     )
 
 
-def _wanted(going: Sequence[Entrant], sensor: int) -> Ints:
+def _wanted(going: Sequence[Race], sensor: int) -> Ints:
     """Courses of a sensor that some candidate takes; one, where no race asks for any."""
-    columns = [race.candidates[:, 0 if own == sensor else sensor] for race, own in going if own in (None, sensor)]
+    wanted = [race for race in going if race.sensor in (None, sensor)]
+    columns = [race.candidates[:, sensor if race.sensor is None else 0] for race in wanted]
     return np.unique(np.concatenate(columns)) if columns else np.zeros(1, np.int64)
 
 

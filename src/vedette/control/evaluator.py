@@ -36,7 +36,7 @@ class Evaluator:
         source: which rewards come from: the sensors' pseudo-posteriors, or sums over labels.
         counts: how much of each thing has been evaluated so far.
         notes: what a reader of the decision must know, in the order in which it came up (keys; no values).
-        looks: horizons beyond that of the settings.
+        horizons: further ones, beyond that of the settings.
     """
 
     settings: PlanningSettings
@@ -45,7 +45,7 @@ class Evaluator:
     source: CaseRewards | AdditiveRewards
     counts: dict[str, int]
     notes: dict[str, None] = field(default_factory=dict)
-    looks: tuple[PlanningSettings, ...] = ()
+    horizons: tuple[PlanningSettings, ...] = ()
 
     @classmethod
     def of_cases(
@@ -74,28 +74,28 @@ class Evaluator:
         reward: Any,
         state: State,
         *,
-        looks: tuple[PlanningSettings, ...] | None = (),
+        horizons: tuple[PlanningSettings, ...] | None = (),
         rng: np.random.Generator,
     ) -> Evaluator:
         """By sums over labels, each followed over every course that reaches it; beliefs are LMBs.
 
-        looks: further horizons, at whose ends the expected loss is taken as well; None: those that are due
+        horizons: further ones, at whose ends the expected loss is taken as well; None: those that are due
         (`vedette.control.additive.look_on`). Raises as `JointPlanner.plan`.
         """
         prediction = _prediction(sensors, state, settings)
         found = [lay_out(sensors, options, rule, settings, reward, state, prediction, rng=rng)]
-        if looks is None:
+        if horizons is None:
             due = isinstance(reward, ExpectedLossReward)
-            looks = look_on(sensors, options, prediction, settings) if due else ()
-        for own in looks:
+            horizons = look_on(sensors, options, prediction, settings) if due else ()
+        for own in horizons:
             later = [continued(each, settings.horizon_times(), own.horizon_times()) for each in options]
             ahead = _prediction(sensors, state, own)
             found.append(lay_out(sensors, later, rule, own, reward, state, ahead, rng=rng))
         steps = [len(each.table.labels) * each.num_samples for each in found]
-        horizons = [own.horizon_steps for own in (settings, *looks)]
-        counts = {"filter_steps": int(np.dot(steps, horizons)), "rewards": 0}
-        source = at_all(found) if looks else found[0]
-        return cls(settings, tuple(options), prediction, source, counts, looks=looks)
+        ends = [own.horizon_steps for own in (settings, *horizons)]
+        counts = {"filter_steps": int(np.dot(steps, ends)), "rewards": 0}
+        source = at_all(found) if horizons else found[0]
+        return cls(settings, tuple(options), prediction, source, counts, horizons=horizons)
 
     @property
     def additive(self) -> AdditiveRewards | None:

@@ -21,7 +21,6 @@ from vedette.densities import (
     LMB,
     FactoredGLMB,
     Labelled,
-    UndetectedIntensity,
     as_lmb,
     at_peaks,
     existence_probabilities,
@@ -101,10 +100,9 @@ class Preparation:
             assert not isinstance(reward, ExpectedLossReward)
             evaluator = Evaluator.of_cases(sensors, own, fusion, settings, reward, state, rng=rng)
         else:
-            evaluator = Evaluator.of_sums(sensors, own, rule, settings, reward, state, looks=None, rng=rng)
+            evaluator = Evaluator.of_sums(sensors, own, rule, settings, reward, state, horizons=None, rng=rng)
         told = (
-            *unsought(settings, state.undetected, sums=rule is not None),
-            *without_scans(sensors, settings, state.time),
+            *notes_of_state(sensors, settings, state, sums=rule is not None),
             *(self.mask.notes if self.mask is not None else ()),
             *notes,
         )
@@ -112,21 +110,21 @@ class Preparation:
         return evaluator
 
 
-def unsought(settings: PlanningSettings, undetected: UndetectedIntensity | None, *, sums: bool) -> tuple[str, ...]:
-    """Why targets that were not found yet are not looked for, though they should be; none where they are.
+def notes_of_state(
+    sensors: Sequence[MobileSensor], settings: PlanningSettings, state: State, *, sums: bool
+) -> tuple[str, ...]:
+    """Why targets that were not found yet are not looked for, though they should be; and which sensors do not scan.
 
-    sums: whether rewards are sums over labels.
+    Of these, within the horizon, it is all one what they do. sums: whether rewards are sums over labels.
     """
-    if settings.undetected_worth == 0.0 or (sums and undetected is not None):
-        return ()
-    why = "the state has no intensity of them" if undetected is None else "rewards are no sums over labels"
-    return (f"targets not found yet are not looked for: {why}",)
-
-
-def without_scans(sensors: Sequence[MobileSensor], settings: PlanningSettings, time: float | None) -> tuple[str, ...]:
-    """Which sensors do not scan within the horizon of a decision at a time, so that it is all one what they do."""
-    found = [s + 1 for s, sensor in enumerate(sensors) if not sensor.scans(time, settings).any()]
-    return tuple(f"sensor {s}: no scan within the horizon; all of its courses are worth the same" for s in found)
+    notes = []
+    if settings.undetected_worth != 0.0 and not (sums and state.undetected is not None):
+        why = "the state has no intensity of them" if state.undetected is None else "rewards are no sums over labels"
+        notes.append(f"targets not found yet are not looked for: {why}")
+    for s, sensor in enumerate(sensors):
+        if not sensor.scans(state.time, settings).any():
+            notes.append(f"sensor {s + 1}: no scan within the horizon; all of its courses are worth the same")
+    return tuple(notes)
 
 
 def check_sums(

@@ -49,6 +49,7 @@ class Race:
     Attributes:
         actions: (num_candidates, num_sensors) the joint actions that began, in printed order.
         confidence, indifference: as in `PlanningSettings`.
+        sensor: whose actions race alone; None: those of all sensors, fused.
         left: (num_left,) rows of `actions` that are not excluded.
         rewards: (num_left, num_samples) of those.
         excluded: for each round, the rows that it excluded and their rewards until then.
@@ -57,6 +58,7 @@ class Race:
     actions: Ints
     confidence: float
     indifference: float
+    sensor: int | None = None
     left: Ints = field(init=False)
     rewards: Floats = field(init=False)
     excluded: list[tuple[Ints, Floats]] = field(default_factory=list)

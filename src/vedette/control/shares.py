@@ -57,7 +57,7 @@ def _of_labels(additive: AdditiveRewards, chosen: Ints) -> tuple[Floats, Floats]
     known = unseen.copy()
     known[:, -2] += existence_logits(seen, dim) - existence_logits(unseen, dim)
     before, partly, whole = (
-        (label_values(rows, valuation).mean(axis=2) @ coefficients).reshape(additive.looks, -1).sum(axis=0)
+        (label_values(rows, valuation).mean(axis=2) @ coefficients).reshape(additive.num_horizons, -1).sum(axis=0)
         for rows in (unseen, known, seen)
     )
     return partly - before, whole - partly

@@ -36,7 +36,7 @@ _LEAST_STEPS, _MOST_STEPS = 4, 12
 def look_on(
     sensors: Sequence[MobileSensor], options: Sequence[Options], prediction: LMB, settings: PlanningSettings
 ) -> tuple[PlanningSettings, ...]:
-    """The settings of the looks beyond the horizon, half way and at their end; none where all see what there is to see.
+    """The settings of further horizons, half way and at the end; none where all see what there is to see.
 
     prediction: at the end of the horizon.
     """
@@ -55,8 +55,7 @@ def look_on(
     rate = float((speeds / reaches).max())
     total = min(horizon + beyond, max(_MOST_STEPS / rate, 2.0 * horizon))
     num = min(max(_LEAST_STEPS, math.ceil(total * rate)), _MOST_STEPS)
-    looks = (num // 2, num)
-    return tuple(replace(settings, horizon_steps=steps, horizon_period=total / num) for steps in looks)
+    return tuple(replace(settings, horizon_steps=steps, horizon_period=total / num) for steps in (num // 2, num))
 
 
 def continued(own: Options, horizon: Floats, times: Floats) -> Options:
@@ -79,16 +78,16 @@ def continued(own: Options, horizon: Floats, times: Floats) -> Options:
     return own._replace(courses=np.ascontiguousarray(courses))
 
 
-def at_all(looks: Sequence[AdditiveRewards]) -> AdditiveRewards:
+def at_all(horizons: Sequence[AdditiveRewards]) -> AdditiveRewards:
     """The mean of expected losses at several times, which are as of so many labels more; cells likewise."""
-    first, num = looks[0], len(looks)
-    order, offsets = _in_turn([own.table.offsets for own in looks])
+    first, num = horizons[0], len(horizons)
+    order, offsets = _in_turn([own.table.offsets for own in horizons])
     num_labels = len(first.table.start)
-    labels = np.concatenate([own.table.labels + k * num_labels for k, own in enumerate(looks)])
-    changes = np.concatenate([own.table.changes for own in looks])
-    start = np.concatenate([own.table.start for own in looks])
+    labels = np.concatenate([own.table.labels + k * num_labels for k, own in enumerate(horizons)])
+    changes = np.concatenate([own.table.changes for own in horizons])
+    start = np.concatenate([own.table.start for own in horizons])
     table = first.table._replace(offsets=offsets, labels=labels[order], changes=changes[order], start=start)
-    several = [own.valuation for own in looks]
+    several = [own.valuation for own in horizons]
     valuation = first.valuation._replace(
         params=first.valuation.params * np.array([1.0, 1.0, 1.0 / num]),
         prior=np.concatenate([own.prior for own in several]),
@@ -96,21 +95,21 @@ def at_all(looks: Sequence[AdditiveRewards]) -> AdditiveRewards:
         references=np.concatenate([own.references for own in several]),
         covs=np.concatenate([own.covs for own in several]),
     )
-    of_sensors = list(zip(*(own.bases for own in looks), strict=True))
+    of_sensors = list(zip(*(own.bases for own in horizons), strict=True))
     # Sensors that share their rows go on sharing them.
     distinct = {tuple(map(id, each)): each for each in of_sensors}
     joined = {key: np.concatenate(each) for key, each in distinct.items()}
     bases = tuple(joined[tuple(map(id, each))] for each in of_sensors)
-    return replace(first, table=table, valuation=valuation, bases=bases, cells=_cells(looks), looks=num)
+    return replace(first, table=table, valuation=valuation, bases=bases, cells=_cells(horizons), num_horizons=num)
 
 
-def _cells(looks: Sequence[AdditiveRewards]) -> Cells:
-    several = [own.cells for own in looks]
+def _cells(horizons: Sequence[AdditiveRewards]) -> Cells:
+    several = [own.cells for own in horizons]
     order, offsets = _in_turn([own.offsets for own in several])
     num_cells = len(several[0].worth)
     cells = np.concatenate([own.cells + k * num_cells for k, own in enumerate(several)])
     log_miss = np.concatenate([own.log_miss for own in several])
-    return Cells(offsets, cells[order], log_miss[order], np.concatenate([own.worth for own in several]) / len(looks))
+    return Cells(offsets, cells[order], log_miss[order], np.concatenate([own.worth for own in several]) / len(horizons))
 
 
 def _in_turn(offsets: Sequence[Ints]) -> tuple[Ints, Ints]:

@@ -18,7 +18,6 @@ from vedette.kernels.planning.ascent import Allowed, Cells, Trace, ascend
 from vedette.kernels.planning.bernoulli_rows import Table
 from vedette.kernels.planning.joint_values import alone_values, joint_values, line_values, start_totals
 from vedette.kernels.planning.label_values import EXPECTED_LOSS, FUNCTION, POWER_INTEGRALS, Valuation
-from vedette.models.functions import ModelFunction
 from vedette.probabilities import log_expit
 from vedette.threads import run_chunks
 
@@ -37,7 +36,7 @@ class AdditiveRewards:
         reward: whose `combine` makes rewards of the sums; None: the sum itself.
         cells: where targets may be that were not found yet.
         num_threads: threads that may share the work; the result does not depend on it.
-        looks: times at which labels are valued, each as of labels of its own, one time after the other.
+        num_horizons: at whose ends labels are valued, each as of labels of its own, one horizon after the other.
     """
 
     table: Table
@@ -46,7 +45,7 @@ class AdditiveRewards:
     reward: Any
     cells: Cells
     num_threads: int
-    looks: int = 1
+    num_horizons: int = 1
 
     @property
     def num_samples(self) -> int:
@@ -177,43 +176,30 @@ def valuation_of(reward: PowerReward | LabelReward | ExpectedLossReward, predict
 
     prior: (num_labels, bernoulli_size) rows of the prediction.
     """
+    moments, num = prediction.tracks.to_kernel()[3:], len(prior)
+    loss = Valuation(
+        EXPECTED_LOSS,
+        1,
+        prior,
+        np.zeros((num, 1)),
+        np.empty((0, 2)),
+        0.0,
+        np.empty(0),
+        cardinality_variance_of_label,  # not asked but by FUNCTION
+        *moments,
+    )
     if isinstance(reward, ExpectedLossReward):
         covs = prediction.tracks.covs
         unseen = np.minimum(covs[:, 0, 0] + covs[:, 1, 1], reward.cutoff**2)[:, np.newaxis] ** (0.5 * reward.order)
-        params = np.array([reward.cutoff**2, 0.5 * reward.order, 1.0])
-        return _valuation(EXPECTED_LOSS, 1, prediction, prior, unseen, params=params)
+        return loss._replace(own=unseen, params=np.array([reward.cutoff**2, 0.5 * reward.order, 1.0]))
     if isinstance(reward, PowerReward):
-        volume = unit_volume_of(reward, prediction)
+        log_volume = math.log(unit_volume_of(reward, prediction))
         exponents = np.array([[float(a), float(b)] for a, b in reward.exponents])
-        own = _of_prediction(prediction, exponents, math.log(volume), prior[:, -2])
-        found = _valuation(POWER_INTEGRALS, len(exponents), prediction, prior, own, exponents=exponents)
-        return found._replace(log_volume=math.log(volume))
-    own, params = np.zeros((len(prior), reward.num_terms)), np.ascontiguousarray(reward.params, np.float64)
-    return _valuation(FUNCTION, reward.num_terms, prediction, prior, own, params=params, function=reward.function)
-
-
-def _valuation(
-    kind: int,
-    num: int,
-    prediction: LMB,
-    prior: Floats,
-    own: Floats,
-    *,
-    exponents: Floats | None = None,
-    params: Floats | None = None,
-    function: ModelFunction = cardinality_variance_of_label,  # not asked but by FUNCTION
-) -> Valuation:
-    return Valuation(
-        kind,
-        num,
-        prior,
-        own,
-        np.empty((0, 2)) if exponents is None else exponents,
-        0.0,
-        np.empty(0) if params is None else params,
-        function,
-        *prediction.tracks.to_kernel()[3:],
-    )
+        own = _of_prediction(prediction, exponents, log_volume, prior[:, -2])
+        powers = loss._replace(kind=POWER_INTEGRALS, num=len(exponents), own=own)
+        return powers._replace(exponents=exponents, log_volume=log_volume)
+    own, params = np.zeros((num, reward.num_terms)), np.ascontiguousarray(reward.params, np.float64)
+    return loss._replace(kind=FUNCTION, num=reward.num_terms, own=own, params=params, function=reward.function)
 
 
 def _of_prediction(prediction: LMB, exponents: Floats, log_volume: float, logits: Floats) -> Floats:

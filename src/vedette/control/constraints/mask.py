@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -13,6 +14,9 @@ from vedette.kernels.base.types import Bools, Ints
 # Courses that are tried for a group of sensors that hold each other up. With more, a decision would wait for the proof
 # that nothing is allowed; what is found in so many is as good as known.
 _TRIES = 1000
+
+_Node = TypeVar("_Node")
+_OVER: Any = object()  # of an iterator
 
 _GIVEN = "the constraint is given up"
 
@@ -100,7 +104,7 @@ def repaired(mask: Mask, start: Sequence[int]) -> tuple[int, ...]:
         if sensor not in settled:
             group = _group(mask, sensor)
             settled.update(group)
-            _Branching(mask, at, group).settle()
+            _settle(mask, at, group)
     return tuple(at)
 
 
@@ -156,47 +160,64 @@ def _group(mask: Mask, sensor: int) -> list[int]:
     return sorted(found)
 
 
-class _Branching:
-    """Branch and bound for the fewest violations in one group; better joint actions are written into `at`."""
+def depth_first(
+    start: _Node, ways: Callable[[_Node], Iterator[_Node | None]], is_end: Callable[[_Node], bool], tries: int
+) -> _Node | None:
+    """The first end that is come to, way by way, back where there is no way on; None: none in so many tries.
 
-    def __init__(self, mask: Mask, at: list[int], group: list[int]) -> None:
-        self.mask, self.at, self.tries = mask, at, _TRIES
-        # What is certain to be violated by each course, given the courses decided so far.
-        self.costs: dict[int, Ints] = {s: (~mask.single[s]).astype(np.int64) for s in group}
-        self.decided: dict[int, int] = {}
-        alone = sum(int(self.costs[s][at[s]]) for s in group)
-        every = sum(int(mask.clashes(at, s)[at[s]]) for s in group)
-        self.fewest = (every + alone) // 2  # each pair is counted at both its ends
+    ways: on from a node; None for one that is closed, which is a try all the same.
+    """
+    waiting: list[Iterator[_Node | None]] = [iter((start,))]
+    for _ in range(tries):
+        while (node := next(waiting[-1], _OVER)) is _OVER:
+            waiting.pop()
+            if not waiting:
+                return None
+        if node is not None:
+            if is_end(node):
+                return node
+            waiting.append(ways(node))
+    return None
 
-    def settle(self) -> None:
-        """Search the group, unless it is so large that one dive would take all tries."""
-        if len(self.costs) <= _TRIES // 2:
-            self._branch(0)
 
-    def _branch(self, violated: int) -> None:
-        free = [s for s in self.costs if s not in self.decided]
-        least = {s: int(self.costs[s].min()) for s in free}
-        if violated + sum(least.values()) >= self.fewest:
+class _Decided(NamedTuple):
+    """Courses of some sensors of a group."""
+
+    courses: dict[int, int]
+    violated: int  # by them
+    costs: dict[int, Ints]  # of each other sensor what each of its courses is then certain to violate
+
+
+def _settle(mask: Mask, at: list[int], group: list[int]) -> None:
+    """Branch and bound for the fewest violations in one group; better joint actions are written into `at`.
+
+    A group so large that one dive would take all tries is left as it is.
+    """
+    costs: dict[int, Ints] = {s: (~mask.single[s]).astype(np.int64) for s in group}
+    alone = sum(int(costs[s][at[s]]) for s in group)
+    every = sum(int(mask.clashes(at, s)[at[s]]) for s in group)
+    fewest = (every + alone) // 2  # each pair is counted at both its ends
+
+    def is_end(node: _Decided) -> bool:
+        nonlocal fewest
+        if not node.costs and node.violated < fewest:
+            fewest = node.violated
+            for s, course in node.courses.items():
+                at[s] = course
+        return fewest == 0
+
+    def ways(node: _Decided) -> Iterator[_Decided]:
+        least = {s: int(own.min()) for s, own in node.costs.items()}
+        if not least or node.violated + sum(least.values()) >= fewest:
             return
-        if not free:
-            self.fewest = violated
-            for s, course in self.decided.items():
-                self.at[s] = course
-            return
-        sensor = min(free, key=lambda s: (-least[s], int((self.costs[s] == least[s]).sum())))
-        for course in np.argsort(self.costs[sensor], kind="stable").tolist():
-            self.tries -= 1
-            if self.tries < 0 or self.fewest == 0:
-                return
-            self._decide(sensor, course, violated + int(self.costs[sensor][course]))
+        sensor = min(least, key=lambda s: (-least[s], int((node.costs[s] == least[s]).sum())))
+        own = node.costs[sensor]
+        for course in np.argsort(own, kind="stable").tolist():
+            costs = {s: each for s, each in node.costs.items() if s != sensor}
+            for other in mask.others(sensor):
+                if other in costs:
+                    costs[other] = costs[other] + mask.others(other)[sensor][course]
+            yield _Decided({**node.courses, sensor: course}, node.violated + int(own[course]), costs)
 
-    def _decide(self, sensor: int, course: int, violated: int) -> None:
-        free = [other for other in self.mask.others(sensor) if other not in self.decided]
-        rows = [self.mask.others(other)[sensor][course] for other in free]
-        self.decided[sensor] = course
-        for other, row in zip(free, rows, strict=True):
-            self.costs[other] += row
-        self._branch(violated)
-        for other, row in zip(free, rows, strict=True):
-            self.costs[other] -= row
-        del self.decided[sensor]
+    if len(group) <= _TRIES // 2:
+        depth_first(_Decided({}, 0, costs), ways, is_end, _TRIES + 1)

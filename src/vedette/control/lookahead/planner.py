@@ -24,7 +24,7 @@ from vedette.control.lookahead.courses import CourseTree
 from vedette.control.lookahead.problem import Best, JointSequence, LaidCourses, SequenceProblem, SequenceSearch
 from vedette.control.lookahead.rules import Rules
 from vedette.control.plan import Plan
-from vedette.control.preparation import AnyReward, Planned, check_sums, planned_on, unsought, without_scans
+from vedette.control.preparation import AnyReward, Planned, check_sums, notes_of_state, planned_on
 from vedette.control.problem import searched
 from vedette.control.rewards import ExpectedLossReward
 from vedette.control.search import AutomaticSearch
@@ -182,8 +182,8 @@ class HorizonPlanner:
         def part(weight: float, stage: int) -> LaidCourses:
             # From one state of the random numbers, and so of the same samples.
             def lay_out(options: tuple[Options, ...]) -> Evaluator:
-                looks = first.looks if stage == 1 else ()
-                return self._lay_out(given, stage, looks, options, copy.deepcopy(samples))
+                horizons = first.horizons if stage == 1 else ()
+                return self._lay_out(given, stage, horizons, options, copy.deepcopy(samples))
 
             return LaidCourses(given.trees, stage, lay_out, weight, first.counts)
 
@@ -197,7 +197,7 @@ class HorizonPlanner:
         self,
         given: _Given,
         stage: int,
-        looks: tuple[PlanningSettings, ...] | None,
+        horizons: tuple[PlanningSettings, ...] | None,
         options: tuple[Options, ...],
         rng: np.random.Generator,
     ) -> Evaluator:
@@ -205,7 +205,7 @@ class HorizonPlanner:
         rule, settings = given.planned.rule, replace(self.settings, horizon_steps=given.stages.num_steps(stage))
         assert rule is not None
         state = given.planned.state
-        return Evaluator.of_sums(self.sensors, options, rule, settings, self.reward, state, looks=looks, rng=rng)
+        return Evaluator.of_sums(self.sensors, options, rule, settings, self.reward, state, horizons=horizons, rng=rng)
 
     def _plan(
         self, given: _Given, evidence: Evidence, choice: tuple[int, ...], problem: SequenceProblem | None
@@ -225,8 +225,7 @@ class HorizonPlanner:
                 *self.notes,
                 *(() if given.rules is None else given.rules.notes(sequence)),
                 *formed,
-                *unsought(self.settings, state.undetected, sums=True),
-                *without_scans(self.sensors, ahead, state.time),
+                *notes_of_state(self.sensors, ahead, state, sums=True),
             ),
             tuple(self._told(choice, courses, stages.depth)),
             curve=evidence.curve() if problem is None else problem.curve(),

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from collections.abc import Sequence as Several
 from dataclasses import dataclass, field, replace
 from itertools import combinations
-from typing import Any, NamedTuple, TypeVar
+from typing import NamedTuple
 
 import numpy as np
 
 from vedette.control.constraints import Mask, opened, repaired, without_course
+from vedette.control.constraints.mask import depth_first
 from vedette.control.lookahead.ahead import Ahead
 from vedette.control.lookahead.courses import CourseTree, Sequence
 from vedette.kernels.base.types import Bools
@@ -18,9 +19,6 @@ from vedette.kernels.base.types import Bools
 # Courses that are tried. With more, a decision would wait for the proof that nothing is allowed; what is found in so
 # many is as good as known.
 _MOST_TRIES = 10_000
-
-_Node = TypeVar("_Node")
-_OVER: Any = object()  # of an iterator
 
 
 @dataclass(slots=True, eq=False)
@@ -145,26 +143,6 @@ class Rules:
             places = {first: mine.place(one), second: its.place(other)}
             self._tables[key] = self.ahead.pairs(stage, places).get((first, second))
         return self._tables[key]
-
-
-def depth_first(
-    start: _Node, ways: Callable[[_Node], Iterator[_Node | None]], is_end: Callable[[_Node], bool], tries: int
-) -> _Node | None:
-    """The first end that is come to, way by way, back where there is no way on; None: none in so many tries.
-
-    ways: on from a node; None for one that is closed, which is a try all the same.
-    """
-    waiting: list[Iterator[_Node | None]] = [iter((start,))]
-    for _ in range(tries):
-        while (node := next(waiting[-1], _OVER)) is _OVER:
-            waiting.pop()
-            if not waiting:
-                return None
-        if node is not None:
-            if is_end(node):
-                return node
-            waiting.append(ways(node))
-    return None
 
 
 class _Begun(NamedTuple):
