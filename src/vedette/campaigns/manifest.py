@@ -14,7 +14,7 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict, JsonValue, ValidationError
 
-from vedette.campaigns.cells import Campaign, Cell, safe_name, scenario_text
+from vedette.campaigns.cells import Campaign, Cell, safe_name
 from vedette.campaigns.spec import CampaignSpec, spec_from_data
 from vedette.errors import InputError
 from vedette.files import write_whole
@@ -85,9 +85,9 @@ def new_manifest(campaign: Campaign) -> dict[str, Any]:
                 "name": cell.name,
                 "planner": cell.planner,
                 "settings": cell.settings,
-                "scenario": scenario_text(cell.scenario),
+                "scenario": text,
             }
-            for cell in campaign.cells
+            for cell, text in zip(campaign.cells, campaign.texts(), strict=True)
         ],
         "created": _now(),
         "sessions": [],

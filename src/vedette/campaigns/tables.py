@@ -40,12 +40,13 @@ class _Part(NamedTuple):
 
     cell: Cell
     run: int
-    table: pa.Table
+    columns: Columns
+    num_rows: int
 
 
 def tables_of_record(record: RunRecord) -> dict[str, pa.Table]:
     """The tables of a single run, null for what is not a number."""
-    return {name: _with_units(pa.Table.from_batches([table])) for name, table in _batches(record).items()}
+    return {name: _arrow(columns, _layout(name)) for name, columns in _columns(record).items()}
 
 
 def tables_of_runs(campaign: Campaign, runs: Iterable[FinishedRun]) -> dict[str, pa.Table]:
@@ -56,26 +57,25 @@ def tables_of_runs(campaign: Campaign, runs: Iterable[FinishedRun]) -> dict[str,
     parts: dict[str, list[_Part]] = {}
     for run in runs:
         cell = campaign.cell(run.cell)
-        measures, session = run.metrics.columns(), np.full(run.record.num_scans, run.session)
-        of_run = {"runs": to_arrow(_summary(run), _ANY), **_batches(run.record, measures, {"session": session})}
-        for name, table in of_run.items():
-            parts.setdefault(name, []).append(_Part(cell, run.record.run, pa.Table.from_batches([table])))
+        of_run = {"runs": _summary(run), **_columns(run.record)}
+        of_run["scans"] |= run.metrics.columns()
+        of_run["timings"]["session"] = np.full(run.record.num_scans, run.session)
+        for name, columns in of_run.items():
+            parts.setdefault(name, []).append(_Part(cell, run.record.run, columns, len(next(iter(columns.values())))))
     metadata = {"vedette": json.dumps({"campaign": campaign.name, "seed": campaign.seed})}
-    return {name: _with_units(_joined(campaign, of)).replace_schema_metadata(metadata) for name, of in parts.items()}
+    return {name: _joined(campaign, name, of).replace_schema_metadata(metadata) for name, of in parts.items()}
 
 
-def _batches(record: RunRecord, measures: Any = None, timed: Any = None) -> dict[str, pa.RecordBatch]:
-    """The tables of one run; `measures` are more columns of the scans, `timed` of the timings."""
-    tables = tables_of(record)
-    timings = {"step": np.arange(1, record.num_scans + 1), "time_s": record.times, **timing_table(record)}
-    scans = to_arrow({**tables.pop("scans"), **(measures or {})}, _ANY, nan_is_null=True)
-    others = {
-        name: to_arrow(table, layout, nan_is_null=True)
-        for of, layouts in ((tables, LAYOUTS), (optional_tables_of(record), OPTIONAL))
-        for name, layout in layouts.items()
-        if (table := of.get(name)) is not None
-    }
-    return {"scans": scans, **others, "timings": to_arrow({**timings, **(timed or {})}, TIMINGS, nan_is_null=True)}
+def _columns(record: RunRecord) -> dict[str, Columns]:
+    """The tables of one run."""
+    tables = {**tables_of(record), **optional_tables_of(record)}
+    ordered = {name: tables[name] for name in (*LAYOUTS, *OPTIONAL) if name in tables}
+    timings = timing_table(record)
+    return {**ordered, "timings": {"step": timings.pop("step"), "time_s": record.times, **timings}}
+
+
+def _layout(name: str) -> Layout:
+    return {**LAYOUTS, **OPTIONAL, "timings": TIMINGS, "scans": _ANY, "runs": _ANY}[name]
 
 
 def _summary(run: FinishedRun) -> Columns:
@@ -90,18 +90,31 @@ def _summary(run: FinishedRun) -> Columns:
     }
 
 
-def _joined(campaign: Campaign, parts: list[_Part]) -> pa.Table:
+def _joined(campaign: Campaign, name: str, parts: list[_Part]) -> pa.Table:
     """The tables of one name of all runs, cell, settings and number before each row; null for what a run lacks."""
-    rows = np.repeat(np.arange(len(parts)), [part.table.num_rows for part in parts])
+    layout, counts = _layout(name), [part.num_rows for part in parts]
     settings = {axis: [setting_of(campaign, part.cell, axis) for part in parts] for axis in campaign.axes}
     keys = {"cell": [part.cell.name for part in parts], **settings, "run": [part.run for part in parts]}
-    table = pa.concat_tables([part.table for part in parts], promote_options="default")
-    return pa.table(
-        {
-            **{name: pa.array(of).take(pa.array(rows)) for name, of in keys.items()},
-            **dict(zip(table.column_names, table.columns, strict=True)),
-        }
-    ).combine_chunks()
+    kinds = {key: Kind.TEXT if isinstance(values[0], str) else Kind.NUMBER for key, values in keys.items()}
+    columns: Columns = {key: _repeated(values, counts) for key, values in keys.items()}
+    for column in dict.fromkeys(column for part in parts for column in part.columns):
+        kind = layout.kind(column)
+        assert kind is not None  # of every column of a run
+        columns[column] = _concatenated([(part.columns.get(column), part.num_rows) for part in parts], kind)
+    return _arrow(columns, Layout({**kinds, **layout.fixed}, layout.more))
+
+
+def _repeated(values: list[Any], counts: list[int]) -> Any:
+    if isinstance(values[0], str):
+        return [value for value, count in zip(values, counts, strict=True) for _ in range(count)]
+    return np.repeat(np.array(values), counts)
+
+
+def _concatenated(parts: list[tuple[Any, int]], kind: Kind) -> Any:
+    if kind is Kind.TEXT:
+        return [text for column, _ in parts for text in column]
+    missing = -1 if kind is Kind.COUNT else np.nan
+    return np.concatenate([np.full(count, missing) if column is None else column for column, count in parts])
 
 
 def setting_of(campaign: Campaign, cell: Cell, axis: str) -> Any:
@@ -114,13 +127,14 @@ def setting_of(campaign: Campaign, cell: Cell, axis: str) -> Any:
     return json.dumps(value)
 
 
-def _with_units(table: pa.Table) -> pa.Table:
-    schema = table.schema
+def _arrow(columns: Columns, layout: Layout) -> pa.Table:
+    """The table, with the unit of each column in the metadata of its field."""
+    batch = to_arrow(columns, layout, nan_is_null=True)
+    schema = batch.schema
     for index, schema_field in enumerate(schema):
-        unit = unit_of(schema_field.name)
-        if unit:
+        if unit := unit_of(schema_field.name):
             schema = schema.set(index, schema_field.with_metadata({"unit": unit}))
-    return table.cast(schema)
+    return pa.Table.from_arrays(batch.columns, schema=schema)
 
 
 def unit_of(column: str) -> str | None:

@@ -1,10 +1,11 @@
-"""What a worker process on this machine does before anything else."""
+"""What a worker process of this machine has loaded before it is started: all that its tasks need."""
 
 from __future__ import annotations
 
-import signal
+import pyarrow  # noqa: F401
+import scipy.optimize  # noqa: F401
 
+import vedette.kernels.base.dispatchers  # noqa: F401
+from vedette.campaigns.tasks import perform
 
-def dask_setup(_: object) -> None:
-    """Leave Ctrl-C to the process that the person started: it stops its workers."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+__all__ = ["perform"]

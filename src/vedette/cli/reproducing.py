@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from vedette.cli.campaign import carry_out, report_failures
+from vedette.cli.campaign import carry_out, load_workers, report_failures
 from vedette.cli.comparisons import print_scores
 from vedette.cli.completing import lists_of_strategies, reproducible
 from vedette.cli.documents import results_document
@@ -64,6 +64,8 @@ def reproduce(
     A campaign with its report, tables and figures.
     """
     need("vedette reproduce", "jinja2", "matplotlib", "pyarrow")
+    if not list_:
+        load_workers(workers)
     from vedette.campaigns import open_results, resolve
     from vedette.campaigns.yardsticks import yardsticks
 

@@ -13,6 +13,7 @@ from enum import Enum
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vedette.errors import InputError
 from vedette.extras import need
@@ -78,21 +79,60 @@ def to_arrow(columns: Columns, layout: Layout, *, nan_is_null: bool = False) -> 
         kind = layout.kind(name)
         if kind is None:
             raise InputError(f"column {shown(name)}: expected one of {', '.join(layout.fixed)}")
-        if kind is Kind.TEXT:
-            arrays.append(pa.array(column, pa.string()))
-            continue
-        values = np.ascontiguousarray(column)
-        if kind is Kind.COUNT and (gaps := values < 0).any():
-            arrays.append(pa.array(np.where(gaps, 0, values), mask=gaps))
-        elif kind in (Kind.VALUE, Kind.TRUTH) or (nan_is_null and kind is Kind.NUMBER):
-            arrays.append(pa.array(values, from_pandas=True))
-        else:  # what pa.array gives, in two thirds of the time
-            buffers = [None, pa.py_buffer(values)]
-            arrays.append(pa.Array.from_buffers(pa.from_numpy_dtype(values.dtype), len(values), buffers, 0))
+        is_text = kind is Kind.TEXT
+        arrays.append(_texts(list(column)) if is_text else _numbers(np.ascontiguousarray(column), kind, nan_is_null))
     lengths = [len(array) for array in arrays]
     if len(set(lengths)) > 1:
         raise InputError(f"columns: expected equal lengths; got {', '.join(map(str, lengths))}")
     return pa.RecordBatch.from_arrays(arrays, list(columns))
+
+
+# By their buffers, as pa.array and to_numpy would, but these load pandas if it is there, longer than a run takes.
+
+
+def _texts(texts: list[Any]) -> pa.Array:
+    import pyarrow as pa
+
+    known = {text: text.encode() for text in set(texts)}
+    encoded = [known[text] for text in texts]
+    offsets = np.cumsum([0, *map(len, encoded)], dtype=np.int32)
+    buffers = [None, pa.py_buffer(offsets), pa.py_buffer(b"".join(encoded))]
+    return pa.Array.from_buffers(pa.string(), len(encoded), buffers)
+
+
+def _numbers(values: NDArray[Any], kind: Kind, nan_is_null: bool) -> pa.Array:
+    import pyarrow as pa
+
+    missing = np.zeros(len(values), bool)
+    if kind is Kind.COUNT:
+        missing = values < 0
+        values = np.where(missing, 0, values)
+    elif kind is Kind.VALUE or (nan_is_null and kind is Kind.NUMBER):
+        missing = np.isnan(values)
+    known = pa.py_buffer(_bits(~missing)) if missing.any() else None
+    is_truth = values.dtype == bool
+    content, values_type = (_bits(values), pa.bool_()) if is_truth else (values, pa.from_numpy_dtype(values.dtype))
+    return pa.Array.from_buffers(values_type, len(values), [known, pa.py_buffer(content)])
+
+
+def _bits(truths: Bools) -> NDArray[np.uint8]:
+    return np.packbits(truths, bitorder="little")
+
+
+def _values(column: pa.Array, kind: Kind) -> NDArray[Any]:
+    """The numbers of a column, in memory of their own; -1 or NaN where there is none."""
+    known, content = column.buffers()
+    bits = slice(column.offset, column.offset + len(column))
+    if kind is Kind.TRUTH:
+        return _truths(content)[bits]
+    values = np.frombuffer(content or b"", np.int64 if kind in (Kind.INTEGER, Kind.COUNT) else np.float64)[bits].copy()
+    if column.null_count:
+        values[~_truths(known)[bits]] = -1 if kind is Kind.COUNT else np.nan
+    return values
+
+
+def _truths(bits: Any) -> Bools:
+    return np.unpackbits(np.frombuffer(bits or b"", np.uint8), bitorder="little").astype(bool)
 
 
 def write_table(columns: Columns, layout: Layout, metadata: Mapping[str, str] | None = None) -> bytes:
@@ -200,9 +240,6 @@ def _read_columns(schema: pa.Schema, message: pa.Message, layout: Layout, place:
         kind = layout.kind(name)
         if column.null_count and kind not in (Kind.COUNT, Kind.VALUE):
             raise InputError(f"{place}, column {shown(name)}: expected {kind.value if kind else ''}; got nothing")
-        if kind is Kind.TEXT:
-            columns[name] = column.to_pylist()
-        else:
-            whole = column.fill_null(-1) if kind is Kind.COUNT and column.null_count else column
-            columns[name] = np.array(whole.to_numpy(zero_copy_only=False))  # a copy: arrays that may be written to
+        assert kind is not None  # of the names checked before
+        columns[name] = column.to_pylist() if kind is Kind.TEXT else _values(column, kind)
     return columns
