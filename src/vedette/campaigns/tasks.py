@@ -18,7 +18,7 @@ from vedette.simulation.kept import encode_timings
 from vedette.simulation.storage import versions
 
 # Below this a task costs more to hand out than it is worth.
-MIN_TASK_SECONDS = 0.5
+MIN_TASK_SECONDS = 0.1
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -112,7 +112,7 @@ def _one(cell: Cell, seed: int, run: int) -> Landed | Failed:
 
 
 class TaskQueue:
-    """The runs that are still to do, handed out as tasks of about half a second or more.
+    """The runs that are still to do, handed out as tasks of a tenth of a second or more.
 
     Runs of equal number come together, so that strategies can be compared early. The first run of each set of kernels
     goes before the others that need it, so that they are compiled once and not once a worker. How long a run of a cell
