@@ -10,20 +10,19 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyarrow as pa
 
 from vedette.campaigns.cells import Campaign, Cell
-from vedette.simulation.arrow import Columns, Kind, Layout, to_arrow
+from vedette.simulation.arrow import Columns, Kind, Layout, stacked, to_arrow
 from vedette.simulation.records import RunRecord
 from vedette.simulation.tables import (
     LAYOUTS,
     OPTIONAL,
     OSPA_COLUMNS,
     TIMINGS,
-    optional_tables_of,
     tables_of,
     timing_table,
 )
@@ -33,15 +32,6 @@ if TYPE_CHECKING:
 
 _UNITS = {"_m": "m", "_s": "s", "_rad": "rad"}
 _ANY = Layout({"sha256": Kind.TEXT}, {"": Kind.NUMBER})
-
-
-class _Part(NamedTuple):
-    """The table of one run among those of its name."""
-
-    cell: Cell
-    run: int
-    columns: Columns
-    num_rows: int
 
 
 def tables_of_record(record: RunRecord) -> dict[str, pa.Table]:
@@ -54,24 +44,30 @@ def tables_of_runs(campaign: Campaign, runs: Iterable[FinishedRun]) -> dict[str,
 
     Takes about as much memory as the tables: some 150 MB for 1,000 runs of 40 scans with joint decisions.
     """
-    parts: dict[str, list[_Part]] = {}
+    parts: dict[str, list[Columns]] = {}
     for run in runs:
         cell = campaign.cell(run.cell)
         of_run = {"runs": _summary(run), **_columns(run.record)}
         of_run["scans"] |= run.metrics.columns()
         of_run["timings"]["session"] = np.full(run.record.num_scans, run.session)
+        settings = {axis: setting_of(campaign, cell, axis) for axis in campaign.axes}
+        keys = {"cell": run.cell, **settings, "run": run.record.run}
         for name, columns in of_run.items():
-            parts.setdefault(name, []).append(_Part(cell, run.record.run, columns, len(next(iter(columns.values())))))
+            parts.setdefault(name, []).append({**keys, **columns})
+    kinds = {key: Kind.TEXT if isinstance(value, str) else Kind.NUMBER for key, value in keys.items()} if parts else {}
     metadata = {"vedette": json.dumps({"campaign": campaign.name, "seed": campaign.seed})}
-    return {name: _joined(campaign, name, of).replace_schema_metadata(metadata) for name, of in parts.items()}
+    tables = {}
+    for name, of in parts.items():
+        layout = Layout({**kinds, **_layout(name).fixed}, _layout(name).more)
+        names = list(dict.fromkeys(name for part in of for name in part))
+        tables[name] = _arrow(stacked(of, layout, names), layout).replace_schema_metadata(metadata)
+    return tables
 
 
 def _columns(record: RunRecord) -> dict[str, Columns]:
     """The tables of one run."""
-    tables = {**tables_of(record), **optional_tables_of(record)}
-    ordered = {name: tables[name] for name in (*LAYOUTS, *OPTIONAL) if name in tables}
     timings = timing_table(record)
-    return {**ordered, "timings": {"step": timings.pop("step"), "time_s": record.times, **timings}}
+    return {**tables_of(record), "timings": {"step": timings.pop("step"), "time_s": record.times, **timings}}
 
 
 def _layout(name: str) -> Layout:
@@ -88,33 +84,6 @@ def _summary(run: FinishedRun) -> Columns:
         **{f"mean_{name}": np.array([value]) for name, value in means},
         "sha256": [run.checksum],
     }
-
-
-def _joined(campaign: Campaign, name: str, parts: list[_Part]) -> pa.Table:
-    """The tables of one name of all runs, cell, settings and number before each row; null for what a run lacks."""
-    layout, counts = _layout(name), [part.num_rows for part in parts]
-    settings = {axis: [setting_of(campaign, part.cell, axis) for part in parts] for axis in campaign.axes}
-    keys = {"cell": [part.cell.name for part in parts], **settings, "run": [part.run for part in parts]}
-    kinds = {key: Kind.TEXT if isinstance(values[0], str) else Kind.NUMBER for key, values in keys.items()}
-    columns: Columns = {key: _repeated(values, counts) for key, values in keys.items()}
-    for column in dict.fromkeys(column for part in parts for column in part.columns):
-        kind = layout.kind(column)
-        assert kind is not None  # of every column of a run
-        columns[column] = _concatenated([(part.columns.get(column), part.num_rows) for part in parts], kind)
-    return _arrow(columns, Layout({**kinds, **layout.fixed}, layout.more))
-
-
-def _repeated(values: list[Any], counts: list[int]) -> Any:
-    if isinstance(values[0], str):
-        return [value for value, count in zip(values, counts, strict=True) for _ in range(count)]
-    return np.repeat(np.array(values), counts)
-
-
-def _concatenated(parts: list[tuple[Any, int]], kind: Kind) -> Any:
-    if kind is Kind.TEXT:
-        return [text for column, _ in parts for text in column]
-    missing = -1 if kind is Kind.COUNT else np.nan
-    return np.concatenate([np.full(count, missing) if column is None else column for column, count in parts])
 
 
 def setting_of(campaign: Campaign, cell: Cell, axis: str) -> Any:
