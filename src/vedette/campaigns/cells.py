@@ -6,7 +6,7 @@ import hashlib
 import itertools
 import json
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -105,14 +105,15 @@ class Campaign:
         texts = {key: dump_scenario(_unmeasured(each), folder=each.folder) for key, each in scenarios.items()}
         return tuple(texts[id(cell.scenario)] for cell in self.cells)
 
-    def digest(self) -> str:
+    def digest(self, texts: Sequence[str] = ()) -> str:
         """SHA-256 of all that fixes the bytes of a run: seed, each cell's planner and scenario, and the files it names.
 
-        The number of runs is not part of it: more runs leave the earlier ones as they are.
+        The number of runs is not part of it: more runs leave the earlier ones as they are. texts: of `texts`, where they
+        are at hand.
         """
         cells = [
             (cell.name, cell.planner, text, _contents(cell.scenario))
-            for cell, text in zip(self.cells, self.texts(), strict=True)
+            for cell, text in zip(self.cells, texts or self.texts(), strict=True)
         ]
         return hashlib.sha256(json.dumps([self.seed, cells]).encode()).hexdigest()
 

@@ -70,6 +70,7 @@ class _Manifest(BaseModel):
 
 def new_manifest(campaign: Campaign) -> dict[str, Any]:
     """The manifest of a campaign that nobody has worked on yet, as plain data of JSON."""
+    texts = campaign.texts()
     manifest = {
         "format": FORMAT,
         "format_version": FORMAT_VERSION,
@@ -79,7 +80,7 @@ def new_manifest(campaign: Campaign) -> dict[str, Any]:
         "compare": campaign.compare,
         "axes": campaign.axes,
         "spec": {field: value for field, value in campaign.spec.items() if field != "runs"},
-        "digest": campaign.digest(),
+        "digest": campaign.digest(texts),
         "cells": [
             {
                 "name": cell.name,
@@ -87,7 +88,7 @@ def new_manifest(campaign: Campaign) -> dict[str, Any]:
                 "settings": cell.settings,
                 "scenario": text,
             }
-            for cell, text in zip(campaign.cells, campaign.texts(), strict=True)
+            for cell, text in zip(campaign.cells, texts, strict=True)
         ],
         "created": _now(),
         "sessions": [],

@@ -170,12 +170,15 @@ class CampaignResults:
         return FinishedRun(entry.cell, record, metrics, entry.session, entry.checksum)
 
 
-def open_results(folder: Path | str, metrics: Sequence[Metric] = ()) -> CampaignResults:
+def open_results(
+    folder: Path | str, metrics: Sequence[Metric] = (), campaign: Campaign | None = None
+) -> CampaignResults:
     """Open the results folder of a campaign to read.
 
     Args:
         folder: finished, unfinished, or while it is written.
         metrics: measures of one's own, computed of every run that is read, beside those that were kept.
+        campaign: what the folder is of, where that is known, so that its scenarios need not be read; else None.
 
     Raises `InputError`, naming the file, for a folder that holds no campaign, or one whose manifest or runs are
     missing, cut short or altered.
@@ -187,4 +190,5 @@ def open_results(folder: Path | str, metrics: Sequence[Metric] = ()) -> Campaign
     manifest = read_manifest(target)
     reader = Reader(target)
     reader.check(contents_checksum(manifest))
-    return CampaignResults(target, campaign_of(target, manifest), manifest, reader, tuple(metrics))
+    known = campaign_of(target, manifest) if campaign is None else campaign.with_runs(manifest["num_runs"])
+    return CampaignResults(target, known, manifest, reader, tuple(metrics))

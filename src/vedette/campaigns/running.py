@@ -138,7 +138,7 @@ def run_campaign(
                 num_landed += 1
                 watch.landed(result)
     # Each time: what was left of them by another end of this call, or altered since, is put right.
-    export_tables(open_results(folder), Path(folder) / TABLES)
+    export_tables(open_results(folder, campaign=campaign), Path(folder) / TABLES)
     return Outcome(num_landed, num_found, tuple(failed))
 
 
@@ -162,7 +162,7 @@ def _measure_anew(store: Store, campaign: Campaign, watch: Watch) -> None:
     own = {cell.name: own_metrics(cell.scenario) for cell in campaign.cells}
     lacking = store.unmeasured({cell: [metric.name for metric in of_cell] for cell, of_cell in own.items()})
     if lacking:
-        results = open_results(store.folder)
+        results = open_results(store.folder, campaign=campaign)
         for cell, run in lacking:
             there = results.run(cell, run)
             store.put_metrics(cell, run, encode_metrics(there.metrics.with_own(there.record, own[cell])))
