@@ -108,8 +108,8 @@ class Campaign:
     def digest(self, texts: Sequence[str] = ()) -> str:
         """SHA-256 of all that fixes the bytes of a run: seed, each cell's planner and scenario, and the files it names.
 
-        The number of runs is not part of it: more runs leave the earlier ones as they are. texts: of `texts`, where they
-        are at hand.
+        The number of runs is not part of it: more runs leave the earlier ones as they are. texts: see `texts`; where
+        they are at hand.
         """
         cells = [
             (cell.name, cell.planner, text, _contents(cell.scenario))

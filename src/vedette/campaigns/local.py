@@ -21,6 +21,7 @@ _TASKS_A_WORKER = 2  # one that waits, so that none idles while results travel
 _WAIT_SECONDS = 0.2  # without an end, it could not be interrupted everywhere
 _START_SECONDS = 120.0
 _MOST_FAILED_STARTS = 3  # in a row
+_FILES, _FILES_A_WORKER = 40, 10  # open at once, with room to spare: 16 were with one worker, 72 with eight
 
 
 @contextmanager
@@ -30,6 +31,7 @@ def local_workers(num_workers: int) -> Iterator[LocalWorkers]:
     Raises:
         VedetteError: they cannot be started.
     """
+    _make_room_for_files(num_workers)
     workers = LocalWorkers()
     try:
         try:
@@ -42,6 +44,27 @@ def local_workers(num_workers: int) -> Iterator[LocalWorkers]:
         yield workers
     finally:
         workers.end()
+
+
+def _make_room_for_files(num_workers: int) -> None:
+    """Raise this process's limit of open files where it is too low, as far as the system lets it.
+
+    Raises `VedetteError` where that is not enough.
+    """
+    try:
+        import resource
+    except ImportError:  # Windows has no such limit
+        return
+    needed = _FILES + num_workers * _FILES_A_WORKER
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    if soft == resource.RLIM_INFINITY or soft >= needed:
+        return
+    if hard != resource.RLIM_INFINITY and hard < needed:
+        raise VedetteError(
+            f"workers: expected that {needed} files may be open at once for {num_workers} workers; the limit is {hard} "
+            "(ulimit -n; --workers 1 needs fewer)"
+        )
+    resource.setrlimit(resource.RLIMIT_NOFILE, (needed, hard))
 
 
 @dataclass(slots=True, eq=False)
