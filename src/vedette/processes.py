@@ -61,7 +61,6 @@ def as_children() -> Iterator[None]:
 
 def end_with_parent() -> None:
     """Have this process end when the one that started it has ended, however that came about."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_wait_and_end, daemon=True).start()
 
 

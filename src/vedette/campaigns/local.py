@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import time
 from collections.abc import Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
@@ -72,24 +73,24 @@ class _Worker:
     """One process, in a pool of its own: one that dies leaves the others alone."""
 
     pool: ProcessPoolExecutor
-    process: BaseProcess
     begun: Future[int]
+    processes: set[BaseProcess]  # the one, or none where it has died by now
     tasks: dict[Future[Outcome], Task] = field(default_factory=dict)  # in the order in which it does them
 
     @classmethod
     def start(cls) -> _Worker:
-        pool = ProcessPoolExecutor(1, context(), initializer=end_with_parent)
+        pool = ProcessPoolExecutor(1, context(), initializer=_begin)
         others = set(active_children())
         with as_children():
             begun = pool.submit(os.getpid)
-        (process,) = set(active_children()) - others
-        return cls(pool, process, begun)
+        return cls(pool, begun, set(active_children()) - others)
 
     def has_begun(self) -> bool:
         return self.begun.done() and self.begun.exception() is None
 
     def end(self) -> None:
-        self.process.kill()
+        for process in self.processes:
+            process.kill()
         self.pool.shutdown(cancel_futures=True)
 
 
@@ -169,6 +170,12 @@ class LocalWorkers:
         self._workers[self._workers.index(dead)] = _Worker.start()
         for task in left:
             self.submit(task)
+
+
+def _begin() -> None:
+    """What a worker does first."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the server may be another's, which does not
+    end_with_parent()
 
 
 def _not_started() -> VedetteError:
