@@ -83,3 +83,8 @@ def test_more_text_than_offsets_can_say_is_refused(monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(arrow, "_MOST_TEXT", 5)
     with pytest.raises(InputError, match="expected at most 5 bytes; got 6"):
         to_arrow({"name": ["abc", "def"]}, LAYOUT)
+
+
+def test_a_column_that_is_not_among_the_names_is_named() -> None:
+    with pytest.raises(InputError, match="column 'value_0': expected one of name, place"):
+        stacked([{"name": "one", "place": 1, "value_0": 2.0}], LAYOUT, ["name", "place"])

@@ -86,8 +86,12 @@ def stacked(
         layout: of the result. Where a part lacks a column there is nothing: NaN, or -1 of a count.
         names: of all columns, in order; none: the fixed ones and then what the parts have beside them.
         num_rows: of each part; none: as its columns have, one where all are single values.
+
+    Raises `InputError` for a column that is not among the names.
     """
     names = names or list(dict.fromkeys([*layout.fixed, *(name for part in parts for name in part)]))
+    if others := {name for part in parts for name in part} - set(names):
+        raise InputError(f"column {shown(min(others))}: expected one of {', '.join(names)}")
     lengths = num_rows or [next((len(of) for of in part.values() if not np.isscalar(of)), 1) for part in parts]
     joined: Columns = {}
     for name in names:

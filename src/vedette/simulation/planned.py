@@ -80,7 +80,8 @@ def planned_tables(decisions: Sequence[Decision], num_sensors: int) -> dict[str,
             if len(table.sensors) > 1 or num_sensors <= _FEW_SENSORS:
                 joint.append(rows)
             else:
-                own.append({**rows, "sensor": table.sensors[0], "action": rows[f"action_{table.sensors[0]}"]})
+                (sensor,) = table.sensors
+                own.append({"sensor": sensor, "action": rows.pop(f"action_{sensor}"), **rows})
     start, end = (*DECISION, "reward_table"), ("reward", "reward_se", "chosen")
     names = (*start, *(f"action_{sensor}" for sensor in range(num_sensors)), *end)
     found = {
@@ -114,20 +115,20 @@ def decisions_of(tables: Mapping[str, Mapping[str, Any]], poses: Floats) -> tupl
 
     Raises `InputError`, `KeyError`, `IndexError` or `ValueError` for tables that do not fit together.
     """
-    table, actions, rewards = (tables[name] for name in PLANNED)
-    num, own = len(table["decision"]), tables.get("own_rewards")
+    table = tables["decisions"]
+    num = len(table["decision"])
     if not np.array_equal(table["decision"], np.arange(num)):
         raise InputError("decisions, column decision: expected them numbered from 0")
     counted = PLANNED["decisions"].others(table)
-    of_actions, of_rewards = _rows_by("decision", actions, num), _rows_by("decision", rewards, num)
-    of_own = [slice(0)] * num if own is None else _rows_by("decision", own, num)
+    of_actions, of_rewards = (parts_of(tables[name], "decision", num) for name in ("actions", "rewards"))
+    of_own = parts_of(tables["own_rewards"], "decision", num) if "own_rewards" in tables else [{}] * num
     decisions, room = [], _MOST_REWARDS
     for index, step in enumerate(table["step"].tolist()):
         plan = _plan(
             table["planner"][index],
-            {name: column[of_actions[index]] for name, column in actions.items()},
-            {name: column[of_rewards[index]] for name, column in rewards.items()},
-            {name: column[of_own[index]] for name, column in (own or {}).items()},
+            of_actions[index],
+            of_rewards[index],
+            of_own[index],
             table["notes"][index],
             {name.removeprefix("num_"): int(table[name][index]) for name in counted if table[name][index] >= 0},
             room,
@@ -147,8 +148,7 @@ def _plan(
     room: int,
 ) -> Plan:
     options, chosen = [], []
-    for rows in _rows_by("sensor", actions):
-        own = {name: column[rows] for name, column in actions.items()}
+    for own in parts_of(actions, "sensor"):
         if not np.array_equal(own["action"], np.arange(len(own["action"]))):
             raise InputError("actions, column action: expected those of a sensor numbered from 0")
         (choice,) = np.flatnonzero(own["chosen"])
@@ -257,7 +257,7 @@ def _rows_of(rewards: Mapping[str, Any]) -> Iterator[tuple[int, slice]]:
         yield number, slice(start, stop)
 
 
-def _rows_by(name: str, table: Mapping[str, Any], num: int | None = None) -> list[slice]:
+def parts_of(table: Mapping[str, Any], name: str, num: int | None = None) -> list[Columns]:
     """The rows of each number from 0 to `num` - 1, which stand in order; without it of every number up to the last."""
     numbers: Ints = table[name]
     if num is None and len(numbers) and (numbers[0] != 0 or np.any(np.diff(numbers) > 1)):
@@ -266,4 +266,4 @@ def _rows_by(name: str, table: Mapping[str, Any], num: int | None = None) -> lis
     if np.any(np.diff(numbers) < 0) or np.any(numbers < 0) or np.any(numbers >= num):
         raise InputError(f"column {name}: expected rows in order, of 0 to {num - 1}")
     bounds = np.searchsorted(numbers, np.arange(num + 1)).tolist()
-    return [slice(start, stop) for start, stop in pairwise(bounds)]
+    return [{key: column[start:stop] for key, column in table.items()} for start, stop in pairwise(bounds)]
