@@ -13,8 +13,8 @@ from multiprocessing.context import BaseContext
 
 # Elsewhere a fork of a process that has loaded half of the system's libraries is not safe, or there is none.
 _METHOD = "forkserver" if sys.platform == "linux" else "spawn"
-# What the workers of a campaign need.
-_LOADED = "vedette.campaigns.worker"
+# What the workers of a campaign need, with Numba.
+_LOADED = ("vedette.campaigns.local", "vedette.kernels.base.dispatchers", "scipy.optimize")
 # One thread in each: as many processes as processors share the work already.
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
@@ -35,7 +35,7 @@ def load_ahead(*more: str) -> None:
     if _METHOD == "forkserver":
         from multiprocessing import forkserver
 
-        context().set_forkserver_preload([_LOADED, *more])
+        context().set_forkserver_preload([*_LOADED, *more])
         with as_children():
             forkserver.ensure_running()
 

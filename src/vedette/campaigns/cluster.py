@@ -88,9 +88,6 @@ class RemoteWorkers:
         future = next(self._done)
         return self._tasks.pop(future), self._outcome(future)
 
-    def settle(self) -> None:
-        """See `Workers`: the cluster replaces its own."""
-
     def _outcome(self, future: Future) -> Outcome | WorkerDied:
         from distributed import KilledWorker
 

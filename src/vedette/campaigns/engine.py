@@ -31,10 +31,6 @@ class Workers(Protocol):
         """
         ...
 
-    def settle(self) -> None:
-        """Wait until those that died are replaced, but not for ever."""
-        ...
-
 
 def in_process(queue: TaskQueue) -> Iterator[Landed | Failed]:
     """Every run, one after the other, by this process."""
@@ -71,7 +67,6 @@ def _alone(workers: Workers, task: Task) -> Outcome:
     A task counts as suspect too when it only waited at a worker that another one killed, or another took its memory.
     """
     for _ in range(_TRIES_ALONE):
-        workers.settle()
         workers.submit(task)
         _, outcome = _next(workers)
         if not isinstance(outcome, WorkerDied):

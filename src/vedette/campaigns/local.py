@@ -133,9 +133,6 @@ class LocalWorkers:
                 raise _not_started()
         return self._ended.pop(0)
 
-    def settle(self) -> None:
-        """See `Workers`: those that died are replaced at once."""
-
     def end(self) -> None:
         """Stop them, whatever they are doing."""
         for worker in self._workers:

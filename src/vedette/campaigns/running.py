@@ -33,35 +33,23 @@ class Watch(Protocol):
 
     def begin(self, num_found: int, num_runs: int) -> None:
         """How many runs were there already, and how many there are to be."""
-        ...
+        return
 
     def note(self, text: str) -> None:
         """Something that a person should know."""
-        ...
+        return
 
     def landed(self, result: Landed) -> None:
         """A run is in the store."""
-        ...
+        return
 
     def failed(self, result: Failed) -> None:
         """A run could not be finished."""
-        ...
+        return
 
 
-class Unwatched:
+class Unwatched(Watch):
     """Tells nobody."""
-
-    def begin(self, num_found: int, num_runs: int) -> None:
-        """See `Watch`."""
-
-    def note(self, text: str) -> None:
-        """See `Watch`."""
-
-    def landed(self, result: Landed) -> None:
-        """See `Watch`."""
-
-    def failed(self, result: Failed) -> None:
-        """See `Watch`."""
 
 
 @dataclass(frozen=True, slots=True)
