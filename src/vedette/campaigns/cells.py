@@ -140,8 +140,7 @@ def resolve(
     changed: dict[str, Scenario] = {}
     varying = [axis for axis, values in axes.items() if len(values) > 1 or axis == "planner"]
     cells: list[Cell] = []
-    for values in itertools.product(*axes.values()):
-        settings = dict(zip(axes, values, strict=True))
+    for settings in spec.settings():
         name = _unused(_name({axis: settings[axis] for axis in varying}, axes), cells)
         cells.append(_cell(name, settings, loaded[settings["scenario"]], spec, changed, approve))
     # Never the scenario unless asked for: runs of different scenarios are not paired.

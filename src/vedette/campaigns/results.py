@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Any, SupportsIndex
 
 from vedette.campaigns.cells import Campaign, Cell
 from vedette.campaigns.codec import decode
-from vedette.campaigns.finished import FinishedRun
+from vedette.campaigns.dataset import dataset_of_scans
 from vedette.campaigns.journal import DATABASE, Entry, Failure, Reader
 from vedette.campaigns.manifest import campaign_of, contents_checksum, read_manifest
+from vedette.campaigns.tables import FinishedRun, tables_of_runs
 from vedette.errors import InputError
 from vedette.evaluation.comparison import Comparison, scored
 from vedette.evaluation.metrics import Metric, RunMetrics, decode_metrics
@@ -115,8 +116,6 @@ class CampaignResults:
         For pandas `.to_pandas()`, for polars `polars.from_arrow`; DuckDB queries them as they are. See
         `vedette.campaigns.tables`. None where no run is finished.
         """
-        from vedette.campaigns.tables import tables_of_runs
-
         return tables_of_runs(self.campaign, self.runs())
 
     def dataset(self) -> xarray.Dataset:
@@ -124,8 +123,6 @@ class CampaignResults:
 
         Raises `InputError` where xarray is not installed.
         """
-        from vedette.campaigns.dataset import dataset_of_scans
-
         return dataset_of_scans(self.campaign, self.tables().get("scans"))
 
     def _finished(self) -> list[tuple[str, int]]:

@@ -10,12 +10,14 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
 
 from vedette.campaigns.cells import Campaign, Cell
+from vedette.evaluation.metrics import RunMetrics
 from vedette.simulation.arrow import Columns, Kind, Layout, stacked, to_arrow
 from vedette.simulation.records import RunRecord
 from vedette.simulation.tables import (
@@ -27,11 +29,27 @@ from vedette.simulation.tables import (
     timing_table,
 )
 
-if TYPE_CHECKING:
-    from vedette.campaigns.finished import FinishedRun
-
 _UNITS = {"_m": "m", "_s": "s", "_rad": "rad"}
 _ANY = Layout({"sha256": Kind.TEXT}, {"": Kind.NUMBER})
+
+
+@dataclass(frozen=True, slots=True)
+class FinishedRun:
+    """One run of a campaign.
+
+    Attributes:
+        cell: name of its cell.
+        record: with the seconds that it took.
+        metrics: measures of its estimates.
+        session: number of the session, from 1, in the manifest's list, that kept it.
+        checksum: SHA-256 of all but its timings; equal for equal results.
+    """
+
+    cell: str
+    record: RunRecord
+    metrics: RunMetrics
+    session: int
+    checksum: str
 
 
 def tables_of_record(record: RunRecord) -> dict[str, pa.Table]:
