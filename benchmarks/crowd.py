@@ -30,6 +30,7 @@ from vedette.densities import Estimate
 from vedette.evaluation import ospa
 from vedette.filters import TwoStepFilter
 from vedette.models import SensorModel, TargetModel
+from vedette.processes import end_with_parent
 from vedette.scenarios import GeneratedCrowd, Scenario, crowd_text, parse_scenario, with_fields
 from vedette.scenarios.build import build_experiment
 from vedette.simulation import Experiment, Truth, simulate_scan
@@ -212,7 +213,7 @@ def main() -> None:
     for kind, num in wanted:
         crowd = GeneratedCrowd(num_targets=num, density=options.density, num_steps=options.steps)
         # Memory is that of a process's whole life: each row has one of its own.
-        with multiprocessing.get_context("spawn").Pool(1) as pool:
+        with multiprocessing.get_context("spawn").Pool(1, end_with_parent) as pool:
             rows.append(pool.apply(measured, (crowd, kind, options.repeats)))
     print(table(rows))
     if options.figure:

@@ -35,6 +35,7 @@ from timed_planner import Timed
 from vedette.evaluation.metrics import ospa_of_run
 from vedette.evaluation.statistics import paired_difference, summarise
 from vedette.kernels.base.types import Floats
+from vedette.processes import end_with_parent
 from vedette.scenarios import Scenario, with_fields
 from vedette.scenarios.build import build_experiment, build_planner
 from vedette.simulation import simulate
@@ -216,7 +217,7 @@ def wanted(given: argparse.Namespace, store: Store) -> Iterator[tuple[str, str, 
 
 def run_all(given: argparse.Namespace, store: Store) -> None:
     """Run what is wanted; what fails is told, and the rest goes on."""
-    with ProcessPoolExecutor(given.workers, get_context("spawn")) as pool:
+    with ProcessPoolExecutor(given.workers, get_context("spawn"), initializer=end_with_parent) as pool:
         futures = {pool.submit(score, *task): task for task in wanted(given, store)}
         try:
             for done in as_completed(futures):

@@ -39,6 +39,7 @@ from timed_planner import Timed
 from vedette.evaluation.metrics import ospa_of_run
 from vedette.evaluation.runs import measure_run
 from vedette.kernels.base.types import Floats
+from vedette.processes import end_with_parent
 from vedette.scenarios import Scenario, load_scenario, with_fields
 from vedette.scenarios.build import build_experiment, build_planner
 from vedette.scenarios.sections.lookahead import Lookahead
@@ -209,7 +210,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, help="file of results, which is gone on with")
     given = parser.parse_args()
     store, runs = Store(given.out), range(given.first, given.first + given.runs)
-    with ProcessPoolExecutor(given.workers, get_context("spawn")) as pool:
+    with ProcessPoolExecutor(given.workers, get_context("spawn"), initializer=end_with_parent) as pool:
         for scene in given.scenes:
             wanted = [
                 strategy

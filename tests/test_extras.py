@@ -153,14 +153,19 @@ def test_every_command_is_among_these() -> None:
     assert set(typer.main.get_command(app).commands) == {command[0] for command in (*LIGHT[1:], *HEAVY)}  # type: ignore[attr-defined]
 
 
-def test_several_workers_need_the_extra_of_clusters_and_one_does_not(tmp_path: Path) -> None:
-    (tmp_path / "spec.toml").write_text('name = "trial"\nscenarios = ["linear-10"]\nplanners = ["still"]\nruns = 1\n')
-    command = ["campaign", "spec.toml", "--workers"]
-    (two, one) = outcomes([[*command, "2"], [*command, "1"]], tmp_path, ["cryptography", "distributed", "dask"])
-    assert two[0] == 1
-    assert "(--workers 1 does without) needs cryptography and distributed" in two[2]
-    assert "pip install 'vedette[cluster]'" in two[2]
-    assert one[0] == 0, one[2]
+def test_only_a_scheduler_needs_the_extra_of_clusters(tmp_path: Path) -> None:
+    (tmp_path / "spec.toml").write_text('name = "trial"\nscenarios = ["linear-10"]\nplanners = ["still"]\nruns = 2\n')
+    command = ["campaign", "spec.toml"]
+    found = outcomes(
+        [[*command, "--scheduler", "tcp://127.0.0.1:1"], [*command, "--workers", "2"]],
+        tmp_path,
+        ["cryptography", "distributed", "dask"],
+    )
+    (cluster, two) = found
+    assert cluster[0] == 1
+    assert "a campaign on a cluster needs distributed, which is not installed" in cluster[2]
+    assert "pip install 'vedette[cluster]'" in cluster[2]
+    assert two[0] == 0, two[2]
     assert (tmp_path / "trial-results" / "tables").is_dir()
 
 

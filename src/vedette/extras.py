@@ -15,7 +15,6 @@ EXTRA_OF = {
     "pyarrow": "campaigns",
     "jinja2": "report",
     "matplotlib": "report",
-    "cryptography": "cluster",
     "distributed": "cluster",
     "xarray": "xarray",
 }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from datetime import date, timedelta
 from typing import Any
 
@@ -46,6 +46,23 @@ def named_in(name: str, unit: str) -> str:
 def amount(number: str, unit: str) -> str:
     """`1.25 m`; of a quantity without a unit the number alone."""
     return f"{number} {unit}" if unit else number
+
+
+def with_error(mean: float, error: float | None, sign: str = "") -> str:
+    """`12.30 ± 0.45`; without its standard error where that is not known, None or NaN. sign: "+" for always one."""
+    text = f"{mean:{sign}.2f}"
+    return text if error is None or error != error else f"{text} ± {error:.2f}"
+
+
+def with_minus(text: str) -> str:
+    """The text with minus signs in place of hyphens."""
+    return text.replace("-", "\N{MINUS SIGN}")
+
+
+def markdown_table(header: Sequence[str], rows: Iterable[Sequence[str]], *, numbers: bool = True) -> str:
+    """A table in Markdown, its first column words; with `numbers` the others end at the right."""
+    lines = ["| " + " | ".join(header) + " |", "| --- |" + (" ---: |" if numbers else " --- |") * (len(header) - 1)]
+    return "\n".join([*lines, *("| " + " | ".join(row) + " |" for row in rows)]) + "\n"
 
 
 def plain(value: Any) -> str:

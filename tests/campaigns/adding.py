@@ -27,12 +27,12 @@ def entry_of(run: int) -> Entry:
 def add_for_ever(folder: Path, pause: str = "0.0") -> None:
     """Print the number of every run once it is added; rest for so many seconds after each."""
     writer = Writer(folder)
-    writer.open(CONTENTS)
+    writer.open_runs(CONTENTS)
     done = writer.finished()
     run = 0
     while True:
         if (CELL, run) not in done:
-            writer.add(entry_of(run))
+            writer.put(entry_of(run))
             print(f"{run}\n", end="", flush=True)
             time.sleep(float(pause))
         run += 1
@@ -65,16 +65,16 @@ def add_half(folder: Path) -> None:
 def add_until_full(folder: Path, make_room: str) -> None:
     """Add until the disk is full, say what that raised, make room, add once more."""
     writer = Writer(folder)
-    writer.open(CONTENTS)
+    writer.open_runs(CONTENTS)
     run = 0
     try:
         while run < 1000:
-            writer.add(entry_of(run))
+            writer.put(entry_of(run))
             run += 1
     except InputError as error:
         print(f"run {run}: {error}")
     exec(make_room)
-    writer.add(entry_of(run))
+    writer.put(entry_of(run))
     writer.close()
     print(f"went on with run {run}", flush=True)
 

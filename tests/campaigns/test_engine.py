@@ -8,14 +8,19 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
+from multiprocessing import active_children
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 from campaigns.examples import small_campaign
-from vedette.campaigns.clients import local_workers, remote_workers
+from vedette.campaigns import local
+from vedette.campaigns.cluster import remote_workers
 from vedette.campaigns.engine import in_process, on_workers
-from vedette.campaigns.tasks import Failed, Landed, TaskQueue
+from vedette.campaigns.local import local_workers
+from vedette.campaigns.tasks import Failed, Landed, Task, TaskQueue, perform
 from vedette.errors import InputError, VedetteError
 from waiting import wait_for_port
 
@@ -35,14 +40,48 @@ def alone() -> dict[tuple[str, int], bytes]:
     return payloads(in_process(TaskQueue(small_campaign(runs=RUNS), ())))
 
 
+def on_local_workers(num_workers: int = 2) -> Iterator[Landed | Failed]:
+    with local_workers(num_workers) as workers:
+        yield from on_workers(workers, TaskQueue(small_campaign(runs=RUNS), ()))
+
+
 def test_workers_change_no_byte_even_when_one_is_killed(alone: dict[tuple[str, int], bytes]) -> None:
+    before = set(active_children())
     results = []
-    with local_workers(2) as client:
-        for result in on_workers(client, TaskQueue(small_campaign(runs=RUNS), ()), print):
-            results.append(result)
-            if len(results) == 10:
-                os.kill(next(iter(client.run(os.getpid).values())), signal.SIGKILL)
+    for result in on_local_workers():
+        results.append(result)
+        if len(results) == 10:
+            (set(active_children()) - before).pop().kill()
     assert payloads(results) == alone
+    assert set(active_children()) <= before
+
+
+def test_a_task_that_kills_its_workers_is_told_and_the_others_are_done(
+    alone: dict[tuple[str, int], bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its own runs alone, one after the other, with those that can be done."""
+    monkeypatch.setattr(local, "perform", partial(deadly, tmp_path / "deaths"))
+    results = list(on_local_workers())
+    failed = [result for result in results if isinstance(result, Failed)]
+    assert failed == [Failed("still", 7, "every worker that took it died (out of memory?)")]
+    expected = {key: value for key, value in alone.items() if key != ("still", 7)}
+    assert payloads(result for result in results if isinstance(result, Landed)) == expected
+    assert len((tmp_path / "deaths").read_text()) == 2 + 2 * 2  # as one of a task, and alone
+
+
+def deadly(deaths: Path, task: Task) -> Any:
+    """As `perform`, but one run takes its worker's life."""
+    if task.cell.name == "still" and 7 in task.runs:
+        with deaths.open("a") as file:
+            file.write("x")
+        os.kill(os.getpid(), signal.SIGKILL)
+    return perform(task)
+
+
+def test_workers_that_end_while_they_start_are_told_of(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(local, "_begin", partial(os._exit, 3))
+    with pytest.raises(VedetteError, match="the worker processes ended while they started"):
+        list(on_local_workers())
 
 
 @contextmanager
@@ -66,9 +105,9 @@ def test_a_cluster_of_its_own_does_the_same(alone: dict[tuple[str, int], bytes],
     with (
         dask("scheduler", "--host", "127.0.0.1", "--port", str(free_port)),
         dask("worker", address, "--nthreads", "1", "--nworkers", "2"),
-        remote_workers(address) as client,
+        remote_workers(address, print) as workers,
     ):
-        assert payloads(on_workers(client, TaskQueue(small_campaign(runs=RUNS), ()), print)) == alone
+        assert payloads(on_workers(workers, TaskQueue(small_campaign(runs=RUNS), ()))) == alone
 
 
 def test_a_scheduler_that_is_killed_is_said_to_be_gone(free_port: int) -> None:
@@ -76,8 +115,8 @@ def test_a_scheduler_that_is_killed_is_said_to_be_gone(free_port: int) -> None:
     landed = []
 
     def run_until_it_dies() -> None:
-        with remote_workers(address) as client:
-            for result in on_workers(client, TaskQueue(small_campaign(runs=RUNS), ()), print):
+        with remote_workers(address, print) as workers:
+            for result in on_workers(workers, TaskQueue(small_campaign(runs=RUNS), ())):
                 landed.append(result)
                 if len(landed) == 5:
                     scheduler.kill()
@@ -93,8 +132,8 @@ def test_a_scheduler_that_is_killed_is_said_to_be_gone(free_port: int) -> None:
 
 
 def test_an_address_where_nothing_answers(free_port: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("vedette.campaigns.clients._CONNECT_SECONDS", 0.5)
+    monkeypatch.setattr("vedette.campaigns.cluster._CONNECT_SECONDS", 0.5)
     for address in (f"tcp://127.0.0.1:{free_port}", "nonsense://x", ""):
         expected = pytest.raises(InputError, match="scheduler: expected the address of a running dask scheduler")
-        with expected, remote_workers(address):
+        with expected, remote_workers(address, print):
             pass

@@ -25,7 +25,7 @@ pytestmark = pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="needs ki
 @pytest.fixture
 def folder(tmp_path):
     writer = Writer(tmp_path)
-    writer.open(CONTENTS)
+    writer.open_runs(CONTENTS)
     writer.close()
     return tmp_path
 
@@ -77,8 +77,8 @@ def test_whatever_was_added_survives_a_kill_at_any_moment(folder):
 
 def test_a_transaction_killed_half_way_is_taken_back_by_the_first_reader(folder):
     writer = Writer(folder)
-    writer.open(CONTENTS)
-    writer.add(entry_of(0))
+    writer.open_runs(CONTENTS)
+    writer.put(entry_of(0))
     writer.close()
     before = (folder / DATABASE).stat().st_size
     with started("add_half", str(folder)) as process:

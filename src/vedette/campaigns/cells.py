@@ -6,7 +6,7 @@ import hashlib
 import itertools
 import json
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -96,20 +96,26 @@ class Campaign:
         spec_from_data({**self.spec, "runs": num_runs})
         return replace(self, num_runs=num_runs, spec={**self.spec, "runs": num_runs})
 
-    def digest(self) -> str:
+    def texts(self) -> tuple[str, ...]:
+        """The scenario of each cell as YAML that can be kept anywhere.
+
+        It is without the user's own measures, as these fix nothing of a run.
+        """
+        scenarios = {id(cell.scenario): cell.scenario for cell in self.cells}  # strategies share one
+        texts = {key: dump_scenario(_unmeasured(each), folder=each.folder) for key, each in scenarios.items()}
+        return tuple(texts[id(cell.scenario)] for cell in self.cells)
+
+    def digest(self, texts: Sequence[str] = ()) -> str:
         """SHA-256 of all that fixes the bytes of a run: seed, each cell's planner and scenario, and the files it names.
 
-        The number of runs is not part of it: more runs leave the earlier ones as they are.
+        The number of runs is not part of it: more runs leave the earlier ones as they are. texts: see `texts`; where
+        they are at hand.
         """
         cells = [
-            (cell.name, cell.planner, scenario_text(cell.scenario), _contents(cell.scenario)) for cell in self.cells
+            (cell.name, cell.planner, text, _contents(cell.scenario))
+            for cell, text in zip(self.cells, texts or self.texts(), strict=True)
         ]
         return hashlib.sha256(json.dumps([self.seed, cells]).encode()).hexdigest()
-
-
-def scenario_text(scenario: Scenario) -> str:
-    """The scenario as YAML that can be kept anywhere, without the user's own measures: they fix nothing of a run."""
-    return dump_scenario(_unmeasured(scenario), folder=scenario.folder)
 
 
 def _unmeasured(scenario: Scenario) -> ScenarioModel:
@@ -131,12 +137,12 @@ def resolve(
     """
     axes = spec.axes()
     loaded = {name: _load(name, number, Path(folder)) for number, name in enumerate(spec.scenarios)}
+    changed: dict[str, Scenario] = {}
     varying = [axis for axis, values in axes.items() if len(values) > 1 or axis == "planner"]
     cells: list[Cell] = []
-    for values in itertools.product(*axes.values()):
-        settings = dict(zip(axes, values, strict=True))
+    for settings in spec.settings():
         name = _unused(_name({axis: settings[axis] for axis in varying}, axes), cells)
-        cells.append(_cell(name, settings, loaded[settings["scenario"]], spec, approve))
+        cells.append(_cell(name, settings, loaded[settings["scenario"]], spec, changed, approve))
     # Never the scenario unless asked for: runs of different scenarios are not paired.
     candidates = ("planner", *(axis for axis in axes if axis != "scenario"))
     compare = spec.compare or next((axis for axis in candidates if len(axes[axis]) > 1), "planner")
@@ -155,8 +161,10 @@ def _cell(
     settings: Mapping[str, Any],
     scenario: Scenario,
     spec: CampaignSpec,
+    changed: dict[str, Scenario],
     approve: Callable[[Scenario], None],
 ) -> Cell:
+    """A cell; `changed` holds the scenarios of those before it by their fields, as strategies share one."""
     fields = dict(spec.set)
     fields |= {_SECTIONS[axis]: settings[axis] for axis in _SECTIONS if axis in settings}
     for variant in spec.variants:
@@ -164,15 +172,17 @@ def _cell(
             fields |= variant.set
     fields |= {axis: settings[axis] for axis in spec.grid}
     planner = settings["planner"]
+    key = json.dumps([settings["scenario"], fields])
     try:
-        changed = with_fields(scenario, fields)
-        approve(changed)
-        build_planner(changed, planner)
+        if key not in changed:
+            changed[key] = with_fields(scenario, fields)
+        approve(changed[key])
+        build_planner(changed[key], planner)
     except ScenarioError as error:
         raise InputError(listed(list(dict.fromkeys(f"cell {name}: {fault}" for fault in error.faults)))) from None
     except InputError as error:
         raise InputError(f"cell {name}: {error}") from None
-    return Cell(name, dict(settings), changed, planner)
+    return Cell(name, dict(settings), changed[key], planner)
 
 
 def _name(settings: Mapping[str, Any], axes: Mapping[str, tuple[Any, ...]]) -> str:

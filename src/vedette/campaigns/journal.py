@@ -32,6 +32,7 @@ _TABLES = (
     "CREATE TABLE failures (cell TEXT NOT NULL, run INTEGER NOT NULL, session INTEGER NOT NULL, "
     "message TEXT NOT NULL, PRIMARY KEY (cell, run))",
 )
+_ALTERED = "expected the run as it was written; it is cut short or altered"
 _COLUMNS = "cell, run, session, payload, payload_sha256, metrics, metrics_sha256, timings, timings_sha256"
 
 
@@ -75,13 +76,18 @@ class Writer:
     def __init__(self, folder: Path) -> None:
         self._path = folder / DATABASE
         self._lock = _lock(folder)
-        self._database: sqlite3.Connection | None = None
+        self._opened: sqlite3.Connection | None = None
 
-    def open(self, contents: str) -> None:
+    @property
+    def _database(self) -> sqlite3.Connection:
+        assert self._opened is not None  # by `open_runs`
+        return self._opened
+
+    def open_runs(self, contents: str) -> None:
         """Make the file, or check that it is of the campaign whose manifest has the checksum `contents`."""
         with _explained(self._path):
             database = sqlite3.connect(self._path, timeout=_WAIT, isolation_level=None, check_same_thread=False)
-            self._database = database
+            self._opened = database
             database.execute("PRAGMA journal_mode = PERSIST")
             database.execute("PRAGMA synchronous = FULL")
             database.execute("BEGIN IMMEDIATE")
@@ -94,99 +100,100 @@ class Writer:
             database.execute("COMMIT")
         _check_contents(self._path, found, contents)
 
-    def add(self, entry: Entry) -> None:
+    def put(self, entry: Entry) -> None:
         """Put the run on the disk; when this returns it stays, whatever happens to this process or its machine."""
         parts = (entry.payload, entry.metrics, entry.timings)
-        packed = [(zlib.compress(part, _LEVEL), _checksum(entry.cell, entry.run, part)) for part in parts]
-        row = (entry.cell, entry.run, entry.session, *itertools.chain.from_iterable(packed))
-        assert self._database is not None
+        packed = itertools.chain.from_iterable(_packed(entry.cell, entry.run, part) for part in parts)
+        row = (entry.cell, entry.run, entry.session, *packed)
         try:
-            with _explained(self._path, f"cell {entry.cell}, run {entry.run}: "):
+            with _explained(self._path, _place(entry.cell, entry.run)):
                 self._database.execute("BEGIN IMMEDIATE")
                 with self._database:  # both or neither
                     self._database.execute(f"INSERT INTO runs ({_COLUMNS}) VALUES ({', '.join('?' * len(row))})", row)
                     self._database.execute("DELETE FROM failures WHERE cell = ? AND run = ?", (entry.cell, entry.run))
         except sqlite3.IntegrityError:
             raise InputError(
-                f"{self._path}: cell {entry.cell}, run {entry.run}: expected another run; it is there"
+                f"{self._path}: {_place(entry.cell, entry.run)}expected another run; it is there"
             ) from None
 
-    def note_failure(self, failure: Failure) -> None:
+    def put_failure(self, failure: Failure) -> None:
         """Keep why a run could not be finished, in place of an earlier reason, until it is."""
-        row = (failure.cell, failure.run, failure.session, failure.message)
-        assert self._database is not None
-        with _explained(self._path, f"cell {failure.cell}, run {failure.run}: "):
-            self._database.execute("INSERT OR REPLACE INTO failures VALUES (?, ?, ?, ?)", row)
+        self._change(
+            failure.cell,
+            failure.run,
+            "INSERT OR REPLACE INTO failures (session, message, cell, run) VALUES (?, ?, ?, ?)",
+            failure.session,
+            failure.message,
+        )
 
     def finished(self) -> set[tuple[str, int]]:
         """Cell and number of every run in the file."""
-        assert self._database is not None
-        with _explained(self._path):
-            rows = self._database.execute("SELECT cell, run FROM runs").fetchall()
-        return set(_checked_keys(self._path, rows))
+        return set(self._keys())
 
     def damaged(self) -> tuple[tuple[str, int], ...]:
         """Cell and number of every run whose row is not as it was written."""
-        assert self._database is not None
         with _explained(self._path):
             rows = self._database.execute(f"SELECT {_COLUMNS} FROM runs ORDER BY cell, run")
             return tuple((row[0], row[1]) for row in rows if _verified(row) is None)
 
     def metrics(self) -> Iterator[tuple[str, int, bytes]]:
         """Cell and number of every run, with its measures."""
-        assert self._database is not None
         with _explained(self._path):
             rows = self._database.execute("SELECT cell, run, metrics FROM runs ORDER BY cell, run").fetchall()
         return ((cell, run, inflate(packed)) for cell, run, packed in rows)
 
     def put_metrics(self, cell: str, run: int, metrics: bytes) -> None:
         """Keep other measures of a run that is there."""
-        row = (zlib.compress(metrics, _LEVEL), _checksum(cell, run, metrics), cell, run)
-        assert self._database is not None
-        with _explained(self._path, f"cell {cell}, run {run}: "):
-            self._database.execute("UPDATE runs SET metrics = ?, metrics_sha256 = ? WHERE cell = ? AND run = ?", row)
+        where = "UPDATE runs SET metrics = ?, metrics_sha256 = ? WHERE cell = ? AND run = ?"
+        self._change(cell, run, where, *_packed(cell, run, metrics))
 
     def rewrite(self, payload: Callable[[Entry], bytes]) -> None:
         """Give every run another payload, all in one transaction.
 
         Raises `InputError`, and changes nothing, for a run that is not as it was written, and as `payload` does.
         """
-        assert self._database is not None
         with _explained(self._path):
-            keys = self._database.execute("SELECT cell, run FROM runs ORDER BY cell, run").fetchall()
+            keys = self._keys()
             self._database.execute("BEGIN IMMEDIATE")
             with self._database:
-                for key in _checked_keys(self._path, keys):
+                for key in keys:
                     self._rewrite(*key, payload)
 
     def _rewrite(self, cell: str, run: int, payload: Callable[[Entry], bytes]) -> None:
-        assert self._database is not None
-        where = f"{self._path}: cell {cell}, run {run}: "
+        where = f"{self._path}: {_place(cell, run)}"
         rows = self._database.execute(f"SELECT {_COLUMNS} FROM runs WHERE cell = ? AND run = ?", (cell, run))
         entry = _verified(rows.fetchone())
         if entry is None:
-            raise InputError(f"{where}expected the run as it was written; it is cut short or altered")
+            raise InputError(f"{where}{_ALTERED}")
         try:
-            content = payload(entry)
+            packed = _packed(cell, run, payload(entry))
         except InputError as error:
             raise InputError(f"{where}{error}") from error
-        row = (zlib.compress(content, _LEVEL), _checksum(cell, run, content), cell, run)
-        self._database.execute("UPDATE runs SET payload = ?, payload_sha256 = ? WHERE cell = ? AND run = ?", row)
+        change = "UPDATE runs SET payload = ?, payload_sha256 = ? WHERE cell = ? AND run = ?"
+        self._database.execute(change, (*packed, cell, run))
 
     def discard(self, cell: str, run: int) -> None:
         """Take a run out of the file."""
-        assert self._database is not None
-        with _explained(self._path, f"cell {cell}, run {run}: "):
-            self._database.execute("DELETE FROM runs WHERE cell = ? AND run = ?", (cell, run))
+        self._change(cell, run, "DELETE FROM runs WHERE cell = ? AND run = ?")
+
+    def _keys(self) -> list[tuple[str, int]]:
+        with _explained(self._path):
+            rows = self._database.execute("SELECT cell, run FROM runs ORDER BY cell, run").fetchall()
+        return _checked_keys(self._path, rows)
+
+    def _change(self, cell: str, run: int, statement: str, *values: Any) -> None:
+        """A statement about one run, which stands behind its values."""
+        with _explained(self._path, _place(cell, run)):
+            self._database.execute(statement, (*values, cell, run))
 
     def close(self) -> None:
         """Let other writers in."""
-        if self._database is not None:
+        if self._opened is not None:
             # A reader at this very moment: the emptied journal does no harm.
             with suppress(sqlite3.Error, UnicodeDecodeError):
-                self._database.execute("PRAGMA busy_timeout = 0")
-                self._database.execute("PRAGMA journal_mode = DELETE")
-            self._database.close()
+                self._opened.execute("PRAGMA busy_timeout = 0")
+                self._opened.execute("PRAGMA journal_mode = DELETE")
+            self._opened.close()
         self._lock.close()
 
 
@@ -215,13 +222,13 @@ class Reader:
 
     def entry(self, cell: str, run: int) -> Entry:
         """A finished run, its checksums verified. `InputError` where there is none, or its row is damaged."""
-        where = f"cell {cell}, run {run}: "
+        where = _place(cell, run)
         rows = self._ask(f"SELECT {_COLUMNS} FROM runs WHERE cell = ? AND run = ?", (cell, run), where)
         if not rows:
             raise InputError(f"{self._path}: {where}expected a finished run; it is not there yet")
         entry = _verified(rows[0])
         if entry is None:
-            raise InputError(f"{self._path}: {where}expected the run as it was written; it is cut short or altered")
+            raise InputError(f"{self._path}: {where}{_ALTERED}")
         return entry
 
     def _ask(self, question: str, values: Sequence[Any] = (), where: str = "") -> list[Any]:
@@ -292,6 +299,14 @@ def _check_contents(path: Path, found: Sequence[tuple[str]], contents: str) -> N
             f"{path}: expected the runs of the manifest beside it; they are another campaign's, or the manifest was "
             "altered"
         )
+
+
+def _place(cell: str, run: int) -> str:
+    return f"cell {cell}, run {run}: "
+
+
+def _packed(cell: str, run: int, content: bytes) -> tuple[bytes, str]:
+    return zlib.compress(content, _LEVEL), _checksum(cell, run, content)
 
 
 def _checksum(cell: str, run: int, content: bytes) -> str:

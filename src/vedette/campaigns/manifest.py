@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import itertools
 import json
 import os
 import platform
@@ -14,7 +13,7 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict, JsonValue, ValidationError
 
-from vedette.campaigns.cells import Campaign, Cell, safe_name, scenario_text
+from vedette.campaigns.cells import Campaign, Cell, safe_name
 from vedette.campaigns.spec import CampaignSpec, spec_from_data
 from vedette.errors import InputError
 from vedette.files import write_whole
@@ -70,6 +69,7 @@ class _Manifest(BaseModel):
 
 def new_manifest(campaign: Campaign) -> dict[str, Any]:
     """The manifest of a campaign that nobody has worked on yet, as plain data of JSON."""
+    texts = campaign.texts()
     manifest = {
         "format": FORMAT,
         "format_version": FORMAT_VERSION,
@@ -79,15 +79,15 @@ def new_manifest(campaign: Campaign) -> dict[str, Any]:
         "compare": campaign.compare,
         "axes": campaign.axes,
         "spec": {field: value for field, value in campaign.spec.items() if field != "runs"},
-        "digest": campaign.digest(),
+        "digest": campaign.digest(texts),
         "cells": [
             {
                 "name": cell.name,
                 "planner": cell.planner,
                 "settings": cell.settings,
-                "scenario": scenario_text(cell.scenario),
+                "scenario": text,
             }
-            for cell in campaign.cells
+            for cell, text in zip(campaign.cells, texts, strict=True)
         ],
         "created": _now(),
         "sessions": [],
@@ -187,13 +187,13 @@ def campaign_of(folder: Path, manifest: Mapping[str, Any]) -> Campaign:
 
 def _check_same_as(specification: CampaignSpec, manifest: Mapping[str, Any]) -> None:
     """`InputError` unless the cells are those of the specification, each under a name that a file may have."""
-    axes = specification.axes()
+    axes, settings = specification.axes(), specification.settings()
     for field, value, wanted in (
         ("name", manifest["name"], specification.name),
         ("seed", manifest["seed"], specification.seed),
-        ("axes", list(manifest["axes"].items()), list(axes.items())),
-        ("settings", [list(cell["settings"].items()) for cell in manifest["cells"]], _combinations(axes)),
-        ("planner", [cell["planner"] for cell in manifest["cells"]], [one["planner"] for one in _settings(axes)]),
+        ("axes", manifest["axes"], axes),
+        ("settings", [cell["settings"] for cell in manifest["cells"]], settings),
+        ("planner", [cell["planner"] for cell in manifest["cells"]], [one["planner"] for one in settings]),
     ):
         if json.dumps(value) != json.dumps(wanted):  # texts, as to Python 1, 1.0 and true are equal
             raise InputError(f"{field}: expected what the specification says; got other values")
@@ -202,14 +202,6 @@ def _check_same_as(specification: CampaignSpec, manifest: Mapping[str, Any]) -> 
         raise InputError(f"cells: expected names that are unique and fit for files; got {shown(names)}")
     if manifest["compare"] not in axes:
         raise InputError(f"compare: expected one of {', '.join(axes)}; got {shown(manifest['compare'])}")
-
-
-def _settings(axes: Mapping[str, tuple[Any, ...]]) -> list[dict[str, Any]]:
-    return [dict(zip(axes, values, strict=True)) for values in itertools.product(*axes.values())]
-
-
-def _combinations(axes: Mapping[str, tuple[Any, ...]]) -> list[list[tuple[str, Any]]]:
-    return [list(settings.items()) for settings in _settings(axes)]
 
 
 def _cell(entry: Mapping[str, Any], read: dict[str, Scenario]) -> Cell:

@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Any, SupportsIndex
 
 from vedette.campaigns.cells import Campaign, Cell
 from vedette.campaigns.codec import decode
-from vedette.campaigns.finished import FinishedRun
+from vedette.campaigns.dataset import dataset_of_scans
 from vedette.campaigns.journal import DATABASE, Entry, Failure, Reader
 from vedette.campaigns.manifest import campaign_of, contents_checksum, read_manifest
+from vedette.campaigns.tables import FinishedRun, tables_of_runs
 from vedette.errors import InputError
 from vedette.evaluation.comparison import Comparison, scored
 from vedette.evaluation.metrics import Metric, RunMetrics, decode_metrics
@@ -115,8 +116,6 @@ class CampaignResults:
         For pandas `.to_pandas()`, for polars `polars.from_arrow`; DuckDB queries them as they are. See
         `vedette.campaigns.tables`. None where no run is finished.
         """
-        from vedette.campaigns.tables import tables_of_runs
-
         return tables_of_runs(self.campaign, self.runs())
 
     def dataset(self) -> xarray.Dataset:
@@ -124,8 +123,6 @@ class CampaignResults:
 
         Raises `InputError` where xarray is not installed.
         """
-        from vedette.campaigns.dataset import dataset_of_scans
-
         return dataset_of_scans(self.campaign, self.tables().get("scans"))
 
     def _finished(self) -> list[tuple[str, int]]:
@@ -170,12 +167,15 @@ class CampaignResults:
         return FinishedRun(entry.cell, record, metrics, entry.session, entry.checksum)
 
 
-def open_results(folder: Path | str, metrics: Sequence[Metric] = ()) -> CampaignResults:
+def open_results(
+    folder: Path | str, metrics: Sequence[Metric] = (), campaign: Campaign | None = None
+) -> CampaignResults:
     """Open the results folder of a campaign to read.
 
     Args:
         folder: finished, unfinished, or while it is written.
         metrics: measures of one's own, computed of every run that is read, beside those that were kept.
+        campaign: what the folder is of, where that is known, so that its scenarios need not be read; else None.
 
     Raises `InputError`, naming the file, for a folder that holds no campaign, or one whose manifest or runs are
     missing, cut short or altered.
@@ -187,4 +187,5 @@ def open_results(folder: Path | str, metrics: Sequence[Metric] = ()) -> Campaign
     manifest = read_manifest(target)
     reader = Reader(target)
     reader.check(contents_checksum(manifest))
-    return CampaignResults(target, campaign_of(target, manifest), manifest, reader, tuple(metrics))
+    known = campaign_of(target, manifest) if campaign is None else campaign.with_runs(manifest["num_runs"])
+    return CampaignResults(target, known, manifest, reader, tuple(metrics))

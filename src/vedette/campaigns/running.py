@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Generator
-from contextlib import closing, nullcontext
+from contextlib import closing
 from dataclasses import dataclass
 from multiprocessing import current_process
 from pathlib import Path
 from typing import Protocol
 
 from vedette.campaigns.cells import Campaign
-from vedette.campaigns.clients import local_workers, remote_workers, wait_for_worker
+from vedette.campaigns.cluster import remote_workers
 from vedette.campaigns.engine import in_process, on_workers
 from vedette.campaigns.export import export_tables
 from vedette.campaigns.journal import DATABASE
+from vedette.campaigns.local import local_workers
 from vedette.campaigns.manifest import MANIFEST
 from vedette.campaigns.results import open_results
 from vedette.campaigns.store import Store
-from vedette.campaigns.tasks import Failed, Landed, TaskQueue, perform
+from vedette.campaigns.tasks import Failed, Landed, TaskQueue
 from vedette.errors import InputError, VedetteError
 from vedette.evaluation.metrics import encode_metrics
 from vedette.evaluation.runs import own_metrics
@@ -32,35 +33,23 @@ class Watch(Protocol):
 
     def begin(self, num_found: int, num_runs: int) -> None:
         """How many runs were there already, and how many there are to be."""
-        ...
+        return
 
     def note(self, text: str) -> None:
         """Something that a person should know."""
-        ...
+        return
 
     def landed(self, result: Landed) -> None:
         """A run is in the store."""
-        ...
+        return
 
     def failed(self, result: Failed) -> None:
         """A run could not be finished."""
-        ...
+        return
 
 
-class Unwatched:
+class Unwatched(Watch):
     """Tells nobody."""
-
-    def begin(self, num_found: int, num_runs: int) -> None:
-        """See `Watch`."""
-
-    def note(self, text: str) -> None:
-        """See `Watch`."""
-
-    def landed(self, result: Landed) -> None:
-        """See `Watch`."""
-
-    def failed(self, result: Failed) -> None:
-        """See `Watch`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,8 +101,6 @@ def run_campaign(
         )
     if scheduler is not None:
         need("a campaign on a cluster", "distributed")
-    elif num_workers > 1:
-        need("a campaign of more than one worker (--workers 1 does without)", "cryptography", "distributed")
     watch = watch or Unwatched()
     failed, num_landed = [], 0
     database = Path(folder) / DATABASE
@@ -139,7 +126,7 @@ def run_campaign(
                 num_landed += 1
                 watch.landed(result)
     # Each time: what was left of them by another end of this call, or altered since, is put right.
-    export_tables(open_results(folder), Path(folder) / TABLES)
+    export_tables(open_results(folder, campaign=campaign), Path(folder) / TABLES)
     return Outcome(num_landed, num_found, tuple(failed))
 
 
@@ -162,27 +149,20 @@ def _measure_anew(store: Store, campaign: Campaign, watch: Watch) -> None:
     """Measures that the program or the scenarios have gained since runs were kept, of their records."""
     own = {cell.name: own_metrics(cell.scenario) for cell in campaign.cells}
     lacking = store.unmeasured({cell: [metric.name for metric in of_cell] for cell, of_cell in own.items()})
-    results = open_results(store.folder)
-    for cell, run in lacking:
-        there = results.run(cell, run)
-        store.put_metrics(cell, run, encode_metrics(there.metrics.with_own(there.record, own[cell])))
     if lacking:
+        results = open_results(store.folder, campaign=campaign)
+        for cell, run in lacking:
+            there = results.run(cell, run)
+            store.put_metrics(cell, run, encode_metrics(there.metrics.with_own(there.record, own[cell])))
         watch.note(f"measured anew: {counted(len(lacking), 'run')}")
 
 
 def _results(queue: TaskQueue, num_workers: int, scheduler: str | None, watch: Watch) -> Generator[Landed | Failed]:
-    if scheduler is None and num_workers <= 1:
-        yield from in_process(queue)
-        return
     if scheduler is not None:
-        with remote_workers(scheduler) as client:
-            yield from on_workers(client, queue, watch.note, first=list(queue.warm_up()))
-        return
-    # Here first, so that kernels are compiled once and not once a worker; meanwhile the workers start.
-    first = list(queue.warm_up())
-    with local_workers(min(num_workers, len(queue))) if len(queue) else nullcontext() as client:
-        for task in first:
-            yield from perform(task)
-        if client is not None:
-            wait_for_worker(client)
-            yield from on_workers(client, queue, watch.note)
+        with remote_workers(scheduler, watch.note) as workers:
+            yield from on_workers(workers, queue)
+    elif num_workers > 1 and len(queue) > 1:
+        with local_workers(min(num_workers, len(queue))) as workers:
+            yield from on_workers(workers, queue)
+    else:
+        yield from in_process(queue)

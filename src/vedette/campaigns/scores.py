@@ -10,10 +10,9 @@ from vedette.campaigns.results import CampaignResults, GroupComparison
 from vedette.evaluation import Summary
 from vedette.kernels.base.types import Floats
 from vedette.simulation.records import RunRecord
-from vedette.text import named_in
+from vedette.text import markdown_table, named_in, with_error, with_minus
 
 TRACKED_OF_ALL = "tracked_of_all"  # as scenes and campaigns name the measure
-_MINUS = "\N{MINUS SIGN}"
 _UNKNOWN = ""
 _LEAST_SECONDS = 1e-4
 
@@ -58,7 +57,7 @@ def score_strategies(results: CampaignResults, group: GroupComparison) -> tuple[
             StrategyScore(
                 label=label,
                 ospa=float(total.mean),
-                standard_error=_or_none(float(total.standard_error)),
+                standard_error=float(total.standard_error) if comparison.num_runs > 1 else None,
                 worst=float(comparison.run_means(label).max()),
                 difference=comparison.difference(label).summary if label != group.labels[0] else None,
                 cardinality_error=float(comparison.summary(label, "cardinality_error").mean),
@@ -87,10 +86,10 @@ def score_row(score: StrategyScore) -> tuple[str, ...]:
     more = score.difference
     return (
         score.label,
-        _with_error(score.ospa, score.standard_error),
+        with_minus(with_error(score.ospa, score.standard_error)),
         _UNKNOWN if score.worst is None else f"{score.worst:.2f}",
-        _UNKNOWN if more is None else _with_error(float(more.mean), _or_none(float(more.standard_error)), sign="+"),
-        f"{score.cardinality_error:+.2f}".replace("-", _MINUS),
+        _UNKNOWN if more is None else with_minus(with_error(float(more.mean), float(more.standard_error), "+")),
+        with_minus(f"{score.cardinality_error:+.2f}"),
         _UNKNOWN if score.tracked is None else f"{100.0 * score.tracked:.1f} %",
         _UNKNOWN if score.decision_seconds is None else _seconds(score.decision_seconds),
         str(score.num_runs),
@@ -99,13 +98,7 @@ def score_row(score: StrategyScore) -> tuple[str, ...]:
 
 def score_markdown(scores: tuple[StrategyScore, ...], unit: str, reference: str) -> str:
     """The table as Markdown."""
-    names = score_header(unit, reference)
-    lines = ["| " + " | ".join(names) + " |", "| --- |" + " ---: |" * (len(names) - 1)]
-    return "\n".join([*lines, *("| " + " | ".join(score_row(score)) + " |" for score in scores)]) + "\n"
-
-
-def _or_none(value: float) -> float | None:
-    return None if np.isnan(value) else value
+    return markdown_table(score_header(unit, reference), map(score_row, scores))
 
 
 def _seconds(value: float) -> str:
@@ -113,8 +106,3 @@ def _seconds(value: float) -> str:
     if value < _LEAST_SECONDS:
         return f"<{_LEAST_SECONDS:g}"
     return f"{value:.2g}" if value < 10.0 else f"{value:.0f}"
-
-
-def _with_error(mean: float, error: float | None, sign: str = "") -> str:
-    text = f"{mean:{sign}.2f}".replace("-", _MINUS)
-    return text if error is None else f"{text} ± {error:.2f}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import tomllib
 from collections.abc import Iterator, Mapping
@@ -118,6 +119,11 @@ class CampaignSpec(Section):
         if self.variants:
             axes["variant"] = tuple(variant.name for variant in self.variants)
         return {**axes, **self.grid}
+
+    def settings(self) -> list[dict[str, Any]]:
+        """Axis and value of every cell, in order, the last axis fastest."""
+        axes = self.axes()
+        return [dict(zip(axes, values, strict=True)) for values in itertools.product(*axes.values())]
 
 
 def parse_spec(text: str, file: str = "<text>") -> CampaignSpec:

@@ -26,13 +26,18 @@ from vedette.errors import InputError
 from vedette.evaluation.metrics import has_metrics
 
 
-class Store:
+class Store(journal.Writer):
     """The one writer of a results folder; a context manager. Its calls may come from any thread, one at a time."""
 
-    def __init__(self, folder: Path, campaign: Campaign, writer: journal.Writer, manifest: dict[str, Any]) -> None:
+    def __init__(self, folder: Path, campaign: Campaign, fresh: dict[str, Any]) -> None:
+        super().__init__(folder)
         self.folder = folder
+        try:
+            manifest = self._begin_session(fresh)
+        except BaseException:
+            self.close()
+            raise
         self._num_runs = {cell.name: int(manifest["num_runs"]) for cell in campaign.cells}
-        self._writer = writer
         self._sessions: list[dict[str, Any]] = manifest["sessions"]
 
     @classmethod
@@ -53,13 +58,7 @@ class Store:
             raise InputError(f"{target}: expected a place for a results folder; {error}") from error
         if (target / MANIFEST).exists():  # before the lock, which is a file of its own
             check_same(target, read_manifest(target), fresh)
-        writer = journal.Writer(target)
-        try:
-            manifest = _begin_session(target, fresh, writer)
-        except BaseException:
-            writer.close()
-            raise
-        return cls(target, campaign, writer, manifest)
+        return cls(target, campaign, fresh)
 
     @property
     def session(self) -> int:
@@ -78,18 +77,6 @@ class Store:
         )
         return tuple(changes)
 
-    def finished(self) -> set[tuple[str, int]]:
-        """Cell name and number of every finished run."""
-        return self._writer.finished()
-
-    def damaged(self) -> tuple[tuple[str, int], ...]:
-        """Cell name and number of every finished run that is not as it was written."""
-        return self._writer.damaged()
-
-    def discard(self, cell: str, run: int) -> None:
-        """Take a finished run out, so that it can be added anew."""
-        self._writer.discard(cell, run)
-
     def add(self, cell: str, run: int, payload: bytes, timings: bytes, metrics: bytes = b"") -> None:
         """Keep a finished run (`vedette.campaigns.codec`), and its measures if there are any yet.
 
@@ -102,25 +89,31 @@ class Store:
             raise InputError(f"cell: expected one of {', '.join(self._num_runs)}; got {cell!r}")
         if not 0 <= run < self._num_runs[cell]:
             raise InputError(f"run: expected a number from 0 to {self._num_runs[cell] - 1}; got {run}")
-        self._writer.add(journal.Entry(cell, int(run), self.session, payload, metrics, timings))
+        self.put(journal.Entry(cell, int(run), self.session, payload, metrics, timings))
 
     def unmeasured(self, own: Mapping[str, Collection[str]]) -> tuple[tuple[str, int], ...]:
         """Cell name and number of every finished run that lacks measures: this version's, or its cell's `own`."""
-        return tuple(
-            (cell, run) for cell, run, kept in self._writer.metrics() if not has_metrics(kept, own.get(cell, ()))
-        )
-
-    def put_metrics(self, cell: str, run: int, metrics: bytes) -> None:
-        """Keep measures of a finished run in place of those that are there."""
-        self._writer.put_metrics(cell, run, metrics)
+        return tuple((cell, run) for cell, run, kept in self.metrics() if not has_metrics(kept, own.get(cell, ())))
 
     def note_failure(self, cell: str, run: int, message: str) -> None:
         """Keep why a run could not be finished, until it is."""
-        self._writer.note_failure(journal.Failure(cell, int(run), self.session, message))
+        self.put_failure(journal.Failure(cell, int(run), self.session, message))
 
-    def close(self) -> None:
-        """Let another process write."""
-        self._writer.close()
+    def _begin_session(self, fresh: dict[str, Any]) -> dict[str, Any]:
+        """Write a new session into the folder's manifest, and open its runs; returns the manifest."""
+        started = (self.folder / MANIFEST).exists()
+        manifest = read_manifest(self.folder) if started else fresh
+        check_same(self.folder, manifest, fresh)
+        num_runs = max(manifest["num_runs"], fresh["num_runs"])
+        manifest = {**manifest, "num_runs": num_runs, "sessions": [*manifest["sessions"], new_session()]}
+        contents = contents_checksum(manifest)
+        if started:
+            self.open_runs(contents)  # first, so that damaged runs leave the manifest as it is
+            write_manifest(self.folder, manifest)
+        else:
+            write_manifest(self.folder, manifest)
+            self.open_runs(contents)
+        return manifest
 
     def __enter__(self) -> Store:
         return self
@@ -142,20 +135,3 @@ def _check_place(folder: Path) -> None:
         raise InputError(f"{folder}: expected {MANIFEST} beside {journal.DATABASE}; it is missing, nothing was changed")
     if names:
         raise InputError(f"{folder}: expected a new or empty folder, or one of results; it holds something else")
-
-
-def _begin_session(folder: Path, fresh: dict[str, Any], writer: journal.Writer) -> dict[str, Any]:
-    """Write a new session into the folder's manifest, and open its runs; returns the manifest."""
-    started = (folder / MANIFEST).exists()
-    manifest = read_manifest(folder) if started else fresh
-    check_same(folder, manifest, fresh)
-    num_runs = max(manifest["num_runs"], fresh["num_runs"])
-    manifest = {**manifest, "num_runs": num_runs, "sessions": [*manifest["sessions"], new_session()]}
-    contents = contents_checksum(manifest)
-    if started:
-        writer.open(contents)  # first, so that damaged runs leave the manifest as it is
-        write_manifest(folder, manifest)
-    else:
-        write_manifest(folder, manifest)
-        writer.open(contents)
-    return manifest

@@ -10,42 +10,51 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any, NamedTuple
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
 
 from vedette.campaigns.cells import Campaign, Cell
-from vedette.simulation.arrow import Columns, Kind, Layout, to_arrow
+from vedette.evaluation.metrics import RunMetrics
+from vedette.simulation.arrow import Columns, Kind, Layout, stacked, to_arrow
 from vedette.simulation.records import RunRecord
 from vedette.simulation.tables import (
     LAYOUTS,
     OPTIONAL,
     OSPA_COLUMNS,
     TIMINGS,
-    optional_tables_of,
     tables_of,
     timing_table,
 )
-
-if TYPE_CHECKING:
-    from vedette.campaigns.finished import FinishedRun
 
 _UNITS = {"_m": "m", "_s": "s", "_rad": "rad"}
 _ANY = Layout({"sha256": Kind.TEXT}, {"": Kind.NUMBER})
 
 
-class _Part(NamedTuple):
-    """The table of one run among those of its name."""
+@dataclass(frozen=True, slots=True)
+class FinishedRun:
+    """One run of a campaign.
 
-    cell: Cell
-    run: int
-    table: pa.Table
+    Attributes:
+        cell: name of its cell.
+        record: with the seconds that it took.
+        metrics: measures of its estimates.
+        session: number of the session, from 1, in the manifest's list, that kept it.
+        checksum: SHA-256 of all but its timings; equal for equal results.
+    """
+
+    cell: str
+    record: RunRecord
+    metrics: RunMetrics
+    session: int
+    checksum: str
 
 
 def tables_of_record(record: RunRecord) -> dict[str, pa.Table]:
     """The tables of a single run, null for what is not a number."""
-    return {name: _with_units(pa.Table.from_batches([table])) for name, table in _batches(record).items()}
+    return {name: _arrow(columns, _layout(name)) for name, columns in _columns(record).items()}
 
 
 def tables_of_runs(campaign: Campaign, runs: Iterable[FinishedRun]) -> dict[str, pa.Table]:
@@ -53,29 +62,34 @@ def tables_of_runs(campaign: Campaign, runs: Iterable[FinishedRun]) -> dict[str,
 
     Takes about as much memory as the tables: some 150 MB for 1,000 runs of 40 scans with joint decisions.
     """
-    parts: dict[str, list[_Part]] = {}
+    parts: dict[str, list[Columns]] = {}
     for run in runs:
         cell = campaign.cell(run.cell)
-        measures, session = run.metrics.columns(), np.full(run.record.num_scans, run.session)
-        of_run = {"runs": to_arrow(_summary(run), _ANY), **_batches(run.record, measures, {"session": session})}
-        for name, table in of_run.items():
-            parts.setdefault(name, []).append(_Part(cell, run.record.run, pa.Table.from_batches([table])))
+        of_run = {"runs": _summary(run), **_columns(run.record)}
+        of_run["scans"] |= run.metrics.columns()
+        of_run["timings"]["session"] = np.full(run.record.num_scans, run.session)
+        settings = {axis: setting_of(campaign, cell, axis) for axis in campaign.axes}
+        keys = {"cell": run.cell, **settings, "run": run.record.run}
+        for name, columns in of_run.items():
+            parts.setdefault(name, []).append({**keys, **columns})
+    kinds = {key: Kind.TEXT if isinstance(value, str) else Kind.NUMBER for key, value in keys.items()} if parts else {}
     metadata = {"vedette": json.dumps({"campaign": campaign.name, "seed": campaign.seed})}
-    return {name: _with_units(_joined(campaign, of)).replace_schema_metadata(metadata) for name, of in parts.items()}
+    tables = {}
+    for name, of in parts.items():
+        layout = Layout({**kinds, **_layout(name).fixed}, _layout(name).more)
+        names = list(dict.fromkeys(name for part in of for name in part))
+        tables[name] = _arrow(stacked(of, layout, names), layout).replace_schema_metadata(metadata)
+    return tables
 
 
-def _batches(record: RunRecord, measures: Any = None, timed: Any = None) -> dict[str, pa.RecordBatch]:
-    """The tables of one run; `measures` are more columns of the scans, `timed` of the timings."""
-    tables = tables_of(record)
-    timings = {"step": np.arange(1, record.num_scans + 1), "time_s": record.times, **timing_table(record)}
-    scans = to_arrow({**tables.pop("scans"), **(measures or {})}, _ANY, nan_is_null=True)
-    others = {
-        name: to_arrow(table, layout, nan_is_null=True)
-        for of, layouts in ((tables, LAYOUTS), (optional_tables_of(record), OPTIONAL))
-        for name, layout in layouts.items()
-        if (table := of.get(name)) is not None
-    }
-    return {"scans": scans, **others, "timings": to_arrow({**timings, **(timed or {})}, TIMINGS, nan_is_null=True)}
+def _columns(record: RunRecord) -> dict[str, Columns]:
+    """The tables of one run."""
+    timings = timing_table(record)
+    return {**tables_of(record), "timings": {"step": timings.pop("step"), "time_s": record.times, **timings}}
+
+
+def _layout(name: str) -> Layout:
+    return {**LAYOUTS, **OPTIONAL, "timings": TIMINGS, "scans": _ANY, "runs": _ANY}[name]
 
 
 def _summary(run: FinishedRun) -> Columns:
@@ -90,20 +104,6 @@ def _summary(run: FinishedRun) -> Columns:
     }
 
 
-def _joined(campaign: Campaign, parts: list[_Part]) -> pa.Table:
-    """The tables of one name of all runs, cell, settings and number before each row; null for what a run lacks."""
-    rows = np.repeat(np.arange(len(parts)), [part.table.num_rows for part in parts])
-    settings = {axis: [setting_of(campaign, part.cell, axis) for part in parts] for axis in campaign.axes}
-    keys = {"cell": [part.cell.name for part in parts], **settings, "run": [part.run for part in parts]}
-    table = pa.concat_tables([part.table for part in parts], promote_options="default")
-    return pa.table(
-        {
-            **{name: pa.array(of).take(pa.array(rows)) for name, of in keys.items()},
-            **dict(zip(table.column_names, table.columns, strict=True)),
-        }
-    ).combine_chunks()
-
-
 def setting_of(campaign: Campaign, cell: Cell, axis: str) -> Any:
     """What stands in the column of an axis: text, a truth or a number where all its values are such, else JSON."""
     value, values = cell.settings[axis], campaign.axes[axis]
@@ -114,13 +114,14 @@ def setting_of(campaign: Campaign, cell: Cell, axis: str) -> Any:
     return json.dumps(value)
 
 
-def _with_units(table: pa.Table) -> pa.Table:
-    schema = table.schema
+def _arrow(columns: Columns, layout: Layout) -> pa.Table:
+    """The table, with the unit of each column in the metadata of its field."""
+    batch = to_arrow(columns, layout, nan_is_null=True)
+    schema = batch.schema
     for index, schema_field in enumerate(schema):
-        unit = unit_of(schema_field.name)
-        if unit:
+        if unit := unit_of(schema_field.name):
             schema = schema.set(index, schema_field.with_metadata({"unit": unit}))
-    return table.cast(schema)
+    return pa.Table.from_arrays(batch.columns, schema=schema)
 
 
 def unit_of(column: str) -> str | None:

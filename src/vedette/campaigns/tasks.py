@@ -6,6 +6,7 @@ import math
 import time
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
+from typing import TypeAlias
 
 from vedette.campaigns.cells import Campaign, Cell
 from vedette.campaigns.codec import encode
@@ -17,10 +18,10 @@ from vedette.simulation.kept import encode_timings
 from vedette.simulation.storage import versions
 
 # Below this a task costs more to hand out than it is worth.
-MIN_TASK_SECONDS = 0.5
+MIN_TASK_SECONDS = 0.1
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Task:
     """Some runs of one cell.
 
@@ -69,7 +70,16 @@ class Failed:
     message: str
 
 
-def perform(task: Task) -> tuple[Landed | Failed, ...]:
+# What a task gives back: each of its runs.
+Outcome: TypeAlias = tuple[Landed | Failed, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class WorkerDied:
+    """In place of an outcome: the workers that were given the task died."""
+
+
+def perform(task: Task) -> Outcome:
     """What a worker does. An error in a run is a result of its own and leaves the other runs alone.
 
     Raises:
@@ -102,16 +112,18 @@ def _one(cell: Cell, seed: int, run: int) -> Landed | Failed:
 
 
 class TaskQueue:
-    """The runs that are still to do, handed out as tasks of about half a second or more.
+    """The runs that are still to do, handed out as tasks of a tenth of a second or more.
 
-    Runs of equal number come together, so that strategies can be compared early. How long a run of a cell takes is
-    learnt from the fastest that has landed; nothing that a task holds changes a result.
+    Runs of equal number come together, so that strategies can be compared early. The first run of each set of kernels
+    goes before the others that need it, so that they are compiled once and not once a worker. How long a run of a cell
+    takes is learnt from the fastest that has landed; nothing that a task holds changes a result.
     """
 
     def __init__(self, campaign: Campaign, finished: Collection[tuple[str, int]]) -> None:
         self._campaign = campaign
         self._versions = versions()
         self._fastest: dict[str, float] = {}
+        self._compiled: dict[tuple[object, ...], bool] = {}  # False: by a task that is under way
         self._todo = {
             cell.name: [run for run in range(campaign.num_runs) if (cell.name, run) not in finished]
             for cell in campaign.cells
@@ -121,33 +133,35 @@ class TaskQueue:
         """Runs not yet handed out."""
         return sum(len(runs) for runs in self._todo.values())
 
-    def learn(self, result: Landed) -> None:
-        """Note how long a run took."""
-        self._fastest[result.cell] = min(self._fastest.get(result.cell, math.inf), result.seconds)
+    def learn(self, task: Task, outcome: Outcome) -> Outcome:
+        """Note that a task has ended, and how long its runs took; returns its outcome."""
+        self._compiled[_kernels(task.cell)] = True
+        for result in outcome:
+            if isinstance(result, Landed):
+                self._fastest[result.cell] = min(self._fastest.get(result.cell, math.inf), result.seconds)
+        return outcome
 
     def take(self) -> Task | None:
-        """The next task; None when all runs are handed out."""
-        waiting = [cell for cell in self._campaign.cells if self._todo[cell.name]]
+        """The next task; None when all runs are handed out, or wait for a first one to compile their kernels."""
+        waiting = [cell for cell in self._campaign.cells if self._todo[cell.name] and self._is_ready(cell)]
         if not waiting:
             return None
         cell = min(waiting, key=lambda cell: self._todo[cell.name][0])
+        self._compiled.setdefault(_kernels(cell), False)
         seconds = self._fastest.get(cell.name, MIN_TASK_SECONDS)
-        return self._task(cell, max(1, math.ceil(MIN_TASK_SECONDS / seconds)))
-
-    def warm_up(self) -> Iterator[Task]:
-        """One run for each set of kernels that the campaign needs, taken from what is to do."""
-        seen = set()
-        for cell in self._campaign.cells:
-            model = cell.scenario.model
-            kinds = {sensor.measurement.kind for sensor in model.sensors}
-            strategy = STRATEGIES.get(cell.planner)
-            plans = cell.planner if strategy is None or strategy.needs_labels else ""
-            kernels = (plans, model.filter.kind, model.fusion.kind, model.motion.kind, frozenset(kinds))
-            if kernels not in seen and self._todo[cell.name]:
-                seen.add(kernels)
-                yield self._task(cell, 1)
-
-    def _task(self, cell: Cell, count: int) -> Task:
+        count = max(1, math.ceil(MIN_TASK_SECONDS / seconds))
         runs = self._todo[cell.name]
         taken, self._todo[cell.name] = runs[:count], runs[count:]
         return Task(cell, self._campaign.seed, tuple(taken), self._versions)
+
+    def _is_ready(self, cell: Cell) -> bool:
+        return self._compiled.get(_kernels(cell), True)
+
+
+def _kernels(cell: Cell) -> tuple[object, ...]:
+    """Equal where two cells need the same kernels."""
+    model = cell.scenario.model
+    kinds = {sensor.measurement.kind for sensor in model.sensors}
+    strategy = STRATEGIES.get(cell.planner)
+    plans = cell.planner if strategy is None or strategy.needs_labels else ""
+    return plans, model.filter.kind, model.fusion.kind, model.motion.kind, frozenset(kinds)

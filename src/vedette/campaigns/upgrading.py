@@ -32,7 +32,7 @@ def upgrade_results(directory: Path | str) -> int:
         return number
     writer = journal.Writer(folder)
     try:
-        writer.open(contents_checksum(manifest))
+        writer.open_runs(contents_checksum(manifest))
         writer.rewrite(lambda entry: codec.upgraded(entry.payload, number))
         write_manifest(folder, {**manifest, "format_version": FORMAT_VERSION, "upgraded_from": number})
     finally:

@@ -16,6 +16,7 @@ from vedette.cli.progress import CampaignProgress
 from vedette.cli.results import print_failures
 from vedette.cli.running import Approval, compile_if_cold, interruptible, processors
 from vedette.extras import need
+from vedette.processes import load_ahead
 from vedette.text import counted
 
 if TYPE_CHECKING:
@@ -51,6 +52,8 @@ def campaign(
 ) -> None:
     """Run a campaign, or go on with one: every run that its folder does not hold yet."""
     need("vedette campaign", "pyarrow")
+    if scheduler is None and not dry_run:
+        load_workers(workers)
     from vedette.campaigns import load_spec, resolve
 
     resolved = resolve(load_spec(spec), spec.parent, approve=Approval(trust, spec))
@@ -75,6 +78,12 @@ def campaign(
         }
     )
     report_failures(outcome.failed)
+
+
+def load_workers(workers: int) -> None:
+    """Have what several workers need loaded, while this process reads what they are to do."""
+    if (workers or processors()) > 1:
+        load_ahead("vedette.cli")
 
 
 def carry_out(

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from vedette.campaigns import CampaignResults
+    from vedette.campaigns.results import CampaignResults, GroupComparison
     from vedette.simulation.records import RunRecord
 
 
@@ -40,7 +41,7 @@ def run_document(record: RunRecord, unit: str) -> dict[str, Any]:
     }
 
 
-def results_document(opened: CampaignResults) -> dict[str, Any]:
+def results_document(opened: CampaignResults, groups: Sequence[GroupComparison]) -> dict[str, Any]:
     """A campaign: its strategies side by side, group by group, and what is still to be run."""
     from vedette.evaluation.tables import strategy_numbers
 
@@ -60,6 +61,6 @@ def results_document(opened: CampaignResults) -> dict[str, Any]:
                 "unit": group.comparison.unit,
                 "strategies": [strategy_numbers(group.comparison, name) for name in group.comparison.strategies],
             }
-            for group in opened.comparisons()
+            for group in groups
         ],
     }

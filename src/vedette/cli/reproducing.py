@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from vedette.cli.campaign import carry_out, report_failures
+from vedette.cli.campaign import carry_out, load_workers, report_failures
 from vedette.cli.comparisons import print_scores
 from vedette.cli.completing import lists_of_strategies, reproducible
 from vedette.cli.documents import results_document
@@ -23,6 +24,7 @@ from vedette.extras import need
 
 if TYPE_CHECKING:
     from vedette.campaigns import CampaignResults, CampaignSpec
+    from vedette.campaigns.results import GroupComparison
     from vedette.campaigns.yardsticks import Yardstick
 
 YARDSTICK = "yardstick.md"
@@ -64,6 +66,8 @@ def reproduce(
     A campaign with its report, tables and figures.
     """
     need("vedette reproduce", "jinja2", "matplotlib", "pyarrow")
+    if not list_:
+        load_workers(workers)
     from vedette.campaigns import open_results, resolve
     from vedette.campaigns.yardsticks import yardsticks
 
@@ -77,13 +81,14 @@ def reproduce(
     folder = out or Path(_FOLDER if yardstick is None else campaign.default_folder)
     outcome = carry_out(campaign, folder, workers)
     opened = open_results(folder)
+    groups = opened.comparisons()
     if yardstick is None:
-        print_results(opened)
+        print_results(opened, groups)
     else:
-        _print_beside_published(opened, yardstick)
+        _print_beside_published(opened, groups, yardstick)
     page = _write(opened, yardstick, folder)
     published = () if yardstick is None else yardstick.published
-    publish({**results_document(opened), "published": [asdict(score) for score in published], "report": page})
+    publish({**results_document(opened, groups), "published": [asdict(score) for score in published], "report": page})
     report_failures(outcome.failed)
 
 
@@ -120,11 +125,11 @@ def _list(known: dict[str, Yardstick]) -> None:
     publish([{"name": name, "title": title} for name, title in titles.items()])
 
 
-def _print_beside_published(opened: CampaignResults, yardstick: Yardstick) -> None:
+def _print_beside_published(opened: CampaignResults, groups: Sequence[GroupComparison], yardstick: Yardstick) -> None:
     from vedette.campaigns.scores import score_strategies
     from vedette.campaigns.yardsticks import provenance
 
-    for group in opened.comparisons():
+    for group in groups:
         if title := opened.title(group):
             say(f"{title}:")
         print_scores((*score_strategies(opened, group), *yardstick.published), group.comparison.unit)

@@ -21,7 +21,7 @@ from vedette.text import counted
 if TYPE_CHECKING:
     from vedette.campaigns import Failed
     from vedette.campaigns.journal import Failure
-    from vedette.campaigns.results import CampaignResults
+    from vedette.campaigns.results import CampaignResults, GroupComparison
     from vedette.scenarios import Scenario
     from vedette.simulation.records import RunRecord
 
@@ -64,8 +64,9 @@ def results(
         document = run_document(opened, "" if scenario is None else scenario.model.ospa.unit)
     else:
         opened = open_results(folder)
-        print_results(opened)
-        document = results_document(opened)
+        groups = opened.comparisons()
+        print_results(opened, groups)
+        document = results_document(opened, groups)
     written: list[Path] = []
     if export is not None:
         from vedette.campaigns.export import FORMATS
@@ -96,9 +97,9 @@ def print_failures(failed: Sequence[Failed | Failure], tell: Callable[[str], Non
         tell(f"  and {len(failed) - _SHOWN_FAILURES} more")
 
 
-def print_results(opened: CampaignResults) -> None:
+def print_results(opened: CampaignResults, groups: Sequence[GroupComparison]) -> None:
     """One comparison a group of settings, then how many runs there are and how many are missing."""
-    for group in opened.comparisons():
+    for group in groups:
         if title := opened.title(group):
             say(f"{title}:")
         print_comparison(group.comparison)

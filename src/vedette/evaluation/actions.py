@@ -9,12 +9,12 @@ import numpy as np
 
 from vedette.kernels.base.types import Floats
 from vedette.platforms import Actions
+from vedette.text import with_minus
 
 # What one sensor was sent to do, rounded for counting: name and number of each column.
 Row: TypeAlias = tuple[tuple[str, float], ...]
 
 _UNITS = {"_deg": ("deg", "°"), "_rad": ("rad", " rad"), "_m": ("m", " m")}
-_MINUS = "\N{MINUS SIGN}"
 
 
 class ActionAxis(NamedTuple):
@@ -73,11 +73,6 @@ def row_words(row: Row) -> str:
 def choice_words(rows: Sequence[Row]) -> str:
     """What all sensors do: `-30°, 60°`."""
     return ("; " if any(len(row) > 1 for row in rows) else ", ").join(map(row_words, rows))
-
-
-def with_minus(text: str) -> str:
-    """Text with the minus sign of print."""
-    return text.replace("-", _MINUS)
 
 
 def _parts(column: str) -> tuple[str, str, str]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from vedette.control import JointPlanner
 from vedette.densities import GLMB, LMB, FactoredGLMB, Labelled
-from vedette.evaluation.runs import children_ignore_interrupts
+from vedette.processes import as_children, end_with_parent
 from vedette.scenarios import Scenario
 from vedette.scenarios.build import build_experiment, build_planner
 from vedette.simulation.experiment import Experiment
@@ -34,7 +34,7 @@ def precompile(scenario: Scenario) -> None:
         return
     other = get_context("spawn").Process(target=_compile_planning, args=(scenario,), daemon=True)
     try:
-        with children_ignore_interrupts():
+        with as_children():
             other.start()
     except OSError:
         return
@@ -50,6 +50,7 @@ def _compile_tracker(experiment: Experiment) -> None:
 
 def _compile_planning(scenario: Scenario) -> None:
     """Fuse, estimate and plan as if every birth site held a target, one of which a single sensor knows."""
+    end_with_parent()
     experiment = build_experiment(scenario)
     planner = build_planner(scenario, "jdm")
     assert isinstance(planner, JointPlanner)

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import signal
-import threading
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from functools import partial
 
 from vedette.evaluation.metrics import Metric, RunMetrics, TrackedShare, measure, ospa_of_run
@@ -54,16 +51,3 @@ def measure_run(record: RunRecord, scenario: Scenario, own: Sequence[Metric] = (
     """All measures of a run under the cutoff, order and window of its scenario; raises as `measure`."""
     ospa = scenario.model.ospa
     return measure(record, cutoff=ospa.cutoff, order=ospa.order, window=ospa.window, own=own)
-
-
-@contextmanager
-def children_ignore_interrupts() -> Iterator[None]:
-    """Processes started inside inherit that Ctrl-C is not for them; the main process stops them."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, before)

@@ -12,7 +12,7 @@ import numpy as np
 from vedette.evaluation.actions import choice_words
 from vedette.evaluation.comparison import PARTS, Comparison
 from vedette.evaluation.statistics import PairedDifference, Summary, summarise
-from vedette.text import named_in, spreadsheet_text
+from vedette.text import markdown_table, named_in, spreadsheet_text, with_error
 
 _ERRORS = ("OSPA", "Localisation", "Cardinality", "Difference")
 
@@ -44,18 +44,18 @@ def decision_rows(comparison: Comparison, strategy: str, *, at_most: int = 3) ->
 
 def strategy_markdown(comparison: Comparison) -> str:
     """The table as Markdown, with a line that says what was averaged."""
-    names = header(comparison)
-    lines = ["| " + " | ".join(names) + " |", "|" + " --- |" + " ---: |" * (len(names) - 1)]
-    lines += ["| " + " | ".join(row) + " |" for row in strategy_rows(comparison)]
-    return "\n".join([*lines, "", caption(comparison), ""])
+    table = markdown_table(header(comparison), strategy_rows(comparison))
+    return f"{table}\n{caption(comparison)}\n"
 
 
 def decisions_markdown(comparison: Comparison) -> str:
     """What each strategy decided, and how often, as Markdown."""
-    lines = ["| Strategy | Time | Actions and share of the runs |", "| --- | --- | --- |"]
-    for strategy in comparison.strategies:
-        lines += [f"| {strategy} | {time} | {shares} |" for time, shares in decision_rows(comparison, strategy)]
-    return "\n".join(lines) + "\n"
+    rows = [
+        (strategy, time, shares)
+        for strategy in comparison.strategies
+        for time, shares in decision_rows(comparison, strategy)
+    ]
+    return markdown_table(("Strategy", "Time", "Actions and share of the runs"), rows, numbers=False)
 
 
 def strategy_csv(comparisons: Mapping[str, Comparison] | Comparison) -> str:
@@ -119,7 +119,7 @@ def caption(comparison: Comparison) -> str:
 
 
 def _row(comparison: Comparison, strategy: str) -> tuple[str, ...]:
-    total = _with_error(comparison.summary(strategy))
+    total = _told(comparison.summary(strategy))
     parts = [f"{float(comparison.summary(strategy, part).mean):.2f}" for part in ("localisation", "cardinality")]
     if strategy == comparison.strategies[0]:
         return (strategy, total, *parts, "", "", "")
@@ -130,7 +130,7 @@ def _row(comparison: Comparison, strategy: str) -> tuple[str, ...]:
         strategy,
         total,
         *parts,
-        _with_error(difference.summary, sign="+"),
+        _told(difference.summary, sign="+"),
         interval if known else "unknown",
         _won(difference) if known else "unknown",
     )
@@ -141,6 +141,5 @@ def _won(difference: PairedDifference) -> str:
     return f"{difference.share_won:.0%}{tied}"
 
 
-def _with_error(summary: Summary, sign: str = "") -> str:
-    mean = f"{float(summary.mean):{sign}.2f}"
-    return mean if np.isnan(summary.standard_error) else f"{mean} ± {float(summary.standard_error):.2f}"
+def _told(summary: Summary, sign: str = "") -> str:
+    return with_error(float(summary.mean), float(summary.standard_error), sign)

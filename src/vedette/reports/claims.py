@@ -8,7 +8,7 @@ from typing import Literal
 from vedette.evaluation import Comparison, PairedDifference
 from vedette.evaluation.figures.style import strategy_label
 from vedette.evaluation.health import percent
-from vedette.text import amount
+from vedette.text import amount, with_minus
 
 Verdict = Literal["better", "worse", "untold", "unknown"]
 
@@ -53,7 +53,7 @@ def claim(comparison: Comparison, first: str, second: str) -> Claim:
     mean, low, high = (float(each) for each in (paired.summary.mean, paired.summary.low, paired.summary.high))
     share = "unknown" if verdict == "unknown" else percent(paired.share_won)
     interval = "" if verdict == "unknown" else f" ({low:+.2f} to {high:+.2f})"
-    return Claim(verdict, *names, sentence, _minus(f"{mean:+.2f}{interval}"), share)
+    return Claim(verdict, *names, sentence, with_minus(f"{mean:+.2f}{interval}"), share)
 
 
 def _verdict(paired: PairedDifference) -> Verdict:
@@ -82,7 +82,7 @@ def _worse(first: str, second: str, paired: PairedDifference, unit: str) -> str:
 
 
 def _untold(first: str, second: str, paired: PairedDifference, unit: str) -> str:
-    difference = amount(_minus(f"{float(paired.summary.mean):.2f}"), unit)
+    difference = amount(with_minus(f"{float(paired.summary.mean):.2f}"), unit)
     return (
         f"{first} and {second} are not told apart: the paired difference in mean OSPA, {second} minus {first}, is "
         f"{difference}, but its 95 % confidence interval, {_interval(paired, unit)}, "
@@ -91,7 +91,7 @@ def _untold(first: str, second: str, paired: PairedDifference, unit: str) -> str
 
 
 def _unknown(first: str, second: str, paired: PairedDifference, unit: str) -> str:
-    difference = amount(_minus(f"{float(paired.summary.mean):.2f}"), unit)
+    difference = amount(with_minus(f"{float(paired.summary.mean):.2f}"), unit)
     return (
         f"{first} and {second} have one run in common, and one run tells nothing apart: the difference in mean OSPA, "
         f"{second} minus {first}, is {difference} in it."
@@ -106,7 +106,7 @@ def _interval(paired: PairedDifference, unit: str) -> str:
 
 
 def _range(low: float, high: float, unit: str) -> str:
-    return amount(_minus(f"{low:.2f} to {high:.2f}"), unit)
+    return amount(with_minus(f"{low:.2f} to {high:.2f}"), unit)
 
 
 def _runs(paired: PairedDifference) -> str:
@@ -116,7 +116,3 @@ def _runs(paired: PairedDifference) -> str:
 def _share(paired: PairedDifference) -> str:
     tied = f", equal in {percent(paired.share_tied)}" if paired.share_tied > 0.0 else ""
     return f"{percent(paired.share_won)} of the runs{tied}"
-
-
-def _minus(text: str) -> str:
-    return text.replace("-", "\N{MINUS SIGN}")

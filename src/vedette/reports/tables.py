@@ -15,7 +15,7 @@ from vedette.evaluation.tables import decision_rows, header, strategy_rows
 from vedette.kernels.base.types import Bools, Floats
 from vedette.reports.groups import Group, Strategy
 from vedette.simulation.records import RunRecord
-from vedette.text import elided_apart
+from vedette.text import elided_apart, with_error, with_minus
 
 _BY_CHANCE = 1e-3  # chance below which a largest value says that the filter is not consistent
 _LONGEST_NAME = 32  # letters, beyond which the page gives the full name as a title
@@ -118,7 +118,7 @@ def error_table(group: Group) -> Table | None:
     if group.comparison is None:
         return None
     rows = tuple(
-        (strategy_label(name), *(cell.replace("-", "\N{MINUS SIGN}") for cell in cells))
+        (strategy_label(name), *(with_minus(cell) for cell in cells))
         for name, *cells in strategy_rows(group.comparison)
     )
     first = strategy_label(group.comparison.strategies[0])
@@ -253,8 +253,7 @@ def _over_runs(kind: _Kind, strategy: Strategy, counted: Bools) -> str:
 
 def _with_error(values: Sequence[float]) -> str:
     summary = summarise(values)
-    mean = f"{float(summary.mean):.2f}".replace("-", "\N{MINUS SIGN}")
-    return mean if summary.num_runs < 2 else f"{mean} ± {float(summary.standard_error):.2f}"
+    return with_minus(with_error(float(summary.mean), float(summary.standard_error)))
 
 
 def stage_seconds(strategy: Strategy) -> dict[str, Floats]:
@@ -303,7 +302,7 @@ def decision_table(group: Group) -> Table | None:
     if group.comparison is None:
         return None
     rows = [
-        (strategy_label(strategy), when, shares.replace("-", "\N{MINUS SIGN}"))
+        (strategy_label(strategy), when, with_minus(shares))
         for strategy in group.comparison.strategies
         for when, shares in decision_rows(group.comparison, strategy)
     ]

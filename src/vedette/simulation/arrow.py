@@ -7,12 +7,13 @@ unknown origin: nothing unpacks, no type but those of `Kind` is made, and every 
 from __future__ import annotations
 
 import struct
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vedette.errors import InputError
 from vedette.extras import need
@@ -29,6 +30,7 @@ Columns: TypeAlias = dict[str, "Ints | Floats | Bools | list[str]"]
 RUN_COLUMNS = frozenset({"cell", "run", "scenario", "planner", "variant", "filter", "fusion"})
 
 _MAGIC, _ALIGNMENT = b"ARROW1", 8
+_MOST_TEXT = 2**31 - 1  # bytes of a column: its offsets are 32 bits wide
 
 
 class Kind(Enum):
@@ -40,6 +42,15 @@ class Kind(Enum):
     VALUE = "numbers or nothing"  # (num_rows,) float64, null in the file for NaN
     TRUTH = "truths"  # (num_rows,) bool
     TEXT = "texts"  # num_rows texts
+
+
+_DTYPES: dict[Kind, type] = {
+    Kind.INTEGER: np.int64,
+    Kind.NUMBER: np.float64,
+    Kind.COUNT: np.int64,
+    Kind.VALUE: np.float64,
+    Kind.TRUTH: np.bool_,
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,6 +76,44 @@ class Layout:
         return [name for name in names if name not in self.fixed]
 
 
+def stacked(
+    parts: Sequence[Mapping[str, Any]], layout: Layout, names: Sequence[str] = (), num_rows: Sequence[int] = ()
+) -> Columns:
+    """Tables one below another.
+
+    Args:
+        parts: their columns; a single value stands in every row of its part.
+        layout: of the result. Where a part lacks a column there is nothing: NaN, or -1 of a count.
+        names: of all columns, in order; none: the fixed ones and then what the parts have beside them.
+        num_rows: of each part; none: as its columns have, one where all are single values.
+
+    Raises `InputError` for a column that is not among the names.
+    """
+    names = names or list(dict.fromkeys([*layout.fixed, *(name for part in parts for name in part)]))
+    if others := {name for part in parts for name in part} - set(names):
+        raise InputError(f"column {shown(min(others))}: expected one of {', '.join(names)}")
+    lengths = num_rows or [next((len(of) for of in part.values() if not np.isscalar(of)), 1) for part in parts]
+    joined: Columns = {}
+    for name in names:
+        kind = layout.kind(name)
+        assert kind is not None  # of all that is kept
+        missing = -1 if kind is Kind.COUNT else np.nan
+        joined[name] = _joined([part.get(name, missing) for part in parts], lengths, kind)
+    return joined
+
+
+def _joined(column: list[Any], lengths: Sequence[int], kind: Kind) -> Any:
+    if kind is Kind.TEXT:
+        parts = zip(column, lengths, strict=True)
+        return [text for of, num in parts for text in ([of] * num if isinstance(of, str) else of)]
+    if not column:
+        return np.empty(0, _DTYPES[kind])
+    whole = np.concatenate(
+        [np.full(num, of) if np.isscalar(of) else of for of, num in zip(column, lengths, strict=True)]
+    )
+    return whole if kind is Kind.NUMBER else whole.astype(_DTYPES[kind], copy=False)
+
+
 def to_arrow(columns: Columns, layout: Layout, *, nan_is_null: bool = False) -> pa.RecordBatch:
     """The table in Arrow; with `nan_is_null` for tools that would take NaN for a number.
 
@@ -78,21 +127,62 @@ def to_arrow(columns: Columns, layout: Layout, *, nan_is_null: bool = False) -> 
         kind = layout.kind(name)
         if kind is None:
             raise InputError(f"column {shown(name)}: expected one of {', '.join(layout.fixed)}")
-        if kind is Kind.TEXT:
-            arrays.append(pa.array(column, pa.string()))
-            continue
-        values = np.ascontiguousarray(column)
-        if kind is Kind.COUNT and (gaps := values < 0).any():
-            arrays.append(pa.array(np.where(gaps, 0, values), mask=gaps))
-        elif kind in (Kind.VALUE, Kind.TRUTH) or (nan_is_null and kind is Kind.NUMBER):
-            arrays.append(pa.array(values, from_pandas=True))
-        else:  # what pa.array gives, in two thirds of the time
-            buffers = [None, pa.py_buffer(values)]
-            arrays.append(pa.Array.from_buffers(pa.from_numpy_dtype(values.dtype), len(values), buffers, 0))
+        arrays.append(_texts(list(column)) if kind is Kind.TEXT else _numbers(column, kind, nan_is_null))
     lengths = [len(array) for array in arrays]
     if len(set(lengths)) > 1:
         raise InputError(f"columns: expected equal lengths; got {', '.join(map(str, lengths))}")
     return pa.RecordBatch.from_arrays(arrays, list(columns))
+
+
+# By their buffers, as pa.array and to_numpy would, but these load pandas if it is there, longer than a run takes.
+
+
+def _texts(texts: list[Any]) -> pa.Array:
+    import pyarrow as pa
+
+    known = {text: text.encode() for text in set(texts)}
+    encoded = [known[text] for text in texts]
+    offsets = np.cumsum([0, *map(len, encoded)])
+    if offsets[-1] > _MOST_TEXT:
+        raise InputError(f"column of texts: expected at most {_MOST_TEXT} bytes; got {offsets[-1]}")
+    buffers = [None, pa.py_buffer(offsets.astype(np.int32)), pa.py_buffer(b"".join(encoded))]
+    return pa.Array.from_buffers(pa.string(), len(encoded), buffers)
+
+
+def _numbers(column: Any, kind: Kind, nan_is_null: bool) -> pa.Array:
+    import pyarrow as pa
+
+    values: NDArray[Any] = np.ascontiguousarray(column)
+    missing = np.zeros(len(values), bool)
+    if kind is Kind.COUNT:
+        missing = values < 0
+        values = np.where(missing, 0, values)
+    elif kind is Kind.VALUE or (nan_is_null and kind is Kind.NUMBER):
+        missing = np.isnan(values)
+    known = pa.py_buffer(_bits(~missing)) if missing.any() else None
+    is_truth = values.dtype == bool
+    content, values_type = (_bits(values), pa.bool_()) if is_truth else (values, pa.from_numpy_dtype(values.dtype))
+    return pa.Array.from_buffers(values_type, len(values), [known, pa.py_buffer(content)])
+
+
+def _bits(truths: Bools) -> NDArray[np.uint8]:
+    return np.packbits(truths, bitorder="little")
+
+
+def _values(column: pa.Array, kind: Kind) -> NDArray[Any]:
+    """The numbers of a column, in memory of their own; -1 or NaN where there is none."""
+    known, content = column.buffers()
+    bits = slice(column.offset, column.offset + len(column))
+    if kind is Kind.TRUTH:
+        return _truths(content)[bits]
+    values: NDArray[Any] = np.frombuffer(content or b"", _DTYPES[kind])[bits].copy()
+    if column.null_count:
+        values[~_truths(known)[bits]] = -1 if kind is Kind.COUNT else np.nan
+    return values
+
+
+def _truths(bits: Any) -> Bools:
+    return np.unpackbits(np.frombuffer(bits or b"", np.uint8), bitorder="little").astype(bool)
 
 
 def write_table(columns: Columns, layout: Layout, metadata: Mapping[str, str] | None = None) -> bytes:
@@ -179,12 +269,10 @@ def _check_names(names: list[str], layout: Layout, place: str) -> None:
 def _check_types(schema: pa.Schema, layout: Layout, place: str) -> None:
     import pyarrow as pa
 
-    numbers = {Kind.INTEGER: pa.int64(), Kind.COUNT: pa.int64(), Kind.NUMBER: pa.float64(), Kind.VALUE: pa.float64()}
-    types = {**numbers, Kind.TRUTH: pa.bool_(), Kind.TEXT: pa.string()}
     for each in schema:
         kind = layout.kind(each.name)
         assert kind is not None  # of the names checked before
-        if each.type != types[kind]:
+        if each.type != (pa.string() if kind is Kind.TEXT else pa.from_numpy_dtype(_DTYPES[kind])):
             raise InputError(
                 f"{place}, column {shown(each.name)}: expected {kind.value}; got the type {shown(str(each.type))}"
             )
@@ -200,9 +288,6 @@ def _read_columns(schema: pa.Schema, message: pa.Message, layout: Layout, place:
         kind = layout.kind(name)
         if column.null_count and kind not in (Kind.COUNT, Kind.VALUE):
             raise InputError(f"{place}, column {shown(name)}: expected {kind.value if kind else ''}; got nothing")
-        if kind is Kind.TEXT:
-            columns[name] = column.to_pylist()
-        else:
-            whole = column.fill_null(-1) if kind is Kind.COUNT and column.null_count else column
-            columns[name] = np.array(whole.to_numpy(zero_copy_only=False))  # a copy: arrays that may be written to
+        assert kind is not None  # of the names checked before
+        columns[name] = column.to_pylist() if kind is Kind.TEXT else _values(column, kind)
     return columns

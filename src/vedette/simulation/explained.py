@@ -14,16 +14,14 @@ import numpy as np
 
 from vedette.control import Bound, Explanation, Plan, RunnerUp, TargetGains
 from vedette.errors import InputError
-from vedette.kernels.base.types import Floats
-from vedette.simulation.arrow import Columns, Kind, Layout
+from vedette.simulation.arrow import Columns, Kind, Layout, stacked
+from vedette.simulation.planned import DECISION, moment
 from vedette.simulation.records import Decision
-
-_DECISION = {"decision": Kind.INTEGER, "step": Kind.INTEGER, "time_s": Kind.NUMBER}
 
 EXPLAINED: dict[str, Layout] = {
     "explanations": Layout(
         {
-            **_DECISION,
+            **DECISION,
             "reward": Kind.VALUE,
             "reward_se": Kind.VALUE,
             "baseline": Kind.VALUE,
@@ -41,14 +39,14 @@ EXPLAINED: dict[str, Layout] = {
     ),
     "target_gains": Layout(
         {
-            **_DECISION,
+            **DECISION,
             "birth_step": Kind.INTEGER,
             "birth_site": Kind.INTEGER,
             "existence_gain": Kind.NUMBER,
             "localisation_gain": Kind.NUMBER,
         }
     ),
-    "sensor_gains": Layout({**_DECISION, "sensor": Kind.INTEGER, "gain": Kind.NUMBER, "without": Kind.NUMBER}),
+    "sensor_gains": Layout({**DECISION, "sensor": Kind.INTEGER, "gain": Kind.NUMBER, "without": Kind.NUMBER}),
 }
 
 
@@ -64,68 +62,41 @@ def explained_tables(decisions: Sequence[Decision], num_sensors: int) -> dict[st
             values = getattr(why, name)
             if values is not None and np.shape(values) != (num_sensors,):
                 raise InputError(f"plan.explanation.{name}: expected {num_sensors} numbers; got {np.shape(values)}")
+    names = [*EXPLAINED["explanations"].fixed, *(f"action_{sensor}" for sensor in range(num_sensors))]
+    parts: dict[str, list[dict[str, Any]]] = {name: [] for name in EXPLAINED}
+    for number, each, why in kept:
+        of, gains = moment(number, each), why.of_targets
+        parts["explanations"].append({**of, **_told(why)})
+        if gains is not None:
+            labels = {"birth_step": gains.labels[:, 0], "birth_site": gains.labels[:, 1]}
+            gained = {"existence_gain": gains.existence, "localisation_gain": gains.localisation}
+            parts["target_gains"].append({**of, **labels, **gained})
+        if why.of_sensors is not None and why.without is not None:
+            shares = {"sensor": np.arange(num_sensors), "gain": why.of_sensors, "without": why.without}
+            parts["sensor_gains"].append({**of, **shares})
     return {
-        "explanations": _explanations(kept, num_sensors),
-        "target_gains": _targets(kept),
-        "sensor_gains": _sensors(kept),
+        name: stacked(of, EXPLAINED[name], names if name == "explanations" else list(EXPLAINED[name].fixed))
+        for name, of in parts.items()
     }
 
 
-_Kept = Sequence[tuple[int, Decision, Explanation]]
-
-
-def _moments(kept: _Kept, repeats: Sequence[int]) -> Columns:
-    rows = np.repeat(np.arange(len(kept)), repeats)
+def _told(why: Explanation) -> dict[str, Any]:
+    """What an explanation says in one row."""
+    bound, second = why.bound, why.runner_up
     return {
-        "decision": np.array([number for number, *_ in kept], np.int64)[rows],
-        "step": np.array([each.step for _, each, _ in kept], np.int64)[rows],
-        "time_s": np.array([each.time for _, each, _ in kept], np.float64)[rows],
-    }
-
-
-def _explanations(kept: _Kept, num_sensors: int) -> Columns:
-    every = [why for *_, why in kept]
-    bounds, seconds = [why.bound for why in every], [why.runner_up for why in every]
-    others = np.array([[-1] * num_sensors if one is None else one.actions for one in seconds], np.int64)
-    return {
-        **_moments(kept, [1] * len(kept)),
-        "reward": _numbers([why.reward for why in every]),
-        "reward_se": _numbers([why.standard_error for why in every]),
-        "baseline": _numbers([why.baseline for why in every]),
-        "undetected_gain": _numbers([why.of_undetected for why in every]),
-        "evaluations": np.array([why.evaluations for why in every], np.int64),
-        "bound": _numbers([None if bound is None else bound.upper for bound in bounds]),
-        "bound_kind": ["" if bound is None else bound.kind for bound in bounds],
-        "bound_unbounded": np.array([-1 if bound is None else bound.unbounded for bound in bounds], np.int64),
-        "runner_up": ["" if one is None else one.text for one in seconds],
-        "margin": _numbers([None if one is None else one.margin for one in seconds]),
-        "margin_se": _numbers([None if one is None else one.standard_error for one in seconds]),
-        "missing": ["\n".join(f"{name}: {reason}" for name, reason in why.missing.items()) for why in every],
-        **{f"action_{s}": column for s, column in enumerate(others.reshape(-1, num_sensors).T)},
-    }
-
-
-def _targets(kept: _Kept) -> Columns:
-    gains = [why.of_targets for *_, why in kept]
-    present = [each for each in gains if each is not None]
-    labels = np.concatenate([np.empty((0, 2), np.int64), *(each.labels for each in present)])
-    return {
-        **_moments(kept, [0 if each is None else len(each.labels) for each in gains]),
-        "birth_step": labels[:, 0],
-        "birth_site": labels[:, 1],
-        "existence_gain": np.concatenate([np.empty(0), *(each.existence for each in present)]),
-        "localisation_gain": np.concatenate([np.empty(0), *(each.localisation for each in present)]),
-    }
-
-
-def _sensors(kept: _Kept) -> Columns:
-    counts = [0 if why.of_sensors is None or why.without is None else len(why.of_sensors) for *_, why in kept]
-    present = [why for (*_, why), count in zip(kept, counts, strict=True) if count]
-    return {
-        **_moments(kept, counts),
-        "sensor": np.concatenate([np.empty(0, np.int64), *(np.arange(count) for count in counts)]),
-        "gain": np.concatenate([np.empty(0), *(_floats(why.of_sensors) for why in present)]),
-        "without": np.concatenate([np.empty(0), *(_floats(why.without) for why in present)]),
+        "reward": _or_nan(why.reward),
+        "reward_se": _or_nan(why.standard_error),
+        "baseline": _or_nan(why.baseline),
+        "undetected_gain": _or_nan(why.of_undetected),
+        "evaluations": why.evaluations,
+        "bound": np.nan if bound is None else bound.upper,
+        "bound_kind": "" if bound is None else bound.kind,
+        "bound_unbounded": -1 if bound is None else bound.unbounded,
+        "runner_up": "" if second is None else second.text,
+        "margin": np.nan if second is None else second.margin,
+        "margin_se": np.nan if second is None else _or_nan(second.standard_error),
+        "missing": "\n".join(f"{name}: {reason}" for name, reason in why.missing.items()),
+        **({} if second is None else {f"action_{sensor}": action for sensor, action in enumerate(second.actions)}),
     }
 
 
@@ -195,13 +166,8 @@ def _runner_up(plan: Plan, table: Mapping[str, Any], row: int) -> RunnerUp:
     return RunnerUp(actions, table["runner_up"][row], float(table["margin"][row]), error)
 
 
-def _floats(values: Floats | None) -> Floats:
-    assert values is not None
-    return values
-
-
-def _numbers(values: Sequence[float | None]) -> Floats:
-    return np.array([np.nan if value is None else value for value in values], np.float64)
+def _or_nan(value: float | None) -> float:
+    return np.nan if value is None else value
 
 
 def _number(value: float) -> float | None:

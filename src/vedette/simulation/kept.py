@@ -16,7 +16,6 @@ from vedette.simulation.tables import (
     OPTIONAL,
     TIMINGS,
     check_record,
-    optional_tables_of,
     record_of,
     tables_of,
     timing_table,
@@ -39,9 +38,8 @@ def encode_run(record: RunRecord) -> dict[str, bytes]:
     Raises `InputError` for a record that contradicts itself or holds an invalid plan.
     """
     check_record(record)
-    files = {f"{name}{ENDING}": write_table(table, LAYOUTS[name]) for name, table in tables_of(record).items()}
-    optional = optional_tables_of(record)
-    return files | {f"{name}{ENDING}": write_table(table, OPTIONAL[name]) for name, table in optional.items()}
+    layouts = {**LAYOUTS, **OPTIONAL}
+    return {f"{name}{ENDING}": write_table(table, layouts[name]) for name, table in tables_of(record).items()}
 
 
 def decode_run(
@@ -52,14 +50,12 @@ def decode_run(
     Raises `InputError`, naming `place` and the file, for files that are missing, damaged or do not fit together.
     """
     tables = {}
-    for name, layout in LAYOUTS.items():
+    for name, layout in {**LAYOUTS, **OPTIONAL}.items():
         file = f"{name}{ENDING}"
-        if file not in files:
-            raise InputError(f"{place}: expected a file {file}; got {shown(', '.join(files)) if files else 'none'}")
-        tables[name] = read_table(files[file], layout, f"{place}/{file}")
-    for name, layout in OPTIONAL.items():
-        if (file := f"{name}{ENDING}") in files:
+        if file in files:
             tables[name] = read_table(files[file], layout, f"{place}/{file}")
+        elif name in LAYOUTS:
+            raise InputError(f"{place}: expected a file {file}; got {shown(', '.join(files)) if files else 'none'}")
     spent = {} if timings is None else decode_timings(timings, f"{place}/timings{ENDING}")
     try:
         record = record_of(facts, tables, spent)

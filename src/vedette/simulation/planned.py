@@ -14,20 +14,20 @@ from vedette.control.plan import Plan, RewardTable
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats, Ints
 from vedette.platforms import Actions
-from vedette.simulation.arrow import RUN_COLUMNS, Columns, Kind, Layout
+from vedette.simulation.arrow import RUN_COLUMNS, Columns, Kind, Layout, stacked
 from vedette.simulation.records import Decision
 from vedette.text import shown
 
-_DECISION = {"decision": Kind.INTEGER, "step": Kind.INTEGER, "time_s": Kind.NUMBER}
+DECISION = {"decision": Kind.INTEGER, "step": Kind.INTEGER, "time_s": Kind.NUMBER}
 
 PLANNED: dict[str, Layout] = {
-    "decisions": Layout({**_DECISION, "planner": Kind.TEXT, "notes": Kind.TEXT}, {"num_": Kind.COUNT}),
+    "decisions": Layout({**DECISION, "planner": Kind.TEXT, "notes": Kind.TEXT}, {"num_": Kind.COUNT}),
     "actions": Layout(
-        {**_DECISION, "sensor": Kind.INTEGER, "action": Kind.INTEGER, "chosen": Kind.TRUTH}, {"": Kind.VALUE}
+        {**DECISION, "sensor": Kind.INTEGER, "action": Kind.INTEGER, "chosen": Kind.TRUTH}, {"": Kind.VALUE}
     ),
     "rewards": Layout(
         {
-            **_DECISION,
+            **DECISION,
             "reward_table": Kind.INTEGER,
             "reward": Kind.NUMBER,
             "reward_se": Kind.NUMBER,
@@ -41,7 +41,7 @@ PLANNED: dict[str, Layout] = {
 OWN_REWARDS: dict[str, Layout] = {
     "own_rewards": Layout(
         {
-            **_DECISION,
+            **DECISION,
             "reward_table": Kind.INTEGER,
             "sensor": Kind.INTEGER,
             "action": Kind.INTEGER,
@@ -57,42 +57,56 @@ _MOST_REWARDS = 2**26  # of a run, those that were not evaluated included: what 
 _TAKEN = {*PLANNED["actions"].fixed, *RUN_COLUMNS}
 
 
+def moment(number: int, decision: Decision) -> dict[str, Any]:
+    """The columns that say which decision a row is of."""
+    return {"decision": number, "step": decision.step, "time_s": decision.time}
+
+
 def planned_tables(decisions: Sequence[Decision], num_sensors: int) -> dict[str, Columns]:
-    """The tables of `PLANNED`. Raises `InputError` for plans that no table can hold."""
-    counted = dict.fromkeys(name for decision in decisions for name in decision.plan.counts)
-    of_decisions = {
-        **_columns_of(enumerate(decisions)),
-        "planner": [decision.plan.planner for decision in decisions],
-        "notes": [_notes(decision.plan) for decision in decisions],
-        **{f"num_{name}": np.array([each.plan.counts.get(name, -1) for each in decisions]) for name in counted},
-    }
-    return {"decisions": of_decisions, "actions": _actions(decisions), "rewards": _rewards(decisions, num_sensors)}
+    """The tables of `PLANNED`, and that of `OWN_REWARDS` where there is something to stand in it.
 
-
-def own_reward_tables(decisions: Sequence[Decision], num_sensors: int) -> dict[str, Columns]:
-    """The table of `OWN_REWARDS`, where there is something to stand in it."""
-    if num_sensors <= _FEW_SENSORS:
-        return {}
-    parts = [
-        (number, decision, place, table, np.flatnonzero(~np.isnan(table.mean)))
-        for number, decision in enumerate(decisions)
-        for place, table in enumerate(decision.plan.tables)
-        if len(table.sensors) == 1
+    Raises `InputError` for plans that no table can hold.
+    """
+    of_decisions = [
+        {**moment(number, each), "planner": each.plan.planner, "notes": _notes(each.plan), **_counts(each.plan)}
+        for number, each in enumerate(decisions)
     ]
-    if not parts:
-        return {}
-    lengths = [len(actions) for *_, actions in parts]
-    chosen = [actions == each.plan.chosen[table.sensors[0]] for _, each, _, table, actions in parts]
+    if sum(table.mean.size for each in decisions for table in each.plan.tables) > _MOST_REWARDS:
+        raise InputError(f"plan.tables: expected at most {_MOST_REWARDS} entries in all; got more")
+    joint, own = [], []
+    for number, each in enumerate(decisions):
+        for place, table in enumerate(each.plan.tables):
+            rows = {**moment(number, each), "reward_table": place, **_evaluated(table, each.plan)}
+            if len(table.sensors) > 1 or num_sensors <= _FEW_SENSORS:
+                joint.append(rows)
+            else:
+                (sensor,) = table.sensors
+                own.append({"sensor": sensor, "action": rows.pop(f"action_{sensor}"), **rows})
+    start, end = (*DECISION, "reward_table"), ("reward", "reward_se", "chosen")
+    names = (*start, *(f"action_{sensor}" for sensor in range(num_sensors)), *end)
+    found = {
+        "decisions": stacked(of_decisions, PLANNED["decisions"]),
+        "actions": _actions(decisions),
+        "rewards": stacked(joint, PLANNED["rewards"], names),
+    }
+    layout = OWN_REWARDS["own_rewards"]
+    return {**found, "own_rewards": stacked(own, layout, list(layout.fixed))} if own else found
+
+
+def _counts(plan: Plan) -> dict[str, int]:
+    return {f"num_{name}": count for name, count in plan.counts.items()}
+
+
+def _evaluated(table: RewardTable, plan: Plan) -> dict[str, Any]:
+    """A row an action, or combination of actions, of which the reward is known; by sensor which of its actions."""
+    if list(table.sensors) != sorted(table.sensors):
+        raise InputError(f"plan.tables: expected sensors in increasing order; got {table.sensors}")
+    index = np.argwhere(~np.isnan(table.mean))
     return {
-        "own_rewards": {
-            **_columns_of(((number, decision) for number, decision, *_ in parts), lengths),
-            "reward_table": np.repeat(np.array([place for _, _, place, *_ in parts], np.int64), lengths),
-            "sensor": np.repeat(np.array([table.sensors[0] for *_, table, _ in parts], np.int64), lengths),
-            "action": _joined([actions for *_, actions in parts], np.int64),
-            "reward": _joined([table.mean[actions] for *_, table, actions in parts], np.float64),
-            "reward_se": _joined([table.standard_error[actions] for *_, table, actions in parts], np.float64),
-            "chosen": _joined(chosen, bool),
-        }
+        **{f"action_{sensor}": column for sensor, column in zip(table.sensors, index.T, strict=True)},
+        "reward": table.mean[tuple(index.T)],
+        "reward_se": table.standard_error[tuple(index.T)],
+        "chosen": (index == [plan.chosen[sensor] for sensor in table.sensors]).all(axis=1),
     }
 
 
@@ -101,20 +115,20 @@ def decisions_of(tables: Mapping[str, Mapping[str, Any]], poses: Floats) -> tupl
 
     Raises `InputError`, `KeyError`, `IndexError` or `ValueError` for tables that do not fit together.
     """
-    table, actions, rewards = (tables[name] for name in PLANNED)
-    num, own = len(table["decision"]), tables.get("own_rewards")
+    table = tables["decisions"]
+    num = len(table["decision"])
     if not np.array_equal(table["decision"], np.arange(num)):
         raise InputError("decisions, column decision: expected them numbered from 0")
     counted = PLANNED["decisions"].others(table)
-    of_actions, of_rewards = _rows_by("decision", actions, num), _rows_by("decision", rewards, num)
-    of_own = [slice(0)] * num if own is None else _rows_by("decision", own, num)
+    of_actions, of_rewards = (parts_of(tables[name], "decision", num) for name in ("actions", "rewards"))
+    of_own = parts_of(tables["own_rewards"], "decision", num) if "own_rewards" in tables else [{}] * num
     decisions, room = [], _MOST_REWARDS
     for index, step in enumerate(table["step"].tolist()):
         plan = _plan(
             table["planner"][index],
-            {name: column[of_actions[index]] for name, column in actions.items()},
-            {name: column[of_rewards[index]] for name, column in rewards.items()},
-            {name: column[of_own[index]] for name, column in (own or {}).items()},
+            of_actions[index],
+            of_rewards[index],
+            of_own[index],
             table["notes"][index],
             {name.removeprefix("num_"): int(table[name][index]) for name in counted if table[name][index] >= 0},
             room,
@@ -134,8 +148,7 @@ def _plan(
     room: int,
 ) -> Plan:
     options, chosen = [], []
-    for rows in _rows_by("sensor", actions):
-        own = {name: column[rows] for name, column in actions.items()}
+    for own in parts_of(actions, "sensor"):
         if not np.array_equal(own["action"], np.arange(len(own["action"]))):
             raise InputError("actions, column action: expected those of a sensor numbered from 0")
         (choice,) = np.flatnonzero(own["chosen"])
@@ -200,28 +213,20 @@ def _notes(plan: Plan) -> str:
 
 def _actions(decisions: Sequence[Decision]) -> Columns:
     """One row a decision, sensor and action; null where a number is none of the sensor's."""
+    layout = PLANNED["actions"]
     parts = [
-        (number, decision, sensor, own.columns, own.values)
+        {
+            **moment(number, decision),
+            "sensor": sensor,
+            "action": np.arange(len(own)),
+            "chosen": np.arange(len(own)) == decision.plan.chosen[sensor],
+            **dict(zip(map(_column_of, own.columns), own.values.T, strict=True)),
+        }
         for number, decision in enumerate(decisions)
         for sensor, own in enumerate(decision.plan.actions)
     ]
-    lengths = [len(values) for *_, values in parts]
-    names = _in_one_order([own for *_, own, _ in parts])
-    numbers = {name: np.full(sum(lengths), np.nan) for name in names}
-    start = 0
-    for *_, own, values in parts:
-        for name, column in zip(own, values.T, strict=True):
-            numbers[name][start : start + len(values)] = column
-        start += len(values)
-    return {
-        **_columns_of(((number, decision) for number, decision, *_ in parts), lengths),
-        "sensor": np.repeat(np.array([sensor for _, _, sensor, *_ in parts], np.int64), lengths),
-        "action": _joined([np.arange(length) for length in lengths], np.int64),
-        "chosen": _joined(
-            [np.arange(len(values)) == decision.plan.chosen[sensor] for _, decision, sensor, _, values in parts], bool
-        ),
-        **{f"action_{name}" if _is_taken(name) else name: column for name, column in numbers.items()},
-    }
+    numbers = _in_one_order([own.columns for decision in decisions for own in decision.plan.actions])
+    return stacked(parts, layout, [*layout.fixed, *map(_column_of, numbers)])
 
 
 def _in_one_order(orders: Sequence[Sequence[str]]) -> tuple[str, ...]:
@@ -237,54 +242,9 @@ def _in_one_order(orders: Sequence[Sequence[str]]) -> tuple[str, ...]:
         raise InputError(f"plan.actions: expected columns in one order for all; got {listed}") from None
 
 
-def _is_taken(name: str) -> bool:
-    return name in _TAKEN or name.startswith("action_")
-
-
-def _rewards(decisions: Sequence[Decision], num_sensors: int) -> Columns:
-    """One row an action, or combination of actions, that was evaluated; null for a sensor that is not of the table."""
-    parts = [
-        (number, decision, place, table, np.argwhere(~np.isnan(table.mean)))
-        for number, decision in enumerate(decisions)
-        for place, table in enumerate(decision.plan.tables)
-        if len(table.sensors) > 1 or num_sensors <= _FEW_SENSORS
-    ]
-    if sum(table.mean.size for each in decisions for table in each.plan.tables) > _MOST_REWARDS:
-        raise InputError(f"plan.tables: expected at most {_MOST_REWARDS} entries in all; got more")
-    lengths = [len(index) for *_, index in parts]
-    actions = np.full((sum(lengths), num_sensors), -1)
-    start = 0
-    for _, _, _, table, index in parts:
-        if list(table.sensors) != sorted(table.sensors):
-            raise InputError(f"plan.tables: expected sensors in increasing order; got {table.sensors}")
-        actions[start : start + len(index), list(table.sensors)] = index
-        start += len(index)
-    return {
-        **_columns_of(((number, decision) for number, decision, *_ in parts), lengths),
-        "reward_table": np.repeat(np.array([place for _, _, place, *_ in parts], np.int64), lengths),
-        **{f"action_{sensor}": actions[:, sensor] for sensor in range(num_sensors)},
-        "reward": _joined([table.mean[tuple(index.T)] for *_, table, index in parts], np.float64),
-        "reward_se": _joined([table.standard_error[tuple(index.T)] for *_, table, index in parts], np.float64),
-        "chosen": _joined(
-            [(index == [each.plan.chosen[s] for s in table.sensors]).all(axis=1) for _, each, _, table, index in parts],
-            bool,
-        ),
-    }
-
-
-def _columns_of(numbered: Iterator[tuple[int, Decision]] | enumerate[Decision], repeats: Any = 1) -> Columns:
-    """Number, step and time of decisions, each for as many rows as `repeats` says."""
-    rows = [(number, decision.step, decision.time) for number, decision in numbered]
-    numbers, steps, times = zip(*rows, strict=True) if rows else ((), (), ())
-    return {
-        "decision": np.repeat(np.array(numbers, np.int64), repeats),
-        "step": np.repeat(np.array(steps, np.int64), repeats),
-        "time_s": np.repeat(np.array(times, np.float64), repeats),
-    }
-
-
-def _joined(parts: Sequence[np.ndarray[Any, Any]], dtype: type) -> np.ndarray[Any, Any]:
-    return np.concatenate([np.empty(0, dtype), *parts]).astype(dtype, copy=False)
+def _column_of(name: str) -> str:
+    """Of a platform's own number."""
+    return f"action_{name}" if name in _TAKEN or name.startswith("action_") else name
 
 
 def _rows_of(rewards: Mapping[str, Any]) -> Iterator[tuple[int, slice]]:
@@ -297,7 +257,7 @@ def _rows_of(rewards: Mapping[str, Any]) -> Iterator[tuple[int, slice]]:
         yield number, slice(start, stop)
 
 
-def _rows_by(name: str, table: Mapping[str, Any], num: int | None = None) -> list[slice]:
+def parts_of(table: Mapping[str, Any], name: str, num: int | None = None) -> list[Columns]:
     """The rows of each number from 0 to `num` - 1, which stand in order; without it of every number up to the last."""
     numbers: Ints = table[name]
     if num is None and len(numbers) and (numbers[0] != 0 or np.any(np.diff(numbers) > 1)):
@@ -306,4 +266,4 @@ def _rows_by(name: str, table: Mapping[str, Any], num: int | None = None) -> lis
     if np.any(np.diff(numbers) < 0) or np.any(numbers < 0) or np.any(numbers >= num):
         raise InputError(f"column {name}: expected rows in order, of 0 to {num - 1}")
     bounds = np.searchsorted(numbers, np.arange(num + 1)).tolist()
-    return [slice(start, stop) for start, stop in pairwise(bounds)]
+    return [{key: column[start:stop] for key, column in table.items()} for start, stop in pairwise(bounds)]

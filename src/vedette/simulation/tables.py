@@ -20,7 +20,7 @@ from vedette.kernels.base.types import Floats, Ints
 from vedette.simulation.arrow import Columns, Kind, Layout
 from vedette.simulation.explained import EXPLAINED, explained_tables, with_explanations
 from vedette.simulation.health import FUSION_COLUMNS, SENSOR_COLUMNS, Health
-from vedette.simulation.planned import OWN_REWARDS, PLANNED, decisions_of, own_reward_tables, planned_tables
+from vedette.simulation.planned import OWN_REWARDS, PLANNED, decisions_of, planned_tables
 from vedette.simulation.records import Decision, RunRecord
 from vedette.simulation.truth import Truth
 
@@ -70,22 +70,17 @@ def check_record(record: RunRecord) -> None:
 
 
 def tables_of(record: RunRecord) -> Tables:
-    """The tables of `LAYOUTS`."""
+    """The tables of `LAYOUTS`, and those of `OPTIONAL` that the run has."""
     of_scans = {
         "scans": _scans(record),
         "truth": _truth(record),
         "tracks": _tracks(record),
         "sensors": _sensors(record),
     }
-    return {**of_scans, **planned_tables(record.decisions, record.num_sensors)}
-
-
-def optional_tables_of(record: RunRecord) -> Tables:
-    """The tables of `OPTIONAL` that the run has."""
-    found = own_reward_tables(record.decisions, record.num_sensors)
+    planned = planned_tables(record.decisions, record.num_sensors)
     if not any(decision.plan.explanation is not None for decision in record.decisions):
-        return found
-    return {**found, **explained_tables(record.decisions, record.num_sensors)}
+        return {**of_scans, **planned}
+    return {**of_scans, **planned, **explained_tables(record.decisions, record.num_sensors)}
 
 
 def timing_table(record: RunRecord) -> Columns:

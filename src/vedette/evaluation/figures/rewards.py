@@ -12,7 +12,7 @@ from matplotlib.patches import Rectangle
 
 from vedette.control.plan import Plan, RewardTable
 from vedette.errors import InputError
-from vedette.evaluation.actions import ActionAxis, action_axis, with_minus
+from vedette.evaluation.actions import ActionAxis, action_axis
 from vedette.evaluation.figures.scene import Scene
 from vedette.evaluation.figures.style import (
     COLOURS,
@@ -26,6 +26,7 @@ from vedette.evaluation.figures.style import (
 )
 from vedette.kernels.base.types import Floats
 from vedette.platforms import Actions
+from vedette.text import with_minus
 
 _PANEL_WIDTH = 2.4  # inches, within the labels of a column
 

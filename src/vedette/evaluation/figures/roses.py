@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from vedette.errors import InputError
-from vedette.evaluation.actions import Row, row_words, with_minus
+from vedette.evaluation.actions import Row, row_words
 from vedette.evaluation.comparison import Choice, Comparison
 from vedette.evaluation.figures.labels import short_labels
 from vedette.evaluation.figures.scene import Scene
@@ -26,6 +26,7 @@ from vedette.evaluation.figures.style import (
     styled,
 )
 from vedette.kernels.base.types import Floats, Ints
+from vedette.text import with_minus
 
 _SIZE = 1.5  # inches of a rose
 _MOST_BARS = 4  # of a sensor

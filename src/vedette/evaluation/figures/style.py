@@ -23,6 +23,7 @@ from matplotlib.textpath import text_to_path
 
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats
+from vedette.text import with_minus
 
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
@@ -145,7 +146,7 @@ def strategy_label(name: str) -> str:
 
 def degrees_label(value: float) -> str:
     """A number of degrees with the minus sign that Matplotlib's own ticks have."""
-    return f"{value:.0f}".replace("-", "\N{MINUS SIGN}")
+    return with_minus(f"{value:.0f}")
 
 
 def legend_columns(labels: Sequence[str], *, width: float = COLUMN_WIDTH) -> int:

@@ -1,0 +1,182 @@
+"""Workers on this machine: processes of the standard library's pools."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from collections.abc import Iterator
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from multiprocessing import active_children
+from multiprocessing.process import BaseProcess
+
+from vedette.campaigns.tasks import Outcome, Task, WorkerDied, perform
+from vedette.errors import VedetteError
+from vedette.processes import as_children, context, end_with_parent, load_ahead
+from vedette.reading import said
+
+_TASKS_A_WORKER = 2  # one that waits, so that none idles while results travel
+_WAIT_SECONDS = 0.2  # without an end, it could not be interrupted everywhere
+_START_SECONDS = 120.0
+_MOST_FAILED_STARTS = 3  # in a row
+_FILES, _FILES_A_WORKER = 40, 10  # open at once, with room to spare: 16 were with one worker, 72 with eight
+
+
+@contextmanager
+def local_workers(num_workers: int) -> Iterator[LocalWorkers]:
+    """As many worker processes on this machine; one that dies is replaced.
+
+    Raises:
+        VedetteError: they cannot be started.
+    """
+    _make_room_for_files(num_workers)
+    workers = LocalWorkers()
+    try:
+        try:
+            load_ahead()
+            workers.start(num_workers)
+        except OSError as error:
+            raise VedetteError(
+                f"workers: expected that {num_workers} processes can be started; {said(error)} (--workers 1 needs none)"
+            ) from error
+        yield workers
+    finally:
+        workers.end()
+
+
+def _make_room_for_files(num_workers: int) -> None:
+    """Raise this process's limit of open files where it is too low, as far as the system lets it.
+
+    Raises `VedetteError` where that is not enough.
+    """
+    try:
+        import resource
+    except ImportError:  # Windows has no such limit
+        return
+    needed = _FILES + num_workers * _FILES_A_WORKER
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    if soft == resource.RLIM_INFINITY or soft >= needed:
+        return
+    if hard != resource.RLIM_INFINITY and hard < needed:
+        raise VedetteError(
+            f"workers: expected that {needed} files may be open at once for {num_workers} workers; the limit is {hard} "
+            "(ulimit -n; --workers 1 needs fewer)"
+        )
+    resource.setrlimit(resource.RLIMIT_NOFILE, (needed, hard))
+
+
+@dataclass(slots=True, eq=False)
+class _Worker:
+    """One process, in a pool of its own: one that dies leaves the others alone."""
+
+    pool: ProcessPoolExecutor
+    begun: Future[int]
+    processes: set[BaseProcess]  # the one, or none where it has died by now
+    tasks: dict[Future[Outcome], Task] = field(default_factory=dict)  # in the order in which it does them
+
+    @classmethod
+    def start(cls) -> _Worker:
+        pool = ProcessPoolExecutor(1, context(), initializer=_begin)
+        others = set(active_children())
+        with as_children():
+            begun = pool.submit(os.getpid)
+        return cls(pool, begun, set(active_children()) - others)
+
+    def has_begun(self) -> bool:
+        return self.begun.done() and self.begun.exception() is None
+
+    def end(self) -> None:
+        for process in self.processes:
+            process.kill()
+        self.pool.shutdown(cancel_futures=True)
+
+
+class LocalWorkers:
+    """See `vedette.campaigns.engine.Workers`."""
+
+    def __init__(self) -> None:
+        self._since = time.monotonic()
+        self._failed_starts = 0
+        self._killers: set[Task] = set()
+        self._ended: list[tuple[Task, Outcome | WorkerDied]] = []
+        self._workers: list[_Worker] = []
+
+    def start(self, num_workers: int) -> None:
+        """Start so many; `OSError` where the system starts no more."""
+        for _ in range(num_workers):
+            self._workers.append(_Worker.start())
+
+    def room(self) -> int:
+        """See `Workers`."""
+        return _TASKS_A_WORKER * len(self._workers)
+
+    def submit(self, task: Task) -> None:
+        """See `Workers`."""
+        while True:
+            worker = min(self._workers, key=lambda each: len(each.tasks))
+            try:
+                worker.tasks[worker.pool.submit(perform, task)] = task
+                return
+            except BrokenProcessPool:
+                self._replace(worker)
+
+    def next(self) -> tuple[Task, Outcome | WorkerDied]:
+        """See `Workers`."""
+        while not self._ended:
+            wait([each for worker in self._workers for each in worker.tasks], _WAIT_SECONDS, FIRST_COMPLETED)
+            for worker in list(self._workers):
+                self._collect(worker)
+            if time.monotonic() - self._since > _START_SECONDS and not any(map(_Worker.has_begun, self._workers)):
+                raise _not_started()
+        return self._ended.pop(0)
+
+    def end(self) -> None:
+        """Stop them, whatever they are doing."""
+        for worker in self._workers:
+            worker.end()
+
+    def _collect(self, worker: _Worker) -> None:
+        """Note what a worker has finished; replace one that died."""
+        for future in [each for each in worker.tasks if each.done()]:
+            if isinstance(error := future.exception(), BrokenProcessPool):
+                self._replace(worker)
+                return
+            if error is not None:
+                raise error
+            self._failed_starts = 0
+            self._ended.append((worker.tasks.pop(future), future.result()))
+
+    def _replace(self, dead: _Worker) -> None:
+        """Start another worker in the place of one that died: it is given what that one had not done."""
+        dead.end()
+        left = list(dead.tasks.values())
+        if dead.has_begun():
+            self._failed_starts = 0
+            if left and left[0] in self._killers:
+                self._killers.remove(left[0])
+                self._ended.append((left.pop(0), WorkerDied()))
+            else:
+                self._killers.update(left[:1])
+        else:
+            self._failed_starts += 1
+            if self._failed_starts >= _MOST_FAILED_STARTS:
+                raise _not_started()
+        self._workers[self._workers.index(dead)] = _Worker.start()
+        for task in left:
+            self.submit(task)
+
+
+def _begin() -> None:
+    """What a worker does first."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the server may be another's, which does not
+    end_with_parent()
+
+
+def _not_started() -> VedetteError:
+    return VedetteError(
+        "the worker processes ended while they started; in a script of your own, put the call that runs the "
+        'campaign under `if __name__ == "__main__":`'
+    )

@@ -1,0 +1,71 @@
+"""Processes beside this one: they share what one process has loaded, leave Ctrl-C to this one, and end with it."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from multiprocessing.context import BaseContext
+
+# Elsewhere a fork of a process that has loaded half of the system's libraries is not safe, or there is none.
+_METHOD = "forkserver" if sys.platform == "linux" else "spawn"
+# What the workers of a campaign need, with Numba.
+_LOADED = ("vedette.campaigns.local", "vedette.kernels.base.dispatchers", "scipy.optimize")
+# One thread in each: as many processes as processors share the work already.
+_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+
+
+def context() -> BaseContext:
+    """How processes are started; with `as_children` around every start, and `end_with_parent` first of all in each."""
+    return multiprocessing.get_context(_METHOD)
+
+
+def load_ahead(*more: str) -> None:
+    """Begin to load what processes of `context` need, while this one goes on, in one that they will be forks of.
+
+    Args:
+        more: modules beside those of the workers of a campaign.
+
+    Where the platform has no such process, or this program has one already, each loads what it needs itself.
+    """
+    if _METHOD == "forkserver":
+        from multiprocessing import forkserver
+
+        context().set_forkserver_preload([*_LOADED, *more])
+        with as_children():
+            forkserver.ensure_running()
+
+
+@contextmanager
+def as_children() -> Iterator[None]:
+    """Processes started inside inherit that Ctrl-C is not for them, and that linear algebra has one thread.
+
+    The main process stops them.
+    """
+    ours = {name: "1" for name in _THREADS if name not in os.environ}
+    in_main = threading.current_thread() is threading.main_thread()
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN) if in_main else None
+    os.environ.update(ours)
+    try:
+        yield
+    finally:
+        for name in ours:
+            os.environ.pop(name, None)
+        if in_main:
+            signal.signal(signal.SIGINT, before)
+
+
+def end_with_parent() -> None:
+    """Have this process end when the one that started it has ended, however that came about."""
+    threading.Thread(target=_wait_and_end, daemon=True).start()
+
+
+def _wait_and_end() -> None:
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+    parent.join()
+    os._exit(1)
