@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
-from vedette.models.arguments import positive
+from vedette.models.fields import Positive, check_fields, part
 
 
+@part("expected_loss", "reward")
 @dataclass(frozen=True, slots=True)
 class ExpectedLossReward:
-    """Less the error that is to be expected of the targets' positions, cut off where one counts as lost:
+    """Less the error to be expected of the targets' positions; in closed form, without samples.
+
+    Cut off where a target counts as lost:
 
         R = -sum over labels of r (q min(sqrt(tr P+), c)^p + (1 - q) min(sqrt(tr P), c)^p)
         q = 1 - prod over sensors of (1 - P_D)
@@ -27,17 +31,18 @@ class ExpectedLossReward:
     It assumes that what the sensors measure is used in full, whatever the fusion.
 
     Attributes:
-        cutoff: c, m.
-        order: p, that of the score by which the tracks are judged: 1 of OSPA as it is mostly taken, 2 of squared
-            errors. The larger, the more it is about what is known worst, such as weak labels that are spread wide.
+        cutoff: error that counts as a lost target, c [m].
+        order: power of the error, p, that of the score by which the tracks are judged: 1 of OSPA as it is mostly taken,
+            2 of squared errors. The larger, the more it is about what is known worst, such as weak labels that are
+            spread wide.
 
     Raises:
         InputError: a cutoff or an order that is not above 0.
     """
 
-    cutoff: float = 100.0
-    order: float = 1.0
+    cutoff: Positive = 100.0
+    order: Positive = 1.0
+    words: ClassVar[str] = "minus expected loss"
 
     def __post_init__(self) -> None:
-        positive("cutoff", self.cutoff)
-        positive("order", self.order)
+        check_fields(self)

@@ -11,15 +11,19 @@ from vedette.control.rewards.base import Exponents, UnitVolume, check_unit_volum
 from vedette.densities import GLMB, LMB
 from vedette.divergence import cauchy_schwarz, renyi
 from vedette.kernels.base.types import Floats
-from vedette.models.arguments import real, reject
+from vedette.models.arguments import reject
+from vedette.models.fields import Positive, check_fields, part
 
 
+@part("cauchy_schwarz", "reward")
 @dataclass(frozen=True, slots=True)
 class CauchySchwarzReward:
     """Cauchy-Schwarz divergence between prediction and update (paper eq. 8), on the label sets that both have.
 
     Attributes:
-        unit_volume: K of eq. 5; or "reference", under which K <p, p> of the prediction is about 1 (paper-notes 15).
+        unit_volume: unit K of hyper-volume (eq. 5): a number, or "reference" for (4 pi)^(d/2) sqrt(det P) of the
+            prediction, under which K <p, p> is about 1 (paper-notes 15), and localisation counts as much as
+            cardinality.
 
     Raises:
         InputError: another word, or a number that is not finite and above 0.
@@ -27,6 +31,7 @@ class CauchySchwarzReward:
 
     unit_volume: UnitVolume = 1.0
     exponents: ClassVar[Exponents] = ((0.0, 2.0), (1.0, 1.0), (2.0, 0.0))
+    words: ClassVar[str] = "CS divergence"
 
     def __post_init__(self) -> None:
         check_unit_volume(self.unit_volume)
@@ -45,6 +50,7 @@ class CauchySchwarzReward:
         return cauchy_schwarz(predicted, updated, unit_volume=volume, support="common")
 
 
+@part("renyi", "reward")
 @dataclass(frozen=True, slots=True)
 class RenyiReward:
     """Renyi divergence of the prediction from the update, on the label sets that both have, where both sum to one.
@@ -52,17 +58,19 @@ class RenyiReward:
     log(integral of predicted^order updated^(1 - order)) / (order - 1); see `vedette.divergence.renyi`. It needs no K.
 
     Attributes:
-        order: above 0 and not 1. 1/2 is symmetric, twice the Bhattacharyya distance. Above 1 it is infinite, and so no
-            reward, where the prediction is much wider than the update.
+        order: exponent of the prediction, above 0 and not 1. 1/2 is symmetric, twice the Bhattacharyya distance. Above
+            1 it is infinite, and so no reward, where the prediction is much wider than the update.
 
     Raises:
         InputError: another order.
     """
 
-    order: float = 0.5
+    order: Positive = 0.5
+    words: ClassVar[str] = "Rényi divergence"
 
     def __post_init__(self) -> None:
-        if real("order", self.order) <= 0.0 or self.order == 1.0:
+        check_fields(self)
+        if self.order == 1.0:
             raise reject("order", "a finite number above 0 other than 1", self.order)
 
     @property

@@ -9,9 +9,10 @@ import numpy as np
 
 from vedette.control.search.known import Joint, Known
 from vedette.control.search.problem import JointProblem
-from vedette.models.arguments import count
+from vedette.models.fields import Repeats, check_fields, part
 
 
+@part("coordinate_ascent", "search")
 @dataclass(frozen=True, slots=True)
 class CoordinateAscent:
     """One sensor at a time, the others held, until no sensor alone can do better; for many sensors.
@@ -23,16 +24,16 @@ class CoordinateAscent:
     it that is; where none is, the mask is opened (`vedette.control.constraints.opened`).
 
     Attributes:
-        num_restarts: further ascents, from joint actions drawn at random.
+        num_restarts: ascents from random joint actions, after that from the independent decision.
 
     Raises:
         InputError: a number below 0.
     """
 
-    num_restarts: int = 2
+    num_restarts: Repeats = 2
 
     def __post_init__(self) -> None:
-        count("num_restarts", self.num_restarts)
+        check_fields(self)
 
     def search(self, problem: JointProblem, *, rng: np.random.Generator) -> tuple[int, ...]:
         """The best of all ascents; of equal ones that were evaluated the first in printed order."""

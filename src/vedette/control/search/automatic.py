@@ -11,7 +11,7 @@ from vedette.control.search.ascent import ascents, first_starts
 from vedette.control.search.exhaustive import ExhaustiveSearch
 from vedette.control.search.known import Known
 from vedette.control.search.problem import JointProblem
-from vedette.models.arguments import dimension
+from vedette.models.fields import Count, check_fields, part
 
 # Beyond so many sensors, every joint action is more than a decision has time for.
 _MAX_SENSORS = 3
@@ -22,6 +22,7 @@ _MAX_SENSORS = 3
 _NUM_RESTARTS, _LEAST_GAP, _FIRST_TRIES = 2, 0.01, 1000
 
 
+@part("automatic", "search")
 @dataclass(frozen=True, slots=True)
 class AutomaticSearch:
     """Every joint action of up to three sensors; coordinate ascent with restarts for more.
@@ -30,16 +31,16 @@ class AutomaticSearch:
     than 1 % to be gained.
 
     Attributes:
-        max_joint_actions: above which two or three sensors are searched by coordinate ascent, too.
+        max_joint_actions: number above which two or three sensors are searched by coordinate ascent, too.
 
     Raises:
         InputError: a bound below 1.
     """
 
-    max_joint_actions: int = 1_000_000
+    max_joint_actions: Count = 1_000_000
 
     def __post_init__(self) -> None:
-        dimension("max_joint_actions", self.max_joint_actions)
+        check_fields(self)
 
     def search(self, problem: JointProblem, *, rng: np.random.Generator) -> tuple[int, ...]:
         """As the search that it is."""

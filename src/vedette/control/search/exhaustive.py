@@ -11,9 +11,10 @@ from vedette.control.constraints import Mask, opened
 from vedette.control.search.problem import JointProblem, all_joint_actions, first_best
 from vedette.errors import InputError
 from vedette.kernels.base.types import Ints
-from vedette.models.arguments import dimension
+from vedette.models.fields import Count, check_fields, part
 
 
+@part("exhaustive", "search")
 @dataclass(frozen=True, slots=True)
 class ExhaustiveSearch:
     """Every joint action (paper, Algorithm 2): the best there is, and the oracle for all other searches.
@@ -28,10 +29,10 @@ class ExhaustiveSearch:
         InputError: a bound below 1.
     """
 
-    max_joint_actions: int = 1_000_000
+    max_joint_actions: Count = 1_000_000
 
     def __post_init__(self) -> None:
-        dimension("max_joint_actions", self.max_joint_actions)
+        check_fields(self)
 
     def search(self, problem: JointProblem, *, rng: np.random.Generator) -> tuple[int, ...]:
         """The best of all; nothing is drawn. Raises `InputError` for more joint actions than `max_joint_actions`."""

@@ -13,11 +13,10 @@ from vedette.control.search.known import Joint, Known
 from vedette.control.search.problem import JointProblem, first_best
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats, Ints
-from vedette.models.arguments import one_of
-
-ORDERS = ("printed", "best_first")
+from vedette.models.fields import check_fields, part
 
 
+@part("sequential_greedy", "search")
 @dataclass(frozen=True, slots=True)
 class SequentialGreedy:
     """Sensors are decided one after the other, each by the reward of those decided, while the others do not scan.
@@ -42,7 +41,7 @@ class SequentialGreedy:
     order: Literal["printed", "best_first"] = "printed"
 
     def __post_init__(self) -> None:
-        one_of("order", self.order, ORDERS)
+        check_fields(self)
 
     def search(self, problem: JointProblem, *, rng: np.random.Generator) -> tuple[int, ...]:
         """The joint action that is decided so; nothing is drawn.

@@ -65,17 +65,28 @@ def _too_large(value: Any, path: tuple[str | int, ...]) -> tuple[str | int, ...]
 
 Whole = Annotated[int, BeforeValidator(_whole)]
 Name = Annotated[str, AfterValidator(_word)]
+# By the names of `vedette.models.fields`, and within what is of sense in a file.
+Count = Annotated[Whole, Field(ge=1, le=1_000_000_000)]
+Natural = Annotated[Whole, Field(ge=0)]
+Repeats = Annotated[Whole, Field(ge=0, le=1_000_000)]
+Real = float
 Positive = Annotated[float, Field(gt=0.0), AfterValidator(_not_tiny)]
+NonNegative = Annotated[float, Field(ge=0.0)]
 Probability = Annotated[float, Field(ge=0.0, le=1.0)]
+Chance = Annotated[float, Field(gt=0.0, lt=1.0)]
+Share = Annotated[float, Field(ge=0.0, lt=1.0)]
+Portion = Annotated[float, Field(gt=0.0, le=1.0)]
+Limit = Positive
+HalfWidth = Annotated[float, Field(gt=0.0, le=180.0)]
+Reals = Annotated[tuple[float, ...], Field(strict=False, min_length=1)]
+Positives = Annotated[tuple[Positive, ...], Field(strict=False, min_length=1)]
+PositivePair = Annotated[tuple[Positive, Positive], Field(strict=False)]
+NonNegativePair = Annotated[tuple[NonNegative, NonNegative], Field(strict=False)]
 # Lists in the file are tuples here; `strict=False` admits a list and leaves the items strict.
 Numbers = Annotated[tuple[float, ...], Field(strict=False)]
-SomeNumbers = Annotated[tuple[float, ...], Field(strict=False, min_length=1)]
 Point = Annotated[tuple[float, float], Field(strict=False)]
 Step = Annotated[Whole, Field(ge=1)]
 Steps = Annotated[tuple[Step, ...], Field(strict=False)]
-Count = Annotated[Whole, Field(ge=1, le=1_000_000_000)]
-Share = Annotated[float, Field(ge=0.0, lt=1.0)]
-Chance = Annotated[float, Field(gt=0.0, lt=1.0)]
 GaussianMethod = Literal["auto", "ekf", "ukf", "ckf"]
 DetectionAt = Literal["centre", "mean"]
 
@@ -169,12 +180,11 @@ class Section(BaseModel):
 
 
 def _field_in_part(section: type[Section], name: str, data: Mapping[str, Any]) -> Any:
-    if name not in data:
-        field = section.model_fields[name]
-        missing = ErrorDetails(type="missing", loc=(), msg="", input=None)
-        return Unread([missing]) if field.is_required() else field.get_default()
+    if name not in data and section.model_fields[name].is_required():
+        return Unread([ErrorDetails(type="missing", loc=(), msg="", input=None)])
+    given = {name: data[name]} if name in data else {}
     try:
-        return getattr(_alone(section, name).model_validate({name: data[name]}, context=IN_PART), name)
+        return getattr(_alone(section, name).model_validate(given, context=IN_PART), name)
     except ValidationError as error:
         return Unread([{**detail, "loc": detail["loc"][1:]} for detail in error.errors(include_url=False)])
 

@@ -24,9 +24,10 @@ from vedette.scenarios.sections.base import (
     check,
 )
 from vedette.scenarios.sections.constraints import AnyConstraint
+from vedette.scenarios.sections.derived import of_kind
 from vedette.scenarios.sections.lookahead import Lookahead
-from vedette.scenarios.sections.rewards import AnyReward, ExpectedLossReward
-from vedette.scenarios.sections.search import AnySearch, Automatic
+from vedette.scenarios.sections.rewards import AnyReward
+from vedette.scenarios.sections.search import AnySearch
 
 if TYPE_CHECKING:  # with the planners comes the compiler, which a check does without
     from vedette.control import Constraint, PlanningSettings
@@ -113,7 +114,7 @@ class Control(Section):
         "[-].",
     )
     reward: AnyReward = Field(
-        default=ExpectedLossReward(),
+        default=of_kind("expected_loss"),
         description="Value of a density; none: the expected loss, of the cutoff and the order of ospa [-].",
     )
     undetected_worth: Annotated[float, Field(ge=0.0)] = Field(
@@ -121,7 +122,9 @@ class Control(Section):
         description="What finding a target of `undetected` is worth, in units of the reward; of the expected loss "
         "m to the power of its order, such as its cutoff to that power [-].",
     )
-    search: AnySearch = Field(default=Automatic(), description="Which joint actions a joint decision evaluates [-].")
+    search: AnySearch = Field(
+        default=of_kind("automatic"), description="Which joint actions a joint decision evaluates [-]."
+    )
     constraints: Annotated[tuple[AnyConstraint, ...], Field(strict=False)] = Field(
         default=(), description="What the sensors must not do [-]."
     )

@@ -94,7 +94,7 @@ class Custom(Section):
                 got = ", ".join(self.arguments)
                 raise NotGiven(self, "arguments", f"none, as {self.function} is no class and no function", got)
             elif not as_it_is and callable(found):
-                found = found(**_asked_for(found, parts), **self.arguments)
+                found = found(**asked_for(found, parts), **self.arguments)
         except VedetteError:
             raise
         except Exception as error:
@@ -115,7 +115,7 @@ def _is_function(wanted: type) -> bool:
     return "__call__" in vars(wanted)
 
 
-def _asked_for(made: Any, parts: dict[str, Any]) -> dict[str, Any]:
+def asked_for(made: Any, parts: dict[str, Any]) -> dict[str, Any]:
     """Of the parts, those that a class or function has parameters for."""
     try:
         parameters = inspect.signature(made).parameters

@@ -15,6 +15,7 @@ from vedette.scenarios.sections.base import Name, Section, attempt, check
 from vedette.scenarios.sections.birth import Birth
 from vedette.scenarios.sections.checks import CHECKS, step_of_time
 from vedette.scenarios.sections.control import Control
+from vedette.scenarios.sections.derived import of_kind
 from vedette.scenarios.sections.fusion import AnyFusion, Fusion
 from vedette.scenarios.sections.network import NetworkSection
 from vedette.scenarios.sections.planners import STRATEGIES, AnyPlanner
@@ -24,8 +25,6 @@ from vedette.scenarios.sections.targets import Targets
 from vedette.scenarios.sections.tracking import AnyFilter, Filter
 from vedette.scenarios.sections.undetected import UndetectedSection
 from vedette.scenarios.sections.world import (
-    ConstantSurvival,
-    ConstantVelocity,
     Motion,
     RegionSection,
     Survival,
@@ -69,8 +68,8 @@ class ScenarioModel(Section):
     description: str = Field(default="", description="What it is, where it comes from [-].")
     time: Time = Field(description="The scans [-].")
     region: RegionSection = Field(description="Surveillance region [-].")
-    motion: Motion = Field(default=ConstantVelocity(), description="How targets move [-].")
-    survival: Survival = Field(default=ConstantSurvival(), description="Whether they go on living [-].")
+    motion: Motion = Field(default=of_kind("constant_velocity"), description="How targets move [-].")
+    survival: Survival = Field(default=of_kind("constant"), description="Whether they go on living [-].")
     birth: Birth = Field(description="Where they appear, as the filters know it [-].")
     targets: Targets = Field(description="The true targets [-].")
     sensor_defaults: SensorDefaults | None = Field(

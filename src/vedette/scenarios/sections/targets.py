@@ -13,7 +13,7 @@ from pydantic import Field
 
 from vedette.errors import InputError
 from vedette.scenarios.faults import Finding, describe
-from vedette.scenarios.sections.base import Point, Positive, Probability, Section, SomeNumbers, Step, check
+from vedette.scenarios.sections.base import Point, Positive, Probability, Reals, Section, Step, check
 from vedette.scenarios.sections.world import Motion, RegionSection, Time, grouped_order
 
 if TYPE_CHECKING:  # with the models comes the compiler, which a check does without
@@ -44,11 +44,11 @@ class _World(Protocol):
 class ScriptedTarget(Section):
     """One true target that follows the motion model."""
 
-    state: SomeNumbers = Field(description="State at its first scan [m, m/s, ...].")
+    state: Reals = Field(description="State at its first scan [m, m/s, ...].")
     start_step: Step = Field(default=1, description="First scan at which it is there [-].")
     end_step: Step | None = Field(default=None, description="Last scan at which it is there; none: to the end [-].")
     process_noise: bool = Field(default=False, description="Whether its motion is disturbed by the process noise [-].")
-    std: SomeNumbers | None = Field(
+    std: Reals | None = Field(
         default=None,
         description="Standard deviation of each component of its first state, which every run draws anew around state; "
         "none: the same in every run [m, m/s, ...].",
@@ -188,8 +188,8 @@ class PoissonTargets(Section):
 
     kind: Literal["poisson"] = Field(default="poisson", description="Kind of targets [-].")
     expected: Positive = Field(description="Mean number of births a scan [-].")
-    mean: SomeNumbers = Field(description="Mean state of a birth [m, m/s, ...].")
-    std: SomeNumbers = Field(description="Standard deviation of each state component of a birth [m, m/s, ...].")
+    mean: Reals = Field(description="Mean state of a birth [m, m/s, ...].")
+    std: Reals = Field(description="Standard deviation of each state component of a birth [m, m/s, ...].")
     death_probability: Probability = Field(
         default=0.0, description="Probability with which a target dies from scan to scan [-]."
     )
@@ -224,7 +224,7 @@ class CrowdTargets(Section):
     number: Annotated[int, Field(ge=1, le=1_000_000)] = Field(
         description="Number of targets at the first scan, and on average later [-]."
     )
-    std: SomeNumbers = Field(
+    std: Reals = Field(
         description="Standard deviation around 0 of each component of a first state but the position [m/s, ...]."
     )
     death_probability: Probability = Field(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
@@ -11,21 +10,17 @@ from pydantic import Field
 
 from vedette.scenarios.faults import Finding
 from vedette.scenarios.sections.base import (
-    Chance,
     Count,
     DetectionAt,
     GaussianMethod,
-    Positive,
-    Probability,
     Section,
-    Share,
     check,
 )
 from vedette.scenarios.sections.custom import Custom
+from vedette.scenarios.sections.derived import Part, derived
 
 if TYPE_CHECKING:  # with the filters comes the compiler, which a check does without
     from vedette.filters import Filter as LocalFilter
-    from vedette.filters import Limits
     from vedette.models import SensorModel, TargetModel
     from vedette.tracking import CentralFilter
 
@@ -46,59 +41,9 @@ class GibbsAssignment(Section):
 Assignment = Annotated[RankedAssignment | GibbsAssignment, Field(discriminator="kind")]
 
 
-class FilterLimits(Section):
+@derived("vedette.filters.limits:Limits")
+class FilterLimits(Part):
     """Caps and thresholds of a filter: what it throws away, and so what it costs."""
-
-    max_hypotheses: Count = Field(
-        default=300, description="Most hypotheses kept after a scan; of a factored_glmb, in each factor [-]."
-    )
-    min_relative_weight: Share = Field(
-        default=1e-6,
-        description="Hypotheses (of a cphd: large numbers of targets) lighter than this times the heaviest are dropped "
-        "[-].",
-    )
-    min_track_weight: Probability = Field(
-        default=1e-5,
-        description="Each label's heaviest hypothesis is kept unless lighter than this times the heaviest of all [-].",
-    )
-    gate_probability: Annotated[float, Field(gt=0.0, le=1.0)] = Field(
-        default=1.0 - 1e-7, description="Probability that a target's measurement falls in its gate; 1: no gate [-]."
-    )
-    min_log_clutter: float = Field(
-        default=-60.0, description="Floor of the log clutter intensity, for places where clutter is impossible [-]."
-    )
-    max_search_nodes: Count = Field(default=1_000_000, description="Bound on the ranking search [-].")
-    min_component_weight: Share = Field(
-        default=1e-5, description="Components lighter than this share of their track or intensity are dropped [-]."
-    )
-    merge_distance: float = Field(
-        default=2.0, ge=0.0, description="Mahalanobis distance within which components are merged; 0: never [-]."
-    )
-    max_components: Count = Field(default=10, description="Most Gaussian components of a track [-].")
-    min_existence: Share = Field(
-        default=1e-4,
-        description="LMB tracks, tracks alone in their factor and Bernoullis less probable than this are dropped [-].",
-    )
-    max_labels: Count = Field(
-        default=200, description="Most tracks of an LMB or factored_glmb, Bernoullis of a cb_member [-]."
-    )
-    max_position_std: Positive | None = Field(
-        default=None,
-        description="Labels whose position is less certain than this along both axes are dropped; none: never [m].",
-    )
-    max_intensity_components: Count = Field(
-        default=100, description="Most Gaussian components of the intensity of a phd or cphd, all targets together [-]."
-    )
-    max_existence: Chance = Field(
-        default=0.999, description="Bernoullis of a cb_member surer than this are taken as this sure [-]."
-    )
-
-    def build(self) -> Limits:
-        """Caps and thresholds of the filters."""
-        from vedette.filters import Limits
-
-        given = self.model_dump()
-        return Limits(**given | {"max_position_std": self.max_position_std or math.inf})
 
 
 # Filters that keep no identity of their targets.
