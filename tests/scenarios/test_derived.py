@@ -34,6 +34,8 @@ TYPES = (
     "Chance",
     "Share",
     "Portion",
+    "L1Error",
+    "EnoughSamples",
     "Limit",
 )
 

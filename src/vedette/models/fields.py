@@ -28,6 +28,8 @@ from vedette.models.arguments import (
 )
 
 T = TypeVar("T")
+# Of a search and the first round of a race (`vedette.control.rounds`).
+_LEAST_SAMPLES = 24
 
 
 def _share(field: str, value: Any) -> float:
@@ -49,6 +51,18 @@ def half_width(field: str, value: Any) -> float:
     return float(value)
 
 
+def _l1_error(field: str, value: Any) -> float:
+    if not 0.0 <= real(field, value) <= 2.0:
+        raise reject(field, "a number from 0 to 2", value)
+    return float(value)
+
+
+def _enough_samples(field: str, value: Any) -> int:
+    if dimension(field, value) < _LEAST_SAMPLES:
+        raise reject(field, f"a whole number of at least {_LEAST_SAMPLES}", value)
+    return int(value)
+
+
 def _limit(field: str, value: Any) -> float:
     return math.inf if is_infinite(value) else positive(field, value)
 
@@ -63,6 +77,8 @@ Probability = Annotated[float, probability]  # [0, 1]
 Chance = Annotated[float, chance]  # (0, 1)
 Share = Annotated[float, _share]  # [0, 1)
 Portion = Annotated[float, _portion]  # (0, 1]
+L1Error = Annotated[float, _l1_error]  # of densities that each integrate to 1
+EnoughSamples = Annotated[int, _enough_samples]  # to tell candidates apart by
 Limit = Annotated[float, _limit]  # above 0, or infinite; in a file then left out
 HalfWidth = Annotated[float, half_width]  # rad, in (0, pi]
 Reals: TypeAlias = ArrayLike  # one or more

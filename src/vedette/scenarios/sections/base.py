@@ -76,6 +76,8 @@ Probability = Annotated[float, Field(ge=0.0, le=1.0)]
 Chance = Annotated[float, Field(gt=0.0, lt=1.0)]
 Share = Annotated[float, Field(ge=0.0, lt=1.0)]
 Portion = Annotated[float, Field(gt=0.0, le=1.0)]
+L1Error = Annotated[float, Field(ge=0.0, le=2.0)]
+EnoughSamples = Annotated[Count, Field(ge=24)]
 Limit = Positive
 HalfWidth = Annotated[float, Field(gt=0.0, le=180.0)]
 Reals = Annotated[tuple[float, ...], Field(strict=False, min_length=1)]

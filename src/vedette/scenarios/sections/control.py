@@ -6,25 +6,21 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated
 
 from pydantic import Field
 
 from vedette.scenarios.faults import Finding, describe
 from vedette.scenarios.sections.base import (
-    Chance,
     Count,
     Numbers,
     Positive,
-    Probability,
-    Section,
     Share,
     Steps,
-    Whole,
     check,
 )
 from vedette.scenarios.sections.constraints import AnyConstraint
-from vedette.scenarios.sections.derived import of_kind
+from vedette.scenarios.sections.derived import Derived, derived, of_kind
 from vedette.scenarios.sections.lookahead import Lookahead
 from vedette.scenarios.sections.rewards import AnyReward
 from vedette.scenarios.sections.search import AnySearch
@@ -33,25 +29,23 @@ if TYPE_CHECKING:  # with the planners comes the compiler, which a check does wi
     from vedette.control import Constraint, PlanningSettings
 
 
-class PlanningLimits(Section):
+_SETTINGS = "vedette.control.settings:PlanningSettings"
+_LIMITS = (
+    "max_prior_hypotheses",
+    "max_version_divergence",
+    "max_glmb_sensors",
+    "max_glmb_targets",
+    "max_bound_work",
+)
+# Of the settings, those that no file gives or gives otherwise.
+_ELSEWHERE = (*_LIMITS, "horizon_steps", "horizon_period", "end", "limits", "num_threads")
+
+
+@derived(_SETTINGS, only=_LIMITS)
+class PlanningLimits(Derived):
     """How much of the density the planner works with."""
 
-    max_prior_hypotheses: Count = Field(default=10, description="Most hypotheses at the start of the horizon [-].")
-    max_version_divergence: Annotated[float, Field(ge=0.0)] = Field(
-        default=1e-3,
-        description="Densities of one label within so many nats of each other are taken as one at the start of the "
-        "horizon; 0: none are [nats].",
-    )
     max_hypotheses: Count = Field(default=10, description="Most hypotheses after each step of the horizon [-].")
-    max_glmb_sensors: Annotated[Whole, Field(ge=0)] = Field(
-        default=4, description="With more sensors GLMB beliefs are planned on as LMBs, which plans then say [-]."
-    )
-    max_glmb_targets: Annotated[Whole, Field(ge=0)] = Field(
-        default=10, description="The same with more targets expected [-]."
-    )
-    max_bound_work: Annotated[Whole, Field(ge=0)] = Field(
-        default=256, description="Ways to see a target, times samples, that are tried for the bound of a plan [-]."
-    )
     min_relative_weight: Share = Field(
         default=1e-5, description="Hypotheses lighter than this times the heaviest are dropped [-]."
     )
@@ -63,7 +57,8 @@ def _order(name: str, moments: Sequence[float]) -> Iterator[Finding]:
             yield (name, i + 1), f"more than the one before it, {before:g}", describe(after)
 
 
-class Control(Section):
+@derived(_SETTINGS, without=_ELSEWHERE)
+class Control(Derived):
     """When and how the sensors decide where to go. Without decisions they keep their course.
 
     Over the horizon no target is born and none dies (paper-notes 11).
@@ -81,46 +76,9 @@ class Control(Section):
         description="Time between pseudo-updates, T; none: time.step_period. In longer steps than scans the "
         "acceleration of motion is held longer, and predictions spread too far [s].",
     )
-    num_samples: Count = Field(default=40, description="Multi-target samples of the expected reward, M [-].")
-    confidence: Chance | None = Field(
-        default=None,
-        description="With it, samples are added until the choice is so surely the best of its candidates, whatever "
-        "num_samples says [-].",
-    )
-    indifference: Share = Field(
-        default=0.0, description="With confidence: a reward short of the best by this share of it is good enough [-]."
-    )
-    max_samples: Annotated[Count, Field(ge=24)] = Field(
-        default=2000, description="With confidence: samples after which the decision is taken as it stands [-]."
-    )
-    max_seconds: Positive | None = Field(
-        default=None,
-        description="With confidence: time after which it is taken likewise; what a seed gives then depends on the "
-        "speed of the machine [s].",
-    )
-    ideal_measurements: Literal["ideal", "expected", "sampled"] = Field(
-        default="ideal",
-        description="Pseudo-measurements of a sample, never with clutter: noise-free, of the targets whose detection "
-        "probability is at least detection_threshold; noise-free, of targets seen by chance with that probability; or "
-        "seen by chance, with measurement noise [-].",
-    )
-    detection_threshold: Probability = Field(
-        default=0.5, description="Ideal measurements see a target when its detection is at least so probable [-]."
-    )
-    association: Literal["known", "full"] = Field(
-        default="known",
-        description="Pseudo-updates of LMB beliefs: each pseudo-measurement is of its own target or else clutter, "
-        "which is fast for any number of targets and sensors; or the filter's own update, which asks which it was "
-        "[-].",
-    )
     reward: AnyReward = Field(
         default=of_kind("expected_loss"),
         description="Value of a density; none: the expected loss, of the cutoff and the order of ospa [-].",
-    )
-    undetected_worth: Annotated[float, Field(ge=0.0)] = Field(
-        default=0.0,
-        description="What finding a target of `undetected` is worth, in units of the reward; of the expected loss "
-        "m to the power of its order, such as its cutoff to that power [-].",
     )
     search: AnySearch = Field(
         default=of_kind("automatic"), description="Which joint actions a joint decision evaluates [-]."
@@ -166,20 +124,8 @@ class Control(Section):
         return PlanningSettings(
             horizon_steps=horizon[0],
             horizon_period=horizon[1],
-            num_samples=self.num_samples,
-            confidence=self.confidence,
-            indifference=self.indifference,
-            max_samples=self.max_samples,
-            max_seconds=self.max_seconds,
-            ideal_measurements=self.ideal_measurements,
-            detection_threshold=self.detection_threshold,
-            association=self.association,
-            max_glmb_sensors=self.limits.max_glmb_sensors,
-            max_glmb_targets=self.limits.max_glmb_targets,
-            undetected_worth=self.undetected_worth,
-            max_bound_work=self.limits.max_bound_work,
-            max_prior_hypotheses=self.limits.max_prior_hypotheses,
-            max_version_divergence=self.limits.max_version_divergence,
+            **self.given(),
+            **self.limits.given(),
             limits=replace(
                 planning_limits(),
                 max_hypotheses=self.limits.max_hypotheses,

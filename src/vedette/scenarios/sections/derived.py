@@ -35,8 +35,8 @@ S = TypeVar("S", bound=Section)
 Definition = ast.ClassDef | ast.FunctionDef
 
 
-class Part(Section):
-    """A section of a part of the library's own, which is made by what it is derived from."""
+class Derived(Section):
+    """A section with fields of a class or function of the library."""
 
     of: ClassVar[str]  # module:name of the class or function
     names: ClassVar[dict[str, str]]  # key of the file -> field or parameter of that
@@ -57,6 +57,10 @@ class Part(Section):
             if value is not None or not _may_be_infinite(self.of, name):
                 found[name] = value
         return found
+
+
+class Part(Derived):
+    """A section of a part of the library, which is made by what it is derived from."""
 
     def build(self, folder: Path | None = None, **given: Any) -> Any:
         """The part; of what is `given` it takes what it has parameters for."""
@@ -103,7 +107,8 @@ def derived(of: str, *, without: tuple[str, ...] = (), only: tuple[str, ...] = (
                 fields[key] = (annotation, _field(declared))
         extended = create_model(section.__name__, __base__=section, __module__=section.__module__, **fields)  # type: ignore[call-overload]
         extended.__doc__, extended.of, extended.names = section.__doc__ or _summary(of), of, names
-        order = ("kind", *section.__annotations__, *names, *extended.model_fields)
+        own_fields = [key for key in section.__annotations__ if key not in names]
+        order = ("kind", *own_fields, *names, *extended.model_fields)
         extended.__pydantic_fields__ = {
             key: extended.model_fields[key] for key in order if key in extended.model_fields
         }

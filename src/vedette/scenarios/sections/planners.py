@@ -13,6 +13,7 @@ from pydantic import Field
 from vedette.scenarios.faults import Finding, describe
 from vedette.scenarios.sections.base import Count, Section, check
 from vedette.scenarios.sections.custom import Custom
+from vedette.scenarios.sections.derived import Derived, derived
 from vedette.scenarios.sections.lookahead import Lookahead
 from vedette.scenarios.sections.rewards import AnyReward
 from vedette.scenarios.sections.search import AnySearch
@@ -213,19 +214,16 @@ class NamedRule(Section):
         return Named(name, _rule(self.kind, self.targets)(parts))
 
 
-class NamedOracle(Section):
+@derived("vedette.simulation.oracle:OraclePlanner")
+class NamedOracle(Derived):
     """What is done by who knows where the targets are, as of oracle: the floor beside which strategies are put."""
 
     kind: Literal["oracle"] = Field(default="oracle", description="Kind of planner [-].")
-    depth: Count = Field(default=1, description="Decisions in a row that it looks at [-].")
-    beam_width: Count = Field(
-        default=8, description="Joint actions, those best for one decision, that it follows to the next [-]."
-    )
     needs_labels: ClassVar[bool] = False
 
     def planner(self, name: str, parts: Parts, folder: Path) -> Planner:
         """The planner, under the name that the scenario gives it."""
-        return Named(name, _oracle(parts, depth=self.depth, beam_width=self.beam_width))
+        return Named(name, _oracle(parts, **self.given()))
 
 
 class CustomPlanner(Custom):

@@ -14,6 +14,7 @@ from pydantic import Field
 from vedette.errors import InputError
 from vedette.scenarios.faults import Finding, describe
 from vedette.scenarios.sections.base import Point, Positive, Probability, Reals, Section, Step, check
+from vedette.scenarios.sections.derived import Derived, derived
 from vedette.scenarios.sections.world import Motion, RegionSection, Time, grouped_order
 
 if TYPE_CHECKING:  # with the models comes the compiler, which a check does without
@@ -123,7 +124,8 @@ class Columns(Section):
         return {key: name for key in type(self).model_fields if (name := getattr(self, key)) is not None}
 
 
-class RecordedTargets(Section):
+@derived("vedette.recorded.cleaning:Cleaning")
+class RecordedTargets(Derived):
     """Targets from a CSV or Parquet file of reports: time, which target, where. Interpolated at the scans."""
 
     kind: Literal["recorded"] = Field(default="recorded", description="Kind of targets [-].")
@@ -134,13 +136,6 @@ class RecordedTargets(Section):
     )
     origin_deg: Point | None = Field(
         default=None, description="Longitude and latitude of x = y = 0; none: the middle of the reports [deg]."
-    )
-    max_gap: Positive = Field(default=60.0, description="A longer silence ends the track [s].")
-    min_speed: float = Field(
-        default=0.0, ge=0.0, description="A track slower than this on average is left out (moored) [m/s]."
-    )
-    max_speed: Positive | None = Field(
-        default=None, description="Reports that would need more are dropped (jumps); none: no limit [m/s]."
     )
     crop: bool = Field(default=True, description="Whether tracks end at the edges of the region [-].")
 
@@ -166,17 +161,16 @@ class RecordedTargets(Section):
 def _read(
     file: str, changed_ns: int, num_bytes: int, section: RecordedTargets, region: RegionSection
 ) -> RecordedSource:
-    from vedette.models import Region
     from vedette.recorded import Cleaning
     from vedette.recorded import RecordedTargets as RecordedSource
 
-    edges = Region(region.x_min, region.x_max, region.y_min, region.y_max)
+    edges = region.build()
     return RecordedSource.from_file(
         file,
         columns=section.columns.given(),
         origin_deg=section.origin_deg,
         time_origin=section.time_origin,
-        cleaning=Cleaning(section.max_gap, section.min_speed, section.max_speed, edges if section.crop else None),
+        cleaning=Cleaning(**section.given(), region=edges if section.crop else None),
     )
 
 

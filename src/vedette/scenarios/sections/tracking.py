@@ -17,7 +17,7 @@ from vedette.scenarios.sections.base import (
     check,
 )
 from vedette.scenarios.sections.custom import Custom
-from vedette.scenarios.sections.derived import Part, derived
+from vedette.scenarios.sections.derived import Derived, Part, derived
 
 if TYPE_CHECKING:  # with the filters comes the compiler, which a check does without
     from vedette.filters import Filter as LocalFilter
@@ -52,22 +52,9 @@ UNLABELLED = ("phd", "cphd", "cb_member")
 LABELS_CAPPED = ("lmb", "factored_glmb", "cb_member")
 
 
-class Filter(Section):
-    """The filter that every sensor runs on its own scans."""
+class _Sensing(Section):
+    """How any filter takes what a sensor measures and detects."""
 
-    kind: Literal["delta_glmb", "m_delta_glmb", "lmb", "factored_glmb", "phd", "cphd", "cb_member"] = Field(
-        default="factored_glmb",
-        description="delta-GLMB; delta-GLMB marginalised after each scan (one component a label set); LMB; product of "
-        "delta-GLMBs, each of the labels that contend with each other, for any number of targets; or, without labels "
-        "and for a single sensor that nobody steers by its density: PHD, CPHD, cardinality-balanced multi-Bernoulli "
-        "[-].",
-    )
-    max_split_error: Annotated[float, Field(ge=0.0, le=2.0)] = Field(
-        default=0.01,
-        description="Of a factored_glmb: L1 error up to which labels that contended are taken as independent again, "
-        "and versions of a label as one; 2: always, as an LMB; 0: where they are [-].",
-    )
-    max_factor_labels: Count = Field(default=20, description="Of a factored_glmb: most labels of a factor [-].")
     gaussian_method: GaussianMethod = Field(
         default="auto",
         description="Extended, unscented or cubature Kalman; auto: extended where Jacobians exist, but unscented for a "
@@ -77,6 +64,19 @@ class Filter(Section):
         default="centre",
         description="Of a predicted Gaussian, the probability of detection at its centre, as in the paper, or its mean "
         "over the Gaussian: for sensors whose view ends [-].",
+    )
+
+
+@derived("vedette.filters.factored:FactoredGlmbFilter", only=("max_split_error", "max_factor_labels"))
+class Filter(_Sensing, Derived):
+    """The filter that every sensor runs on its own scans."""
+
+    kind: Literal["delta_glmb", "m_delta_glmb", "lmb", "factored_glmb", "phd", "cphd", "cb_member"] = Field(
+        default="factored_glmb",
+        description="delta-GLMB; delta-GLMB marginalised after each scan (one component a label set); LMB; product of "
+        "delta-GLMBs, each of the labels that contend with each other, for any number of targets; or, without labels "
+        "and for a single sensor that nobody steers by its density: PHD, CPHD, cardinality-balanced multi-Bernoulli "
+        "[-].",
     )
     assignment: Assignment = Field(default=RankedAssignment(), description="How associations are truncated [-].")
     limits: FilterLimits = Field(default=FilterLimits(), description="What is thrown away [-].")
@@ -102,7 +102,7 @@ class Filter(Section):
             case "lmb":
                 return LmbFilter(targets, sensor, limits)
             case "factored_glmb":
-                return FactoredGlmbFilter(targets, sensor, limits, self.max_split_error, self.max_factor_labels)
+                return FactoredGlmbFilter(targets, sensor, limits, **self.given())
             case "phd":
                 return PhdFilter(targets, sensor, limits)
             case "cphd":
@@ -130,26 +130,16 @@ class Filter(Section):
 
         limits = self.limits.build()
         if self.kind == "factored_glmb":
-            return SequentialFactoredFilter(targets, sensors, limits, self.max_split_error, self.max_factor_labels)
+            return SequentialFactoredFilter(targets, sensors, limits, **self.given())
         if self.kind == "lmb":
             return (SequentialLmbFilter if in_turn else MultiSensorLmbFilter)(targets, sensors, limits)
         return MultiSensorGlmbFilter(targets, sensors, limits, marginalised=self.kind == "m_delta_glmb")
 
 
-class CustomFilter(Custom):
+class CustomFilter(_Sensing, Custom):
     """A user's own `vedette.filters.Filter`, made for each sensor; called with `targets` and `sensor`."""
 
     kind: Literal["custom"] = Field(default="custom", description="Kind of filter [-].")
-    gaussian_method: GaussianMethod = Field(
-        default="auto",
-        description="Extended, unscented or cubature Kalman; auto: extended where Jacobians exist, but unscented for a "
-        "target that is close to a sensor for how well its place is known [-].",
-    )
-    detection_at: DetectionAt = Field(
-        default="centre",
-        description="Of a predicted Gaussian, the probability of detection at its centre, as in the paper, or its mean "
-        "over the Gaussian: for sensors whose view ends [-].",
-    )
     gives: ClassVar[str] = "vedette.filters:Filter"
 
     def build(self, targets: TargetModel, sensor: SensorModel, folder: Path) -> LocalFilter:
