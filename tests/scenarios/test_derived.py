@@ -85,6 +85,60 @@ def test_a_filter_parameter_is_written_once(tmp_path: Path) -> None:
     assert "filter.limits.max_forgotten: expected a number of at least 1, got 0" in found["refused"]
 
 
+KIND = '''
+"""The last of all joint actions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vedette.control.search.problem import JointProblem
+from vedette.models.fields import Count, check_fields, part
+
+
+@part("last", "search")
+@dataclass(frozen=True, slots=True)
+class LastSearch:
+    """The last of all.
+
+    Attributes:
+        times: how often it is looked at.
+    """
+
+    times: Count = 3
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+
+    def search(self, problem: JointProblem, *, rng: np.random.Generator) -> tuple[int, ...]:
+        """The last of every sensor's."""
+        return tuple(num - 1 for num in problem.shape)
+'''
+
+AFTER_KIND = """
+import json
+from vedette.scenarios import json_schema, load_scenario, with_fields
+from vedette.scenarios.build import build_planner
+
+changed = with_fields(load_scenario("two-searchers"), {"control.search": {"kind": "last", "times": 4}})
+search = build_planner(changed, "jdm").search
+print(json.dumps([type(search).__name__, search.times, json_schema()["$defs"]["LastSearch"]["properties"]["times"]]))
+"""
+
+
+def test_a_kind_is_one_file(tmp_path: Path) -> None:
+    shutil.copytree(SRC / "vedette", tmp_path / "vedette", ignore=shutil.ignore_patterns("__pycache__"))
+    (tmp_path / "vedette" / "control" / "search" / "last.py").write_text(KIND, "utf-8")
+    own = {**os.environ, "PYTHONPATH": str(tmp_path)}
+    ran = subprocess.run([sys.executable, "-c", AFTER_KIND], env=own, capture_output=True, text=True, check=False)
+    assert ran.returncode == 0, ran.stderr
+    name, times, field = json.loads(ran.stdout)
+    assert (name, times, field["default"]) == ("LastSearch", 4, 3)
+    assert field["description"] == "How often it is looked at [-]."
+
+
 @pytest.mark.parametrize("name", TYPES)
 @pytest.mark.parametrize("value", NUMBERS)
 def test_a_file_and_a_constructor_take_the_same_numbers(name: str, value: Any) -> None:

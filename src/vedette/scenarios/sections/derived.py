@@ -17,7 +17,7 @@ import re
 from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, NamedTuple, TypeVar, Union
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, NamedTuple, TypeVar, Union, cast
 
 from pydantic import Field, create_model
 
@@ -30,6 +30,10 @@ _ROOT = Path(__file__).parents[2]
 _ENTRY = re.compile(r"    (\w+(?:, \w+)*): (.*)")
 _TYPES = {**vars(base), "__builtins__": {"bool": bool}, "UnitVolume": Literal["reference"] | base.Positive}
 _CONSTANTS = {"__builtins__": {}, "math": math}
+
+# A mark with its kind and room, and the name of what is marked; texts that a class has beside its fields.
+_MARK = re.compile(r'(?m)^@part\("(\w+)", "(\w+)".*\n(?:@.*\n)*(?:class|def) (\w+)')
+_WORDS = re.compile(r'(?m)^    (\w+): ClassVar\[str\] = "(.*)"$')
 
 S = TypeVar("S", bound=Section)
 Definition = ast.ClassDef | ast.FunctionDef
@@ -95,29 +99,36 @@ def derived(of: str, *, without: tuple[str, ...] = (), only: tuple[str, ...] = (
     without: those that no file gives. only: those that it has; none: all others.
     """
 
-    def add(section: type[S]) -> type[S]:
-        names, fields = {}, {}
-        for declared in _declared(of):
-            own, key = section.model_fields.get(declared.key), declared.key
-            annotation = _type(declared.type) if own is None else section.__annotations__.get(key, own.annotation)
-            if annotation is None or key == "kind" or key in without or (only and key not in only):
-                continue
-            names[key] = declared.name
-            if own is None or own.description is None:
-                fields[key] = (annotation, _field(declared))
-        extended = create_model(section.__name__, __base__=section, __module__=section.__module__, **fields)  # type: ignore[call-overload]
-        extended.__doc__, extended.of, extended.names = section.__doc__ or _summary(of), of, names
-        own_fields = [key for key in section.__annotations__ if key not in names]
-        order = ("kind", *own_fields, *names, *extended.model_fields)
-        extended.__pydantic_fields__ = {
-            key: extended.model_fields[key] for key in order if key in extended.model_fields
-        }
-        for name, words in _words(of):
-            setattr(extended, name, words)
-        found: type[S] = extended
-        return found
+    return lambda section: _extended(section, section.__name__, of, {}, without, only)
 
-    return add
+
+def _extended(
+    section: type[S],
+    name: str,
+    of: str,
+    fields: dict[str, Any],
+    without: tuple[str, ...] = (),
+    only: tuple[str, ...] = (),
+) -> type[S]:
+    """A section with further fields and those of a class or function."""
+    names, is_bare = {}, "kind" in fields
+    for declared in _declared(of):
+        own, key = section.model_fields.get(declared.key), declared.key
+        annotation = _type(declared.type) if own is None else section.__annotations__.get(key, own.annotation)
+        if annotation is None or key == "kind" or key in without or (only and key not in only):
+            continue
+        names[key] = declared.name
+        if own is None or own.description is None:
+            fields[key] = (annotation, _field(declared))
+    found: Any = create_model(name, __base__=section, __module__=section.__module__, **fields)
+    found.__doc__, found.of, found.names = _summary(of) if is_bare else section.__doc__, of, names
+    own_fields = () if is_bare else tuple(key for key in section.__annotations__ if key not in names)
+    order = dict.fromkeys(("kind", *own_fields, *names, *found.model_fields))
+    found.__pydantic_fields__ = {key: found.model_fields[key] for key in order if key in found.model_fields}
+    for word, text in _WORDS.findall(_source(of)):
+        setattr(found, word, text)
+    made: type[S] = found
+    return made
 
 
 def one_of(
@@ -132,11 +143,12 @@ def one_of(
     found = {section.model_fields["kind"].default: section for section in own}
     for kind, of in _marked(folder, room):
         if kind not in found:
-            found[kind] = derived(of)(_bare(room, kind, parent))
+            found[kind] = _extended(parent, *_bare(room, kind, of))
     if gives:
-        custom = _bare(room, "custom", _OwnPart)
-        custom.__doc__, custom.gives = f"A user's own `{gives.replace(':', '.')}`.", gives
-        found["custom"] = custom
+        name, _, fields = _bare(room, "custom")
+        words: Any = create_model(name, __base__=_OwnPart, __module__=__name__, **fields)
+        words.__doc__, words.gives = f"A user's own `{gives.replace(':', '.')}`.", gives
+        found["custom"] = words
     ordered = sorted(found, key=lambda kind: (kind == "custom", kind))
     return Annotated[Union[tuple(found[kind] for kind in ordered)], Field(discriminator="kind")]  # noqa: UP007
 
@@ -151,52 +163,40 @@ def kinds(union: Any) -> dict[str, Any]:
     return {section.model_fields["kind"].default: section for section in union.__origin__.__args__}
 
 
-def _bare(room: str, kind: str, parent: type[Section]) -> Any:
-    """A section with nothing but its kind."""
-    word: Any = Literal[kind]
-    return create_model(
-        f"{kind}_{room}".title().replace("_", ""),
-        __base__=parent,
-        __module__=__name__,
-        kind=(word, Field(default=kind, description=f"Kind of {room} [-].")),
-    )
+def _bare(room: str, kind: str, of: str = "") -> tuple[str, str, dict[str, Any]]:
+    """Name of a section, what it is of, and its kind as a field."""
+    field = Field(default=kind, description=f"Kind of {room} [-].")
+    return f"{kind}_{room}".title().replace("_", ""), of, {"kind": (Literal[kind], field)}
 
 
 @cache
-def _tree(module: str) -> ast.Module:
-    return ast.parse((_ROOT / (module.partition(".")[2].replace(".", "/") + ".py")).read_text("utf-8"))
+def _text(file: Path) -> str:
+    return file.read_text("utf-8")
+
+
+@cache
+def _source(of: str) -> str:
+    """Of a class or function, with what decorates it; of a class as far as its first method."""
+    module, _, name = of.partition(":")
+    text = _text(_ROOT / (module.partition(".")[2].replace(".", "/") + ".py"))
+    head = re.search(rf"(?m)^(?:@.*\n)*(?:class|def) {name}\b", text)
+    assert head is not None, of
+    end = re.compile(r"\n\n    (?:@|def )|\n(?=[^\s)])").search(text, head.end())
+    return text[head.start() : end.start() if end else None]
 
 
 @cache
 def _definition(of: str) -> Definition:
-    module, _, name = of.partition(":")
-    return next(node for node in _tree(module).body if isinstance(node, Definition) and node.name == name)
+    return cast(Definition, ast.parse(_source(of)).body[0])
 
 
 def _marked(folder: str, room: str) -> Iterator[tuple[str, str]]:
     """Kind, and module and name, of what is marked as parts of a room in the modules of a folder."""
     for file in sorted((_ROOT / folder).glob("*.py")):
-        if f', "{room}"' not in file.read_text("utf-8"):
-            continue
         module = ".".join(("vedette", *file.relative_to(_ROOT).with_suffix("").parts))
-        for node in (node for node in _tree(module).body if isinstance(node, Definition)):
-            for mark in _marks(node):
-                kind, at = (ast.literal_eval(word) for word in mark.args)
-                if at == room:
-                    yield kind, f"{module}:{node.name}"
-
-
-def _marks(node: Definition) -> Iterator[ast.Call]:
-    for mark in node.decorator_list:
-        if isinstance(mark, ast.Call) and ast.unparse(mark.func) == "part":
-            yield mark
-
-
-def _words(of: str) -> Iterator[tuple[str, str]]:
-    """Texts that a class has beside its fields."""
-    for item in _definition(of).body:
-        if isinstance(item, ast.AnnAssign) and ast.unparse(item.annotation) == "ClassVar[str]" and item.value:
-            yield ast.unparse(item.target), ast.literal_eval(item.value)
+        for kind, at, name in _MARK.findall(_text(file)):
+            if at == room:
+                yield kind, f"{module}:{name}"
 
 
 def _summary(of: str) -> str:
@@ -220,7 +220,8 @@ def _entries(text: str) -> dict[str, str]:
 def _declared(of: str) -> tuple[Declared, ...]:
     node = _definition(of)
     entries = _entries(ast.get_docstring(node) or "")
-    keys = {ast.literal_eval(word.value): word.arg for mark in _marks(node) for word in mark.keywords}
+    marks = [mark for mark in node.decorator_list if isinstance(mark, ast.Call)]
+    keys = {ast.literal_eval(word.value): word.arg for mark in marks for word in mark.keywords if word.arg}
     stated = _fields(node) if isinstance(node, ast.ClassDef) else _parameters(node)
     return tuple(
         Declared(
