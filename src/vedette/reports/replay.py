@@ -20,7 +20,6 @@ from vedette.reports.groups import Strategy
 from vedette.reports.why import why_data
 from vedette.scenarios import Scenario
 from vedette.scenarios.build import build_scan_times, build_true_sensors
-from vedette.scenarios.names import sensor_names
 from vedette.scenarios.sections.sensors import Sensor as SensorSection
 from vedette.scenarios.trust import code_of
 from vedette.scenarios.views import field_of_view
@@ -43,7 +42,7 @@ def replay_data(strategy: Strategy, record: RunRecord, group: str, *, trust: boo
     scenario = strategy.cell.scenario
     extent = _extent(record, scenario)
     places = max(0, _DIGITS - math.floor(math.log10(max(extent[1] - extent[0], extent[3] - extent[2]))))
-    scene, names, sections = strategy.scene, sensor_names(scenario.model), scenario.model.sensors
+    scene, names, sections = strategy.scene, scenario.model.sensor_names, scenario.model.sensors
     sensors = [_sensor(name, section) for name, section in zip(names, sections, strict=True)]
     has_velocity = scenario.model.motion.kind != "custom"
     axes = dict[str, dict[str, Any]]()

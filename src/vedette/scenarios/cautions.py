@@ -12,7 +12,6 @@ from vedette.kernels.base.types import Bools, Floats
 from vedette.scenarios.cures import accepted, fusions_instead, with_own_labels
 from vedette.scenarios.faults import Path, Told
 from vedette.scenarios.loading import Scenario, document_of, place_fault
-from vedette.scenarios.names import sensor_names
 from vedette.scenarios.plausibility import implausible
 from vedette.scenarios.sections import ScenarioModel
 from vedette.scenarios.sections.fusion import BY_LABEL, Fusion
@@ -142,7 +141,7 @@ def _many_sensors(scenario: Scenario) -> Iterator[tuple[Path, str]]:
 def _cells(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
     if model.undetected is None:
         return
-    for name, sensor in zip(sensor_names(model), model.sensors, strict=True):
+    for name, sensor in zip(model.sensor_names, model.sensors, strict=True):
         field = field_of_view(sensor)
         if field is not None and field.reach < 0.5 * model.undetected.cell:
             yield (
@@ -182,7 +181,7 @@ def _views(scenario: Scenario) -> Iterator[tuple[Path, str]]:
     }
     if len(chances) < 2:
         return
-    table, names = np.stack(list(chances.values())), [sensor_names(model)[i] for i in chances]
+    table, names = np.stack(list(chances.values())), [model.sensor_names[i] for i in chances]
     spread = table.max(axis=0) - table.min(axis=0)
     worst = int(spread.argmax())
     if spread[worst] > MAX_DIFFERENCE:

@@ -11,7 +11,6 @@ import numpy as np
 from vedette.kernels.base.types import Floats
 from vedette.plausible import LARGE_ANGLE, seem_degrees
 from vedette.scenarios.faults import Path, format_path
-from vedette.scenarios.names import sensor_names
 from vedette.scenarios.sections import ScenarioModel
 from vedette.scenarios.sections.birth import BirthSite
 from vedette.scenarios.sections.sensing import Measurement, Noise, components
@@ -110,7 +109,7 @@ def _distance(start: Floats, site: BirthSite, order: list[int]) -> float:
 
 def _per_scan(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
     """Probabilities a scan, where a sensor does not scan at every step: they count at every step all the same."""
-    every, name = max((own.scans.every, name) for own, name in zip(model.sensors, sensor_names(model), strict=True))
+    every, name = max((own.scans.every, name) for own, name in zip(model.sensors, model.sensor_names, strict=True))
     survival, per_scan = model.survival, []
     if model.birth.period is None and model.birth.steps == "every":
         per_scan.append("birth")

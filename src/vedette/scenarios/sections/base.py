@@ -5,7 +5,7 @@ Each field's description ends with its unit in brackets; [-] is a number without
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import cache
 from inspect import isfunction
 from typing import Annotated, Any, ClassVar, Literal, Self
@@ -24,7 +24,7 @@ from pydantic import (
 )
 from pydantic_core import ErrorDetails, PydanticCustomError
 
-from vedette.scenarios.faults import Finding, describe
+from vedette.scenarios.faults import Finding, Path, describe
 from vedette.scenarios.sections.unread import NotRead, Unread
 
 # Squares and products of numbers in this range are numbers, too.
@@ -110,6 +110,18 @@ def attempt(findings: Iterator[Finding]) -> Iterator[Finding]:
         yield from findings
     except NotRead:
         return
+
+
+def sections_in(value: Any, path: Path = ()) -> Iterator[tuple[Path, Section]]:
+    """A section and all in it, each with its path."""
+    inner: Iterable[tuple[str | int, Any]] = ()
+    if isinstance(value, Section):
+        yield path, value
+        inner = ((name, getattr(value, name)) for name in type(value).model_fields)
+    elif isinstance(value, tuple | dict):
+        inner = enumerate(value) if isinstance(value, tuple) else value.items()
+    for name, item in inner:
+        yield from sections_in(item, (*path, name))
 
 
 def is_whole(value: Any) -> bool:

@@ -8,7 +8,7 @@ import importlib.util
 import inspect
 import re
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
 from types import ModuleType
@@ -17,7 +17,8 @@ from typing import Annotated, Any, ClassVar
 from pydantic import AfterValidator, Field, JsonValue
 
 from vedette.errors import InputError, VedetteError
-from vedette.scenarios.sections.base import Section, expected
+from vedette.scenarios.faults import Path as Places
+from vedette.scenarios.sections.base import Section, expected, sections_in
 
 _REFERENCE = re.compile(r"([A-Za-z_]\w*(\.[A-Za-z_]\w*)*|[^:]+\.py):[A-Za-z_]\w*(\.[A-Za-z_]\w*)*")
 
@@ -109,6 +110,11 @@ class Custom(Section):
 
     def _not_given(self, got: str) -> NotGiven:
         return NotGiven(self, "function", f"{self.function} to give a {self.protocol().__name__}", got)
+
+
+def customs(section: Section) -> Iterator[tuple[Places, Custom]]:
+    """Everything of the user's own in a section, with its path."""
+    return ((path, found) for path, found in sections_in(section) if isinstance(found, Custom))
 
 
 def _is_function(wanted: type) -> bool:

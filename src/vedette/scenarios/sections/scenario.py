@@ -126,6 +126,11 @@ class ScenarioModel(Section):
             yield from attempt(across(self))
 
     @property
+    def sensor_names(self) -> tuple[str, ...]:
+        """Name of each sensor; `sensor 1`, `sensor 2`, ... where none is given."""
+        return tuple(sensor.name or f"sensor {number}" for number, sensor in enumerate(self.sensors, 1))
+
+    @property
     def decision_steps(self) -> tuple[int, ...]:
         """The scans after which the sensors decide, however the scenario says it."""
         if self.control.decision_times is None:

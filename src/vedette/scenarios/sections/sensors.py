@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, create_model
 
 from vedette.plausible import told_elsewhere
 from vedette.scenarios.faults import Finding, describe
@@ -191,19 +191,18 @@ class Sensor(Section):
         return self.truth.build(known, self.measurement, region, folder)
 
 
-class SensorDefaults(Section):
-    """What every sensor has unless it says otherwise; key by key, a sensor's own value replaces the whole default."""
-
-    heading_deg: float | None = Field(default=None, description="Heading at the start [deg].")
-    platform: AnyPlatform | None = Field(default=None, description="What carries them: what they may do [-].")
-    moves_from: Literal["first_decision", "start"] | None = Field(
-        default=None, description="Whether they lie still until the first decision [-]."
+if TYPE_CHECKING:
+    SensorDefaults = Section
+else:
+    SensorDefaults = create_model(
+        "SensorDefaults",
+        __base__=Section,
+        __module__=__name__,
+        __doc__="What every sensor has unless it says otherwise; key by key, a sensor's own value replaces the whole "
+        "default.",
+        **{
+            name: (f"{Sensor.__annotations__[name]} | None", Field(default=None, description=field.description))
+            for name, field in Sensor.model_fields.items()
+            if name not in ("name", "position")
+        },
     )
-    measurement: Measurement | None = Field(default=None, description="What they measure [-].")
-    noise: Noise | None = Field(default=None, description="Measurement noise [-].")
-    detection: Detection | None = Field(default=None, description="Probability of detection [-].")
-    clutter: Clutter | None = Field(default=None, description="False measurements [-].")
-    truth: TrueSensor | None = Field(
-        default=None, description="What they are in truth, where the filters' model of them differs [-]."
-    )
-    scans: ScanTimes | None = Field(default=None, description="Steps at which they scan [-].")
