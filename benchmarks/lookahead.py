@@ -41,7 +41,7 @@ from vedette.evaluation.runs import measure_run
 from vedette.kernels.base.types import Floats
 from vedette.scenarios import Scenario, load_scenario, with_fields
 from vedette.scenarios.build import build_experiment, build_planner
-from vedette.scenarios.sections.lookahead import Lookahead
+from vedette.scenarios.sections.deciding import Lookahead
 from vedette.simulation import simulate
 
 SCENES = ("beyond-the-gap", "two-searchers")

@@ -22,9 +22,9 @@ from vedette.platforms import Actions
 from vedette.platforms.base import actions_at
 from vedette.scenarios.loading import Scenario
 from vedette.scenarios.sections.custom import Custom, NotGiven
+from vedette.scenarios.sections.deciding import Lookahead
 from vedette.scenarios.sections.fusion import IN_FULL, OF_SCANS, ONE_BELIEF, CustomFusion
-from vedette.scenarios.sections.lookahead import Lookahead
-from vedette.scenarios.sections.planners import STRATEGIES, AnyPlanner, NamedIndependent, Parts, Strategy
+from vedette.scenarios.sections.planners import STRATEGIES, Named, NamedIndependent, Parts, Strategy
 from vedette.scenarios.sections.scenario import ScenarioModel
 from vedette.scenarios.sections.sensors import Sensor
 from vedette.scenarios.sections.tracking import CustomFilter
@@ -241,9 +241,9 @@ def build_planner(scenario: Scenario, name: str, num_threads: int = 0) -> Planne
         {"timetable": _timetable(scenario), "cutoff": model.ospa.cutoff},
     )
     if name in model.planners:
-        return model.planners[name].planner(name, parts, folder)
+        return Named(name, model.planners[name].planner(parts, folder))
     try:
-        return STRATEGIES[name].planner(parts)
+        return strategy.planner(parts, folder)
     except InputError as error:
         raise InputError(f"planner {name}: {error}") from error
 
@@ -262,11 +262,11 @@ def _timetable(scenario: Scenario) -> Timetable:
     )
 
 
-def _notes_of_decisions(scenario: Scenario, fusion: Fusion, strategy: Strategy | AnyPlanner) -> tuple[str, ...]:
+def _notes_of_decisions(scenario: Scenario, fusion: Fusion, strategy: Strategy) -> tuple[str, ...]:
     """What the decisions of a strategy say of their fusion, where the tracks are fused in another way, and of radio."""
     model, section = scenario.model, scenario.model.fusion
     reward = getattr(strategy, "reward", None) or model.control.reward
-    alone = strategy is STRATEGIES["idm"] or isinstance(strategy, NamedIndependent)
+    alone = isinstance(strategy, NamedIndependent)
     found = []
     in_full = isinstance(fusion, ParallelUpdate) or reward.kind == "expected_loss"
     if in_full and not alone and section.kind not in (*IN_FULL, "none"):

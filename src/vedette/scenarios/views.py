@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from vedette.scenarios.sections import ScenarioModel
-from vedette.scenarios.sections.constraints import KeepOut, StayInside
+from vedette.scenarios.sections.deciding import KeepOut, StayInside
 from vedette.scenarios.sections.sensors import Sensor
 from vedette.scenarios.sections.world import RegionSection
 

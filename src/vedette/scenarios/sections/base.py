@@ -1,4 +1,5 @@
-"""What the sections of a scenario share: the strict base class and the types of their fields.
+"""What the sections of a scenario share: the strict base class, the types of their fields, and what stands for a value
+that could not be read.
 
 Each field's description ends with its unit in brackets; [-] is a number without a unit.
 """
@@ -25,7 +26,34 @@ from pydantic import (
 from pydantic_core import ErrorDetails, PydanticCustomError
 
 from vedette.scenarios.faults import Finding, Path, describe
-from vedette.scenarios.sections.unread import NotRead, Unread
+
+
+class NotRead(Exception):
+    """A check asked for a value that could not be read."""
+
+
+class Unread:
+    """A value that could not be read; whatever is done with it raises `NotRead`.
+
+    Attributes:
+        errors: what pydantic said of the value.
+    """
+
+    __slots__ = ("errors",)
+
+    def __init__(self, errors: list[ErrorDetails]) -> None:
+        self.errors = errors
+
+    def _refuse(self, *_: Any) -> Any:
+        raise NotRead
+
+    __getattr__ = __getitem__ = __call__ = __iter__ = __len__ = __contains__ = __bool__ = __float__ = __index__ = (
+        _refuse
+    )
+    __eq__ = __ne__ = __lt__ = __le__ = __gt__ = __ge__ = __hash__ = __abs__ = __neg__ = _refuse
+    __str__ = __repr__ = _refuse
+    __add__ = __radd__ = __sub__ = __rsub__ = __mul__ = __rmul__ = __truediv__ = __rtruediv__ = __pow__ = _refuse
+
 
 # Squares and products of numbers in this range are numbers, too.
 _SMALLEST, _LARGEST = 1e-30, 1e15

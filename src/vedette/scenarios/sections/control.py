@@ -1,16 +1,16 @@
-"""Section about control: when to decide, and how an action is valued."""
+"""Section about control: when to decide and how an action is valued; and what must hold between it and tracking."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
-from pathlib import Path
+from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Annotated
 
 from pydantic import Field
 
-from vedette.scenarios.faults import Finding, describe
+from vedette.scenarios.faults import Finding, Path, describe
 from vedette.scenarios.sections.base import (
     Count,
     Numbers,
@@ -19,14 +19,14 @@ from vedette.scenarios.sections.base import (
     Steps,
     check,
 )
-from vedette.scenarios.sections.constraints import AnyConstraint
+from vedette.scenarios.sections.deciding import AnyConstraint, AnyReward, AnySearch, Lookahead
 from vedette.scenarios.sections.derived import Derived, derived, of_kind
-from vedette.scenarios.sections.lookahead import Lookahead
-from vedette.scenarios.sections.rewards import AnyReward
-from vedette.scenarios.sections.search import AnySearch
+from vedette.scenarios.sections.tracking import UNLABELLED
 
-if TYPE_CHECKING:  # with the planners comes the compiler, which a check does without
+if TYPE_CHECKING:  # with these comes the compiler, which a check does without
     from vedette.control import Constraint, PlanningSettings
+    from vedette.scenarios.sections.deciding import AnyReward, AnySearch, Lookahead
+    from vedette.scenarios.sections.scenario import ScenarioModel
 
 
 _SETTINGS = "vedette.control.settings:PlanningSettings"
@@ -134,6 +134,72 @@ class Control(Derived):
             num_threads=num_threads,
         )
 
-    def build_constraints(self, folder: Path) -> tuple[Constraint, ...]:
+    def build_constraints(self, folder: FilePath) -> tuple[Constraint, ...]:
         """What the sensors must not do; raises `InputError` for what cannot be had."""
         return tuple(constraint.build(folder) for constraint in self.constraints)
+
+
+def constraints_on_labels(model: ScenarioModel) -> Iterator[Finding]:
+    """Constraints that ask where targets will be ask a density with labels."""
+    for i, constraint in enumerate(model.control.constraints):
+        if model.filter.kind in UNLABELLED and constraint.kind == "void_probability":
+            wanted = f"another constraint, as {model.filter.kind} filters have no labels to look ahead by"
+            yield ("control", "constraints", i, "kind"), wanted, describe(constraint.kind)
+
+
+def greedy_of_sums(model: ScenarioModel) -> Iterator[Finding]:
+    """Greedy searches ask for rewards of some of the sensors alone, which only sums over labels have."""
+    if model.filter.kind in UNLABELLED:
+        return
+    limits, other = model.control.limits, "coordinate_ascent or another"
+    few = len(model.sensors) <= limits.max_glmb_sensors and limits.max_glmb_targets > 0
+    of_lmbs = model.fusion.kind != "custom" and model.fusion.decides_in_full
+    for path, search, reward in _joint(model):
+        if search.kind != "sequential_greedy" or reward.kind == "expected_loss":
+            continue
+        if model.control.association == "full":
+            why = "as with control.association full decisions are no sums over labels"
+            yield (*path, "kind"), f"{other}, {why}", describe(search.kind)
+        elif few and not of_lmbs and model.filter.kind in ("delta_glmb", "m_delta_glmb"):
+            why = f"as decisions on {model.filter.kind} beliefs are no sums over labels"
+            hint = "or control.limits.max_glmb_targets of 0, with which they are"
+            yield (*path, "kind"), f"{other}, {why}, {hint}", describe(search.kind)
+
+
+def _joint(model: ScenarioModel) -> Iterator[tuple[Path, AnySearch, AnyReward]]:
+    """Of each strategy that decides jointly: where its search stands, the search, and the reward."""
+    control = model.control
+    yield ("control", "search"), control.search, control.reward
+    for name, own in model.planners.items():
+        if own.kind == "joint":
+            path: Path = ("control", "search") if own.search is None else ("planners", name, "search")
+            yield path, own.search or control.search, own.reward or control.reward
+
+
+def longer_plans(model: ScenarioModel) -> Iterator[Finding]:
+    """Decisions over several periods are pseudo-updates apart, and sums over labels."""
+    control = model.control
+    given: dict[Path, Lookahead | None] = {("control", "lookahead"): control.lookahead}
+    given.update({("planners", name): own for name, own in model.planners.items() if own.kind == "lookahead"})
+    for path, own in given.items():
+        if own is None:
+            continue
+        if own.period is not None:
+            horizon_period = model.horizon[1]
+            steps = own.period / horizon_period
+            if round(steps) < 1 or abs(steps - round(steps)) > 1e-9 * steps:
+                multiple = f"a whole multiple of control.horizon_period, {horizon_period:g}"
+                yield (*path, "period"), multiple, describe(own.period)
+        if control.association != "known":
+            yield ("control", "association"), "known, with a lookahead", describe(control.association)
+
+
+def targets_of_rules(model: ScenarioModel) -> Iterator[Finding]:
+    """Each sensor heads for a target."""
+    for name, own in model.planners.items():
+        if own.kind == "assigned" and own.targets is not None and len(own.targets) != len(model.sensors):
+            wanted = f"{len(model.sensors)} numbers, one a sensor"
+            yield ("planners", name, "targets"), wanted, describe(list(own.targets))
+
+
+DECISION_CHECKS = (constraints_on_labels, greedy_of_sums, longer_plans, targets_of_rules)
