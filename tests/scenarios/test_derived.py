@@ -18,6 +18,10 @@ import vedette
 from vedette.errors import InputError
 from vedette.models import fields
 from vedette.scenarios.sections import base
+from vedette.scenarios.sections.deciding import AnyConstraint, AnyReward, AnySearch
+from vedette.scenarios.sections.derived import Derived, derived, kinds
+from vedette.scenarios.sections.sensing import Clutter, Detection, Measurement, Noise
+from vedette.scenarios.sections.world import Motion, Survival
 
 SRC = Path(vedette.__file__).parents[1]
 TOOLS = Path(__file__).parents[2] / "tools"
@@ -83,6 +87,21 @@ def test_a_filter_parameter_is_written_once(tmp_path: Path) -> None:
     assert found["row"] == ["| `max_forgotten` | integer | `7` | Labels forgotten [-]. |"]
     assert found["filters"] == [7, 9]
     assert "filter.limits.max_forgotten: expected a number of at least 1, got 0" in found["refused"]
+
+
+def test_every_part_that_is_marked_is_a_kind() -> None:
+    unions = (AnyReward, AnyConstraint, AnySearch, Motion, Survival, Measurement, Noise, Detection, Clutter)
+    found = sorted(kind for union in unions for kind in kinds(union) if kind != "custom")
+    own = ["keep_out", "range_dependent", "stay_inside"]  # not marked: written out
+    sources = [file.read_text("utf-8") for file in (SRC / "vedette").rglob("*.py") if file.name != "derived.py"]
+    marked = [kind for source in sources for kind in re.findall(r'(?m)^@part\(\s*"(\w+)"', source)]
+    assert sorted([*marked, *own]) == found
+
+
+def test_a_plain_number_is_refused() -> None:
+    """What it may be is not said, and it would be missing from the file unseen."""
+    with pytest.raises(TypeError, match=r"OraclePlanner\.cutoff: expected a type of .*; got float"):
+        derived("vedette.simulation.oracle:OraclePlanner")(Derived)
 
 
 KIND = '''

@@ -2,9 +2,9 @@
 
 A field's name, type, default and description are those of the dataclass field or of the parameter, and of its entry in
 the docstring, which ends with its unit in brackets where it has one. The source is read and nothing is imported, as
-with the parts comes the compiler, which a check does without. What is of no type of `vedette.models.fields` (a region,
-a sensor) is not said in a file but given to `build`. In a file an angle `*_rad` is `*_deg`, and what may be infinite is
-left out.
+with the parts comes the compiler, which a check does without; fields of parents are not. What is of no type of
+`vedette.models.fields` (a region, a sensor) is not said in a file but given to `build`. In a file an angle `*_rad` is
+`*_deg`, and what may be infinite is left out.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ class Derived(Section):
             value = getattr(self, key)
             if isinstance(value, Section):
                 value = value.build()  # type: ignore[attr-defined] # of a region, say
-            if key.endswith("_deg") and not name.endswith("_deg") and value is not None:
+            if _in_degrees(key, name) and value is not None:
                 value = math.radians(value)
             if value is not None or not _may_be_infinite(self.of, name):
                 found[name] = value
@@ -91,14 +91,23 @@ class Declared(NamedTuple):
     default: str | None
     description: str
 
+    @property
+    def in_degrees(self) -> bool:
+        """Whether a file gives it in degrees, and the library in radians."""
+        return _in_degrees(self.key, self.name)
+
+
+def _in_degrees(key: str, name: str) -> bool:
+    return key.endswith("_deg") and not name.endswith("_deg")
+
 
 def derived(of: str, *, without: tuple[str, ...] = (), only: tuple[str, ...] = ()) -> Callable[[type[S]], type[S]]:
     """Add the fields of a class or function, `module:name`, to a section that does not have them.
 
     A field that the section itself has without a description, as it is of another type in a file, is described so too.
-    without: those that no file gives. only: those that it has; none: all others.
+    without: those that no file gives. only: those that it has; none: all others. Raises `TypeError` for a plain number
+    that is neither, as what it may be is not said.
     """
-
     return lambda section: _extended(section, section.__name__, of, {}, without, only)
 
 
@@ -115,7 +124,11 @@ def _extended(
     for declared in _declared(of):
         own, key = section.model_fields.get(declared.key), declared.key
         annotation = _type(declared.type) if own is None else section.__annotations__.get(key, own.annotation)
-        if annotation is None or key == "kind" or key in without or (only and key not in only):
+        if key == "kind" or key in without or (only and key not in only):
+            continue
+        if annotation is None:
+            if declared.type in ("int", "float"):
+                raise TypeError(f"{of}.{declared.name}: expected a type of vedette.models.fields; got {declared.type}")
             continue
         names[key] = declared.name
         if own is None or own.description is None:
@@ -143,12 +156,13 @@ def one_of(
     found = {section.model_fields["kind"].default: section for section in own}
     for kind, of in _marked(folder, room):
         if kind not in found:
-            found[kind] = _extended(parent, *_bare(room, kind, of))
+            found[kind] = _extended(parent, _name(room, kind), of, _kind(room, kind))
     if gives:
-        name, _, fields = _bare(room, "custom")
-        words: Any = create_model(name, __base__=_OwnPart, __module__=__name__, **fields)
-        words.__doc__, words.gives = f"A user's own `{gives.replace(':', '.')}`.", gives
-        found["custom"] = words
+        custom: Any = create_model(
+            _name(room, "custom"), __base__=_OwnPart, __module__=__name__, **_kind(room, "custom")
+        )
+        custom.__doc__, custom.gives = f"A user's own `{gives.replace(':', '.')}`.", gives
+        found["custom"] = custom
     ordered = sorted(found, key=lambda kind: (kind == "custom", kind))
     return Annotated[Union[tuple(found[kind] for kind in ordered)], Field(discriminator="kind")]  # noqa: UP007
 
@@ -163,10 +177,13 @@ def kinds(union: Any) -> dict[str, Any]:
     return {section.model_fields["kind"].default: section for section in union.__origin__.__args__}
 
 
-def _bare(room: str, kind: str, of: str = "") -> tuple[str, str, dict[str, Any]]:
-    """Name of a section, what it is of, and its kind as a field."""
-    field = Field(default=kind, description=f"Kind of {room} [-].")
-    return f"{kind}_{room}".title().replace("_", ""), of, {"kind": (Literal[kind], field)}
+def _name(room: str, kind: str) -> str:
+    return f"{kind}_{room}".title().replace("_", "")
+
+
+def _kind(room: str, kind: str) -> dict[str, Any]:
+    """The field of a section that says its kind."""
+    return {"kind": (Literal[kind], Field(default=kind, description=f"Kind of {room} [-]."))}
 
 
 @cache
@@ -269,12 +286,12 @@ def _field(declared: Declared) -> Any:
     default: Any = ...
     if declared.default is not None:
         default = eval(declared.default, _CONSTANTS)
-        if isinstance(default, float) and declared.key.endswith("_deg") and not declared.name.endswith("_deg"):
+        if isinstance(default, float) and declared.in_degrees:
             default = math.degrees(default)
         default = None if default == math.inf else default
     text = re.sub(r"^\(\w+,\) ", "", declared.description).rstrip(".")
     text = text[:1].upper() + text[1:]
-    if declared.key.endswith("_deg") and not declared.name.endswith("_deg"):
+    if declared.in_degrees:
         text = text.replace("[rad", "[deg")
     unit = "" if text.endswith("]") else " [-]"
     return Field(default, description=f"{text}{unit}.")

@@ -145,7 +145,7 @@ class NamedRule(Strategy):
         return RulePlanner(parts.sensors, self.kind, parts.settings, parts.constraints, parts.estimate, self.targets)
 
 
-@derived("vedette.simulation.oracle:OraclePlanner")
+@derived("vedette.simulation.oracle:OraclePlanner", without=("cutoff",))
 class NamedOracle(Strategy, Derived):
     """What is done by who knows where the targets are, as of oracle: the floor beside which strategies are put."""
 
