@@ -150,18 +150,19 @@ def one_of(
     """The parts of a room, such as "search", as a field's type: one section a kind, which the field `kind` chooses.
 
     folder: of the modules in which parts are marked by `vedette.models.fields.part`. gives: class or protocol of one of
-    the user's own. own: sections that are more than what they are derived from, in place of those. parent: of the
-    others.
+    the user's own, and what else is to be said of it. own: sections that are more than what they are derived from, in
+    place of those. parent: of the others.
     """
     found = {section.model_fields["kind"].default: section for section in own}
     for kind, of in _marked(folder, room):
         if kind not in found:
             found[kind] = _extended(parent, _name(room, kind), of, _kind(room, kind))
     if gives:
+        path, more = re.fullmatch(r"([\w.:]+)(.*)", gives).groups()  # type: ignore[union-attr]
         custom: Any = create_model(
             _name(room, "custom"), __base__=_OwnPart, __module__=__name__, **_kind(room, "custom")
         )
-        custom.__doc__, custom.gives = f"A user's own `{gives.replace(':', '.')}`.", gives
+        custom.__doc__, custom.gives = f"A user's own `{path.replace(':', '.')}`{more}.", path
         found["custom"] = custom
     ordered = sorted(found, key=lambda kind: (kind == "custom", kind))
     return Annotated[Union[tuple(found[kind] for kind in ordered)], Field(discriminator="kind")]  # noqa: UP007

@@ -12,7 +12,7 @@ from pydantic import Field
 from vedette.scenarios.faults import Finding
 from vedette.scenarios.sections.base import HalfWidth, Numbers, Point, Positive, Reals, check
 from vedette.scenarios.sections.custom import Custom
-from vedette.scenarios.sections.derived import Part, derived
+from vedette.scenarios.sections.derived import Part, derived, one_of
 
 if TYPE_CHECKING:  # with the platforms come the models, and the compiler, which a check does without
     from vedette.platforms import Platform
@@ -160,4 +160,8 @@ class Camera(_PlatformSection):
         return self.carrier.top_speed
 
 
-AnyPlatform = Annotated[Still | Courses | Steps | Waypoints | Camera | CustomPlatform, Field(discriminator="kind")]
+if TYPE_CHECKING:
+    AnyPlatform = _PlatformSection
+else:
+    _WRITTEN = (Still, Courses, Steps, Waypoints, Camera, CustomPlatform)
+    AnyPlatform = one_of("platform", "platforms", own=_WRITTEN, parent=_PlatformSection)

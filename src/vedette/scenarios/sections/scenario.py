@@ -19,7 +19,7 @@ from vedette.scenarios.sections.derived import of_kind
 from vedette.scenarios.sections.fusion import AnyFusion, Fusion
 from vedette.scenarios.sections.network import NetworkSection
 from vedette.scenarios.sections.planners import STRATEGIES, AnyPlanner
-from vedette.scenarios.sections.scoring import AnyEstimator, AnyMetric, MapEstimator, Ospa
+from vedette.scenarios.sections.scoring import AnyEstimator, AnyMetric, Ospa
 from vedette.scenarios.sections.sensors import Sensor, SensorDefaults
 from vedette.scenarios.sections.targets import Targets
 from vedette.scenarios.sections.tracking import AnyFilter, Filter
@@ -84,7 +84,7 @@ class ScenarioModel(Section):
     undetected: UndetectedSection | None = Field(
         default=None, description="The targets not yet found, for planners that search; none: no account of them [-]."
     )
-    estimator: AnyEstimator = Field(default=MapEstimator(), description="How estimates are read off [-].")
+    estimator: AnyEstimator = Field(default=of_kind("map"), description="How estimates are read off [-].")
     control: Control = Field(default=Control(), description="When and how the sensors decide [-].")
     planners: dict[Name, AnyPlanner] = Field(
         default={},

@@ -6,7 +6,7 @@ import os
 from collections.abc import Iterator, Sequence
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal, Protocol
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import numpy as np
 from pydantic import Field
@@ -15,11 +15,12 @@ from vedette.errors import InputError
 from vedette.scenarios.faults import Finding, describe
 from vedette.scenarios.sections.base import Point, Positive, Probability, Reals, Section, Step, check
 from vedette.scenarios.sections.derived import Derived, derived
-from vedette.scenarios.sections.world import Motion, RegionSection, Time, grouped_order
+from vedette.scenarios.sections.world import RegionSection, grouped_order
 
 if TYPE_CHECKING:  # with the models comes the compiler, which a check does without
     from vedette.models import MotionModel
     from vedette.recorded import RecordedTargets as RecordedSource
+    from vedette.scenarios.sections.scenario import ScenarioModel
     from vedette.simulation import CrowdTargets as CrowdSource
     from vedette.simulation import PoissonTargets as PoissonSource
     from vedette.simulation import ScriptedTargets as ScriptedSource
@@ -29,17 +30,6 @@ def _negative_stds(stds: Sequence[float]) -> Iterator[Finding]:
     for i, std in enumerate(stds):
         if std < 0.0:
             yield ("std", i), "a number of at least 0", describe(std)
-
-
-class _World(Protocol):
-    """What of a scenario targets are made with."""
-
-    @property
-    def time(self) -> Time: ...
-    @property
-    def region(self) -> RegionSection: ...
-    @property
-    def motion(self) -> Motion: ...
 
 
 class ScriptedTarget(Section):
@@ -79,7 +69,7 @@ class ScriptedTargets(Section):
             changes[min((track.end_step or num_steps) + 1, num_steps + 1)] -= 1
         return float(np.cumsum(changes)[: num_steps + 1].max())
 
-    def build(self, world: _World, motion: MotionModel, folder: Path) -> ScriptedSource:
+    def build(self, world: ScenarioModel, motion: MotionModel, folder: Path) -> ScriptedSource:
         """The targets, as `motion` moves them."""
         from vedette.simulation import ScriptedTargets
 
@@ -143,7 +133,7 @@ class RecordedTargets(Derived):
         """None: it takes the file to know."""
         return None
 
-    def build(self, world: _World, motion: MotionModel, folder: Path) -> RecordedSource:
+    def build(self, world: ScenarioModel, motion: MotionModel, folder: Path) -> RecordedSource:
         """The targets, as they were recorded. Raises `InputError` for a file that cannot be read, or gives none."""
         return self.source(world.region, folder)
 
@@ -198,7 +188,7 @@ class PoissonTargets(Section):
             return None
         return self.expected * (1.0 - (1.0 - self.death_probability) ** num_steps) / self.death_probability
 
-    def build(self, world: _World, motion: MotionModel, folder: Path) -> PoissonSource:
+    def build(self, world: ScenarioModel, motion: MotionModel, folder: Path) -> PoissonSource:
         """The targets, as `motion` moves them."""
         from vedette.simulation import PoissonTargets
 
@@ -233,7 +223,7 @@ class CrowdTargets(Section):
         """The number at every scan, on average."""
         return float(self.number)
 
-    def build(self, world: _World, motion: MotionModel, folder: Path) -> CrowdSource:
+    def build(self, world: ScenarioModel, motion: MotionModel, folder: Path) -> CrowdSource:
         """The targets, as `motion` moves them."""
         from vedette.simulation import CrowdTargets
 
