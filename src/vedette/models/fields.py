@@ -107,15 +107,15 @@ def check_fields(made: Any, prefix: str = "") -> None:
         InputError: names the field, what was expected and what came.
     """
     kind: type = type(made)
-    for name, optional, check in _checks(kind):
+    for name, field, optional, check in _checks(kind, prefix):
         value = getattr(made, name)
-        if not (optional and value is None):
-            check(f"{prefix}{name}", value)
+        if value is not None or not optional:
+            check(field, value)
 
 
 @cache
-def _checks(kind: type) -> tuple[tuple[str, bool, Callable[[str, Any], Any]], ...]:
-    return tuple(_found(kind))
+def _checks(kind: type, prefix: str) -> tuple[tuple[str, str, bool, Callable[[str, Any], Any]], ...]:
+    return tuple((name, f"{prefix}{name}", optional, check) for name, optional, check in _found(kind))
 
 
 def _found(kind: type) -> Iterator[tuple[str, bool, Callable[[str, Any], Any]]]:

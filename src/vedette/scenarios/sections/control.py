@@ -39,9 +39,14 @@ _LIMITS = (
 )
 # Of the settings, those that no file gives or gives otherwise.
 _ELSEWHERE = (*_LIMITS, "horizon_steps", "horizon_period", "end", "limits", "num_threads")
+_FIRST = (
+    *("decision_steps", "decision_times", "horizon_steps", "horizon_period"),
+    *("num_samples", "confidence", "indifference", "max_samples", "max_seconds"),
+    *("ideal_measurements", "detection_threshold", "association", "reward"),
+)
 
 
-@derived(_SETTINGS, only=_LIMITS)
+@derived(_SETTINGS, only=_LIMITS, first=("max_prior_hypotheses", "max_version_divergence", "max_hypotheses"))
 class PlanningLimits(Derived):
     """How much of the density the planner works with."""
 
@@ -57,7 +62,7 @@ def _order(name: str, moments: Sequence[float]) -> Iterator[Finding]:
             yield (name, i + 1), f"more than the one before it, {before:g}", describe(after)
 
 
-@derived(_SETTINGS, without=_ELSEWHERE)
+@derived(_SETTINGS, without=_ELSEWHERE, first=_FIRST)
 class Control(Derived):
     """When and how the sensors decide where to go. Without decisions they keep their course.
 

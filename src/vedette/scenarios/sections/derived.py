@@ -101,14 +101,15 @@ def _in_degrees(key: str, name: str) -> bool:
     return key.endswith("_deg") and not name.endswith("_deg")
 
 
-def derived(of: str, *, without: tuple[str, ...] = (), only: tuple[str, ...] = ()) -> Callable[[type[S]], type[S]]:
+def derived(of: str, **which: tuple[str, ...]) -> Callable[[type[S]], type[S]]:
     """Add the fields of a class or function, `module:name`, to a section that does not have them.
 
     A field that the section itself has without a description, as it is of another type in a file, is described so too.
-    without: those that no file gives. only: those that it has; none: all others. Raises `TypeError` for a plain number
-    that is neither, as what it may be is not said.
+    without: those that no file gives. only: those that it has; none: all others. first: keys in front of these, and
+    those of the section alone behind them, in what is written and shown. Raises `TypeError` for a plain number that is
+    neither, as what it may be is not said.
     """
-    return lambda section: _extended(section, section.__name__, of, {}, without, only)
+    return lambda section: _extended(section, section.__name__, of, {}, **which)
 
 
 def _extended(
@@ -116,11 +117,13 @@ def _extended(
     name: str,
     of: str,
     fields: dict[str, Any],
+    *,
     without: tuple[str, ...] = (),
     only: tuple[str, ...] = (),
+    first: tuple[str, ...] = (),
 ) -> type[S]:
     """A section with further fields and those of a class or function."""
-    names, is_bare = {}, "kind" in fields
+    names = {}
     for declared in _declared(of):
         own, key = section.model_fields.get(declared.key), declared.key
         annotation = _type(declared.type) if own is None else section.__annotations__.get(key, own.annotation)
@@ -134,9 +137,8 @@ def _extended(
         if own is None or own.description is None:
             fields[key] = (annotation, _field(declared))
     found: Any = create_model(name, __base__=section, __module__=section.__module__, **fields)
-    found.__doc__, found.of, found.names = _summary(of) if is_bare else section.__doc__, of, names
-    own_fields = () if is_bare else tuple(key for key in section.__annotations__ if key not in names)
-    order = dict.fromkeys(("kind", *own_fields, *names, *found.model_fields))
+    found.__doc__, found.of, found.names = _summary(of) if "kind" in fields else section.__doc__, of, names
+    order = dict.fromkeys(("kind", *first, *names, *found.model_fields))
     found.__pydantic_fields__ = {key: found.model_fields[key] for key in order if key in found.model_fields}
     for word, text in _WORDS.findall(_source(of)):
         setattr(found, word, text)

@@ -38,7 +38,11 @@ OF_LMBS: tuple[FusionKind, ...] = ("clmb", "arithmetic_average")
 Weights = Annotated[tuple[Probability, ...], Field(strict=False, min_length=1)]
 
 
-@derived("vedette.fusion.base:FusionLimits", without=("log_min_component_weight",))
+@derived(
+    "vedette.fusion.base:FusionLimits",
+    without=("log_min_component_weight",),
+    first=("max_hypotheses", "max_components", "min_component_weight"),
+)
 class FusionLimits(Derived):
     """Caps on the cost of a fusion."""
 

@@ -45,7 +45,7 @@ class Still(_PlatformSection):
     names: ClassVar[dict[str, str]] = {}
 
 
-@derived("vedette.platforms.courses:Courses")
+@derived("vedette.platforms.courses:Courses", first=("speed", "speeds"))
 class Courses(_PlatformSection):
     """Turns at once, and keeps course and speed until the next decision; an action is a heading."""
 
@@ -124,7 +124,7 @@ class CustomPlatform(_PlatformSection, Custom):
 Carrier = Annotated[Still | Courses | Steps | Waypoints | CustomPlatform, Field(discriminator="kind")]
 
 
-@derived("vedette.platforms.camera:Pointing")
+@derived("vedette.platforms.camera:Pointing", first=("pointing_deg", "half_width_deg"))
 class Camera(_PlatformSection):
     """Is pointed, and may zoom, on the spot or on what carries it; an action is a pointing, and what the carrier does.
 

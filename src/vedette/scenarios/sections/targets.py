@@ -114,7 +114,7 @@ class Columns(Section):
         return {key: name for key in type(self).model_fields if (name := getattr(self, key)) is not None}
 
 
-@derived("vedette.recorded.cleaning:Cleaning")
+@derived("vedette.recorded.cleaning:Cleaning", first=("path", "columns", "time_origin", "origin_deg"))
 class RecordedTargets(Derived):
     """Targets from a CSV or Parquet file of reports: time, which target, where. Interpolated at the scans."""
 

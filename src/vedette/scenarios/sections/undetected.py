@@ -21,7 +21,7 @@ if TYPE_CHECKING:  # with the models comes the compiler, which a check does with
 MAX_CELLS = 250_000
 
 
-@derived("vedette.models.undetected:UndetectedModel")
+@derived("vedette.models.undetected:UndetectedModel", first=("cell",))
 class UndetectedSection(Derived):
     """How many targets there are that no sensor has found yet, on a grid: some at first, others that appear later."""
 
