@@ -11,14 +11,16 @@ from vedette.control.rewards.base import Exponents, UnitVolume, check_unit_volum
 from vedette.densities import GLMB, LMB
 from vedette.divergence import cauchy_schwarz, renyi
 from vedette.kernels.base.types import Floats
-from vedette.models.arguments import reject
-from vedette.models.fields import Positive, check_fields, part
+from vedette.models.arguments import real, reject
+from vedette.models.fields import Positive, part
 
 
 @part("cauchy_schwarz", "reward")
 @dataclass(frozen=True, slots=True)
 class CauchySchwarzReward:
-    """Cauchy-Schwarz divergence between prediction and update (paper eq. 8), on the label sets that both have.
+    """Cauchy-Schwarz divergence between the prediction and the update (paper eqs. 5, 8 and 13 to 17).
+
+    On the label sets that both have.
 
     Attributes:
         unit_volume: unit K of hyper-volume (eq. 5): a number, or "reference" for (4 pi)^(d/2) sqrt(det P) of the
@@ -69,8 +71,7 @@ class RenyiReward:
     words: ClassVar[str] = "Rényi divergence"
 
     def __post_init__(self) -> None:
-        check_fields(self)
-        if self.order == 1.0:
+        if real("order", self.order) <= 0.0 or self.order == 1.0:
             raise reject("order", "a finite number above 0 other than 1", self.order)
 
     @property
