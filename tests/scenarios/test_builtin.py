@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from scenarios.minimal import kinds
 from vedette.scenarios import list_builtin, load_scenario
 from vedette.scenarios.build import build_targets
 from vedette.scenarios.loading import Scenario
 from vedette.scenarios.sections import ScenarioModel, Section
-from vedette.scenarios.sections.derived import kinds
 from vedette.scenarios.sections.platforms import Courses
 from vedette.scenarios.sections.sensing import Clutter, Detection, Measurement, RangeDependentNoise
 from vedette.scenarios.sections.targets import RecordedTargets, ScriptedTargets

@@ -15,11 +15,12 @@ import pytest
 from pydantic import TypeAdapter, ValidationError
 
 import vedette
+from scenarios.minimal import kinds
 from vedette.errors import InputError
 from vedette.models import fields
 from vedette.scenarios.sections import base
 from vedette.scenarios.sections.deciding import AnyConstraint, AnyReward, AnySearch
-from vedette.scenarios.sections.derived import Derived, derived, kinds
+from vedette.scenarios.sections.derived import Derived, derived
 from vedette.scenarios.sections.sensing import Clutter, Detection, Measurement, Noise
 from vedette.scenarios.sections.world import Motion, Survival
 

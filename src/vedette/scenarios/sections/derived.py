@@ -175,11 +175,6 @@ def of_kind(kind: str) -> Any:
     return {"kind": kind}
 
 
-def kinds(union: Any) -> dict[str, Any]:
-    """The sections of a type made by `one_of`, by kind."""
-    return {section.model_fields["kind"].default: section for section in union.__origin__.__args__}
-
-
 def _name(room: str, kind: str) -> str:
     return f"{kind}_{room}".title().replace("_", "")
 
