@@ -42,7 +42,7 @@ from vedette.kernels.base.types import Floats
 from vedette.processes import end_with_parent
 from vedette.scenarios import Scenario, load_scenario, with_fields
 from vedette.scenarios.build import build_experiment, build_planner
-from vedette.scenarios.sections.lookahead import Lookahead
+from vedette.scenarios.sections.deciding import Lookahead
 from vedette.simulation import simulate
 
 SCENES = ("beyond-the-gap", "two-searchers")

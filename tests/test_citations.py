@@ -59,5 +59,5 @@ def test_every_section_algorithm_and_figure_that_is_cited_is_there() -> None:
 
 
 def test_the_reward_names_the_equations_that_define_it() -> None:
-    (numbers,) = {n for path, n in cited(r"paper eqs\. (5[^)]*)") if path.endswith("sections/rewards.py")}
+    (numbers,) = {n for path, n in cited(r"paper eqs\. (5[^)]*)") if path.endswith("rewards/power.py")}
     assert numbers == "5, 8 and 13 to 17"

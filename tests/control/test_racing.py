@@ -268,11 +268,11 @@ def test_nothing_to_track() -> None:
 @pytest.mark.parametrize(
     ("field", "value", "expected"),
     [
-        ("confidence", 1.0, "between 0 and 1"),
-        ("confidence", 0, "between 0 and 1"),
+        ("confidence", 1.0, "above 0 and below 1"),
+        ("confidence", 0, "above 0 and below 1"),
         ("confidence", "high", "finite number"),
-        ("indifference", -0.1, "at least 0"),
-        ("indifference", 1.0, "share of the best reward"),
+        ("indifference", -0.1, r"in \[0, 1\)"),
+        ("indifference", 1.0, r"in \[0, 1\)"),
         ("max_samples", 23, "at least 24"),
         ("max_samples", 100.5, "whole number"),
         ("max_seconds", 0.0, "above 0"),

@@ -122,7 +122,7 @@ def test_constant_survival():
     [
         (lambda: models.constant_velocity(-1.0), "sigma_v"),
         (lambda: models.constant_velocity(math.nan), "sigma_v"),
-        (lambda: models.constant_velocity(1.0, acceleration="jerk"), "acceleration"),
+        (lambda: models.constant_velocity(1.0, acceleration="jerk"), "acceleration"),  # type: ignore[arg-type]
         (lambda: models.constant_velocity("5"), "sigma_v"),  # type: ignore[arg-type]
         (lambda: models.coordinated_turn(1.0, -0.1), "sigma_turn_rate"),
         (lambda: models.constant_survival(1.2), "prob_survival"),

@@ -17,8 +17,7 @@ from vedette.reports.origin import versions_table
 from vedette.reports.spec_text import spec_toml
 from vedette.scenarios import load_scenario
 from vedette.scenarios.dumping import dump_scenario
-from vedette.scenarios.generated import GeneratedScene
-from vedette.scenarios.generated_text import scene_text
+from vedette.scenarios.generated import GeneratedScene, scene_text
 
 HOSTILE = '<script>alert("&")</script>'
 

@@ -1,6 +1,14 @@
-"""A small valid scenario that tests change."""
+"""A small valid scenario that tests change, and the sections of one field."""
 
 from __future__ import annotations
+
+from typing import Any
+
+
+def kinds(union: Any) -> dict[str, Any]:
+    """The sections of a type made by `one_of`, by kind."""
+    return {section.model_fields["kind"].default: section for section in union.__origin__.__args__}
+
 
 MINIMAL = """\
 name: small

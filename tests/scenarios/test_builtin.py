@@ -9,16 +9,15 @@ from typing import Any
 import numpy as np
 import pytest
 
+from scenarios.minimal import kinds
 from vedette.scenarios import list_builtin, load_scenario
 from vedette.scenarios.build import build_targets
 from vedette.scenarios.loading import Scenario
-from vedette.scenarios.sections import ScenarioModel
-from vedette.scenarios.sections.clutter import RegionClutter
-from vedette.scenarios.sections.detection import GaussianDetection
+from vedette.scenarios.sections import ScenarioModel, Section
 from vedette.scenarios.sections.platforms import Courses
-from vedette.scenarios.sections.sensing import BearingRange, RangeDependentNoise
+from vedette.scenarios.sections.sensing import Clutter, Detection, Measurement, RangeDependentNoise
 from vedette.scenarios.sections.targets import RecordedTargets, ScriptedTargets
-from vedette.scenarios.sections.world import ConstantVelocity
+from vedette.scenarios.sections.world import Motion
 from vedette.simulation import Truth
 
 LAYOUTS: dict[str, dict[str, Any]] = {
@@ -38,8 +37,8 @@ LAYOUTS: dict[str, dict[str, Any]] = {
 NOTE_ROWS = {
     1: ("motion.state_order", "grouped"),
     3: ("sensors.0.noise", RangeDependentNoise()),
-    4: ("sensors.0.detection", GaussianDetection()),
-    5: ("sensors.0.clutter", RegionClutter()),
+    4: ("sensors.0.detection", kinds(Detection)["gaussian"]()),
+    5: ("sensors.0.clutter", kinds(Clutter)["region"]()),
     6: ("birth.steps", "every"),
     7: ("fusion.missing_weight", 1e-6),
     8: ("fusion.mixture_power", "auto"),
@@ -96,14 +95,14 @@ def test_the_papers_scenario_has_the_numbers_of_the_notes(name: str) -> None:
 def test_the_papers_scenario_has_the_papers_numbers(name: str) -> None:
     model = load_scenario(name).model
     assert (model.time.num_steps, model.time.step_period, model.time.start) == (40, 1.0, 1.0)
-    assert model.motion == ConstantVelocity(sigma_v=5.0)
+    assert model.motion == kinds(Motion)["constant_velocity"](sigma_v=5.0)
     assert model.survival.model_dump() == {"kind": "constant", "probability": 0.98, "period": None}
     for sensor in model.sensors:
-        assert sensor.measurement == BearingRange()
-        noise = RangeDependentNoise(sigma_range=10.0, eta_range=5e-5, sigma_bearing_deg=1.0, eta_bearing=5e-6)
+        assert sensor.measurement == kinds(Measurement)["bearing_range"]()
+        noise: Section = RangeDependentNoise(sigma_range=10.0, eta_range=5e-5, sigma_bearing_deg=1.0, eta_bearing=5e-6)
         assert sensor.noise == noise
-        assert sensor.detection == GaussianDetection(sigma=10000.0)
-        assert sensor.clutter == RegionClutter(rate=25.0)
+        assert sensor.detection == kinds(Detection)["gaussian"](sigma=10000.0)
+        assert sensor.clutter == kinds(Clutter)["region"](rate=25.0)
     assert model.region.model_dump() == {"x_min": -1000.0, "x_max": 1000.0, "y_min": -1000.0, "y_max": 1000.0}
     assert model.fusion.model_dump()["weights"] == (0.5, 0.5)
     control = model.control
@@ -173,7 +172,7 @@ def test_three_positions_is_the_published_scene() -> None:
     assert np.diff(truth.offsets)[[0, 19, 39, 59, 70, 80, 90, 99]].tolist() == [2, 4, 6, 10, 8, 6, 4, 4]
     assert truth.at(69)[1][0].tolist() == [-80.0 + 69 * 0.75, -20.0 + 69 * 1.5, 0.75, 1.5]
     assert {(site.existence, site.std) for site in model.birth.sites} == {(0.03, (10.0,) * 4)}
-    motion = model.motion.build("auto", scenario.folder)
+    motion = model.motion.build(scenario.folder)
     axis = np.array([[1 / 3, 1 / 2], [1 / 2, 1.0]])
     np.testing.assert_allclose(motion.noise_cov(np.zeros(4), 1.0), np.kron(axis, np.eye(2)), rtol=1e-15)
     sensors = [(s.detection.model_dump()["probability"], s.noise.model_dump()["std"][0]) for s in model.sensors]

@@ -90,13 +90,13 @@ def test_a_constraint_of_ones_own(tmp_path: Path) -> None:
     assert (own.name, own.needs_beliefs) == ("odd_ones", False)
 
 
-KINDS = "one of stay_inside, keep_out, separation, void_probability, custom"
+KINDS = "one of keep_out, separation, stay_inside, void_probability, custom"
 
 
 @pytest.mark.parametrize(
     ("text", "fault"),
     [
-        ("search: {kind: annealing}", 'control.search.kind: expected one of automatic, exhaustive, coordinate_ascent, sequential_greedy, cross_entropy, custom, got "annealing"'),
+        ("search: {kind: annealing}", 'control.search.kind: expected one of automatic, coordinate_ascent, cross_entropy, exhaustive, sequential_greedy, custom, got "annealing"'),
         ("search: {kind: coordinate_ascent, num_restarts: -1}", "control.search.num_restarts: expected a number of at least 0, got -1"),
         ("search: {kind: sequential_greedy, order: last}", 'control.search.order: expected one of printed, best_first, got "last"'),
         ("search: {kind: cross_entropy, elite_share: 1.0}", "control.search.elite_share: expected a number below 1, got 1.0"),

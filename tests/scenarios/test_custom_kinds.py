@@ -124,7 +124,7 @@ def test_a_reward_of_power_integrals_is_one_too(folder: Path) -> None:
     file.write_text(file.read_text().replace(own("reward", "{scale: 2.0}"), own("Overlap", "{power: 0.25}")))
     assert check(file)[0] == 0
     reward = load_scenario(file).model.control.reward.build(folder)
-    assert (reward.exponents[0], reward.combine(np.array([-1.0]))) == ((0.25, 0.75), 1.0)  # type: ignore[union-attr]
+    assert (reward.exponents[0], reward.combine(np.array([-1.0]))) == ((0.25, 0.75), 1.0)
 
 
 @pytest.mark.parametrize(

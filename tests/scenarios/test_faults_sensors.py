@@ -79,7 +79,7 @@ CASES = [
         "heading_deg: 4.0",
         "platform: {kind: curses, speed: 4.0}",
         [
-            'f.yaml:17:59: sensors[0].platform.kind: expected one of still, courses, steps, waypoints, camera, custom, got "curses" (did you mean courses?)'
+            'f.yaml:17:59: sensors[0].platform.kind: expected one of camera, courses, steps, still, waypoints, custom, got "curses" (did you mean courses?)'
         ],
     ),
     (

@@ -207,7 +207,7 @@ CASES = [
         "decision_steps: [4, 8]",
         "reward: {kind: entropy}",
         [
-            'f.yaml:22:26: control.reward.kind: expected one of cauchy_schwarz, renyi, kullback_leibler, cardinality_variance, expected_gospa, peecs, expected_loss, custom, got "entropy"'
+            'f.yaml:22:26: control.reward.kind: expected one of cardinality_variance, cauchy_schwarz, expected_gospa, expected_loss, kullback_leibler, peecs, renyi, custom, got "entropy"'
         ],
     ),
     (

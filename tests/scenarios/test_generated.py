@@ -12,8 +12,7 @@ from vedette.evaluation import measure_run, own_metrics, run_scenario
 from vedette.scenarios import Scenario, parse_scenario, with_fields
 from vedette.scenarios.build import build_targets
 from vedette.scenarios.cautions import cautions
-from vedette.scenarios.generated import PATTERNS, VIEWS, GeneratedScene
-from vedette.scenarios.generated_text import scene_text
+from vedette.scenarios.generated import PATTERNS, VIEWS, GeneratedScene, scene_text
 from vedette.scenarios.sections.tracking import Filter
 
 

@@ -96,6 +96,12 @@ def test_faults(plain: Scenario, fields: dict[str, Any], message: str) -> None:
     assert message in str(fault.value)
 
 
+def test_of_what_cannot_be_read_no_more_is_said(plain: Scenario) -> None:
+    with pytest.raises(ScenarioError) as fault:
+        with_fields(plain, {"control.lookahead": {"exploration": -1}})
+    assert str(fault.value) == "control.lookahead.exploration: expected a number of at least 0, got -1"
+
+
 def test_who_looks_ahead_crosses_the_gap(gap: Scenario) -> None:
     """A single decision that ends with its horizon has nothing to gain there; one that looks on goes, too."""
     ends = with_fields(gap, {"control.reward": {"kind": "kullback_leibler"}})

@@ -11,8 +11,7 @@ import pytest
 from vedette.errors import InputError
 from vedette.evaluation import run_scenario
 from vedette.scenarios import Scenario, parse_scenario, with_fields
-from vedette.scenarios.generated import GeneratedScene
-from vedette.scenarios.generated_text import scene_text
+from vedette.scenarios.generated import GeneratedScene, scene_text
 from vedette.simulation import planned
 from vedette.simulation.arrow import read_table, write_table
 from vedette.simulation.kept import decode_run, encode_run

@@ -25,7 +25,6 @@ from vedette.evaluation.figures.style import (
 )
 from vedette.kernels.base.types import Floats
 from vedette.scenarios import Scenario
-from vedette.scenarios.names import sensor_names
 from vedette.scenarios.views import FieldOfView, field_of_view, zones
 from vedette.simulation import Truth
 
@@ -95,7 +94,7 @@ def _draw_sensors(axes: Axes, scenario: Scenario, scale: float) -> None:
     region = scenario.model.region
     extent = max(region.x_max - region.x_min, region.y_max - region.y_min)
     offsets = name_offsets(np.array([sensor.position for sensor in model.sensors]), extent)
-    for name, sensor, offset in zip(sensor_names(model), model.sensors, offsets, strict=True):
+    for name, sensor, offset in zip(model.sensor_names, model.sensors, offsets, strict=True):
         place = (sensor.position[0] * scale, sensor.position[1] * scale)
         if sensor.platform.top_speed > 0.0:
             _draw_heading(axes, place, np.radians(sensor.heading_deg))

@@ -174,7 +174,6 @@ def print_run(record: RunRecord, scenario: Scenario | None) -> None:
     from vedette.evaluation.certainty import certainty_lines
     from vedette.evaluation.comparison import choices_of
     from vedette.evaluation.health import health_line
-    from vedette.scenarios.names import sensor_names
 
     console = new_console()
     console.print(
@@ -198,7 +197,7 @@ def print_run(record: RunRecord, scenario: Scenario | None) -> None:
             console.print(f"note: {note}", soft_wrap=True)
     for line in certainty_lines(record):
         console.print(line, soft_wrap=True)
-    unit, names = (scenario.model.ospa.unit, sensor_names(scenario.model)) if scenario else ("", ())
+    unit, names = (scenario.model.ospa.unit, scenario.model.sensor_names) if scenario else ("", ())
     total, localisation, cardinality = record.ospa.mean(axis=0)
     parts = f"(localisation {localisation:.2f}, cardinality {cardinality:.2f})"
     console.print(f"mean OSPA {amount(f'{total:.2f}', unit)} {parts}")

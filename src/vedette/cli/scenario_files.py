@@ -85,8 +85,7 @@ def generate(
 
     A square of 500 m a sensor, so that scenes of few and of many sensors compare.
     """
-    from vedette.scenarios.generated import PATTERNS, VIEWS, GeneratedScene
-    from vedette.scenarios.generated_text import scene_text
+    from vedette.scenarios.generated import PATTERNS, VIEWS, GeneratedScene, scene_text
 
     for name, value, known in (("--pattern", pattern, PATTERNS), ("--view", view, VIEWS)):
         if value not in known:
@@ -120,8 +119,7 @@ def crowd(
 
     A square whose area grows with their number, so that crowds of few and of many targets compare.
     """
-    from vedette.scenarios.generated_crowd import MEASURED, GeneratedCrowd
-    from vedette.scenarios.generated_crowd_text import crowd_text
+    from vedette.scenarios.generated_crowd import MEASURED, GeneratedCrowd, crowd_text
 
     if measured not in MEASURED:
         raise usage_error(f"expected one of {', '.join(MEASURED)}; got {measured}", "--measured")

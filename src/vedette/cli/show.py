@@ -102,10 +102,8 @@ def _numbers_table(title: str, *columns: str) -> Table:
 def _sensors(scenario: Scenario) -> Table:
     from rich.text import Text
 
-    from vedette.scenarios.names import sensor_names
-
     table = _numbers_table("sensors", "name", "x\n(m)", "y\n(m)", "heading\n(deg)", "platform", "moves from")
-    for name, sensor in zip(sensor_names(scenario.model), scenario.model.sensors, strict=True):
+    for name, sensor in zip(scenario.model.sensor_names, scenario.model.sensors, strict=True):
         place = (f"{sensor.position[0]:g}", f"{sensor.position[1]:g}")
         start = "-" if sensor.platform.kind == "still" else sensor.moves_from.replace("_", " ")
         table.add_row(Text(name), *place, f"{sensor.heading_deg:g}", sensor.platform.kind, start)
@@ -114,13 +112,12 @@ def _sensors(scenario: Scenario) -> Table:
 
 def _sensing(scenario: Scenario) -> Table:
     """What the sensors measure: once where it is the same for all."""
-    from vedette.scenarios.names import sensor_names
     from vedette.scenarios.summary import sensing
 
     described = [sensing(sensor) for sensor in scenario.model.sensors]
     if all(rows == described[0] for rows in described):
         return _grid(described[0])
-    names = sensor_names(scenario.model)
+    names = scenario.model.sensor_names
     return _grid((f"{name}: {key}", text) for name, rows in zip(names, described, strict=True) for key, text in rows)
 
 

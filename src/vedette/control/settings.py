@@ -12,23 +12,21 @@ from vedette.errors import InputError
 from vedette.filters import Filter, Limits
 from vedette.kernels.base.types import Bools, Floats
 from vedette.kernels.planning.ideal import EXPECTED, IDEAL, SAMPLED
-from vedette.models.arguments import (
-    count,
-    dimension,
-    float_array,
-    instance,
-    non_negative,
-    one_of,
-    positive,
-    probability,
-    real,
-    reject,
+from vedette.models.arguments import float_array, instance, reject
+from vedette.models.fields import (
+    Chance,
+    Count,
+    EnoughSamples,
+    Natural,
+    NonNegative,
+    Positive,
+    Probability,
+    Real,
+    Share,
+    check_fields,
 )
 from vedette.platforms import Platform
 from vedette.platforms.base import check_platform
-
-# Of a search and the first round of a race (`vedette.control.rounds`).
-_LEAST_SAMPLES = 24
 
 IDEAL_MODES = {"ideal": IDEAL, "expected": EXPECTED, "sampled": SAMPLED}
 
@@ -45,33 +43,37 @@ class PlanningSettings:
     """Horizon, samples and caps of a decision.
 
     Attributes:
-        horizon_steps, horizon_period: H pseudo-updates, T seconds apart (paper: 5 and 2 s).
-        num_samples: M multi-target samples, the same ones for every action and sensor (paper: 40). With `confidence`,
-            as many as it takes, instead.
-        ideal_measurements: "ideal": noise-free, of the sampled targets whose detection probability is at least
-            `detection_threshold`; "expected": noise-free, each target seen with its detection probability, so that the
-            mean over samples is the expectation over detections; "sampled": seen likewise, with measurement noise.
-        detection_threshold: the probability from which on "ideal" measurements see a target (paper-notes 12).
-        association: of LMBs. "known": each ideal measurement is of its own label or else clutter, so that labels are
-            independent and rewards are sums over them, which is fast for any number of targets and sensors; "full":
-            the filter's own update, which also asks which of several targets was measured.
-        max_glmb_sensors, max_glmb_targets: with more sensors, or more targets expected, GLMBs are planned on their
-            LMBs, which the plan then says.
-        undetected_worth: of finding a target of `State.undetected`, in units of the reward (of the expected loss: m to
-            the power of its order); 0: nobody is looked for. Targets not found are taken to stay where they are.
+        horizon_steps: pseudo-updates over the horizon, H (paper: 5).
+        horizon_period: time between pseudo-updates, T (paper: 2) [s].
+        num_samples: multi-target samples of the expected reward, M, the same ones for every action and sensor (paper:
+            40). With `confidence`, as many as it takes, instead.
+        ideal_measurements: pseudo-measurements of a sample, never with clutter. "ideal": noise-free, of the targets
+            whose detection probability is at least `detection_threshold`; "expected": noise-free, of targets seen by
+            chance with that probability, so that the mean over samples is the expectation over detections; "sampled":
+            seen by chance, with measurement noise.
+        detection_threshold: ideal measurements see a target when its detection is at least so probable (paper-notes
+            12).
+        association: pseudo-updates of LMB beliefs. "known": each pseudo-measurement is of its own target or else
+            clutter, so that labels are independent and rewards are sums over them, which is fast for any number of
+            targets and sensors; "full": the filter's own update, which also asks which of several targets was measured.
+        max_glmb_sensors: with more sensors GLMB beliefs are planned on as LMBs, which plans then say.
+        max_glmb_targets: the same with more targets expected.
+        undetected_worth: what finding a target of `undetected` is worth, in units of the reward; of the expected loss m
+            to the power of its order, such as its cutoff to that power; 0: nobody is looked for. Targets not found are
+            taken to stay where they are.
         end: s, time of the last scan, on the clock of `State.time`: no decision after it is planned for; None: none is.
-        max_prior_hypotheses: heaviest hypotheses of each local posterior that enter the pseudo-updates. An LMB enters
-            whole.
-        max_version_divergence: nats within which a label's densities under two of these hypotheses are taken as one,
-            the heavier hypothesis's; 0: none are.
-        max_bound_work: ways to see a target, times samples, that are tried at most for the bound of a plan.
-        confidence: with which the choice is to be the best of its candidates; samples are then added until it is, see
-            `vedette.control.racing`. None: `num_samples`, whatever they can tell.
-        indifference: with `confidence`, how much less than the best is good enough, relative to the magnitude of the
-            best mean reward: 0.01 is one per cent of it.
-        max_samples: with `confidence`, samples in all after which the decision is taken as it stands.
-        max_seconds: s after which it is taken likewise, at the end of a round of samples; the first is always made. A
-            plan then depends on how fast the machine is, not on its seed alone. None: no limit.
+        max_prior_hypotheses: most hypotheses, the heaviest, of each local posterior at the start of the horizon. An LMB
+            enters whole.
+        max_version_divergence: densities of one label within so many nats of each other are taken as one, the heavier
+            hypothesis's, at the start of the horizon; 0: none are [nats].
+        max_bound_work: ways to see a target, times samples, that are tried for the bound of a plan.
+        confidence: with it, samples are added until the choice is so surely the best of its candidates, whatever
+            `num_samples` says; see `vedette.control.racing`.
+        indifference: with `confidence`: a reward short of the best by this share of it is good enough; 0.01 is one per
+            cent of the magnitude of the best mean reward.
+        max_samples: with `confidence`: samples after which the decision is taken as it stands.
+        max_seconds: with `confidence`: time after which it is taken likewise, at the end of a round of samples; the
+            first is always made. What a seed gives then depends on the speed of the machine; none: no limit [s].
         limits: caps of the pseudo-updates, which are ranked, not Gibbs sampled, whatever the filter does. Every label
             set of the prior keeps its heaviest hypothesis beyond these caps, and an LMB keeps all its labels. Tracks
             that are mixtures are replaced by one Gaussian of their moments beforehand.
@@ -81,56 +83,34 @@ class PlanningSettings:
         InputError: a field out of range.
     """
 
-    horizon_steps: int = 5
-    horizon_period: float = 2.0
-    num_samples: int = 40
+    horizon_steps: Count = 5
+    horizon_period: Positive = 2.0
+    num_samples: Count = 40
     ideal_measurements: Literal["ideal", "expected", "sampled"] = "ideal"
-    detection_threshold: float = 0.5
+    detection_threshold: Probability = 0.5
     association: Literal["known", "full"] = "known"
-    max_glmb_sensors: int = 4
-    max_glmb_targets: int = 10
-    max_prior_hypotheses: int = 10
-    max_version_divergence: float = 1e-3
-    max_bound_work: int = 256
-    undetected_worth: float = 0.0
-    end: float | None = None
-    confidence: float | None = None
-    indifference: float = 0.0
-    max_samples: int = 2000
-    max_seconds: float | None = None
+    max_glmb_sensors: Natural = 4
+    max_glmb_targets: Natural = 10
+    max_prior_hypotheses: Count = 10
+    max_version_divergence: NonNegative = 1e-3
+    max_bound_work: Natural = 256
+    undetected_worth: NonNegative = 0.0
+    end: Real | None = None
+    confidence: Chance | None = None
+    indifference: Share = 0.0
+    max_samples: EnoughSamples = 2000
+    max_seconds: Positive | None = None
     limits: Limits = field(default_factory=planning_limits)
-    num_threads: int = 0
+    num_threads: Natural = 0
 
     def __post_init__(self) -> None:
-        for name in ("horizon_steps", "num_samples", "max_prior_hypotheses"):
-            dimension(name, getattr(self, name))
-        for name in ("max_glmb_sensors", "max_glmb_targets", "max_bound_work", "num_threads"):
-            count(name, getattr(self, name))
-        one_of("association", self.association, ("known", "full"))
-        positive("horizon_period", self.horizon_period)
-        probability("detection_threshold", self.detection_threshold)
-        non_negative("undetected_worth", self.undetected_worth)
-        non_negative("max_version_divergence", self.max_version_divergence)
-        if self.end is not None:
-            real("end", self.end)
-        self._check_certainty()
-        one_of("ideal_measurements", self.ideal_measurements, IDEAL_MODES)
+        check_fields(self)
         own = self.limits
         instance("limits", own, Limits)
         if own.max_components != 1 or own.min_existence != 0.0 or own.min_track_weight != 1.0:
             raise InputError(
                 "limits: expected max_components 1, min_existence 0 and min_track_weight 1, as in planning_limits()"
             )
-
-    def _check_certainty(self) -> None:
-        if self.confidence is not None and not 0.0 < real("confidence", self.confidence) < 1.0:
-            raise reject("confidence", "a probability between 0 and 1, neither of them", self.confidence)
-        if non_negative("indifference", self.indifference) >= 1.0:
-            raise reject("indifference", "a share of the best reward, from 0 to less than 1", self.indifference)
-        if dimension("max_samples", self.max_samples) < _LEAST_SAMPLES:
-            raise reject("max_samples", f"a whole number of at least {_LEAST_SAMPLES}", self.max_samples)
-        if self.max_seconds is not None:
-            positive("max_seconds", self.max_seconds)
 
     def horizon_times(self) -> Floats:
         """(horizon_steps,) s from the decision to each pseudo-update."""

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import partial
 
-from vedette.evaluation.metrics import Metric, RunMetrics, TrackedShare, measure, ospa_of_run
+from vedette.evaluation.metrics import Metric, RunMetrics, measure, ospa_of_run
 from vedette.scenarios import Scenario
 from vedette.scenarios.build import build_experiment, build_planner, build_sensors, build_true_sensors
-from vedette.scenarios.sections.scoring import AnyMetric, CustomMetric
+from vedette.scenarios.sections.scoring import AnyMetric
 from vedette.simulation.loop import simulate
 from vedette.simulation.records import Measure, RunRecord
 
@@ -39,12 +39,10 @@ def own_metrics(scenario: Scenario) -> tuple[Metric, ...]:
 
 
 def _measure_of(scenario: Scenario, section: AnyMetric) -> Measure:
-    if isinstance(section, CustomMetric):
-        made: Measure = section.made(scenario.folder)
-        return made
     known, ospa = tuple(sensor.filter.sensor for sensor in build_sensors(scenario)), scenario.model.ospa
     sensors = tuple(true.model for true in build_true_sensors(scenario, known))
-    return TrackedShare(sensors, ospa.cutoff, ospa.order, section.min_detection)
+    made: Measure = section.build(scenario.folder, sensors=sensors, cutoff=ospa.cutoff, order=ospa.order)
+    return made
 
 
 def measure_run(record: RunRecord, scenario: Scenario, own: Sequence[Metric] = ()) -> RunMetrics:

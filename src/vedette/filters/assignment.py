@@ -11,11 +11,13 @@ from vedette.errors import InputError
 from vedette.kernels.association.marginals import Association
 from vedette.kernels.association.propagation import propagate_beliefs
 from vedette.kernels.base.types import Floats, Ints
-from vedette.models.arguments import dimension, non_negative, params_vector
+from vedette.models.arguments import params_vector
+from vedette.models.fields import Count, NonNegative, check_fields, part
 from vedette.models.functions import ModelFunction, model_function, require_kind
 from vedette.models.probe import probe_marginals
 
 
+@part("ranked", "assignment")
 @dataclass(frozen=True, slots=True)
 class Ranked:
     """Joint choices in exact order, as many as `Limits` lets; for an LMB the exact sum over all of them, but in
@@ -23,6 +25,7 @@ class Ranked:
     """
 
 
+@part("gibbs", "assignment")
 @dataclass(frozen=True, slots=True)
 class Gibbs:
     """Joint choices drawn by a Gibbs sampler (Vo, Vo, Hoang 2017, Algorithm 1), for scenes too busy to rank.
@@ -34,10 +37,10 @@ class Gibbs:
         InputError: a number of samples below 1.
     """
 
-    num_samples: int = 1000
+    num_samples: Count = 1000
 
     def __post_init__(self) -> None:
-        dimension("num_samples", self.num_samples)
+        check_fields(self)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -82,6 +85,7 @@ def belief_propagation(offsets: Ints, columns: Ints, log_weights: Floats, params
     return propagate_beliefs(offsets, columns, log_weights, int(params[0]), params[1], out)
 
 
+@part("belief_propagation", "assignment")
 @dataclass(frozen=True, slots=True)
 class BeliefPropagation:
     """Association marginals by loopy belief propagation (Williams and Lau 2014), for an LMB.
@@ -98,12 +102,11 @@ class BeliefPropagation:
         InputError: no sweep, a negative tolerance.
     """
 
-    max_sweeps: int = 1000
-    tolerance: float = 1e-6
+    max_sweeps: Count = 1000
+    tolerance: NonNegative = 1e-6
 
     def __post_init__(self) -> None:
-        dimension("max_sweeps", self.max_sweeps)
-        non_negative("tolerance", self.tolerance)
+        check_fields(self)
 
     def to_kernel(self) -> Association:
         """The same, as kernels take it."""

@@ -23,6 +23,7 @@ from vedette.kernels.base.types import Bools, FactoredGlmb
 from vedette.kernels.steps.factored import FactoredReport, Factoring, step_factored
 from vedette.kernels.steps.in_view import in_view
 from vedette.models.arguments import dimension, non_negative
+from vedette.models.fields import Count, L1Error
 
 # Two claims to a measurement make a link where both hold with a probability above this times the error of a split, or
 # above this at all. Weaker links make groups that no list is long enough for.
@@ -77,13 +78,13 @@ class FactoredGlmbFilter(_OfFactors, LabelledFilter[FactoredGLMB]):
         targets: how targets move, live on and appear.
         sensor: what the sensor sees of them.
         limits: caps and thresholds; those on hypotheses hold for each factor.
-        max_split_error: L1 error, of densities that each integrate to 1, up to which the labels of a factor are split;
-            0 to 2; and up to which versions of a label are made one. Two factors are taken together where both take a
-            measurement with a probability above twice this, or above .02, if they were independent; see
-            `scans_together`.
-        max_factor_labels: labels of a factor at most, and a quarter of those that take a scan together; where more
-            contend, links are made from the strongest on and left out where they would join more. What all this leaves
-            out is in `FilterInfo.factoring_error`.
+        max_split_error: of a factored_glmb: L1 error, of densities that each integrate to 1, up to which labels that
+            contended are taken as independent again, and versions of a label as one; 2: always, as an LMB; 0: where
+            they are. Two factors are taken together where both take a measurement with a probability above twice this,
+            or above .02, if they were independent; see `scans_together`.
+        max_factor_labels: of a factored_glmb: most labels of a factor, and a quarter of those that take a scan
+            together; where more contend, links are made from the strongest on and left out where they would join more.
+            What all this leaves out is in `FilterInfo.factoring_error`.
         scans_together: scans of one time that go into one belief, of this sensor and others, as by `ParallelUpdate`.
             What a weak link that is cut leaves out counts with each of them: so for S scans links are cut S^2 times
             later.
@@ -92,8 +93,8 @@ class FactoredGlmbFilter(_OfFactors, LabelledFilter[FactoredGLMB]):
         InputError: a part of another kind, or a field out of range.
     """
 
-    max_split_error: float = 0.01
-    max_factor_labels: int = 20
+    max_split_error: L1Error = 0.01
+    max_factor_labels: Count = 20
     scans_together: int = 1
 
     def __post_init__(self) -> None:

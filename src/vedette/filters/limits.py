@@ -16,7 +16,17 @@ from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.types import Bools, Ints
 from vedette.kernels.gaussian.mixtures import MixtureCaps
 from vedette.kernels.steps.lmb import Reduction
-from vedette.models.arguments import chance, dimension, is_infinite, non_negative, positive, probability, real, reject
+from vedette.models.fields import (
+    Chance,
+    Count,
+    Limit,
+    NonNegative,
+    Portion,
+    Probability,
+    Real,
+    Share,
+    check_fields,
+)
 from vedette.probabilities import chi_squared_quantile, logit
 
 _Labelled = TypeVar("_Labelled", GLMB, LMB, FactoredGLMB)
@@ -36,7 +46,7 @@ class Limits:
             least this times the heaviest of all; 1 switches this off. Without it a target whose first measurements fit
             its birth badly is crowded out by variations of the heaviest hypotheses, and lost for good.
         gate_probability: probability that a target's measurement falls inside its gate; 1 switches gating off.
-        min_log_clutter: floor on the log clutter intensity. A measurement where the model says that clutter is
+        min_log_clutter: floor of the log clutter intensity. A measurement where the model says that clutter is
             impossible (outside the region) would otherwise forbid every hypothesis that leaves it unexplained.
         max_search_nodes: bound on the ranking search, a guard against scenes of hopeless ambiguity.
         min_component_weight: mixture components lighter than this share of their track, or of the intensity of a PHD
@@ -45,8 +55,8 @@ class Limits:
         max_components: components a track; 1 keeps one moment-matched Gaussian.
         min_existence: labels of an LMB or alone in their factor, or Bernoullis, less probable than this are dropped.
         max_labels: labels of an LMB or a factored density, or Bernoullis of a multi-Bernoulli, kept.
-        max_position_std: m; labels whose position is less certain than this along both axes are dropped after the scan:
-            targets that nobody has seen for long. Infinite: none is.
+        max_position_std: labels whose position is less certain than this along both axes are dropped after the scan:
+            targets that nobody has seen for long; infinite, in a file none: never [m].
         max_intensity_components: components of the intensity of a PHD or CPHD filter, all targets together.
         max_existence: Bernoullis of the CB-MeMBer filter surer than this are taken as this sure; below 1, because the
             update weighs them by r / (1 - r), and leaves one that is certain as it was, whatever the scan says.
@@ -55,36 +65,23 @@ class Limits:
         InputError: a field out of range.
     """
 
-    max_hypotheses: int = 300
-    min_relative_weight: float = 1e-6
-    min_track_weight: float = 1e-5
-    gate_probability: float = 1.0 - 1e-7
-    min_log_clutter: float = -60.0
-    max_search_nodes: int = 1_000_000
-    min_component_weight: float = 1e-5
-    merge_distance: float = 2.0
-    max_components: int = 10
-    min_existence: float = 1e-4
-    max_labels: int = 200
-    max_position_std: float = math.inf
-    max_intensity_components: int = 100
-    max_existence: float = 0.999
+    max_hypotheses: Count = 300
+    min_relative_weight: Share = 1e-6
+    min_track_weight: Probability = 1e-5
+    gate_probability: Portion = 1.0 - 1e-7
+    min_log_clutter: Real = -60.0
+    max_search_nodes: Count = 1_000_000
+    min_component_weight: Share = 1e-5
+    merge_distance: NonNegative = 2.0
+    max_components: Count = 10
+    min_existence: Share = 1e-4
+    max_labels: Count = 200
+    max_position_std: Limit = math.inf
+    max_intensity_components: Count = 100
+    max_existence: Chance = 0.999
 
     def __post_init__(self) -> None:
-        counts = ("max_hypotheses", "max_search_nodes", "max_components", "max_labels", "max_intensity_components")
-        for name in counts:
-            dimension(f"Limits.{name}", getattr(self, name))
-        for name in ("min_relative_weight", "min_component_weight", "min_existence"):
-            if not 0.0 <= real(f"Limits.{name}", getattr(self, name)) < 1.0:
-                raise reject(f"Limits.{name}", "a number in [0, 1)", getattr(self, name))
-        chance("Limits.max_existence", self.max_existence)
-        probability("Limits.min_track_weight", self.min_track_weight)
-        if probability("Limits.gate_probability", self.gate_probability) == 0.0:
-            raise reject("Limits.gate_probability", "a probability above 0", self.gate_probability)
-        if not is_infinite(self.max_position_std):
-            positive("Limits.max_position_std", self.max_position_std)
-        non_negative("Limits.merge_distance", self.merge_distance)
-        real("Limits.min_log_clutter", self.min_log_clutter)
+        check_fields(self, "Limits.")
 
     @classmethod
     def none(cls) -> Limits:

@@ -15,7 +15,8 @@ from vedette.fusion.validity import ValidBeliefs, all_valid
 from vedette.fusion.views import Views
 from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.gaussian.mixtures import MixtureCaps
-from vedette.models.arguments import dimension, instance, non_negative, one_of, real, reject, sequence
+from vedette.models.arguments import instance, one_of, real, reject, sequence
+from vedette.models.fields import Count, NonNegative, check_fields
 from vedette.text import either
 
 MixturePower = Literal["auto", "moment_matched", "component_wise", "quadrature"]
@@ -106,19 +107,22 @@ class Linear(Protocol):
 class FusionLimits(NamedTuple):
     """Caps on the cost of a fusion.
 
-    log_min_component_weight, merge_distance, max_components: reduction of a track's mixture before it is raised to a
-    power and after the fusion (dropped below the weight; merged within the Mahalanobis distance; the heaviest kept).
-    A `merge_distance` of None is 2 for component-wise powers and 0.5 for quadrature. Not used with moment matching.
-    max_combinations: bound on the combinations of components of one label, max_components^sensors; under `auto`
-    so many fewer components are kept.
-    max_hypotheses: label sets kept in a fused GLMB.
+    Attributes:
+        log_min_component_weight: log of the weight below which components of a track's mixture are dropped before it is
+            raised to a power and after the fusion; unused when moment matched.
+        merge_distance: components within this Mahalanobis distance are merged then; none: 2 for component_wise, 0.5 for
+            quadrature powers.
+        max_components: most components of a track before its power is taken; unused when moment matched.
+        max_combinations: bound on the combinations of components of one label at all sensors, max_components^sensors;
+            under `auto` so many fewer components are kept.
+        max_hypotheses: most label sets of the fused density.
     """
 
     log_min_component_weight: float = math.log(1e-5)
-    merge_distance: float | None = None
-    max_components: int = 4
-    max_combinations: int = 4096
-    max_hypotheses: int = 1000
+    merge_distance: NonNegative | None = None
+    max_components: Count = 4
+    max_combinations: Count = 4096
+    max_hypotheses: Count = 1000
 
 
 class PowerRule(NamedTuple):
@@ -154,13 +158,10 @@ def check_power(mixture_power: str, limits: FusionLimits, num_sensors: int) -> N
 def check_limits(limits: Any) -> None:
     """Raise `InputError` unless these are caps that can be kept."""
     instance("limits", limits, FusionLimits)
-    for name in ("max_components", "max_combinations", "max_hypotheses"):
-        dimension(f"limits.{name}", getattr(limits, name))
+    check_fields(limits, "limits.")
     least = limits.log_min_component_weight
     if not (isinstance(least, float) and least == -math.inf):
         real("limits.log_min_component_weight", least)
-    if limits.merge_distance is not None:
-        non_negative("limits.merge_distance", limits.merge_distance)
 
 
 def power_rule(mixture_power: str, limits: FusionLimits, state_dim: int, num_sensors: int = 1) -> PowerRule:

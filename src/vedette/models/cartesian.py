@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from vedette.kernels.base.types import Floats
+from vedette.models.fields import part
 from vedette.models.functions import model_function
 from vedette.models.measurement import MeasurementModel
 
@@ -26,7 +27,8 @@ def _places(measurements: Floats, pose: Floats) -> Floats:
     return measurements
 
 
+@part("position", "measurement")
 def position() -> MeasurementModel:
-    """[px, py] of the target in metres, in the frame of the region; the sensor's pose plays no part."""
+    """z = [px, py] of the target in m, in the frame of the region; the sensor's pose plays no part."""
     angular = np.array([False, False])
     return MeasurementModel(2, _position, np.empty(0), _position_jacobian, angular, _places, is_linear=True)

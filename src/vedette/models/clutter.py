@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from vedette.errors import InputError, ModelError
 from vedette.kernels.base.types import Bools, Floats
 from vedette.models.arguments import dimension, float_array, generator, non_negative, params_vector, pose_vector, reject
+from vedette.models.fields import NonNegative, Reals, part
 from vedette.models.functions import ModelFunction, describe, model_function, numbers_at, require_kind
 from vedette.models.measurement import MeasurementModel, angular_flags, wrap_angular
 from vedette.models.probe import probe_log_intensity
@@ -143,14 +144,16 @@ def log_or_minus_infinity(value: float) -> float:
     return math.log(value) if value > 0.0 else -math.inf
 
 
+@part("measurement_space", "clutter")
 def measurement_space_clutter(
-    rate: float, low: ArrayLike, high: ArrayLike, *, angular: Sequence[bool] | Bools | None = None
+    rate: NonNegative, low: Reals, high: Reals, *, angular: Sequence[bool] | Bools | None = None
 ) -> ClutterModel:
-    """Clutter uniform over the box low <= z <= high of measurement space: intensity rate / volume inside, 0 outside.
+    """Poisson clutter, uniform over a box of the sensor's measurement space: intensity rate / volume inside, 0 outside.
 
     Args:
         rate: expected number a scan.
-        low, high: (meas_dim,) bounds, in the unit of each component.
+        low: (meas_dim,) lowest value of each measurement component; a bearing in radians [rad, m].
+        high: (meas_dim,) highest value of each measurement component; a bearing in radians [rad, m].
         angular: (meas_dim,) which components are angles. Their bounds may then lie anywhere on the circle, such as
             0 to 2 pi; without it, bounds of an angle must lie in [-pi, pi], where measured angles are.
     """

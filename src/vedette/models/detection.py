@@ -13,6 +13,7 @@ from vedette.kernels.base.types import Floats
 from vedette.models import detection_functions as functions
 from vedette.models.arguments import params_vector, pose_vector, positive, probability, reject, state_table
 from vedette.models.detection_functions import MAX_PROB_DETECTION
+from vedette.models.fields import HalfWidth, Positive, Probability, half_width, part
 from vedette.models.functions import ModelFunction, describe, numbers_at, require_kind
 from vedette.models.probe import probe_probability
 
@@ -68,38 +69,57 @@ def _guarded(prob_detection: float, field: str = "prob_detection") -> float:
     return min(probability(field, prob_detection), MAX_PROB_DETECTION)
 
 
-def _half_width(half_width_rad: float, name: str = "half_width_rad") -> float:
-    if positive(name, half_width_rad) > math.pi:
-        raise reject(name, "an angle in radians, in (0, pi] (is it in degrees?)", half_width_rad)
-    return float(half_width_rad)
-
-
 def _edge(max_range: float, outside: float) -> float:
     """How far there is anything to detect."""
     return float(max_range) if outside == 0.0 else math.inf
 
 
-def constant_detection(prob_detection: float) -> DetectionModel:
-    """The same detection probability everywhere; 1 is taken as `MAX_PROB_DETECTION`."""
+@part("constant", "detection", probability="prob_detection")
+def constant_detection(prob_detection: Probability) -> DetectionModel:
+    """The same probability of detection everywhere.
+
+    Args:
+        prob_detection: probability of detection; 1 is taken as a little less, `MAX_PROB_DETECTION`.
+    """
     return DetectionModel(functions.constant, np.array([_guarded(prob_detection)]), functions.mean_constant)
 
 
-def gaussian_detection(sigma: float) -> DetectionModel:
-    """exp(-d^2 / (2 sigma^2)) at distance d (paper section IV, sigma_D = 10000 m; paper-notes 4), capped alike."""
+@part("gaussian", "detection")
+def gaussian_detection(sigma: Positive = 10000.0) -> DetectionModel:
+    """Probability of detection exp(-d^2 / (2 sigma^2)) at distance d (paper section IV; paper-notes 4).
+
+    Args:
+        sigma: distance scale of the fall of detection; capped as others are [m].
+    """
     return DetectionModel(functions.gaussian, np.array([positive("sigma", sigma)]), functions.mean_gaussian)
 
 
-def limited_range(prob_detection: float, max_range: float, outside: float = 0.0) -> DetectionModel:
-    """Constant up to `max_range` metres, `outside` beyond."""
+@part("limited_range", "detection", probability="prob_detection")
+def limited_range(prob_detection: Probability, max_range: Positive, outside: Probability = 0.0) -> DetectionModel:
+    """Detection within a distance, and less or none beyond.
+
+    Args:
+        prob_detection: probability of detection within `max_range`; 1 is taken as a little less, `MAX_PROB_DETECTION`.
+        max_range: greatest distance [m].
+        outside: probability of detection beyond it.
+    """
     params = np.array([_guarded(prob_detection), positive("max_range", max_range), _guarded(outside, "outside")])
     return DetectionModel(functions.limited_range, params, functions.mean_limited_range, _edge(max_range, outside))
 
 
+@part("limited_sector", "detection", probability="prob_detection")
 def limited_sector(
-    prob_detection: float, max_range: float, half_width_rad: float, outside: float = 0.0
+    prob_detection: Probability, max_range: Positive, half_width_rad: HalfWidth, outside: Probability = 0.0
 ) -> DetectionModel:
-    """Constant up to `max_range` metres, within `half_width_rad`, in (0, pi], of the heading; else `outside`."""
-    params = [_guarded(prob_detection), positive("max_range", max_range), _half_width(half_width_rad)]
+    """Detection within a distance and a sector (field of view) around the sensor's heading; less or none beyond.
+
+    Args:
+        prob_detection: probability of detection within the sector; 1 is taken as a little less, `MAX_PROB_DETECTION`.
+        max_range: greatest distance [m].
+        half_width_rad: greatest angle from the heading, either side, up to a half turn [rad].
+        outside: probability of detection outside the sector.
+    """
+    params = [_guarded(prob_detection), positive("max_range", max_range), half_width("half_width_rad", half_width_rad)]
     return DetectionModel(
         functions.limited_sector,
         np.array([*params, _guarded(outside, "outside")]),
@@ -108,49 +128,57 @@ def limited_sector(
     )
 
 
+@part("soft_sector", "detection", probability="prob_detection")
 def soft_sector(
-    prob_detection: float,
-    max_range: float,
-    half_width_rad: float = math.pi,
+    prob_detection: Probability,
+    max_range: Positive,
+    half_width_rad: HalfWidth = math.pi,
     *,
-    range_slope: float,
-    angle_slope: float | None = None,
+    range_slope: Positive,
+    angle_slope: Positive | None = None,
     cut: bool = False,
 ) -> DetectionModel:
-    """Detection that falls off gradually at the edges of a sector, as logistic functions of distance and angle.
+    """Detection that falls off gradually at the edges of a sector around the sensor's heading.
 
+    In distance and angle by logistic functions:
     p / (1 + exp(range_slope (rho - max_range))) / (1 + exp(angle_slope (|dtheta| - half_width_rad))) at the distance
     rho and the angle dtheta from the heading. A target at the sensor itself is straight ahead.
 
     Args:
-        prob_detection: p, deep within the sector; 1 is taken as `MAX_PROB_DETECTION`.
-        max_range: m; p / 2 there, straight ahead.
-        half_width_rad: in (0, pi]. With pi and no `angle_slope` detection does not depend on the angle.
-        range_slope: 1/m, above 0.
-        angle_slope: 1/rad, above 0; None: the edges at `half_width_rad` are sharp.
-        cut: whether nothing at all is detected beyond `max_range` and `half_width_rad`.
+        prob_detection: probability of detection deep within the sector, p; 1 is taken as a little less,
+            `MAX_PROB_DETECTION`.
+        max_range: distance at which half of it is left, straight ahead [m].
+        half_width_rad: angle from the heading, either side, at which half of it is left; with a half turn and no
+            `angle_slope` detection does not depend on the angle [rad].
+        range_slope: steepness of the edge in range [1/m].
+        angle_slope: steepness of the edges in angle; none: sharp ones, and at a half turn none at all [1/rad].
+        cut: whether nothing at all is detected beyond `max_range` and the half width.
     """
     slope = 0.0 if angle_slope is None else positive("angle_slope", angle_slope)
     if not isinstance(cut, bool):
         raise reject("cut", "true or false", cut)
-    params = [_guarded(prob_detection), positive("max_range", max_range), _half_width(half_width_rad)]
+    params = [_guarded(prob_detection), positive("max_range", max_range), half_width("half_width_rad", half_width_rad)]
     params += [positive("range_slope", range_slope), slope, float(cut)]
     return DetectionModel(functions.soft_sector, np.array(params), reach=float(max_range) if cut else math.inf)
 
 
-def camera(prob_detection: float, max_range: float, reference_half_width_rad: float | None = None) -> DetectionModel:
-    """Constant up to a range and within the pose's half width of its pointing; 0 elsewhere.
+@part("camera", "detection", probability="prob_detection")
+def camera(
+    prob_detection: Probability, max_range: Positive, reference_half_width_rad: HalfWidth | None = None
+) -> DetectionModel:
+    """Detection within the field of view of a camera: along its pointing, as far to either side as its half width.
 
     The pose is [px, py, heading_rad, pointing_rad, half_width_rad], see `vedette.platforms.Pointing`.
 
     Args:
-        prob_detection: within the field of view; 1 is taken as `MAX_PROB_DETECTION`.
-        max_range: m.
-        reference_half_width_rad: where the camera zooms, the half width at which it sees as far as `max_range`; it sees
-            as many times farther as its field is narrower; in (0, pi]. None: as far at every width.
+        prob_detection: probability of detection within the field of view; 1 is taken as a little less,
+            `MAX_PROB_DETECTION`.
+        max_range: greatest distance [m].
+        reference_half_width_rad: where it zooms, the half width at which it sees so far; it sees as many times farther
+            as its field is narrower; none: as far at every width [rad].
     """
     given = reference_half_width_rad
-    reference = 0.0 if given is None else _half_width(given, "reference_half_width_rad")
+    reference = 0.0 if given is None else half_width("reference_half_width_rad", given)
     params = np.array([_guarded(prob_detection), positive("max_range", max_range), reference])
     reach = float(max_range) if reference == 0.0 else math.inf
     return DetectionModel(functions.camera, params, functions.mean_camera, reach)

@@ -7,12 +7,14 @@ the left, appended for the coordinated turn.
 from __future__ import annotations
 
 import math
+from typing import Literal
 
 import numpy as np
 
 from vedette.kernels.base.compile import inlined, kernel
 from vedette.kernels.base.types import Floats
 from vedette.models.arguments import non_negative, one_of
+from vedette.models.fields import NonNegative, part
 from vedette.models.functions import model_function
 from vedette.models.motion import MotionModel
 
@@ -74,17 +76,20 @@ def _cv_continuous_noise(state: Floats, dt: float, params: Floats, out: Floats) 
         out[axis + 2, axis + 2] = dt * variance
 
 
-def constant_velocity(sigma_v: float, *, acceleration: str = "held", method: str = "auto") -> MotionModel:
-    """Constant velocity under white acceleration.
+@part("constant_velocity", "motion")
+def constant_velocity(
+    sigma_v: NonNegative = 5.0, *, acceleration: Literal["held", "continuous"] = "held", method: str = "auto"
+) -> MotionModel:
+    """Constant velocity with white acceleration noise. State [px, py, vx, vy].
 
     Held within a step (paper section IV, F_k and Q_k), the noise of an axis is sigma_v^2 [[dt^4/4, dt^3/2], [dt^3/2,
     dt^2]]; continuous in time (Bar-Shalom, Li and Kirubarajan 2001, section 6.2.2), it is sigma_v^2 [[dt^3/3, dt^2/2],
     [dt^2/2, dt]], and two steps have the noise of one of their length.
 
     Args:
-        sigma_v: standard deviation of the held acceleration, m/s^2 (paper: 5); of a continuous one the root of its
-            spectral density, m/s^1.5.
-        acceleration: "held" or "continuous".
+        sigma_v: standard deviation of a held acceleration (paper: 5); of a continuous one the root of its spectral
+            density, in m/s^1.5 [m/s^2].
+        acceleration: whether the acceleration is constant within a step, as in the paper, or white in continuous time.
         method: Gaussian method, see `MotionModel`.
     """
     one_of("acceleration", acceleration, _CV_NOISE)
@@ -165,14 +170,20 @@ def _ct_noise(state: Floats, dt: float, params: Floats, out: Floats) -> None:
     out[4, 4] = (dt * params[1]) ** 2
 
 
-def coordinated_turn(sigma_v: float, sigma_turn_rate: float, *, method: str = "auto") -> MotionModel:
-    """Exact turn at a rate that is constant within a step.
+@part("coordinated_turn", "motion", sigma_turn_rate_deg="sigma_turn_rate")
+def coordinated_turn(
+    sigma_v: NonNegative = 5.0,
+    sigma_turn_rate: NonNegative = math.radians(1.0),  # noqa: B008 # a number
+    *,
+    method: str = "auto",
+) -> MotionModel:
+    """Turn at an unknown rate, exact where it is constant within a step. State [px, py, vx, vy, turn rate in rad/s].
 
     Noise B B' with B = blkdiag([dt^2/2; dt] sigma_v, the same for the other axis, dt sigma_turn_rate).
 
     Args:
-        sigma_v: standard deviation of the acceleration on each axis, m/s^2.
-        sigma_turn_rate: standard deviation of the turn acceleration, rad/s^2.
+        sigma_v: standard deviation of the acceleration on each axis [m/s^2].
+        sigma_turn_rate: standard deviation of the turn acceleration [rad/s^2].
         method: Gaussian method, see `MotionModel`.
     """
     params = np.array([non_negative("sigma_v", sigma_v), non_negative("sigma_turn_rate", sigma_turn_rate)])

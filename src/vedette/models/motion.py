@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from vedette.kernels.base.types import Floats, Motion
 from vedette.kernels.gaussian.sigma_points import CUBATURE, LINEARISED, SWITCHED, UNSCENTED
 from vedette.models.arguments import dimension, one_of, params_vector, positive, probability, real, reject, state_table
+from vedette.models.fields import Positive, Probability, part
 from vedette.models.functions import ModelFunction, model_function, numbers_at, require_kind, write_rows
 from vedette.models.probe import probe_array, probe_covariance, probe_jacobian, probe_probability
 
@@ -168,13 +169,14 @@ def _survival_within(state: Floats, dt: float, params: Floats) -> float:
     return params[0] ** (dt / params[1])  # type: ignore[no-any-return]
 
 
-def constant_survival(prob_survival: float, period: float | None = None) -> SurvivalModel:
-    """The same survival probability everywhere.
+@part("constant", "survival", probability="prob_survival")
+def constant_survival(prob_survival: Probability = 0.98, period: Positive | None = None) -> SurvivalModel:
+    """The same probability of survival everywhere.
 
     Args:
-        prob_survival: of living through `period` seconds; through dt seconds then prob_survival^(dt / period), in
-            however many steps.
-        period: s; None: it is that of each step, whatever its length (paper: 0.98).
+        prob_survival: probability of living on to the next scan (paper: 0.98), or through the period; through dt
+            seconds then prob_survival^(dt / period), in however many steps.
+        period: time for which the probability is meant; none: a scan, however long after another [s].
 
     Raises:
         InputError: no probability, or no period above 0.

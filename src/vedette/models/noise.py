@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats
 from vedette.models.arguments import float_array, non_negative, positive, reject
+from vedette.models.fields import NonNegativePair, PositivePair, Positives, part
 from vedette.models.functions import model_function
 from vedette.models.measurement import NoiseModel
 
@@ -54,20 +54,26 @@ def _by_axis(state: Floats, pose: Floats, params: Floats, out: Floats) -> None:
         out[i, 1 - i] = 0.0
 
 
-def constant_noise(stds: ArrayLike) -> NoiseModel:
-    """Independent noise with the given standard deviation of each measurement component, in its own unit."""
+@part("constant", "noise", std="stds")
+def constant_noise(stds: Positives) -> NoiseModel:
+    """The same standard deviations everywhere, of independent noise.
+
+    Args:
+        stds: standard deviation of each measurement component; a bearing in radians [rad, m].
+    """
     values = float_array("stds", stds, (None,))
     if len(values) == 0 or (values <= 0.0).any():
         raise reject("stds", "one or more numbers above 0", stds)
     return NoiseModel(_constant, values, len(values), values)
 
 
-def axis_noise(std: ArrayLike, growth: ArrayLike) -> NoiseModel:
-    """Noise of a position measurement: standard deviation std_i + growth_i d_i^2, d_i the offset along axis i.
+@part("by_axis", "noise")
+def axis_noise(std: PositivePair, growth: NonNegativePair) -> NoiseModel:
+    """Of a position: standard deviations std + growth d^2 along each axis, d the target's offset along it.
 
     Args:
-        std: (2,) m, along x and y, above 0.
-        growth: (2,) 1/m, at least 0.
+        std: (2,) standard deviation along x and y at offset 0 [m].
+        growth: (2,) growth with the square of the offset along x and y [1/m].
     """
     stds, growths = float_array("std", std, (2,)), float_array("growth", growth, (2,))
     if (stds <= 0.0).any():

@@ -13,6 +13,7 @@ import numpy as np
 
 from vedette.kernels.base.compile import inlined
 from vedette.kernels.base.types import Floats
+from vedette.models.fields import part
 from vedette.models.functions import model_function
 from vedette.models.measurement import MeasurementModel
 
@@ -78,17 +79,20 @@ def _places(measurements: Floats, pose: Floats) -> Floats:
     return np.stack([pose[0] + ranges * np.cos(bearings), pose[1] + ranges * np.sin(bearings)], axis=1)
 
 
+@part("bearing_range", "measurement")
 def bearing_range() -> MeasurementModel:
-    """[bearing, range] of the target from the sensor (paper: z_k)."""
+    """z = [bearing in rad, range in m] (paper: z_k); the bearing counter-clockwise from east, in (-pi, pi]."""
     angular, least = np.array([True, False]), np.array([-np.inf, 0.0])
     return MeasurementModel(2, _bearing_range, np.empty(0), _bearing_range_jacobian, angular, _places, least)
 
 
+@part("bearing_only", "measurement")
 def bearing_only() -> MeasurementModel:
-    """[bearing]."""
+    """z = [bearing in rad], counter-clockwise from east, in (-pi, pi]."""
     return MeasurementModel(1, _bearing, np.empty(0), _bearing_jacobian, np.array([True]))
 
 
+@part("range_only", "measurement")
 def range_only() -> MeasurementModel:
-    """[range]."""
+    """z = [range in m]."""
     return MeasurementModel(1, _range, np.empty(0), _range_jacobian, np.array([False]), least=np.zeros(1))

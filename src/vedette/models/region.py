@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from vedette.kernels.base.types import Bools, Floats
 from vedette.models.arguments import as_array, generator, real, reject
+from vedette.models.fields import Real
 from vedette.plausible import implausible, seem_degrees
 
 
@@ -22,12 +23,19 @@ def tell_degrees(field: str, corners: Floats) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Region:
-    """Rectangle [x_min, x_max] x [y_min, y_max] in metres, with a positive area."""
+    """Rectangle [x_min, x_max] x [y_min, y_max] with a positive area.
 
-    x_min: float
-    x_max: float
-    y_min: float
-    y_max: float
+    Attributes:
+        x_min: western edge [m].
+        x_max: eastern edge [m].
+        y_min: southern edge [m].
+        y_max: northern edge [m].
+    """
+
+    x_min: Real
+    x_max: Real
+    y_min: Real
+    y_max: Real
 
     def __post_init__(self) -> None:
         for name in ("x_min", "x_max", "y_min", "y_max"):

@@ -15,6 +15,7 @@ from vedette.kernels.base.compile import inlined, kernel
 from vedette.kernels.base.types import Floats
 from vedette.models.arguments import non_negative, one_of, reject
 from vedette.models.clutter import ClutterModel, log_or_minus_infinity
+from vedette.models.fields import NonNegative, part
 from vedette.models.functions import ModelFunction, model_function
 from vedette.models.measurement import MeasurementModel
 from vedette.models.region import Region
@@ -108,8 +109,9 @@ class _RegionSampler:
         return measurement.measure(states, pose)
 
 
-def region_clutter(rate: float, region: Region, kind: str) -> ClutterModel:
-    """Clutter uniform in `region` as a sensor of the given kind measures it (paper section IV; paper-notes 5).
+@part("region", "clutter")
+def region_clutter(rate: NonNegative, region: Region, kind: str) -> ClutterModel:
+    """Poisson clutter, uniform over the surveillance region (paper section IV; paper-notes 5).
 
     It is drawn by putting uniform positions, at rest, through the sensor's measurement function.
 

@@ -16,6 +16,7 @@ from vedette.kernels.base.types import Floats
 from vedette.kernels.gaussian.scratch import wrap_angle
 from vedette.models.arguments import non_negative, one_of, positive, reject
 from vedette.models.clutter import ClutterModel, log_or_minus_infinity
+from vedette.models.fields import HalfWidth, NonNegative, Positive, part
 from vedette.models.functions import ModelFunction, model_function
 from vedette.models.measurement import MeasurementModel
 
@@ -94,13 +95,14 @@ class _AroundSampler:
         return measurement.measure(states, pose)
 
 
+@part("around_sensor", "clutter")
 def around_sensor(
-    rate: float,
+    rate: NonNegative,
     kind: str,
     *,
-    radius: float | None = None,
-    half_side: float | None = None,
-    half_width_rad: float = math.pi,
+    radius: Positive | None = None,
+    half_side: Positive | None = None,
+    half_width_rad: HalfWidth = math.pi,
 ) -> ClutterModel:
     """Clutter uniform over a disc, a square along the axes, or a sector of either, centred on the sensor.
 
@@ -110,9 +112,9 @@ def around_sensor(
     Args:
         rate: expected number a scan in the figure.
         kind: "position" or "bearing_range": what the sensor measures.
-        radius: of the disc, m.
-        half_side: of the square, m; one of `radius` and `half_side` is to be given.
-        half_width_rad: greatest angle from the heading, in (0, pi]; pi: all round.
+        radius: of a disc [m].
+        half_side: of a square along the axes, half its side; one of the two is to be given [m].
+        half_width_rad: greatest angle from the heading, either side [rad].
     """
     one_of("kind", kind, _KINDS)
     if (radius is None) == (half_side is None):

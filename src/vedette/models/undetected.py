@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vedette.kernels.base.types import Floats
 from vedette.models.arguments import float_array, non_negative, probability, reject
+from vedette.models.fields import NonNegative, Probability
 from vedette.models.grid import CellGrid
 
 # Standard deviations beyond which a Gaussian is taken as 0: what lies there is below the rounding of a sum.
@@ -27,11 +29,11 @@ class UndetectedModel:
         grid: the cells.
         expected: mean number of undetected targets in the region at the first scan, before it, spread evenly; or
             (num_cells,) that in each cell.
-        birth_rate: mean number of targets that appear in the region in a second.
-        enters: where: "anywhere" alike, or at the "border" of the region, in the cells along it.
-        speed: m/s; standard deviation of each of the two components of the velocity.
-        survival: probability that a target lives through a second; None: as the tracker's `TargetModel` has it, at the
-            middle of a cell and at rest.
+        birth_rate: mean number of targets that appear in the region in a second [1/s].
+        enters: where they appear: anywhere alike, or along the border of the region, in the cells there.
+        speed: standard deviation of each of the two components of the velocity [m/s].
+        survival: probability of living through a second; none: as survival says of a scan, at the middle of a cell and
+            at rest.
 
     Raises:
         InputError: names the field, what was expected and what came.
@@ -39,10 +41,10 @@ class UndetectedModel:
 
     grid: CellGrid
     expected: float | Floats
-    birth_rate: float = 0.0
-    enters: str = "anywhere"
+    birth_rate: NonNegative = 0.0
+    enters: Literal["anywhere", "border"] = "anywhere"
     speed: float = 0.0
-    survival: float | None = None
+    survival: Probability | None = None
 
     def __post_init__(self) -> None:
         if not isinstance(self.grid, CellGrid):

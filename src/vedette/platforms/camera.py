@@ -11,6 +11,7 @@ import numpy as np
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats
 from vedette.models.arguments import float_array, positive, reject
+from vedette.models.fields import Positive
 from vedette.models.measurement import wrap_angles
 from vedette.platforms.base import Platform, check_platform
 
@@ -32,10 +33,11 @@ class Pointing:
     `vedette.models.camera` looks along the pointing, as far to either side as the half width.
 
     Attributes:
-        pointings_deg: degrees, counter-clockwise from +x.
-        relative: whether they are added to the present pointing; actions are absolute all the same.
-        half_widths_deg: of the field of view, of which an action chooses one at once; none: it does not zoom.
-        turn_rate_deg: degrees a second, the shorter way, counter-clockwise where both are as long; None: at once.
+        pointings_deg: where it may point, counter-clockwise from east [deg].
+        relative: whether these are changes of its pointing, added to it; actions are absolute all the same.
+        half_widths_deg: half widths that it may zoom to at once; none: it does not zoom [deg].
+        turn_rate_deg: how fast it turns, the shorter way, counter-clockwise where both are as long; none: at once
+            [deg/s].
 
     Raises:
         InputError: no pointing, or one that is not finite; half widths outside (0, 180]; a rate that is not above 0.
@@ -44,7 +46,7 @@ class Pointing:
     pointings_deg: Sequence[float]
     relative: bool = False
     half_widths_deg: Sequence[float] = ()
-    turn_rate_deg: float | None = None
+    turn_rate_deg: Positive | None = None
 
     def __post_init__(self) -> None:
         for name in ("pointings_deg", "half_widths_deg"):

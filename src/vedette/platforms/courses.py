@@ -21,7 +21,7 @@ class Courses:
     Attributes:
         speed: m/s; or several, of which an action chooses one.
         headings_deg: degrees, counter-clockwise from +x (the paper's 13 by default, of which -180 and 180 are one).
-        relative: whether they are added to the present heading (paper-notes 14); actions are absolute all the same.
+        relative: whether they are changes of heading, added to it (paper-notes 14); actions are absolute all the same.
 
     Raises:
         InputError: no heading or speed, one that is not finite, a speed below 0.

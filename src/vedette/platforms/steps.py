@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from vedette.kernels.base.types import Floats
-from vedette.models.arguments import float_array, non_negative, positive, reject
+from vedette.models.arguments import float_array, non_negative, reject
+from vedette.models.fields import Positive, check_fields
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,23 +35,22 @@ class Steps:
     """Steps of one length, each made at a speed and followed by waiting.
 
     Attributes:
-        length: m.
-        speed: m/s.
-        directions_deg: degrees, counter-clockwise from +x.
+        length: length of a step [m].
+        speed: speed on the way [m/s].
+        directions_deg: directions, counter-clockwise from east [deg].
         stay: whether staying is an action, too, the last one.
 
     Raises:
         InputError: no direction, or one that is not finite; a length or speed that is not above 0.
     """
 
-    length: float
-    speed: float
+    length: Positive
+    speed: Positive
     directions_deg: Sequence[float] = (0.0, 45.0, 90.0, 135.0, 180.0, -135.0, -90.0, -45.0)
     stay: bool = True
 
     def __post_init__(self) -> None:
-        positive("length", self.length)
-        positive("speed", self.speed)
+        check_fields(self)
         directions = float_array("directions_deg", self.directions_deg, (None,))
         if len(directions) == 0:
             raise reject("directions_deg", "at least one angle in degrees", "none")
@@ -92,7 +92,7 @@ class Waypoints:
     Attributes:
         points: (num_points, 2) m.
         speed: m/s.
-        closed: whether the first follows the last, round and round; otherwise it waits at the last.
+        closed: whether the first follows the last, round and round; else it waits there.
 
     Raises:
         InputError: no point, or one that is not finite; a speed below 0.

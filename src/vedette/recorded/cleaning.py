@@ -9,7 +9,8 @@ import numpy as np
 
 from vedette.kernels.base.types import Floats, Ints
 from vedette.models import Region
-from vedette.models.arguments import non_negative, positive, reject
+from vedette.models.arguments import reject
+from vedette.models.fields import NonNegative, Positive, check_fields
 from vedette.recorded.reports import Reports
 
 
@@ -47,25 +48,23 @@ class Cleaning:
     """How reports become tracks, in this order.
 
     Attributes:
-        max_speed: m/s; as few reports as possible are removed so that no two that follow one another need more (jumps).
-            None: no limit.
+        max_speed: as few reports as possible are dropped so that no two that follow one another need more (jumps);
+            none: no limit [m/s].
         region: reports outside it are removed, and a track ends where it leaves; None: everywhere.
-        max_gap: s; a longer silence ends a track, and the next report begins another.
-        min_speed: m/s; a track that is slower on average (path length over duration) is dropped, such as a moored ship.
+        max_gap: a longer silence ends a track, and the next report begins another [s].
+        min_speed: a track slower than this on average (path length over duration) is left out, such as a moored ship
+            [m/s].
 
     A track left with one report is dropped.
     """
 
-    max_gap: float = 60.0
-    min_speed: float = 0.0
-    max_speed: float | None = None
+    max_gap: Positive = 60.0
+    min_speed: NonNegative = 0.0
+    max_speed: Positive | None = None
     region: Region | None = None
 
     def __post_init__(self) -> None:
-        positive("max_gap", self.max_gap)
-        non_negative("min_speed", self.min_speed)
-        if self.max_speed is not None:
-            positive("max_speed", self.max_speed)
+        check_fields(self)
         if self.region is not None and not isinstance(self.region, Region):
             raise reject("region", "a Region or None", self.region)
 

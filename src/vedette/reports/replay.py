@@ -20,9 +20,6 @@ from vedette.reports.groups import Strategy
 from vedette.reports.why import why_data
 from vedette.scenarios import Scenario
 from vedette.scenarios.build import build_scan_times, build_true_sensors
-from vedette.scenarios.names import sensor_names
-from vedette.scenarios.sections.detection import CameraDetection, LimitedRange, LimitedSector, SoftSector
-from vedette.scenarios.sections.sensing import BearingOnly, BearingRange, Position, RangeOnly
 from vedette.scenarios.sections.sensors import Sensor as SensorSection
 from vedette.scenarios.trust import code_of
 from vedette.scenarios.views import field_of_view
@@ -45,7 +42,7 @@ def replay_data(strategy: Strategy, record: RunRecord, group: str, *, trust: boo
     scenario = strategy.cell.scenario
     extent = _extent(record, scenario)
     places = max(0, _DIGITS - math.floor(math.log10(max(extent[1] - extent[0], extent[3] - extent[2]))))
-    scene, names, sections = strategy.scene, sensor_names(scenario.model), scenario.model.sensors
+    scene, names, sections = strategy.scene, scenario.model.sensor_names, scenario.model.sensors
     sensors = [_sensor(name, section) for name, section in zip(names, sections, strict=True)]
     has_velocity = scenario.model.motion.kind != "custom"
     axes = dict[str, dict[str, Any]]()
@@ -90,13 +87,11 @@ def _extent(record: RunRecord, scenario: Scenario) -> tuple[float, float, float,
 
 def _sensor(name: str, section: SensorSection) -> dict[str, Any]:
     """What a sensor sees, for drawing: how a measurement lies in the plane, and its field where that has an edge."""
-    kinds = {BearingRange: "point", Position: "position", BearingOnly: "ray", RangeOnly: "circle"}
-    found: dict[str, Any] = {"name": name, "kind": kinds.get(type(section.measurement), "none")}
-    if isinstance(section.detection, LimitedRange | LimitedSector | SoftSector) and math.isfinite(
-        section.detection.max_range
-    ):
+    kinds = {"bearing_range": "point", "position": "position", "bearing_only": "ray", "range_only": "circle"}
+    found: dict[str, Any] = {"name": name, "kind": kinds.get(section.measurement.kind, "none")}
+    if section.detection.kind in ("limited_range", "limited_sector", "soft_sector"):
         found["range"] = section.detection.max_range
-    if isinstance(section.detection, LimitedSector | SoftSector) and "range" in found:
+    if section.detection.kind in ("limited_sector", "soft_sector"):
         found["half_width"] = round(math.radians(section.detection.half_width_deg), 4)
     return found
 
@@ -104,7 +99,7 @@ def _sensor(name: str, section: SensorSection) -> dict[str, Any]:
 def _pose(pose: Floats, section: SensorSection, places: int) -> list[float]:
     """Place and heading; of a camera its field of view, too: middle and half width in rad, reach in m."""
     found = [*_rounded(pose[:2], places), round(float(pose[2]), 4)]
-    if isinstance(section.detection, CameraDetection):
+    if section.detection.kind == "camera":
         field = field_of_view(section, pose.tolist())
         found += [] if field is None else [*_rounded(field[:2], 4), round(field.reach, places)]
     return found

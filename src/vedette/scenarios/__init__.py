@@ -3,10 +3,8 @@
 What is built of them is in `vedette.scenarios.build`.
 """
 
-from vedette.scenarios.generated import GeneratedScene
-from vedette.scenarios.generated_crowd import GeneratedCrowd
-from vedette.scenarios.generated_crowd_text import crowd_text
-from vedette.scenarios.generated_text import scene_text
+from vedette.scenarios.generated import GeneratedScene, scene_text
+from vedette.scenarios.generated_crowd import GeneratedCrowd, crowd_text
 from vedette.scenarios.loading import Scenario, json_schema, list_builtin, load_scenario, parse_scenario
 from vedette.scenarios.overrides import with_fields
 

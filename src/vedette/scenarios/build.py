@@ -21,12 +21,11 @@ from vedette.models import SensorModel, TargetModel
 from vedette.platforms import Actions
 from vedette.platforms.base import actions_at
 from vedette.scenarios.loading import Scenario
-from vedette.scenarios.sections.custom import NotGiven
+from vedette.scenarios.sections.custom import Custom, NotGiven
+from vedette.scenarios.sections.deciding import Lookahead
 from vedette.scenarios.sections.fusion import IN_FULL, OF_SCANS, ONE_BELIEF, CustomFusion
-from vedette.scenarios.sections.lookahead import Lookahead
-from vedette.scenarios.sections.planners import STRATEGIES, AnyPlanner, NamedIndependent, Parts, Strategy
+from vedette.scenarios.sections.planners import STRATEGIES, Named, NamedIndependent, Parts, Strategy
 from vedette.scenarios.sections.scenario import ScenarioModel
-from vedette.scenarios.sections.sensing import CustomMeasurement
 from vedette.scenarios.sections.sensors import Sensor
 from vedette.scenarios.sections.tracking import CustomFilter
 from vedette.scenarios.sections.tracking import Filter as FilterSection
@@ -85,7 +84,7 @@ def build_sensors(scenario: Scenario) -> tuple[MobileSensor, ...]:
     model, folder = scenario.model, scenario.folder
     method, region = model.filter.gaussian_method, model.region.build()
     targets = TargetModel(
-        model.motion.build(method, folder), model.survival.build(folder), model.birth.build(model.motion)
+        model.motion.build(folder, method=method), model.survival.build(folder), model.birth.build(model.motion)
     )
     found = []
     for sensor in model.sensors:
@@ -112,7 +111,7 @@ def _check_own(scenario: Scenario, section: Sensor, sensor: SensorModel, local: 
     """`NotGiven` where the user's own measurement or filter has less than the scenario asks of it."""
     model, measured = scenario.model, section.measurement
     born = model.birth.from_measurements is not None
-    if born and sensor.measurement.places is None and isinstance(measured, CustomMeasurement):
+    if born and sensor.measurement.places is None and isinstance(measured, Custom):
         wanted = f"{measured.function} to give a measurement with `places`, as targets are born of measurements"
         raise NotGiven(measured, "function", wanted, "one without")
     waits = not section.scans.build(model.time.num_steps).all() or (model.network is not None and model.network.delay)
@@ -203,7 +202,7 @@ def _first_actions(scenario: Scenario, sensors: tuple[MobileSensor, ...]) -> tup
 def build_targets(scenario: Scenario) -> TargetSource:
     """The true targets. Raises `InputError` for a custom motion or a recorded file that cannot be had."""
     model, folder = scenario.model, scenario.folder
-    return model.targets.build(model, model.motion.build("auto", folder), folder)
+    return model.targets.build(model, model.motion.build(folder), folder)
 
 
 def build_planner(scenario: Scenario, name: str, num_threads: int = 0) -> Planner | None:
@@ -243,9 +242,9 @@ def build_planner(scenario: Scenario, name: str, num_threads: int = 0) -> Planne
         {"timetable": _timetable(scenario), "cutoff": model.ospa.cutoff},
     )
     if name in model.planners:
-        return model.planners[name].planner(name, parts, folder)
+        return Named(name, model.planners[name].planner(parts, folder))
     try:
-        return STRATEGIES[name].planner(parts)
+        return strategy.planner(parts, folder)
     except InputError as error:
         raise InputError(f"planner {name}: {error}") from error
 
@@ -264,11 +263,11 @@ def _timetable(scenario: Scenario) -> Timetable:
     )
 
 
-def _notes_of_decisions(scenario: Scenario, fusion: Fusion, strategy: Strategy | AnyPlanner) -> tuple[str, ...]:
+def _notes_of_decisions(scenario: Scenario, fusion: Fusion, strategy: Strategy) -> tuple[str, ...]:
     """What the decisions of a strategy say of their fusion, where the tracks are fused in another way, and of radio."""
     model, section = scenario.model, scenario.model.fusion
     reward = getattr(strategy, "reward", None) or model.control.reward
-    alone = strategy is STRATEGIES["idm"] or isinstance(strategy, NamedIndependent)
+    alone = isinstance(strategy, NamedIndependent)
     found = []
     in_full = isinstance(fusion, ParallelUpdate) or reward.kind == "expected_loss"
     if in_full and not alone and section.kind not in (*IN_FULL, "none"):

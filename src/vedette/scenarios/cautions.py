@@ -12,18 +12,10 @@ from vedette.kernels.base.types import Bools, Floats
 from vedette.scenarios.cures import accepted, fusions_instead, with_own_labels
 from vedette.scenarios.faults import Path, Told
 from vedette.scenarios.loading import Scenario, document_of, place_fault
-from vedette.scenarios.names import sensor_names
 from vedette.scenarios.plausibility import implausible
 from vedette.scenarios.sections import ScenarioModel
-from vedette.scenarios.sections.detection import (
-    CameraDetection,
-    ConstantDetection,
-    GaussianDetection,
-    LimitedRange,
-    LimitedSector,
-    SoftSector,
-)
 from vedette.scenarios.sections.fusion import BY_LABEL, Fusion
+from vedette.scenarios.sections.sensing import Detection
 from vedette.scenarios.sections.sensors import Sensor
 from vedette.scenarios.sections.targets import RecordedTargets
 from vedette.scenarios.sections.tracking import LABELS_CAPPED, Filter
@@ -149,7 +141,7 @@ def _many_sensors(scenario: Scenario) -> Iterator[tuple[Path, str]]:
 def _cells(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
     if model.undetected is None:
         return
-    for name, sensor in zip(sensor_names(model), model.sensors, strict=True):
+    for name, sensor in zip(model.sensor_names, model.sensors, strict=True):
         field = field_of_view(sensor)
         if field is not None and field.reach < 0.5 * model.undetected.cell:
             yield (
@@ -189,7 +181,7 @@ def _views(scenario: Scenario) -> Iterator[tuple[Path, str]]:
     }
     if len(chances) < 2:
         return
-    table, names = np.stack(list(chances.values())), [sensor_names(model)[i] for i in chances]
+    table, names = np.stack(list(chances.values())), [model.sensor_names[i] for i in chances]
     spread = table.max(axis=0) - table.min(axis=0)
     worst = int(spread.argmax())
     if spread[worst] > MAX_DIFFERENCE:
@@ -225,7 +217,7 @@ def _limited_and_moving(scenario: Scenario, fusion: Fusion) -> Iterator[tuple[Pa
     for i, sensor in enumerate(model.sensors):
         field = field_of_view(sensor)
         limited = field is not None and field.reach < across
-        if (limited and sensor.platform.top_speed > 0.0) or isinstance(sensor.detection, CameraDetection):
+        if (limited and sensor.platform.top_speed > 0.0) or sensor.detection.kind == "camera":
             yield (
                 ("sensors", i, "detection"),
                 f"sensors that move or turn and see only so far will differ in what they see; {_rule(fusion)} loses "
@@ -242,23 +234,23 @@ def prob_detection(sensor: Sensor, points: Floats) -> Floats | None:
     section = sensor.detection
     ahead = points - np.array(sensor.position)
     distances = np.hypot(ahead[:, 0], ahead[:, 1])
-    if isinstance(section, ConstantDetection):
+    if section.kind == "constant":
         return np.full(len(points), section.probability)
-    if isinstance(section, GaussianDetection):
+    if section.kind == "gaussian":
         return np.asarray(np.exp(-0.5 * (distances / section.sigma) ** 2))
     field = field_of_view(sensor)
     if field is not None:
         off = np.arctan2(ahead[:, 1], ahead[:, 0]) - field.middle
         off = np.where(distances == 0.0, 0.0, np.abs((off + math.pi) % (2.0 * math.pi) - math.pi))
         seen = (distances <= field.reach) & (off <= field.half_width)
-        if isinstance(section, SoftSector):
+        if section.kind == "soft_sector":
             return _soft(section, distances - field.reach, off - field.half_width, seen)
-        outside = section.outside if isinstance(section, LimitedRange | LimitedSector) else 0.0
+        outside = section.outside if section.kind in ("limited_range", "limited_sector") else 0.0
         return np.where(seen, field.probability, outside)
     return None
 
 
-def _soft(section: SoftSector, beyond_range: Floats, beyond_angle: Floats, seen: Bools) -> Floats:
+def _soft(section: Detection, beyond_range: Floats, beyond_angle: Floats, seen: Bools) -> Floats:
     """(n,) probabilities of detection of a soft sector, by how far places lie beyond its edges in m and rad."""
     detected = section.probability * _logistic(section.range_slope * beyond_range)
     if section.angle_slope is not None:

@@ -13,9 +13,8 @@ from vedette.errors import VedetteError
 from vedette.filters import labels_targets
 from vedette.scenarios.build import build_experiment, build_planner, build_sensors
 from vedette.scenarios.faults import Told
-from vedette.scenarios.file_checks import customs
 from vedette.scenarios.loading import Scenario, document_of, place_fault
-from vedette.scenarios.sections.custom import NotGiven
+from vedette.scenarios.sections.custom import NotGiven, customs
 from vedette.simulation.loop import simulate
 from vedette.simulation.stopping import RunStopped, cause_of
 
@@ -37,7 +36,7 @@ def code_faults(scenario: Scenario) -> list[str]:
 
 
 def _faults(scenario: Scenario) -> Iterator[Told]:
-    found = list(customs(scenario.model, ()))
+    found = list(customs(scenario.model))
     places = {id(section): path for path, section in found}
     alone = [section for _, section in found if section.field not in _MADE_OF_PARTS]
     attempts: list[Callable[[], Any]] = [partial(section.made, scenario.folder) for section in alone]

@@ -12,8 +12,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from vedette.scenarios.faults import Path, Told, describe
-from vedette.scenarios.sections.base import IN_PART, Section
-from vedette.scenarios.sections.unread import Unread
+from vedette.scenarios.sections.base import IN_PART, Section, Unread
 
 S = TypeVar("S", bound=Section)
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +11,10 @@ from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
 from ruamel.yaml.scalarstring import DoubleQuotedScalarString
 
-from vedette.scenarios.sections import ScenarioModel
+from vedette.scenarios.sections import ScenarioModel, Section
+from vedette.scenarios.sections.base import sections_in
+from vedette.scenarios.sections.custom import Custom
+from vedette.scenarios.sections.targets import RecordedTargets
 from vedette.scenarios.yaml_reader import plain_scalar
 
 _LONGEST_LINE = 100
@@ -38,18 +40,17 @@ def dump_scenario(model: ScenarioModel, *, folder: Path | None = None) -> str:
 
 def files_of(model: ScenarioModel, folder: Path) -> tuple[Path, ...]:
     """The files beside the scenario that decide what it means: recorded targets, and Python files of custom models."""
-    return tuple(dict.fromkeys(_files(model.model_dump(mode="json"), folder.resolve())))
+    beside = folder.resolve()
+    found = [beside / name for _, section in sections_in(model) if (name := _file(section))]
+    return tuple(dict.fromkeys(found))
 
 
-def _files(value: Any, folder: Path) -> Iterator[Path]:
-    if isinstance(value, list | dict):
-        for item in value.values() if isinstance(value, dict) else value:
-            yield from _files(item, folder)
-    if isinstance(value, dict):
-        if value.get("kind") == "recorded":
-            yield folder / value["path"]
-        elif value.get("kind") == "custom" and ".py:" in value["function"]:
-            yield folder / value["function"].rpartition(":")[0]
+def _file(section: Section) -> str:
+    """The file that a section itself names; empty where it names none."""
+    if isinstance(section, RecordedTargets):
+        return section.path
+    module = section.function.rpartition(":")[0] if isinstance(section, Custom) else ""
+    return module if module.endswith(".py") else ""
 
 
 def _anchored(value: Any, folder: Path) -> Any:

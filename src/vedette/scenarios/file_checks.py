@@ -9,17 +9,16 @@ import os
 import symtable
 import tokenize
 import warnings
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from pathlib import Path as FilePath
-from typing import Any
 
 import numpy as np
 
 from vedette.errors import InputError
 from vedette.scenarios.faults import Finding, Path, describe, named
 from vedette.scenarios.sections import ScenarioModel
-from vedette.scenarios.sections.base import Section, attempt, is_whole
-from vedette.scenarios.sections.custom import Custom
+from vedette.scenarios.sections.base import attempt, is_whole
+from vedette.scenarios.sections.custom import Custom, customs
 from vedette.scenarios.sections.targets import RecordedTargets
 
 
@@ -80,19 +79,6 @@ def _columns(recorded: RecordedTargets, file: FilePath) -> Iterator[Finding]:
         yield ("targets", "columns"), wanted, "nothing"
 
 
-def customs(value: Any, path: Path) -> Iterator[tuple[Path, Custom]]:
-    """Everything of the user's own in a section, with its path."""
-    if isinstance(value, Custom):
-        yield path, value
-    inner: Iterable[tuple[str | int, Any]] = ()
-    if isinstance(value, Section):
-        inner = ((name, getattr(value, name)) for name in type(value).model_fields)
-    elif isinstance(value, tuple | dict):
-        inner = enumerate(value) if isinstance(value, tuple) else value.items()
-    for name, item in inner:
-        yield from customs(item, (*path, name))
-
-
 def _is_findable(package: str) -> bool:
     try:
         return importlib.util.find_spec(package) is not None
@@ -119,7 +105,7 @@ def _unnamed(file: FilePath, name: str) -> tuple[str, str] | None:
 
 def reference_findings(model: ScenarioModel, folder: FilePath) -> Iterator[Finding]:
     """Which code of the user's own is not there. Nothing is imported."""
-    for path, custom in customs(model, ()):
+    for path, custom in customs(model):
         yield from attempt(_reference(path, custom, folder))
 
 

@@ -11,12 +11,11 @@ import numpy as np
 from vedette.kernels.base.types import Floats
 from vedette.plausible import LARGE_ANGLE, seem_degrees
 from vedette.scenarios.faults import Path, format_path
-from vedette.scenarios.names import sensor_names
 from vedette.scenarios.sections import ScenarioModel
 from vedette.scenarios.sections.birth import BirthSite
-from vedette.scenarios.sections.sensing import Measurement, Noise
+from vedette.scenarios.sections.sensing import Measurement, Noise, components
 from vedette.scenarios.sections.targets import ScriptedTargets
-from vedette.scenarios.sections.world import ConstantSurvival, RegionSection, grouped_order
+from vedette.scenarios.sections.world import RegionSection, grouped_order
 
 # Standard deviations from every birth site at which a target begins that filters never find.
 _FAR_FROM_SITES = 8.0
@@ -45,7 +44,7 @@ def _bearings(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
 
 
 def _bearing_noise(path: Path, measurement: Measurement, noise: Noise) -> Iterator[tuple[Path, str]]:
-    for component in measurement.angular:
+    for component in components(measurement)[1]:
         if noise.kind == "range_dependent":
             std, at = math.radians(noise.sigma_bearing_deg), (*path, "sigma_bearing_deg")
             if std > LARGE_ANGLE:
@@ -110,11 +109,11 @@ def _distance(start: Floats, site: BirthSite, order: list[int]) -> float:
 
 def _per_scan(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
     """Probabilities a scan, where a sensor does not scan at every step: they count at every step all the same."""
-    every, name = max((own.scans.every, name) for own, name in zip(model.sensors, sensor_names(model), strict=True))
+    every, name = max((own.scans.every, name) for own, name in zip(model.sensors, model.sensor_names, strict=True))
     survival, per_scan = model.survival, []
     if model.birth.period is None and model.birth.steps == "every":
         per_scan.append("birth")
-    if isinstance(survival, ConstantSurvival) and survival.period is None and survival.probability < 1.0:
+    if survival.kind == "constant" and survival.period is None and survival.probability < 1.0:
         per_scan.append("survival")
     for section in per_scan if every > 1 else ():
         yield (

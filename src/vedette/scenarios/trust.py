@@ -4,26 +4,16 @@ from __future__ import annotations
 
 import os
 import stat
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
-
-from pydantic import BaseModel
 
 from vedette.scenarios.loading import BUILTIN_FOLDER, Scenario
+from vedette.scenarios.sections.base import Section
+from vedette.scenarios.sections.custom import customs
 
 
-def code_of(section: BaseModel) -> tuple[str, ...]:
+def code_of(section: Section) -> tuple[str, ...]:
     """What of the user's own a scenario, or a section of one, has imported and called, each once, in order."""
-    return tuple(dict.fromkeys(_references(section.model_dump(mode="json"))))
-
-
-def _references(value: Any) -> Iterator[str]:
-    if isinstance(value, dict) and value.get("kind") == "custom":
-        yield value["function"]
-    elif isinstance(value, dict | list):
-        for item in value.values() if isinstance(value, dict) else value:
-            yield from _references(item)
+    return tuple(dict.fromkeys(custom.function for _, custom in customs(section)))
 
 
 def not_own(scenario: Scenario) -> str:

@@ -7,8 +7,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from vedette.scenarios.sections import ScenarioModel
-from vedette.scenarios.sections.constraints import KeepOut, StayInside
-from vedette.scenarios.sections.detection import CameraDetection, LimitedRange, LimitedSector, SoftSector
+from vedette.scenarios.sections.deciding import KeepOut, StayInside
 from vedette.scenarios.sections.sensors import Sensor
 from vedette.scenarios.sections.world import RegionSection
 
@@ -55,11 +54,11 @@ def field_of_view(sensor: Sensor, pose: Sequence[float] | None = None) -> FieldO
     The edge of a soft sector is where half of its probability is left.
     """
     section, at = sensor.detection, sensor.pose if pose is None else pose
-    if isinstance(section, LimitedRange):
+    if section.kind == "limited_range":
         return FieldOfView(at[2], math.pi, section.max_range, section.probability)
-    if isinstance(section, LimitedSector | SoftSector):
+    if section.kind in ("limited_sector", "soft_sector"):
         return FieldOfView(at[2], math.radians(section.half_width_deg), section.max_range, section.probability)
-    if isinstance(section, CameraDetection) and len(at) >= 5:
+    if section.kind == "camera" and len(at) >= 5:
         reference, width = section.reference_half_width_deg, at[4]
         reach = section.max_range * (math.radians(reference) / width if reference is not None and width > 0.0 else 1.0)
         return FieldOfView(at[3], width, reach, section.probability)

@@ -25,6 +25,7 @@ from vedette.errors import InputError
 from vedette.filters import shared_targets
 from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.models.arguments import dimension, generator, instance, positive
+from vedette.models.fields import Count
 from vedette.platforms import Options
 from vedette.platforms.base import courses_of
 from vedette.simulation.cramer_rao import Stretch, scan_information, transition_jacobians
@@ -81,8 +82,8 @@ class OraclePlanner:
         sensors: the sensors.
         timetable: when they scan and decide.
         cutoff: the error that counts as a lost target, m.
-        depth: decisions in a row that are looked at.
-        beam_width: how many joint actions, those best for one decision, are followed to the next one.
+        depth: decisions in a row that it looks at.
+        beam_width: joint actions, those best for one decision, that it follows to the next.
         settings: the horizon, over which courses are told apart.
         search: which joint actions are looked at.
         constraints: what the sensors must not do, tested at the decision at hand.
@@ -96,8 +97,8 @@ class OraclePlanner:
     sensors: tuple[MobileSensor, ...]
     timetable: Timetable
     cutoff: float = 100.0
-    depth: int = 1
-    beam_width: int = 8
+    depth: Count = 1
+    beam_width: Count = 8
     settings: PlanningSettings = field(default_factory=PlanningSettings)
     search: JointSearch = field(default_factory=AutomaticSearch)
     constraints: tuple[Constraint, ...] = ()

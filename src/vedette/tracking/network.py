@@ -9,7 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from vedette.kernels.base.types import Bools, Floats, Ints
-from vedette.models.arguments import count, dimension, is_infinite, positive, probability, reject
+from vedette.models.arguments import reject
+from vedette.models.fields import Count, Limit, Natural, Share, check_fields
 
 # Stands for "never" among step numbers and numbers of hops.
 NEVER = np.iinfo(np.int64).max // 2
@@ -20,32 +21,25 @@ class Network:
     """A radio network of moving sensors, in which every message is passed on from neighbour to neighbour.
 
     Attributes:
-        radio_range: m; sensors hear each other up to this distance.
-        hops: how many links a message may travel; None: as far as the links reach.
+        radio_range: distance up to which sensors hear each other; none: any [m].
+        hops: links that a message may travel; none: as far as they reach.
         loss: probability that a link fails at a scan, in both directions, for all messages.
-        delay: scans that a message takes for each hop.
-        consensus_rounds: rounds of averaging with the neighbours (Metropolis weights) instead of messages that are
-            passed on; None: no consensus.
+        delay: scans that a message takes for each link.
+        consensus_rounds: rounds of averaging with the neighbours (Metropolis weights) after each scan, instead of
+            passing messages on; for fusions of densities; none: no consensus.
 
     Raises:
         InputError: names the field, what was expected and what came.
     """
 
-    radio_range: float = math.inf
-    hops: int | None = None
-    loss: float = 0.0
-    delay: int = 0
-    consensus_rounds: int | None = None
+    radio_range: Limit = math.inf
+    hops: Count | None = None
+    loss: Share = 0.0
+    delay: Natural = 0
+    consensus_rounds: Count | None = None
 
     def __post_init__(self) -> None:
-        if not is_infinite(self.radio_range):
-            positive("Network.radio_range", self.radio_range)
-        if probability("Network.loss", self.loss) == 1.0:
-            raise reject("Network.loss", "a probability below 1", self.loss)
-        count("Network.delay", self.delay)
-        for name in ("hops", "consensus_rounds"):
-            if getattr(self, name) is not None:
-                dimension(f"Network.{name}", getattr(self, name))
+        check_fields(self, "Network.")
         if self.consensus_rounds is not None and (self.delay > 0 or self.hops is not None):
             raise reject("Network.consensus_rounds", "None with a delay or a number of hops", self.consensus_rounds)
 

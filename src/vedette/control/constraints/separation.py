@@ -8,27 +8,29 @@ import numpy as np
 
 from vedette.control.constraints.protocol import Situation
 from vedette.kernels.base.types import Bools, Floats
-from vedette.models.arguments import positive
+from vedette.models.fields import Positive, check_fields, part
 
 
+@part("separation", "constraint")
 @dataclass(frozen=True, slots=True)
 class Separation:
-    """Any two platforms keep a least distance: at the times of the horizon, and between two of them, where both are
-    taken to go straight and evenly from one position to the next. The way from where they are now counts where they are
-    not too near already.
+    """Any two platforms keep a least distance.
+
+    At the times of the horizon, and between two of them, where both are taken to go straight and evenly from one
+    position to the next. The way from where they are now counts where they are not too near already.
 
     Attributes:
-        distance: m, which is allowed itself.
+        distance: least distance, which is allowed itself [m].
 
     Raises:
         InputError: a distance that is not above 0.
     """
 
-    distance: float
+    distance: Positive
     timeless = True
 
     def __post_init__(self) -> None:
-        positive("distance", self.distance)
+        check_fields(self)
 
     @property
     def name(self) -> str:

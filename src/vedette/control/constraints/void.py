@@ -11,13 +11,15 @@ from vedette.control.constraints.protocol import Alone, Situation
 from vedette.densities import GLMB, LMB, FactoredGLMB, Labelled, TrackTable
 from vedette.densities.factored import LABELLED
 from vedette.kernels.base.types import Floats, Ints
-from vedette.models.arguments import float_array, positive, probability, reject
+from vedette.models.arguments import float_array, positive, reject
+from vedette.models.fields import Positive, Probability, check_fields, part
 from vedette.probabilities import expit
 
 # Entries of the tables that a GLMB's hypotheses take at a time.
 _BLOCK = 1 << 21
 
 
+@part("void_probability", "constraint")
 @dataclass(frozen=True, slots=True)
 class VoidProbability(Alone):
     """Around every sensor no target is near, with a least probability at each time of the horizon (Beard et al.).
@@ -26,19 +28,18 @@ class VoidProbability(Alone):
     labeled multi-Bernoulli models, IEEE Transactions on Signal Processing 65 (2017) 5047-5061, arXiv:1510.05532.
 
     Attributes:
-        radius: m, within which no target is to be.
-        probability: that there is none, at least.
+        radius: within which no target is to be [m].
+        probability: that there is none, at least, at each time of the horizon.
 
     Raises:
         InputError: a radius that is not above 0, or no probability.
     """
 
-    radius: float
-    probability: float
+    radius: Positive
+    probability: Probability
 
     def __post_init__(self) -> None:
-        positive("radius", self.radius)
-        probability("probability", self.probability)
+        check_fields(self)
 
     @property
     def name(self) -> str:

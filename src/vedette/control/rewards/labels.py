@@ -14,7 +14,7 @@ import numpy as np
 
 from vedette.kernels.base.types import Floats
 from vedette.kernels.gaussian.linalg import cholesky, log_det_from_factor, solve_lower
-from vedette.models.arguments import positive, probability
+from vedette.models.fields import Positive, Probability, check_fields, part
 from vedette.models.functions import ModelFunction, model_function
 
 # A probability below this is taken as this in a quotient.
@@ -43,6 +43,7 @@ class _OneSum:
         return np.asarray(self.sign * sums[..., 0])
 
 
+@part("kullback_leibler", "reward")
 @dataclass(frozen=True, slots=True)
 class KullbackLeiblerReward(_OneSum):
     """Kullback-Leibler divergence of the update from the prediction, label by label: how much is learnt, in nats.
@@ -52,6 +53,7 @@ class KullbackLeiblerReward(_OneSum):
     """
 
     sign: ClassVar[float] = 1.0
+    words: ClassVar[str] = "KL divergence, nats"
 
     @property
     def function(self) -> ModelFunction:
@@ -59,9 +61,12 @@ class KullbackLeiblerReward(_OneSum):
         return kullback_leibler_of_label
 
 
+@part("cardinality_variance", "reward")
 @dataclass(frozen=True, slots=True)
 class CardinalityVarianceReward(_OneSum):
     """Less the variance of the number of targets: sum of r (1 - r) over the labels (of a GLMB, of its LMB)."""
+
+    words: ClassVar[str] = "minus variance of cardinality"
 
     @property
     def function(self) -> ModelFunction:
@@ -69,6 +74,7 @@ class CardinalityVarianceReward(_OneSum):
         return cardinality_variance_of_label
 
 
+@part("expected_gospa", "reward")
 @dataclass(frozen=True, slots=True)
 class ExpectedGospaReward(_OneSum):
     """Less the mean squared GOSPA (alpha = 2, p = 2) that is to be expected of the best estimate after the update.
@@ -77,16 +83,17 @@ class ExpectedGospaReward(_OneSum):
     min(r min(tr P, c^2) + (1 - r) c^2 / 2, r c^2 / 2), P the covariance of the position.
 
     Attributes:
-        cutoff: c, m.
+        cutoff: error that counts as a lost target, c [m].
 
     Raises:
         InputError: a cutoff that is not above 0.
     """
 
-    cutoff: float = 100.0
+    cutoff: Positive = 100.0
+    words: ClassVar[str] = "minus squared GOSPA, m²"
 
     def __post_init__(self) -> None:
-        positive("cutoff", self.cutoff)
+        check_fields(self)
 
     @property
     def function(self) -> ModelFunction:
@@ -99,6 +106,7 @@ class ExpectedGospaReward(_OneSum):
         return np.array([self.cutoff**2])
 
 
+@part("peecs", "reward")
 @dataclass(frozen=True, slots=True)
 class PeecsReward:
     """Less the posterior expected error of cardinality and states (Gostar, Hoseinnezhad, Bab-Hadiashar 2013, 2015).
@@ -108,20 +116,20 @@ class PeecsReward:
     the place of the publication's scale, which is that of the particles at hand).
 
     Attributes:
-        share: of the error of the cardinality, in [0, 1].
-        cutoff: c, m.
+        share: weight of the error of the number of targets.
+        cutoff: error of a position that counts as 1, c [m].
 
     Raises:
         InputError: a share outside [0, 1], a cutoff that is not above 0.
     """
 
-    share: float = 0.5
-    cutoff: float = 100.0
+    share: Probability = 0.5
+    cutoff: Positive = 100.0
     num_terms: ClassVar[int] = 4
+    words: ClassVar[str] = "minus PEECS"
 
     def __post_init__(self) -> None:
-        probability("share", self.share)
-        positive("cutoff", self.cutoff)
+        check_fields(self)
 
     @property
     def function(self) -> ModelFunction:

@@ -11,15 +11,21 @@ from vedette.control.rewards.base import Exponents, UnitVolume, check_unit_volum
 from vedette.densities import GLMB, LMB
 from vedette.divergence import cauchy_schwarz, renyi
 from vedette.kernels.base.types import Floats
-from vedette.models.arguments import positive, real, reject
+from vedette.models.arguments import real, reject
+from vedette.models.fields import Positive, check_fields, part
 
 
+@part("cauchy_schwarz", "reward")
 @dataclass(frozen=True, slots=True)
 class CauchySchwarzReward:
-    """Cauchy-Schwarz divergence between prediction and update (paper eq. 8), on the label sets that both have.
+    """Cauchy-Schwarz divergence between the prediction and the update (paper eqs. 5, 8 and 13 to 17).
+
+    On the label sets that both have.
 
     Attributes:
-        unit_volume: K of eq. 5; or "reference", under which K <p, p> of the prediction is about 1 (paper-notes 15).
+        unit_volume: unit K of hyper-volume (eq. 5): a number, or "reference" for (4 pi)^(d/2) sqrt(det P) of the
+            prediction, under which K <p, p> is about 1 (paper-notes 15), and localisation counts as much as
+            cardinality.
 
     Raises:
         InputError: another word, or a number that is not finite and above 0.
@@ -27,6 +33,7 @@ class CauchySchwarzReward:
 
     unit_volume: UnitVolume = 1.0
     exponents: ClassVar[Exponents] = ((0.0, 2.0), (1.0, 1.0), (2.0, 0.0))
+    words: ClassVar[str] = "CS divergence"
 
     def __post_init__(self) -> None:
         check_unit_volume(self.unit_volume)
@@ -45,6 +52,7 @@ class CauchySchwarzReward:
         return cauchy_schwarz(predicted, updated, unit_volume=volume, support="common")
 
 
+@part("renyi", "reward")
 @dataclass(frozen=True, slots=True)
 class RenyiReward:
     """Renyi divergence of the prediction from the update, on the label sets that both have, where both sum to one.
@@ -52,14 +60,15 @@ class RenyiReward:
     log(integral of predicted^order updated^(1 - order)) / (order - 1); see `vedette.divergence.renyi`. It needs no K.
 
     Attributes:
-        order: above 0 and not 1. 1/2 is symmetric, twice the Bhattacharyya distance. Above 1 it is infinite, and so no
-            reward, where the prediction is much wider than the update.
+        order: exponent of the prediction, above 0 and not 1. 1/2 is symmetric, twice the Bhattacharyya distance. Above
+            1 it is infinite, and so no reward, where the prediction is much wider than the update.
 
     Raises:
         InputError: another order.
     """
 
-    order: float = 0.5
+    order: Positive = 0.5
+    words: ClassVar[str] = "Rényi divergence"
 
     def __post_init__(self) -> None:
         if real("order", self.order) <= 0.0 or self.order == 1.0:
@@ -84,9 +93,12 @@ class RenyiReward:
         return renyi(predicted, updated, self.order, support="common")
 
 
+@part("expected_loss", "reward")
 @dataclass(frozen=True, slots=True)
 class ExpectedLossReward:
-    """Less the error that is to be expected of the targets' positions, cut off where one counts as lost:
+    """Less the error to be expected of the targets' positions; in closed form, without samples.
+
+    Cut off where a target counts as lost:
 
         R = -sum over labels of r (q min(sqrt(tr P+), c)^p + (1 - q) min(sqrt(tr P), c)^p)
         q = 1 - prod over sensors of (1 - P_D)
@@ -104,17 +116,18 @@ class ExpectedLossReward:
     It assumes that what the sensors measure is used in full, whatever the fusion.
 
     Attributes:
-        cutoff: c, m.
-        order: p, that of the score by which the tracks are judged: 1 of OSPA as it is mostly taken, 2 of squared
-            errors. The larger, the more it is about what is known worst, such as weak labels that are spread wide.
+        cutoff: error that counts as a lost target, c [m].
+        order: power of the error, p, that of the score by which the tracks are judged: 1 of OSPA as it is mostly taken,
+            2 of squared errors. The larger, the more it is about what is known worst, such as weak labels that are
+            spread wide.
 
     Raises:
         InputError: a cutoff or an order that is not above 0.
     """
 
-    cutoff: float = 100.0
-    order: float = 1.0
+    cutoff: Positive = 100.0
+    order: Positive = 1.0
+    words: ClassVar[str] = "minus expected loss"
 
     def __post_init__(self) -> None:
-        positive("cutoff", self.cutoff)
-        positive("order", self.order)
+        check_fields(self)

@@ -10,7 +10,7 @@ import numpy as np
 
 from vedette.control.search.exhaustive import ExhaustiveSearch
 from vedette.control.search.problem import Joint, JointProblem, Known
-from vedette.models.arguments import count, dimension
+from vedette.models.fields import Count, Repeats, check_fields, part
 
 # Beyond so many sensors, every joint action is more than a decision has time for.
 _MAX_SENSORS = 3
@@ -21,6 +21,7 @@ _MAX_SENSORS = 3
 _NUM_RESTARTS, _LEAST_GAP, _FIRST_TRIES = 2, 0.01, 1000
 
 
+@part("coordinate_ascent", "search")
 @dataclass(frozen=True, slots=True)
 class CoordinateAscent:
     """One sensor at a time, the others held, until no sensor alone can do better; for many sensors.
@@ -32,16 +33,16 @@ class CoordinateAscent:
     it that is; where none is, the mask is opened (`vedette.control.constraints.opened`).
 
     Attributes:
-        num_restarts: further ascents, from joint actions drawn at random.
+        num_restarts: ascents from random joint actions, after that from the independent decision.
 
     Raises:
         InputError: a number below 0.
     """
 
-    num_restarts: int = 2
+    num_restarts: Repeats = 2
 
     def __post_init__(self) -> None:
-        count("num_restarts", self.num_restarts)
+        check_fields(self)
 
     def search(self, problem: JointProblem, *, rng: np.random.Generator) -> tuple[int, ...]:
         """The best of all ascents; of equal ones that were evaluated the first in printed order."""
@@ -74,6 +75,7 @@ def _ascend(known: Known, start: Joint) -> Joint:
     return at
 
 
+@part("automatic", "search")
 @dataclass(frozen=True, slots=True)
 class AutomaticSearch:
     """Every joint action of up to three sensors; coordinate ascent with restarts for more.
@@ -82,16 +84,16 @@ class AutomaticSearch:
     than 1 % to be gained.
 
     Attributes:
-        max_joint_actions: above which two or three sensors are searched by coordinate ascent, too.
+        max_joint_actions: number above which two or three sensors are searched by coordinate ascent, too.
 
     Raises:
         InputError: a bound below 1.
     """
 
-    max_joint_actions: int = 1_000_000
+    max_joint_actions: Count = 1_000_000
 
     def __post_init__(self) -> None:
-        dimension("max_joint_actions", self.max_joint_actions)
+        check_fields(self)
 
     def search(self, problem: JointProblem, *, rng: np.random.Generator) -> tuple[int, ...]:
         """As the search that it is."""

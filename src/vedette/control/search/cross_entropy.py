@@ -10,12 +10,13 @@ import numpy as np
 from vedette.control.constraints import Mask
 from vedette.control.search.problem import JointProblem, Known
 from vedette.kernels.base.types import Floats, Ints
-from vedette.models.arguments import chance, dimension, real, reject
+from vedette.models.fields import Chance, Count, Portion, check_fields, part
 
 # A distribution in which every sensor has an action of this probability has nothing more to find.
 _DEGENERATE = 0.99
 
 
+@part("cross_entropy", "search")
 @dataclass(frozen=True, slots=True)
 class CrossEntropy:
     """Cross-entropy method: joint actions are drawn, each sensor's action by probabilities of its own, and these are
@@ -30,7 +31,7 @@ class CrossEntropy:
 
     Attributes:
         num_samples: joint actions drawn in a round.
-        elite_share: of these that the probabilities are drawn to, in (0, 1).
+        elite_share: share of these that the probabilities are drawn to, in (0, 1).
         smoothing: how far they are drawn there in a round, in (0, 1]; 1: all the way.
         max_rounds: most rounds.
 
@@ -38,17 +39,13 @@ class CrossEntropy:
         InputError: a field out of range.
     """
 
-    num_samples: int = 200
-    elite_share: float = 0.1
-    smoothing: float = 0.7
-    max_rounds: int = 50
+    num_samples: Count = 200
+    elite_share: Chance = 0.1
+    smoothing: Portion = 0.7
+    max_rounds: Count = 50
 
     def __post_init__(self) -> None:
-        dimension("num_samples", self.num_samples)
-        dimension("max_rounds", self.max_rounds)
-        chance("elite_share", self.elite_share)
-        if not 0.0 < real("smoothing", self.smoothing) <= 1.0:
-            raise reject("smoothing", "a number above 0, up to 1", self.smoothing)
+        check_fields(self)
 
     def search(self, problem: JointProblem, *, rng: np.random.Generator) -> tuple[int, ...]:
         """The best of all that were drawn; of equal ones the first in printed order."""

@@ -14,11 +14,10 @@ from vedette.control.constraints import Mask, opened
 from vedette.control.search.problem import Joint, JointProblem, Known, all_joint_actions, first_best
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats, Ints
-from vedette.models.arguments import dimension, one_of
-
-ORDERS = ("printed", "best_first")
+from vedette.models.fields import Count, check_fields, part
 
 
+@part("exhaustive", "search")
 @dataclass(frozen=True, slots=True)
 class ExhaustiveSearch:
     """Every joint action (paper, Algorithm 2): the best there is, and the oracle for all other searches.
@@ -33,10 +32,10 @@ class ExhaustiveSearch:
         InputError: a bound below 1.
     """
 
-    max_joint_actions: int = 1_000_000
+    max_joint_actions: Count = 1_000_000
 
     def __post_init__(self) -> None:
-        dimension("max_joint_actions", self.max_joint_actions)
+        check_fields(self)
 
     def search(self, problem: JointProblem, *, rng: np.random.Generator) -> tuple[int, ...]:
         """The best of all; nothing is drawn. Raises `InputError` for more joint actions than `max_joint_actions`."""
@@ -72,6 +71,7 @@ class ExhaustiveSearch:
         )
 
 
+@part("sequential_greedy", "search")
 @dataclass(frozen=True, slots=True)
 class SequentialGreedy:
     """Sensors are decided one after the other, each by the reward of those decided, while the others do not scan.
@@ -96,7 +96,7 @@ class SequentialGreedy:
     order: Literal["printed", "best_first"] = "printed"
 
     def __post_init__(self) -> None:
-        one_of("order", self.order, ORDERS)
+        check_fields(self)
 
     def search(self, problem: JointProblem, *, rng: np.random.Generator) -> tuple[int, ...]:
         """The joint action that is decided so; nothing is drawn.

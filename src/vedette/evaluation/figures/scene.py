@@ -14,7 +14,6 @@ from vedette.evaluation.figures.labels import drawn_text
 from vedette.evaluation.figures.style import GREY, INK
 from vedette.kernels.base.types import Floats
 from vedette.scenarios import Scenario
-from vedette.scenarios.names import sensor_names
 from vedette.scenarios.sections.planners import STRATEGIES, NamedIndependent, NamedJoint, NamedLookahead
 from vedette.scenarios.views import INSIDE, NO_GO, REGION, Zone, zones
 from vedette.text import elided
@@ -68,7 +67,7 @@ def scene_of(scenario: Scenario, planner: str) -> Scene:
         words = (own.reward or model.control.reward).words
     elif planner in STRATEGIES:
         words = model.control.reward.words
-    return Scene(sensor_names(model), words, zones(model))
+    return Scene(model.sensor_names, words, zones(model))
 
 
 def name_offsets(places: Floats, extent: float) -> list[dict[str, Any]]:

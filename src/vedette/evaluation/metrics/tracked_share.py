@@ -12,6 +12,7 @@ from vedette.evaluation.metrics.matching import match_run
 from vedette.kernels.base.types import Bools, Floats
 from vedette.models import SensorModel
 from vedette.models.arguments import probability, reject
+from vedette.models.fields import Probability
 from vedette.simulation.records import RunRecord
 from vedette.simulation.truth import Truth
 
@@ -57,7 +58,7 @@ class TrackedShare:
     sensors: tuple[SensorModel, ...]
     cutoff: float
     order: float
-    min_detection: float = 0.5
+    min_detection: Probability = 0.5
 
     def __post_init__(self) -> None:
         check_parameters(self.cutoff, self.order, finite=True)

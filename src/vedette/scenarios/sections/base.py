@@ -1,11 +1,12 @@
-"""What the sections of a scenario share: the strict base class and the types of their fields.
+"""What the sections of a scenario share: the strict base class, the types of their fields, and what stands for a value
+that could not be read.
 
 Each field's description ends with its unit in brackets; [-] is a number without a unit.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import cache
 from inspect import isfunction
 from typing import Annotated, Any, ClassVar, Literal, Self
@@ -24,8 +25,35 @@ from pydantic import (
 )
 from pydantic_core import ErrorDetails, PydanticCustomError
 
-from vedette.scenarios.faults import Finding, describe
-from vedette.scenarios.sections.unread import NotRead, Unread
+from vedette.scenarios.faults import Finding, Path, describe
+
+
+class NotRead(Exception):
+    """A check asked for a value that could not be read."""
+
+
+class Unread:
+    """A value that could not be read; whatever is done with it raises `NotRead`.
+
+    Attributes:
+        errors: what pydantic said of the value.
+    """
+
+    __slots__ = ("errors",)
+
+    def __init__(self, errors: list[ErrorDetails]) -> None:
+        self.errors = errors
+
+    def _refuse(self, *_: Any) -> Any:
+        raise NotRead
+
+    __getattr__ = __getitem__ = __call__ = __iter__ = __len__ = __contains__ = __bool__ = __float__ = __index__ = (
+        _refuse
+    )
+    __eq__ = __ne__ = __lt__ = __le__ = __gt__ = __ge__ = __hash__ = __abs__ = __neg__ = _refuse
+    __str__ = __repr__ = _refuse
+    __add__ = __radd__ = __sub__ = __rsub__ = __mul__ = __rmul__ = __truediv__ = __rtruediv__ = __pow__ = _refuse
+
 
 # Squares and products of numbers in this range are numbers, too.
 _SMALLEST, _LARGEST = 1e-30, 1e15
@@ -65,17 +93,30 @@ def _too_large(value: Any, path: tuple[str | int, ...]) -> tuple[str | int, ...]
 
 Whole = Annotated[int, BeforeValidator(_whole)]
 Name = Annotated[str, AfterValidator(_word)]
+# By the names of `vedette.models.fields`, and within what is of sense in a file.
+Count = Annotated[Whole, Field(ge=1, le=1_000_000_000)]
+Natural = Annotated[Whole, Field(ge=0)]
+Repeats = Annotated[Whole, Field(ge=0, le=1_000_000)]
+Real = float
 Positive = Annotated[float, Field(gt=0.0), AfterValidator(_not_tiny)]
+NonNegative = Annotated[float, Field(ge=0.0)]
 Probability = Annotated[float, Field(ge=0.0, le=1.0)]
+Chance = Annotated[float, Field(gt=0.0, lt=1.0)]
+Share = Annotated[float, Field(ge=0.0, lt=1.0)]
+Portion = Annotated[float, Field(gt=0.0, le=1.0)]
+L1Error = Annotated[float, Field(ge=0.0, le=2.0)]
+EnoughSamples = Annotated[Count, Field(ge=24)]
+Limit = Positive
+HalfWidth = Annotated[float, Field(gt=0.0, le=180.0)]
+Reals = Annotated[tuple[float, ...], Field(strict=False, min_length=1)]
+Positives = Annotated[tuple[Positive, ...], Field(strict=False, min_length=1)]
+PositivePair = Annotated[tuple[Positive, Positive], Field(strict=False)]
+NonNegativePair = Annotated[tuple[NonNegative, NonNegative], Field(strict=False)]
 # Lists in the file are tuples here; `strict=False` admits a list and leaves the items strict.
 Numbers = Annotated[tuple[float, ...], Field(strict=False)]
-SomeNumbers = Annotated[tuple[float, ...], Field(strict=False, min_length=1)]
 Point = Annotated[tuple[float, float], Field(strict=False)]
 Step = Annotated[Whole, Field(ge=1)]
 Steps = Annotated[tuple[Step, ...], Field(strict=False)]
-Count = Annotated[Whole, Field(ge=1, le=1_000_000_000)]
-Share = Annotated[float, Field(ge=0.0, lt=1.0)]
-Chance = Annotated[float, Field(gt=0.0, lt=1.0)]
 GaussianMethod = Literal["auto", "ekf", "ukf", "ckf"]
 DetectionAt = Literal["centre", "mean"]
 
@@ -97,6 +138,18 @@ def attempt(findings: Iterator[Finding]) -> Iterator[Finding]:
         yield from findings
     except NotRead:
         return
+
+
+def sections_in(value: Any, path: Path = ()) -> Iterator[tuple[Path, Section]]:
+    """A section and all in it, each with its path."""
+    inner: Iterable[tuple[str | int, Any]] = ()
+    if isinstance(value, Section):
+        yield path, value
+        inner = ((name, getattr(value, name)) for name in type(value).model_fields)
+    elif isinstance(value, tuple | dict):
+        inner = enumerate(value) if isinstance(value, tuple) else value.items()
+    for name, item in inner:
+        yield from sections_in(item, (*path, name))
 
 
 def is_whole(value: Any) -> bool:
@@ -169,12 +222,11 @@ class Section(BaseModel):
 
 
 def _field_in_part(section: type[Section], name: str, data: Mapping[str, Any]) -> Any:
-    if name not in data:
-        field = section.model_fields[name]
-        missing = ErrorDetails(type="missing", loc=(), msg="", input=None)
-        return Unread([missing]) if field.is_required() else field.get_default()
+    if name not in data and section.model_fields[name].is_required():
+        return Unread([ErrorDetails(type="missing", loc=(), msg="", input=None)])
+    given = {name: data[name]} if name in data else {}
     try:
-        return getattr(_alone(section, name).model_validate({name: data[name]}, context=IN_PART), name)
+        return getattr(_alone(section, name).model_validate(given, context=IN_PART), name)
     except ValidationError as error:
         return Unread([{**detail, "loc": detail["loc"][1:]} for detail in error.errors(include_url=False)])
 

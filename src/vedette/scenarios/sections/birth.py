@@ -11,17 +11,17 @@ from pydantic import Field
 
 from vedette.covariances import SMALLEST_VARIANCE
 from vedette.scenarios.faults import Finding, describe
-from vedette.scenarios.sections.base import Chance, Positive, Section, SomeNumbers, Steps, check
+from vedette.scenarios.sections.base import Chance, Positive, Reals, Section, Steps, check
 from vedette.scenarios.sections.world import Motion, grouped_order
 
 if TYPE_CHECKING:  # with the models comes the compiler, which a check does without
     from vedette.kernels.base.types import Floats
     from vedette.models import BirthModel
 
-CovRows = Annotated[tuple[SomeNumbers, ...], Field(strict=False)]
+CovRows = Annotated[tuple[Reals, ...], Field(strict=False)]
 
 
-def _spreads(stds: SomeNumbers) -> Iterator[Finding]:
+def _spreads(stds: Reals) -> Iterator[Finding]:
     """What is wrong with standard deviations of a birth."""
     for j, std in enumerate(stds):
         if std <= 0.0:
@@ -36,8 +36,8 @@ class BirthSite(Section):
     existence: float = Field(
         gt=0.0, lt=1.0, description="Probability that a target appears, at each such scan or within the period [-]."
     )
-    mean: SomeNumbers = Field(description="Mean state [m, m/s, ...].")
-    std: SomeNumbers | None = Field(
+    mean: Reals = Field(description="Mean state [m, m/s, ...].")
+    std: Reals | None = Field(
         default=None, description="Standard deviation of each state component; else give cov [m, m/s, ...]."
     )
     cov: CovRows | None = Field(
@@ -63,7 +63,7 @@ class MeasuredBirth(Section):
 
     expected: Positive = Field(default=0.5, description="Mean number of such births a scan [-].")
     max_existence: Chance = Field(default=0.03, description="Most that any of them may have as existence [-].")
-    std: SomeNumbers = Field(description="Standard deviation of each state component of a birth [m, m/s, ...].")
+    std: Reals = Field(description="Standard deviation of each state component of a birth [m, m/s, ...].")
 
     @check
     def _positive(self) -> Iterator[Finding]:

@@ -14,9 +14,9 @@ from vedette.covariances import covariance_fault
 from vedette.scenarios.faults import Finding, Path, describe
 from vedette.scenarios.sections.base import attempt
 from vedette.scenarios.sections.birth import BirthSite
-from vedette.scenarios.sections.decision_checks import DECISION_CHECKS
+from vedette.scenarios.sections.control import DECISION_CHECKS
 from vedette.scenarios.sections.fusion import OF_LMBS, OF_SCANS
-from vedette.scenarios.sections.network_checks import NETWORK_CHECKS
+from vedette.scenarios.sections.network import NETWORK_CHECKS
 from vedette.scenarios.sections.tracking import UNLABELLED
 from vedette.scenarios.sections.undetected import cells_of_undetected
 

@@ -1,56 +1,56 @@
-"""Section about control: when to decide, and how an action is valued."""
+"""Section about control: when to decide and how an action is valued; and what must hold between it and tracking."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from pathlib import Path as FilePath
+from typing import TYPE_CHECKING, Annotated
 
 from pydantic import Field
 
-from vedette.scenarios.faults import Finding, describe
+from vedette.scenarios.faults import Finding, Path, describe
 from vedette.scenarios.sections.base import (
-    Chance,
     Count,
     Numbers,
     Positive,
-    Probability,
-    Section,
     Share,
     Steps,
-    Whole,
     check,
 )
-from vedette.scenarios.sections.constraints import AnyConstraint
-from vedette.scenarios.sections.lookahead import Lookahead
-from vedette.scenarios.sections.rewards import AnyReward, ExpectedLossReward
-from vedette.scenarios.sections.search import AnySearch, Automatic
+from vedette.scenarios.sections.deciding import AnyConstraint, AnyReward, AnySearch, Lookahead
+from vedette.scenarios.sections.derived import Derived, derived, of_kind
+from vedette.scenarios.sections.tracking import UNLABELLED
 
-if TYPE_CHECKING:  # with the planners comes the compiler, which a check does without
+if TYPE_CHECKING:  # with these comes the compiler, which a check does without
     from vedette.control import Constraint, PlanningSettings
+    from vedette.scenarios.sections.deciding import AnyReward, AnySearch, Lookahead
+    from vedette.scenarios.sections.scenario import ScenarioModel
 
 
-class PlanningLimits(Section):
+_SETTINGS = "vedette.control.settings:PlanningSettings"
+_LIMITS = (
+    "max_prior_hypotheses",
+    "max_version_divergence",
+    "max_glmb_sensors",
+    "max_glmb_targets",
+    "max_bound_work",
+)
+# Of the settings, those that no file gives or gives otherwise.
+_ELSEWHERE = (*_LIMITS, "horizon_steps", "horizon_period", "end", "limits", "num_threads")
+_FIRST = (
+    *("decision_steps", "decision_times", "horizon_steps", "horizon_period"),
+    *("num_samples", "confidence", "indifference", "max_samples", "max_seconds"),
+    *("ideal_measurements", "detection_threshold", "association", "reward"),
+)
+
+
+@derived(_SETTINGS, only=_LIMITS, first=("max_prior_hypotheses", "max_version_divergence", "max_hypotheses"))
+class PlanningLimits(Derived):
     """How much of the density the planner works with."""
 
-    max_prior_hypotheses: Count = Field(default=10, description="Most hypotheses at the start of the horizon [-].")
-    max_version_divergence: Annotated[float, Field(ge=0.0)] = Field(
-        default=1e-3,
-        description="Densities of one label within so many nats of each other are taken as one at the start of the "
-        "horizon; 0: none are [nats].",
-    )
     max_hypotheses: Count = Field(default=10, description="Most hypotheses after each step of the horizon [-].")
-    max_glmb_sensors: Annotated[Whole, Field(ge=0)] = Field(
-        default=4, description="With more sensors GLMB beliefs are planned on as LMBs, which plans then say [-]."
-    )
-    max_glmb_targets: Annotated[Whole, Field(ge=0)] = Field(
-        default=10, description="The same with more targets expected [-]."
-    )
-    max_bound_work: Annotated[Whole, Field(ge=0)] = Field(
-        default=256, description="Ways to see a target, times samples, that are tried for the bound of a plan [-]."
-    )
     min_relative_weight: Share = Field(
         default=1e-5, description="Hypotheses lighter than this times the heaviest are dropped [-]."
     )
@@ -62,7 +62,8 @@ def _order(name: str, moments: Sequence[float]) -> Iterator[Finding]:
             yield (name, i + 1), f"more than the one before it, {before:g}", describe(after)
 
 
-class Control(Section):
+@derived(_SETTINGS, without=_ELSEWHERE, first=_FIRST)
+class Control(Derived):
     """When and how the sensors decide where to go. Without decisions they keep their course.
 
     Over the horizon no target is born and none dies (paper-notes 11).
@@ -80,48 +81,13 @@ class Control(Section):
         description="Time between pseudo-updates, T; none: time.step_period. In longer steps than scans the "
         "acceleration of motion is held longer, and predictions spread too far [s].",
     )
-    num_samples: Count = Field(default=40, description="Multi-target samples of the expected reward, M [-].")
-    confidence: Chance | None = Field(
-        default=None,
-        description="With it, samples are added until the choice is so surely the best of its candidates, whatever "
-        "num_samples says [-].",
-    )
-    indifference: Share = Field(
-        default=0.0, description="With confidence: a reward short of the best by this share of it is good enough [-]."
-    )
-    max_samples: Annotated[Count, Field(ge=24)] = Field(
-        default=2000, description="With confidence: samples after which the decision is taken as it stands [-]."
-    )
-    max_seconds: Positive | None = Field(
-        default=None,
-        description="With confidence: time after which it is taken likewise; what a seed gives then depends on the "
-        "speed of the machine [s].",
-    )
-    ideal_measurements: Literal["ideal", "expected", "sampled"] = Field(
-        default="ideal",
-        description="Pseudo-measurements of a sample, never with clutter: noise-free, of the targets whose detection "
-        "probability is at least detection_threshold; noise-free, of targets seen by chance with that probability; or "
-        "seen by chance, with measurement noise [-].",
-    )
-    detection_threshold: Probability = Field(
-        default=0.5, description="Ideal measurements see a target when its detection is at least so probable [-]."
-    )
-    association: Literal["known", "full"] = Field(
-        default="known",
-        description="Pseudo-updates of LMB beliefs: each pseudo-measurement is of its own target or else clutter, "
-        "which is fast for any number of targets and sensors; or the filter's own update, which asks which it was "
-        "[-].",
-    )
     reward: AnyReward = Field(
-        default=ExpectedLossReward(),
+        default=of_kind("expected_loss"),
         description="Value of a density; none: the expected loss, of the cutoff and the order of ospa [-].",
     )
-    undetected_worth: Annotated[float, Field(ge=0.0)] = Field(
-        default=0.0,
-        description="What finding a target of `undetected` is worth, in units of the reward; of the expected loss "
-        "m to the power of its order, such as its cutoff to that power [-].",
+    search: AnySearch = Field(
+        default=of_kind("automatic"), description="Which joint actions a joint decision evaluates [-]."
     )
-    search: AnySearch = Field(default=Automatic(), description="Which joint actions a joint decision evaluates [-].")
     constraints: Annotated[tuple[AnyConstraint, ...], Field(strict=False)] = Field(
         default=(), description="What the sensors must not do [-]."
     )
@@ -163,20 +129,8 @@ class Control(Section):
         return PlanningSettings(
             horizon_steps=horizon[0],
             horizon_period=horizon[1],
-            num_samples=self.num_samples,
-            confidence=self.confidence,
-            indifference=self.indifference,
-            max_samples=self.max_samples,
-            max_seconds=self.max_seconds,
-            ideal_measurements=self.ideal_measurements,
-            detection_threshold=self.detection_threshold,
-            association=self.association,
-            max_glmb_sensors=self.limits.max_glmb_sensors,
-            max_glmb_targets=self.limits.max_glmb_targets,
-            undetected_worth=self.undetected_worth,
-            max_bound_work=self.limits.max_bound_work,
-            max_prior_hypotheses=self.limits.max_prior_hypotheses,
-            max_version_divergence=self.limits.max_version_divergence,
+            **self.given(),
+            **self.limits.given(),
             limits=replace(
                 planning_limits(),
                 max_hypotheses=self.limits.max_hypotheses,
@@ -185,6 +139,72 @@ class Control(Section):
             num_threads=num_threads,
         )
 
-    def build_constraints(self, folder: Path) -> tuple[Constraint, ...]:
+    def build_constraints(self, folder: FilePath) -> tuple[Constraint, ...]:
         """What the sensors must not do; raises `InputError` for what cannot be had."""
         return tuple(constraint.build(folder) for constraint in self.constraints)
+
+
+def constraints_on_labels(model: ScenarioModel) -> Iterator[Finding]:
+    """Constraints that ask where targets will be ask a density with labels."""
+    for i, constraint in enumerate(model.control.constraints):
+        if model.filter.kind in UNLABELLED and constraint.kind == "void_probability":
+            wanted = f"another constraint, as {model.filter.kind} filters have no labels to look ahead by"
+            yield ("control", "constraints", i, "kind"), wanted, describe(constraint.kind)
+
+
+def greedy_of_sums(model: ScenarioModel) -> Iterator[Finding]:
+    """Greedy searches ask for rewards of some of the sensors alone, which only sums over labels have."""
+    if model.filter.kind in UNLABELLED:
+        return
+    limits, other = model.control.limits, "coordinate_ascent or another"
+    few = len(model.sensors) <= limits.max_glmb_sensors and limits.max_glmb_targets > 0
+    of_lmbs = model.fusion.kind != "custom" and model.fusion.decides_in_full
+    for path, search, reward in _joint(model):
+        if search.kind != "sequential_greedy" or reward.kind == "expected_loss":
+            continue
+        if model.control.association == "full":
+            why = "as with control.association full decisions are no sums over labels"
+            yield (*path, "kind"), f"{other}, {why}", describe(search.kind)
+        elif few and not of_lmbs and model.filter.kind in ("delta_glmb", "m_delta_glmb"):
+            why = f"as decisions on {model.filter.kind} beliefs are no sums over labels"
+            hint = "or control.limits.max_glmb_targets of 0, with which they are"
+            yield (*path, "kind"), f"{other}, {why}, {hint}", describe(search.kind)
+
+
+def _joint(model: ScenarioModel) -> Iterator[tuple[Path, AnySearch, AnyReward]]:
+    """Of each strategy that decides jointly: where its search stands, the search, and the reward."""
+    control = model.control
+    yield ("control", "search"), control.search, control.reward
+    for name, own in model.planners.items():
+        if own.kind == "joint":
+            path: Path = ("control", "search") if own.search is None else ("planners", name, "search")
+            yield path, own.search or control.search, own.reward or control.reward
+
+
+def longer_plans(model: ScenarioModel) -> Iterator[Finding]:
+    """Decisions over several periods are pseudo-updates apart, and sums over labels."""
+    control = model.control
+    given: dict[Path, Lookahead | None] = {("control", "lookahead"): control.lookahead}
+    given.update({("planners", name): own for name, own in model.planners.items() if own.kind == "lookahead"})
+    for path, own in given.items():
+        if own is None:
+            continue
+        if own.period is not None:
+            horizon_period = model.horizon[1]
+            steps = own.period / horizon_period
+            if round(steps) < 1 or abs(steps - round(steps)) > 1e-9 * steps:
+                multiple = f"a whole multiple of control.horizon_period, {horizon_period:g}"
+                yield (*path, "period"), multiple, describe(own.period)
+        if control.association != "known":
+            yield ("control", "association"), "known, with a lookahead", describe(control.association)
+
+
+def targets_of_rules(model: ScenarioModel) -> Iterator[Finding]:
+    """Each sensor heads for a target."""
+    for name, own in model.planners.items():
+        if own.kind == "assigned" and own.targets is not None and len(own.targets) != len(model.sensors):
+            wanted = f"{len(model.sensors)} numbers, one a sensor"
+            yield ("planners", name, "targets"), wanted, describe(list(own.targets))
+
+
+DECISION_CHECKS = (constraints_on_labels, greedy_of_sums, longer_plans, targets_of_rules)

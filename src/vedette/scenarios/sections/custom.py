@@ -8,7 +8,7 @@ import importlib.util
 import inspect
 import re
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
 from types import ModuleType
@@ -17,7 +17,8 @@ from typing import Annotated, Any, ClassVar
 from pydantic import AfterValidator, Field, JsonValue
 
 from vedette.errors import InputError, VedetteError
-from vedette.scenarios.sections.base import Section, expected
+from vedette.scenarios.faults import Path as Places
+from vedette.scenarios.sections.base import Section, expected, sections_in
 
 _REFERENCE = re.compile(r"([A-Za-z_]\w*(\.[A-Za-z_]\w*)*|[^:]+\.py):[A-Za-z_]\w*(\.[A-Za-z_]\w*)*")
 
@@ -94,7 +95,7 @@ class Custom(Section):
                 got = ", ".join(self.arguments)
                 raise NotGiven(self, "arguments", f"none, as {self.function} is no class and no function", got)
             elif not as_it_is and callable(found):
-                found = found(**_asked_for(found, parts), **self.arguments)
+                found = found(**asked_for(found, parts), **self.arguments)
         except VedetteError:
             raise
         except Exception as error:
@@ -111,11 +112,16 @@ class Custom(Section):
         return NotGiven(self, "function", f"{self.function} to give a {self.protocol().__name__}", got)
 
 
+def customs(section: Section) -> Iterator[tuple[Places, Custom]]:
+    """Everything of the user's own in a section, with its path."""
+    return ((path, found) for path, found in sections_in(section) if isinstance(found, Custom))
+
+
 def _is_function(wanted: type) -> bool:
     return "__call__" in vars(wanted)
 
 
-def _asked_for(made: Any, parts: dict[str, Any]) -> dict[str, Any]:
+def asked_for(made: Any, parts: dict[str, Any]) -> dict[str, Any]:
     """Of the parts, those that a class or function has parameters for."""
     try:
         parameters = inspect.signature(made).parameters

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, TypeAlias
 from pydantic import Field
 
 from vedette.scenarios.faults import Finding, describe
-from vedette.scenarios.sections.base import Chance, Count, Probability, Section, check
+from vedette.scenarios.sections.base import Chance, Probability, Section, check
 from vedette.scenarios.sections.custom import Custom
+from vedette.scenarios.sections.derived import Derived, derived
 
 if TYPE_CHECKING:  # with the fusions comes the compiler, which a check does without
     from vedette.fusion import Fusion as FusionRule
@@ -37,23 +38,23 @@ OF_LMBS: tuple[FusionKind, ...] = ("clmb", "arithmetic_average")
 Weights = Annotated[tuple[Probability, ...], Field(strict=False, min_length=1)]
 
 
-class FusionLimits(Section):
+@derived(
+    "vedette.fusion.base:FusionLimits",
+    without=("log_min_component_weight",),
+    first=("max_hypotheses", "max_components", "min_component_weight"),
+)
+class FusionLimits(Derived):
     """Caps on the cost of a fusion."""
 
-    max_hypotheses: Count = Field(default=1000, description="Most label sets of the fused density [-].")
-    max_components: Count = Field(
-        default=4, description="Most components of a track before its power is taken; unused when moment matched [-]."
-    )
     min_component_weight: Chance = Field(
         default=1e-5, description="Lighter components are dropped; unused when moment matched [-]."
     )
-    merge_distance: Annotated[float, Field(ge=0.0)] | None = Field(
-        default=None,
-        description="Closer components are merged; none: 2 for component_wise, 0.5 for quadrature powers [-].",
-    )
-    max_combinations: Count = Field(
-        default=4096, description="Bound on the combinations of components of one label at all sensors [-]."
-    )
+
+    def build(self) -> RuleLimits:
+        """The caps, of the weight its log."""
+        from vedette.fusion import FusionLimits
+
+        return FusionLimits(log_min_component_weight=math.log(self.min_component_weight), **self.given())
 
 
 class CustomCentral(Custom):
@@ -159,7 +160,7 @@ class Fusion(Section):
         if self.kind in ONE_BELIEF:
             return None
         if self.kind == "parallel":
-            return ParallelUpdate(missing_existence=self.missing_existence, limits=self._caps())
+            return ParallelUpdate(missing_existence=self.missing_existence, limits=self.limits.build())
         rule = self._by_label(num_sensors)
         return Matched(rule) if self.matching == "assignment" else rule
 
@@ -180,24 +181,12 @@ class Fusion(Section):
     def _by_label(self, num_sensors: int) -> FusionRule:
         from vedette.fusion import ArithmeticAverage, Clmb, CmDeltaGlmb
 
-        weights, limits = self.scaled_weights(num_sensors), self._caps()
+        weights, limits = self.scaled_weights(num_sensors), self.limits.build()
         if self.kind == "arithmetic_average":
             return ArithmeticAverage(weights, self.by_views, limits)
         if self.kind == "clmb":
             return Clmb(weights, self.mixture_power, self.missing_existence, limits, self.by_views)
         return CmDeltaGlmb(weights, self.mixture_power, math.log(self.missing_weight), limits)
-
-    def _caps(self) -> RuleLimits:
-        from vedette.fusion import FusionLimits as RuleLimits
-
-        caps = self.limits
-        return RuleLimits(
-            math.log(caps.min_component_weight),
-            caps.merge_distance,
-            caps.max_components,
-            caps.max_combinations,
-            caps.max_hypotheses,
-        )
 
 
 class CustomFusion(Custom):

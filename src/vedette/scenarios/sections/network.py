@@ -1,4 +1,4 @@
-"""The radio network that sensors send their scans or beliefs over."""
+"""The radio network that sensors send their scans or beliefs over, and what must hold between it, births and fusion."""
 
 from __future__ import annotations
 
@@ -8,30 +8,21 @@ from typing import TYPE_CHECKING, Annotated
 from pydantic import Field
 
 from vedette.scenarios.faults import Finding, describe
-from vedette.scenarios.sections.base import Count, Positive, Section, Share, Whole, check
+from vedette.scenarios.sections.base import Whole, check
+from vedette.scenarios.sections.derived import Part, derived
+from vedette.scenarios.sections.fusion import BY_LABEL, OF_SCANS, Fusion
+from vedette.scenarios.sections.sensing import WITHOUT_PLACE
+from vedette.scenarios.sections.tracking import UNLABELLED
 
-if TYPE_CHECKING:  # with the trackers comes the compiler, which a check does without
-    from vedette.tracking import Network
+if TYPE_CHECKING:  # with these comes the compiler, which a check does without
+    from vedette.scenarios.sections.scenario import ScenarioModel
 
 
-class NetworkSection(Section):
+@derived("vedette.tracking.network:Network")
+class NetworkSection(Part):
     """Who hears whom: messages are passed on from sensor to sensor, and each goes on from what it has heard."""
 
-    radio_range: Positive | None = Field(
-        default=None, description="Distance up to which sensors hear each other; none: any [m]."
-    )
-    hops: Count | None = Field(
-        default=None, description="Links that a message may travel; none: as far as they reach [-]."
-    )
-    loss: Share = Field(default=0.0, description="Probability that a link fails at a scan [-].")
-    delay: Annotated[Whole, Field(ge=0, le=1000)] = Field(
-        default=0, description="Scans that a message takes for each link [-]."
-    )
-    consensus_rounds: Count | None = Field(
-        default=None,
-        description="Rounds of averaging with the neighbours after each scan, instead of passing messages on; for "
-        "fusions of densities; none: no consensus [-].",
-    )
+    delay: Annotated[Whole, Field(ge=0, le=1000)]
 
     @check
     def _consensus_is_at_once(self) -> Iterator[Finding]:
@@ -39,9 +30,62 @@ class NetworkSection(Section):
             if self.consensus_rounds is not None and getattr(self, name):
                 yield (name,), "none with consensus_rounds", describe(getattr(self, name))
 
-    def build(self) -> Network:
-        """The network."""
-        from vedette.tracking import Network
 
-        reach = float("inf") if self.radio_range is None else self.radio_range
-        return Network(reach, self.hops, self.loss, self.delay, self.consensus_rounds)
+def network_of_several(model: ScenarioModel) -> Iterator[Finding]:
+    """A network has sensors that fuse something."""
+    if model.network is None:
+        return
+    if len(model.sensors) < 2:
+        yield ("network",), "none, as there is a single sensor", "a network"
+    elif model.fusion.kind == "none":
+        yield ("network",), "none, as nothing is fused", "a network"
+
+
+def network_of_fusion(model: ScenarioModel) -> Iterator[Finding]:
+    """What is sent can be sent as the network does it."""
+    network, fusion = model.network, model.fusion
+    if network is None:
+        return
+    if fusion.kind in OF_SCANS and network.consensus_rounds is not None:
+        wanted = f"none, as under {fusion.kind} sensors send scans, of which there is no average"
+        yield ("network", "consensus_rounds"), wanted, describe(network.consensus_rounds)
+    if fusion.kind == "parallel" and model.filter.kind == "factored_glmb":
+        wanted = "lmb, as over a network parallel adds what a scan said to another prediction, label by label"
+        yield ("filter", "kind"), wanted, describe(model.filter.kind)
+    if fusion.kind == "parallel" and network.delay > 0:
+        yield ("network", "delay"), "0, as parallel divides by the prediction of the same time", describe(network.delay)
+    if fusion.kind in (*BY_LABEL, "custom") and not fusion.feeds_back:
+        yield ("fusion", "feedback"), "true, as sensors of a network go on from what they have fused", "false"
+
+
+def births_from_measurements(model: ScenarioModel) -> Iterator[Finding]:
+    """Measurements say where a target may have been born, and labels whose it is."""
+    measured, fusion = model.birth.from_measurements, model.fusion
+    if measured is None:
+        return
+    path, dim = ("birth", "from_measurements"), model.motion.state_dim
+    if len(measured.std) != dim:
+        yield (*path, "std"), f"{dim} numbers, as a state under motion has", describe(measured.std)
+    if model.filter.kind in UNLABELLED:
+        yield path, f"none, as {model.filter.kind} filters have no labels", "births from measurements"
+    for i, sensor in enumerate(model.sensors):
+        if sensor.measurement.kind in WITHOUT_PLACE:
+            wanted = "a measurement that says where a target is, for birth.from_measurements"
+            yield ("sensors", i, "measurement", "kind"), wanted, describe(sensor.measurement.kind)
+    if len(model.sensors) > 1 and isinstance(fusion, Fusion) and fusion.kind in BY_LABEL:
+        when = "without feedback" if not fusion.feeds_back else None if model.network is None else "over a network"
+        if when is not None and fusion.matching == "labels":
+            wanted = f"assignment, as {when} sensors make labels of their own from their measurements"
+            yield ("fusion", "matching"), wanted, describe(fusion.matching)
+
+
+def matching_of_own_labels(model: ScenarioModel) -> Iterator[Finding]:
+    """Labels are matched where sensors can have different ones for one target."""
+    fusion = model.fusion
+    if not isinstance(fusion, Fusion) or fusion.matching == "labels" or fusion.kind not in BY_LABEL:
+        return
+    if fusion.feedback and model.network is None:
+        yield ("fusion", "matching"), "labels, as with feedback all sensors share them", describe(fusion.matching)
+
+
+NETWORK_CHECKS = (network_of_several, network_of_fusion, births_from_measurements, matching_of_own_labels)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, NamedTuple
@@ -13,14 +13,12 @@ from pydantic import Field
 from vedette.scenarios.faults import Finding, describe
 from vedette.scenarios.sections.base import Count, Section, check
 from vedette.scenarios.sections.custom import Custom
-from vedette.scenarios.sections.lookahead import Lookahead
-from vedette.scenarios.sections.rewards import AnyReward
-from vedette.scenarios.sections.search import AnySearch
+from vedette.scenarios.sections.deciding import AnyReward, AnySearch, Lookahead
+from vedette.scenarios.sections.derived import Derived, derived
 
 if TYPE_CHECKING:  # with the planners comes the compiler, which a check does without
     from vedette.control import Constraint, JointSearch, MobileSensor, Plan, Planner, PlanningSettings
     from vedette.control.preparation import AnyReward as PlannedReward
-    from vedette.control.rules_of_thumb import Rule
     from vedette.densities import Estimator
     from vedette.fusion import Fusion
     from vedette.platforms import Actions
@@ -51,60 +49,141 @@ class Parts(NamedTuple):
     oracle: dict[str, Any]
 
 
-class Strategy(NamedTuple):
-    """A strategy that every scenario has: whether it needs labels, and how its planner is made."""
+class Strategy(Section):
+    """A way to decide, of every scenario or under a name of its own."""
 
-    needs_labels: bool
-    planner: Callable[[Parts], Planner | None]
+    needs_labels: ClassVar[bool] = False
+
+    def planner(self, parts: Parts, folder: Path) -> Planner | None:
+        """Who decides; None: nobody."""
+        return None
 
 
-def _joint(parts: Parts) -> Planner:
-    from vedette.control import JointPlanner
+class _Valued(Strategy):
+    """A strategy that decides by a reward of its own."""
 
-    return JointPlanner(
-        parts.sensors,
-        parts.fusion,
-        parts.settings,
-        parts.reward,
-        parts.search,
-        parts.constraints,
-        parts.notes,
+    reward: AnyReward | None = Field(default=None, description="In place of control.reward; none: that one [-].")
+    needs_labels: ClassVar[bool] = True
+
+    def shared(self, parts: Parts, folder: Path) -> dict[str, Any]:
+        """What all planners that value densities are made of."""
+        reward = parts.reward if self.reward is None else self.reward.build(folder)
+        names = ("sensors", "fusion", "settings", "constraints", "notes")
+        return {"reward": reward, **{name: getattr(parts, name) for name in names}}
+
+
+class NamedJoint(_Valued):
+    """Joint decisions, as of jdm, by a search or a reward of its own: strategies to compare in one campaign."""
+
+    kind: Literal["joint"] = Field(default="joint", description="Kind of planner [-].")
+    search: AnySearch | None = Field(default=None, description="In place of control.search; none: that one [-].")
+
+    def planner(self, parts: Parts, folder: Path) -> Planner:
+        """With the search."""
+        from vedette.control import JointPlanner
+
+        search = parts.search if self.search is None else self.search.build(folder)
+        return JointPlanner(**self.shared(parts, folder), search=search)
+
+
+class NamedIndependent(_Valued):
+    """Independent decisions, as of idm, by a reward of its own."""
+
+    kind: Literal["independent"] = Field(default="independent", description="Kind of planner [-].")
+
+    def planner(self, parts: Parts, folder: Path) -> Planner:
+        """Watched, as of pairs of sensors it knows nothing."""
+        from vedette.control import IndependentPlanner
+
+        return _watched(IndependentPlanner(**self.shared(parts, folder)), parts)
+
+
+class _Ahead(_Valued):
+    """Decisions over several periods, as the section about control has it."""
+
+    def ahead(self, parts: Parts) -> dict[str, Any]:
+        """How far, and by which search."""
+        return parts.lookahead
+
+    def planner(self, parts: Parts, folder: Path) -> Planner:
+        """With that search."""
+        from vedette.control import HorizonPlanner
+
+        return HorizonPlanner(**self.shared(parts, folder), **self.ahead(parts))
+
+
+class NamedLookahead(_Ahead, Lookahead):
+    """Decisions over several periods, as of lookahead, by a reward or a depth of its own."""
+
+    kind: Literal["lookahead"] = Field(default="lookahead", description="Kind of planner [-].")
+
+    def ahead(self, parts: Parts) -> dict[str, Any]:
+        """As it says itself."""
+        return self.build()
+
+
+class NamedRule(Strategy):
+    """Sensors that head for the estimated targets by a rule of thumb, as of the strategies of these names."""
+
+    kind: Literal["nearest", "assigned", "centroid"] = Field(
+        description="For each sensor its nearest target that none before it took; the s-th target for the s-th sensor; "
+        "the middle of all targets [-]."
+    )
+    targets: Annotated[tuple[Count, ...], Field(strict=False)] | None = Field(
+        default=None, description="Of assigned: the number of each sensor's target instead, counted from 1 [-]."
     )
 
+    @check
+    def _targets_of_assigned(self) -> Iterator[Finding]:
+        if self.targets is not None and self.kind != "assigned":
+            yield ("targets",), f"none, as the rule is {self.kind}", describe(list(self.targets))
 
-def _lookahead(parts: Parts) -> Planner:
-    from vedette.control import HorizonPlanner
+    def planner(self, parts: Parts, folder: Path) -> Planner:
+        """By the rule."""
+        from vedette.control import RulePlanner
 
-    return HorizonPlanner(
-        parts.sensors,
-        parts.fusion,
-        parts.settings,
-        parts.reward,
-        constraints=parts.constraints,
-        notes=parts.notes,
-        **parts.lookahead,
-    )
+        return RulePlanner(parts.sensors, self.kind, parts.settings, parts.constraints, parts.estimate, self.targets)
 
 
-def _independent(parts: Parts) -> Planner:
-    from vedette.control import IndependentPlanner
+@derived("vedette.simulation.oracle:OraclePlanner", without=("cutoff",))
+class NamedOracle(Strategy, Derived):
+    """What is done by who knows where the targets are, as of oracle: the floor beside which strategies are put."""
 
-    decides = IndependentPlanner(
-        parts.sensors, parts.fusion, parts.settings, parts.reward, parts.constraints, parts.notes
-    )
-    return _watched(decides, parts)  # of pairs of sensors it knows nothing
+    kind: Literal["oracle"] = Field(default="oracle", description="Kind of planner [-].")
+
+    def planner(self, parts: Parts, folder: Path) -> Planner:
+        """Who waits to be told of the targets."""
+        from vedette.simulation import OraclePlanner
+
+        own: dict[str, Any] = {"settings": parts.settings, "constraints": parts.constraints, "estimate": parts.estimate}
+        return OraclePlanner(parts.sensors, **own, **parts.oracle, **self.given())
 
 
-def _random(parts: Parts) -> Planner:
-    from vedette.control import RandomPlanner
+class CustomPlanner(Strategy, Custom):
+    """A user's own planner; called with `sensors`, `fusion`, `settings`, `reward`, `search`, `first_actions`,
+    `constraints`, `notes`, `lookahead`, `estimate`, `oracle`, of which it names those that it wants."""
 
-    return RandomPlanner(parts.sensors, parts.settings, parts.constraints)
+    kind: Literal["custom"] = Field(default="custom", description="Kind of planner [-].")
+    spared: ClassVar[tuple[str, ...]] = ("name",)  # which the scenario gives
+    gives: ClassVar[str] = "vedette.control:Planner"
+
+    def planner(self, parts: Parts, folder: Path) -> Planner:
+        """The user's own."""
+        return _watched(self.made(folder, **parts._asdict()), parts)
 
 
-def _fixed(parts: Parts) -> Planner:
-    from vedette.control import FixedPlanner
+class _Random(Strategy):
+    def planner(self, parts: Parts, folder: Path) -> Planner:
+        from vedette.control import RandomPlanner
 
-    return _watched(FixedPlanner(parts.first_actions), parts)
+        return RandomPlanner(parts.sensors, parts.settings, parts.constraints)
+
+
+class _Fixed(Strategy):
+    def planner(self, parts: Parts, folder: Path) -> Planner:
+        from vedette.control import FixedPlanner
+
+        return _watched(FixedPlanner(parts.first_actions), parts)
 
 
 def _watched(decides: Planner, parts: Parts) -> Planner:
@@ -116,130 +195,19 @@ def _watched(decides: Planner, parts: Parts) -> Planner:
     return WatchedPlanner(decides, parts.sensors, parts.settings, parts.constraints)
 
 
-def _rule(rule: Rule, targets: tuple[int, ...] | None = None) -> Callable[[Parts], Planner]:
-    def planner(parts: Parts) -> Planner:
-        from vedette.control import RulePlanner
-
-        return RulePlanner(parts.sensors, rule, parts.settings, parts.constraints, parts.estimate, targets)
-
-    return planner
-
-
-def _oracle(parts: Parts, **given: Any) -> Planner:
-    from vedette.simulation import OraclePlanner
-
-    own: dict[str, Any] = {"settings": parts.settings, "constraints": parts.constraints, "estimate": parts.estimate}
-    return OraclePlanner(parts.sensors, **own, **parts.oracle, **given)
-
-
-STRATEGIES = {
-    "jdm": Strategy(True, _joint),
-    "idm": Strategy(True, _independent),
-    "lookahead": Strategy(True, _lookahead),
-    "nearest": Strategy(False, _rule("nearest")),
-    "assigned": Strategy(False, _rule("assigned")),
-    "centroid": Strategy(False, _rule("centroid")),
-    "oracle": Strategy(False, _oracle),
-    "random": Strategy(False, _random),
-    "fixed": Strategy(False, _fixed),
-    "still": Strategy(False, lambda parts: None),
+# Those that every scenario has. Not validated: that would build, at import, what reads rewards and searches.
+STRATEGIES: dict[str, Strategy] = {
+    "jdm": NamedJoint.model_construct(),
+    "idm": NamedIndependent.model_construct(),
+    "lookahead": _Ahead.model_construct(),
+    "nearest": NamedRule(kind="nearest"),
+    "assigned": NamedRule(kind="assigned"),
+    "centroid": NamedRule(kind="centroid"),
+    "oracle": NamedOracle(),
+    "random": _Random(),
+    "fixed": _Fixed(),
+    "still": Strategy(),
 }
-
-
-class _Valued(Section):
-    """A strategy that decides by a reward of its own."""
-
-    reward: AnyReward | None = Field(default=None, description="In place of control.reward; none: that one [-].")
-
-    def valued(self, parts: Parts, folder: Path) -> Parts:
-        """With that reward."""
-        return parts if self.reward is None else parts._replace(reward=self.reward.build(folder))
-
-
-class NamedJoint(_Valued):
-    """Joint decisions, as of jdm, by a search or a reward of its own: strategies to compare in one campaign."""
-
-    kind: Literal["joint"] = Field(default="joint", description="Kind of planner [-].")
-    search: AnySearch | None = Field(default=None, description="In place of control.search; none: that one [-].")
-    needs_labels: ClassVar[bool] = STRATEGIES["jdm"].needs_labels
-
-    def planner(self, name: str, parts: Parts, folder: Path) -> Planner:
-        """The planner, under the name that the scenario gives it."""
-        search = parts.search if self.search is None else self.search.build(folder)
-        return Named(name, _joint(self.valued(parts, folder)._replace(search=search)))
-
-
-class NamedIndependent(_Valued):
-    """Independent decisions, as of idm, by a reward of its own."""
-
-    kind: Literal["independent"] = Field(default="independent", description="Kind of planner [-].")
-    needs_labels: ClassVar[bool] = STRATEGIES["idm"].needs_labels
-
-    def planner(self, name: str, parts: Parts, folder: Path) -> Planner:
-        """The planner, under the name that the scenario gives it."""
-        return Named(name, _independent(self.valued(parts, folder)))
-
-
-class NamedLookahead(_Valued, Lookahead):
-    """Decisions over several periods, as of lookahead, by a reward or a depth of its own."""
-
-    kind: Literal["lookahead"] = Field(default="lookahead", description="Kind of planner [-].")
-    needs_labels: ClassVar[bool] = STRATEGIES["lookahead"].needs_labels
-
-    def planner(self, name: str, parts: Parts, folder: Path) -> Planner:
-        """The planner, under the name that the scenario gives it."""
-        return Named(name, _lookahead(self.valued(parts, folder)._replace(lookahead=self.build())))
-
-
-class NamedRule(Section):
-    """Sensors that head for the estimated targets by a rule of thumb, as of the strategies of these names."""
-
-    kind: Literal["nearest", "assigned", "centroid"] = Field(
-        description="For each sensor its nearest target that none before it took; the s-th target for the s-th sensor; "
-        "the middle of all targets [-]."
-    )
-    targets: Annotated[tuple[Count, ...], Field(strict=False)] | None = Field(
-        default=None, description="Of assigned: the number of each sensor's target instead, counted from 1 [-]."
-    )
-    needs_labels: ClassVar[bool] = False
-
-    @check
-    def _targets_of_assigned(self) -> Iterator[Finding]:
-        if self.targets is not None and self.kind != "assigned":
-            yield ("targets",), f"none, as the rule is {self.kind}", describe(list(self.targets))
-
-    def planner(self, name: str, parts: Parts, folder: Path) -> Planner:
-        """The planner, under the name that the scenario gives it."""
-        return Named(name, _rule(self.kind, self.targets)(parts))
-
-
-class NamedOracle(Section):
-    """What is done by who knows where the targets are, as of oracle: the floor beside which strategies are put."""
-
-    kind: Literal["oracle"] = Field(default="oracle", description="Kind of planner [-].")
-    depth: Count = Field(default=1, description="Decisions in a row that it looks at [-].")
-    beam_width: Count = Field(
-        default=8, description="Joint actions, those best for one decision, that it follows to the next [-]."
-    )
-    needs_labels: ClassVar[bool] = False
-
-    def planner(self, name: str, parts: Parts, folder: Path) -> Planner:
-        """The planner, under the name that the scenario gives it."""
-        return Named(name, _oracle(parts, depth=self.depth, beam_width=self.beam_width))
-
-
-class CustomPlanner(Custom):
-    """A user's own planner; called with `sensors`, `fusion`, `settings`, `reward`, `search`, `first_actions`,
-    `constraints`, `notes`, `lookahead`, `estimate`, `oracle`, of which it names those that it wants."""
-
-    kind: Literal["custom"] = Field(default="custom", description="Kind of planner [-].")
-    spared: ClassVar[tuple[str, ...]] = ("name",)  # which the scenario gives
-    gives: ClassVar[str] = "vedette.control:Planner"
-    needs_labels: ClassVar[bool] = False
-
-    def planner(self, name: str, parts: Parts, folder: Path) -> Planner:
-        """The user's own, under the name that the scenario gives it."""
-        return Named(name, _watched(self.made(folder, **parts._asdict()), parts))
 
 
 @dataclass(frozen=True, slots=True)

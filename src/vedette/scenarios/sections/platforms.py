@@ -5,31 +5,23 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from pydantic import Field
 
 from vedette.scenarios.faults import Finding
-from vedette.scenarios.sections.base import Numbers, Point, Positive, Section, SomeNumbers, check
+from vedette.scenarios.sections.base import HalfWidth, Numbers, Point, Positive, Reals, check
 from vedette.scenarios.sections.custom import Custom
+from vedette.scenarios.sections.derived import Part, derived, one_of
 
 if TYPE_CHECKING:  # with the platforms come the models, and the compiler, which a check does without
     from vedette.platforms import Platform
 
 Row = tuple[float, ...]
-HalfWidth = Annotated[float, Field(gt=0.0, le=180.0)]
 
 
-class _PlatformSection(Section):
+class _PlatformSection(Part):
     """What a platform has unless it says otherwise: no more than a place and a heading, and a rest."""
-
-    def build(self, folder: Path) -> Platform:
-        """What carries the sensor; `folder` is what a custom platform's file is relative to.
-
-        Raises:
-            InputError: a custom platform that cannot be had.
-        """
-        raise NotImplementedError
 
     def components(self) -> Row:
         """What its pose has at the start beyond place and heading."""
@@ -42,21 +34,18 @@ class _PlatformSection(Section):
     @property
     def top_speed(self) -> float:
         """m/s."""
-        return 0.0
+        return float(self.speed) if "speed" in type(self).model_fields else 0.0
 
 
 class Still(_PlatformSection):
     """Stays where it is."""
 
     kind: Literal["still"] = Field(default="still", description="Kind of platform [-].")
-
-    def build(self, folder: Path) -> Platform:
-        """A platform with nothing to decide."""
-        from vedette.platforms import Still
-
-        return Still()
+    of: ClassVar[str] = "vedette.platforms.steps:Still"
+    names: ClassVar[dict[str, str]] = {}
 
 
+@derived("vedette.platforms.courses:Courses", first=("speed", "speeds"))
 class Courses(_PlatformSection):
     """Turns at once, and keeps course and speed until the next decision; an action is a heading."""
 
@@ -65,23 +54,20 @@ class Courses(_PlatformSection):
     speeds: Annotated[tuple[Annotated[float, Field(ge=0.0)], ...], Field(strict=False, min_length=1)] | None = Field(
         default=None, description="Instead of speed: several, of which an action chooses one [m/s]."
     )
-    headings_deg: SomeNumbers = Field(
+    headings_deg: Reals = Field(
         default=tuple(range(-180, 181, 30)),
         description="Headings, counter-clockwise from east, in the order of tables and figures. Those that are one "
         "course (-180 and 180) are evaluated once and shown each; of equal rewards the first action wins [deg].",
     )
-    relative: bool = Field(default=False, description="Whether they are changes of heading, added to it [-].")
 
     @check
     def _one_of_both(self) -> Iterator[Finding]:
         if (self.speed is None) == (self.speeds is None):
             yield (), "either speed or speeds", "neither" if self.speed is None else "both"
 
-    def build(self, folder: Path) -> Platform:
-        """Courses at one speed or several."""
-        from vedette.platforms import Courses
-
-        return Courses(self.top_speed if self.speeds is None else self.speeds, self.headings_deg, self.relative)
+    def given(self) -> dict[str, Any]:
+        """With one speed or several."""
+        return {**super().given(), "speed": self.top_speed if self.speeds is None else self.speeds}
 
     def first_action(self, heading_deg: float) -> Row | None:
         """Its heading at the start, at its speed, or the first of several."""
@@ -93,52 +79,24 @@ class Courses(_PlatformSection):
         return max(self.speeds) if self.speeds is not None else self.speed or 0.0
 
 
+@derived("vedette.platforms.steps:Steps")
 class Steps(_PlatformSection):
     """Steps of one length, each made at a speed and followed by waiting; an action is a step."""
 
     kind: Literal["steps"] = Field(default="steps", description="Kind of platform [-].")
-    length: Positive = Field(description="Length of a step [m].")
-    speed: Positive = Field(description="Speed on the way [m/s].")
-    directions_deg: SomeNumbers = Field(
-        default=(0.0, 45.0, 90.0, 135.0, 180.0, -135.0, -90.0, -45.0),
-        description="Directions, counter-clockwise from east [deg].",
-    )
-    stay: bool = Field(default=True, description="Whether staying is an action, too, the last one [-].")
-
-    def build(self, folder: Path) -> Platform:
-        """Steps, and staying."""
-        from vedette.platforms import Steps
-
-        return Steps(self.length, self.speed, self.directions_deg, self.stay)
 
     def first_action(self, heading_deg: float) -> Row | None:
         """It stays where it may."""
         return (0.0, 0.0) if self.stay else None
 
-    @property
-    def top_speed(self) -> float:
-        """m/s."""
-        return self.speed
 
-
+@derived("vedette.platforms.steps:Waypoints")
 class Waypoints(_PlatformSection):
     """Follows a path from waypoint to waypoint; an action is the waypoint to head for, counted from 1."""
 
     kind: Literal["waypoints"] = Field(default="waypoints", description="Kind of platform [-].")
     points: Annotated[tuple[Point, ...], Field(strict=False, min_length=1)] = Field(description="The path [m].")
     speed: Positive = Field(description="Speed when under way [m/s].")
-    closed: bool = Field(default=False, description="Whether the first follows the last; else it waits there [-].")
-
-    def build(self, folder: Path) -> Platform:
-        """A path."""
-        from vedette.platforms import Waypoints
-
-        return Waypoints(self.points, self.speed, self.closed)
-
-    @property
-    def top_speed(self) -> float:
-        """m/s."""
-        return self.speed
 
 
 class CustomPlatform(_PlatformSection, Custom):
@@ -148,9 +106,9 @@ class CustomPlatform(_PlatformSection, Custom):
     pose: Numbers = Field(default=(), description="Its pose at the start beyond place and heading [-].")
     gives: ClassVar[str] = "vedette.platforms:Platform"
 
-    def build(self, folder: Path) -> Platform:
+    def build(self, folder: Path | None = None, **_: Any) -> Platform:
         """The user's own."""
-        made: Platform = self.made(folder)
+        made: Platform = self.made(folder or Path())
         return made
 
     def components(self) -> Row:
@@ -166,6 +124,7 @@ class CustomPlatform(_PlatformSection, Custom):
 Carrier = Annotated[Still | Courses | Steps | Waypoints | CustomPlatform, Field(discriminator="kind")]
 
 
+@derived("vedette.platforms.camera:Pointing", first=("pointing_deg", "half_width_deg"))
 class Camera(_PlatformSection):
     """Is pointed, and may zoom, on the spot or on what carries it; an action is a pointing, and what the carrier does.
 
@@ -175,19 +134,14 @@ class Camera(_PlatformSection):
     kind: Literal["camera"] = Field(default="camera", description="Kind of platform [-].")
     pointing_deg: float = Field(default=0.0, description="Where it points at the start, as a heading [deg].")
     half_width_deg: HalfWidth = Field(description="Half the width of its field of view at the start [deg].")
-    pointings_deg: SomeNumbers = Field(description="Where it may point, counter-clockwise from east [deg].")
-    relative: bool = Field(default=False, description="Whether these are changes of its pointing, added to it [-].")
-    half_widths_deg: Annotated[tuple[HalfWidth, ...], Field(strict=False)] = Field(
-        default=(), description="Half widths that it may zoom to; none: it does not zoom [deg]."
-    )
-    turn_rate_deg: Positive | None = Field(default=None, description="How fast it turns; none: at once [deg/s].")
+    half_widths_deg: Annotated[tuple[HalfWidth, ...], Field(strict=False)]
     carrier: Carrier = Field(default=Still(), description="What carries it [-].")
 
-    def build(self, folder: Path) -> Platform:
+    def build(self, folder: Path | None = None, **_: Any) -> Platform:
         """A camera, carried where its carrier moves."""
-        from vedette.platforms import Carried, Pointing
+        from vedette.platforms import Carried
 
-        pointing = Pointing(self.pointings_deg, self.relative, self.half_widths_deg, self.turn_rate_deg)
+        pointing: Platform = super().build(folder)
         return pointing if isinstance(self.carrier, Still) else Carried(self.carrier.build(folder), pointing)
 
     def components(self) -> Row:
@@ -206,4 +160,8 @@ class Camera(_PlatformSection):
         return self.carrier.top_speed
 
 
-AnyPlatform = Annotated[Still | Courses | Steps | Waypoints | Camera | CustomPlatform, Field(discriminator="kind")]
+if TYPE_CHECKING:
+    AnyPlatform = _PlatformSection
+else:
+    _WRITTEN = (Still, Courses, Steps, Waypoints, Camera, CustomPlatform)
+    AnyPlatform = one_of("platform", "platforms", own=_WRITTEN, parent=_PlatformSection)

@@ -15,17 +15,16 @@ from vedette.scenarios.sections.base import Name, Section, attempt, check
 from vedette.scenarios.sections.birth import Birth
 from vedette.scenarios.sections.checks import CHECKS, step_of_time
 from vedette.scenarios.sections.control import Control
+from vedette.scenarios.sections.derived import of_kind
 from vedette.scenarios.sections.fusion import AnyFusion, Fusion
 from vedette.scenarios.sections.network import NetworkSection
 from vedette.scenarios.sections.planners import STRATEGIES, AnyPlanner
-from vedette.scenarios.sections.scoring import AnyEstimator, AnyMetric, MapEstimator, Ospa
+from vedette.scenarios.sections.scoring import AnyEstimator, AnyMetric, Ospa
 from vedette.scenarios.sections.sensors import Sensor, SensorDefaults
 from vedette.scenarios.sections.targets import Targets
 from vedette.scenarios.sections.tracking import AnyFilter, Filter
 from vedette.scenarios.sections.undetected import UndetectedSection
 from vedette.scenarios.sections.world import (
-    ConstantSurvival,
-    ConstantVelocity,
     Motion,
     RegionSection,
     Survival,
@@ -69,8 +68,8 @@ class ScenarioModel(Section):
     description: str = Field(default="", description="What it is, where it comes from [-].")
     time: Time = Field(description="The scans [-].")
     region: RegionSection = Field(description="Surveillance region [-].")
-    motion: Motion = Field(default=ConstantVelocity(), description="How targets move [-].")
-    survival: Survival = Field(default=ConstantSurvival(), description="Whether they go on living [-].")
+    motion: Motion = Field(default=of_kind("constant_velocity"), description="How targets move [-].")
+    survival: Survival = Field(default=of_kind("constant"), description="Whether they go on living [-].")
     birth: Birth = Field(description="Where they appear, as the filters know it [-].")
     targets: Targets = Field(description="The true targets [-].")
     sensor_defaults: SensorDefaults | None = Field(
@@ -85,7 +84,7 @@ class ScenarioModel(Section):
     undetected: UndetectedSection | None = Field(
         default=None, description="The targets not yet found, for planners that search; none: no account of them [-]."
     )
-    estimator: AnyEstimator = Field(default=MapEstimator(), description="How estimates are read off [-].")
+    estimator: AnyEstimator = Field(default=of_kind("map"), description="How estimates are read off [-].")
     control: Control = Field(default=Control(), description="When and how the sensors decide [-].")
     planners: dict[Name, AnyPlanner] = Field(
         default={},
@@ -125,6 +124,11 @@ class ScenarioModel(Section):
     def _across_sections(self) -> Iterator[Finding]:
         for across in CHECKS:
             yield from attempt(across(self))
+
+    @property
+    def sensor_names(self) -> tuple[str, ...]:
+        """Name of each sensor; `sensor 1`, `sensor 2`, ... where none is given."""
+        return tuple(sensor.name or f"sensor {number}" for number, sensor in enumerate(self.sensors, 1))
 
     @property
     def decision_steps(self) -> tuple[int, ...]:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
+from typing import TYPE_CHECKING, Literal
 
 from pydantic import Field
 
 from vedette.scenarios.faults import Finding, describe
-from vedette.scenarios.sections.base import Chance, Count, Positive, Probability, Section, check
-from vedette.scenarios.sections.custom import Custom
+from vedette.scenarios.sections.base import Chance, Count, Positive, Section, check
+from vedette.scenarios.sections.derived import Part, derived, one_of
 
 if TYPE_CHECKING:  # with the densities comes the compiler, which a check does without
     from vedette.densities import Estimate, Estimator
@@ -48,38 +48,21 @@ class MarginalEstimator(Section):
         return estimate
 
 
-class CustomEstimator(Custom):
-    """A user's own way to read the targets off a density: a function of the density and the number of the scan."""
-
-    kind: Literal["custom"] = Field(default="custom", description="Kind of estimate [-].")
-    gives: ClassVar[str] = "vedette.densities:Estimator"
-
-    def build(self, folder: Path) -> Estimator:
-        """The user's own."""
-        made: Estimator = self.made(folder)
-        return made
-
-
-AnyEstimator = Annotated[MapEstimator | MarginalEstimator | CustomEstimator, Field(discriminator="kind")]
-
-
-class CustomMetric(Custom):
-    """A measure of the user's own: a function of a run's record that gives one number a scan."""
-
-    kind: Literal["custom"] = Field(default="custom", description="Kind of measure [-].")
-    gives: ClassVar[str] = "vedette.simulation.records:Measure"
-
-
-class TrackedShare(Section):
+@derived("vedette.evaluation.metrics.tracked_share:TrackedShare", without=("cutoff", "order"))
+class TrackedShare(Part):
     """At each scan, the share of the targets seen by some sensor that have an estimate within the cutoff of `ospa`."""
 
     kind: Literal["tracked_share"] = Field(default="tracked_share", description="Kind of measure [-].")
-    min_detection: Probability = Field(
-        default=0.5, description="Probability of detection from which on a sensor sees a target [-]."
-    )
 
 
-AnyMetric = Annotated[CustomMetric | TrackedShare, Field(discriminator="kind")]
+if TYPE_CHECKING:
+    AnyEstimator = Part
+    AnyMetric = Part
+else:
+    _ESTIMATOR = "vedette.densities:Estimator, a function of the density and the number of the scan"
+    _METRIC = "vedette.simulation.records:Measure, a function of a run's record that gives one number a scan"
+    AnyEstimator = one_of("estimator", "densities", _ESTIMATOR, own=(MapEstimator, MarginalEstimator))
+    AnyMetric = one_of("metric", "evaluation/metrics", _METRIC, own=(TrackedShare,))
 
 
 class Ospa(Section):

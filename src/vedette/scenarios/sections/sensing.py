@@ -1,95 +1,30 @@
-"""Sections about what a sensor measures, and with what noise."""
+"""Sections about a sensor: what it measures with what noise, what it detects, and what it measures falsely."""
 
 from __future__ import annotations
 
 import math
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
+from collections.abc import Iterator
+from pathlib import Path as FilePath
+from typing import TYPE_CHECKING, Any, Literal
 
 from pydantic import Field
 
-from vedette.scenarios.sections.base import Positive, Section
-from vedette.scenarios.sections.custom import Custom
+from vedette.scenarios.faults import Finding, Path, describe
+from vedette.scenarios.sections.base import Positive, Section, check
+from vedette.scenarios.sections.derived import Part, derived, one_of
 
 if TYPE_CHECKING:  # with the models comes the compiler, which a check does without
-    from vedette.models import MeasurementModel, NoiseModel
+    from vedette.models import NoiseModel
 
-
-class BearingRange(Section):
-    """z = [bearing in rad, range in m]; the bearing counter-clockwise from east, in (-pi, pi]."""
-
-    kind: Literal["bearing_range"] = Field(default="bearing_range", description="Kind of measurement [-].")
-    dim: ClassVar[int | None] = 2
-    angular: ClassVar[tuple[int, ...]] = (0,)
-
-    def build(self, folder: Path) -> MeasurementModel:
-        """What a sensor measures."""
-        from vedette.models import bearing_range
-
-        return bearing_range()
-
-
-class BearingOnly(Section):
-    """z = [bearing in rad], counter-clockwise from east, in (-pi, pi]."""
-
-    kind: Literal["bearing_only"] = Field(default="bearing_only", description="Kind of measurement [-].")
-    dim: ClassVar[int | None] = 1
-    angular: ClassVar[tuple[int, ...]] = (0,)
-
-    def build(self, folder: Path) -> MeasurementModel:
-        """What a sensor measures."""
-        from vedette.models import bearing_only
-
-        return bearing_only()
-
-
-class RangeOnly(Section):
-    """z = [range in m]."""
-
-    kind: Literal["range_only"] = Field(default="range_only", description="Kind of measurement [-].")
-    dim: ClassVar[int | None] = 1
-    angular: ClassVar[tuple[int, ...]] = ()
-
-    def build(self, folder: Path) -> MeasurementModel:
-        """What a sensor measures."""
-        from vedette.models import range_only
-
-        return range_only()
-
-
-class Position(Section):
-    """z = [px, py] in m, independent of where the sensor is."""
-
-    kind: Literal["position"] = Field(default="position", description="Kind of measurement [-].")
-    dim: ClassVar[int | None] = 2
-    angular: ClassVar[tuple[int, ...]] = ()
-
-    def build(self, folder: Path) -> MeasurementModel:
-        """What a sensor measures."""
-        from vedette.models import position
-
-        return position()
-
-
-class CustomMeasurement(Custom):
-    """A user's `MeasurementModel`."""
-
-    kind: Literal["custom"] = Field(default="custom", description="Kind of measurement [-].")
-    dim: ClassVar[int | None] = None
-    angular: ClassVar[tuple[int, ...]] = ()
-    gives: ClassVar[str] = "vedette.models:MeasurementModel"
-
-    def build(self, folder: Path) -> MeasurementModel:
-        """What a sensor measures."""
-        made: MeasurementModel = self.made(folder)
-        return made
-
-
-Measurement = Annotated[
-    BearingRange | BearingOnly | RangeOnly | Position | CustomMeasurement, Field(discriminator="kind")
-]
+# Components of each kind of measurement, and those that are angles.
+_COMPONENTS = {"bearing_range": (2, (0,)), "bearing_only": (1, (0,)), "range_only": (1, ()), "position": (2, ())}
 # Kinds of measurement that do not say where a target is.
 WITHOUT_PLACE = ("bearing_only", "range_only")
+
+
+def components(measurement: Measurement) -> tuple[int | None, tuple[int, ...]]:
+    """Number of components of a measurement, None of one of the user's own; and which of them are known as angles."""
+    return _COMPONENTS.get(measurement.kind, (None, ()))
 
 
 class RangeDependentNoise(Section):
@@ -104,65 +39,109 @@ class RangeDependentNoise(Section):
     sigma_bearing_deg: Positive = Field(default=1.0, description="Bearing, the same at distance 0 [deg].")
     eta_bearing: float = Field(default=5e-6, ge=0.0, description="Bearing, growth with distance [rad/m].")
 
-    def build(self, measurement: Measurement, folder: Path) -> NoiseModel:
-        """Measurement noise: the parts that the measurement has."""
+    def build(self, folder: FilePath, *, kind: str, **_: Any) -> NoiseModel:
+        """Measurement noise: the parts that the kind of measurement has."""
         from vedette.models import range_dependent_noise
 
         ranges = {"sigma_range": self.sigma_range, "eta_range": self.eta_range}
         bearings = {"sigma_bearing": math.radians(self.sigma_bearing_deg), "eta_bearing": self.eta_bearing}
         return range_dependent_noise(
-            **(ranges if measurement.kind != "bearing_only" else {}),
-            **(bearings if measurement.kind != "range_only" else {}),
+            **(ranges if kind != "bearing_only" else {}), **(bearings if kind != "range_only" else {})
         )
 
 
-NotNegative = Annotated[float, Field(ge=0.0)]
-PositiveNumbers = Annotated[tuple[Positive, ...], Field(strict=False, min_length=1)]
+class _Clutter(Part):
+    """False measurements, so many a scan."""
 
-
-class ConstantNoise(Section):
-    """The same standard deviations everywhere."""
-
-    kind: Literal["constant"] = Field(default="constant", description="Kind of noise [-].")
-    std: PositiveNumbers = Field(
-        description="Standard deviation of each measurement component; a bearing in radians [rad, m]."
+    rate: float = Field(
+        default=25.0,
+        ge=0.0,
+        le=1e6,
+        description="Mean number of clutter measurements a scan; around a sensor, in the figure [-].",
     )
 
-    def build(self, measurement: Measurement, folder: Path) -> NoiseModel:
-        """Measurement noise."""
-        from vedette.models import constant_noise
 
-        return constant_noise(self.std)
+@derived("vedette.models.sensor_clutter:around_sensor")
+class ClutterAroundSensor(_Clutter):
+    """Poisson clutter, uniform over a disc or a square around the sensor, or the part of it about its heading.
 
+    For a position or bearing_range measurement. It moves and turns with the sensor.
+    """
 
-class NoiseByAxis(Section):
-    """Of a position: standard deviations std + growth d^2 along each axis, d the target's offset along it."""
+    kind: Literal["around_sensor"] = Field(default="around_sensor", description="Kind of clutter [-].")
 
-    kind: Literal["by_axis"] = Field(default="by_axis", description="Kind of noise [-].")
-    std: Annotated[tuple[Positive, Positive], Field(strict=False)] = Field(
-        description="Standard deviation along x and y at offset 0 [m]."
-    )
-    growth: Annotated[tuple[NotNegative, NotNegative], Field(strict=False)] = Field(
-        description="Growth with the square of the offset along x and y [1/m]."
-    )
-
-    def build(self, measurement: Measurement, folder: Path) -> NoiseModel:
-        """Measurement noise."""
-        from vedette.models import axis_noise
-
-        return axis_noise(self.std, self.growth)
+    @check
+    def _one_figure(self) -> Iterator[Finding]:
+        if (self.radius is None) == (self.half_side is None):
+            yield (), "either radius or half_side", "neither" if self.radius is None else "both"
 
 
-class CustomNoise(Custom):
-    """A user's `NoiseModel`."""
+if TYPE_CHECKING:
+    Measurement = Part
+    Noise = Part
+    Detection = Part
+    Clutter = Part
+else:
+    Measurement = one_of("measurement", "models", "vedette.models:MeasurementModel")
+    Noise = one_of("noise", "models", "vedette.models:NoiseModel", own=(RangeDependentNoise,))
+    Detection = one_of("detection", "models", "vedette.models:DetectionModel")
+    Clutter = one_of("clutter", "models", "vedette.models:ClutterModel", own=(ClutterAroundSensor,), parent=_Clutter)
 
-    kind: Literal["custom"] = Field(default="custom", description="Kind of noise [-].")
-    gives: ClassVar[str] = "vedette.models:NoiseModel"
 
-    def build(self, measurement: Measurement, folder: Path) -> NoiseModel:
-        """Measurement noise."""
-        made: NoiseModel = self.made(folder)
-        return made
+def noise_findings(measurement: Measurement, noise: Noise, path: Path) -> Iterator[Finding]:
+    """Whether the noise at `path` is for what is measured."""
+    kind, (dim, angular) = measurement.kind, components(measurement)
+    if noise.kind == "range_dependent" and kind in ("position", "custom"):
+        others = "constant, by_axis or custom" if kind == "position" else "constant or custom"
+        yield path, f"{others} noise for a {kind} measurement", "range_dependent noise"
+    elif noise.kind == "by_axis" and kind not in ("position", "custom"):
+        yield path, f"range_dependent, constant or custom noise for a {kind} measurement", "by_axis noise"
+    elif noise.kind == "constant" and dim is not None and len(noise.std) != dim:
+        yield (*path, "std"), _components(measurement, dim), describe(noise.std)
+    elif noise.kind == "constant":
+        for component in angular:
+            if (std := noise.std[component]) > math.pi:
+                meant = "exchanged" if min(noise.std) < math.pi else "in degrees"
+                wanted = f"a bearing's standard deviation in radians, up to pi ({meant}?)"
+                yield (*path, "std", component), wanted, describe(std)
+    elif noise.kind == "range_dependent" and angular and noise.sigma_bearing_deg > 180.0:
+        wanted = "a bearing's standard deviation in degrees, up to 180"
+        yield (*path, "sigma_bearing_deg"), wanted, describe(noise.sigma_bearing_deg)
 
 
-Noise = Annotated[RangeDependentNoise | ConstantNoise | NoiseByAxis | CustomNoise, Field(discriminator="kind")]
+def clutter_findings(measurement: Measurement, clutter: Clutter, path: Path) -> Iterator[Finding]:
+    """Whether the clutter at `path` is for what is measured."""
+    kind = measurement.kind
+    if clutter.kind == "region" and kind == "custom":
+        yield path, "measurement_space or custom clutter for a custom measurement", "region clutter"
+    if clutter.kind == "around_sensor" and kind not in ("position", "bearing_range"):
+        wanted = f"region, measurement_space or custom clutter for a {kind} measurement"
+        yield path, wanted if kind != "custom" else wanted.replace("region, ", ""), "around_sensor clutter"
+
+
+def clutter_box_findings(measurement: Measurement, clutter: Clutter, path: Path) -> Iterator[Finding]:
+    """Whether the bounds of clutter in measurement space are a box of the measurement's components."""
+    if clutter.kind != "measurement_space":
+        return
+    low, high, (dim, angular) = clutter.low, clutter.high, components(measurement)
+    for name, values in (("low", low), ("high", high)):
+        if dim is not None and len(values) != dim:
+            yield (*path, name), _components(measurement, dim), describe(values)
+    if dim is None and len(low) != len(high):
+        yield (*path, "high"), f"as many numbers as low, {len(low)}", describe(high)
+    for j, (least, most) in enumerate(zip(low, high, strict=False)):
+        if most <= least:
+            yield (*path, "high", j), f"a number above low, {least:g}", describe(most)
+        elif j in angular and most - least > 2.0 * math.pi * (1.0 + 1e-9):
+            yield (*path, "high", j), f"an angle of at most 2 pi above low, {least:g}", describe(most)
+
+
+def same_measurement_findings(true: Measurement, known: Measurement, path: Path) -> Iterator[Finding]:
+    """Whether the true measurement is one that the filter's model can take for its own."""
+    if "custom" not in (true.kind, known.kind) and components(true) != components(known):
+        yield (*path, "kind"), f"{known.kind} or custom, as the filter takes it for that", describe(true.kind)
+
+
+def _components(measurement: Measurement, dim: int) -> str:
+    numbers = "1 number" if dim == 1 else f"{dim} numbers"
+    return f"{numbers}, as a {measurement.kind} measurement has"

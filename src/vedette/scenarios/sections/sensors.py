@@ -1,37 +1,103 @@
-"""Sections about the sensors: where they are, how they move, and what they see."""
+"""Sections about the sensors: where they are, how they move, what they see, and what they are in truth."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, create_model
 
 from vedette.plausible import told_elsewhere
 from vedette.scenarios.faults import Finding, describe
-from vedette.scenarios.sections.base import (
-    DetectionAt,
-    GaussianMethod,
-    Name,
-    Point,
-    Section,
-    Step,
-    check,
+from vedette.scenarios.sections.base import DetectionAt, GaussianMethod, Name, Point, Section, Step, check
+from vedette.scenarios.sections.derived import of_kind
+from vedette.scenarios.sections.platforms import AnyPlatform
+from vedette.scenarios.sections.sensing import (
+    WITHOUT_PLACE,
+    Clutter,
+    Detection,
+    Measurement,
+    Noise,
+    clutter_box_findings,
+    clutter_findings,
+    noise_findings,
+    same_measurement_findings,
 )
-from vedette.scenarios.sections.clutter import Clutter, RegionClutter
-from vedette.scenarios.sections.detection import Detection, GaussianDetection
-from vedette.scenarios.sections.platforms import AnyPlatform, Still
-from vedette.scenarios.sections.sensing import BearingRange, Measurement, Noise, RangeDependentNoise
-from vedette.scenarios.sections.sensor_checks import clutter_box_findings, clutter_findings, noise_findings
-from vedette.scenarios.sections.true_sensors import TrueSensor
 
 if TYPE_CHECKING:  # with the models comes the compiler, which a check does without
     from vedette.kernels.base.types import Bools
     from vedette.models import Region, SensorModel
     from vedette.simulation import TrueSensor as TrueSensorModel
+
+
+def built_parts(section: Any, like: Measurement, region: Region, folder: Path, known: Any = None) -> dict[str, Any]:
+    """What a section says of measurement, noise, detection and clutter, by these names.
+
+    like: the measurement that noise and clutter are for. known: the measurement model where the section names none.
+    """
+    measured = known if section.measurement is None else section.measurement.build(folder)
+    given = {"measurement": measured, "angular": measured.angular, "kind": like.kind, "region": region}
+    found = {
+        name: part.build(folder, **given)
+        for name in ("noise", "detection", "clutter")
+        if (part := getattr(section, name)) is not None
+    }
+    return {"measurement": measured, **found}
+
+
+class TrueSensor(Section):
+    """The sensor that is simulated; what it does not say is as the filters know it."""
+
+    measurement: Measurement | None = Field(default=None, description="What it measures [-].")
+    noise: Noise | None = Field(default=None, description="Measurement noise [-].")
+    detection: Detection | None = Field(default=None, description="Probability of detection [-].")
+    clutter: Clutter | None = Field(default=None, description="False measurements [-].")
+    first_detection: Detection | None = Field(
+        default=None, description="Probability of detection at its first scan alone; none: as at the others [-]."
+    )
+    detection_of: Literal["state", "measurement"] = Field(
+        default="state",
+        description="Where the probability of detection is taken: at the target's true state, or at the position that "
+        "was measured of it, noise included (of a position or bearing_range measurement) [-].",
+    )
+
+    def findings_beside(self, known: Measurement) -> Iterator[Finding]:
+        """What is wrong with it beside the measurement that the filters know."""
+        if self.measurement is not None:
+            yield from same_measurement_findings(self.measurement, known, ("truth", "measurement"))
+        measurement = self._like(known)
+        if self.noise is not None:
+            yield from noise_findings(measurement, self.noise, ("truth", "noise"))
+        if self.clutter is not None:
+            yield from clutter_findings(measurement, self.clutter, ("truth", "clutter"))
+            yield from clutter_box_findings(measurement, self.clutter, ("truth", "clutter"))
+        if self.detection_of == "measurement" and measurement.kind in WITHOUT_PLACE:
+            wanted = f"state, as a {measurement.kind} measurement does not say where the target is"
+            yield ("truth", "detection_of"), wanted, describe(self.detection_of)
+
+    def _like(self, known: Measurement) -> Measurement:
+        """What noise and clutter are for: the filters' kind, which a measurement of the user's own stands in for."""
+        return known if self.measurement is None or known.kind != "custom" else self.measurement
+
+    def build(self, known: SensorModel, measurement: Measurement, region: Region, folder: Path) -> TrueSensorModel:
+        """The sensor, beside the filters' model and their section of the measurement.
+
+        Raises:
+            InputError: a custom model that cannot be had, or parts that do not fit together.
+        """
+        from vedette.simulation.true_sensors import TrueSensor as Made
+
+        like = self._like(measurement)
+        parts = built_parts(self, like, region, folder, known.measurement)
+        with told_elsewhere():
+            # The filters' method may need a Jacobian; nothing is filtered with this model.
+            model = replace(known, method="auto", **parts)
+        first = None if self.first_detection is None else self.first_detection.build(folder)
+        return Made(model, first, self.detection_of)
 
 
 class ScanTimes(Section):
@@ -56,16 +122,16 @@ class Sensor(Section):
     name: Name | None = Field(default=None, description="What to call it; none: `sensor 1`, `sensor 2`, ... [-].")
     position: Point = Field(description="Where it starts [m].")
     heading_deg: float = Field(default=0.0, description="Heading at the start, counter-clockwise from east [deg].")
-    platform: AnyPlatform = Field(default=Still(), description="What carries it: what it may do [-].")
+    platform: AnyPlatform = Field(default=of_kind("still"), description="What carries it: what it may do [-].")
     moves_from: Literal["first_decision", "start"] = Field(
         default="first_decision",
         description="Whether it lies still until its first decision, as in the paper, or is under way on its course, "
         "or under the first of its actions [-].",
     )
-    measurement: Measurement = Field(default=BearingRange(), description="What it measures [-].")
-    noise: Noise = Field(default=RangeDependentNoise(), description="Measurement noise [-].")
-    detection: Detection = Field(default=GaussianDetection(), description="Probability of detection [-].")
-    clutter: Clutter = Field(default=RegionClutter(), description="False measurements [-].")
+    measurement: Measurement = Field(default=of_kind("bearing_range"), description="What it measures [-].")
+    noise: Noise = Field(default=of_kind("range_dependent"), description="Measurement noise [-].")
+    detection: Detection = Field(default=of_kind("gaussian"), description="Probability of detection [-].")
+    clutter: Clutter = Field(default=of_kind("region"), description="False measurements [-].")
 
     truth: TrueSensor | None = Field(
         default=None,
@@ -112,34 +178,31 @@ class Sensor(Section):
         """
         from vedette.models import SensorModel
 
-        measurement = self.measurement.build(folder)
-        noise, detection = self.noise.build(self.measurement, folder), self.detection.build(folder)
-        clutter = self.clutter.build(measurement, self.measurement.kind, region, folder)
+        parts = built_parts(self, self.measurement, region, folder)
         with told_elsewhere():
-            return SensorModel(measurement, noise, detection, clutter, method, detection_at)
+            return SensorModel(**parts, method=method, detection_at=detection_at)
 
     def build_true(self, known: SensorModel, region: Region, folder: Path) -> TrueSensorModel:
         """What it is, beside what the filters know; errors as of `build`."""
-        from vedette.simulation.true_sensors import TrueSensor
+        from vedette.simulation.true_sensors import TrueSensor as Made
 
         if self.truth is None:
-            return TrueSensor(known)
+            return Made(known)
         return self.truth.build(known, self.measurement, region, folder)
 
 
-class SensorDefaults(Section):
-    """What every sensor has unless it says otherwise; key by key, a sensor's own value replaces the whole default."""
-
-    heading_deg: float | None = Field(default=None, description="Heading at the start [deg].")
-    platform: AnyPlatform | None = Field(default=None, description="What carries them: what they may do [-].")
-    moves_from: Literal["first_decision", "start"] | None = Field(
-        default=None, description="Whether they lie still until the first decision [-]."
+if TYPE_CHECKING:
+    SensorDefaults = Section
+else:
+    SensorDefaults = create_model(
+        "SensorDefaults",
+        __base__=Section,
+        __module__=__name__,
+        __doc__="What every sensor has unless it says otherwise; key by key, a sensor's own value replaces the whole "
+        "default.",
+        **{
+            name: (f"{Sensor.__annotations__[name]} | None", Field(default=None, description=field.description))
+            for name, field in Sensor.model_fields.items()
+            if name not in ("name", "position")
+        },
     )
-    measurement: Measurement | None = Field(default=None, description="What they measure [-].")
-    noise: Noise | None = Field(default=None, description="Measurement noise [-].")
-    detection: Detection | None = Field(default=None, description="Probability of detection [-].")
-    clutter: Clutter | None = Field(default=None, description="False measurements [-].")
-    truth: TrueSensor | None = Field(
-        default=None, description="What they are in truth, where the filters' model of them differs [-]."
-    )
-    scans: ScanTimes | None = Field(default=None, description="Steps at which they scan [-].")

@@ -6,19 +6,21 @@ import os
 from collections.abc import Iterator, Sequence
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal, Protocol
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import numpy as np
 from pydantic import Field
 
 from vedette.errors import InputError
 from vedette.scenarios.faults import Finding, describe
-from vedette.scenarios.sections.base import Point, Positive, Probability, Section, SomeNumbers, Step, check
-from vedette.scenarios.sections.world import Motion, RegionSection, Time, grouped_order
+from vedette.scenarios.sections.base import Point, Positive, Probability, Reals, Section, Step, check
+from vedette.scenarios.sections.derived import Derived, derived
+from vedette.scenarios.sections.world import RegionSection, grouped_order
 
 if TYPE_CHECKING:  # with the models comes the compiler, which a check does without
     from vedette.models import MotionModel
     from vedette.recorded import RecordedTargets as RecordedSource
+    from vedette.scenarios.sections.scenario import ScenarioModel
     from vedette.simulation import CrowdTargets as CrowdSource
     from vedette.simulation import PoissonTargets as PoissonSource
     from vedette.simulation import ScriptedTargets as ScriptedSource
@@ -30,25 +32,14 @@ def _negative_stds(stds: Sequence[float]) -> Iterator[Finding]:
             yield ("std", i), "a number of at least 0", describe(std)
 
 
-class _World(Protocol):
-    """What of a scenario targets are made with."""
-
-    @property
-    def time(self) -> Time: ...
-    @property
-    def region(self) -> RegionSection: ...
-    @property
-    def motion(self) -> Motion: ...
-
-
 class ScriptedTarget(Section):
     """One true target that follows the motion model."""
 
-    state: SomeNumbers = Field(description="State at its first scan [m, m/s, ...].")
+    state: Reals = Field(description="State at its first scan [m, m/s, ...].")
     start_step: Step = Field(default=1, description="First scan at which it is there [-].")
     end_step: Step | None = Field(default=None, description="Last scan at which it is there; none: to the end [-].")
     process_noise: bool = Field(default=False, description="Whether its motion is disturbed by the process noise [-].")
-    std: SomeNumbers | None = Field(
+    std: Reals | None = Field(
         default=None,
         description="Standard deviation of each component of its first state, which every run draws anew around state; "
         "none: the same in every run [m, m/s, ...].",
@@ -78,7 +69,7 @@ class ScriptedTargets(Section):
             changes[min((track.end_step or num_steps) + 1, num_steps + 1)] -= 1
         return float(np.cumsum(changes)[: num_steps + 1].max())
 
-    def build(self, world: _World, motion: MotionModel, folder: Path) -> ScriptedSource:
+    def build(self, world: ScenarioModel, motion: MotionModel, folder: Path) -> ScriptedSource:
         """The targets, as `motion` moves them."""
         from vedette.simulation import ScriptedTargets
 
@@ -123,7 +114,8 @@ class Columns(Section):
         return {key: name for key in type(self).model_fields if (name := getattr(self, key)) is not None}
 
 
-class RecordedTargets(Section):
+@derived("vedette.recorded.cleaning:Cleaning", first=("path", "columns", "time_origin", "origin_deg"))
+class RecordedTargets(Derived):
     """Targets from a CSV or Parquet file of reports: time, which target, where. Interpolated at the scans."""
 
     kind: Literal["recorded"] = Field(default="recorded", description="Kind of targets [-].")
@@ -135,20 +127,13 @@ class RecordedTargets(Section):
     origin_deg: Point | None = Field(
         default=None, description="Longitude and latitude of x = y = 0; none: the middle of the reports [deg]."
     )
-    max_gap: Positive = Field(default=60.0, description="A longer silence ends the track [s].")
-    min_speed: float = Field(
-        default=0.0, ge=0.0, description="A track slower than this on average is left out (moored) [m/s]."
-    )
-    max_speed: Positive | None = Field(
-        default=None, description="Reports that would need more are dropped (jumps); none: no limit [m/s]."
-    )
     crop: bool = Field(default=True, description="Whether tracks end at the edges of the region [-].")
 
     def expected_number(self, num_steps: int) -> float | None:
         """None: it takes the file to know."""
         return None
 
-    def build(self, world: _World, motion: MotionModel, folder: Path) -> RecordedSource:
+    def build(self, world: ScenarioModel, motion: MotionModel, folder: Path) -> RecordedSource:
         """The targets, as they were recorded. Raises `InputError` for a file that cannot be read, or gives none."""
         return self.source(world.region, folder)
 
@@ -166,17 +151,16 @@ class RecordedTargets(Section):
 def _read(
     file: str, changed_ns: int, num_bytes: int, section: RecordedTargets, region: RegionSection
 ) -> RecordedSource:
-    from vedette.models import Region
     from vedette.recorded import Cleaning
     from vedette.recorded import RecordedTargets as RecordedSource
 
-    edges = Region(region.x_min, region.x_max, region.y_min, region.y_max)
+    edges = region.build()
     return RecordedSource.from_file(
         file,
         columns=section.columns.given(),
         origin_deg=section.origin_deg,
         time_origin=section.time_origin,
-        cleaning=Cleaning(section.max_gap, section.min_speed, section.max_speed, edges if section.crop else None),
+        cleaning=Cleaning(**section.given(), region=edges if section.crop else None),
     )
 
 
@@ -188,8 +172,8 @@ class PoissonTargets(Section):
 
     kind: Literal["poisson"] = Field(default="poisson", description="Kind of targets [-].")
     expected: Positive = Field(description="Mean number of births a scan [-].")
-    mean: SomeNumbers = Field(description="Mean state of a birth [m, m/s, ...].")
-    std: SomeNumbers = Field(description="Standard deviation of each state component of a birth [m, m/s, ...].")
+    mean: Reals = Field(description="Mean state of a birth [m, m/s, ...].")
+    std: Reals = Field(description="Standard deviation of each state component of a birth [m, m/s, ...].")
     death_probability: Probability = Field(
         default=0.0, description="Probability with which a target dies from scan to scan [-]."
     )
@@ -204,7 +188,7 @@ class PoissonTargets(Section):
             return None
         return self.expected * (1.0 - (1.0 - self.death_probability) ** num_steps) / self.death_probability
 
-    def build(self, world: _World, motion: MotionModel, folder: Path) -> PoissonSource:
+    def build(self, world: ScenarioModel, motion: MotionModel, folder: Path) -> PoissonSource:
         """The targets, as `motion` moves them."""
         from vedette.simulation import PoissonTargets
 
@@ -224,7 +208,7 @@ class CrowdTargets(Section):
     number: Annotated[int, Field(ge=1, le=1_000_000)] = Field(
         description="Number of targets at the first scan, and on average later [-]."
     )
-    std: SomeNumbers = Field(
+    std: Reals = Field(
         description="Standard deviation around 0 of each component of a first state but the position [m/s, ...]."
     )
     death_probability: Probability = Field(
@@ -239,7 +223,7 @@ class CrowdTargets(Section):
         """The number at every scan, on average."""
         return float(self.number)
 
-    def build(self, world: _World, motion: MotionModel, folder: Path) -> CrowdSource:
+    def build(self, world: ScenarioModel, motion: MotionModel, folder: Path) -> CrowdSource:
         """The targets, as `motion` moves them."""
         from vedette.simulation import CrowdTargets
 

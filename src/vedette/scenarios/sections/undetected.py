@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 from pydantic import Field
 
 from vedette.scenarios.faults import Finding, describe
-from vedette.scenarios.sections.base import Positive, Probability, Section
+from vedette.scenarios.sections.base import Positive
+from vedette.scenarios.sections.derived import Derived, derived
 from vedette.scenarios.sections.world import RegionSection
 
 if TYPE_CHECKING:  # with the models comes the compiler, which a check does without
@@ -20,21 +21,15 @@ if TYPE_CHECKING:  # with the models comes the compiler, which a check does with
 MAX_CELLS = 250_000
 
 
-class UndetectedSection(Section):
+@derived("vedette.models.undetected:UndetectedModel", first=("cell",))
+class UndetectedSection(Derived):
     """How many targets there are that no sensor has found yet, on a grid: some at first, others that appear later."""
 
     cell: Positive = Field(description="Side of a cell, at most [m].")
     expected: float = Field(ge=0.0, description="Mean number of them at the first scan, spread evenly [-].")
-    birth_rate: float = Field(default=0.0, ge=0.0, description="Mean number that appear in the region [1/s].")
-    enters: Literal["anywhere", "border"] = Field(
-        default="anywhere", description="Where they appear: anywhere alike, or along the border of the region [-]."
-    )
     speed: float = Field(
         ge=0.0,
         description="Standard deviation of both components of their velocity, drawn anew at every scan [m/s].",
-    )
-    survival: Probability | None = Field(
-        default=None, description="Probability of living through a second; none: as survival says of a scan [-]."
     )
     region: RegionSection | None = Field(
         default=None, description="Where they are; none: in the region of the scenario [-]."
@@ -45,7 +40,7 @@ class UndetectedSection(Section):
         from vedette.models import CellGrid, UndetectedModel
 
         grid = CellGrid.covering((self.region or region).build(), self.cell)
-        return UndetectedModel(grid, self.expected, self.birth_rate, self.enters, self.speed, self.survival)
+        return UndetectedModel(grid, **self.given())
 
 
 def cells_of_undetected(model: ScenarioModel) -> Iterator[Finding]:

@@ -11,21 +11,20 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from vedette.plausible import told_elsewhere
 from vedette.scenarios.faults import Finding, describe
 from vedette.scenarios.sections.base import (
     GaussianMethod,
     Positive,
-    Probability,
     Section,
     Whole,
     check,
 )
 from vedette.scenarios.sections.custom import Custom, NotGiven
+from vedette.scenarios.sections.derived import Part, derived, one_of
 
 if TYPE_CHECKING:  # with the models comes the compiler, which a check does without
     from vedette.kernels.base.types import Floats
-    from vedette.models import MotionModel, Region, SurvivalModel
+    from vedette.models import MotionModel
 
 
 class Time(Section):
@@ -46,13 +45,9 @@ class Time(Section):
         return self.start + self.step_period * np.arange(self.num_steps, dtype=np.float64)
 
 
-class RegionSection(Section):
+@derived("vedette.models.region:Region")
+class RegionSection(Part):
     """The surveillance region: a rectangle, x to the east and y to the north."""
-
-    x_min: float = Field(description="Western edge [m].")
-    x_max: float = Field(description="Eastern edge [m].")
-    y_min: float = Field(description="Southern edge [m].")
-    y_max: float = Field(description="Northern edge [m].")
 
     @check
     def _width(self) -> Iterator[Finding]:
@@ -63,13 +58,6 @@ class RegionSection(Section):
     def _height(self) -> Iterator[Finding]:
         if self.y_max <= self.y_min:
             yield ("y_max",), f"a number above y_min, {self.y_min:g}", describe(self.y_max)
-
-    def build(self) -> Region:
-        """The surveillance region."""
-        from vedette.models import Region
-
-        with told_elsewhere():
-            return Region(self.x_min, self.x_max, self.y_min, self.y_max)
 
 
 StateOrder = Annotated[
@@ -82,55 +70,18 @@ StateOrder = Annotated[
 ]
 
 
-class ConstantVelocity(Section):
-    """Constant velocity with white acceleration noise. State [px, py, vx, vy]."""
+class _Motion(Part):
+    """How targets move, and in which order the file writes their states."""
 
-    kind: Literal["constant_velocity"] = Field(default="constant_velocity", description="Kind of motion [-].")
-    sigma_v: float = Field(
-        default=5.0,
-        ge=0.0,
-        description="Standard deviation of a held acceleration; of a continuous one the root of its spectral density, "
-        "in m/s^1.5 [m/s^2].",
-    )
-    acceleration: Literal["held", "continuous"] = Field(
-        default="held",
-        description="Whether the acceleration is constant within a step, as in the paper, or white in continuous time "
-        "[-].",
-    )
     state_order: StateOrder = "grouped"
 
     @property
     def state_dim(self) -> int:
         """Number of components of a state."""
-        return 4
-
-    def build(self, method: GaussianMethod, folder: Path) -> MotionModel:
-        """The motion model."""
-        from vedette.models import constant_velocity
-
-        return constant_velocity(self.sigma_v, acceleration=self.acceleration, method=method)
+        return _STATE_DIMS[self.kind]
 
 
-class CoordinatedTurn(Section):
-    """Turn at an unknown rate. State [px, py, vx, vy, turn rate in rad/s]."""
-
-    kind: Literal["coordinated_turn"] = Field(default="coordinated_turn", description="Kind of motion [-].")
-    sigma_v: float = Field(default=5.0, ge=0.0, description="Standard deviation of the acceleration [m/s^2].")
-    sigma_turn_rate_deg: float = Field(
-        default=1.0, ge=0.0, description="Standard deviation of the turn acceleration [deg/s^2]."
-    )
-    state_order: StateOrder = "grouped"
-
-    @property
-    def state_dim(self) -> int:
-        """Number of components of a state."""
-        return 5
-
-    def build(self, method: GaussianMethod, folder: Path) -> MotionModel:
-        """The motion model."""
-        from vedette.models import coordinated_turn
-
-        return coordinated_turn(self.sigma_v, math.radians(self.sigma_turn_rate_deg), method=method)
+_STATE_DIMS = {"constant_velocity": 4, "coordinated_turn": 5}
 
 
 class CustomMotion(Custom):
@@ -145,7 +96,7 @@ class CustomMotion(Custom):
         """States are written as the model has them."""
         return "grouped"
 
-    def build(self, method: GaussianMethod, folder: Path) -> MotionModel:
+    def build(self, folder: Path, method: GaussianMethod = "auto") -> MotionModel:
         """The motion model. Raises `InputError` where it has another state dimension than it says."""
         motion: MotionModel = self.made(folder)
         if motion.state_dim != self.state_dim:
@@ -153,7 +104,12 @@ class CustomMotion(Custom):
         return motion if method == "auto" else replace(motion, method=method)
 
 
-Motion = Annotated[ConstantVelocity | CoordinatedTurn | CustomMotion, Field(discriminator="kind")]
+if TYPE_CHECKING:
+    Motion = _Motion
+    Survival = Part
+else:
+    Motion = one_of("motion", "models", own=(CustomMotion,), parent=_Motion)
+    Survival = one_of("survival", "models", "vedette.models:SurvivalModel")
 
 
 def grouped_order(motion: Motion) -> list[int]:
@@ -161,37 +117,3 @@ def grouped_order(motion: Motion) -> list[int]:
     if motion.state_order == "grouped":
         return list(range(motion.state_dim))
     return [0, 2, 1, 3, *range(4, motion.state_dim)]
-
-
-class ConstantSurvival(Section):
-    """The same probability of survival everywhere."""
-
-    kind: Literal["constant"] = Field(default="constant", description="Kind of survival [-].")
-    probability: Probability = Field(
-        default=0.98, description="Probability of living on to the next scan, or through the period [-]."
-    )
-    period: Positive | None = Field(
-        default=None,
-        description="Time for which the probability is meant; none: a scan, however long after another [s].",
-    )
-
-    def build(self, folder: Path) -> SurvivalModel:
-        """The survival model."""
-        from vedette.models import constant_survival
-
-        return constant_survival(self.probability, self.period)
-
-
-class CustomSurvival(Custom):
-    """A user's `SurvivalModel`."""
-
-    kind: Literal["custom"] = Field(default="custom", description="Kind of survival [-].")
-    gives: ClassVar[str] = "vedette.models:SurvivalModel"
-
-    def build(self, folder: Path) -> SurvivalModel:
-        """The survival model."""
-        made: SurvivalModel = self.made(folder)
-        return made
-
-
-Survival = Annotated[ConstantSurvival | CustomSurvival, Field(discriminator="kind")]

@@ -1,0 +1,133 @@
+"""What the numbers of a part may be: types that say it once, for its constructor and for the scenario file.
+
+`num_restarts: Natural = 2` in a dataclass is a field that its constructor checks by `check_fields`, and that the
+section of the same part in a scenario reads and describes (`vedette.scenarios.sections.derived`).
+"""
+
+from __future__ import annotations
+
+import inspect
+import math
+from collections.abc import Callable, Iterator
+from functools import cache, partial
+from typing import Annotated, Any, Literal, TypeAlias, TypeVar, get_args, get_origin, get_type_hints
+
+from numpy.typing import ArrayLike
+
+from vedette.models.arguments import (
+    chance,
+    count,
+    dimension,
+    is_infinite,
+    non_negative,
+    one_of,
+    positive,
+    probability,
+    real,
+    reject,
+)
+
+T = TypeVar("T")
+# Of a search and the first round of a race (`vedette.control.rounds`).
+_LEAST_SAMPLES = 24
+
+
+def _share(field: str, value: Any) -> float:
+    if not 0.0 <= real(field, value) < 1.0:
+        raise reject(field, "a number in [0, 1)", value)
+    return float(value)
+
+
+def _portion(field: str, value: Any) -> float:
+    if not 0.0 < real(field, value) <= 1.0:
+        raise reject(field, "a number above 0, up to 1", value)
+    return float(value)
+
+
+def half_width(field: str, value: Any) -> float:
+    """Half the angle of a sector, rad."""
+    if positive(field, value) > math.pi:
+        raise reject(field, "an angle in radians, in (0, pi] (is it in degrees?)", value)
+    return float(value)
+
+
+def _l1_error(field: str, value: Any) -> float:
+    if not 0.0 <= real(field, value) <= 2.0:
+        raise reject(field, "a number from 0 to 2", value)
+    return float(value)
+
+
+def _enough_samples(field: str, value: Any) -> int:
+    if dimension(field, value) < _LEAST_SAMPLES:
+        raise reject(field, f"a whole number of at least {_LEAST_SAMPLES}", value)
+    return int(value)
+
+
+def _limit(field: str, value: Any) -> float:
+    return math.inf if is_infinite(value) else positive(field, value)
+
+
+Count = Annotated[int, dimension]  # at least 1
+Natural = Annotated[int, count]  # at least 0
+Repeats = Annotated[int, count]  # the same; in a file up to a million
+Real = Annotated[float, real]
+Positive = Annotated[float, positive]
+NonNegative = Annotated[float, non_negative]
+Probability = Annotated[float, probability]  # [0, 1]
+Chance = Annotated[float, chance]  # (0, 1)
+Share = Annotated[float, _share]  # [0, 1)
+Portion = Annotated[float, _portion]  # (0, 1]
+L1Error = Annotated[float, _l1_error]  # of densities that each integrate to 1
+EnoughSamples = Annotated[int, _enough_samples]  # to tell candidates apart by
+Limit = Annotated[float, _limit]  # above 0, or infinite; in a file then left out
+HalfWidth = Annotated[float, half_width]  # rad, in (0, pi]
+Reals: TypeAlias = ArrayLike  # one or more
+Positives: TypeAlias = ArrayLike  # the same, each above 0
+PositivePair: TypeAlias = ArrayLike
+NonNegativePair: TypeAlias = ArrayLike
+
+
+def part(kind: str, room: str, **names: str) -> Callable[[T], T]:
+    """Mark a class or a function as what a scenario's `kind` of a room, such as "search", stands for.
+
+    names: of fields or parameters that are called otherwise in a file, key by key; where the key ends in `_deg`, an
+    angle is in degrees there.
+    """
+
+    def marked(made: T) -> T:
+        return made
+
+    return marked
+
+
+def check_fields(made: Any, prefix: str = "") -> None:
+    """Hold the fields of a dataclass against their types; those that may be None may.
+
+    Raises:
+        InputError: names the field, what was expected and what came.
+    """
+    kind: type = type(made)
+    for name, field, optional, check in _checks(kind, prefix):
+        value = getattr(made, name)
+        if value is not None or not optional:
+            check(field, value)
+
+
+@cache
+def _checks(kind: type, prefix: str) -> tuple[tuple[str, str, bool, Callable[[str, Any], Any]], ...]:
+    return tuple((name, f"{prefix}{name}", optional, check) for name, optional, check in _found(kind))
+
+
+def _found(kind: type) -> Iterator[tuple[str, bool, Callable[[str, Any], Any]]]:
+    hints = get_type_hints(kind, include_extras=True)
+    for name in inspect.get_annotations(kind):
+        alone = get_origin(hints[name]) in (Annotated, Literal)
+        options = (hints[name],) if alone else get_args(hints[name])
+        choices = [option for option in options if option is not type(None)]
+        if len(choices) != 1:
+            continue
+        optional, words = type(None) in options, get_args(choices[0])
+        if get_origin(choices[0]) is Annotated:
+            yield name, optional, words[1]
+        elif get_origin(choices[0]) is Literal:
+            yield name, optional, partial(one_of, words=words)

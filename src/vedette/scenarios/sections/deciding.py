@@ -1,0 +1,145 @@
+"""Sections about decisions: rewards, constraints, searches, and how far they look ahead."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+
+import numpy as np
+from pydantic import Field
+
+from vedette.plausible import told_elsewhere
+from vedette.scenarios.faults import Finding, describe
+from vedette.scenarios.sections.base import Count, Point, Positive, Probability, Section, check
+from vedette.scenarios.sections.custom import Custom
+from vedette.scenarios.sections.derived import Part, derived, one_of
+from vedette.scenarios.sections.world import RegionSection
+
+
+@derived("vedette.control.rewards.power:RenyiReward")
+class RenyiReward(Part):
+    """Renyi divergence of the predicted from the updated density."""
+
+    kind: Literal["renyi"] = Field(default="renyi", description="Kind of reward [-].")
+
+    @check
+    def _not_one(self) -> Iterator[Finding]:
+        if self.order == 1.0:
+            yield ("order",), "a number other than 1", "1"
+
+
+class CustomReward(Custom):
+    """A user's own `vedette.control.Reward`, a function of the predicted and the updated density, `PowerReward` or
+    `LabelReward`."""
+
+    kind: Literal["custom"] = Field(default="custom", description="Kind of reward [-].")
+    words: ClassVar[str] = ""
+    gives: ClassVar[str] = "vedette.control:Reward"
+
+    def lacking(self, found: object) -> str:
+        """As of other kinds; a reward of sums is no function."""
+        from vedette.control import LabelReward, PowerReward
+
+        return "" if isinstance(found, PowerReward | LabelReward) else super().lacking(found)
+
+    def build(self, folder: Path) -> Any:
+        """The user's own."""
+        return self.made(folder)
+
+
+if TYPE_CHECKING:
+    AnyReward = Part
+else:
+    AnyReward = one_of("reward", "control/rewards", own=(RenyiReward, CustomReward))
+
+
+@derived("vedette.control.constraints.regions:StayInside")
+class StayInside(Part):
+    """Every platform stays inside a rectangle."""
+
+    kind: Literal["stay_inside"] = Field(default="stay_inside", description="Kind of constraint [-].")
+    region: RegionSection
+
+
+class KeepOut(Section):
+    """No platform enters a rectangle or a polygon."""
+
+    kind: Literal["keep_out"] = Field(default="keep_out", description="Kind of constraint [-].")
+    region: RegionSection | None = Field(default=None, description="A rectangle [-].")
+    polygon: Annotated[tuple[Point, ...], Field(strict=False, min_length=3)] | None = Field(
+        default=None, description="The corners of a polygon in order, instead of a rectangle [m]."
+    )
+
+    @check
+    def _one_area(self) -> Iterator[Finding]:
+        if (self.region is None) == (self.polygon is None):
+            yield (), "either region or polygon", "none" if self.region is None else "both"
+
+    def build(self, folder: Path) -> Any:
+        """The constraint."""
+        from vedette.control import KeepOut
+
+        with told_elsewhere():
+            return KeepOut(np.array(self.polygon) if self.region is None else self.region.build())
+
+
+if TYPE_CHECKING:
+    AnyConstraint = Part
+else:
+    AnyConstraint = one_of("constraint", "control/constraints", "vedette.control:Constraint", own=(StayInside, KeepOut))
+
+
+class Lookahead(Section):
+    """How many decisions the strategy `lookahead` takes at once, of which it carries out the first."""
+
+    depth: Annotated[Count, Field(le=100)] = Field(default=3, description="Number of decisions [-].")
+    period: Positive | None = Field(
+        default=None,
+        description="Time from a decision to the next, a whole multiple of horizon_period; none: horizon_steps times "
+        "horizon_period [s].",
+    )
+    method: Literal["beam", "tree"] = Field(
+        default="beam",
+        description="Search where there are more joint sequences than the budget: beams of sequences, sensor by "
+        "sensor; or Monte-Carlo tree search [-].",
+    )
+    beam_width: Count | None = Field(
+        default=None, description="Of beam: sequences of a sensor kept at each decision; none: 8 [-]."
+    )
+    exploration: Probability | None = Field(
+        default=None, description="Of tree: weight of what was seldom tried; none: 0.3 [-]."
+    )
+    rollout: Literal["random", "kept"] | None = Field(
+        default=None,
+        description="Of tree: how a beginning is completed, by random actions, or by keeping to the last one; none: "
+        "random [-].",
+    )
+    budget: Count = Field(default=2000, description="Most joint sequences that are evaluated for a decision [-].")
+    discount: Probability | None = Field(
+        default=0.25,
+        description="Weight of the reward at the end of a decision's horizon relative to that of the decision before; "
+        "none: only the end of the last one's counts [-].",
+    )
+
+    @check
+    def _of_the_method(self) -> Iterator[Finding]:
+        for name, method in (("beam_width", "beam"), ("exploration", "tree"), ("rollout", "tree")):
+            if method != self.method and getattr(self, name) is not None:
+                yield (name,), f"none, as it is of method {method}", describe(getattr(self, name))
+
+    def build(self) -> dict[str, Any]:
+        """Arguments of `vedette.control.HorizonPlanner` by name."""
+        from vedette.control import BeamSearch, TreeSearch
+
+        names = ("beam_width",) if self.method == "beam" else ("exploration", "rollout")
+        given = {name: value for name in names if (value := getattr(self, name)) is not None}
+        search = BeamSearch(**given) if self.method == "beam" else TreeSearch(**given)
+        shared = {name: getattr(self, name) for name in ("depth", "period", "budget", "discount")}
+        return {"search": search, **shared}
+
+
+if TYPE_CHECKING:
+    AnySearch = Part
+else:
+    AnySearch = one_of("search", "control/search", "vedette.control:JointSearch")

@@ -1,0 +1,295 @@
+"""Sections of run-time classes and functions, made from their declarations: what is written there is written once.
+
+A field's name, type, default and description are those of the dataclass field or of the parameter, and of its entry in
+the docstring, which ends with its unit in brackets where it has one. The source is read and nothing is imported, as
+with the parts comes the compiler, which a check does without; fields of parents are not. What is of no type of
+`vedette.models.fields` (a region, a sensor) is not said in a file but given to `build`. In a file an angle `*_rad` is
+`*_deg`, and what may be infinite is left out.
+"""
+
+from __future__ import annotations
+
+import ast
+import importlib
+import inspect
+import math
+import re
+from collections.abc import Callable, Iterator
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, NamedTuple, TypeVar, Union, cast
+
+from pydantic import Field, create_model
+
+from vedette.plausible import told_elsewhere
+from vedette.scenarios.sections import base
+from vedette.scenarios.sections.base import Section
+from vedette.scenarios.sections.custom import Custom, asked_for
+
+_ROOT = Path(__file__).parents[2]
+_ENTRY = re.compile(r"    (\w+(?:, \w+)*): (.*)")
+_TYPES = {**vars(base), "__builtins__": {"bool": bool}, "UnitVolume": Literal["reference"] | base.Positive}
+_CONSTANTS = {"__builtins__": {}, "math": math}
+
+# A mark with its kind and room, and the name of what is marked; texts that a class has beside its fields.
+_MARK = re.compile(r'(?m)^@part\("(\w+)", "(\w+)".*\n(?:@.*\n)*(?:class|def) (\w+)')
+_WORDS = re.compile(r'(?m)^    (\w+): ClassVar\[str\] = "(.*)"$')
+
+S = TypeVar("S", bound=Section)
+Definition = ast.ClassDef | ast.FunctionDef
+
+
+class Derived(Section):
+    """A section with fields of a class or function of the library."""
+
+    of: ClassVar[str]  # module:name of the class or function
+    names: ClassVar[dict[str, str]]  # key of the file -> field or parameter of that
+
+    if TYPE_CHECKING:  # its fields are declared where the part is
+
+        def __getattr__(self, name: str) -> Any: ...
+
+    def given(self) -> dict[str, Any]:
+        """What the file says, by the names and in the units of the class or function; what it leaves open is not."""
+        found = {}
+        for key, name in self.names.items():
+            value = getattr(self, key)
+            if isinstance(value, Section):
+                value = value.build()  # type: ignore[attr-defined] # of a region, say
+            if _in_degrees(key, name) and value is not None:
+                value = math.radians(value)
+            if value is not None or not _may_be_infinite(self.of, name):
+                found[name] = value
+        return found
+
+
+class Part(Derived):
+    """A section of a part of the library, which is made by what it is derived from."""
+
+    def build(self, folder: Path | None = None, **given: Any) -> Any:
+        """The part; of what is `given` it takes what it has parameters for."""
+        module, _, name = self.of.partition(":")
+        made = getattr(importlib.import_module(module), name)
+        with told_elsewhere():
+            return made(**self.given(), **asked_for(made, given))
+
+
+class _OwnPart(Custom):
+    def build(self, folder: Path, **_: Any) -> Any:
+        return self.made(folder)
+
+
+class Declared(NamedTuple):
+    """A field or parameter as it stands in the source: type and default in words of Python, and its description.
+
+    key: its name in a file.
+    """
+
+    key: str
+    name: str
+    type: str
+    default: str | None
+    description: str
+
+    @property
+    def in_degrees(self) -> bool:
+        """Whether a file gives it in degrees, and the library in radians."""
+        return _in_degrees(self.key, self.name)
+
+
+def _in_degrees(key: str, name: str) -> bool:
+    return key.endswith("_deg") and not name.endswith("_deg")
+
+
+def derived(of: str, **which: tuple[str, ...]) -> Callable[[type[S]], type[S]]:
+    """Add the fields of a class or function, `module:name`, to a section that does not have them.
+
+    A field that the section itself has without a description, as it is of another type in a file, is described so too.
+    without: those that no file gives. only: those that it has; none: all others. first: keys in front of these, and
+    those of the section alone behind them, in what is written and shown. Raises `TypeError` for a plain number that is
+    neither, as what it may be is not said.
+    """
+    return lambda section: _extended(section, section.__name__, of, {}, **which)
+
+
+def _extended(
+    section: type[S],
+    name: str,
+    of: str,
+    fields: dict[str, Any],
+    *,
+    without: tuple[str, ...] = (),
+    only: tuple[str, ...] = (),
+    first: tuple[str, ...] = (),
+) -> type[S]:
+    """A section with further fields and those of a class or function."""
+    names = {}
+    for declared in _declared(of):
+        own, key = section.model_fields.get(declared.key), declared.key
+        annotation = _type(declared.type) if own is None else section.__annotations__.get(key, own.annotation)
+        if key == "kind" or key in without or (only and key not in only):
+            continue
+        if annotation is None:
+            if declared.type in ("int", "float"):
+                raise TypeError(f"{of}.{declared.name}: expected a type of vedette.models.fields; got {declared.type}")
+            continue
+        names[key] = declared.name
+        if own is None or own.description is None:
+            fields[key] = (annotation, _field(declared))
+    found: Any = create_model(name, __base__=section, __module__=section.__module__, **fields)
+    found.__doc__, found.of, found.names = _summary(of) if "kind" in fields else section.__doc__, of, names
+    order = dict.fromkeys(("kind", *first, *names, *found.model_fields))
+    found.__pydantic_fields__ = {key: found.model_fields[key] for key in order if key in found.model_fields}
+    for word, text in _WORDS.findall(_source(of)):
+        setattr(found, word, text)
+    made: type[S] = found
+    return made
+
+
+def one_of(
+    room: str, folder: str, gives: str = "", own: tuple[type[Section], ...] = (), parent: type[Part] = Part
+) -> Any:
+    """The parts of a room, such as "search", as a field's type: one section a kind, which the field `kind` chooses.
+
+    folder: of the modules in which parts are marked by `vedette.models.fields.part`. gives: class or protocol of one of
+    the user's own, and what else is to be said of it. own: sections that are more than what they are derived from, in
+    place of those. parent: of the others.
+    """
+    found = {section.model_fields["kind"].default: section for section in own}
+    for kind, of in _marked(folder, room):
+        if kind not in found:
+            found[kind] = _extended(parent, _name(room, kind), of, _kind(room, kind))
+    if gives:
+        path, more = re.fullmatch(r"([\w.:]+)(.*)", gives).groups()  # type: ignore[union-attr]
+        custom: Any = create_model(
+            _name(room, "custom"), __base__=_OwnPart, __module__=__name__, **_kind(room, "custom")
+        )
+        custom.__doc__, custom.gives = f"A user's own `{path.replace(':', '.')}`{more}.", path
+        found["custom"] = custom
+    ordered = sorted(found, key=lambda kind: (kind == "custom", kind))
+    return Annotated[Union[tuple(found[kind] for kind in ordered)], Field(discriminator="kind")]  # noqa: UP007
+
+
+def of_kind(kind: str) -> Any:
+    """The default of a field: its part of this kind, as the file would say it."""
+    return {"kind": kind}
+
+
+def _name(room: str, kind: str) -> str:
+    return f"{kind}_{room}".title().replace("_", "")
+
+
+def _kind(room: str, kind: str) -> dict[str, Any]:
+    """The field of a section that says its kind."""
+    return {"kind": (Literal[kind], Field(default=kind, description=f"Kind of {room} [-]."))}
+
+
+@cache
+def _text(file: Path) -> str:
+    return file.read_text("utf-8")
+
+
+@cache
+def _source(of: str) -> str:
+    """Of a class or function, with what decorates it; of a class as far as its first method."""
+    module, _, name = of.partition(":")
+    text = _text(_ROOT / (module.partition(".")[2].replace(".", "/") + ".py"))
+    head = re.search(rf"(?m)^(?:@.*\n)*(?:class|def) {name}\b", text)
+    assert head is not None, of
+    end = re.compile(r"\n\n    (?:@|def )|\n(?=[^\s)])").search(text, head.end())
+    return text[head.start() : end.start() if end else None]
+
+
+@cache
+def _definition(of: str) -> Definition:
+    return cast(Definition, ast.parse(_source(of)).body[0])
+
+
+def _marked(folder: str, room: str) -> Iterator[tuple[str, str]]:
+    """Kind, and module and name, of what is marked as parts of a room in the modules of a folder."""
+    for file in sorted((_ROOT / folder).glob("*.py")):
+        module = ".".join(("vedette", *file.relative_to(_ROOT).with_suffix("").parts))
+        for kind, at, name in _MARK.findall(_text(file)):
+            if at == room:
+                yield kind, f"{module}:{name}"
+
+
+def _summary(of: str) -> str:
+    """First paragraph of the docstring."""
+    return inspect.cleandoc(ast.get_docstring(_definition(of)) or "").partition("\n\n")[0]
+
+
+def _entries(text: str) -> dict[str, str]:
+    """What a docstring says of each field or parameter."""
+    found: dict[str, str] = {}
+    names: list[str] = []
+    for line in text.splitlines():
+        entry = _ENTRY.fullmatch(line)
+        names = entry[1].split(", ") if entry else names if line.startswith(" " * 8) else []
+        for name in names:
+            found[name] = entry[2] if entry else f"{found[name]} {line.strip()}"
+    return found
+
+
+@cache
+def _declared(of: str) -> tuple[Declared, ...]:
+    node = _definition(of)
+    entries = _entries(ast.get_docstring(node) or "")
+    marks = [mark for mark in node.decorator_list if isinstance(mark, ast.Call)]
+    keys = {ast.literal_eval(word.value): word.arg for mark in marks for word in mark.keywords if word.arg}
+    stated = _fields(node) if isinstance(node, ast.ClassDef) else _parameters(node)
+    return tuple(
+        Declared(
+            keys.get(name) or re.sub("_rad$", "_deg", name),
+            name,
+            kind,
+            None if default is None else ast.unparse(default),
+            entries.get(name, ""),
+        )
+        for name, kind, default in stated
+    )
+
+
+def _fields(node: ast.ClassDef) -> Iterator[tuple[str, str, ast.expr | None]]:
+    for item in node.body:
+        if isinstance(item, ast.AnnAssign) and isinstance(item.target, ast.Name):
+            kind = ast.unparse(item.annotation)
+            if not kind.startswith("ClassVar"):
+                yield item.target.id, kind, item.value
+
+
+def _parameters(node: ast.FunctionDef) -> Iterator[tuple[str, str, ast.expr | None]]:
+    of, later = node.args.args, node.args.kwonlyargs
+    defaults = [*[None] * (len(of) - len(node.args.defaults)), *node.args.defaults, *node.args.kw_defaults]
+    for argument, default in zip((*of, *later), defaults, strict=True):
+        yield argument.arg, ast.unparse(argument.annotation) if argument.annotation else "", default
+
+
+def _may_be_infinite(of: str, name: str) -> bool:
+    return any(declared.name == name and declared.type == "Limit" for declared in _declared(of))
+
+
+def _type(words: str) -> Any:
+    """A type of a section; None for what no file says."""
+    if words == "Sequence[float]":
+        return base.Reals
+    try:
+        found = eval(words, _TYPES)  # the library's own source
+    except (NameError, TypeError):
+        return None
+    return found | None if words == "Limit" else found
+
+
+def _field(declared: Declared) -> Any:
+    default: Any = ...
+    if declared.default is not None:
+        default = eval(declared.default, _CONSTANTS)
+        if isinstance(default, float) and declared.in_degrees:
+            default = math.degrees(default)
+        default = None if default == math.inf else default
+    text = re.sub(r"^\(\w+,\) ", "", declared.description).rstrip(".")
+    text = text[:1].upper() + text[1:]
+    if declared.in_degrees:
+        text = text.replace("[rad", "[deg")
+    unit = "" if text.endswith("]") else " [-]"
+    return Field(default, description=f"{text}{unit}.")
