@@ -451,7 +451,7 @@ def test_parts_that_do_not_fit(kind: Any) -> None:
 
 def test_options_of_the_delta_glmb_filter() -> None:
     tracker = make(DeltaGlmbFilter)
-    with pytest.raises(InputError, match="assignment: expected one of Ranked, Gibbs; got str"):
+    with pytest.raises(InputError, match="assignment: expected Ranked or Gibbs; got str"):
         dataclasses.replace(tracker, assignment="murty")
     value: Any
     for value in (0, -3, math.nan):

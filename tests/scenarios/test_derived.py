@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import pickle
 import re
 import shutil
 import subprocess
@@ -18,10 +19,12 @@ import vedette
 from scenarios.minimal import kinds
 from vedette.errors import InputError
 from vedette.models import fields
+from vedette.scenarios import list_builtin, load_scenario
 from vedette.scenarios.sections import base
 from vedette.scenarios.sections.deciding import AnyConstraint, AnyReward, AnySearch
 from vedette.scenarios.sections.derived import Derived, derived
 from vedette.scenarios.sections.sensing import Clutter, Detection, Measurement, Noise
+from vedette.scenarios.sections.tracking import Assignment
 from vedette.scenarios.sections.world import Motion, Survival
 
 SRC = Path(vedette.__file__).parents[1]
@@ -91,7 +94,7 @@ def test_a_filter_parameter_is_written_once(tmp_path: Path) -> None:
 
 
 def test_every_part_that_is_marked_is_a_kind() -> None:
-    unions = (AnyReward, AnyConstraint, AnySearch, Motion, Survival, Measurement, Noise, Detection, Clutter)
+    unions = (AnyReward, AnyConstraint, AnySearch, Motion, Survival, Measurement, Noise, Detection, Clutter, Assignment)
     found = sorted(kind for union in unions for kind in kinds(union) if kind != "custom")
     own = ["keep_out", "range_dependent", "stay_inside"]  # not marked: written out
     sources = [file.read_text("utf-8") for file in (SRC / "vedette").rglob("*.py") if file.name != "derived.py"]
@@ -148,6 +151,85 @@ print(json.dumps([type(search).__name__, search.times, json_schema()["$defs"]["L
 """
 
 
+METHOD = '''
+"""Every track by itself."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from vedette.kernels.association.marginals import Association
+from vedette.kernels.base.types import Floats, Ints
+from vedette.models.fields import Positive, check_fields, part
+from vedette.models.functions import model_function
+
+
+@model_function("association_marginals")
+def each_alone(offsets: Ints, columns: Ints, log_weights: Floats, params: Floats, out: Floats) -> float:
+    """params: sharpness."""
+    for row in range(len(offsets) - 1):
+        total = 0.0
+        for option in range(offsets[row], offsets[row + 1]):
+            total += math.exp(params[0] * log_weights[option])
+        for option in range(offsets[row], offsets[row + 1]):
+            out[option] = params[0] * log_weights[option] - math.log(total)
+    return 0.0
+
+
+@part("alone", "assignment")
+@dataclass(frozen=True, slots=True)
+class Alone:
+    """Tracks that do not know of each other.
+
+    Attributes:
+        sharpness: power of each weight.
+    """
+
+    sharpness: Positive = 1.0
+    finds: ClassVar[str] = "marginals"
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+
+    def to_kernel(self) -> Association:
+        """The same, as kernels take it."""
+        return Association(each_alone, np.array([self.sharpness]))
+'''
+
+AFTER_METHOD = """
+import json
+import numpy as np
+from vedette.errors import ScenarioError
+from vedette.scenarios import json_schema, load_scenario, with_fields
+from vedette.scenarios.build import build_sensors
+
+fields = {"filter.kind": "lmb", "filter.assignment": {"kind": "alone", "sharpness": 0.5}}
+try:
+    with_fields(load_scenario("two-searchers"), fields | {"filter.kind": "factored_glmb"})
+except ScenarioError as error:
+    refused = str(error)
+local = build_sensors(with_fields(load_scenario("two-searchers"), fields))[0].filter
+local.step(local.initial(), [], [0.0, 0.0, 0.0], 1.0, 1, rng=np.random.default_rng(0))
+default = json_schema()["$defs"]["AloneAssignment"]["properties"]["sharpness"]["default"]
+print(json.dumps([local.assignment.sharpness, default, refused]))
+"""
+
+
+def test_an_association_method_is_one_file(tmp_path: Path) -> None:
+    shutil.copytree(SRC / "vedette", tmp_path / "vedette", ignore=shutil.ignore_patterns("__pycache__"))
+    (tmp_path / "vedette" / "filters" / "alone.py").write_text(METHOD, "utf-8")
+    own = {**os.environ, "PYTHONPATH": str(tmp_path)}
+    ran = subprocess.run([sys.executable, "-c", AFTER_METHOD], env=own, capture_output=True, text=True, check=False)
+    assert ran.returncode == 0, ran.stderr
+    sharpness, default, refused = json.loads(ran.stdout)
+    assert (sharpness, default) == (0.5, 1.0)
+    assert "filter.assignment.kind: expected ranked, as the filter is factored_glmb" in refused
+
+
 def test_a_kind_is_one_file(tmp_path: Path) -> None:
     shutil.copytree(SRC / "vedette", tmp_path / "vedette", ignore=shutil.ignore_patterns("__pycache__"))
     (tmp_path / "vedette" / "control" / "search" / "last.py").write_text(KIND, "utf-8")
@@ -174,3 +256,10 @@ def test_a_file_and_a_constructor_take_the_same_numbers(name: str, value: Any) -
     except InputError:
         in_python = False
     assert in_file == in_python
+
+
+def test_scenarios_can_be_handed_to_another_process() -> None:
+    scenarios = [load_scenario(name) for name in list_builtin()]
+    code = "import pickle, sys; print(*(each.model.model_dump_json() for each in pickle.load(sys.stdin.buffer)))"
+    told = subprocess.run([sys.executable, "-c", code], input=pickle.dumps(scenarios), capture_output=True, check=True)
+    assert told.stdout.decode().strip() == " ".join(each.model.model_dump_json() for each in scenarios)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any, TypeAlias
+from typing import Any, ClassVar, Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
 
@@ -17,12 +17,26 @@ from vedette.models.functions import ModelFunction, model_function, require_kind
 from vedette.models.probe import probe_marginals
 
 
+@runtime_checkable
+class OfMarginals(Protocol):
+    """How an LMB filter has the probabilities of associations."""
+
+    def to_kernel(self) -> Association | None:
+        """Who gives them, as kernels take it; None: the sums over clusters."""
+        ...
+
+
 @part("ranked", "assignment")
 @dataclass(frozen=True, slots=True)
 class Ranked:
     """Joint choices in exact order, as many as `Limits` lets; for an LMB the exact sum over all of them, but in
     clusters too large for that.
     """
+
+    finds: ClassVar[str] = "choices and marginals"
+
+    def to_kernel(self) -> None:
+        """None: the sums over clusters."""
 
 
 @part("gibbs", "assignment")
@@ -38,6 +52,7 @@ class Gibbs:
     """
 
     num_samples: Count = 1000
+    finds: ClassVar[str] = "choices"
 
     def __post_init__(self) -> None:
         check_fields(self)
@@ -104,6 +119,7 @@ class BeliefPropagation:
 
     max_sweeps: Count = 1000
     tolerance: NonNegative = 1e-6
+    finds: ClassVar[str] = "marginals"
 
     def __post_init__(self) -> None:
         check_fields(self)
@@ -114,20 +130,14 @@ class BeliefPropagation:
 
 
 OfChoices: TypeAlias = Ranked | Gibbs
-OfMarginals: TypeAlias = Ranked | BeliefPropagation | Marginals
 Assignment: TypeAlias = OfChoices | OfMarginals
 
 
-def check_assignment(value: Any, kinds: Any) -> None:
-    """`InputError` unless the assignment is one of the kinds that a filter takes."""
-    if not isinstance(value, kinds):
-        names = ", ".join(kind.__name__ for kind in kinds.__args__)
-        raise InputError(f"assignment: expected one of {names}; got {type(value).__name__}")
-
-
-def kernel_association(assignment: OfMarginals) -> Association | None:
-    """Who gives the marginals, as kernels take it; None: the sums over clusters."""
-    return None if isinstance(assignment, Ranked) else assignment.to_kernel()
+def check_marginals(value: Any) -> None:
+    """`InputError` unless an LMB filter can associate so."""
+    if not isinstance(value, OfMarginals):
+        expected = "Ranked, BeliefPropagation, Marginals or another with to_kernel()"
+        raise InputError(f"assignment: expected {expected}; got {type(value).__name__}")
 
 
 __all__ = [
@@ -135,7 +145,8 @@ __all__ = [
     "BeliefPropagation",
     "Gibbs",
     "Marginals",
+    "OfChoices",
+    "OfMarginals",
     "Ranked",
-    "check_assignment",
-    "kernel_association",
+    "check_marginals",
 ]

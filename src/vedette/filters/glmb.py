@@ -7,8 +7,8 @@ from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
 from vedette.densities import GLMB
-from vedette.errors import NumericalError
-from vedette.filters.assignment import Gibbs, OfChoices, Ranked, check_assignment
+from vedette.errors import InputError, NumericalError
+from vedette.filters.assignment import Gibbs, OfChoices, Ranked
 from vedette.filters.base import LabelledFilter, OfKind, SensorStep
 from vedette.filters.blind import blind_sensor
 from vedette.filters.info import FilterInfo
@@ -72,7 +72,8 @@ class DeltaGlmbFilter(_OfGlmb, LabelledFilter[GLMB]):
 
     def __post_init__(self) -> None:
         LabelledFilter.__post_init__(self)  # slots replace the class that super() looks for
-        check_assignment(self.assignment, OfChoices)
+        if not isinstance(self.assignment, OfChoices):
+            raise InputError(f"assignment: expected Ranked or Gibbs; got {type(self.assignment).__name__}")
         flag("marginalised", self.marginalised)
 
     def _blind(self) -> DeltaGlmbFilter:

@@ -11,7 +11,7 @@ import numpy as np
 
 from vedette.densities import LMB
 from vedette.errors import NumericalError
-from vedette.filters.assignment import OfMarginals, Ranked, check_assignment, kernel_association
+from vedette.filters.assignment import OfMarginals, Ranked, check_marginals
 from vedette.filters.base import Filter, LabelledFilter, OfKind, SensorStep
 from vedette.filters.blind import blind_sensor
 from vedette.filters.info import FilterInfo
@@ -66,13 +66,13 @@ class LmbFilter(OfLmb, LabelledFilter[LMB]):
 
     def __post_init__(self) -> None:
         LabelledFilter.__post_init__(self)  # slots replace the class that super() looks for
-        check_assignment(self.assignment, OfMarginals)
+        check_marginals(self.assignment)
 
     def _blind(self) -> LmbFilter:
         return LmbFilter(self.targets, blind_sensor(), Limits.none())
 
     def _stepped(self, prior: Lmb, step: SensorStep) -> tuple[Lmb, LmbReport]:
-        association, (_, motion, _, _) = kernel_association(self.assignment), step.inputs
+        association, (_, motion, _, _) = self.assignment.to_kernel(), step.inputs
         if association is None and motion is None:
             return _by_combinations(prior, step)
         return step_lmb(prior, *step.inputs, step.limits.reduction(), association)
@@ -96,10 +96,10 @@ class SequentialLmbFilter(OfLmb, InTurn[LMB]):
 
     def __post_init__(self) -> None:
         MultiSensorFilter.__post_init__(self)  # slots replace the class that super() looks for
-        check_assignment(self.assignment, OfMarginals)
+        check_marginals(self.assignment)
 
     def _stepped(self, prior: Lmb, step: SensorStep) -> tuple[Lmb, LmbReport]:
-        association = kernel_association(self.assignment)
+        association = self.assignment.to_kernel()
         if association is None:
             return _by_combinations(prior, step)
         return step_lmb(prior, *step.inputs, step.limits.reduction(), association)
@@ -123,4 +123,4 @@ def _by_combinations(prior: Lmb, step: SensorStep) -> tuple[Lmb, LmbReport]:
 
 def association_of(tracker: Filter) -> Association | None:
     """Who gives the association marginals of a filter, as kernels take it; None: the sums over clusters, or nobody."""
-    return kernel_association(tracker.assignment) if isinstance(tracker, LmbFilter) else None
+    return tracker.assignment.to_kernel() if isinstance(tracker, LmbFilter) else None

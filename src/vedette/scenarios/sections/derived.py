@@ -14,6 +14,7 @@ import importlib
 import inspect
 import math
 import re
+import sys
 from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
@@ -166,6 +167,8 @@ def one_of(
         )
         custom.__doc__, custom.gives = f"A user's own `{path.replace(':', '.')}`{more}.", path
         found["custom"] = custom
+    for section in found.values():  # by which what is pickled, for another process, is found again
+        setattr(sys.modules[section.__module__], section.__name__, section)
     ordered = sorted(found, key=lambda kind: (kind == "custom", kind))
     return Annotated[Union[tuple(found[kind] for kind in ordered)], Field(discriminator="kind")]  # noqa: UP007
 

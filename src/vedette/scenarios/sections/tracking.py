@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, get_args
 
 from pydantic import Field
 
@@ -37,12 +37,8 @@ class FilterLimits(Part):
 
 # Filters that keep no identity of their targets.
 UNLABELLED = ("phd", "cphd", "cb_member")
-# How filters can associate; the others rank.
-ASSIGNMENTS = {
-    "delta_glmb": ("ranked", "gibbs"),
-    "m_delta_glmb": ("ranked", "gibbs"),
-    "lmb": ("ranked", "belief_propagation", "custom"),
-}
+# What filters ask of an assignment, where not both.
+_ASKED = {"delta_glmb": "choices", "m_delta_glmb": "choices", "lmb": "marginals"}
 # Filters of which `max_labels` bounds how many targets there can be.
 LABELS_CAPPED = ("lmb", "factored_glmb", "cb_member")
 
@@ -78,7 +74,12 @@ class Filter(_Sensing, Derived):
 
     @check
     def _assignment_fits(self) -> Iterator[Finding]:
-        fitting = ASSIGNMENTS.get(self.kind, ("ranked",))
+        asked = _ASKED.get(self.kind, "choices and marginals")
+        fitting = [
+            section.model_fields["kind"].default
+            for section in get_args(get_args(Assignment)[0])
+            if asked in getattr(section, "finds", "marginals")  # those of the user's own
+        ]
         if self.assignment.kind not in fitting:
             yield (
                 ("assignment", "kind"),
