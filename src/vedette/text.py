@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from datetime import date, timedelta
 from typing import Any
 
@@ -46,6 +47,12 @@ def named_in(name: str, unit: str) -> str:
 def amount(number: str, unit: str) -> str:
     """`1.25 m`; of a quantity without a unit the number alone."""
     return f"{number} {unit}" if unit else number
+
+
+def unused(name: str, taken: Collection[str]) -> str:
+    """The name, or where that is taken the first of `name-2`, `name-3` and so on that is not."""
+    candidates = itertools.chain([name], (f"{name}-{number}" for number in itertools.count(2)))
+    return next(candidate for candidate in candidates if candidate not in taken)
 
 
 def with_error(mean: float, error: float | None, sign: str = "") -> str:

@@ -20,9 +20,9 @@ from vedette.campaigns import local
 from vedette.campaigns.cluster import remote_workers
 from vedette.campaigns.engine import in_process, on_workers
 from vedette.campaigns.local import local_workers
-from vedette.campaigns.tasks import Failed, Landed, Task, TaskQueue, perform
+from vedette.campaigns.tasks import Failed, Landed, Task, TaskQueue, WorkerDied, perform
 from vedette.errors import InputError, VedetteError
-from waiting import wait_for_port
+from waiting import wait_for_port, wait_until
 
 pytestmark = pytest.mark.filterwarnings("ignore::ResourceWarning", "ignore::DeprecationWarning")
 RUNS = 30
@@ -76,6 +76,30 @@ def deadly(deaths: Path, task: Task) -> Any:
             file.write("x")
         os.kill(os.getpid(), signal.SIGKILL)
     return perform(task)
+
+
+def test_a_task_that_was_done_when_its_worker_died_is_not_done_again(
+    alone: dict[tuple[str, int], bytes], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nor taken for what it died of: nobody looks before the next task is handed out."""
+    queue = TaskQueue(small_campaign(runs=RUNS), ())
+    first, second = queue.take(), queue.take()
+    assert first is not None
+    assert second is not None
+    with local_workers(1) as workers:
+        workers.submit(first)
+        (worker,) = workers._workers
+        (done,) = worker.tasks
+        done.result()
+        for process in worker.processes:
+            process.kill()
+        wait_until(lambda: not active_children(), "the end of the worker")
+        workers.submit(second)
+        ended = [workers.next(), workers.next()]
+        assert [task for task, _ in ended] == [first, second]
+        assert workers._killers == set()
+    landed = [result for _, outcome in ended if not isinstance(outcome, WorkerDied) for result in outcome]
+    assert payloads(landed).items() <= alone.items()
 
 
 def test_workers_that_end_while_they_start_are_told_of(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -10,7 +10,7 @@ import pytest
 
 from vedette.errors import InputError
 from vedette.simulation import arrow
-from vedette.simulation.arrow import Kind, Layout, read_table, stacked, to_arrow, write_table
+from vedette.simulation.arrow import Columns, Kind, Layout, read_table, stacked, to_arrow, write_table
 
 LAYOUT = Layout(
     {"name": Kind.TEXT, "place": Kind.INTEGER, "truth": Kind.TRUTH, "number": Kind.NUMBER},
@@ -28,7 +28,7 @@ PARTS: list[dict[str, Any]] = [
     {"name": "none", "place": np.empty(0, np.int64), "truth": True, "number": 1.0},
     {"name": "single", "place": 9, "truth": True, "number": -np.inf},
 ]
-TABLE = {
+TABLE: dict[str, list[Any]] = {
     "name": ["one", "one", "one", "ä", "", "single"],
     "place": [3, 4, 5, 1, 1, 9],
     "truth": [True, False, True, False, False, True],
@@ -74,7 +74,7 @@ def test_no_rows_have_all_columns() -> None:
 
 
 def test_nan_is_nothing_where_that_is_asked_for() -> None:
-    columns = {"number": np.array([np.nan, 1.0]), "place": np.array([1, 2])}
+    columns: Columns = {"number": np.array([np.nan, 1.0]), "place": np.array([1, 2])}
     found = to_arrow(columns, Layout({"number": Kind.NUMBER, "place": Kind.INTEGER}), nan_is_null=True)
     assert found.to_pydict() == {"number": [None, 1.0], "place": [1, 2]}
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import itertools
 import json
 import re
 from collections.abc import Callable, Mapping, Sequence
@@ -18,7 +17,7 @@ from vedette.scenarios.build import build_planner
 from vedette.scenarios.dumping import dump_scenario, files_of
 from vedette.scenarios.overrides import with_fields
 from vedette.scenarios.sections import ScenarioModel
-from vedette.text import listed
+from vedette.text import listed, unused
 
 _LONGEST_NAME = 120
 _SECTIONS = {"filter": "filter.kind", "fusion": "fusion.kind"}
@@ -141,7 +140,7 @@ def resolve(
     varying = [axis for axis, values in axes.items() if len(values) > 1 or axis == "planner"]
     cells: list[Cell] = []
     for settings in spec.settings():
-        name = _unused(_name({axis: settings[axis] for axis in varying}, axes), cells)
+        name = unused(_name({axis: settings[axis] for axis in varying}, axes), {cell.name for cell in cells})
         cells.append(_cell(name, settings, loaded[settings["scenario"]], spec, changed, approve))
     # Never the scenario unless asked for: runs of different scenarios are not paired.
     candidates = ("planner", *(axis for axis in axes if axis != "scenario"))
@@ -203,12 +202,6 @@ def _name(settings: Mapping[str, Any], axes: Mapping[str, tuple[Any, ...]]) -> s
 def safe_name(text: str) -> str:
     """The text with what is unfit for a file name as underscores."""
     return re.sub(r"[^\w.+-]+", "_", text)
-
-
-def _unused(name: str, cells: list[Cell]) -> str:
-    taken = {cell.name for cell in cells}
-    candidates = itertools.chain([name], (f"{name}-{number}" for number in itertools.count(2)))
-    return next(candidate for candidate in candidates if candidate not in taken)
 
 
 def _contents(scenario: Scenario) -> list[str]:

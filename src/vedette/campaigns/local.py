@@ -35,13 +35,7 @@ def local_workers(num_workers: int) -> Iterator[LocalWorkers]:
     _make_room_for_files(num_workers)
     workers = LocalWorkers()
     try:
-        try:
-            load_ahead()
-            workers.start(num_workers)
-        except OSError as error:
-            raise VedetteError(
-                f"workers: expected that {num_workers} processes can be started; {said(error)} (--workers 1 needs none)"
-            ) from error
+        workers.start(num_workers)
         yield workers
     finally:
         workers.end()
@@ -81,8 +75,14 @@ class _Worker:
     def start(cls) -> _Worker:
         pool = ProcessPoolExecutor(1, context(), initializer=_begin)
         others = set(active_children())
-        with as_children():
-            begun = pool.submit(os.getpid)
+        try:
+            load_ahead()
+            with as_children():
+                begun = pool.submit(os.getpid)
+        except OSError as error:
+            raise VedetteError(
+                f"workers: expected that another process can be started; {said(error)} (--workers 1 needs none)"
+            ) from error
         return cls(pool, begun, set(active_children()) - others)
 
     def has_begun(self) -> bool:
@@ -105,7 +105,7 @@ class LocalWorkers:
         self._workers: list[_Worker] = []
 
     def start(self, num_workers: int) -> None:
-        """Start so many; `OSError` where the system starts no more."""
+        """Start so many; `VedetteError` where the system starts no more."""
         for _ in range(num_workers):
             self._workers.append(_Worker.start())
 
@@ -129,6 +129,8 @@ class LocalWorkers:
             wait([each for worker in self._workers for each in worker.tasks], _WAIT_SECONDS, FIRST_COMPLETED)
             for worker in list(self._workers):
                 self._collect(worker)
+                if any(each.done() for each in worker.tasks):
+                    self._replace(worker)
             if time.monotonic() - self._since > _START_SECONDS and not any(map(_Worker.has_begun, self._workers)):
                 raise _not_started()
         return self._ended.pop(0)
@@ -139,19 +141,19 @@ class LocalWorkers:
             worker.end()
 
     def _collect(self, worker: _Worker) -> None:
-        """Note what a worker has finished; replace one that died."""
+        """Note what a worker has finished; where it died, what it had not is left."""
         for future in [each for each in worker.tasks if each.done()]:
-            if isinstance(error := future.exception(), BrokenProcessPool):
-                self._replace(worker)
-                return
-            if error is not None:
+            error = future.exception()
+            if error is None:
+                self._failed_starts = 0
+                self._ended.append((worker.tasks.pop(future), future.result()))
+            elif not isinstance(error, BrokenProcessPool):
                 raise error
-            self._failed_starts = 0
-            self._ended.append((worker.tasks.pop(future), future.result()))
 
     def _replace(self, dead: _Worker) -> None:
         """Start another worker in the place of one that died: it is given what that one had not done."""
         dead.end()
+        self._collect(dead)
         left = list(dead.tasks.values())
         if dead.has_begun():
             self._failed_starts = 0
@@ -165,6 +167,7 @@ class LocalWorkers:
             if self._failed_starts >= _MOST_FAILED_STARTS:
                 raise _not_started()
         self._workers[self._workers.index(dead)] = _Worker.start()
+        self._since = time.monotonic()
         for task in left:
             self.submit(task)
 

@@ -20,6 +20,7 @@ from vedette.evaluation.figures.style import strategy_label
 from vedette.kernels.base.types import Bools
 from vedette.scenarios.sections.tracking import UNLABELLED
 from vedette.simulation.records import RunRecord
+from vedette.text import unused
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,7 +94,8 @@ def gather(results: CampaignResults) -> Iterator[Group]:
     taken: set[str] = set()
     for cells in campaign.groups():
         shared = {axis: value for axis, value in cells[0].settings.items() if axis != campaign.compare}
-        yield _group(results, cells, _unused(_slug(campaign, shared), taken), _title(campaign, cells[0]))
+        taken.add(name := unused(_slug(campaign, shared), taken))
+        yield _group(results, cells, name, _title(campaign, cells[0]))
 
 
 def _group(results: CampaignResults, cells: tuple[Cell, ...], name: str, title: str) -> Group:
@@ -174,11 +176,3 @@ def _title(campaign: Campaign, cell: Cell) -> str:
 def _slug(campaign: Campaign, shared: Mapping[str, Any]) -> str:
     parts = [str(value) for axis, value in shared.items() if axis in varying_axes(campaign)]
     return re.sub(r"[^A-Za-z0-9.]+", "-", "-".join(parts)).strip("-.") or "all"
-
-
-def _unused(name: str, taken: set[str]) -> str:
-    fresh, number = name, 2
-    while fresh in taken:
-        fresh, number = f"{name}-{number}", number + 1
-    taken.add(fresh)
-    return fresh

@@ -53,6 +53,10 @@ _DTYPES: dict[Kind, type] = {
 }
 
 
+_NAMES = {np.int64: "int64", np.float64: "double", np.bool_: "bool"}
+_ARROW_TYPES = {**{kind: _NAMES[dtype] for kind, dtype in _DTYPES.items()}, Kind.TEXT: "string"}
+
+
 @dataclass(frozen=True, slots=True)
 class Layout:
     """The columns of a table.
@@ -205,9 +209,7 @@ def read_table(content: bytes, layout: Layout, place: str) -> Columns:
     """
     try:
         schema, batch = _messages(content)
-        _check_names(schema.names, layout, place)
-        _check_types(schema, layout, place)
-        return _read_columns(schema, batch, layout, place)
+        return _read_columns(schema, batch, _kinds(schema, layout, place), place)
     except InputError:
         raise
     except Exception as error:  # damage can raise nearly anything in there
@@ -253,41 +255,32 @@ def _is_compressed(metadata: bytes) -> bool:
     return bool(entry(header + struct.unpack_from("<I", metadata, header)[0], 3))
 
 
-def _check_names(names: list[str], layout: Layout, place: str) -> None:
-    missing = [name for name in layout.fixed if name not in names]
+def _kinds(schema: pa.Schema, layout: Layout, place: str) -> dict[str, Kind]:
+    """What each column holds, if they are those of the layout."""
+    missing = [name for name in layout.fixed if name not in schema.names]
     if missing:
-        raise InputError(f"{place}: expected a column {missing[0]}; got {shown(', '.join(names))}")
-    seen: set[str] = set()
-    for name in names:
-        if layout.kind(name) is None:
+        raise InputError(f"{place}: expected a column {missing[0]}; got {shown(', '.join(schema.names))}")
+    kinds: dict[str, Kind] = {}
+    for name, arrow_type in zip(schema.names, map(str, schema.types), strict=True):
+        kind = layout.kind(name)
+        if kind is None:
             raise InputError(f"{place}: expected no other column than {', '.join(layout.fixed)}; got {shown(name)}")
-        if name in seen:
+        if name in kinds:
             raise InputError(f"{place}: expected each column once; got {shown(name)} twice")
-        seen.add(name)
+        if arrow_type != _ARROW_TYPES[kind]:
+            raise InputError(f"{place}, column {shown(name)}: expected {kind.value}; got the type {shown(arrow_type)}")
+        kinds[name] = kind
+    return kinds
 
 
-def _check_types(schema: pa.Schema, layout: Layout, place: str) -> None:
-    import pyarrow as pa
-
-    for each in schema:
-        kind = layout.kind(each.name)
-        assert kind is not None  # of the names checked before
-        if each.type != (pa.string() if kind is Kind.TEXT else pa.from_numpy_dtype(_DTYPES[kind])):
-            raise InputError(
-                f"{place}, column {shown(each.name)}: expected {kind.value}; got the type {shown(str(each.type))}"
-            )
-
-
-def _read_columns(schema: pa.Schema, message: pa.Message, layout: Layout, place: str) -> Columns:
+def _read_columns(schema: pa.Schema, message: pa.Message, kinds: Mapping[str, Kind], place: str) -> Columns:
     import pyarrow as pa
 
     batch = pa.ipc.read_record_batch(message, schema)
     batch.validate(full=True)
     columns: Columns = {}
-    for name, column in zip(schema.names, batch.columns, strict=True):
-        kind = layout.kind(name)
+    for (name, kind), column in zip(kinds.items(), batch.columns, strict=True):
         if column.null_count and kind not in (Kind.COUNT, Kind.VALUE):
-            raise InputError(f"{place}, column {shown(name)}: expected {kind.value if kind else ''}; got nothing")
-        assert kind is not None  # of the names checked before
+            raise InputError(f"{place}, column {shown(name)}: expected {kind.value}; got nothing")
         columns[name] = column.to_pylist() if kind is Kind.TEXT else _values(column, kind)
     return columns
