@@ -13,10 +13,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from pydantic import TypeAdapter, ValidationError
+from pydantic import BaseModel, TypeAdapter, ValidationError
 
 import vedette
 from scenarios.minimal import kinds
+from scenarios.test_schema import sections
 from vedette.errors import InputError
 from vedette.models import fields
 from vedette.scenarios import list_builtin, load_scenario
@@ -100,6 +101,11 @@ def test_every_part_that_is_marked_is_a_kind() -> None:
     sources = [file.read_text("utf-8") for file in (SRC / "vedette").rglob("*.py") if file.name != "derived.py"]
     marked = [kind for source in sources for kind in re.findall(r'(?m)^@part\(\s*"(\w+)"', source)]
     assert sorted([*marked, *own]) == found
+
+
+@pytest.mark.parametrize("section", dict.fromkeys(sections()), ids=lambda section: section.__name__)
+def test_sections_go_to_workers_by_their_names(section: type[BaseModel]) -> None:
+    assert pickle.loads(pickle.dumps(section)) is section
 
 
 def test_a_plain_number_is_refused() -> None:

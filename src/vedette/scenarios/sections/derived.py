@@ -14,7 +14,6 @@ import importlib
 import inspect
 import math
 import re
-import sys
 from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
@@ -159,18 +158,23 @@ def one_of(
     found = {section.model_fields["kind"].default: section for section in own}
     for kind, of in _marked(folder, room):
         if kind not in found:
-            found[kind] = _extended(parent, _name(room, kind), of, _kind(room, kind))
+            found[kind] = _importable(_extended(parent, _name(room, kind), of, _kind(room, kind)))
     if gives:
         path, more = re.fullmatch(r"([\w.:]+)(.*)", gives).groups()  # type: ignore[union-attr]
         custom: Any = create_model(
             _name(room, "custom"), __base__=_OwnPart, __module__=__name__, **_kind(room, "custom")
         )
         custom.__doc__, custom.gives = f"A user's own `{path.replace(':', '.')}`{more}.", path
-        found["custom"] = custom
-    for section in found.values():  # by which what is pickled, for another process, is found again
-        setattr(sys.modules[section.__module__], section.__name__, section)
+        found["custom"] = _importable(custom)
     ordered = sorted(found, key=lambda kind: (kind == "custom", kind))
     return Annotated[Union[tuple(found[kind] for kind in ordered)], Field(discriminator="kind")]  # noqa: UP007
+
+
+def _importable(section: Any) -> Any:
+    """A section that no module defines, as a name of this one: workers get it by pickle."""
+    section.__module__ = __name__
+    globals()[section.__name__] = section
+    return section
 
 
 def of_kind(kind: str) -> Any:
