@@ -10,11 +10,13 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from multiprocessing.context import BaseContext
+from pathlib import Path
 
 # Elsewhere a fork of a process that has loaded half of the system's libraries is not safe, or there is none.
 _METHOD = "forkserver" if sys.platform == "linux" else "spawn"
 # What the workers of a campaign need, with Numba.
 _LOADED = ("vedette.campaigns.local", "vedette.kernels.base.dispatchers", "scipy.optimize")
+_SOURCE = Path(__file__).resolve().parents[1]
 # One thread in each: as many processes as processors share the work already.
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
@@ -36,8 +38,16 @@ def load_ahead(*more: str) -> None:
         from multiprocessing import forkserver
 
         context().set_forkserver_preload([*_LOADED, *more])
-        with as_children():
-            forkserver.ensure_running()
+        before = os.environ.get("PYTHONPATH")
+        if _SOURCE.name == "src":  # found by a path that may have been relative to where this process was
+            os.environ["PYTHONPATH"] = os.pathsep.join([str(_SOURCE), *([before] if before else [])])
+        try:
+            with as_children():
+                forkserver.ensure_running()
+        finally:
+            os.environ.pop("PYTHONPATH", None)
+            if before is not None:
+                os.environ["PYTHONPATH"] = before
 
 
 @contextmanager
