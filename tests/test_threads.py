@@ -115,9 +115,9 @@ belief = LMB.from_bernoullis(
 settings = PlanningSettings(num_samples=30_000, association="full", num_threads=int(sys.argv[1]))
 kernel, done = pseudo.pseudo_update_lmb, []
 
-def counted(prior, decision, first, last, results):
+def counted(prior, decision, association, first, last, results):
     print("planning", flush=True)
-    kernel(prior, decision, first, last, results)
+    kernel(prior, decision, association, first, last, results)
     done.append(last - first)
 
 pseudo.pseudo_update_lmb = counted

@@ -18,6 +18,7 @@ from vedette.densities.label_sets import label_sets, places_of, single_gaussians
 from vedette.filters import shared_targets
 from vedette.filters.inputs import model_errors
 from vedette.filters.lmb import association_of
+from vedette.kernels.association.marginals import Association
 from vedette.kernels.base.types import Bools, Floats, Ints, Motion, Sensor
 from vedette.kernels.gaussian.sigma_points import LINEARISED
 from vedette.kernels.planning.forms import ANY, BEARING_RANGE, CONSTANT, GAUSSIAN, GROWING, POSITION, SAME, Forms
@@ -107,7 +108,7 @@ def pseudo_posteriors(
     if isinstance(belief, GLMB):
         return _run_glmb(belief, decision, settings, num_cases)
     targets = targets_of(belief.tracks.labels, labels, futures.offsets)
-    return _run_lmb(belief, decision, settings, num_cases, targets)
+    return _run_lmb(belief, decision, association_of(sensor.filter), settings, num_cases, targets)
 
 
 def decision_of(
@@ -139,7 +140,6 @@ def decision_of(
         horizon,
         futures,
         settings.limits.truncation(own.meas_dim),
-        association_of(sensor.filter),
     )
 
 
@@ -178,7 +178,12 @@ def _run_glmb(belief: GLMB, decision: Decision, settings: PlanningSettings, num_
 
 
 def _run_lmb(
-    belief: LMB, decision: Decision, settings: PlanningSettings, num_cases: int, targets: Ints
+    belief: LMB,
+    decision: Decision,
+    association: Association | None,
+    settings: PlanningSettings,
+    num_cases: int,
+    targets: Ints,
 ) -> LabelledCases:
     num, dim = belief.tracks.num_tracks, belief.tracks.state_dim
     results = LmbResults(
@@ -199,7 +204,7 @@ def _run_lmb(
             )
         else:
             run_chunks(
-                lambda first, last: pseudo_update_lmb(prior, decision, first, last, results),
+                lambda first, last: pseudo_update_lmb(prior, decision, association, first, last, results),
                 num_cases,
                 settings.threads(),
             )

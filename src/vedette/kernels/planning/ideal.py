@@ -7,7 +7,6 @@ from typing import NamedTuple
 import numpy as np
 
 from vedette.errors import ModelError
-from vedette.kernels.association.marginals import Association
 from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.bundle_types import typed_by_fields
 from vedette.kernels.base.compile import borrowing, inlined, kernel
@@ -64,7 +63,6 @@ class Decision(NamedTuple):
     horizon: Horizon
     futures: Futures  # as this sensor sees them
     truncation: Truncation
-    association: Association | None  # of an LMB, in place of the sums over clusters
 
 
 @borrowing

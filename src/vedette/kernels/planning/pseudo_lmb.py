@@ -15,7 +15,7 @@ import numpy as np
 from vedette.errors import NumericalError
 from vedette.kernels.association.assignment import Options
 from vedette.kernels.association.clusters import MarginalWork, grown_marginal_work, make_marginal_work
-from vedette.kernels.association.marginals import fill_marginals
+from vedette.kernels.association.marginals import Association, fill_marginals
 from vedette.kernels.association.near import Near, all_measurements
 from vedette.kernels.association.options import make_options, view_options, weigh_options
 from vedette.kernels.association.predicted import Rows, leave_unseen, make_rows, predict_rows
@@ -95,7 +95,15 @@ def _grown_work(work: LmbWork) -> LmbWork:
 
 
 @borrowing
-def _update_cases(prior: Lmb, decision: Decision, first: int, last: int, results: LmbResults, work: LmbWork) -> int:
+def _update_cases(
+    prior: Lmb,
+    decision: Decision,
+    association: Association | None,
+    first: int,
+    last: int,
+    results: LmbResults,
+    work: LmbWork,
+) -> int:
     """Cases `first:last`; returns `last`, or the case before which `work` must be grown."""
     sensor, horizon, caps, belief = decision.sensor, decision.horizon, decision.truncation, work.belief
     num_samples, prepared = len(decision.futures.offsets) - 1, -1
@@ -114,7 +122,7 @@ def _update_cases(prior: Lmb, decision: Decision, first: int, last: int, results
             prepared = action
             options = view_options(work.options, len(rows.log_absent), num)
             weigh_options(rows, work.near, scan, sensor, caps, work.log_clutter, options)
-            sums, has_room = fill_marginals(options, caps.search, decision.association, work.clusters, work.marginals)
+            sums, has_room = fill_marginals(options, caps.search, association, work.clusters, work.marginals)
             if not has_room:
                 return case
             if sums.log_total == -math.inf:
@@ -132,10 +140,15 @@ def _update_cases(prior: Lmb, decision: Decision, first: int, last: int, results
 
 
 @kernel
-def pseudo_update_lmb(prior: Lmb, decision: Decision, first: int, last: int, results: LmbResults) -> None:
-    """Cases `first:last` of one sensor, into `results`. prior: of one Gaussian a track."""
+def pseudo_update_lmb(
+    prior: Lmb, decision: Decision, association: Association | None, first: int, last: int, results: LmbResults
+) -> None:
+    """Cases `first:last` of one sensor, into `results`.
+
+    prior: of one Gaussian a track. association: in place of the sums over clusters.
+    """
     work = _make_work(prior, len(decision.sensor.angular), most_targets(decision.futures))
     while first < last:
-        first = _update_cases(prior, decision, first, last, results, work)
+        first = _update_cases(prior, decision, association, first, last, results, work)
         if first < last:
             work = _grown_work(work)
