@@ -24,7 +24,8 @@ def test_a_part_that_comes_before_its_caller_is_linked(order: Any, monkeypatch: 
     found = libraries._all_of
 
     def reordered(given: list[Any]) -> list[Any]:
-        parts, others = [], []
+        parts: list[Any] = []
+        others: list[Any] = []
         for library in found(given):
             (parts if isinstance(library, libraries.PartLibrary) else others).append(library)
         return [*(parts[i] for i in order if i < len(parts)), *parts[len(order) :], *others]
