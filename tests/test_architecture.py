@@ -57,13 +57,13 @@ def test_the_drawing_is_of_the_present_source(tool: ModuleType) -> None:
 
 def test_no_file_imports_what_imports_it() -> None:
     """At run time, within functions too; what is imported for its type alone may go round."""
-    graph = grimp.build_graph("vedette", exclude_type_checking_imports=True)
+    graph = grimp.build_graph("vedette", exclude_type_checking_imports=True, cache_dir=None)
     order = TopologicalSorter({name: graph.find_modules_directly_imported_by(name) for name in graph.modules})
     order.prepare()  # raises CycleError, which names the files
 
 
 def test_no_file_of_control_does_so_for_a_type_either() -> None:
-    graph = grimp.build_graph("vedette")
+    graph = grimp.build_graph("vedette", cache_dir=None)
     names = graph.find_descendants("vedette.control")
     imports = {name: graph.find_modules_directly_imported_by(name) & names for name in names}
     TopologicalSorter(imports).prepare()

@@ -36,7 +36,7 @@ CASES = [
         "kind: m_delta_glmb",
         "kind: lmb, assignment: {kind: gibbs, num_samples: 10}",
         [
-            'f.yaml:19:40: filter.assignment.kind: expected ranked, as the filter is lmb, got "gibbs"',
+            'f.yaml:19:40: filter.assignment.kind: expected belief_propagation or ranked or custom, as the filter is lmb, got "gibbs"',
             'f.yaml:20:16: fusion.kind: expected sequential, parallel, clmb, arithmetic_average, central or none, as the filters are lmb, got "cm_delta_glmb"',
         ],
     ),

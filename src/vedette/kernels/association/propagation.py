@@ -44,8 +44,11 @@ def _send_to_measurements(
         for option in range(offsets[row], offsets[row + 1]):
             if columns[option] >= 0:
                 own = weights[option] * to_row[option]
-                others = _sum_of_others(own, largest, rest, option == heaviest)
-                to_column[option] = weights[option] / (free[row] + others) if weights[option] > 0.0 else 0.0
+                others = free[row] + _sum_of_others(own, largest, rest, option == heaviest)
+                if weights[option] == 0.0:
+                    to_column[option] = 0.0
+                else:
+                    to_column[option] = math.inf if others == 0.0 else weights[option] / others
 
 
 @inlined
