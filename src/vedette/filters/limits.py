@@ -126,7 +126,7 @@ class Limits:
 
     def keeping_labels(self) -> Limits:
         """The same, but that no label is dropped."""
-        return replace(self, min_existence=0.0, max_labels=2**62, max_position_std=math.inf)
+        return _keeping_labels(self)
 
     def without_excess(self, belief: FactoredGLMB) -> tuple[FactoredGLMB, float, bool]:
         """The belief without the least probable labels beyond `max_labels` and without those of `without_spread`; the
@@ -168,6 +168,11 @@ def _truncation(limits: Limits, meas_dim: int) -> Truncation:
 @lru_cache(maxsize=1000)
 def _reduction(limits: Limits) -> Reduction:
     return Reduction(limits.track_caps(), logit(limits.min_existence), int(limits.max_labels))
+
+
+@lru_cache(maxsize=1000)
+def _keeping_labels(limits: Limits) -> Limits:
+    return replace(limits, min_existence=0.0, max_labels=2**62, max_position_std=math.inf)
 
 
 def _spread_labels(belief: Labelled, max_position_std: float) -> Ints:

@@ -13,6 +13,7 @@ import numpy as np
 
 from vedette.errors import ModelError
 from vedette.kernels.association.assignment import ABSENT, MISSED
+from vedette.kernels.association.marginals import SUM_TOLERANCE
 from vedette.kernels.base.compile import SIGNATURES
 from vedette.kernels.base.types import Floats
 from vedette.models.functions import ModelFunction, call, describe
@@ -104,7 +105,7 @@ def probe_marginals(function: ModelFunction, params: Floats) -> None:
     out = np.full(len(columns), np.nan)
     log_total = float(_checked_call(function, *args, out))
     sums = np.add.reduceat(np.exp(out), offsets[:-1])
-    if not (math.isfinite(log_total) and np.allclose(sums, 1.0, rtol=0.0, atol=1e-6)):
+    if not (math.isfinite(log_total) and np.allclose(sums, 1.0, rtol=0.0, atol=SUM_TOLERANCE)):
         got = f"{out.tolist()} and {log_total}"
         raise _fault(
             function, args, "log probabilities that sum to 1 in each row, and the log of the total weight", got

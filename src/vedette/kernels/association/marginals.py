@@ -52,7 +52,7 @@ class Association(NamedTuple):
 
 
 # Of the probabilities of a row, from 1: what rounding may leave.
-_SUM_TOLERANCE = 1e-6
+SUM_TOLERANCE = 1e-6
 
 
 @inlined
@@ -67,7 +67,7 @@ def _told(options: Options, association: Association, out: Floats) -> MarginalSu
         total = 0.0
         for option in range(offsets[row], offsets[row + 1]):
             total += math.exp(out[option])
-        if not abs(total - 1.0) <= _SUM_TOLERANCE:
+        if not abs(total - 1.0) <= SUM_TOLERANCE:
             raise ModelError("association_marginals function: the probabilities of a row's options do not sum to 1")
     return MarginalSums(log_total, 0, math.nan)
 
