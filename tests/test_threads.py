@@ -116,7 +116,8 @@ settings = PlanningSettings(num_samples=30_000, association="full", num_threads=
 kernel, done = pseudo.pseudo_update_lmb, []
 
 def counted(prior, decision, association, first, last, results):
-    print("planning", flush=True)
+    if done:  # all is loaded: CPython ends by the signal where it met exec() of a string, caught or not
+        print("planning", flush=True)
     kernel(prior, decision, association, first, last, results)
     done.append(last - first)
 

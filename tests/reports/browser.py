@@ -86,10 +86,15 @@ class Browser:
         result: dict[str, Any] = answer["result"]
         return result
 
-    def wait_for(self, method: str, session: str) -> None:
-        """Wait for an event, unless it has come already."""
-        if not any(event["method"] == method and event.get("sessionId") == session for event in self.events):
-            self._wait(lambda got: got.get("method") == method and got.get("sessionId") == session)
+    def wait_for_load(self, loader: str) -> None:
+        """Wait until what a navigation began is loaded, unless it is already; a blank page before it does not count."""
+        wanted = {"loaderId": loader, "name": "load"}
+
+        def loaded(event: dict[str, Any]) -> bool:
+            return event.get("method") == "Page.lifecycleEvent" and wanted.items() <= event["params"].items()
+
+        if not any(map(loaded, self.events)):
+            self._wait(loaded)
 
     def _wait(self, wanted: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
         deadline = time.monotonic() + PATIENCE
@@ -133,8 +138,8 @@ class Page:
         scheme = {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}
         self.call("Emulation.setEmulatedMedia", features=[scheme])
         self.url = path.resolve().as_uri() + (f"?{query}" if query else "")
-        self.call("Page.navigate", url=self.url)
-        browser.wait_for("Page.loadEventFired", self._session)
+        self.call("Page.setLifecycleEventsEnabled", enabled=True)
+        browser.wait_for_load(self.call("Page.navigate", url=self.url)["loaderId"])
 
     def call(self, method: str, **params: Any) -> dict[str, Any]:
         """A command for this tab."""
