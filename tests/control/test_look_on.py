@@ -29,7 +29,7 @@ from vedette.densities import LMB, UndetectedIntensity
 from vedette.filters import LmbFilter
 from vedette.fusion import ParallelUpdate
 from vedette.platforms import Carried, Courses, Options, Pointing, Steps, Still
-from vedette.platforms.options import options_at
+from vedette.platforms.base import options_at
 
 KNOWN = replace(SETTINGS, association="known")  # two steps of 4 s
 HORIZON = KNOWN.horizon_times()

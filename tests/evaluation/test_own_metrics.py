@@ -25,7 +25,7 @@ from vedette.errors import InputError, VedetteError
 from vedette.evaluation.metrics import Metric, decode_metrics, encode_metrics, kept, measure
 from vedette.reports import write_report
 from vedette.reports.groups import gather
-from vedette.reports.summary import write_summary
+from vedette.reports.saving import write_summary
 from vedette.reports.tables import measure_table
 from vedette.scenarios import load_scenario
 from vedette.scenarios.dumping import dump_scenario

@@ -16,7 +16,7 @@ from vedette.cli import app
 from vedette.errors import InputError
 from vedette.evaluation import run_scenario
 from vedette.scenarios import Scenario, load_scenario, with_fields
-from vedette.simulation.stopping import RunStopped
+from vedette.simulation.loop import RunStopped
 
 OWN = Path(__file__).with_name("own_parts.py")
 

@@ -10,13 +10,11 @@ from vedette import __version__
 from vedette.cli.campaign import campaign
 from vedette.cli.errors import Commands
 from vedette.cli.output import speaking
-from vedette.cli.reporting import report
 from vedette.cli.reproducing import reproduce
-from vedette.cli.results import results
+from vedette.cli.results import report, results, upgrade
 from vedette.cli.running import run
 from vedette.cli.scenario_files import check, crowd, generate, init, list_, schema
 from vedette.cli.show import show
-from vedette.cli.upgrading import upgrade
 
 app = typer.Typer(
     cls=Commands,

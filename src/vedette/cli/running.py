@@ -24,8 +24,8 @@ from vedette.text import amount, counted
 
 if TYPE_CHECKING:
     from vedette.scenarios import Scenario
+    from vedette.simulation.loop import RunInterrupted, RunStopped
     from vedette.simulation.records import RunRecord
-    from vedette.simulation.stopping import RunInterrupted, RunStopped
 
 
 def compile_if_cold(scenario: Scenario) -> None:
@@ -110,7 +110,7 @@ def run(
     from vedette.evaluation.runs import run_scenario
     from vedette.scenarios import load_scenario
     from vedette.scenarios.dumping import dump_scenario
-    from vedette.simulation.stopping import RunInterrupted, RunStopped
+    from vedette.simulation.loop import RunInterrupted, RunStopped
     from vedette.simulation.storage import check_free, save_run
 
     loaded = load_scenario(scenario)

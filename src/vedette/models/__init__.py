@@ -1,7 +1,6 @@
 """How targets move and what a sensor at a place sees of them; all of it functions that a user can write too."""
 
 from vedette.models.birth import BirthModel, MeasurementBirth
-from vedette.models.cartesian import position
 from vedette.models.clutter import ClutterModel, ClutterSampler, measurement_space_clutter
 from vedette.models.detection import (
     DetectionModel,
@@ -16,7 +15,7 @@ from vedette.models.detection_functions import MAX_PROB_DETECTION
 from vedette.models.functions import ModelFunction, model_function
 from vedette.models.grid import CellGrid
 from vedette.models.kinematics import constant_velocity, coordinated_turn
-from vedette.models.measurement import MeasurementModel, NoiseModel
+from vedette.models.measurement import MeasurementModel, NoiseModel, position
 from vedette.models.motion import MotionModel, SurvivalModel, constant_survival, kernel_motion
 from vedette.models.noise import axis_noise, constant_noise, range_dependent_noise
 from vedette.models.polar import bearing_only, bearing_range, range_only

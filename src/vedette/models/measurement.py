@@ -12,8 +12,33 @@ from numpy.typing import ArrayLike
 from vedette.errors import ModelError
 from vedette.kernels.base.types import Bools, Floats
 from vedette.models.arguments import dimension, float_array, params_vector, pose_vector, reject, state_table
-from vedette.models.functions import ModelFunction, require_kind, write_rows
+from vedette.models.fields import part
+from vedette.models.functions import ModelFunction, model_function, require_kind, write_rows
 from vedette.models.probe import probe_array, probe_covariance, probe_jacobian
+
+
+@model_function("measurement")
+def _position(state: Floats, pose: Floats, params: Floats, out: Floats) -> None:
+    out[0] = state[0]
+    out[1] = state[1]
+
+
+@model_function("measurement_jacobian")
+def _position_jacobian(state: Floats, pose: Floats, params: Floats, out: Floats) -> None:
+    for i in range(2):
+        for j in range(out.shape[1]):
+            out[i, j] = 1.0 if i == j else 0.0
+
+
+def _places(measurements: Floats, pose: Floats) -> Floats:
+    return measurements
+
+
+@part("position", "measurement")
+def position() -> MeasurementModel:
+    """z = [px, py] of the target in m, in the frame of the region; the sensor's pose plays no part."""
+    angular = np.array([False, False])
+    return MeasurementModel(2, _position, np.empty(0), _position_jacobian, angular, _places, is_linear=True)
 
 
 def angular_flags(name: str, angular: Sequence[bool] | Bools, meas_dim: int) -> Bools:

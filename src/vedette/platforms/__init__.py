@@ -1,11 +1,9 @@
 """What a sensor may do, as rows of named numbers, and the poses that follow."""
 
-from vedette.platforms.actions import Actions
-from vedette.platforms.base import Platform
+from vedette.platforms.base import Actions, Options, Platform, options_at
 from vedette.platforms.camera import Carried, Pointing
 from vedette.platforms.courses import PAPER_HEADINGS_DEG, Courses
 from vedette.platforms.fleet import Fleet
-from vedette.platforms.options import Options, options_at
 from vedette.platforms.sequences import Sequences
 from vedette.platforms.steps import Steps, Still, Waypoints
 

@@ -1,14 +1,102 @@
-"""The protocol of platforms, and the one place where their answers are checked."""
+"""The protocol of platforms, their actions as rows of named numbers, and the options of a sensor at a decision.
+
+Here is the one place where a platform's answers are checked.
+"""
 
 from __future__ import annotations
 
-from typing import Any, Protocol, runtime_checkable
+import math
+from dataclasses import dataclass
+from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
-from vedette.kernels.base.types import Floats
-from vedette.models.arguments import as_array, float_array, reject
-from vedette.platforms.actions import Actions
+from vedette.errors import InputError
+from vedette.kernels.base.types import Bools, Floats, Ints
+from vedette.models.arguments import as_array, float_array, reject, sequence
+
+# Poses nearer than this, relative to their size, are one: rounding of degrees to radians and back stays below.
+_SAME_POSE = 1e-9
+
+
+class Options(NamedTuple):
+    """What one sensor may do at a decision.
+
+    actions: all of them, in the order of tables. courses: (num_courses, num_times, pose_dim) the different courses that
+    they lead to, each in the place of its first action. which: (num_actions,) which course each action takes. pose:
+    (pose_dim,) where it is now.
+    """
+
+    actions: Actions
+    courses: Floats
+    which: Ints
+    pose: Floats
+
+    def first_action(self, course: int) -> int:
+        """The first action that takes a course."""
+        return int(np.flatnonzero(self.which == course)[0])
+
+
+def options_at(field: str, platform: Platform, pose: Floats, times: Floats) -> Options:
+    """The options of a platform at a pose, told apart by where it is at `times`, in seconds from now.
+
+    Raises `InputError`, with the name of the platform, for actions or courses that are none.
+    """
+    actions = actions_at(field, platform, pose)
+    courses = courses_of(field, platform, pose, actions.values, times)
+    firsts = _same(courses).argmax(axis=1)  # itself, if none before it
+    own, which = np.unique(firsts, return_inverse=True)
+    return Options(actions, courses[own], which, pose)
+
+
+def _same(courses: Floats) -> Bools:
+    """(num, num) which courses are equal up to rounding, headings up to whole turns; the second is compared to."""
+    num = len(courses)
+    equal = np.ones((num, num), np.bool_)
+    for component in range(courses.shape[2]):
+        values = courses[:, :, component]
+        off = np.abs(values[:, np.newaxis] - values)
+        if component == 2:
+            off = np.abs(np.remainder(off + math.pi, 2.0 * math.pi) - math.pi)
+        equal &= (off <= _SAME_POSE * np.maximum(1.0, np.abs(values))[:, np.newaxis]).all(axis=2)
+    return equal
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Actions:
+    """What one sensor may do, one action a row.
+
+    Attributes:
+        columns: what the numbers of an action are: `heading_deg`, an absolute heading counter-clockwise from +x, or
+            whatever the platform calls them; units other than SI's in the name.
+        values: (num_actions, num_columns), in the order of tables.
+
+    Raises:
+        InputError: no action, or numbers that are not finite or not as many as columns.
+    """
+
+    columns: tuple[str, ...]
+    values: Floats
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "columns", sequence("actions.columns", self.columns, "names of columns"))
+        values = float_array("actions.values", self.values, (None, len(self.columns)))
+        if len(values) == 0:
+            raise InputError("actions.values: expected at least one action; got none")
+        object.__setattr__(self, "values", values)
+
+    @classmethod
+    def of(cls, **numbers: float) -> Actions:
+        """A single action, as in `Actions.of(heading_deg=30.0)`."""
+        return cls(tuple(numbers), np.array([list(numbers.values())]))
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+    def text(self, index: int) -> str:
+        """One action in words: `heading_deg 30, speed 5`."""
+        numbers = zip(self.columns, self.values[index].tolist(), strict=True)
+        return ", ".join(f"{name} {round(value, 6):g}" for name, value in numbers)
 
 
 @runtime_checkable

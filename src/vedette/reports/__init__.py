@@ -4,8 +4,7 @@ from vedette.extras import need
 
 need("a report", "jinja2", "matplotlib", "pyarrow")
 
-from vedette.reports.saving import write_figures
-from vedette.reports.summary import write_summary
+from vedette.reports.saving import write_figures, write_summary
 from vedette.reports.writing import code_in_replays, write_report
 
 __all__ = ["code_in_replays", "write_figures", "write_report", "write_summary"]

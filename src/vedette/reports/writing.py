@@ -25,10 +25,9 @@ from vedette.reports.claims import Claim, all_pairs, claims
 from vedette.reports.drawings import Drawing, error_drawings, group_drawings, sweep_drawings, typical_records
 from vedette.reports.groups import Group, axis_label, gather
 from vedette.reports.health import group_health, health_table
-from vedette.reports.origin import versions_table
+from vedette.reports.origin import spec_toml, versions_table
 from vedette.reports.replay import code_of_sensors, replay_data
 from vedette.reports.saving import run_errors
-from vedette.reports.spec_text import spec_toml
 from vedette.reports.svg import inline_png, inline_svg
 from vedette.reports.tables import Table, cost_table, decision_table, error_table, measure_table
 from vedette.text import named_in

@@ -15,8 +15,7 @@ from vedette.scenarios.build import build_experiment, build_planner, build_senso
 from vedette.scenarios.faults import Told
 from vedette.scenarios.loading import Scenario, document_of, place_fault
 from vedette.scenarios.sections.custom import NotGiven, customs
-from vedette.simulation.loop import simulate
-from vedette.simulation.stopping import RunStopped, cause_of
+from vedette.simulation.loop import RunStopped, cause_of, simulate
 
 _SCANS = 3  # that are tried: enough for one that is missing, and one after births
 # These are made of other parts, and so as parts of the whole.

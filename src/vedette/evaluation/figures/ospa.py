@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -11,7 +12,6 @@ from matplotlib.figure import Figure
 from vedette.errors import InputError
 from vedette.evaluation.comparison import PARTS, Comparison
 from vedette.evaluation.figures.labels import short_labels
-from vedette.evaluation.figures.overlap import own_points, shared_stretches
 from vedette.evaluation.figures.style import (
     GREY,
     colour,
@@ -24,6 +24,50 @@ from vedette.evaluation.figures.style import (
 from vedette.evaluation.statistics import Summary
 from vedette.kernels.base.types import Bools, Floats
 from vedette.text import named_in
+
+
+@dataclass(frozen=True, slots=True)
+class Shared:
+    """A stretch over which several curves are one.
+
+    Attributes:
+        members: which curves, increasing.
+        shown: (num_points,) the points of the stretch; it may have gaps.
+    """
+
+    members: tuple[int, ...]
+    shown: Bools
+
+
+def shared_stretches(curves: Floats) -> tuple[Shared, ...]:
+    """Every set of curves that are equal over one or more steps, with the points of those steps.
+
+    Args:
+        curves: (num_curves, num_points).
+    """
+    same_point = curves[:, None, :] == curves[None, :, :]
+    same_step = same_point[:, :, :-1] & same_point[:, :, 1:]
+    found: dict[tuple[int, ...], Bools] = {}
+    for step in range(curves.shape[1] - 1):
+        for curve in range(len(curves)):
+            members = tuple(np.flatnonzero(same_step[curve, :, step]).tolist())
+            if len(members) > 1 and members[0] == curve:
+                found.setdefault(members, np.zeros(curves.shape[1], bool))[step : step + 2] = True
+    return tuple(Shared(members, shown) for members, shown in found.items())
+
+
+def own_points(curves: Floats) -> Bools:
+    """(num_curves, num_points) ends of the steps over which a curve is equal to no other; all of a single one."""
+    num_curves, num_points = curves.shape
+    if num_curves == 1:
+        return np.ones((1, num_points), bool)
+    same_point = curves[:, None, :] == curves[None, :, :]
+    alone = (same_point[:, :, :-1] & same_point[:, :, 1:]).sum(axis=1) == 1
+    own = np.zeros(curves.shape, bool)
+    own[:, :-1] |= alone
+    own[:, 1:] |= alone
+    return own
+
 
 _LABELS = {"total": "OSPA", "localisation": "Localisation", "cardinality": "Cardinality"}
 _DASH = 4.5  # line widths, of curves that lie on one another

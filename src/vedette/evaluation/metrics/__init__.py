@@ -3,10 +3,9 @@
 from vedette.evaluation.metrics.consistency import AverageNees, average_nees, nees, nees_interval
 from vedette.evaluation.metrics.kept import decode_metrics, encode_metrics, has_metrics
 from vedette.evaluation.metrics.matching import Matching, match_run
-from vedette.evaluation.metrics.own import Metric
 from vedette.evaluation.metrics.point_gospa import GospaResult, GospaSeries, gospa, gospa_distance, gospa_of_run
 from vedette.evaluation.metrics.point_ospa import OspaResult, ospa, ospa_of_run
-from vedette.evaluation.metrics.run import RunMetrics, measure
+from vedette.evaluation.metrics.run import Metric, RunMetrics, measure
 from vedette.evaluation.metrics.track_ospa import TrackSet, ospa2, ospa2_of_run
 from vedette.evaluation.metrics.tracked_share import TrackedShare, seen_targets
 from vedette.evaluation.metrics.trajectories import Continuity, continuity, continuity_of_run

@@ -1,19 +1,80 @@
-"""The Gaussian-mixture PHD filter: one step of the intensity of a Poisson density (Vo and Ma 2006)."""
+"""The Gaussian-mixture PHD filter (Vo and Ma 2006), and what the CPHD filter shares with it.
+
+An intensity is predicted and seen as the one row of a scan: its components are the surviving ones followed by the birth
+sites; its options are to be missed or detected as one of the gated measurements, and never to be absent.
+"""
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
-from vedette.kernels.association.assignment import MISSED
+from vedette.kernels.association.assignment import MISSED, Options
 from vedette.kernels.association.options import weighed_options
+from vedette.kernels.association.predicted import Rows, rows_of_scan
 from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.compile import kernel
-from vedette.kernels.base.types import Mixture, Motion, ScanInput, Sensor
+from vedette.kernels.base.types import Floats, Mixture, Motion, ScanInput, Sensor, Tracks
 from vedette.kernels.gaussian.linalg import log_add
-from vedette.kernels.gaussian.mixtures import MixtureCaps
-from vedette.kernels.steps.intensity import IntensityReport, corrected_intensity, predict_intensity
+from vedette.kernels.gaussian.mixtures import MixtureCaps, make_components, reduce_mixture, require_gaussians
+from vedette.kernels.steps.assembly import write_updated
+
+
+class IntensityReport(NamedTuple):
+    """What a step found and what it left out."""
+
+    log_total: float  # log density of the scan relative to clutter alone
+    log_clutter: float  # sum of the log clutter intensities of the scan
+    num_raised: int  # measurements whose clutter intensity was raised to the floor
+    log_kept: float  # log of the share of the cardinality distribution that trimming left, 0 where there is none
+
+
+@kernel
+def predict_intensity(prior: Mixture, scan: ScanInput, motion: Motion, sensor: Sensor) -> tuple[Rows, float]:
+    """The predicted intensity as one row, survivors before births, and the log of the weight that died.
+
+    The births carry the intensity of the multi-Bernoulli birth: the sum of existence times density over the sites.
+    """
+    num = len(prior.log_weights)
+    offsets = np.zeros(2, np.int64)
+    offsets[1] = num
+    one_track = Tracks(np.zeros((1, 2), np.int64), offsets, prior.log_weights, prior.means, prior.covs)
+    rows = rows_of_scan(one_track, scan, motion, sensor)
+    log_died = rows.log_absent[0]
+    all_components = np.zeros(2, np.int64)
+    all_components[1] = len(rows.log_weights)
+    never_absent = np.full(1, -math.inf)
+    one_row = Rows(
+        rows.labels[:1], all_components, never_absent, rows.log_weights, rows.means, rows.covs, rows.innovation
+    )
+    return one_row, log_died
+
+
+@kernel
+def corrected_intensity(rows: Rows, options: Options, log_factors: Floats, caps: MixtureCaps) -> Mixture:
+    """The components of every option times the option's factor, reduced; their total weight is kept.
+
+    log_factors: (>= num_options,) log of the factor of each option.
+    """
+    num_options = options.offsets[1]
+    num_components, dim = rows.means.shape
+    filled = 0
+    for option in range(num_options):
+        entry = options.entries[option]
+        for i in range(entry, entry + num_components):
+            if options.component_log_weights[i] > -math.inf:
+                filled += 1
+    wide, start = make_components(filled, dim), 0
+    for option in range(num_options):
+        end = write_updated(0, option, rows, options, start, wide)
+        for c in range(start, end):
+            wide.log_weights[c] += log_factors[option]
+        start = end
+    few_weights, few_means, few_covs = reduce_mixture(wide.log_weights, wide.means, wide.covs, caps)
+    require_gaussians(few_means, few_covs)
+    return Mixture(few_weights, few_means, few_covs)
 
 
 @kernel
