@@ -4,9 +4,11 @@ from vedette.tracking.base import State, Tracker, TrackerInfo
 from vedette.tracking.belief_network import BeliefNetwork
 from vedette.tracking.central import Central, CentralFilter
 from vedette.tracking.distributed import Distributed
+from vedette.tracking.late import Instant, LateInfo, LateScans, SensorScan, Timeline
 from vedette.tracking.network import Network
 from vedette.tracking.scan_network import ScanNetwork
 from vedette.tracking.searching import Searching
+from vedette.tracking.snapshots import load_snapshot, save_snapshot
 from vedette.tracking.stages import Stages, stage_of
 
 __all__ = [
@@ -14,12 +16,19 @@ __all__ = [
     "Central",
     "CentralFilter",
     "Distributed",
+    "Instant",
+    "LateInfo",
+    "LateScans",
     "Network",
     "ScanNetwork",
     "Searching",
+    "SensorScan",
     "Stages",
     "State",
+    "Timeline",
     "Tracker",
     "TrackerInfo",
+    "load_snapshot",
+    "save_snapshot",
     "stage_of",
 ]

@@ -1,0 +1,269 @@
+"""Scans in whatever order they come: one that is late is put in its place, and what came after is worked again."""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_left
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+from operator import attrgetter
+from typing import Any
+
+import numpy as np
+
+from vedette.errors import InputError
+from vedette.filters.inputs import check_scan
+from vedette.kernels.base.types import Floats
+from vedette.models.arguments import count, instance, pose_vector, positive, real, reject
+from vedette.tracking.base import State, Tracker, TrackerInfo
+
+_TIME = attrgetter("time")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SensorScan:
+    """One scan of one sensor, as it arrives.
+
+    Attributes:
+        sensor: which of the tracker's sensors it is of, from 0.
+        time: s, when it was taken.
+        measurements: (num, meas_dim), in any order; angles in radians. Empty where nothing was found.
+        pose: [px, py, heading_rad, ...] of the sensor then.
+    """
+
+    sensor: int
+    time: float
+    measurements: Any
+    pose: Any
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Instant:
+    """A time at which sensors scanned, and what was believed after it.
+
+    Attributes:
+        time: s.
+        scans: of the sensors that scanned, by their numbers.
+        poses: (num_sensors, 3 or more) of all sensors, each where its last scan was.
+        state: the tracker's, after these scans.
+        info: what its step reported.
+    """
+
+    time: float
+    scans: dict[int, SensorScan]
+    poses: Floats
+    state: State
+    info: TrackerInfo
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Timeline:
+    """The instants that a late scan may still come before, and what was believed at the one before them.
+
+    Attributes:
+        settled: the state before all instants, which no scan changes any more.
+        settled_poses: (num_sensors, 3 or more) of the sensors then.
+        instants: in order of time.
+        newest: s, the latest time of all scans that came; None before the first.
+        num_taken: scans that are in the beliefs.
+        num_late: of these, how many came after a later one.
+        num_dropped: scans that came too late.
+        num_repeated: scans that came again.
+    """
+
+    settled: State
+    settled_poses: Floats
+    instants: tuple[Instant, ...] = ()
+    newest: float | None = None
+    num_taken: int = 0
+    num_late: int = 0
+    num_dropped: int = 0
+    num_repeated: int = 0
+
+    @property
+    def state(self) -> State:
+        """What is believed at the latest instant."""
+        return self.instants[-1].state if self.instants else self.settled
+
+    @property
+    def poses(self) -> Floats:
+        """(num_sensors, 3 or more) where each sensor was last, at the latest instant."""
+        return self.instants[-1].poses if self.instants else self.settled_poses
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LateInfo:
+    """What was done with scans that arrived.
+
+    Attributes:
+        steps: reports of the tracker's steps that were made, in order of time.
+        num_worked_again: how many of these steps had been made before, with fewer scans.
+        dropped: the scans that came too late.
+    """
+
+    steps: tuple[TrackerInfo, ...]
+    num_worked_again: int
+    dropped: tuple[SensorScan, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LateScans:
+    """A tracker for scans that come late, early or not at all, each with its own time.
+
+    Scans of one time are one step of the tracker. A scan that comes after later ones is put in its place, and the
+    steps since then are made again from the state before it: inside the window the beliefs are bit for bit those of
+    the same scans in order. One that is older than the window is counted and dropped.
+
+    Steps are numbered in order of time, and so are the labels of births: a target that is born after the time of a
+    late scan, within the window, gets the label that it would have had.
+
+    Attributes:
+        tracker: any.
+        poses: (num_sensors, 3 or more) where each sensor is before its first scan.
+        window: s, from the latest scan back.
+        seed: of the random numbers of filters that draw; those of a step are the same whenever it is made.
+
+    Raises:
+        InputError: something else than a tracker, not one pose a sensor, no positive window.
+    """
+
+    tracker: Tracker
+    poses: Any
+    window: float = 30.0
+    seed: int = 0
+    _start: Floats = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        instance("tracker", self.tracker, Tracker)
+        if self.window != math.inf:
+            positive("window", self.window)
+        count("seed", self.seed)
+        num = len(self.tracker.sensors)
+        given = [pose_vector(f"poses[{s}]", pose) for s, pose in enumerate(self.poses)]
+        if len(given) != num:
+            raise reject("poses", f"{num}, one a sensor", len(given))
+        start = np.zeros((num, max(map(len, given))))
+        for s, pose in enumerate(given):
+            start[s, : len(pose)] = pose
+        object.__setattr__(self, "_start", start)
+
+    def initial(self) -> Timeline:
+        """Before the first scan."""
+        return Timeline(self.tracker.initial(), self._start)
+
+    def take(self, timeline: Timeline, scans: Iterable[SensorScan]) -> tuple[Timeline, LateInfo]:
+        """Take in scans, in the order in which they arrived; those of one call are worked at once.
+
+        Args:
+            timeline: as the call before left it.
+            scans: of whatever sensors and times.
+
+        Returns:
+            The timeline with them, and what was done.
+
+        Raises:
+            InputError: a sensor that there is not, a time that is no finite number, a pose or measurements that no
+                scan of the sensor has, two different scans of a sensor at one time. The timeline given stays as it was.
+            ModelError, NumericalError: as of the tracker's step.
+        """
+        came: dict[float, dict[int, SensorScan]] = {}
+        first, newest, dropped = math.inf, timeline.newest, list[SensorScan]()
+        taken = late = repeated = 0
+        for given in scans:
+            scan = self._checked(given)
+            if newest is not None and scan.time < newest - self.window:
+                dropped.append(scan)
+                continue
+            before = _scans_at(timeline, scan.time) | came.get(scan.time, {})
+            if scan.sensor in before:
+                _check_same(before[scan.sensor], scan)
+                repeated += 1
+                continue
+            came.setdefault(scan.time, {})[scan.sensor] = scan
+            taken, late = taken + 1, late + (newest is not None and scan.time < newest)
+            first, newest = min(first, scan.time), scan.time if newest is None else max(newest, scan.time)
+        kept = timeline.instants[: _place(timeline, first)]
+        made = self._worked(timeline, len(kept), came)
+        after = replace(
+            timeline,
+            instants=kept + made,
+            newest=newest,
+            num_taken=timeline.num_taken + taken,
+            num_late=timeline.num_late + late,
+            num_dropped=timeline.num_dropped + len(dropped),
+            num_repeated=timeline.num_repeated + repeated,
+        )
+        info = LateInfo(tuple(i.info for i in made), len(timeline.instants) - len(kept), tuple(dropped))
+        return self._settled(after), info
+
+    def _checked(self, scan: SensorScan) -> SensorScan:
+        """The scan with arrays of its own, so that what is worked again is what came."""
+        instance("scan", scan, SensorScan)
+        num, sensors = len(self.tracker.sensors), self.tracker.sensors
+        if count("scan.sensor", scan.sensor) >= num:
+            raise reject("scan.sensor", f"a whole number from 0 to {num - 1}", scan.sensor)
+        name = f"scan of sensor {scan.sensor} at {real('scan.time', scan.time):g} s"
+        pose = pose_vector(f"{name}, pose", scan.pose)
+        if len(pose) > self._start.shape[1]:
+            raise reject(f"{name}, pose", f"at most {self._start.shape[1]} numbers, as of poses", len(pose))
+        try:
+            check_scan(scan.measurements, sensors[scan.sensor])
+        except InputError as error:
+            raise InputError(f"{name}: {error}") from None
+        return SensorScan(int(scan.sensor), float(scan.time), np.array(scan.measurements, float), pose.copy())
+
+    def _worked(
+        self, timeline: Timeline, num_kept: int, came: dict[float, dict[int, SensorScan]]
+    ) -> tuple[Instant, ...]:
+        """The tracker's steps with the scans that came, on from the instants that stay as they are."""
+        due = {i.time: i.scans for i in timeline.instants[num_kept:]}
+        for time, scans in came.items():
+            due[time] = due.get(time, {}) | scans
+        before = timeline.instants[num_kept - 1] if num_kept else None
+        state = timeline.settled if before is None else before.state
+        poses = timeline.settled_poses if before is None else before.poses
+        made = []
+        for time in sorted(due):
+            poses = poses.copy()
+            for s, scan in due[time].items():
+                poses[s, : len(scan.pose)] = scan.pose
+            measured = [due[time][s].measurements if s in due[time] else None for s in range(len(poses))]
+            state, info = self.tracker.step(state, measured, poses, time, rngs=self._streams(state.step + 1))
+            made.append(Instant(time, due[time], poses, state, info))
+        return tuple(made)
+
+    def _streams(self, step: int) -> tuple[np.random.Generator, ...]:
+        """The random numbers of each sensor at a step."""
+        return tuple(
+            np.random.default_rng(np.random.SeedSequence(self.seed, spawn_key=(step, s)))
+            for s in range(len(self.tracker.sensors))
+        )
+
+    def _settled(self, timeline: Timeline) -> Timeline:
+        """Without the instants that no scan can come before any more."""
+        if timeline.newest is None:
+            return timeline
+        past = _place(timeline, timeline.newest - self.window)
+        if past == 0:
+            return timeline
+        last = timeline.instants[past - 1]
+        return replace(timeline, settled=last.state, settled_poses=last.poses, instants=timeline.instants[past:])
+
+
+def _place(timeline: Timeline, time: float) -> int:
+    """How many instants are before a time."""
+    return bisect_left(timeline.instants, time, key=_TIME)
+
+
+def _scans_at(timeline: Timeline, time: float) -> dict[int, SensorScan]:
+    """The scans of a time that are in the timeline already."""
+    place = _place(timeline, time)
+    found = timeline.instants[place : place + 1]
+    return found[0].scans if found and found[0].time == time else {}
+
+
+def _check_same(there: SensorScan, again: SensorScan) -> None:
+    """Raise `InputError` where a sensor has scanned at a time already, and measured something else."""
+    if not np.array_equal(there.measurements, again.measurements) or not np.array_equal(there.pose, again.pose):
+        place = f"scan of sensor {again.sensor} at {again.time:g} s"
+        raise InputError(f"{place}: expected one scan of a sensor at a time; got a second one that differs")
