@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vedette.recorded.cleaning import longest_reachable
-from vedette.recorded.geography import to_tangent_plane
+from vedette.recorded.geography import Origin
 from vedette.recorded.reports import seconds
 
 Path2D = NDArray[np.float64]  # (n, 3): time in s, x east and y north in m
@@ -40,7 +40,7 @@ def read_ships(recording: Path) -> dict[str, Path2D]:
         rows = list(csv.DictReader(file))
     times = np.array([seconds(row["Time"]) for row in rows])
     longitudes, latitudes = ([float(row[name]) for row in rows] for name in ("Longitude_degrees", "Latitude_degrees"))
-    reports = np.column_stack([times - times.min(), to_tangent_plane(longitudes, latitudes, ORIGIN_DEG)])
+    reports = np.column_stack([times - times.min(), Origin(*ORIGIN_DEG).to_plane(longitudes, latitudes)])
     names = np.array([row["MMSI"] for row in rows])
     order = np.lexsort((times, names))
     ships, starts = np.unique(names[order], return_index=True)

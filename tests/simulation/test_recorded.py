@@ -15,8 +15,9 @@ from vedette.errors import InputError
 from vedette.models import Region
 from vedette.recorded import Cleaning, RecordedTargets
 from vedette.recorded.cleaning import longest_reachable
-from vedette.recorded.geography import SEMI_MAJOR_AXIS, to_tangent_plane
+from vedette.recorded.geography import Origin
 
+SEMI_MAJOR_AXIS = 6378137.0  # m, of WGS 84
 RNG = np.random.default_rng(0)
 
 
@@ -99,10 +100,10 @@ def test_tangent_plane_against_radii_of_curvature():
     curvature = 1.0 - eccentricity_squared * math.sin(latitude) ** 2
     north = SEMI_MAJOR_AXIS * (1 - eccentricity_squared) / curvature**1.5
     east = SEMI_MAJOR_AXIS / math.sqrt(curvature) * math.cos(latitude)
-    plane = to_tangent_plane([8.0, 8.001, 8.0], [50.0, 50.0, 50.001], (8.0, 50.0))
+    plane = Origin(8.0, 50.0).to_plane([8.0, 8.001, 8.0], [50.0, 50.0, 50.001])
     expected = np.array([[0, 0], [east * math.radians(0.001), 0], [0, north * math.radians(0.001)]])
     np.testing.assert_allclose(plane, expected, atol=2e-3)
-    np.testing.assert_allclose(np.hypot(*to_tangent_plane([9.4], [50.0], (8.0, 50.0))[0]), 100e3, rtol=5e-3)
+    np.testing.assert_allclose(np.hypot(*Origin(8.0, 50.0).to_plane([9.4], [50.0])[0]), 100e3, rtol=5e-3)
 
 
 def test_jumps_are_removed_wherever_they_are():

@@ -1,53 +1,93 @@
-"""Longitude and latitude to metres in the plane that touches the Earth at an origin."""
+"""Longitude and latitude, and metres in the plane that touches the Earth at an origin (WGS 84)."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats
-from vedette.models.arguments import float_array, reject
+from vedette.models.arguments import float_array, real, reject
 
-# WGS 84: semi-major axis in metres and flattening.
-SEMI_MAJOR_AXIS = 6378137.0
-FLATTENING = 1.0 / 298.257223563
-_ECCENTRICITY_SQUARED = FLATTENING * (2.0 - FLATTENING)
-
-
-def _earth_centred(longitude_rad: Floats, latitude_rad: Floats) -> Floats:
-    """(..., 3) Earth-centred coordinates in metres of points on the ellipsoid."""
-    normal = SEMI_MAJOR_AXIS / np.sqrt(1.0 - _ECCENTRICITY_SQUARED * np.sin(latitude_rad) ** 2)
-    x = normal * np.cos(latitude_rad) * np.cos(longitude_rad)
-    y = normal * np.cos(latitude_rad) * np.sin(longitude_rad)
-    z = normal * (1.0 - _ECCENTRICITY_SQUARED) * np.sin(latitude_rad)
-    return np.stack([x, y, z], axis=-1)
+_LONGEST, _HIGHEST = 360.0, 90.0  # deg
+_NEAR_ENOUGH = 1e-7  # m above the ellipsoid, of a point that is to lie on it; it is known to some 1e-8
+_MOST_STEPS = 60
 
 
-def to_tangent_plane(longitude_deg: ArrayLike, latitude_deg: ArrayLike, origin_deg: tuple[float, float]) -> Floats:
-    """(n, 2) metres east and north of the origin: points of the WGS 84 ellipsoid projected on its tangent plane.
+@dataclass(frozen=True, slots=True)
+class Origin:
+    """Where on the Earth (0, 0) is: x goes to the east, y to the north in the plane that touches it there.
 
     Distances from the origin come out short by about d^3 / (6 R^2): 4 mm at 10 km, 4 m at 100 km.
 
-    Args:
-        longitude_deg, latitude_deg: (n,) degrees east and north.
-        origin_deg: longitude and latitude of (0, 0).
+    Attributes:
+        longitude_deg: degrees to the east.
+        latitude_deg: degrees to the north.
 
     Raises:
-        InputError: a point on the other side of the globe, which would fall on the place of one on this side.
+        InputError: no longitude or latitude in degrees.
     """
-    longitudes = np.radians(float_array("longitude_deg", longitude_deg, (None,)))
-    latitudes = np.radians(float_array("latitude_deg", latitude_deg, (len(longitudes),)))
-    origin = float_array("origin_deg", origin_deg, (2,))
-    if abs(origin[0]) > 360.0 or abs(origin[1]) > 90.0:
-        raise reject("origin_deg", "longitude and latitude in degrees", origin.tolist())
-    longitude, latitude = np.radians(origin)
-    east = np.array([-np.sin(longitude), np.cos(longitude), 0.0])
-    up = np.array([np.cos(latitude) * np.cos(longitude), np.cos(latitude) * np.sin(longitude), np.sin(latitude)])
-    points = _earth_centred(longitudes, latitudes)
-    if (points @ up <= 0.0).any():
-        index = int(np.argmin(points @ up))
-        place = f"({np.degrees(longitudes[index]):g}, {np.degrees(latitudes[index]):g})"
-        raise InputError(f"longitude, latitude: expected points on the origin's side of the globe; got {place} degrees")
-    offsets = points - _earth_centred(longitude, latitude)
-    return np.stack([offsets @ east, offsets @ np.cross(up, east)], axis=-1)
+
+    longitude_deg: float
+    latitude_deg: float
+
+    def __post_init__(self) -> None:
+        for name, most in (("longitude_deg", _LONGEST), ("latitude_deg", _HIGHEST)):
+            value = real(f"origin.{name}", getattr(self, name))
+            if abs(value) > most:
+                raise reject(f"origin.{name}", f"degrees from {-most:g} to {most:g}", value)
+
+    def to_plane(self, longitude_deg: ArrayLike, latitude_deg: ArrayLike) -> Floats:
+        """(n, 2) metres east and north of the origin: points of the ellipsoid, projected on its tangent plane.
+
+        Args:
+            longitude_deg, latitude_deg: (n,) degrees east and north.
+
+        Raises:
+            InputError: a point on the other side of the globe, which would fall on the place of one on this side.
+        """
+        from pymap3d import geodetic2enu  # here, as most programs need none
+
+        longitudes = float_array("longitude_deg", longitude_deg, (None,))
+        latitudes = float_array("latitude_deg", latitude_deg, (len(longitudes),))
+        east, north, _ = geodetic2enu(latitudes, longitudes, 0.0, self.latitude_deg, self.longitude_deg, 0.0)
+        ups = _cosines(longitudes, latitudes) @ _cosines(self.longitude_deg, self.latitude_deg)
+        if (ups <= 0.0).any():
+            index = int(np.argmin(ups))
+            place = f"({longitudes[index]:g}, {latitudes[index]:g})"
+            raise InputError(
+                f"longitude, latitude: expected points on the origin's side of the globe; got {place} degrees"
+            )
+        return np.stack([east, north], axis=-1)
+
+    def to_degrees(self, positions: ArrayLike) -> Floats:
+        """(n, 2) longitudes and latitudes in degrees of points of the plane, (n, 2) m east and north of the origin.
+
+        The inverse of `to_plane`: of each point the one of the ellipsoid below it.
+
+        Raises:
+            InputError: a point of the plane that no point of this side of the globe lies below.
+        """
+        from pymap3d import enu2geodetic
+
+        plane = float_array("positions", positions, (None, 2))
+        up = np.zeros(len(plane))
+        for _ in range(_MOST_STEPS):
+            latitude, longitude, above = enu2geodetic(*plane.T, up, self.latitude_deg, self.longitude_deg, 0.0)
+            if (np.abs(above) <= _NEAR_ENOUGH).all():
+                return np.stack([longitude, latitude], axis=-1)
+            # The height above the ellipsoid grows with that above the plane by the cosine of the angle between them.
+            slopes = _cosines(longitude, latitude) @ _cosines(self.longitude_deg, self.latitude_deg)
+            up = up - above / np.maximum(slopes, 0.1)
+        index = int(np.argmax(np.abs(above)))
+        raise reject("positions", "points above the origin's side of the globe", plane[index].tolist())
+
+
+def _cosines(longitude_deg: ArrayLike, latitude_deg: ArrayLike) -> Floats:
+    """(..., 3) direction cosines of what is up at a place."""
+    longitude, latitude = np.radians(longitude_deg), np.radians(latitude_deg)
+    return np.stack(
+        [np.cos(latitude) * np.cos(longitude), np.cos(latitude) * np.sin(longitude), np.sin(latitude)], axis=-1
+    )

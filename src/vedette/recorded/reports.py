@@ -17,7 +17,7 @@ import numpy as np
 from vedette.errors import InputError
 from vedette.extras import need
 from vedette.kernels.base.types import Floats, Ints
-from vedette.recorded.geography import to_tangent_plane
+from vedette.recorded.geography import Origin
 from vedette.text import elided, printable, shown
 
 # Beyond these, differences and speeds of reports mean nothing.
@@ -202,7 +202,11 @@ def _reason(error: Exception) -> str:
 
 
 def parse_reports(
-    table: Table, *, columns: Mapping[str, str] | None = None, origin_deg: tuple[float, float] | None = None
+    table: Table,
+    *,
+    columns: Mapping[str, str] | None = None,
+    origin_deg: tuple[float, float] | None = None,
+    usual_origin_deg: tuple[float, float] | None = None,
 ) -> Reports:
     """Reports out of a table with columns time, id and x, y or longitude, latitude; vx, vy where there are any.
 
@@ -210,7 +214,8 @@ def parse_reports(
         table: see `read_table`.
         columns: names in the table where they differ: {"time": "Time", "id": "MMSI", ...}. Naming a longitude and
             latitude makes the record geographic; otherwise x, y are used if they are there.
-        origin_deg: longitude and latitude of (0, 0) for a geographic record; None: the median of the reports.
+        origin_deg: longitude and latitude of (0, 0) for a geographic record; for another it is an error.
+        usual_origin_deg: the same where that is None, and of no matter for another; None: the median of the reports.
 
     Raises:
         InputError: names the file, row, column, what was expected and what came.
@@ -219,7 +224,7 @@ def parse_reports(
     if unknown := set(given) - {"time", "id", "x", "y", "longitude", "latitude", "vx", "vy"}:
         raise InputError(f"columns: expected time, id, x, y, longitude, latitude, vx or vy; got {', '.join(unknown)}")
     times, labels = table.times(given.get("time", "time")), table.labels(given.get("id", "id"))
-    positions, origin, bounds = _positions(table, given, origin_deg)
+    positions, origin, bounds = _positions(table, given, origin_deg, usual_origin_deg)
     if len(times) == 0:
         raise InputError(f"{table.source}: expected at least one report; got none")
     speed_columns = [given.get(name, name) for name in ("vx", "vy")]
@@ -241,7 +246,10 @@ def _pair(table: Table, names: Sequence[str]) -> Floats:
 
 
 def _positions(
-    table: Table, given: Mapping[str, str], origin_deg: tuple[float, float] | None
+    table: Table,
+    given: Mapping[str, str],
+    origin_deg: tuple[float, float] | None,
+    usual_origin_deg: tuple[float, float] | None,
 ) -> tuple[Floats, tuple[float, float] | None, tuple[tuple[float, float], tuple[float, float]] | None]:
     """Places in m, where the origin is, and between which degrees they were."""
     named_geographic = "longitude" in given or "latitude" in given
@@ -260,9 +268,10 @@ def _positions(
         if (wrong := np.abs(values) > limit).any():
             raise table.fault(int(np.argmax(wrong)), column, f"a {name} in degrees, at most {limit:g}")
         degrees.append(values)
+    origin_deg = origin_deg or usual_origin_deg
     if origin_deg is None:
         origin_deg = (float(np.median(degrees[0])), float(np.median(degrees[1]))) if len(degrees[0]) else (0.0, 0.0)
     if not len(degrees[0]):
         return np.empty((0, 2)), origin_deg, None
     low, high = ((float(end(degrees[0])), float(end(degrees[1]))) for end in (np.min, np.max))
-    return to_tangent_plane(degrees[0], degrees[1], origin_deg), origin_deg, (low, high)
+    return Origin(*origin_deg).to_plane(*degrees), origin_deg, (low, high)

@@ -59,6 +59,7 @@ class RecordedTargets:
         *,
         columns: Mapping[str, str] | None = None,
         origin_deg: tuple[float, float] | None = None,
+        usual_origin_deg: tuple[float, float] | None = None,
         time_origin: float | str | None = None,
         cleaning: Cleaning | None = None,
     ) -> RecordedTargets:
@@ -67,13 +68,17 @@ class RecordedTargets:
         Args:
             path: the file.
             columns: names in the file where they differ, {"time": "Time", "id": "MMSI", "longitude": "lon", ...}.
-            origin_deg: longitude and latitude of (0, 0), for the tangent plane; None: the median of the reports.
+            origin_deg: longitude and latitude of (0, 0), for the tangent plane; only for longitudes and latitudes.
+            usual_origin_deg: the same where `origin_deg` is None, and of no matter for x and y; None: the median of the
+                reports.
             time_origin, cleaning: see the class.
 
         Raises:
             InputError: names the file, row, column, what was expected and what came.
         """
-        reports = parse_reports(read_table(path), columns=columns, origin_deg=origin_deg)
+        reports = parse_reports(
+            read_table(path), columns=columns, origin_deg=origin_deg, usual_origin_deg=usual_origin_deg
+        )
         return cls(reports, time_origin, cleaning or Cleaning())
 
     @classmethod

@@ -44,6 +44,7 @@ _LONGEST_WORD = 100  # comparing words takes the product of their lengths
 
 def read_section(section: type[S], data: Mapping[str, Any]) -> tuple[S, list[Told]]:
     """The section in the data and what is wrong with it; where that is anything, the section is one in part."""
+    data = section.in_metres(data)
     try:
         return section.model_validate(data), []
     except ValidationError:
@@ -120,6 +121,8 @@ def _unknown_key(path: Path, key: str, known: list[str]) -> Told:
     hint = suggestion(key, known)
     if key == "<<":
         hint = "YAML 1.2 has no merge keys; sensor_defaults holds what sensors share"
+    if key in ("lon_min", "lon_max", "lat_min", "lat_max"):
+        hint = "a box of degrees needs an `origin: {lon: , lat: }` of the scenario, and its four ends in order"
     if key in ("speed", "actions_deg", "headings") and "platform" not in path:
         hint = "the platform of a sensor has it: `platform: {kind: courses, speed: 50.0, headings_deg: [0, 90]}`"
     return Told((*path, key), _one_of(known), UNKNOWN, hint)
@@ -193,6 +196,9 @@ def _translate(error: ErrorDetails, annotation: Any, path: Path) -> Told:
                 describe(error["input"]),
                 suggestion(error["input"], _literals(inner)),
             )
+    if isinstance(error["input"], Mapping) and {"lon", "lat"} & set(error["input"]):
+        hint = "places in degrees need an `origin: {lon: , lat: }` of the scenario, both numbers of degrees"
+        return Told(path, _expected(error, inner), describe(error["input"]), hint)
     return Told(path, _expected(error, inner), describe(error["input"]))
 
 

@@ -50,7 +50,7 @@ def _content(recorded: RecordedTargets, model: ScenarioModel, folder: FilePath) 
     if not all(map(is_whole, (recorded, model.region, model.time))):
         return
     try:
-        recorded.source(model.region, folder).truth(model.time.build(), rng=np.random.default_rng(0))
+        recorded.source(model, folder).truth(model.time.build(), rng=np.random.default_rng(0))
     except InputError as error:
         yield ("targets", "path"), "a file of recorded targets that a run can use", str(error)
 

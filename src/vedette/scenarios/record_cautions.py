@@ -21,7 +21,7 @@ def record_cautions(scenario: Scenario) -> Iterator[tuple[Path, str]]:
     model, folder = scenario.model, scenario.folder
     if not isinstance(model.targets, RecordedTargets):
         return
-    source = model.targets.source(model.region, folder)
+    source = model.targets.source(model, folder)
     yield from _repeats(model.targets, source)
     for index, sensor in enumerate(model.sensors):
         path: Path = ("sensors", index, "position")

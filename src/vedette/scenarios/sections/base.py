@@ -202,6 +202,11 @@ class Section(BaseModel):
         return self
 
     @classmethod
+    def in_metres(cls, data: Mapping[str, Any]) -> Mapping[str, Any]:
+        """The mapping with its places in metres, where they may be in anything else."""
+        return data
+
+    @classmethod
     def prepared(cls, data: Mapping[str, Any]) -> Mapping[str, Any]:
         """The mapping as its fields read it."""
         return data

@@ -18,6 +18,7 @@ from vedette.scenarios.sections.control import Control
 from vedette.scenarios.sections.derived import of_kind
 from vedette.scenarios.sections.fusion import AnyFusion, Fusion
 from vedette.scenarios.sections.network import NetworkSection
+from vedette.scenarios.sections.places import OriginSection, bare_degrees, in_metres
 from vedette.scenarios.sections.planners import STRATEGIES, AnyPlanner
 from vedette.scenarios.sections.scoring import AnyEstimator, AnyMetric, Ospa
 from vedette.scenarios.sections.sensors import Sensor, SensorDefaults
@@ -67,6 +68,9 @@ class ScenarioModel(Section):
     name: Name = Field(description="Short name [-].")
     description: str = Field(default="", description="What it is, where it comes from [-].")
     time: Time = Field(description="The scans [-].")
+    origin: OriginSection | None = Field(
+        default=None, description="Where x = y = 0 is on the Earth; none: nowhere, and all places are in metres [-]."
+    )
     region: RegionSection = Field(description="Surveillance region [-].")
     motion: Motion = Field(default=of_kind("constant_velocity"), description="How targets move [-].")
     survival: Survival = Field(default=of_kind("constant"), description="Whether they go on living [-].")
@@ -111,9 +115,14 @@ class ScenarioModel(Section):
                 yield ("metrics", name), "a name of letters, digits and underscores", describe(name)
 
     @classmethod
+    def in_metres(cls, data: Mapping[str, Any]) -> Mapping[str, Any]:
+        """With places in degrees, as an origin allows them, in metres."""
+        return in_metres(data)
+
+    @classmethod
     def prepared(cls, data: Mapping[str, Any]) -> Mapping[str, Any]:
-        """With what `sensor_defaults` gives, in every sensor, and a reward where none is named."""
-        return with_reward(merge_sensor_defaults(data))
+        """In metres, with what `sensor_defaults` gives in every sensor, and a reward where none is named."""
+        return with_reward(merge_sensor_defaults(in_metres(data)))
 
     @field_validator("sensor_defaults")
     @classmethod
@@ -122,7 +131,7 @@ class ScenarioModel(Section):
 
     @check
     def _across_sections(self) -> Iterator[Finding]:
-        for across in CHECKS:
+        for across in (*CHECKS, bare_degrees):
             yield from attempt(across(self))
 
     @property

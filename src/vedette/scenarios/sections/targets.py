@@ -125,7 +125,9 @@ class RecordedTargets(Derived):
         default=None, description="Recorded time of the first scan, a number or ISO 8601; none: the earliest [s]."
     )
     origin_deg: Point | None = Field(
-        default=None, description="Longitude and latitude of x = y = 0; none: the middle of the reports [deg]."
+        default=None,
+        description="Longitude and latitude of x = y = 0; none: those of the scenario's "
+        "origin, or the middle of the reports where it has none [deg].",
     )
     crop: bool = Field(default=True, description="Whether tracks end at the edges of the region [-].")
 
@@ -135,21 +137,27 @@ class RecordedTargets(Derived):
 
     def build(self, world: ScenarioModel, motion: MotionModel, folder: Path) -> RecordedSource:
         """The targets, as they were recorded. Raises `InputError` for a file that cannot be read, or gives none."""
-        return self.source(world.region, folder)
+        return self.source(world, folder)
 
-    def source(self, region: RegionSection, folder: Path) -> RecordedSource:
+    def source(self, world: ScenarioModel, folder: Path) -> RecordedSource:
         """The same; a file that stays as it was is read once."""
         file = folder / self.path
         try:
             state = os.stat(file)
         except (OSError, ValueError):
             raise InputError(f"{self.path}: expected a readable file of recorded targets; got none") from None
-        return _read(str(file.resolve()), state.st_mtime_ns, state.st_size, self, region)
+        origin = None if world.origin is None else (world.origin.lon, world.origin.lat)
+        return _read(str(file.resolve()), state.st_mtime_ns, state.st_size, self, world.region, origin)
 
 
 @lru_cache(maxsize=16)
 def _read(
-    file: str, changed_ns: int, num_bytes: int, section: RecordedTargets, region: RegionSection
+    file: str,
+    changed_ns: int,
+    num_bytes: int,
+    section: RecordedTargets,
+    region: RegionSection,
+    origin: tuple[float, float] | None,
 ) -> RecordedSource:
     from vedette.recorded import Cleaning
     from vedette.recorded import RecordedTargets as RecordedSource
@@ -159,6 +167,7 @@ def _read(
         file,
         columns=section.columns.given(),
         origin_deg=section.origin_deg,
+        usual_origin_deg=origin,
         time_origin=section.time_origin,
         cleaning=Cleaning(**section.given(), region=edges if section.crop else None),
     )
