@@ -15,6 +15,7 @@ from vedette.cli.results import report, results, upgrade
 from vedette.cli.running import run
 from vedette.cli.scenario_files import check, crowd, generate, init, list_, schema
 from vedette.cli.show import show
+from vedette.cli.tracking import track
 
 app = typer.Typer(
     cls=Commands,
@@ -49,6 +50,7 @@ app.command()(speaking(check))
 app.command()(speaking(show))
 app.command()(speaking(schema))
 app.command()(speaking(run))
+app.command()(speaking(track))
 app.command()(speaking(reproduce))
 app.command()(speaking(campaign))
 app.command()(speaking(results))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -129,7 +130,7 @@ def run(
                 record = run_scenario(loaded, planner, seed=seed, run=run_number, num_threads=threads)
         except (RunStopped, RunInterrupted) as error:
             if error.record is None:
-                _end(error, "nothing was written")
+                end_stopped(error, "nothing was written")
             record, stop = error.record, error
         print_run(record, loaded)
         kept = out if stop is None or not _holds_whole_run(out) else None
@@ -137,12 +138,12 @@ def run(
             save_run(record, kept, scenario_text=dump_scenario(loaded.model, folder=loaded.folder), overwrite=overwrite)
     publish({**run_document(record, loaded.model.ospa.unit), "folder": kept})
     if stop is not None and kept is None:
-        _end(stop, "nothing was written" if out is None else f"{out} keeps the whole run that was there")
+        end_stopped(stop, "nothing was written" if out is None else f"{out} keeps the whole run that was there")
     if out is not None:
         with interruptible(f"wrote {out}, but not all of its figures"):
             _draw_run(record, loaded, out / "figures")
         if stop is not None:
-            _end(stop, f"wrote {out}, with the {counted(record.num_scans, 'scan')} before")
+            end_stopped(stop, f"wrote {out}, with the {counted(record.num_scans, 'scan')} before")
         say(f"wrote {out}")
 
 
@@ -152,7 +153,7 @@ def _holds_whole_run(folder: Path | None) -> bool:
     return folder is not None and (folder / MANIFEST).exists() and read_manifest(folder)["run"].get("stopped") is None
 
 
-def _end(stop: RunStopped | RunInterrupted, left: str) -> NoReturn:
+def end_stopped(stop: RunStopped | RunInterrupted, left: str) -> NoReturn:
     """Say where a run stopped and what is left of it; the exit status says why."""
     complain(str(stop))
     complain(left)
@@ -199,8 +200,9 @@ def print_run(record: RunRecord, scenario: Scenario | None) -> None:
         console.print(line, soft_wrap=True)
     unit, names = (scenario.model.ospa.unit, scenario.model.sensor_names) if scenario else ("", ())
     total, localisation, cardinality = record.ospa.mean(axis=0)
-    parts = f"(localisation {localisation:.2f}, cardinality {cardinality:.2f})"
-    console.print(f"mean OSPA {amount(f'{total:.2f}', unit)} {parts}")
+    if not math.isnan(total):  # nobody may know the targets
+        parts = f"(localisation {localisation:.2f}, cardinality {cardinality:.2f})"
+        console.print(f"mean OSPA {amount(f'{total:.2f}', unit)} {parts}")
     spent = ", ".join(f"{stage} {seconds.sum():.2f} s" for stage, seconds in record.timings.items())
     console.print(f"time spent: {spent}")
     console.print(health_line(record, names), soft_wrap=True)

@@ -2,18 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 
+import numpy as np
+
+from vedette.densities import Estimate
 from vedette.evaluation.metrics import Metric, RunMetrics, measure, ospa_of_run
+from vedette.kernels.base.types import Floats
 from vedette.scenarios import Scenario
 from vedette.scenarios.build import build_experiment, build_planner, build_sensors, build_true_sensors
 from vedette.scenarios.sections.scoring import AnyMetric
+from vedette.simulation.journal import Score
 from vedette.simulation.loop import simulate
 from vedette.simulation.records import Measure, RunRecord
+from vedette.simulation.truth import Truth
 
 
-def run_scenario(scenario: Scenario, planner: str, *, seed: int, run: int = 0, num_threads: int = 0) -> RunRecord:
+def run_scenario(
+    scenario: Scenario,
+    planner: str,
+    *,
+    seed: int,
+    run: int = 0,
+    num_threads: int = 0,
+    watch: Callable[[int], None] | None = None,
+) -> RunRecord:
     """One run of a scenario under a strategy.
 
     Args:
@@ -23,14 +37,22 @@ def run_scenario(scenario: Scenario, planner: str, *, seed: int, run: int = 0, n
             scenario's own.
         seed, run: fix every random number; runs with equal seed and number are paired across strategies.
         num_threads: share a decision (0: one a processor) and change no result.
+        watch: told the number of every scan that is done.
 
     Raises:
         VedetteError: the scenario's models, filters or planner cannot do what is asked.
     """
     ospa = scenario.model.ospa
-    score = partial(ospa_of_run, cutoff=ospa.cutoff, order=ospa.order, components=ospa.components)
+    score: Score = partial(ospa_of_run, cutoff=ospa.cutoff, order=ospa.order, components=ospa.components)
+    if scenario.model.targets.kind == "unknown":
+        score = _unscored
     decides = build_planner(scenario, planner, num_threads)
-    return simulate(build_experiment(scenario), decides, seed=seed, run=run, score=score)
+    return simulate(build_experiment(scenario), decides, seed=seed, run=run, score=score, watch=watch)
+
+
+def _unscored(truth: Truth, estimates: Sequence[Estimate]) -> Floats:
+    """(num_scans, 3) NaN: nobody knows the targets."""
+    return np.full((len(estimates), 3), np.nan)
 
 
 def own_metrics(scenario: Scenario) -> tuple[Metric, ...]:

@@ -1,7 +1,18 @@
-"""Targets recorded in the world: readers of reports, their cleaning, longitude and latitude."""
+"""What was recorded in the world: reports of targets and their cleaning, scans of sensors, longitude and latitude."""
 
 from vedette.recorded.cleaning import Cleaning, CleaningCounts, RecordedTrack
 from vedette.recorded.geography import Origin
+from vedette.recorded.scans import Conventions, RecordedScans, Site, parse_scans
 from vedette.recorded.targets import RecordedTargets
 
-__all__ = ["Cleaning", "CleaningCounts", "Origin", "RecordedTargets", "RecordedTrack"]
+__all__ = [
+    "Cleaning",
+    "CleaningCounts",
+    "Conventions",
+    "Origin",
+    "RecordedScans",
+    "RecordedTargets",
+    "RecordedTrack",
+    "Site",
+    "parse_scans",
+]

@@ -21,8 +21,8 @@ from vedette.recorded.geography import Origin
 from vedette.text import elided, printable, shown
 
 # Beyond these, differences and speeds of reports mean nothing.
-_FARTHEST = 1e9  # m, m/s
-_LATEST = 1e12  # s
+FARTHEST = 1e9  # m, m/s
+LATEST = 1e12  # s
 _SAME_TIME = 1e-6  # s; two reports of one target nearer in time than this are one
 # Larger files would fill the memory before anything could be said of them.
 _MOST_BYTES = 500_000_000
@@ -81,7 +81,7 @@ class Table:
         values = np.empty(len(cells))
         for i, cell in enumerate(cells):
             try:
-                values[i] = _number(cell)
+                values[i] = number(cell)
             except (TypeError, ValueError, OverflowError):
                 raise self.fault(i, name, "a finite number") from None
         if not np.isfinite(values).all():
@@ -93,15 +93,15 @@ class Table:
     def times(self, name: str) -> Floats:
         """A column of numbers of seconds, or of ISO 8601 times."""
         cells = self.column(name)
-        if not len(cells) or _is_number(cells[0]):
-            return self.numbers(name, _LATEST)
+        if not len(cells) or is_number(cells[0]):
+            return self.numbers(name, LATEST)
         values = np.empty(len(cells))
         for i, cell in enumerate(cells):
             try:
                 values[i] = seconds(cell)
             except (TypeError, ValueError, OverflowError):
                 raise self.fault(i, name, "an ISO 8601 time") from None
-            if not abs(values[i]) <= _LATEST:  # a number, infinite or not, among times
+            if not abs(values[i]) <= LATEST:  # a number, infinite or not, among times
                 raise self.fault(i, name, "an ISO 8601 time")
         return values
 
@@ -119,7 +119,7 @@ def column_names(names: Iterable[str]) -> str:
     return ", ".join(listed[:_MOST_NAMES]) + (f" and {len(listed) - _MOST_NAMES} more" * (len(listed) > _MOST_NAMES))
 
 
-def _number(cell: Any) -> float:
+def number(cell: Any) -> float:
     """A number, or text of one as every program writes it. Raises `TypeError` or `ValueError` for anything else."""
     if isinstance(cell, str):
         if "_" in cell or not cell.isascii():  # Python reads 1_000 and digits of any script
@@ -129,9 +129,10 @@ def _number(cell: Any) -> float:
     return float(cell)
 
 
-def _is_number(cell: Any) -> bool:
+def is_number(cell: Any) -> bool:
+    """Whether `number` takes it."""
     try:
-        _number(cell)
+        number(cell)
     except (TypeError, ValueError, OverflowError):
         return False
     return True
@@ -139,8 +140,8 @@ def _is_number(cell: Any) -> bool:
 
 def seconds(time: Any) -> float:
     """A number, or the seconds from 1970 UTC to an ISO 8601 time or `datetime`; without a zone it is taken as UTC."""
-    if _is_number(time):
-        return _number(time)
+    if is_number(time):
+        return number(time)
     moment = time if isinstance(time, datetime) else datetime.fromisoformat(str(time).strip())
     return (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()
 
@@ -156,7 +157,7 @@ def read_table(path: str | Path) -> Table:
     if file.suffix.lower() not in (".csv", ".parquet"):
         raise InputError(f"{named}: expected a .csv or .parquet file")
     if not os.path.isfile(file):  # a name can be too long, or hold what no name can: for pathlib, an error
-        raise InputError(f"{named}: no such file; expected recorded targets")
+        raise InputError(f"{named}: no such file; expected a table of records")
     if (size := file.stat().st_size) > _MOST_BYTES:
         raise InputError(f"{named}: expected a file of at most {_MOST_BYTES} bytes; got {size}")
     return _read_csv(file) if file.suffix.lower() == ".csv" else _read_parquet(file)
@@ -242,7 +243,7 @@ def parse_reports(
 
 def _pair(table: Table, names: Sequence[str]) -> Floats:
     """(n, 2) of two columns, in m or m/s."""
-    return np.stack([table.numbers(name, _FARTHEST) for name in names], axis=1)
+    return np.stack([table.numbers(name, FARTHEST) for name in names], axis=1)
 
 
 def _positions(

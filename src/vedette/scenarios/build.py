@@ -55,9 +55,10 @@ def build_experiment(scenario: Scenario) -> Experiment:
     sensors = build_sensors(scenario)
     tracker, times = _tracker(scenario, tuple(sensor.filter for sensor in sensors)), build_scan_times(scenario)
     known = tuple(sensor.filter.sensor for sensor in sensors)
+    recording = None if model.recording is None else model.recording.build(model, scenario.folder)
     return Experiment(
         name=model.name,
-        times=model.time.build(),
+        times=model.time.build() if recording is None else recording.times,
         targets=model.targets.build(model, tracker.targets.motion, scenario.folder),
         tracker=tracker,
         platforms=tuple(sensor.platform for sensor in sensors),
@@ -71,7 +72,8 @@ def build_experiment(scenario: Scenario) -> Experiment:
         explain=model.control.explain,
         # Where they are what the tracker takes them for, a tracker of other sensors may stand in for this one.
         true_sensors=build_true_sensors(scenario, known) if any(sensor.truth for sensor in model.sensors) else (),
-        scans_at=None if times.all() else times,
+        scans_at=None if times.all() or recording is not None else times,
+        recording=recording,
     )
 
 

@@ -14,6 +14,7 @@ from ruamel.yaml.scalarstring import DoubleQuotedScalarString
 from vedette.scenarios.sections import ScenarioModel, Section
 from vedette.scenarios.sections.base import sections_in
 from vedette.scenarios.sections.custom import Custom
+from vedette.scenarios.sections.recording import RecordingSection
 from vedette.scenarios.sections.targets import RecordedTargets
 from vedette.scenarios.yaml_reader import plain_scalar
 
@@ -47,7 +48,7 @@ def files_of(model: ScenarioModel, folder: Path) -> tuple[Path, ...]:
 
 def _file(section: Section) -> str:
     """The file that a section itself names; empty where it names none."""
-    if isinstance(section, RecordedTargets):
+    if isinstance(section, RecordedTargets | RecordingSection):
         return section.path
     module = section.function.rpartition(":")[0] if isinstance(section, Custom) else ""
     return module if module.endswith(".py") else ""
@@ -60,7 +61,7 @@ def _anchored(value: Any, folder: Path) -> Any:
     if not isinstance(value, dict):
         return value
     anchored = {key: _anchored(item, folder) for key, item in value.items()}
-    if value.get("kind") == "recorded":
+    if value.get("kind") == "recorded" or {"path", "bad_rows"} <= set(value):
         anchored["path"] = str((folder / value["path"]).resolve())
     elif value.get("kind") == "custom" and ".py:" in value["function"]:
         anchored = {**value, "function": str(folder / value["function"])}

@@ -15,6 +15,7 @@ from vedette.scenarios.faults import Fault, Path, Told, describe
 from vedette.scenarios.file_checks import recorded_findings, reference_findings
 from vedette.scenarios.sections import ScenarioModel
 from vedette.scenarios.sections.base import attempt
+from vedette.scenarios.sections.recording import recording_findings
 from vedette.scenarios.yaml_reader import MOST_BYTES, Document, read_yaml
 from vedette.text import elided, printable
 
@@ -84,7 +85,8 @@ def diagnose(document: Document, folder: FilePath | None) -> tuple[ScenarioModel
         return None, _unique(faults)
     model, told = read_section(ScenarioModel, document.data)
     beside = folder or FilePath()
-    for findings in (recorded_findings(model, beside), reference_findings(model, beside)):
+    read = (recorded_findings(model, beside), recording_findings(model, beside), reference_findings(model, beside))
+    for findings in read:
         told += [Told(*finding) for finding in attempt(findings)]
     faults += [place_fault(document, fault) for fault in told]
     return (None if faults else model), _unique(faults)

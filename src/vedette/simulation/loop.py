@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import sysconfig
 import traceback
+from collections.abc import Callable
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -78,7 +80,15 @@ def sensor_streams(seed: int, run: int, stream: int, num_sensors: int) -> tuple[
     return tuple(run_stream(seed, run, stream, sensor) for sensor in range(num_sensors))
 
 
-def simulate(experiment: Experiment, planner: Planner | None, *, seed: int, run: int, score: Score) -> RunRecord:
+def simulate(
+    experiment: Experiment,
+    planner: Planner | None,
+    *,
+    seed: int,
+    run: int,
+    score: Score,
+    watch: Callable[[int], None] | None = None,
+) -> RunRecord:
     """One run of a strategy.
 
     Args:
@@ -86,6 +96,7 @@ def simulate(experiment: Experiment, planner: Planner | None, *, seed: int, run:
         planner: decides at the experiment's decision steps; None: the sensors never move, and no decision is made.
         seed, run: fix every random number; runs with equal seed and number are paired across planners.
         score: (num_scans, 3) OSPA of the estimates against the truth, see `vedette.evaluation.ospa_of_run`.
+        watch: told the number of every scan that is done.
 
     Raises:
         VedetteError: the true targets cannot be had.
@@ -97,8 +108,8 @@ def simulate(experiment: Experiment, planner: Planner | None, *, seed: int, run:
     journal = Journal(experiment, planner.name if planner is not None else "still", seed, run, truth)
     try:
         # Of scans that are drawn nobody has exchanged the numbers.
-        with told_elsewhere():
-            _go(experiment, planner, journal)
+        with told_elsewhere() if experiment.recording is None else nullcontext():
+            _go(experiment, planner, journal, watch)
         with journal.timing("score"):
             return journal.record(score(truth, journal.estimates))
     except KeyboardInterrupt as interrupt:
@@ -116,25 +127,31 @@ def _told(planner: Any, truth: Truth) -> Planner | None:
     return told
 
 
-def _go(experiment: Experiment, planner: Planner | None, journal: Journal) -> None:
+def _go(experiment: Experiment, planner: Planner | None, journal: Journal, watch: Callable[[int], None] | None) -> None:
     """Every scan of a run, one after the other, written down in the journal."""
     seed, run, num = journal.seed, journal.run, experiment.num_sensors
     scan_rngs, filter_rngs = (sensor_streams(seed, run, stream, num) for stream in (SCANS, FILTER))
     planner = _told(planner, journal.truth)
     planner_rng = run_stream(seed, run, RANDOM_CONTROL if isinstance(planner, RandomPlanner) else PLANNER)
-    tracker = experiment.tracker
+    tracker, recording = experiment.tracker, experiment.recording
     state, fleet = tracker.initial(), experiment.fleet(moving=planner is not None)
     for step, time in enumerate(experiment.times.tolist(), start=1):
         journal.begin(step)
-        poses = fleet.poses(time)
+        poses = fleet.poses(time) if recording is None else recording.poses[step - 1]
         with journal.timing("scans"):
-            scans = simulate_scans(journal.truth.at(step - 1)[1], poses, experiment.sensors_at(step), rngs=scan_rngs)
+            if recording is None:
+                states = journal.truth.at(step - 1)[1]
+                scans = simulate_scans(states, poses, experiment.sensors_at(step), rngs=scan_rngs)
+                measurements = [None if scan is None else scan.measurements for scan in scans]
+            else:
+                measurements = list(recording.scans[step - 1])
         with journal.timing("filter"):
-            measurements = [None if scan is None else scan.measurements for scan in scans]
             state, info = tracker.step(state, measurements, poses, time, rngs=filter_rngs)
         with journal.timing("estimate"):
             estimate = experiment.estimate(state.fused, step)
         journal.note(poses, info, estimate)
+        if watch is not None:
+            watch(step)
         if planner is not None and step in experiment.decision_steps:
             with journal.timing("planning"):
                 plan = planner.plan(state, poses, rng=planner_rng)

@@ -36,6 +36,11 @@ def step_of_time(time: float, start: float, step_period: float) -> int | None:
     return round(position) if abs(position - round(position)) <= _TIME_TOLERANCE else None
 
 
+def _unknown_targets(model: ScenarioModel) -> Iterator[Finding]:
+    if model.targets.kind == "unknown" and model.recording is None:
+        yield ("targets", "kind"), "targets to simulate scans of, or a recording of scans", '"unknown"'
+
+
 def _up_to_last(path: Path, step: int | None, last: int) -> Iterator[Finding]:
     if step is not None and step > last:
         yield path, f"a step up to the last, {last}", describe(step)
@@ -232,6 +237,7 @@ CHECKS = (
     _birth_steps,
     _birth_sites,
     _targets,
+    _unknown_targets,
     _sensor_names,
     _scan_steps,
     _scans_of_unlabelled,

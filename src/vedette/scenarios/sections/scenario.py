@@ -20,6 +20,7 @@ from vedette.scenarios.sections.fusion import AnyFusion, Fusion
 from vedette.scenarios.sections.network import NetworkSection
 from vedette.scenarios.sections.places import OriginSection, bare_degrees, in_metres
 from vedette.scenarios.sections.planners import STRATEGIES, AnyPlanner
+from vedette.scenarios.sections.recording import RecordingSection
 from vedette.scenarios.sections.scoring import AnyEstimator, AnyMetric, Ospa
 from vedette.scenarios.sections.sensors import Sensor, SensorDefaults
 from vedette.scenarios.sections.targets import Targets
@@ -76,6 +77,9 @@ class ScenarioModel(Section):
     survival: Survival = Field(default=of_kind("constant"), description="Whether they go on living [-].")
     birth: Birth = Field(description="Where they appear, as the filters know it [-].")
     targets: Targets = Field(description="The true targets [-].")
+    recording: RecordingSection | None = Field(
+        default=None, description="Scans that were recorded; none: they are simulated [-]."
+    )
     sensor_defaults: SensorDefaults | None = Field(
         default=None, exclude=True, description="What the sensors share; merged into them when read [-]."
     )

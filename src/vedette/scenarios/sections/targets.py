@@ -240,4 +240,22 @@ class CrowdTargets(Section):
         return CrowdTargets(motion, self.number, world.region.build(), np.array(self.std), self.death_probability)
 
 
-Targets = Annotated[ScriptedTargets | RecordedTargets | PoissonTargets | CrowdTargets, Field(discriminator="kind")]
+class UnknownTargets(Section):
+    """Nobody knows them: scans were recorded, and estimates have nothing to be scored against."""
+
+    kind: Literal["unknown"] = Field(default="unknown", description="Kind of targets [-].")
+
+    def expected_number(self, num_steps: int) -> float | None:
+        """None."""
+        return None
+
+    def build(self, world: ScenarioModel, motion: MotionModel, folder: Path) -> ScriptedSource:
+        """None."""
+        from vedette.simulation import ScriptedTargets
+
+        return ScriptedTargets(motion, np.empty((0, motion.state_dim)))
+
+
+Targets = Annotated[
+    ScriptedTargets | RecordedTargets | PoissonTargets | CrowdTargets | UnknownTargets, Field(discriminator="kind")
+]

@@ -1,0 +1,132 @@
+"""The command that tracks recorded scans: track."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from vedette.cli.compiling import compiling
+from vedette.cli.completing import one_of
+from vedette.cli.documents import run_document
+from vedette.cli.errors import named_options, usage_error
+from vedette.cli.options import Overwrite, Trust
+from vedette.cli.output import console, note, publish, say
+from vedette.cli.running import Approval, compile_if_cold, end_stopped, interruptible, print_run
+from vedette.cli.scenario_files import warn
+from vedette.extras import need
+from vedette.text import counted
+
+if TYPE_CHECKING:
+    from vedette.scenarios import Scenario
+    from vedette.simulation.records import RunRecord
+
+_BAD_ROWS = ("refuse", "skip")
+_SHOWN_ROWS = 5
+_LASTING = 10  # estimates of a track that is more than a moment's
+
+
+def track(
+    scans: Annotated[Path, typer.Argument(metavar="SCANS", help="CSV or Parquet file with a row a measurement.")],
+    sensors: Annotated[
+        Path,
+        typer.Option("--sensors", metavar="FILE", help="YAML file about the sensors: where they are, what they see."),
+    ],
+    truth: Annotated[
+        Path | None, typer.Option("--truth", metavar="FILE", help="The targets' own reports, to be scored against.")
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", metavar="DIR", help="Folder for results, tracks, figures; none: only print."),
+    ] = None,
+    overwrite: Overwrite = False,
+    speed: Annotated[
+        float,
+        typer.Option("--speed", min=0.001, help="m/s that targets hardly exceed, where motion or births are not said."),
+    ] = 10.0,
+    bad_rows: Annotated[
+        str,
+        typer.Option(
+            "--bad-rows", help="refuse (default) or skip rows that cannot be read.", autocompletion=one_of(*_BAD_ROWS)
+        ),
+    ] = "refuse",
+    trust: Trust = False,
+) -> None:
+    """Track recorded scans: estimates, whole tracks, health, figures; with the targets' reports, errors too."""
+    from vedette.evaluation.runs import run_scenario
+    from vedette.evaluation.track_table import table_of_run, write_tracks
+    from vedette.scenarios.dumping import dump_scenario
+    from vedette.scenarios.of_recording import scenario_of_recording
+    from vedette.simulation.loop import RunInterrupted, RunStopped
+    from vedette.simulation.storage import check_free, save_run
+
+    if bad_rows not in _BAD_ROWS:
+        raise usage_error(f"expected one of {', '.join(_BAD_ROWS)}; got {bad_rows!r}", "--bad-rows")
+    if out is not None:
+        need("vedette track --out", "matplotlib", "pyarrow")
+        with named_options({"directory": "--out"}):
+            check_free(out, overwrite)
+    scenario, recording, assumed = scenario_of_recording(sensors, scans, truth, speed=speed, bad_rows=bad_rows)
+    Approval(trust)(scenario)
+    warn(scenario)
+    for text in recording.skipped[:_SHOWN_ROWS]:
+        note(f"skipped: {text}")
+    if len(recording.skipped) > _SHOWN_ROWS:
+        note(f"skipped: {len(recording.skipped) - _SHOWN_ROWS} more rows")
+    for text in assumed:
+        note(f"not said, so {text}")
+    with interruptible("nothing was written"):
+        compile_if_cold(scenario)
+        try:
+            with compiling(), _progress(len(recording.times)) as watch:
+                record = run_scenario(scenario, "still", seed=0, watch=watch)
+        except (RunStopped, RunInterrupted) as error:
+            end_stopped(error, "nothing was written")
+        print_run(record, scenario)
+        tracks = _summary(record)
+        say(f"{counted(recording.num_measurements, 'measurement')}, {tracks}")
+        table = table_of_run(record, scenario)
+        written: list[Path] = []
+        if out is not None:
+            text = dump_scenario(scenario.model, folder=scenario.folder)
+            save_run(record, out, scenario_text=text, overwrite=overwrite)
+            for ending in (".csv", ".geojson") if scenario.model.origin is not None else (".csv",):
+                write_tracks(out / "tracks" / f"tracks{ending}", table)
+                written.append(out / "tracks" / f"tracks{ending}")
+    if out is not None:
+        with interruptible(f"wrote {out}, but not all of its figures"):
+            _draw(record, scenario, out)
+        say(f"wrote {out}")
+    document = run_document(record, scenario.model.ospa.unit)
+    publish({**document, "assumed": assumed, "skipped": recording.skipped, "folder": out, "written": written})
+
+
+@contextmanager
+def _progress(num_scans: int) -> Iterator[Callable[[int], None]]:
+    """A bar on a terminal, told of every scan that is done."""
+    from rich.progress import Progress
+
+    screen = console(stderr=True)
+    with Progress(console=screen, disable=not screen.is_terminal, transient=True) as bar:
+        task = bar.add_task("scans", total=num_scans)
+        yield lambda step: bar.update(task, completed=step)
+
+
+def _summary(record: RunRecord) -> str:
+    """How many tracks there were, and how many of them lasted."""
+    seen: dict[tuple[int, ...], int] = {}
+    for estimate in record.estimates:
+        for label in map(tuple, estimate.labels.tolist()):
+            seen[label] = seen.get(label, 0) + 1
+    lasting = sum(number >= _LASTING for number in seen.values())
+    mean = sum(seen.values()) / max(record.num_scans, 1)
+    return f"{counted(len(seen), 'track')}, {lasting} of them of {_LASTING} estimates or more; {mean:.1f} at a time"
+
+
+def _draw(record: RunRecord, scenario: Scenario, out: Path) -> None:
+    from vedette.evaluation.figures import save_figure, scene_of, tracks_figure
+
+    save_figure(tracks_figure(record, scene=scene_of(scenario, record.planner)), out / "figures" / "tracks")

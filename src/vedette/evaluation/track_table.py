@@ -1,0 +1,169 @@
+"""Estimated tracks for the programs of others: named columns, longitude and latitude, UTC; CSV, Parquet, GeoJSON."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from vedette.errors import InputError
+from vedette.evaluation.metrics.matching import match_run
+from vedette.extras import need
+from vedette.files import write_whole
+from vedette.recorded import Origin
+from vedette.scenarios import Scenario
+from vedette.simulation.records import RunRecord
+
+ENDINGS = (".csv", ".parquet", ".geojson")
+_EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
+
+
+def track_table(
+    record: RunRecord,
+    *,
+    cutoff: float,
+    origin: Origin | None = None,
+    start: float = 0.0,
+    is_utc: bool = False,
+    names: Sequence[str] = (),
+) -> dict[str, list[Any]]:
+    """One row an estimate, by columns.
+
+    `time_s` is that of the record plus `start`; `utc` where that is since 1970. `label` is `birth step.index`; `x_m`,
+    `y_m`, `vx_mps`, `vy_mps` the estimate, `std_...` its standard deviations (velocities only where the state goes on
+    with them: four components or more), `existence` the probability that it is there. `lon_deg`, `lat_deg` with an
+    origin. `target` names the true target that OSPA's assignment gives it, nearer than `cutoff` (m); None: none.
+
+    names: of the true targets, by their ids; else `id + 1`.
+    """
+    matching = match_run(record.truth, record.estimates, cutoff=cutoff, order=1.0)
+    partners = dict(
+        zip(
+            zip(matching.scans.tolist(), map(tuple, matching.labels.tolist()), strict=True),
+            record.truth.ids[matching.truth_rows].tolist(),
+            strict=True,
+        )
+    )
+    rows = [
+        (scan, tuple(label), mean, np.sqrt(np.diagonal(cov)), existence)
+        for scan, estimate in enumerate(record.estimates)
+        for label, mean, cov, existence in zip(
+            estimate.labels.tolist(), estimate.means, estimate.covs, estimate.existence.tolist(), strict=True
+        )
+    ]
+    times = [float(record.times[row[0]]) + start for row in rows]
+    table: dict[str, list[Any]] = {"time_s": times}
+    if is_utc:
+        table["utc"] = [_utc(time) for time in times]
+    table["label"] = [f"{label[0]}.{label[1]}" for _, label, *_ in rows]
+    columns = ("x_m", "y_m", "vx_mps", "vy_mps")
+    dim = len(rows[0][2]) if rows else len(columns)
+    for j, column in enumerate(columns[: 4 if dim >= 4 else 2]):
+        table[column] = [float(row[2][j]) for row in rows]
+    for j, column in enumerate(columns[: 4 if dim >= 4 else 2]):
+        table[f"std_{column}"] = [float(row[3][j]) for row in rows]
+    if origin is not None:
+        places = origin.to_degrees(np.array([row[2][:2] for row in rows]).reshape(-1, 2))
+        table["lon_deg"], table["lat_deg"] = places[:, 0].tolist(), places[:, 1].tolist()
+    table["existence"] = [row[4] for row in rows]
+    table["target"] = [_name(partners.get((row[0], row[1])), names) for row in rows]
+    return table
+
+
+def table_of_run(record: RunRecord, scenario: Scenario) -> dict[str, list[Any]]:
+    """As `track_table`, with what the run's scenario says of place, time and targets."""
+    model = scenario.model
+    origin = None if model.origin is None else model.origin.build()
+    names: tuple[str, ...] = ()
+    start, is_utc = 0.0, False
+    if model.recording is not None:
+        recording = model.recording.build(model, scenario.folder)
+        start, is_utc = recording.start, recording.is_utc
+    if model.targets.kind == "recorded":
+        names = tuple(str(track.name) for track in model.targets.source(model, scenario.folder).tracks)
+    return track_table(record, cutoff=model.ospa.cutoff, origin=origin, start=start, is_utc=is_utc, names=names)
+
+
+def write_tracks(path: Path, table: Mapping[str, Sequence[Any]]) -> None:
+    """Write a track table as its file's ending says: .csv, .parquet or .geojson. It appears whole or not at all.
+
+    GeoJSON has a feature a track, a line through its places in longitude and latitude (a point where there is one),
+    with its label, its target, and times and existence place by place.
+
+    Raises:
+        InputError: another ending, a file that cannot be written, or GeoJSON of tracks without longitudes.
+    """
+    ending = path.suffix.lower()
+    if ending not in ENDINGS:
+        raise InputError(f"{path}: expected a file that ends with {', '.join(ENDINGS)}; got {ending or 'none'}")
+    makers = {".csv": _csv, ".parquet": _parquet, ".geojson": _geojson}
+    content = makers[ending](table)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_whole(path, lambda file: file.write(content))
+    except OSError as error:
+        raise InputError(f"{path}: expected a file that can be written; {error}") from error
+
+
+def _name(target: int | None, names: Sequence[str]) -> str | None:
+    if target is None:
+        return None
+    return names[target] if target < len(names) else str(target + 1)
+
+
+def _utc(time: float) -> str:
+    return (_EPOCH + timedelta(seconds=time)).isoformat(timespec="milliseconds").replace("+00:00", "Z")
+
+
+def _csv(table: Mapping[str, Sequence[Any]]) -> bytes:
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(table)
+    writer.writerows(zip(*table.values(), strict=True))
+    return text.getvalue().encode()
+
+
+def _parquet(table: Mapping[str, Sequence[Any]]) -> bytes:
+    need("a Parquet file", "pyarrow")
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    texts = {"utc", "label", "target"}
+    arrays = {name: pa.array(cells, pa.string() if name in texts else pa.float64()) for name, cells in table.items()}
+    content = io.BytesIO()
+    parquet.write_table(pa.table(arrays), content, compression="zstd")
+    return content.getvalue()
+
+
+def _geojson(table: Mapping[str, Sequence[Any]]) -> bytes:
+    if "lon_deg" not in table:
+        raise InputError("GeoJSON: expected tracks in longitude and latitude, by an origin of the scenario; got metres")
+    tracks = defaultdict(list)
+    for row, label in enumerate(table["label"]):
+        tracks[label].append(row)
+    features = []
+    for label, rows in tracks.items():
+        places = [[round(table["lon_deg"][row], 7), round(table["lat_deg"][row], 7)] for row in rows]
+        line = {"type": "LineString", "coordinates": places}
+        geometry = line if len(places) > 1 else {"type": "Point", "coordinates": places[0]}
+        told = {"label": label, "target": _most_common([table["target"][row] for row in rows])}
+        for name in ("time_s", "utc", "existence"):
+            if name in table:
+                told[name] = [table[name][row] for row in rows]
+        features.append({"type": "Feature", "geometry": geometry, "properties": told})
+    return json.dumps({"type": "FeatureCollection", "features": features}).encode()
+
+
+def _most_common(names: Sequence[str | None]) -> str | None:
+    found = [name for name in names if name is not None]
+    return max(sorted(set(found)), key=found.count) if found else None
+
+
+__all__ = ["ENDINGS", "table_of_run", "track_table", "write_tracks"]

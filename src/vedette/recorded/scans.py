@@ -1,0 +1,341 @@
+"""Recorded scans of sensors: rows of measurements, in the units and conventions of whoever wrote them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from vedette.errors import InputError
+from vedette.kernels.base.types import Floats
+from vedette.models.arguments import reject
+from vedette.recorded.geography import Origin
+from vedette.recorded.reports import FARTHEST, LATEST, Table, column_names, is_number, number, seconds
+from vedette.text import shown
+
+# What a row may say: the quantity, and the units that the end of a column's name may give it.
+_LENGTHS = {"m": 1.0, "km": 1000.0, "nmi": 1852.0}
+_ANGLES = {"rad": 1.0, "deg": math.pi / 180.0}
+QUANTITIES: dict[str, Mapping[str, float]] = {
+    "range": _LENGTHS,
+    "bearing": _ANGLES,
+    "x": _LENGTHS,
+    "y": _LENGTHS,
+    "lon": {"deg": 1.0},
+    "lat": {"deg": 1.0},
+    "own_x": _LENGTHS,
+    "own_y": _LENGTHS,
+    "own_lon": {"deg": 1.0},
+    "own_lat": {"deg": 1.0},
+    "own_heading": _ANGLES,
+}
+_OTHER_NAMES = {"lon": ("longitude",), "lat": ("latitude",), "time": ("time_s", "time_utc"), "range": ("distance",)}
+_MOST = {
+    **dict.fromkeys(("lon", "own_lon"), 360.0),
+    **dict.fromkeys(("lat", "own_lat"), 90.0),
+    **dict.fromkeys(("bearing", "own_heading"), 2.0 * math.pi),
+}
+# Components of a measurement of a kind, by their quantities.
+COMPONENTS = {
+    "bearing_range": ("bearing", "range"),
+    "bearing_only": ("bearing",),
+    "range_only": ("range",),
+    "position": ("x", "y"),
+}
+
+Bearings = Literal["east", "north"]
+
+
+@dataclass(frozen=True, slots=True)
+class Site:
+    """A sensor of a recording.
+
+    Attributes:
+        name: as the rows name it; its number, from 1, will do too.
+        kind: of its measurements, a key of `COMPONENTS`.
+        pose: [px, py, heading_rad, ...] where the rows do not say.
+    """
+
+    name: str
+    kind: str
+    pose: tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Conventions:
+    """How the rows are to be read.
+
+    Attributes:
+        columns: name in the table of a quantity, where it differs: {"time": "Time", "sensor": "radar", ...}.
+        units: unit of a quantity ("m", "km", "nmi"; "deg", "rad"), where its column's name does not end with it, as
+            `range_km` and `bearing_deg` do. Lengths are else in m; angles must say.
+        bearings: from where bearings and headings are counted: "north", clockwise, as a compass has them; or "east",
+            counter-clockwise, as the library has them.
+        gather: s; rows of a sensor within this time after its first make one scan, at the mean of their times.
+        bad_rows: whether a row that cannot be read is refused or left out, and counted.
+
+    Raises:
+        InputError: a quantity, unit or word of another kind, or a time below 0.
+    """
+
+    columns: Mapping[str, str]
+    units: Mapping[str, str]
+    bearings: Bearings | None = None
+    gather: float = 0.0
+    bad_rows: Literal["refuse", "skip"] = "refuse"
+
+    def __post_init__(self) -> None:
+        known = ("time", "sensor", *QUANTITIES)
+        for field, given in (("columns", self.columns), ("units", self.units)):
+            for name in given:
+                if name not in known:
+                    raise reject(field, f"quantities among {', '.join(known)}", name)
+        for name, unit in self.units.items():
+            if unit not in QUANTITIES.get(name, {}):
+                raise reject(f"units.{name}", f"one of {', '.join(QUANTITIES.get(name, ())) or 'none'}", unit)
+        if self.bearings not in ("east", "north", None):
+            raise reject("bearings", "east or north", self.bearings)
+        if self.bad_rows not in ("refuse", "skip"):
+            raise reject("bad_rows", "refuse or skip", self.bad_rows)
+        if not 0.0 <= self.gather < math.inf:
+            raise reject("gather", "seconds, at least 0", self.gather)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RecordedScans:
+    """Scans at the instants at which any sensor scanned.
+
+    Attributes:
+        times: (num_instants,) s after the first, increasing.
+        start: s; the recorded time of the first: since 1970 UTC where times were dates.
+        is_utc: whether they were.
+        scans: for each instant one a sensor: (num, meas_dim) measurements as filters take them; None: it did not scan.
+        poses: (num_instants, num_sensors, 3 or more), each sensor where it was when it scanned last.
+        skipped: what was wrong with the rows that were left out.
+    """
+
+    times: Floats
+    start: float
+    is_utc: bool
+    scans: tuple[tuple[Floats | None, ...], ...]
+    poses: Floats
+    skipped: tuple[str, ...] = ()
+
+    @property
+    def num_measurements(self) -> int:
+        """Of all scans."""
+        return sum(len(scan) for scans in self.scans for scan in scans if scan is not None)
+
+
+def parse_scans(
+    table: Table, sites: Sequence[Site], conventions: Conventions, origin: Origin | None = None
+) -> RecordedScans:
+    """Scans out of rows of one measurement each: time, sensor, and what was measured.
+
+    A row whose measured cells are all empty says that the sensor scanned and found nothing.
+
+    Args:
+        table: see `vedette.recorded.reports.read_table`.
+        sites: the sensors, in the order of the tracker's.
+        conventions: how rows are read.
+        origin: of longitudes and latitudes.
+
+    Raises:
+        InputError: names the file, row, column, what was expected and what came.
+    """
+    rows = _Rows(table, sites, conventions, origin)
+    found, skipped = rows.read()
+    if not found:
+        raise InputError(f"{table.source}: expected at least one row that can be read; got none of {len(table.rows)}")
+    return _at_instants(found, sites, conventions.gather, rows.is_utc, skipped)
+
+
+@dataclass(frozen=True, slots=True)
+class _Row:
+    time: float
+    sensor: int
+    measured: tuple[float, ...] | None
+    pose: tuple[float, ...]
+
+
+class _Rows:
+    """The columns of a table as quantities."""
+
+    def __init__(self, table: Table, sites: Sequence[Site], conventions: Conventions, origin: Origin | None) -> None:
+        self.table, self.sites, self.conventions, self.origin = table, sites, conventions, origin
+        self._columns: dict[str, tuple[str, float]] = {}
+        for quantity, units in QUANTITIES.items():
+            if (found := self._found(quantity, units)) is not None:
+                self._columns[quantity] = found
+        self._time, self._sensor = self._plain("time"), self._plain("sensor")
+        self._numbers = {site.name: s for s, site in enumerate(sites)} | {
+            str(s): s - 1 for s in range(1, len(sites) + 1) if str(s) not in {site.name for site in sites}
+        }
+        cells = table.columns[self._time]
+        self.is_utc = len(cells) > 0 and not is_number(cells[0])
+        self._check()
+
+    def _plain(self, quantity: str) -> str:
+        """The column of time or sensor."""
+        names = (self.conventions.columns.get(quantity, quantity), *_OTHER_NAMES.get(quantity, ()))
+        for name in names:
+            if name in self.table.columns:
+                return name
+        self.table.column(names[0])
+        raise AssertionError  # it is not there, which was told
+
+    def _found(self, quantity: str, units: Mapping[str, float]) -> tuple[str, float] | None:
+        """The column of a quantity and what one of its units is in SI; None where there is none."""
+        if (named := self.conventions.columns.get(quantity)) is not None:
+            self.table.column(named)
+            return named, self._unit(quantity, named, units)
+        for stem in (quantity, *_OTHER_NAMES.get(quantity, ())):
+            for name in (stem, *(f"{stem}_{unit}" for unit in units)):
+                if name in self.table.columns:
+                    return name, self._unit(quantity, name, units)
+        return None
+
+    def _unit(self, quantity: str, name: str, units: Mapping[str, float]) -> float:
+        given = self.conventions.units.get(quantity)
+        ends = [unit for unit in units if name.endswith(f"_{unit}")]
+        if given is None and not ends and units is _ANGLES:
+            wanted = f"a unit of {quantity}: a column {quantity}_deg or {quantity}_rad, or units: {{{quantity}: deg}}"
+            raise InputError(f"{self.table.source}, column {shown(name)}: expected {wanted}; got none")
+        return units[given or (ends[0] if ends else next(iter(units)))]
+
+    def _check(self) -> None:
+        """That the table has what the sensors measure, and says how."""
+        have = column_names(self.table.columns) or "none"
+        geographic = {"lon", "lat"} <= set(self._columns)
+        for site in self.sites:
+            if site.kind not in COMPONENTS:
+                raise reject(f"sensor {site.name}", f"measurements of kind {', '.join(COMPONENTS)}", site.kind)
+            for quantity in COMPONENTS[site.kind]:
+                if quantity not in self._columns and not (site.kind == "position" and geographic):
+                    wanted = f"a column of {quantity}, as sensor {shown(site.name)} measures {site.kind}"
+                    raise InputError(f"{self.table.source}: expected {wanted}; got columns {have}")
+        angles = {"bearing", "own_heading"} & set(self._columns)
+        if angles and self.conventions.bearings is None:
+            wanted = "bearings: north (clockwise, a compass) or east (counter-clockwise)"
+            name = shown(self._columns[min(angles)][0])
+            raise InputError(f"{self.table.source}, column {name}: expected {wanted}; got none")
+        if {"lon", "lat", "own_lon", "own_lat"} & set(self._columns) and self.origin is None:
+            wanted = "an origin {lon: , lat: } for longitudes and latitudes"
+            raise InputError(f"{self.table.source}: expected {wanted}; got none")
+
+    def read(self) -> tuple[list[_Row], tuple[str, ...]]:
+        """The rows that can be read, and what is wrong with the others."""
+        found, skipped = list[_Row](), list[str]()
+        for i in range(len(self.table.rows)):
+            try:
+                found.append(self._row(i))
+            except InputError as error:
+                if self.conventions.bad_rows == "refuse":
+                    raise
+                skipped.append(str(error))
+        return found, tuple(skipped)
+
+    def _row(self, i: int) -> _Row:
+        label = str(self.table.columns[self._sensor][i]).strip()
+        if label not in self._numbers:
+            names = ", ".join(shown(site.name) for site in self.sites)
+            raise self.table.fault(i, self._sensor, f"a sensor among {names}, or its number from 1")
+        site = self.sites[self._numbers[label]]
+        return _Row(self._seconds(i), self._numbers[label], self._measured(i, site), self._pose(i, site))
+
+    def _seconds(self, i: int) -> float:
+        """The time of a row, all as dates or all as numbers."""
+        cell = self.table.columns[self._time][i]
+        try:
+            time = seconds(cell)
+        except (TypeError, ValueError, OverflowError):
+            time = math.nan
+        if not abs(time) <= LATEST or is_number(cell) == self.is_utc:
+            wanted = "an ISO 8601 time" if self.is_utc else "a finite number of seconds"
+            raise self.table.fault(i, self._time, wanted)
+        return time
+
+    def _value(self, i: int, quantity: str) -> float:
+        name, unit = self._columns[quantity]
+        try:
+            value = unit * number(self.table.columns[name][i])
+        except (TypeError, ValueError, OverflowError):
+            value = math.nan
+        if not math.isfinite(value):
+            raise self.table.fault(i, name, "a finite number")
+        most = _MOST.get(quantity, FARTHEST)
+        if abs(value) > most * (1.0 + 1e-9) or (quantity == "range" and value < 0.0):
+            limits = f"from {0 if quantity == 'range' else -most / unit:g} to {most / unit:g}"
+            raise self.table.fault(i, name, f"a number {limits}")
+        if quantity in ("bearing", "own_heading"):
+            turned = math.pi / 2.0 - value if self.conventions.bearings == "north" else value
+            return math.remainder(turned, 2.0 * math.pi)
+        return value
+
+    def _measured(self, i: int, site: Site) -> tuple[float, ...] | None:
+        """As filters take it; None of a scan that found nothing."""
+        quantities: tuple[str, ...] = COMPONENTS[site.kind]
+        if site.kind == "position" and "lon" in self._columns:
+            quantities = ("lon", "lat")
+        cells = [self.table.columns[self._columns[quantity][0]][i] for quantity in quantities]
+        if all(cell is None or str(cell).strip() == "" for cell in cells):
+            return None
+        values = [self._value(i, quantity) for quantity in quantities]
+        return self._plane(values) if quantities[0] == "lon" else tuple(values)
+
+    def _pose(self, i: int, site: Site) -> tuple[float, ...]:
+        """Where the sensor was, as far as the row says."""
+        place: tuple[float, ...] = site.pose[:2]
+        if {"own_lon", "own_lat"} <= set(self._columns):
+            place = self._plane([self._value(i, "own_lon"), self._value(i, "own_lat")])
+        elif {"own_x", "own_y"} <= set(self._columns):
+            place = self._value(i, "own_x"), self._value(i, "own_y")
+        heading = self._value(i, "own_heading") if "own_heading" in self._columns else site.pose[2]
+        return (*place, heading, *site.pose[3:])
+
+    def _plane(self, degrees: Sequence[float]) -> tuple[float, ...]:
+        assert self.origin is not None  # as was checked
+        x, y = self.origin.to_plane([degrees[0]], [degrees[1]])[0].tolist()
+        return x, y
+
+
+def _at_instants(
+    rows: list[_Row], sites: Sequence[Site], gather: float, is_utc: bool, skipped: tuple[str, ...]
+) -> RecordedScans:
+    """Rows of one sensor and time as a scan, scans of one time as an instant."""
+    scans: dict[float, dict[int, list[_Row]]] = {}
+    for s in range(len(sites)):
+        own = sorted((row for row in rows if row.sensor == s), key=lambda row: row.time)
+        for group in _groups(own, gather):
+            time = math.fsum(row.time for row in group) / len(group) if gather > 0.0 else group[0].time
+            scans.setdefault(time, {})[s] = group
+    times = sorted(scans)
+    longest = max(len(site.pose) for site in sites)
+    poses, at = np.zeros((len(times), len(sites), longest)), np.zeros((len(sites), longest))
+    for s, site in enumerate(sites):
+        at[s, : len(site.pose)] = site.pose
+    found = []
+    for k, time in enumerate(times):
+        for s, group in scans[time].items():
+            at[s, : len(group[-1].pose)] = group[-1].pose
+        poses[k] = at
+        found.append(tuple(_scan(scans[time][s], sites[s]) if s in scans[time] else None for s in range(len(sites))))
+    return RecordedScans(np.array(times) - times[0], times[0], is_utc, tuple(found), poses, skipped)
+
+
+def _groups(rows: list[_Row], gather: float) -> list[list[_Row]]:
+    groups: list[list[_Row]] = []
+    for row in rows:
+        if groups and row.time - groups[-1][0].time <= gather:
+            groups[-1].append(row)
+        else:
+            groups.append([row])
+    return groups
+
+
+def _scan(rows: list[_Row], site: Site) -> Floats:
+    measured = [row.measured for row in rows if row.measured is not None]
+    return np.array(measured, np.float64).reshape(len(measured), len(COMPONENTS[site.kind]))

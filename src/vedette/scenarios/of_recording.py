@@ -1,0 +1,197 @@
+"""A scenario of recorded scans: what a file about the sensors says, and for the rest what the scans themselves say."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path as FilePath
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from vedette.errors import InputError, ScenarioError
+from vedette.kernels.base.types import Floats
+from vedette.reading import read_text
+from vedette.recorded import RecordedScans
+from vedette.scenarios.loading import Scenario, diagnose
+from vedette.scenarios.sections import ScenarioModel
+from vedette.scenarios.yaml_reader import MOST_BYTES, read_yaml
+
+# What a file about sensors need not say; a scenario must.
+_STAND_INS: dict[str, Any] = {
+    "time": {"num_steps": 1},
+    "region": {"x_min": -1e6, "x_max": 1e6, "y_min": -1e6, "y_max": 1e6},
+}
+_MARGIN = 0.05  # of the extent of what was measured, around it
+_EXISTENCE = 0.03  # of a birth where something was measured
+_LOST_PER_SECOND = 0.001
+_BIRTH_STDS = 2.0  # of the noise across, where most was measured
+
+
+class OfRecording(NamedTuple):
+    """A scenario of a recording.
+
+    scenario: which a run tracks. recording: its scans. assumed: what nobody said, and was taken instead, in words.
+    """
+
+    scenario: Scenario
+    recording: RecordedScans
+    assumed: tuple[str, ...]
+
+
+def scenario_of_recording(
+    sensors: FilePath, scans: FilePath, truth: FilePath | None = None, *, speed: float = 10.0, bad_rows: str = "refuse"
+) -> OfRecording:
+    """The scenario of scans that were recorded.
+
+    Args:
+        sensors: a YAML file with `sensors`, and whatever else of a scenario is known: `origin`, `recording` (columns,
+            units, conventions), `motion`, `survival`, `birth`, `filter`, `fusion`, ...; decisions are left out.
+        scans: the CSV or Parquet file of the scans.
+        truth: the file of the targets' own reports; None: as the file about sensors says, or unknown.
+        speed: m/s that targets hardly exceed; motion and births go by it where nothing is said of them.
+        bad_rows: "refuse" or "skip", see `vedette.recorded.Conventions`.
+
+    Raises:
+        InputError: a file that is not there, or rows that cannot be read.
+        ScenarioError: with every fault of the file about sensors.
+    """
+    document = read_yaml(read_text(sensors, "file about sensors", MOST_BYTES), str(sensors))
+    if not isinstance(document.data, Mapping):
+        raise InputError(f"{sensors}: expected a mapping with `sensors`; got {type(document.data).__name__}")
+    said = {key: value for key, value in document.data.items() if key not in ("control", "planners", "time")}
+    own = said.get("recording")
+    said.setdefault("name", scans.stem)
+    said["recording"] = {
+        **(own if isinstance(own, Mapping) else {}),
+        "path": str(scans.resolve()),
+        "bad_rows": bad_rows,
+    }
+    if truth is not None:
+        own = said.get("targets")
+        known = own if isinstance(own, Mapping) and own.get("kind") == "recorded" else {}
+        said["targets"] = {**known, "kind": "recorded", "path": str(truth.resolve())}
+    elif not _are_recorded(said.get("targets")):
+        said["targets"] = {"kind": "unknown"}
+    first = {**_STAND_INS, "birth": _measured_birth(100.0, speed, _state_dim(said)), **said}
+    first["targets"] = {"kind": "unknown"}
+    model, faults = diagnose(replace(document, data=first), sensors.parent)
+    if model is None:
+        raise ScenarioError([fault.message(str(sensors)) for fault in faults])
+    assert model.recording is not None
+    recording = model.recording.build(model, sensors.parent)
+    told, assumed = _assumed(said, model, recording, sensors.parent, speed)
+    model, faults = diagnose(replace(document, data={**said, **told}), sensors.parent)
+    if model is None:
+        raise ScenarioError([fault.message(str(sensors)) for fault in faults])
+    return OfRecording(Scenario(model, sensors), recording, assumed)
+
+
+def _are_recorded(targets: Any) -> bool:
+    return isinstance(targets, Mapping) and targets.get("kind") == "recorded"
+
+
+def _assumed(
+    said: Mapping[str, Any], model: ScenarioModel, recording: RecordedScans, folder: FilePath, speed: float
+) -> tuple[dict[str, Any], tuple[str, ...]]:
+    """The sections that are missing, by the scans; and in words what they say."""
+    told: dict[str, Any] = {"time": _time(recording)}
+    words = []
+    if "region" not in said:
+        told["region"] = region = _extent(model, recording)
+        words.append("region: x from {x_min:g} to {x_max:g} m, y from {y_min:g} to {y_max:g} m".format(**region))
+    if "motion" not in said:
+        told["motion"] = {"kind": "constant_velocity", "sigma_v": speed / 20.0}
+        words.append(f"motion: constant_velocity, sigma_v {speed / 20.0:g} m/s^2 (speed {speed:g} m/s)")
+    if "survival" not in said:
+        told["survival"] = {"kind": "constant", "probability": 1.0 - _LOST_PER_SECOND, "period": 1.0}
+        words.append(f"survival: {1.0 - _LOST_PER_SECOND:g} a second")
+    if "birth" not in said:
+        std = _BIRTH_STDS * _spread(model, recording, folder)
+        told["birth"] = _measured_birth(std, speed, model.motion.state_dim)
+        words.append(f"birth: of measurements, std {std:.3g} m and {speed:g} m/s, existence up to {_EXISTENCE:g}")
+    told |= _assumed_clutter(said, model, recording, words)
+    if _are_recorded(said["targets"]) and "time_origin" not in said["targets"]:
+        told["targets"] = {**said["targets"], "time_origin": recording.start}
+    return told, tuple(words)
+
+
+def _state_dim(said: Mapping[str, Any]) -> int:
+    motion = said.get("motion")
+    found = motion.get("state_dim") if isinstance(motion, Mapping) else None
+    turns = isinstance(motion, Mapping) and motion.get("kind") == "coordinated_turn"
+    return found if isinstance(found, int) else 4 + turns
+
+
+def _measured_birth(std: float, speed: float, state_dim: int) -> dict[str, Any]:
+    rest = [0.1] * (state_dim - 4)  # a turn rate, rad/s
+    stds = [std, std, speed, speed, *rest]
+    return {"sites": [], "from_measurements": {"expected": 0.5, "max_existence": _EXISTENCE, "std": stds}}
+
+
+def _time(recording: RecordedScans) -> dict[str, Any]:
+    """A regular time that says as much of the recording's as one can."""
+    gaps = np.diff(recording.times)
+    period = float(np.median(gaps)) if len(gaps) else 1.0
+    return {"num_steps": len(recording.times), "step_period": period, "start": float(recording.times[0])}
+
+
+def _assumed_clutter(
+    said: Mapping[str, Any], model: ScenarioModel, recording: RecordedScans, words: list[str]
+) -> dict[str, Any]:
+    """The sensors with a rate of clutter, where none is said: half of what they measure."""
+    defaults = said.get("sensor_defaults")
+    shared = isinstance(defaults, Mapping) and "clutter" in defaults
+    sensors = []
+    for s, sensor in enumerate(said["sensors"]):
+        if shared or "clutter" in sensor:
+            sensors.append(sensor)
+            continue
+        counts = [len(scan) for scans in recording.scans if (scan := scans[s]) is not None]
+        rate = max(0.1, round(0.5 * float(np.mean(counts)), 2)) if counts else 1.0
+        sensors.append({**sensor, "clutter": {"kind": "region", "rate": rate}})
+        words.append(f"clutter of {model.sensor_names[s]}: {rate:g} a scan, half of what it measures")
+    return {"sensors": sensors}
+
+
+def _places(model: ScenarioModel, recording: RecordedScans) -> Floats:
+    """(n, 2) where measurements lie that say so, m."""
+    found = [np.empty((0, 2))]
+    for scans, poses in zip(recording.scans, recording.poses, strict=True):
+        for scan, pose, sensor in zip(scans, poses, model.sensors, strict=True):
+            if scan is None or sensor.measurement.kind not in ("bearing_range", "position"):
+                continue
+            if sensor.measurement.kind == "bearing_range":
+                offsets = scan[:, 1:] * np.column_stack([np.cos(scan[:, 0]), np.sin(scan[:, 0])])
+                scan = pose[:2] + offsets
+            found.append(scan)
+    return np.concatenate(found)
+
+
+def _extent(model: ScenarioModel, recording: RecordedScans) -> dict[str, float]:
+    """A rectangle around all that was measured, and the sensors."""
+    places = np.concatenate([_places(model, recording), recording.poses[:, :, :2].reshape(-1, 2)])
+    low, high = places.min(axis=0), places.max(axis=0)
+    if (high - low).max() <= 0.0:
+        raise InputError("region: expected it in the file about sensors, as what they measure says no places; got none")
+    margin = _MARGIN * float((high - low).max())
+    (x_min, y_min), (x_max, y_max) = np.floor(low - margin).tolist(), np.ceil(high + margin).tolist()
+    return {"x_min": x_min, "x_max": x_max, "y_min": y_min, "y_max": y_max}
+
+
+def _spread(model: ScenarioModel, recording: RecordedScans, folder: FilePath) -> float:
+    """Standard deviation of where was measured, m: the upper quartile over all measurements that say a place."""
+    region, method = model.region.build(), model.filter.gaussian_method
+    found = []
+    for s, section in enumerate(model.sensors):
+        stds = section.build(region, method, folder, model.filter.detection_at).noise.least_stds
+        scans = [scan for scans in recording.scans if (scan := scans[s]) is not None and len(scan)]
+        if stds is None or not scans:
+            continue
+        if section.measurement.kind == "bearing_range":
+            found.append(np.maximum(stds[1], stds[0] * np.concatenate(scans)[:, 1]))
+        elif section.measurement.kind == "position":
+            found.append(np.full(sum(map(len, scans)), stds.max()))
+    if not found:
+        raise InputError("birth: expected it in the file about sensors, as what they measure says no places; got none")
+    return float(np.quantile(np.concatenate(found), 0.75))

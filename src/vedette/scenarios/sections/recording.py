@@ -1,0 +1,82 @@
+"""The section about scans that were recorded, instead of simulated ones."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+from pydantic import Field
+
+from vedette.errors import InputError
+from vedette.scenarios.faults import Finding, describe
+from vedette.scenarios.sections.base import NonNegative, Section, attempt
+
+if TYPE_CHECKING:
+    from vedette.recorded import RecordedScans
+    from vedette.scenarios.sections.scenario import ScenarioModel
+
+
+class RecordingSection(Section):
+    """Scans from a CSV or Parquet file with a row a measurement: time, sensor, and what it measured.
+
+    The sensors are as `sensors` says, at their positions unless a row has `own_x` and `own_y`, or `own_lon` and
+    `own_lat`, and `own_heading`. A row with empty cells says that a sensor scanned and found nothing.
+    """
+
+    path: str = Field(min_length=1, description="CSV or Parquet file, relative to the scenario file [-].")
+    columns: dict[str, str] = Field(
+        default={},
+        description="Names of the columns of time, sensor, range, bearing, x, y, lon, lat, own_x, own_y, own_lon, "
+        "own_lat, own_heading, where they differ from these, with or without a unit at the end (range_km) [-].",
+    )
+    units: dict[str, str] = Field(
+        default={}, description="Units of quantities whose columns do not name them: m, km, nmi; deg, rad [-]."
+    )
+    bearings: Literal["east", "north"] | None = Field(
+        default=None,
+        description="From where bearings and headings count: north, clockwise (a compass), or east, counter-clockwise; "
+        "none: there are none [-].",
+    )
+    gather: NonNegative = Field(
+        default=0.0, description="Rows of a sensor within this time after its first are one scan [s]."
+    )
+    bad_rows: Literal["refuse", "skip"] = Field(
+        default="refuse", description="Whether a row that cannot be read is an error, or left out and told of [-]."
+    )
+
+    def build(self, world: ScenarioModel, folder: Path) -> RecordedScans:
+        """The scans. Raises `InputError` for a file that cannot be read, naming row and column."""
+        from vedette.recorded import Conventions, Site, parse_scans
+        from vedette.recorded.reports import read_table
+
+        sites = [
+            Site(name, sensor.measurement.kind, sensor.pose)
+            for name, sensor in zip(world.sensor_names, world.sensors, strict=True)
+        ]
+        conventions = Conventions(self.columns, self.units, self.bearings, self.gather, self.bad_rows)
+        origin = None if world.origin is None else world.origin.build()
+        return parse_scans(read_table(folder / self.path), sites, conventions, origin)
+
+
+def recording_findings(world: ScenarioModel, folder: Path) -> Iterator[Finding]:
+    """What is wrong with recorded scans, and with what a scenario asks beside them."""
+    section = world.recording
+    if section is None:
+        return
+    yield from attempt(_content(section, world, folder))
+    if world.targets.kind not in ("recorded", "unknown"):
+        yield ("targets", "kind"), "recorded or unknown, as the scans are recorded", describe(world.targets.kind)
+    if world.decision_steps:
+        wanted = "no decisions, as it is recorded where the sensors went"
+        yield ("control",), wanted, f"{len(world.decision_steps)} of them"
+
+
+def _content(section: RecordingSection, world: ScenarioModel, folder: Path) -> Iterator[Finding]:
+    try:
+        section.build(world, folder)
+    except InputError as error:
+        yield ("recording",), "scans that can be read", str(error)
+
+
+__all__ = ["RecordingSection", "recording_findings"]
