@@ -58,6 +58,7 @@ LIGHT = [
 HEAVY = {
     ("show", "linear-10", "--out", "picture.png"): ("matplotlib", "report"),
     ("run", "linear-10", "--planner", "still", "--out", "run"): ("matplotlib and pyarrow", "report"),
+    ("track", "scans.csv", "--sensors", "radars.yaml", "--out", "run"): ("matplotlib and pyarrow", "report"),
     ("campaign", "spec.toml"): ("pyarrow", "campaigns"),
     ("results", "there"): ("pyarrow", "campaigns"),
     ("upgrade", "there"): ("pyarrow", "campaigns"),
@@ -107,7 +108,7 @@ def test_extras_bring_what_they_are_named_for() -> None:
         assert package in brought(extra)
         assert brought("campaigns") <= brought(extra)
     plain = {re.split(r"[<>=]", entry)[0] for entry in PROJECT["dependencies"]}
-    assert plain == {"numba", "numpy", "pydantic", "rich", "ruamel.yaml", "scipy", "typer"}
+    assert plain == {"numba", "numpy", "pydantic", "pymap3d", "rich", "ruamel.yaml", "scipy", "typer"}
 
 
 def test_filters_fusion_control_and_scenarios_need_no_extra(tmp_path: Path) -> None:

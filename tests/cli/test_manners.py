@@ -13,6 +13,7 @@ import pytest
 import typer
 from typer.testing import CliRunner, Result
 
+from recordings import write_recording
 from vedette.campaigns.yardsticks import yardsticks
 from vedette.cli import app, completing
 from vedette.scenarios import list_builtin, load_scenario
@@ -34,6 +35,7 @@ def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     (tmp_path / "short.yaml").write_text(text, "utf-8")
     (tmp_path / "faulty.yaml").write_text(text.replace("num_steps: 3", "num_steps: few"), "utf-8")
     (tmp_path / "spec.toml").write_text(SPEC, "utf-8")
+    write_recording(tmp_path, seconds=20.0)
     monkeypatch.chdir(tmp_path)
     return tmp_path
 
@@ -52,6 +54,7 @@ CALLS: list[tuple[tuple[str, ...], set[str]]] = [
     (("schema", "--out", "schema.json"), {"written"}),
     (("run", "short.yaml", "--planner", "still", "--out", "run"), {"decisions", "ospa", "seconds", "health", "folder"}),
     (("results", "run"), {"decisions", "ospa", "written"}),
+    (("track", "scans.csv", "--sensors", "radars.yaml", "--out", "tracked"), {"ospa", "assumed", "skipped", "folder"}),
     (("campaign", "spec.toml", "--dry-run"), {"cells", "compared", "warnings"}),
     (("campaign", "spec.toml", "--workers", "1"), {"folder", "finished", "failed"}),
     (("results", "trial-results", "--export", "tables"), {"comparisons", "missing", "written"}),
@@ -78,7 +81,7 @@ def test_json_is_one_document_and_quiet_is_silence(place: Path) -> None:
             assert Path(path).exists()
     for words in LISTS:
         assert json.loads(call(*words, "--json").stdout)
-    again = {"init", "generate", "crowd", "run"}
+    again = {"init", "generate", "crowd", "run", "track"}
     for words, _ in CALLS:
         replaced = ("--overwrite",) if words[0] in again else ()
         result = call(*words, *replaced, "--quiet")

@@ -41,8 +41,8 @@ def test_planes_are_those_of_the_formulas_and_lead_back() -> None:
         for _ in range(20):
             origin = Origin(rng.uniform(-180.0, 180.0), rng.uniform(-60.0, 60.0))
             places = np.array([origin.longitude_deg, origin.latitude_deg]) + spread * rng.uniform(-1.0, 1.0, (50, 2))
-            plane = origin.to_plane(*places.T)
-            np.testing.assert_allclose(plane, plain_plane(*places.T, origin), atol=1e-8)
+            plane = origin.to_plane(places[:, 0], places[:, 1])
+            np.testing.assert_allclose(plane, plain_plane(places[:, 0], places[:, 1], origin), atol=1e-8)
             back = origin.to_degrees(plane)
             apart = np.abs(back - places) % 360.0
             assert np.minimum(apart, 360.0 - apart).max() < 1e-11

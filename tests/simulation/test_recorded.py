@@ -244,7 +244,7 @@ def test_bad_csv_is_named(tmp_path, text, message):
 
 
 def test_files_that_are_not_tables(tmp_path):
-    with pytest.raises(InputError, match="no such file; expected recorded targets"):
+    with pytest.raises(InputError, match="no such file; expected a table of records"):
         RecordedTargets.from_file(tmp_path / "none.csv")
     with pytest.raises(InputError, match=r"a \.csv or \.parquet file"):
         RecordedTargets.from_file(tmp_path / "tracks.xlsx")

@@ -105,7 +105,8 @@ def simulate(
         RunInterrupted: a `KeyboardInterrupt`, likewise with the record of the scans before.
     """
     truth = experiment.targets.truth(experiment.times, rng=run_stream(seed, run, TRUTH))
-    journal = Journal(experiment, planner.name if planner is not None else "still", seed, run, truth)
+    alone = "still" if experiment.recording is None else "recorded"
+    journal = Journal(experiment, planner.name if planner is not None else alone, seed, run, truth)
     try:
         # Of scans that are drawn nobody has exchanged the numbers.
         with told_elsewhere() if experiment.recording is None else nullcontext():

@@ -126,6 +126,7 @@ _LABELS = {
     "random": "Random",
     "fixed": "Fixed",
     "still": "Not moving",
+    "recorded": "Recorded scans",
     "delta_glmb": "delta-GLMB",
     "m_delta_glmb": "M-delta-GLMB",
     "factored_glmb": "factored GLMB",

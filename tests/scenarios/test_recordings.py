@@ -1,0 +1,287 @@
+"""Recorded scans: rows in anybody's units and conventions, and the scenario that a file about sensors makes of them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from recordings import ORIGIN, RADARS, SHIPS, write_recording
+from vedette.errors import InputError, ScenarioError
+from vedette.evaluation.runs import run_scenario
+from vedette.evaluation.track_table import table_of_run, write_tracks
+from vedette.recorded import Conventions, Origin, RecordedScans, Site, parse_scans
+from vedette.recorded.reports import Table
+from vedette.scenarios import load_scenario
+from vedette.scenarios.dumping import dump_scenario
+from vedette.scenarios.of_recording import scenario_of_recording
+
+SITES = (Site("north", "bearing_range", (0.0, 0.0, 0.0)), Site("south", "bearing_range", (100.0, 0.0, 0.0)))
+ROWS = [
+    {"time": "0.0", "sensor": "north", "range": "1000", "bearing_rad": "0.5"},
+    {"time": "0.0", "sensor": "2", "range": "500", "bearing_rad": "-0.5"},
+    {"time": "2.5", "sensor": "north", "range": "1001", "bearing_rad": "0.6"},
+    {"time": "2.5", "sensor": "north", "range": "700", "bearing_rad": "3.0"},
+    {"time": "5.0", "sensor": "south", "range": "", "bearing_rad": " "},
+]
+
+
+def table(rows: list[dict[str, Any]]) -> Table:
+    return Table({name: [row[name] for row in rows] for name in rows[0]}, range(2, len(rows) + 2), "scans.csv")
+
+
+def parsed(
+    rows: list[dict[str, Any]] = ROWS, sites: Any = SITES, origin: Origin | None = None, **conventions: Any
+) -> RecordedScans:
+    given: dict[str, Any] = {"columns": {}, "units": {}, "bearings": "east", **conventions}
+    return parse_scans(table(rows), sites, Conventions(**given), origin)
+
+
+def changed(row: int, **cells: Any) -> list[dict[str, Any]]:
+    return [{**one, **cells} if i == row else one for i, one in enumerate(ROWS)]
+
+
+def renamed(names: Mapping[str, str], rows: list[dict[str, Any]] = ROWS) -> list[dict[str, Any]]:
+    return [{names.get(name, name): cell for name, cell in row.items()} for row in rows]
+
+
+def test_rows_of_one_time_and_sensor_are_a_scan_and_empty_cells_a_scan_of_nothing() -> None:
+    found = parsed()
+    assert found.times.tolist() == [0.0, 2.5, 5.0]
+    assert (found.start, found.is_utc, found.num_measurements, found.skipped) == (0.0, False, 4, ())
+    first, second, third = found.scans
+    assert first[0] is not None
+    assert first[1] is not None
+    np.testing.assert_array_equal(first[0], [[0.5, 1000.0]])
+    np.testing.assert_array_equal(first[1], [[-0.5, 500.0]])
+    assert second[0] is not None
+    np.testing.assert_array_equal(second[0], [[0.6, 1001.0], [3.0, 700.0]])
+    assert second[1] is None
+    assert third[0] is None
+    assert third[1] is not None
+    assert third[1].shape == (0, 2)
+    np.testing.assert_array_equal(found.poses[:, 1, :2], [[100.0, 0.0]] * 3)
+
+
+def test_rows_may_come_in_any_order() -> None:
+    shuffled = parsed([ROWS[i] for i in (4, 3, 0, 2, 1)])
+    assert shuffled.times.tolist() == [0.0, 2.5, 5.0]
+    assert shuffled.scans[1][0] is not None
+    assert sorted(shuffled.scans[1][0][:, 1].tolist()) == [700.0, 1001.0]
+
+
+@pytest.mark.parametrize(
+    ("names", "conventions", "factor"),
+    [
+        ({"range": "range_km"}, {}, 1000.0),
+        ({"range": "range_nmi"}, {}, 1852.0),
+        ({"range": "distance"}, {}, 1.0),
+        ({"range": "Entfernung"}, {"columns": {"range": "Entfernung"}, "units": {"range": "km"}}, 1000.0),
+        ({"range": "d_nmi"}, {"columns": {"range": "d_nmi"}}, 1852.0),
+        ({}, {"units": {"range": "nmi"}}, 1852.0),
+    ],
+)
+def test_lengths_are_in_the_unit_that_is_named(names: Any, conventions: Any, factor: float) -> None:
+    scan = parsed(renamed(names), **conventions).scans[0][0]
+    assert scan is not None
+    assert scan[0, 1] == 1000.0 * factor
+
+
+def test_a_compass_counts_clockwise_from_north_in_degrees() -> None:
+    for compass, bearing in ((0.0, 90.0), (90.0, 0.0), (180.0, -90.0), (270.0, 180.0), (-30.0, 120.0), (359.0, 91.0)):
+        rows = renamed(
+            {"bearing_rad": "bearing_deg"}, [{**ROWS[0], "bearing_rad": compass, "own_heading_deg": compass}]
+        )
+        found = parsed(rows, bearings="north")
+        assert found.scans[0][0] is not None
+        assert math.cos(found.scans[0][0][0, 0] - math.radians(bearing)) == pytest.approx(1.0, abs=1e-12)
+        assert math.cos(found.poses[0, 0, 2] - math.radians(bearing)) == pytest.approx(1.0, abs=1e-12)
+
+
+def test_places_in_degrees_are_measured_and_sensors_carry_their_own() -> None:
+    sites = [Site("drone", "position", (0.0, 0.0, 0.0))]
+    row = {"time": 0, "sensor": "drone", "lon": -1.12, "lat": 50.79, "own_lon": -1.13, "own_lat": 50.78}
+    found = parsed([row], sites, ORIGIN)
+    assert found.scans[0][0] is not None
+    np.testing.assert_array_equal(found.scans[0][0], ORIGIN.to_plane([-1.12], [50.79]))
+    np.testing.assert_array_equal(found.poses[0, :, :2], ORIGIN.to_plane([-1.13], [50.78]))
+    plane = parsed([{"time": 0, "sensor": "1", "x": 5, "y": "7.5", "own_x": 1, "own_y": 2}], sites)
+    assert plane.scans[0][0] is not None
+    assert (plane.scans[0][0].tolist(), plane.poses[0, 0, :2].tolist()) == ([[5.0, 7.5]], [1.0, 2.0])
+
+
+def test_rows_of_one_turn_of_the_antenna_are_gathered() -> None:
+    rows = [{**ROWS[0], "time": time, "range": 1000 + i} for i, time in enumerate((0.0, 1.0, 2.0, 5.0, 5.5))]
+    found = parsed(rows, gather=2.5)
+    assert found.times.tolist() == [0.0, 4.25]
+    assert [len(scan) for scans in found.scans for scan in scans if scan is not None] == [3, 2]
+    assert found.start == 1.0
+
+
+def test_dates_are_utc() -> None:
+    rows = [{**ROWS[0], "time": text} for text in ("2016-01-12T13:02:21Z", "2016-01-12T14:02:23.5+01:00")]
+    found = parsed(rows)
+    assert (found.is_utc, found.times.tolist(), found.start) == (True, [0.0, 2.5], 1452603741.0)
+
+
+@pytest.mark.parametrize(
+    ("rows", "conventions", "message"),
+    [
+        (changed(3, range="far"), {}, "scans.csv, row 5, column 'range': expected a finite number; got 'far'"),
+        (changed(3, range="nan"), {}, "scans.csv, row 5, column 'range': expected a finite number; got 'nan'"),
+        (changed(3, range="-3"), {}, "row 5, column 'range': expected a number from 0 to 1e+09; got '-3'"),
+        (changed(3, range=""), {}, "row 5, column 'range': expected a finite number; got ''"),
+        (
+            changed(3, bearing_rad="40"),
+            {},
+            "expected a number from -6.28319 to 6.28319; got '40'",
+        ),
+        (
+            changed(3, sensor="east"),
+            {},
+            "column 'sensor': expected a sensor among 'north', 'south', or its number",
+        ),
+        (changed(3, sensor="3"), {}, "expected a sensor among 'north', 'south', or its number from 1; got '3'"),
+        (changed(3, time="soon"), {}, "row 5, column 'time': expected a finite number of seconds; got 'soon'"),
+        (changed(3, time="2016-01-12"), {}, "row 5, column 'time': expected a finite number of seconds"),
+        (ROWS, {"bearings": None}, "column 'bearing_rad': expected bearings: north (clockwise, a compass) or east"),
+        (renamed({"bearing_rad": "bearing"}), {}, "column 'bearing': expected a unit of bearing: a column bearing_deg"),
+        (renamed({"range": "reach"}), {}, "expected a column of range, as sensor 'north' measures bearing_range; got"),
+        (renamed({"time": "when"}), {}, "expected a column 'time'; got columns when, sensor, range, bearing_rad"),
+        (ROWS, {"columns": {"range": "reach"}}, "expected a column 'reach'; got columns time, sensor"),
+        (ROWS, {"columns": {"speed": "v"}}, "columns: expected quantities among time, sensor, range"),
+        (ROWS, {"units": {"range": "ft"}}, "units.range: expected one of m, km, nmi; got ft"),
+        (ROWS, {"gather": -1.0}, "gather: expected seconds, at least 0; got -1.0"),
+        (
+            changed(0, own_lon=1.0, own_lat=2.0)[:1],
+            {},
+            "expected an origin {lon: , lat: } for longitudes and latitudes",
+        ),
+    ],
+)
+def test_what_cannot_be_read_is_named(rows: Any, conventions: Any, message: str) -> None:
+    with pytest.raises(InputError) as error:
+        parsed(rows, **conventions)
+    assert message in str(error.value)
+
+
+def test_bad_rows_are_left_out_and_named_where_that_is_asked_for() -> None:
+    found = parsed(changed(3, range="far"), bad_rows="skip")
+    assert found.num_measurements == 3
+    assert found.skipped == ("scans.csv, row 5, column 'range': expected a finite number; got 'far'",)
+    with pytest.raises(InputError, match="expected at least one row that can be read; got none of 1"):
+        parsed([{**ROWS[0], "range": "far"}], bad_rows="skip")
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    write_recording(tmp_path)
+    return tmp_path
+
+
+def test_a_recording_is_tracked_by_what_is_known_of_its_sensors_alone(folder: Path) -> None:
+    made = scenario_of_recording(folder / "radars.yaml", folder / "scans.csv", folder / "truth.csv")
+    assert [text.split(":")[0] for text in made.assumed] == [
+        "region", "motion", "survival", "birth", "clutter of Calshot", "clutter of boat",
+    ]  # fmt: skip
+    record = run_scenario(made.scenario, "still", seed=0)
+    assert (record.planner, record.num_scans) == ("recorded", len(made.recording.times))
+    np.testing.assert_allclose(record.poses[-1, 0, :2], RADARS["Calshot"][0], atol=5.0)
+    last = made.recording.times[-1] + made.recording.start
+    table = table_of_run(record, made.scenario)
+    now = [i for i, time in enumerate(table["time_s"]) if time == last]
+    assert sorted(table["target"][i] for i in now) == ["ship 0", "ship 1", "ship 2"]
+    assert record.ospa[-10:, 0].mean() < 40.0
+    assert table["utc"][now[0]].startswith("2016-01-12T13:04:")
+    places = ORIGIN.to_plane([table["lon_deg"][i] for i in now], [table["lat_deg"][i] for i in now])
+    np.testing.assert_allclose(places[:, 0], [table["x_m"][i] for i in now], atol=1e-6)
+    truth = SHIPS[:, :2] + SHIPS[:, 2:] * (last - 1452603741.0)
+    assert max(min(np.hypot(*(place - ship)) for ship in truth) for place in places) < 150.0
+
+
+def test_without_the_targets_reports_nothing_is_scored(folder: Path) -> None:
+    made = scenario_of_recording(folder / "radars.yaml", folder / "scans.csv")
+    record = run_scenario(made.scenario, "still", seed=0)
+    assert np.isnan(record.ospa).all()
+    assert set(table_of_run(record, made.scenario)["target"]) == {None}
+    (folder / "kept.yaml").write_text(dump_scenario(made.scenario.model, folder=made.scenario.folder), "utf-8")
+    again = run_scenario(load_scenario(folder / "kept.yaml"), "still", seed=0)
+    for one, other in zip(record.estimates, again.estimates, strict=True):
+        assert one.means.tobytes() == other.means.tobytes()
+
+
+def test_what_is_said_is_not_assumed(folder: Path) -> None:
+    said = (
+        "motion: {kind: constant_velocity, sigma_v: 0.2}\nregion: {x_min: -9e3, x_max: 9e3, y_min: -9e3, y_max: 9e3}\n"
+    )
+    text = (folder / "radars.yaml").read_text("utf-8")
+    (folder / "radars.yaml").write_text(
+        text.replace("detection:", "clutter: {kind: region, rate: 2.0}\n  detection:") + said
+    )
+    made = scenario_of_recording(folder / "radars.yaml", folder / "scans.csv")
+    assert [words.split(":")[0] for words in made.assumed] == ["survival", "birth"]
+    assert made.scenario.model.motion.sigma_v == 0.2
+    assert made.scenario.model.sensors[0].clutter.rate == 2.0
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("sensors:\n", "sensors: []\nmore:\n", r"sensors: expected a list of at least 1"),
+        ("name: Calshot", "name: Cowes", r"recording: expected scans that can be read, got .*'Calshot'"),
+        ("sigma_range: 20.0", "sigma_range: far", r"sigma_range: expected a number, got \"far\""),
+        (
+            "kind: bearing_range",
+            "kind: bearing_only",
+            "measurement.kind: expected a measurement that says where a target is",
+        ),
+    ],
+)
+def test_faults_of_the_file_about_sensors_are_told(folder: Path, old: str, new: str, message: str) -> None:
+    text = (folder / "radars.yaml").read_text("utf-8")
+    assert old in text
+    (folder / "radars.yaml").write_text(text.replace(old, new), "utf-8")
+    with pytest.raises((ScenarioError, InputError), match=message):
+        scenario_of_recording(folder / "radars.yaml", folder / "scans.csv")
+
+
+def test_a_recording_goes_with_no_decisions_and_no_invented_targets(folder: Path) -> None:
+    made = scenario_of_recording(folder / "radars.yaml", folder / "scans.csv")
+    text = dump_scenario(made.scenario.model, folder=folder)
+    for old, new, message in (
+        ("{kind: unknown}", "{kind: scripted, tracks: []}", "targets.kind: expected recorded or unknown"),
+        ("decision_steps:\n", "decision_steps: [3]\n", "control: expected no decisions"),
+    ):
+        assert old in text
+        (folder / "kept.yaml").write_text(text.replace(old, new), "utf-8")
+        with pytest.raises(ScenarioError, match=message):
+            load_scenario(folder / "kept.yaml")
+
+
+def test_tracks_are_written_as_others_read_them(folder: Path) -> None:
+    import csv
+    import json
+
+    from pyarrow import parquet
+
+    made = scenario_of_recording(folder / "radars.yaml", folder / "scans.csv", folder / "truth.csv")
+    columns = table_of_run(run_scenario(made.scenario, "still", seed=0), made.scenario)
+    for ending in ("csv", "parquet", "geojson"):
+        write_tracks(folder / "deep" / f"tracks.{ending}", columns)
+    with (folder / "deep/tracks.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [float(row["x_m"]) for row in rows] == columns["x_m"]
+    assert parquet.read_table(folder / "deep/tracks.parquet").to_pydict() == columns
+    features = json.loads((folder / "deep/tracks.geojson").read_text("utf-8"))["features"]
+    assert sum(len(each["properties"]["time_s"]) for each in features) == len(columns["label"])
+    long = [each for each in features if len(each["properties"]["time_s"]) > 10]
+    assert sorted(each["properties"]["target"] for each in long) == ["ship 0", "ship 1", "ship 2"]
+    assert all(each["geometry"]["type"] == "LineString" for each in long)
+    with pytest.raises(InputError, match=r"expected a file that ends with .csv, .parquet, .geojson; got .txt"):
+        write_tracks(folder / "tracks.txt", columns)
+    with pytest.raises(InputError, match="expected tracks in longitude and latitude"):
+        write_tracks(folder / "t.geojson", {name: cells for name, cells in columns.items() if name != "lon_deg"})
