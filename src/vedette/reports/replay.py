@@ -19,10 +19,11 @@ from vedette.kernels.base.types import Floats
 from vedette.reports.groups import Strategy
 from vedette.reports.why import why_data
 from vedette.scenarios import Scenario
-from vedette.scenarios.build import build_scan_times, build_true_sensors
+from vedette.scenarios.build import build_scan_times, build_true_sensors, drop_outs
 from vedette.scenarios.sections.sensors import Sensor as SensorSection
 from vedette.scenarios.trust import code_of
 from vedette.scenarios.views import field_of_view
+from vedette.simulation.loop import scans_of_run
 from vedette.simulation.records import Decision, RunRecord
 from vedette.simulation.replay import scans_of_sensors
 from vedette.simulation.scans import Scan
@@ -177,7 +178,8 @@ def _scans(
     region, method = model.region.build(), model.filter.gaussian_method
     try:
         sensors = [section.build(region, method, scenario.folder) for section in model.sensors]
-        true, scans_at = build_true_sensors(scenario, sensors), build_scan_times(scenario)
+        true, times = build_true_sensors(scenario, sensors), build_scan_times(scenario)
+        scans_at = scans_of_run(times, drop_outs(scenario), record.num_scans, record.seed, record.run)
         scans = scans_of_sensors(record, len(true), partial(scanning, true, scans_at))
     except VedetteError:
         return []

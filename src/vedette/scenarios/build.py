@@ -74,6 +74,7 @@ def build_experiment(scenario: Scenario) -> Experiment:
         true_sensors=build_true_sensors(scenario, known) if any(sensor.truth for sensor in model.sensors) else (),
         scans_at=None if times.all() or recording is not None else times,
         recording=recording,
+        drop_out=drop_outs(scenario),
     )
 
 
@@ -99,13 +100,13 @@ def build_sensors(scenario: Scenario) -> tuple[MobileSensor, ...]:
 
 def _scan_times(model: ScenarioModel, sensor: Sensor) -> Floats | None:
     """s of the scans of a sensor, as far as decisions look ahead, past the last step too; None: at every step."""
-    if sensor.scans.every == 1:
+    if sensor.scans.steps(model.time.step_period)[0] == 1:
         return None
     lookahead, horizon = model.control.lookahead or Lookahead(), math.prod(model.horizon)
     ahead = horizon + (lookahead.depth - 1) * (lookahead.period or horizon)
     num = model.time.num_steps + math.ceil(ahead / model.time.step_period)
-    times = model.time.model_copy(update={"num_steps": num}).build()
-    found: Floats = times[sensor.scans.build(num)]
+    time = model.time.model_copy(update={"num_steps": num})
+    found: Floats = time.build()[sensor.scans.build(time)]
     return found
 
 
@@ -116,7 +117,8 @@ def _check_own(scenario: Scenario, section: Sensor, sensor: SensorModel, local: 
     if born and sensor.measurement.places is None and isinstance(measured, Custom):
         wanted = f"{measured.function} to give a measurement with `places`, as targets are born of measurements"
         raise NotGiven(measured, "function", wanted, "one without")
-    waits = not section.scans.build(model.time.num_steps).all() or (model.network is not None and model.network.delay)
+    waits = section.scans.drop_out or not section.scans.build(model.time).all()
+    waits = waits or (model.network is not None and model.network.delay)
     if isinstance(model.filter, CustomFilter) and (born or waits) and not isinstance(local, TwoStepFilter):
         why = "targets are born of measurements" if born else "it must predict without a scan"
         wanted = f"{model.filter.function} to give a TwoStepFilter, with predict() and update(), as {why}"
@@ -131,10 +133,16 @@ def build_true_sensors(scenario: Scenario, known: Sequence[SensorModel]) -> tupl
     return tuple(section.build_true(sensor, region, scenario.folder) for section, sensor in places)
 
 
+def drop_outs(scenario: Scenario) -> tuple[float, ...]:
+    """Probability of each sensor that a scan does not take place; () where all do."""
+    found = tuple(sensor.scans.drop_out for sensor in scenario.model.sensors)
+    return found if any(found) else ()
+
+
 def build_scan_times(scenario: Scenario) -> Bools:
     """(num_sensors, num_steps) whether each sensor scans then."""
     model = scenario.model
-    return np.array([sensor.scans.build(model.time.num_steps) for sensor in model.sensors])
+    return np.array([sensor.scans.build(model.time) for sensor in model.sensors])
 
 
 def _tracker(scenario: Scenario, filters: tuple[Filter, ...]) -> Tracker:

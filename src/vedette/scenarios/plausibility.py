@@ -109,7 +109,10 @@ def _distance(start: Floats, site: BirthSite, order: list[int]) -> float:
 
 def _per_scan(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
     """Probabilities a scan, where a sensor does not scan at every step: they count at every step all the same."""
-    every, name = max((own.scans.every, name) for own, name in zip(model.sensors, model.sensor_names, strict=True))
+    every, name = max(
+        (own.scans.steps(model.time.step_period)[0], name)
+        for own, name in zip(model.sensors, model.sensor_names, strict=True)
+    )
     survival, per_scan = model.survival, []
     if model.birth.period is None and model.birth.steps == "every":
         per_scan.append("birth")

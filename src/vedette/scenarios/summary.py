@@ -171,6 +171,11 @@ def _in_truth(sensor: Sensor) -> list[tuple[str, str]]:
         sections = [(name, value) for name, value in parts.items() if isinstance(value, Section)]
         found = [(f"true {name.replace('_', ' ')}", settings(value)) for name, value in sections]
         found += [("detection of", "the measurement")] if truth.detection_of == "measurement" else []
-    if sensor.scans.every > 1:
-        found.append(("scans", f"every {sensor.scans.every} steps from step {sensor.scans.first}"))
+    scans = sensor.scans
+    if scans.period is not None:
+        found.append(("scans", f"every {scans.period:g} s from {scans.offset or 0.0:g} s on"))
+    elif scans.every > 1:
+        found.append(("scans", f"every {scans.every} steps from step {scans.first}"))
+    if sensor.scans.drop_out:
+        found.append(("drop-outs", f"{sensor.scans.drop_out:g} of its scans"))
     return found

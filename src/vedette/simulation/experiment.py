@@ -50,6 +50,7 @@ class Experiment:
         decision_steps: scans (counted from 1) after which the planner is asked.
         true_sensors: the ones that scan; (): they are what the tracker takes them for.
         scans_at: (num_sensors, num_scans or more) whether each scans then; None: at every step.
+        drop_out: of each sensor the probability that a scan does not take place; (): none.
         explain: whether decisions are kept with their explanations, see `vedette.control.Plan.explain`.
         recording: scans that were recorded at `times`, from where; None: they are simulated.
 
@@ -68,6 +69,7 @@ class Experiment:
     decision_steps: tuple[int, ...]
     true_sensors: tuple[TrueSensor, ...] = ()
     scans_at: Bools | None = None
+    drop_out: tuple[float, ...] = ()
     explain: bool = True
     recording: Recording | None = None
 
@@ -90,6 +92,8 @@ class Experiment:
         if bad:
             raise InputError(f"decision_steps: expected scans from 1 to {len(self.times)}; got {bad[0]}")
         true_sensors_of(self.true_sensors, self.tracker.sensors)
+        if self.drop_out and (len(self.drop_out) != num or not all(0.0 <= share < 1.0 for share in self.drop_out)):
+            raise InputError(f"drop_out: expected {num} probabilities below 1, one a sensor; got {self.drop_out}")
         if self.scans_at is not None:
             self._check_scans_at(np.asarray(self.scans_at))
         if self.recording is not None:
@@ -115,9 +119,13 @@ class Experiment:
         """Number of sensors."""
         return len(self.tracker.sensors)
 
-    def sensors_at(self, step: int) -> tuple[TrueSensor | None, ...]:
-        """The sensors as they are at a step (from 1); None for one that does not scan then."""
-        return scanning(true_sensors_of(self.true_sensors, self.tracker.sensors), self.scans_at, step)
+    def sensors_at(self, step: int, scans_at: Bools | None = None) -> tuple[TrueSensor | None, ...]:
+        """The sensors as they are at a step (from 1); None for one that does not scan then.
+
+        scans_at: of a run, see `vedette.simulation.loop.scans_of_run`; None: without drop-outs.
+        """
+        times = self.scans_at if scans_at is None else scans_at
+        return scanning(true_sensors_of(self.true_sensors, self.tracker.sensors), times, step)
 
     def fleet(self, *, moving: bool = True) -> Fleet:
         """The platforms at the first scan; those that are not under way, or not `moving` at all, lie still."""

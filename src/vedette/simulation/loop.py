@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sysconfig
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
@@ -13,6 +13,7 @@ import numpy as np
 
 from vedette.control import Planner, RandomPlanner
 from vedette.errors import VedetteError
+from vedette.kernels.base.types import Bools
 from vedette.plausible import told_elsewhere
 from vedette.simulation.experiment import Experiment
 from vedette.simulation.journal import Journal, Score
@@ -67,7 +68,7 @@ class RunInterrupted(KeyboardInterrupt):
 
 
 # Streams of one run: strategies meet the same truth and the same luck in the scans, whatever else they draw.
-TRUTH, SCANS, FILTER, PLANNER, RANDOM_CONTROL = range(5)
+TRUTH, SCANS, FILTER, PLANNER, RANDOM_CONTROL, DROP_OUTS = range(6)
 
 
 def run_stream(seed: int, run: int, *stream: int) -> np.random.Generator:
@@ -78,6 +79,21 @@ def run_stream(seed: int, run: int, *stream: int) -> np.random.Generator:
 def sensor_streams(seed: int, run: int, stream: int, num_sensors: int) -> tuple[np.random.Generator, ...]:
     """The random numbers of one purpose in one run, for each sensor its own."""
     return tuple(run_stream(seed, run, stream, sensor) for sensor in range(num_sensors))
+
+
+def scans_of_run(
+    scans_at: Bools | None, drop_out: Sequence[float], num_scans: int, seed: int, run: int
+) -> Bools | None:
+    """(num_sensors, num_scans or more) whether each sensor scans in a run, drop-outs taken out; None: always.
+
+    scans_at, drop_out: as of an `Experiment`. Each sensor drops out by random numbers of its own, so that its other
+    scans are those of a run without drop-outs but for what it drew meanwhile.
+    """
+    if not drop_out:
+        return scans_at
+    streams = sensor_streams(seed, run, DROP_OUTS, len(drop_out))
+    there = np.array([rng.random(num_scans) >= share for rng, share in zip(streams, drop_out, strict=True)])
+    return there if scans_at is None else there & scans_at[:, :num_scans]
 
 
 def simulate(
@@ -135,6 +151,7 @@ def _go(experiment: Experiment, planner: Planner | None, journal: Journal, watch
     planner = _told(planner, journal.truth)
     planner_rng = run_stream(seed, run, RANDOM_CONTROL if isinstance(planner, RandomPlanner) else PLANNER)
     tracker, recording = experiment.tracker, experiment.recording
+    scans_at = scans_of_run(experiment.scans_at, experiment.drop_out, len(experiment.times), seed, run)
     state, fleet = tracker.initial(), experiment.fleet(moving=planner is not None)
     for step, time in enumerate(experiment.times.tolist(), start=1):
         journal.begin(step)
@@ -142,7 +159,7 @@ def _go(experiment: Experiment, planner: Planner | None, journal: Journal, watch
         with journal.timing("scans"):
             if recording is None:
                 states = journal.truth.at(step - 1)[1]
-                scans = simulate_scans(states, poses, experiment.sensors_at(step), rngs=scan_rngs)
+                scans = simulate_scans(states, poses, experiment.sensors_at(step, scans_at), rngs=scan_rngs)
                 measurements = [None if scan is None else scan.measurements for scan in scans]
             else:
                 measurements = list(recording.scans[step - 1])

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 from vedette.errors import InputError
 from vedette.simulation.experiment import Experiment
-from vedette.simulation.loop import SCANS, sensor_streams
+from vedette.simulation.loop import SCANS, scans_of_run, sensor_streams
 from vedette.simulation.records import RunRecord
 from vedette.simulation.scans import Scan, simulate_scans
 from vedette.simulation.true_sensors import TrueSensor
@@ -30,7 +31,8 @@ def scans_of(record: RunRecord, experiment: Experiment) -> tuple[tuple[Scan | No
         InputError: another number of sensors in the record than in the experiment.
         VedetteError: what the models raise.
     """
-    return scans_of_sensors(record, experiment.num_sensors, experiment.sensors_at)
+    scans_at = scans_of_run(experiment.scans_at, experiment.drop_out, len(experiment.times), record.seed, record.run)
+    return scans_of_sensors(record, experiment.num_sensors, partial(experiment.sensors_at, scans_at=scans_at))
 
 
 def scans_of_sensors(

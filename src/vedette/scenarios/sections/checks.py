@@ -197,18 +197,22 @@ def _name_once(path: Path, sensor: Sensor, names: set[str]) -> Iterator[Finding]
 
 def _scan_steps(model: ScenarioModel) -> Iterator[Finding]:
     for i, sensor in enumerate(model.sensors):
-        yield from attempt(_first_scan(("sensors", i, "scans", "first"), sensor, model))
+        yield from attempt(_first_scan(("sensors", i, "scans"), sensor, model))
 
 
 def _scans_of_unlabelled(model: ScenarioModel) -> Iterator[Finding]:
     kind = model.filter.kind
     for i, sensor in enumerate(model.sensors):
-        if kind in UNLABELLED and not sensor.scans.build(model.time.num_steps).all():
+        if kind in UNLABELLED and (sensor.scans.drop_out or not sensor.scans.build(model.time).all()):
             yield ("sensors", i, "scans"), f"every step, as {kind} filters go on from each scan", "only some"
 
 
 def _first_scan(path: Path, sensor: Sensor, model: ScenarioModel) -> Iterator[Finding]:
-    yield from _up_to_last(path, sensor.scans.first, model.time.num_steps)
+    scans, period = sensor.scans, model.time.step_period
+    for inside, wanted, got in scans.findings_beside(period):
+        yield (*path, *inside), wanted, got
+    name = "first" if scans.period is None else "offset"
+    yield from _up_to_last((*path, name), scans.steps(period)[1], model.time.num_steps)
 
 
 def _score(model: ScenarioModel) -> Iterator[Finding]:
