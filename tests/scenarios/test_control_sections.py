@@ -106,7 +106,7 @@ KINDS = "one of keep_out, separation, stay_inside, void_probability, custom"
         ("constraints: [{distance: 3.0}]", f"control.constraints[0]: expected a mapping with kind: {KINDS}, got no kind"),
         ("constraints: [{kind: separation, distance: 0.0}]", "control.constraints[0].distance: expected a number above 0, got 0.0"),
         ("constraints: [{kind: separation}]", "control.constraints[0].distance: expected a value, as it is required, got nothing"),
-        ("constraints: [{kind: keep_out}]", "control.constraints[0]: expected either region or polygon, got none"),
+        ("constraints: [{kind: keep_out}]", "control.constraints[0]: expected either region, polygon or geojson, got none"),
         ("constraints: [{kind: keep_out, polygon: [[0, 0], [1, 1]]}]", "control.constraints[0].polygon: expected"),
         ("constraints: [{kind: stay_inside, region: {x_min: 1.0, x_max: 0.0, y_min: 0.0, y_max: 1.0}}]", "control.constraints[0].region.x_max: expected a number above x_min, 1, got 0.0"),
         ("constraints: [{kind: separation, distance: 3.0}, {kind: void_probability, radius: 5.0, probability: 2.0}]", "control.constraints[1].probability: expected a number of at most 1, got 2.0"),

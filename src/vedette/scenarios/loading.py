@@ -13,6 +13,7 @@ from vedette.reading import read_text
 from vedette.scenarios.diagnostics import UNKNOWN, read_section, suggestion
 from vedette.scenarios.faults import Fault, Path, Told, describe
 from vedette.scenarios.file_checks import recorded_findings, reference_findings
+from vedette.scenarios.geojson import with_zones
 from vedette.scenarios.sections import ScenarioModel
 from vedette.scenarios.sections.base import attempt
 from vedette.scenarios.sections.recording import recording_findings
@@ -83,8 +84,10 @@ def diagnose(document: Document, folder: FilePath | None) -> tuple[ScenarioModel
             place = document.value_place(())
             faults.append(Fault(place, Told((), "a mapping of the sections of a scenario", describe(document.data))))
         return None, _unique(faults)
-    model, told = read_section(ScenarioModel, document.data)
     beside = folder or FilePath()
+    data, unread = with_zones(document.data, beside)
+    model, told = read_section(ScenarioModel, data)
+    told += unread
     read = (recorded_findings(model, beside), recording_findings(model, beside), reference_findings(model, beside))
     for findings in read:
         told += [Told(*finding) for finding in attempt(findings)]

@@ -11,7 +11,7 @@ from vedette.scenarios.sections.deciding import KeepOut, StayInside
 from vedette.scenarios.sections.sensors import Sensor
 from vedette.scenarios.sections.world import RegionSection
 
-REGION, NO_GO, INSIDE = "region", "no-go zone", "sensors stay inside"
+REGION, NO_GO, INSIDE, HOLE = "region", "no-go zone", "sensors stay inside", "hole of a no-go zone"
 
 
 class FieldOfView(NamedTuple):
@@ -37,7 +37,8 @@ def zones(model: ScenarioModel) -> tuple[Zone, ...]:
         if isinstance(section, StayInside):
             found.append(Zone(INSIDE, _corners(section.region)))
         elif isinstance(section, KeepOut):
-            found.append(Zone(NO_GO, section.polygon or _corners(section.region)))
+            found += [Zone(NO_GO, section.polygon or _corners(section.region))]
+            found += [Zone(HOLE, hole) for hole in section.holes]
     return tuple(found)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -59,21 +59,27 @@ class KeepOut(Alone):
     Attributes:
         area: a `Region`, or the corners (num_corners, 2) of a polygon in order, m, 3 or more; one that crosses itself
             forbids what is inside by the even-odd rule. Its edge is forbidden, too.
+        holes: polygons inside it that are not forbidden, but for their edges: a lake on an island.
 
     Raises:
-        InputError: an area that is neither.
+        InputError: an area or hole that is neither.
     """
 
     area: Region | Floats
+    holes: tuple[Floats, ...] = ()
     timeless = True
+    _edges: tuple[Floats, Floats] = field(init=False, repr=False)  # (num_edges, 2) where each begins and ends
 
     def __post_init__(self) -> None:
-        corners = float_array("area", _corners(self.area), (None, 2))
-        if len(corners) < 3:
-            raise reject("area", "a Region, or a polygon of at least 3 corners", f"{len(corners)} corners")
+        corners = _polygon("area", self.area.corners if isinstance(self.area, Region) else self.area)
         if not isinstance(self.area, Region):
             tell_degrees("area", corners)
             object.__setattr__(self, "area", corners)
+        holes = tuple(_polygon(f"holes[{i}]", hole) for i, hole in enumerate(self.holes))
+        object.__setattr__(self, "holes", holes)
+        rings = (corners, *holes)
+        ends = np.concatenate([np.roll(ring, -1, axis=0) for ring in rings])
+        object.__setattr__(self, "_edges", (np.concatenate(rings), ends))
 
     @property
     def name(self) -> str:
@@ -87,49 +93,51 @@ class KeepOut(Alone):
 
     def violations(self, situation: Situation) -> tuple[Floats, ...]:
         """m inside it, the mean over the way's corners; next to nothing where it is only crossed between two."""
-        corners = _corners(self.area)
+        edges = self._edges
         ways = np.concatenate([situation.ways(s) for s in range(len(situation.courses))])
-        inside, crosses = _inside(ways, corners), _cross(ways, corners)
+        inside, crosses = _inside(ways, edges), _cross(ways, edges)
         if situation.poses is not None:
             crosses[:, 0] &= ~inside[:, 0]
             inside[:, 0] = False
-        depths = np.where(inside, _distances(ways, corners), 0.0).mean(axis=1)
+        depths = np.where(inside, _distances(ways, edges), 0.0).mean(axis=1)
         touched = inside.any(axis=1) | crosses.any(axis=1)
         return situation.split(np.where(touched, np.maximum(depths, np.finfo(float).tiny), 0.0))
 
 
-def _corners(area: Any) -> Any:
-    return area.corners if isinstance(area, Region) else area
+def _polygon(name: str, given: Any) -> Floats:
+    corners = float_array(name, given, (None, 2))
+    if len(corners) < 3:
+        raise reject(name, "a Region, or a polygon of at least 3 corners", f"{len(corners)} corners")
+    return corners
 
 
-def _inside(points: Floats, corners: Floats) -> Bools:
-    """(...) whether points (..., 2) are inside a polygon: whether a ray to the east crosses its edge an odd number
-    of times."""
+def _inside(points: Floats, edges: tuple[Floats, Floats]) -> Bools:
+    """(...) whether points (..., 2) are inside: whether a ray to the east crosses the edges an odd number of times."""
     x, y = points[..., 0, np.newaxis], points[..., 1, np.newaxis]
-    (x1, y1), (x2, y2) = corners.T, np.roll(corners, -1, axis=0).T
+    (x1, y1), (x2, y2) = edges[0].T, edges[1].T
     spans = (y1 > y) != (y2 > y)
     with np.errstate(divide="ignore", invalid="ignore"):
         crossing = x1 + (y - y1) / (y2 - y1) * (x2 - x1)
     return np.asarray((spans & (x < crossing)).sum(axis=-1) % 2 == 1)
 
 
-def _distances(points: Floats, corners: Floats) -> Floats:
-    """(...) m from points (..., 2) to the edge of a polygon."""
-    along, off = np.roll(corners, -1, axis=0) - corners, points[..., np.newaxis, :] - corners
+def _distances(points: Floats, edges: tuple[Floats, Floats]) -> Floats:
+    """(...) m from points (..., 2) to the nearest edge."""
+    along, off = edges[1] - edges[0], points[..., np.newaxis, :] - edges[0]
     length = np.maximum((along**2).sum(axis=-1), np.finfo(float).tiny)
     share = np.clip((off * along).sum(axis=-1) / length, 0.0, 1.0)
     return np.asarray(np.sqrt(((off - share[..., np.newaxis] * along) ** 2).sum(axis=-1)).min(axis=-1))
 
 
-def _cross(ways: Floats, corners: Floats) -> Bools:
-    """(num_courses, num_legs) whether the straight legs of ways (num_courses, num_points, 2) touch a polygon's edge.
+def _cross(ways: Floats, edges: tuple[Floats, Floats]) -> Bools:
+    """(num_courses, num_legs) whether the straight legs of ways (num_courses, num_points, 2) touch an edge.
 
     Of one point only there is one leg, without length.
     """
     starts = ways[:, :-1] if ways.shape[1] > 1 else ways
     ends = ways[:, 1:] if ways.shape[1] > 1 else ways
     a, b = starts[:, :, np.newaxis], ends[:, :, np.newaxis]
-    c, d = corners, np.roll(corners, -1, axis=0)
+    c, d = edges
     # Two segments touch where neither lies wholly on one side of the other, nor beside it.
     apart = (_side(a, b, c) * _side(a, b, d) > 0.0) | (_side(c, d, a) * _side(c, d, b) > 0.0)
     beside = (np.maximum(a, b) < np.minimum(c, d)) | (np.maximum(c, d) < np.minimum(a, b))

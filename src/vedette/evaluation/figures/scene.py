@@ -15,7 +15,7 @@ from vedette.evaluation.figures.style import GREY, INK
 from vedette.kernels.base.types import Floats
 from vedette.scenarios import Scenario
 from vedette.scenarios.sections.planners import STRATEGIES, NamedIndependent, NamedJoint, NamedLookahead
-from vedette.scenarios.views import INSIDE, NO_GO, REGION, Zone, zones
+from vedette.scenarios.views import HOLE, INSIDE, NO_GO, REGION, Zone, zones
 from vedette.text import elided
 
 _NEAR = 0.1  # of the extent of a figure
@@ -23,6 +23,7 @@ _ZONES: dict[str, dict[str, Any]] = {
     REGION: {"edgecolor": GREY, "linewidth": 0.8, "linestyle": "--"},
     INSIDE: {"edgecolor": INK, "linewidth": 0.8, "linestyle": "-."},
     NO_GO: {"edgecolor": GREY, "linewidth": 0.8, "hatch": "////"},
+    HOLE: {"edgecolor": GREY, "linewidth": 0.8, "fill": True, "facecolor": "white"},
 }
 
 
@@ -86,10 +87,10 @@ def name_offsets(places: Floats, extent: float) -> list[dict[str, Any]]:
 def draw_zones(axes: Axes, drawn: Sequence[Zone], scale: float) -> None:
     """Draw zones into axes, in metres times `scale`."""
     for zone in drawn:
-        axes.add_patch(Polygon(scale * np.array(zone.corners), fill=False, zorder=1.5, **_ZONES[zone.kind]))
+        axes.add_patch(Polygon(scale * np.array(zone.corners), zorder=1.5, **{"fill": False, **_ZONES[zone.kind]}))
 
 
 def zone_handles(drawn: Sequence[Zone]) -> Iterator[Patch]:
     """What the zones mean, for a legend."""
-    for kind in dict.fromkeys(zone.kind for zone in drawn):
+    for kind in dict.fromkeys(zone.kind for zone in drawn if zone.kind != HOLE):
         yield Patch(fill=False, label=kind, **_ZONES[kind])

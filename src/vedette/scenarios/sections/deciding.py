@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
+from vedette.errors import InputError
 from vedette.plausible import told_elsewhere
 from vedette.scenarios.faults import Finding, describe
 from vedette.scenarios.sections.base import Count, Point, Positive, Probability, Section, check
@@ -70,18 +71,30 @@ class KeepOut(Section):
     polygon: Annotated[tuple[Point, ...], Field(strict=False, min_length=3)] | None = Field(
         default=None, description="The corners of a polygon in order, instead of a rectangle [m]."
     )
+    holes: Annotated[
+        tuple[Annotated[tuple[Point, ...], Field(strict=False, min_length=3)], ...], Field(strict=False)
+    ] = Field(default=(), description="Polygons inside it that may be entered: the corners of each in order [m].")
+    geojson: str | None = Field(
+        default=None,
+        description="GeoJSON file, relative to the scenario file, each polygon of which is such a zone; needs an "
+        "origin. A scenario that was read has the polygons instead [-].",
+    )
 
     @check
     def _one_area(self) -> Iterator[Finding]:
-        if (self.region is None) == (self.polygon is None):
-            yield (), "either region or polygon", "none" if self.region is None else "both"
+        given = [name for name in ("region", "polygon", "geojson") if getattr(self, name) is not None]
+        if len(given) != 1:
+            yield (), "either region, polygon or geojson", " and ".join(given) or "none"
 
     def build(self, folder: Path) -> Any:
-        """The constraint."""
+        """The constraint. Raises `InputError` for one whose file was not read, as `load_scenario` does."""
         from vedette.control import KeepOut
 
+        if self.geojson is not None:
+            raise InputError("geojson: expected its polygons, as load_scenario reads them; got the name of a file")
         with told_elsewhere():
-            return KeepOut(np.array(self.polygon) if self.region is None else self.region.build())
+            area = np.array(self.polygon) if self.region is None else self.region.build()
+            return KeepOut(area, tuple(np.array(hole) for hole in self.holes))
 
 
 if TYPE_CHECKING:

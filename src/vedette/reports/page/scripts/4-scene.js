@@ -27,6 +27,11 @@ function drawZones(context, run, view) {
     context.strokeStyle = kind === "region" ? colours.grey : colours.ink;
     context.setLineDash({ region: [5, 4], "no-go zone": [] }[kind] ?? [8, 3, 2, 3]);
     polygon(context, view, corners);
+    if (kind === "hole of a no-go zone") {
+      context.fillStyle = colours.paper;
+      context.setLineDash([]);
+      context.fill();
+    }
     context.stroke();
     context.setLineDash([]);
     if (kind === "no-go zone") hatch(context, view);

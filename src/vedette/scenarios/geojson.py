@@ -1,0 +1,117 @@
+"""Zones out of GeoJSON files: every polygon of one becomes a zone of its own, its corners in metres."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path as FilePath
+from typing import Any
+
+from vedette.errors import InputError
+from vedette.reading import parse_json, read_text
+from vedette.recorded import Origin
+from vedette.scenarios.faults import Path, Told, describe
+from vedette.scenarios.sections.places import OriginSection
+
+_MOST_BYTES = 20_000_000
+_MOST_CORNERS = 50_000  # of all zones of a file: each is looked at for every course of every sensor
+
+Ring = list[list[float]]
+
+
+def with_zones(data: Mapping[str, Any], folder: FilePath) -> tuple[Mapping[str, Any], list[Told]]:
+    """A scenario's data with the polygons of the GeoJSON files that its zones name, and what is wrong with these.
+
+    The first polygon of a file takes the place of the zone that named it; others come after all constraints, so that
+    every other constraint keeps its place.
+    """
+    control = data.get("control")
+    constraints = control.get("constraints") if isinstance(control, Mapping) else None
+    if not isinstance(constraints, list | tuple) or not any(map(_names_file, constraints)):
+        return data, []
+    faults, here, after = list[Told](), list[Any](), list[Any]()
+    for i, constraint in enumerate(constraints):
+        if not _names_file(constraint):
+            here.append(constraint)
+            continue
+        path: Path = ("control", "constraints", i, "geojson")
+        try:
+            polygons = _read(constraint, _origin(data), folder)
+        except InputError as error:
+            faults.append(Told(path, "a GeoJSON file of polygons", str(error)))
+            polygons = [[[[0.0, 0.0], [1e3, 0.0], [0.0, 1e3]]]]
+        zones = [{"kind": "keep_out", "polygon": rings[0], "holes": rings[1:]} for rings in polygons]
+        here.append(zones[0])
+        after += zones[1:]
+    return {**data, "control": {**control, "constraints": [*here, *after]}}, faults  # type: ignore[dict-item]
+
+
+def _names_file(constraint: Any) -> bool:
+    if not isinstance(constraint, Mapping) or constraint.get("kind") != "keep_out":
+        return False
+    return constraint.get("geojson") is not None and not {"region", "polygon"} & set(_given(constraint))
+
+
+def _given(section: Mapping[str, Any]) -> Iterator[str]:
+    return (key for key, value in section.items() if value is not None)
+
+
+def _origin(data: Mapping[str, Any]) -> Origin:
+    try:
+        return OriginSection.model_validate(data.get("origin")).build()
+    except ValueError:
+        raise InputError("longitudes and latitudes, of which the scenario has no valid `origin`") from None
+
+
+def _read(constraint: Mapping[str, Any], origin: Origin, folder: FilePath) -> list[list[Ring]]:
+    """The outer ring of each polygon and then its holes, m."""
+    name = constraint["geojson"]
+    if not isinstance(name, str) or not os.path.isfile(folder / name):
+        raise InputError(f"{describe(name)}: no such file")
+    try:
+        content = parse_json(read_text(folder / name, "GeoJSON file", _MOST_BYTES))
+    except ValueError as error:
+        raise InputError(f"{describe(name)}: {error}") from None
+    found = [[_in_metres(ring, origin, name) for ring in polygon] for polygon in _polygons(content, name) if polygon]
+    if not found:
+        raise InputError(f"{describe(name)}: no polygon in it")
+    if (number := sum(len(ring) for rings in found for ring in rings)) > _MOST_CORNERS:
+        raise InputError(f"{describe(name)}: {number} corners in it, above {_MOST_CORNERS} (simplify it)")
+    return found
+
+
+def _polygons(content: Any, name: str) -> Iterator[Sequence[Any]]:
+    """The rings of every polygon, wherever in the file it is; lines and points are no zones."""
+    kind = content.get("type") if isinstance(content, Mapping) else None
+    if kind == "FeatureCollection":
+        for feature in content.get("features") or ():
+            yield from _polygons(feature, name)
+    elif kind == "Feature":
+        if content.get("geometry") is not None:
+            yield from _polygons(content["geometry"], name)
+    elif kind == "GeometryCollection":
+        for geometry in content.get("geometries") or ():
+            yield from _polygons(geometry, name)
+    elif kind == "Polygon":
+        yield content.get("coordinates") or ()
+    elif kind == "MultiPolygon":
+        yield from content.get("coordinates") or ()
+    elif kind not in ("Point", "MultiPoint", "LineString", "MultiLineString"):
+        raise InputError(f"{describe(name)}: no GeoJSON: type {describe(kind)}")
+
+
+def _in_metres(ring: Any, origin: Origin, name: str) -> Ring:
+    """A ring without its last corner, which repeats the first."""
+    try:
+        degrees = [(float(corner[0]), float(corner[1])) for corner in ring]
+    except (TypeError, ValueError, IndexError, KeyError):
+        raise InputError(f"{describe(name)}: a ring whose corners are not [longitude, latitude]") from None
+    if len(degrees) < 4 or degrees[0] != degrees[-1]:
+        raise InputError(f"{describe(name)}: a ring of {len(degrees)} corners, or not closed")
+    if any(abs(lon) > 360.0 or abs(lat) > 90.0 for lon, lat in degrees):
+        raise InputError(f"{describe(name)}: corners that are no degrees of longitude and latitude")
+    corners: Ring = origin.to_plane([lon for lon, _ in degrees[:-1]], [lat for _, lat in degrees[:-1]]).tolist()
+    return corners
+
+
+__all__ = ["with_zones"]
