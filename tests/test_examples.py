@@ -60,6 +60,7 @@ SHOWN = {
     "docs/filters.md": ["target at"],
     "docs/fusion.md": ["ParallelUpdate ", "Clmb by views "],
     "docs/metrics.md": ["True"],
+    "docs/recordings.md": ["5 scans, 1 late, 0 dropped", "at 10.0 s"],
     "docs/report.md": [],
     "docs/results.md": ["gospa_m", "margin", "jdm-rate-5.0", "heading_deg", "farthest_m"],
     "docs/runs.md": ["m; [10.0, 20.0, 30.0]", "targets; hypotheses of each sensor"],

@@ -159,6 +159,20 @@ def test_scans_of_one_time_are_one_step_however_they_come() -> None:
     assert_equal_bits(together.state, apart.state)
 
 
+def test_beliefs_of_now_are_predicted_and_kept_nowhere() -> None:
+    late = small()
+    timeline, _ = late.take(late.initial(), [scan(0, 1.0), scan(1, 2.0)])
+    ahead = late.at(timeline, 4.5)
+    nothing, _ = late.tracker.step(
+        timeline.state, [None, None], timeline.poses, 4.5, rngs=[np.random.default_rng()] * 2
+    )
+    assert_equal_bits(ahead, nothing)
+    assert late.at(timeline, 2.0) is timeline.state
+    assert timeline.state.time == 2.0
+    with pytest.raises(InputError, match=r"time: expected one from 2 s on, the latest of all scans that came; got 1"):
+        late.at(timeline, 1.0)
+
+
 def test_arrays_that_a_caller_goes_on_to_change_do_not_change_what_is_worked_again() -> None:
     late, buffer, pose = small(), np.array([[3.0, 1.0]]), np.zeros(3)
     timeline, _ = late.take(late.initial(), [scan(0, 2.0, buffer, pose)])

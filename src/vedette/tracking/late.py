@@ -196,6 +196,20 @@ class LateScans:
         info = LateInfo(tuple(i.info for i in made), len(timeline.instants) - len(kept), tuple(dropped))
         return self._settled(after), info
 
+    def at(self, timeline: Timeline, time: float) -> State:
+        """What is believed of a time from the latest instant on, by what has come so far: predicted, and kept nowhere.
+
+        Raises:
+            InputError: a time before the latest instant.
+        """
+        state, now = timeline.state, real("time", time)
+        if state.time == now:
+            return state
+        if state.time is not None and now < state.time:
+            raise reject("time", f"one from {state.time:g} s on, the latest of all scans that came", now)
+        nothing = [None] * len(self._start)
+        return self.tracker.step(state, nothing, timeline.poses, now, rngs=self._streams(state.step + 1))[0]
+
     def _checked(self, scan: SensorScan) -> SensorScan:
         """The scan with arrays of its own, so that what is worked again is what came."""
         instance("scan", scan, SensorScan)
