@@ -26,7 +26,7 @@ from vedette.densities import (
     existence_probabilities,
     settled_lmb,
 )
-from vedette.fusion import Clmb, CmDeltaGlmb, Fusion, Linear, LinearRule, ParallelUpdate
+from vedette.fusion import Clmb, CmDeltaGlmb, Fusion, Linear, LinearRule, ParallelUpdate, shares_prediction
 from vedette.models.arguments import reject
 from vedette.platforms import Options
 from vedette.tracking import State
@@ -169,7 +169,7 @@ def planned_on(
     beliefs = (*state.local, state.fused)
     notes: tuple[str, ...] = ()
     # What divides by the common prediction needs beliefs that have one.
-    from_one = getattr(fusion, "shares_prediction", False) or isinstance(reward, ExpectedLossReward)
+    from_one = shares_prediction(fusion) or isinstance(reward, ExpectedLossReward)
     if _has_glmb(beliefs) and (why := why or _why_lmbs(num_sensors, fusion, settings, reward, beliefs)):
         # Of one belief, open names are settled; of several, each would settle them in its own way.
         as_planned = settled_lmb if from_one or len({id(belief) for belief in beliefs}) == 1 else as_lmb
@@ -200,7 +200,7 @@ def _why_lmbs(
     """Why GLMBs are planned on their LMBs; empty where they are not. beliefs: the fused one last."""
     if isinstance(reward, ExpectedLossReward):
         return "the expected loss asks for no more"
-    if getattr(fusion, "shares_prediction", False):
+    if shares_prediction(fusion):
         return f"{type(fusion).__name__} fuses LMBs"
     if any(isinstance(belief, FactoredGLMB) for belief in beliefs):
         return "products of GLMBs always are"

@@ -16,7 +16,7 @@ from vedette.densities.checks import offsets_of
 from vedette.densities.containers import unchecked
 from vedette.densities.label_sets import label_sets, places_of, single_gaussians
 from vedette.filters import shared_targets
-from vedette.filters.inputs import model_errors
+from vedette.filters.inputs import model_errors, nobody
 from vedette.filters.lmb import association_of
 from vedette.kernels.association.marginals import Association
 from vedette.kernels.base.types import Bools, Floats, Ints, Motion, Sensor
@@ -133,7 +133,7 @@ def decision_of(
     targets, own = sensor.filter.targets, sensor.filter.sensor
     motion, sees = kernel_motion(targets.motion, ALWAYS_SURVIVES), own.to_kernel(detection_at)
     return Decision(
-        LMB.empty(targets.state_dim).to_kernel(),
+        nobody(targets.state_dim),
         motion,
         sees,
         forms_of(motion, sees, horizon.dt, targets.state_dim),

@@ -10,9 +10,10 @@ import numpy as np
 
 from vedette.densities import MultiBernoulli
 from vedette.filters.base import SingleSensorFilter
-from vedette.filters.info import FilterInfo
-from vedette.filters.inputs import check_belief, model_errors
+from vedette.filters.inputs import check_belief, check_scan, model_errors
+from vedette.filters.protocols import FilterInfo
 from vedette.kernels.steps.cbmember import step_cb_member
+from vedette.models.arguments import generator
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,7 +39,8 @@ class CbMemberFilter(SingleSensorFilter):
 
         Nothing is drawn from `rng`; it is taken so that filters are interchangeable.
         """
-        measurements, num_duplicates = self._check_scan(scan, rng)
+        generator(rng)
+        measurements, num_duplicates = check_scan(scan, self.sensor)
         prior = check_belief(belief, MultiBernoulli, self.targets.state_dim)
         inputs = self._inputs(measurements, pose, dt, step)
         limits = self.limits

@@ -11,9 +11,10 @@ import numpy as np
 from vedette.densities import IidCluster
 from vedette.errors import NumericalError
 from vedette.filters.base import SingleSensorFilter
-from vedette.filters.info import FilterInfo
-from vedette.filters.inputs import check_belief, model_errors
+from vedette.filters.inputs import check_belief, check_scan, model_errors
+from vedette.filters.protocols import FilterInfo
 from vedette.kernels.steps.cphd import step_cphd
+from vedette.models.arguments import generator
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,7 +39,8 @@ class CphdFilter(SingleSensorFilter):
 
         Nothing is drawn from `rng`; it is taken so that filters are interchangeable.
         """
-        measurements, num_duplicates = self._check_scan(scan, rng)
+        generator(rng)
+        measurements, num_duplicates = check_scan(scan, self.sensor)
         prior = check_belief(belief, IidCluster, self.targets.state_dim)
         log_cardinality, mixture = prior.to_kernel()
         inputs = self._inputs(measurements, pose, dt, step)

@@ -1,7 +1,18 @@
 """How several sensors' beliefs become one: covariance intersection, arithmetic average and parallel update."""
 
 from vedette.fusion.arithmetic_average import ArithmeticAverage
-from vedette.fusion.base import MIXTURE_POWERS, Fusion, FusionInfo, FusionLimits, Linear, LinearRule, MixturePower
+from vedette.fusion.base import (
+    MIXTURE_POWERS,
+    Fusion,
+    FusionInfo,
+    FusionLimits,
+    Linear,
+    LinearRule,
+    MatchesLabels,
+    MixturePower,
+    SharesPrediction,
+    shares_prediction,
+)
 from vedette.fusion.clmb import Clmb
 from vedette.fusion.cm_delta_glmb import CmDeltaGlmb
 from vedette.fusion.laid_out import LaidOut, LaysOut, lay_out_alone
@@ -23,10 +34,13 @@ __all__ = [
     "Linear",
     "LinearRule",
     "Matched",
+    "MatchesLabels",
     "MixturePower",
     "ParallelUpdate",
+    "SharesPrediction",
     "ValidBeliefs",
     "Views",
     "lay_out_alone",
     "match_labels",
+    "shares_prediction",
 ]

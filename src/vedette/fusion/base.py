@@ -81,6 +81,31 @@ class Fusion(Protocol):
         ...
 
 
+@runtime_checkable
+class SharesPrediction(Protocol):
+    """A fusion that says whether its beliefs must all be updated from one prediction; one that does not: no."""
+
+    @property
+    def shares_prediction(self) -> bool:
+        """Whether they must."""
+        ...
+
+
+@runtime_checkable
+class MatchesLabels(Protocol):
+    """A fusion that says whether labels need not agree across sensors; of one that does not they must."""
+
+    @property
+    def matches_labels(self) -> bool:
+        """Whether they need not."""
+        ...
+
+
+def shares_prediction(fusion: Any) -> bool:
+    """Whether the fusion is of beliefs that were all updated from one prediction, as `ParallelUpdate` is."""
+    return isinstance(fusion, SharesPrediction) and bool(fusion.shares_prediction)
+
+
 class LinearRule(NamedTuple):
     """A fusion of LMBs whose log is linear in the sensors' logs, label by label.
 

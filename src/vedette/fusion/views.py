@@ -39,7 +39,7 @@ class Views:
         if num == 0 or not all(isinstance(sensor, SensorModel) for sensor in self.sensors):
             raise reject("views.sensors", "at least one SensorModel", self.sensors)
         object.__setattr__(self, "poses", float_array("views.poses", self.poses, (num, None)))
-        one_a_sensor("views.scanned", self.scanned, num)
+        one_a_sensor(num, **{"views.scanned": self.scanned})
         if not isinstance(self.prediction, Labelled | None):
             raise reject("views.prediction", f"{LABELLED}, or None", type(self.prediction).__name__)
 
