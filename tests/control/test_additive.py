@@ -25,7 +25,7 @@ from control.examples import (
 from control.known_association import followed, measurement_moments
 from vedette import models
 from vedette.control import CauchySchwarzReward, RenyiReward
-from vedette.control.bounds import best_values
+from vedette.control.problem import best_values
 from vedette.control.pseudo import draw_futures
 from vedette.control.rewards import (
     CardinalityVarianceReward,

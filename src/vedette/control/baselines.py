@@ -7,9 +7,8 @@ from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
-from vedette.control.allowed import beliefs_ahead, mask_of_decision
 from vedette.control.constraints import Constraint, Situation, repaired, violated
-from vedette.control.inputs import check_poses, check_steering, options_of
+from vedette.control.inputs import beliefs_ahead, check_poses, check_steering, mask_of_decision, options_of
 from vedette.control.plan import Plan
 from vedette.control.settings import MobileSensor, PlanningSettings
 from vedette.filters import labels_targets

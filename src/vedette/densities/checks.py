@@ -28,14 +28,16 @@ def check_array(field: str, array: Any, dtype: type, shape: Sequence[int | None]
         raise InputError(f"{field}: expected an array of {np.dtype(dtype)}; got {type(array).__name__}")
     if array.dtype != np.dtype(dtype):
         raise InputError(f"{field}: expected an array of {np.dtype(dtype)}; got one of {array.dtype}")
-    check_shape(field, array, shape)
+    if array.shape != shape:
+        check_shape(field, array, shape)
 
 
 def check_shape(field: str, array: NDArray[Any], shape: Sequence[int | None]) -> None:
     """Raise `InputError` unless `array` has this shape (None: any length)."""
-    if array.shape != tuple(shape) and (
-        array.ndim != len(shape) or any(want not in (None, have) for want, have in zip(shape, array.shape, strict=True))
-    ):
+    fits = array.ndim == len(shape)
+    for want, have in zip(shape, array.shape, strict=False):
+        fits = fits and want in (None, have)
+    if not fits:
         wanted = ", ".join("any" if length is None else str(length) for length in shape)
         raise InputError(f"{field}: expected shape ({wanted}); got {array.shape}")
 

@@ -16,9 +16,8 @@ from vedette.control import (
     Plan,
     PlanningSettings,
 )
-from vedette.control.allowed import mask_of_decision
 from vedette.control.constraints import Mask, repaired
-from vedette.control.inputs import check_poses, check_steering, options_of
+from vedette.control.inputs import check_poses, check_steering, mask_of_decision, options_of
 from vedette.densities import Estimator, best_estimate
 from vedette.errors import InputError
 from vedette.filters import shared_targets

@@ -60,11 +60,6 @@ class AdditiveRewards:
         found = self.reward.coefficients if isinstance(self.reward, LinearReward) else None
         return None if found is None else np.asarray(found, np.float64)
 
-    @property
-    def additive(self) -> AdditiveRewards:
-        """Themselves."""
-        return self
-
     def joint(self) -> AdditiveRewards:
         """Of all sensors, fused: themselves."""
         return self

@@ -8,7 +8,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vedette.control.allowed import beliefs_ahead
 from vedette.control.constraints import (
     Constraint,
     Mask,
@@ -19,6 +18,7 @@ from vedette.control.constraints import (
     pairs_allowed,
     reach_of,
 )
+from vedette.control.inputs import beliefs_ahead
 from vedette.control.settings import MobileSensor, PlanningSettings
 from vedette.densities import Labelled
 from vedette.kernels.base.types import Bools, Floats
