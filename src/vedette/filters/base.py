@@ -5,19 +5,27 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from typing import Any, ClassVar, Generic, NamedTuple, TypeAlias, TypeVar
 
 import numpy as np
 
 from vedette.densities import LMB, Labelled
 from vedette.errors import InputError
-from vedette.filters.blind import NO_POSE, NO_SCAN
 from vedette.filters.inputs import births_for, blame_model, check_belief, check_scan, nobody
 from vedette.filters.limits import Limits
 from vedette.filters.protocols import FilterInfo
 from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.types import Floats, Motion, ScanInput, Sensor
-from vedette.models import SensorModel, TargetModel, kernel_motion
+from vedette.models import (
+    SensorModel,
+    TargetModel,
+    constant_detection,
+    constant_noise,
+    kernel_motion,
+    measurement_space_clutter,
+    position,
+)
 from vedette.models.arguments import generator, pose_vector, positive
 
 BeliefT = TypeVar("BeliefT", bound=Labelled)
@@ -37,6 +45,21 @@ class SensorStep(NamedTuple):
     limits: Limits
     num_scans: int = 1
     rng: np.random.Generator | None = None
+
+
+@cache
+def blind_sensor() -> SensorModel:
+    """One that never detects and has no clutter: with it a step is a prediction; any position will do for it."""
+    return SensorModel(
+        position(),
+        constant_noise([1.0, 1.0]),
+        constant_detection(0.0),
+        measurement_space_clutter(0.0, [0.0, 0.0], [1.0, 1.0]),
+    )
+
+
+NO_SCAN = np.empty((0, 2))
+NO_POSE = np.zeros(3)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

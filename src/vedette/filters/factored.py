@@ -13,8 +13,7 @@ from vedette.densities import FactoredGLMB
 from vedette.densities.checks import offsets_of
 from vedette.densities.label_sets import take_factors
 from vedette.errors import InputError, NumericalError
-from vedette.filters.base import LabelledFilter, OfKind, SensorStep
-from vedette.filters.blind import blind_sensor
+from vedette.filters.base import LabelledFilter, OfKind, SensorStep, blind_sensor
 from vedette.filters.limits import Limits
 from vedette.filters.multi_sensor import InTurn, MultiSensorFilter
 from vedette.filters.protocols import FilterInfo

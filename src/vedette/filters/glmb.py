@@ -10,8 +10,7 @@ from typing import ClassVar
 from vedette.densities import GLMB
 from vedette.errors import InputError, NumericalError
 from vedette.filters.assignment import Gibbs, OfChoices, Ranked
-from vedette.filters.base import LabelledFilter, OfKind, SensorStep
-from vedette.filters.blind import blind_sensor
+from vedette.filters.base import LabelledFilter, OfKind, SensorStep, blind_sensor
 from vedette.filters.limits import Limits
 from vedette.filters.multi_sensor import InTurn
 from vedette.filters.protocols import FilterInfo

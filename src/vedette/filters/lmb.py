@@ -12,8 +12,7 @@ import numpy as np
 from vedette.densities import LMB
 from vedette.errors import NumericalError
 from vedette.filters.assignment import OfMarginals, Ranked, check_marginals
-from vedette.filters.base import LabelledFilter, OfKind, SensorStep
-from vedette.filters.blind import blind_sensor
+from vedette.filters.base import LabelledFilter, OfKind, SensorStep, blind_sensor
 from vedette.filters.limits import Limits
 from vedette.filters.multi_sensor import InTurn, MultiSensorFilter
 from vedette.filters.protocols import Filter, FilterInfo

@@ -11,8 +11,7 @@ import numpy as np
 
 from vedette.densities import LMB, Labelled
 from vedette.errors import InputError
-from vedette.filters.base import BeliefT, OfKind, SensorStep
-from vedette.filters.blind import NO_POSE, NO_SCAN, blind_sensor
+from vedette.filters.base import NO_POSE, NO_SCAN, BeliefT, OfKind, SensorStep, blind_sensor
 from vedette.filters.inputs import births_for, check_belief, check_scan, model_errors, nobody
 from vedette.filters.limits import Limits
 from vedette.filters.protocols import FilterInfo

@@ -12,8 +12,7 @@ from vedette.densities import LMB
 from vedette.densities.factored import as_factored
 from vedette.errors import InputError
 from vedette.filters import FactoredGlmbFilter, Filter, FilterInfo, LmbFilter, TwoStepFilter, shared_targets
-from vedette.filters.base import SingleSensorFilter
-from vedette.filters.blind import NO_POSE, NO_SCAN, blind_sensor
+from vedette.filters.base import NO_POSE, NO_SCAN, SingleSensorFilter, blind_sensor
 from vedette.fusion import ValidBeliefs
 from vedette.models import SensorModel, TargetModel
 from vedette.models.arguments import reject, sequence
