@@ -17,9 +17,7 @@ from vedette.control.rewards.base import LabelReward, PowerReward, Reward, speak
 from vedette.control.rewards.power import ExpectedLossReward
 from vedette.control.settings import MobileSensor, PlanningSettings
 from vedette.densities import (
-    GLMB,
     LMB,
-    FactoredGLMB,
     Labelled,
     as_lmb,
     at_peaks,
@@ -147,7 +145,7 @@ def check_sums(
 def stay_glmbs(sensors: Sequence[MobileSensor], fusion: Fusion, settings: PlanningSettings, reward: AnyReward) -> bool:
     """Whether beliefs of these filters may be planned on as GLMBs, hypothesis by hypothesis."""
     initial = [sensor.filter.initial() for sensor in sensors]
-    return any(isinstance(own, GLMB) for own in initial) and not _why_lmbs(
+    return any(isinstance(own, Labelled) and not (own.is_lmb or own.is_product) for own in initial) and not _why_lmbs(
         len(sensors), fusion, settings, reward, initial
     )
 
@@ -178,7 +176,7 @@ def planned_on(
         state = replace(state, local=local, fused=converted[id(state.fused)])
         notes = (f"planned on the LMBs of the GLMB beliefs: {why}",)
         fusion = _of_lmbs(fusion)
-    if isinstance(reward, ExpectedLossReward) and isinstance(state.fused, LMB):
+    if isinstance(reward, ExpectedLossReward) and state.fused.is_lmb:
         state = replace(state, fused=at_peaks(state.fused))
     if from_one:
         state = replace(state, local=(state.fused,) * num_sensors)
@@ -191,7 +189,7 @@ def _of_lmbs(fusion: Fusion) -> Fusion:
 
 
 def _has_glmb(beliefs: Sequence[Labelled]) -> bool:
-    return any(isinstance(belief, GLMB | FactoredGLMB) for belief in beliefs)
+    return not all(belief.is_lmb for belief in beliefs)
 
 
 def _why_lmbs(
@@ -202,7 +200,7 @@ def _why_lmbs(
         return "the expected loss asks for no more"
     if getattr(fusion, "shares_prediction", False):
         return f"{type(fusion).__name__} fuses LMBs"
-    if any(isinstance(belief, FactoredGLMB) for belief in beliefs):
+    if any(belief.is_product for belief in beliefs):
         return "products of GLMBs always are"
     expected = float(existence_probabilities(beliefs[-1])[1].sum())
     if num_sensors > settings.max_glmb_sensors:

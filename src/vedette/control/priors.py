@@ -8,14 +8,16 @@ predicts and updates all of them does the same work six times.
 
 from __future__ import annotations
 
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
-from vedette.densities import GLMB, LMB, Labelled, TrackTable, marginalise, track_moments
+from vedette.densities import GLMB, Labelled, track_moments
 from vedette.densities.checks import offsets_of
 from vedette.densities.containers import for_kernel, unchecked
-from vedette.densities.label_sets import take_hypotheses, take_tracks
+from vedette.densities.conversions import collapsed
+from vedette.densities.label_sets import possible, take_hypotheses
+from vedette.densities.tracks import gaussian_tracks, take_tracks
 from vedette.filters.inputs import model_errors
 from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.gaussian.linalg import log_sum
@@ -33,7 +35,7 @@ def heaviest_hypotheses(belief: GLMB, most: int) -> GLMB:
     order = np.argsort(-belief.hyp_log_weights, kind="stable")[:most]
     taken = take_hypotheses(belief, order[belief.hyp_log_weights[order] > -np.inf])
     log_weights = taken.hyp_log_weights - log_sum(for_kernel(taken.hyp_log_weights))
-    return unchecked(GLMB, taken.tracks, taken.hyp_offsets, taken.hyp_tracks, log_weights)
+    return taken.with_fields(hyp_log_weights=log_weights)
 
 
 def predicted(fused: _Labelled, motion: MotionModel, num_steps: int, period: float) -> _Labelled:
@@ -42,17 +44,12 @@ def predicted(fused: _Labelled, motion: MotionModel, num_steps: int, period: flo
     Tracks are first collapsed to one Gaussian each (GLMBs are marginalised), as those of the pseudo-updates are. Label
     sets of weight zero are left out of a GLMB.
     """
-    single: Any = fused
-    if not isinstance(fused, LMB):
-        single = marginalise(single, max_components=1)
-    if isinstance(single, GLMB):
-        single = take_hypotheses(single, np.flatnonzero(single.hyp_log_weights > -np.inf))
+    single = possible(collapsed(fused))
     means, covs = track_moments(single.tracks)
     with model_errors():
         paths = predict_paths(kernel_motion(motion, ALWAYS_SURVIVES), float(period), int(num_steps), means, covs)
-    num, ends = single.tracks.num_tracks, (np.ascontiguousarray(own[:, -1]) for own in paths)
-    tracks = unchecked(TrackTable, single.tracks.labels, np.arange(num + 1), np.zeros(num), *ends)
-    return unchecked(type(fused), tracks, *single.to_kernel()[1:])
+    means, covs = (np.ascontiguousarray(own[:, -1]) for own in paths)
+    return single.with_fields(tracks=gaussian_tracks(single.tracks.labels, means, covs))
 
 
 def share_versions(belief: GLMB, most: float) -> GLMB:

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
 from vedette.control.inputs import Belief
 from vedette.control.priors import ALWAYS_SURVIVES, heaviest_hypotheses, share_versions
 from vedette.control.settings import IDEAL_MODES, MobileSensor, PlanningSettings
-from vedette.densities import GLMB, LMB, MultiTargetSamples, sample_glmb, sample_lmb
+from vedette.densities import GLMB, LMB, MultiTargetSamples
 from vedette.densities.cases import LabelledCases
 from vedette.densities.checks import offsets_of
-from vedette.densities.containers import unchecked
-from vedette.densities.label_sets import label_sets, places_of, single_gaussians
+from vedette.densities.label_sets import label_sets
+from vedette.densities.samples import sample_labelled
+from vedette.densities.tracks import places_of, single_gaussians
 from vedette.filters import shared_targets
 from vedette.filters.inputs import model_errors
 from vedette.filters.lmb import association_of
@@ -62,8 +62,7 @@ def draw_paths(
 ) -> tuple[MultiTargetSamples, Floats]:
     """Samples of the fused density, and (horizon_steps, num_targets, state_dim) where they go without noise."""
     targets = shared_targets([sensor.filter for sensor in sensors])
-    draw: Any = sample_glmb if isinstance(fused, GLMB) else sample_lmb
-    samples: MultiTargetSamples = draw(fused, settings.num_samples, rng=rng)
+    samples = sample_labelled(fused, settings.num_samples, rng=rng)
     with model_errors():
         motion = kernel_motion(targets.motion, targets.survival)
         states = propagate_samples(motion, samples.states, float(settings.horizon_period), int(settings.horizon_steps))
@@ -105,7 +104,7 @@ def pseudo_posteriors(
     """
     decision = decision_of(sensor, courses, futures, settings, scans)
     num_cases = len(courses) * settings.num_samples
-    if isinstance(belief, GLMB):
+    if not belief.is_lmb:
         return _run_glmb(belief, decision, settings, num_cases)
     targets = targets_of(belief.tracks.labels, labels, futures.offsets)
     return _run_lmb(belief, decision, association_of(sensor.filter), settings, num_cases, targets)
@@ -157,7 +156,7 @@ def targets_of(table: Ints, labels: Ints, offsets: Ints) -> Ints:
 
 def _run_glmb(belief: GLMB, decision: Decision, settings: PlanningSettings, num_cases: int) -> LabelledCases:
     heaviest = heaviest_hypotheses(belief, settings.max_prior_hypotheses)
-    single = unchecked(GLMB, single_gaussians(heaviest.tracks), *heaviest.to_kernel()[1:])
+    single = heaviest.with_fields(tracks=single_gaussians(heaviest.tracks))
     prior = share_versions(single, settings.max_version_divergence)
     found, dim = label_sets(prior), prior.tracks.state_dim
     set_offsets = offsets_of([len(labels) for labels in found.sets])
@@ -189,7 +188,7 @@ def _run_lmb(
     results = LmbResults(
         np.empty((num_cases, num)), np.empty((num_cases, num, dim)), np.empty((num_cases, num, dim, dim))
     )
-    prior = unchecked(LMB, single_gaussians(belief.tracks), belief.existence_logit).to_kernel()
+    prior = belief.with_fields(tracks=single_gaussians(belief.tracks)).to_kernel()
 
     with model_errors():
         if settings.association == "known":

@@ -9,13 +9,12 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from vedette.densities.factored import FactoredGLMB, Labelled
+from vedette.densities.factored import FactoredGLMB
 from vedette.densities.glmb import GLMB
-from vedette.densities.iid_cluster import IidCluster
-from vedette.densities.lmb import LMB
+from vedette.densities.labelled import LMB, Labelled
 from vedette.densities.multi_bernoulli import MultiBernoulli
-from vedette.densities.poisson import Poisson
 from vedette.densities.tracks import TrackTable
+from vedette.densities.unlabelled import IidCluster, Poisson
 from vedette.errors import InputError, VedetteError
 from vedette.files import write_whole
 from vedette.reading import read_arrays, read_file, said, unreadable

@@ -10,11 +10,10 @@ import numpy as np
 
 from vedette.densities import checks
 from vedette.densities.glmb import GLMB
-from vedette.densities.iid_cluster import IidCluster
-from vedette.densities.lmb import LMB
+from vedette.densities.labelled import LMB, Labelled
 from vedette.densities.multi_bernoulli import MultiBernoulli
-from vedette.densities.poisson import Poisson
 from vedette.densities.tracks import TrackTable
+from vedette.densities.unlabelled import IidCluster, Poisson
 from vedette.errors import InputError, NumericalError, VedetteError
 from vedette.kernels.base.types import Floats, Ints
 from vedette.models.arguments import generator
@@ -64,10 +63,8 @@ def sample_glmb(density: GLMB, num_samples: int, *, rng: np.random.Generator) ->
     """Independent samples of a GLMB: a hypothesis, then a state of each of its tracks."""
     _check(num_samples, rng)
     hyps = _choose(density.hyp_log_weights, np.array([0, density.num_hyps]), np.zeros(num_samples, np.int64), rng)
-    sizes = np.diff(density.hyp_offsets)[hyps]
-    offsets = np.concatenate([np.zeros(1, np.int64), np.cumsum(sizes)])
-    within = np.arange(offsets[-1]) - np.repeat(offsets[:-1], sizes)
-    tracks = density.hyp_tracks[np.repeat(density.hyp_offsets[hyps], sizes) + within]
+    offsets, entries = checks.take_runs(density.hyp_offsets, hyps)
+    tracks = density.hyp_tracks[entries]
     return MultiTargetSamples(offsets, density.tracks.labels[tracks], _draw_states(density.tracks, tracks, rng))
 
 
@@ -76,8 +73,16 @@ def sample_lmb(density: LMB, num_samples: int, *, rng: np.random.Generator) -> M
     _check(num_samples, rng)
     exists = rng.random((num_samples, density.tracks.num_tracks)) < density.existence
     tracks = np.nonzero(exists)[1]
-    offsets = np.concatenate([np.zeros(1, np.int64), np.cumsum(exists.sum(axis=1))])
+    offsets = checks.offsets_of(exists.sum(axis=1))
     return MultiTargetSamples(offsets, density.tracks.labels[tracks], _draw_states(density.tracks, tracks, rng))
+
+
+def sample_labelled(density: Labelled, num_samples: int, *, rng: np.random.Generator) -> MultiTargetSamples:
+    """Independent samples of an LMB or of a GLMB."""
+    if isinstance(density, LMB):
+        return sample_lmb(density, num_samples, rng=rng)
+    assert isinstance(density, GLMB)
+    return sample_glmb(density, num_samples, rng=rng)
 
 
 def sample_poisson(density: Poisson, num_samples: int, *, rng: np.random.Generator) -> MultiTargetSamples:
@@ -109,13 +114,13 @@ def sample_multi_bernoulli(
     _check(num_samples, rng)
     exists = rng.random((num_samples, density.num_bernoullis)) < density.existence
     chosen = np.nonzero(exists)[1]
-    offsets = np.concatenate([np.zeros(1, np.int64), np.cumsum(exists.sum(axis=1))])
+    offsets = checks.offsets_of(exists.sum(axis=1))
     return _unlabelled(offsets, density, density.offsets, chosen, rng)
 
 
 def _alike(density: Poisson | IidCluster, numbers: Ints, rng: np.random.Generator) -> MultiTargetSamples:
     """Samples of these numbers of targets, all drawn from the density's one mixture."""
-    offsets = np.concatenate([np.zeros(1, np.int64), np.cumsum(numbers)])
+    offsets = checks.offsets_of(numbers)
     runs = np.array([0, len(density.log_weights)])
     return _unlabelled(offsets, density, runs, np.zeros(int(offsets[-1]), np.int64), rng)
 
@@ -179,6 +184,7 @@ __all__ = [
     "MultiTargetSamples",
     "sample_glmb",
     "sample_iid_cluster",
+    "sample_labelled",
     "sample_lmb",
     "sample_multi_bernoulli",
     "sample_poisson",

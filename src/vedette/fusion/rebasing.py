@@ -6,7 +6,8 @@ import numpy as np
 
 from vedette.densities import LMB, TrackTable, track_moments
 from vedette.densities.containers import unchecked
-from vedette.densities.label_sets import Label, take_tracks
+from vedette.densities.label_sets import Label
+from vedette.densities.tracks import gaussian_tracks, take_tracks
 from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.labelled.stacking import stack_tracks
 
@@ -18,9 +19,9 @@ def with_labels_of(prediction: LMB, others: LMB) -> LMB:
     if len(lacking) == 0:
         return prediction
     table = stack_tracks([prediction.tracks.to_kernel(), take_tracks(others.tracks, lacking).to_kernel()])
-    order = np.lexsort(table.labels.T[::-1])
     logits = np.concatenate([prediction.existence_logit, others.existence_logit[lacking]])
-    return unchecked(LMB, take_tracks(TrackTable.from_kernel(table), order), logits[order])
+    both: LMB = unchecked(LMB, TrackTable.from_kernel(table), logits)
+    return both.take(np.lexsort(table.labels.T[::-1]))
 
 
 def rebased(posterior: LMB, own: LMB, prediction: LMB) -> LMB:
@@ -45,9 +46,7 @@ def rebased(posterior: LMB, own: LMB, prediction: LMB) -> LMB:
     said, known = posterior.existence_logit[after], own.existence_logit[before]
     with np.errstate(invalid="ignore"):  # what was impossible or certain, and stays so, is no news
         logits[at] += np.where(said == known, 0.0, said - known) + gained
-    num = len(logits)
-    tracks = unchecked(TrackTable, prediction.tracks.labels, np.arange(num + 1), np.zeros(num), means, covs)
-    return unchecked(LMB, tracks, logits)
+    return unchecked(LMB, gaussian_tracks(prediction.tracks.labels, means, covs), logits)
 
 
 def _places(lmb: LMB) -> dict[Label, int]:

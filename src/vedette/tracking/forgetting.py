@@ -6,12 +6,12 @@ from typing import TypeVar
 
 import numpy as np
 
-from vedette.densities import GLMB, LMB, FactoredGLMB, as_lmb, track_moments
+from vedette.densities import Labelled, as_lmb, track_moments
 from vedette.densities.label_sets import without_labels
 from vedette.fusion import Views
 from vedette.models import MeasurementBirth
 
-_Labelled = TypeVar("_Labelled", GLMB, LMB, FactoredGLMB)
+_Labelled = TypeVar("_Labelled", bound=Labelled)
 
 
 def without_forgotten(

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from vedette.densities import LMB, FactoredGLMB, Labelled
+from vedette.densities import FactoredGLMB, Labelled, as_lmb
 from vedette.kernels.base.types import Ints
 from vedette.tracking.network import Network
 
@@ -28,12 +28,13 @@ def bytes_of_belief(belief: Any) -> int:
         return 0
     tracks, dim = belief.tracks, belief.state_dim
     numbers = 2 * tracks.num_tracks + len(tracks.log_weights) * (1 + dim + dim * (dim + 1) // 2)
-    if isinstance(belief, LMB):
+    if belief.is_lmb:
         return NUMBER * (numbers + tracks.num_tracks)
-    own = belief.num_hyps + len(belief.hyp_tracks)
-    if isinstance(belief, FactoredGLMB):
-        own -= 2 * int(np.count_nonzero(belief.is_bernoulli))  # of which an existence says all
-    return NUMBER * (numbers + own)
+    own = belief.to_factors()
+    hyps = len(own.hyp_log_weights) + len(own.hyp_tracks)
+    # Of those of one label an existence says all.
+    singles = int(np.count_nonzero(FactoredGLMB.of(belief).is_bernoulli)) if belief.is_product else 0
+    return NUMBER * (numbers + hyps - 2 * singles)
 
 
 def parts_of_belief(belief: Any) -> dict[bytes, int]:
@@ -45,11 +46,11 @@ def parts_of_belief(belief: Any) -> dict[bytes, int]:
         return {}
     tracks, dim = belief.tracks, belief.state_dim
     of_component = 1 + dim + dim * (dim + 1) // 2
-    if isinstance(belief, LMB):
+    if belief.is_lmb:
         firsts, own = np.arange(tracks.num_tracks + 1), np.ones(tracks.num_tracks, np.int64)
-        others = [belief.existence_logit[i : i + 1].tobytes() for i in range(tracks.num_tracks)]
+        others = [logit.tobytes() for logit in as_lmb(belief).existence_logit]
     else:
-        factored = belief if isinstance(belief, FactoredGLMB) else FactoredGLMB.from_glmb(belief)
+        factored = FactoredGLMB.of(belief)
         firsts, hyps = factored.track_offsets, factored.factor_offsets
         entries = factored.hyp_offsets[hyps]
         own = np.diff(hyps) + np.diff(entries) - 2 * factored.is_bernoulli

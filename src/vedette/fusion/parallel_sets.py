@@ -1,4 +1,4 @@
-"""What posteriors of one common prediction say together of labels that belong together: the sets of a group of them."""
+"""What posteriors of one common prediction say together: of single labels, and of label sets where labels contend."""
 
 from __future__ import annotations
 
@@ -8,22 +8,70 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vedette.densities import GLMB, LMB, FactoredGLMB, TrackTable, existence_probabilities
+from vedette.densities import GLMB, LMB, FactoredGLMB, TrackTable
 from vedette.densities.checks import offsets_of
 from vedette.densities.containers import unchecked
 from vedette.densities.conversions import as_glmb
-from vedette.densities.joining import JoinedFactors
-from vedette.densities.label_sets import laid_out, places_of, take_tracks
+from vedette.densities.label_sets import JoinedFactors, laid_out
+from vedette.densities.tracks import places_of
 from vedette.errors import InputError, NumericalError
 from vedette.fusion.base import count_lost
-from vedette.fusion.parallel_lmbs import unknown_label
+from vedette.fusion.powers import ONE
+from vedette.fusion.views import sum_over_sensors
 from vedette.kernels.base.types import Bools, Floats, Ints, Tracks
-from vedette.kernels.gaussian.mixtures import MixtureCaps
 from vedette.kernels.gaussian.pooling import pooled_tracks
 from vedette.kernels.labelled.groups import group_log_sums
+from vedette.kernels.labelled.stacking import stack_tracks
 from vedette.probabilities import log_expit, logit
 
-ONE = MixtureCaps(-math.inf, 0.0, 1)  # which make of a mixture the Gaussian of its moments
+
+class Posteriors(NamedTuple):
+    """The sensors' posteriors on the labels of the prediction."""
+
+    chosen: Ints  # (num_labels, num_sensors) place in `tracks`, -1 where the sensor lacks the label
+    tracks: Tracks  # of all sensors
+    logits: Floats  # (num_labels, num_sensors)
+
+
+def posteriors_of(prediction: LMB, beliefs: Sequence[LMB], missing_existence: float) -> Posteriors:
+    """The posteriors aligned. Raises `InputError` for a label that the prediction lacks."""
+    shape = prediction.tracks.num_tracks, len(beliefs)
+    floor = math.log(missing_existence) - math.log1p(-missing_existence)
+    logits = np.minimum(prediction.existence_logit, floor)[:, None].repeat(len(beliefs), axis=1)
+    chosen, start = np.full(shape, -1), 0
+    for s, belief in enumerate(beliefs):
+        own = places_of(belief.tracks.labels, prediction.tracks.labels)
+        if (own < 0).any():
+            raise unknown_label(s, belief.tracks.labels[int(np.argmax(own < 0))])
+        chosen[own, s] = start + np.arange(len(own))
+        logits[own, s] = belief.existence_logit
+        start += len(own)
+    return Posteriors(chosen, stack_tracks([belief.tracks.to_kernel() for belief in beliefs]), logits)
+
+
+def unknown_label(sensor: int, label: Ints) -> InputError:
+    """The error of a posterior with a label that the prediction lacks."""
+    return InputError(
+        f"beliefs[{sensor}]: expected labels of views.prediction, from which it was updated; got {label.tolist()}"
+    )
+
+
+def updated_logs(prior: Floats, posteriors: Floats, weights: Floats) -> Floats:
+    """prior + sum_s v_s (posterior_s - prior), where what is infinite and stays so adds nothing."""
+    base = prior[:, None]
+    with np.errstate(invalid="ignore"):
+        change = np.where((posteriors == base) | (weights == 0.0), 0.0, posteriors - base)
+        return np.asarray(prior + sum_over_sensors(weights * change))
+
+
+def check_evidence(labels: Ints, logits: Floats) -> None:
+    """Raise `NumericalError` where a label is certain to one and impossible to another."""
+    faulty = np.isnan(logits)
+    if faulty.any():
+        label = labels[int(np.flatnonzero(faulty)[0])].tolist()
+        raise NumericalError(
+            f"fusion: label {label} is certain to one sensor or the prediction and impossible to another"
+        )
 
 
 class GroupedSets(NamedTuple):
@@ -146,19 +194,6 @@ def check_known_labels(joined: JoinedFactors) -> None:
             raise unknown_label(s, posterior.tracks.labels[int(unknown.argmax())])
 
 
-def lmbs_alone(joined: JoinedFactors) -> tuple[LMB, list[LMB]]:
-    """What the prediction and each posterior are of the labels that are alone in all their factors."""
-    columns = zip(joined.densities, joined.places().T, strict=True)
-    prediction, *posteriors = [_lmb(density, factors[factors >= 0]) for density, factors in columns]
-    return prediction, posteriors
-
-
-def _lmb(density: FactoredGLMB, factors: Ints) -> LMB:
-    first = density.factor_offsets[factors]
-    logits = density.hyp_log_weights[first + 1] - density.hyp_log_weights[first]
-    return unchecked(LMB, take_tracks(density.tracks, density.track_offsets[factors]), logits)
-
-
 def fused_groups(
     groups: Sequence[GroupedSets], log_overlaps: Floats, means: Floats, covs: Floats, max_sets: int
 ) -> tuple[list[FactoredGLMB], float]:
@@ -197,10 +232,10 @@ def _group(labels: Ints, places: Ints, log_weights: Floats, means: Floats, covs:
 
 def lost_labels(posteriors: Sequence[FactoredGLMB], weights: Floats, fused: FactoredGLMB) -> int:
     """Labels that a sensor is sure of and the fused density is not."""
-    labels, existence = existence_probabilities(fused)
+    labels, existence = fused.label_existence()
     surest = np.zeros(len(labels))
     for posterior in [own for own, power in zip(posteriors, weights.tolist(), strict=True) if power > 0.0]:
-        known, own = existence_probabilities(posterior)
+        known, own = posterior.label_existence()
         places = places_of(known, labels)
         np.maximum.at(surest, places[places >= 0], own[places >= 0])
     return count_lost(surest[:, None], existence)
