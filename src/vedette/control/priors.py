@@ -13,11 +13,10 @@ from typing import TypeVar
 import numpy as np
 
 from vedette.densities import GLMB, Labelled, track_moments
-from vedette.densities.checks import offsets_of
-from vedette.densities.containers import for_kernel, unchecked
+from vedette.densities.containers import for_kernel
 from vedette.densities.conversions import collapsed
-from vedette.densities.label_sets import possible, take_hypotheses
-from vedette.densities.tracks import gaussian_tracks, take_tracks
+from vedette.densities.label_sets import possible, relinked, take_hypotheses
+from vedette.densities.tracks import gaussian_tracks
 from vedette.filters.inputs import model_errors
 from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.gaussian.linalg import log_sum
@@ -61,20 +60,7 @@ def share_versions(belief: GLMB, most: float) -> GLMB:
     """
     if most == 0.0 or len(belief.hyp_tracks) == 0:
         return belief
-    leaders = _leaders(belief, _divergences(belief.tracks.means, belief.tracks.covs), most)
-    weights: dict[tuple[int, ...], float] = {}
-    for hyp, log_weight in enumerate(belief.hyp_log_weights.tolist()):
-        members = tuple(leaders[belief.hyp_tracks[belief.hyp_offsets[hyp] : belief.hyp_offsets[hyp + 1]]].tolist())
-        weights[members] = float(np.logaddexp(weights[members], log_weight)) if members in weights else log_weight
-    kept, renumbered = np.unique(leaders, return_inverse=True)
-    places = dict(zip(leaders.tolist(), renumbered.tolist(), strict=True))
-    return unchecked(
-        GLMB,
-        take_tracks(belief.tracks, kept),
-        offsets_of([len(members) for members in weights]),
-        np.array([places[track] for members in weights for track in members], np.int64),
-        np.array(list(weights.values())),
-    )
+    return relinked(belief, _leaders(belief, _divergences(belief.tracks.means, belief.tracks.covs), most))
 
 
 def _divergences(means: Floats, covs: Floats) -> Floats:

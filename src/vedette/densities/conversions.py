@@ -12,14 +12,13 @@ from vedette.densities.checks import distinct_labels, offsets_of, take_runs
 from vedette.densities.containers import unchecked
 from vedette.densities.factored import FactoredGLMB
 from vedette.densities.glmb import GLMB, sets_of_factors
-from vedette.densities.label_sets import label_sets, take_factors
+from vedette.densities.label_sets import take_factors
 from vedette.densities.labelled import LMB, Labelled
-from vedette.densities.tracks import TrackTable, single_gaussians, take_tracks
+from vedette.densities.tracks import TrackTable, reduced_tracks, single_gaussians, take_tracks
 from vedette.errors import InputError
 from vedette.kernels.association.names import settled_names
 from vedette.kernels.base.types import Lmb
 from vedette.kernels.gaussian.mixtures import MixtureCaps
-from vedette.kernels.gaussian.pooling import pooled_tracks
 from vedette.kernels.labelled import conversions as kernels
 from vedette.probabilities import log_expit
 
@@ -75,12 +74,8 @@ def marginalised_factors(density: FactoredGLMB, caps: MixtureCaps) -> FactoredGL
     if bernoulli.all() and len(density.tracks.log_weights) == density.num_factors:
         return density
     singles, several = np.flatnonzero(bernoulli), np.flatnonzero(~bernoulli)
-    alone, num = take_factors(density, singles), len(singles)
-    if len(alone.tracks.log_weights) > num:
-        each = np.arange(num + 1)
-        own = alone.tracks.to_kernel()
-        tracks = pooled_tracks(own, own.labels, each, each[:-1].copy(), np.ones(num), caps)
-        alone = alone.with_fields(tracks=TrackTable.from_kernel(tracks))
+    alone = take_factors(density, singles)
+    alone = alone.with_fields(tracks=TrackTable.from_kernel(reduced_tracks(alone.tracks.to_kernel(), caps)))
     others = _marginalised_glmbs(take_factors(density, several), caps)
     order = np.argsort(np.concatenate([singles, several]))
     return take_factors(FactoredGLMB.product([alone, others], density.state_dim), order)
@@ -192,13 +187,6 @@ def as_glmb(density: Labelled, *, max_hypotheses: int) -> tuple[GLMB, float]:
     return GLMB.from_kernel(glmb), float(discarded_weight)
 
 
-def on_label_sets_of(density: Labelled, other: Labelled) -> GLMB:
-    """A GLMB; an LMB as its hypotheses on the label sets of another GLMB, as of `lmb_on_label_sets`."""
-    assert isinstance(density, LMB | GLMB)
-    assert isinstance(other, GLMB)
-    return density if isinstance(density, GLMB) else lmb_on_label_sets(density, label_sets(other).sets)
-
-
 def lmb_on_label_sets(lmb: LMB, sets: Sequence[Sequence[tuple[int, ...]]]) -> GLMB:
     """The LMB's hypotheses on those of the label sets that it has, in their order; their weights do not sum to one."""
     place = {tuple(label): i for i, label in enumerate(lmb.tracks.labels.tolist())}
@@ -222,7 +210,6 @@ __all__ = [
     "marginalise",
     "marginalised_factors",
     "names_settled",
-    "on_label_sets_of",
     "reduced_lmb",
     "settled_lmb",
 ]

@@ -33,13 +33,12 @@ class LabelSets(NamedTuple):
     groups: Ints
 
 
-def label_sets(belief: GLMB) -> LabelSets:
+def label_sets(belief: Labelled) -> LabelSets:
     """The label sets of a GLMB and which of them each hypothesis has."""
-    groups, firsts = group_by_label_set(belief.to_kernel())
-    labels, offsets = belief.tracks.labels.tolist(), belief.hyp_offsets
-    sets = tuple(
-        tuple(tuple(labels[track]) for track in belief.hyp_tracks[offsets[h] : offsets[h + 1]]) for h in firsts.tolist()
-    )
+    hyps, labels = belief.as_hypotheses(), belief.tracks.labels.tolist()
+    groups, firsts = group_by_label_set(hyps)
+    members = [hyps.hyp_tracks[hyps.hyp_offsets[h] : hyps.hyp_offsets[h + 1]] for h in firsts.tolist()]
+    sets = tuple(tuple(tuple(labels[track]) for track in own) for own in members)
     return LabelSets(sets, groups)
 
 
@@ -150,20 +149,24 @@ def _factors_without(belief: FactoredGLMB, kept: Bools) -> FactoredGLMB:
 
 
 def _glmb_without(belief: GLMB, kept: Bools) -> GLMB:
+    fewer = relinked(belief, np.where(kept, np.arange(len(kept)), -1))
+    return take_hypotheses(fewer, np.argsort(-fewer.hyp_log_weights, kind="stable"))
+
+
+def relinked(belief: GLMB, links: Ints) -> GLMB:
+    """The GLMB with each track replaced by that of its label that `links` (num_tracks,) has, or left out where -1.
+
+    Hypotheses that then hold the same tracks become one, of the sum of their weights, in the order of the first.
+    """
     weights: dict[tuple[int, ...], float] = {}
     for hyp, log_weight in enumerate(belief.hyp_log_weights.tolist()):
-        tracks = belief.hyp_tracks[belief.hyp_offsets[hyp] : belief.hyp_offsets[hyp + 1]]
-        members = tuple(tracks[kept[tracks]].tolist())
-        weights[members] = float(np.logaddexp(weights.get(members, -np.inf), log_weight))
-    order = sorted(weights, key=lambda members: -weights[members])
-    renumbered = np.cumsum(kept) - 1
-    return unchecked(
-        GLMB,
-        take_tracks(belief.tracks, np.flatnonzero(kept)),
-        offsets_of([len(members) for members in order]),
-        np.array([renumbered[track] for members in order for track in members], np.int64),
-        np.array([weights[members] for members in order]),
-    )
+        tracks = links[belief.hyp_tracks[belief.hyp_offsets[hyp] : belief.hyp_offsets[hyp + 1]]]
+        members = tuple(tracks[tracks >= 0].tolist())
+        weights[members] = float(np.logaddexp(weights[members], log_weight)) if members in weights else log_weight
+    used = np.unique(links[links >= 0])
+    entries = np.array([track for members in weights for track in members], np.int64)
+    offsets, log_weights = offsets_of([len(members) for members in weights]), np.array(list(weights.values()))
+    return unchecked(GLMB, take_tracks(belief.tracks, used), offsets, np.searchsorted(used, entries), log_weights)
 
 
 class JoinedFactors(NamedTuple):
@@ -179,22 +182,13 @@ class JoinedFactors(NamedTuple):
     groups: tuple[Ints, ...]
     alone: Bools
 
-    def places(self) -> Ints:
-        """(number of groups that are alone, num_densities) factor of each density there, -1 where it has none."""
-        number = np.cumsum(self.alone) - 1
-        places = np.full((int(self.alone.sum()), len(self.densities)), -1, np.int64)
-        for d, groups in enumerate(self.groups):
-            factors = np.flatnonzero(groups >= 0)
-            factors = factors[self.alone[groups[factors]]]
-            places[number[groups[factors]], d] = factors
-        return places
-
     def lmbs_alone(self) -> list[LMB]:
         """What each density says of the labels that are alone in all their factors."""
-        return [
-            lmb_of_factors(density, factors[factors >= 0])
-            for density, factors in zip(self.densities, self.places().T, strict=True)
-        ]
+        found = []
+        for density, groups in zip(self.densities, self.groups, strict=True):
+            factors = np.argsort(groups, kind="stable")[np.count_nonzero(groups < 0) :]
+            found.append(lmb_of_factors(density, factors[self.alone[groups[factors]]]))
+        return found
 
     def parts(self, group: int) -> list[FactoredGLMB]:
         """What each density has in a group."""

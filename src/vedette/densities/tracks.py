@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,8 @@ from vedette.densities.containers import Container, kernel_arrays, unchecked
 from vedette.errors import InputError, NumericalError, VedetteError
 from vedette.kernels.base import types as kt
 from vedette.kernels.base.types import Floats, Ints
+from vedette.kernels.gaussian.mixtures import MixtureCaps
+from vedette.kernels.gaussian.pooling import pooled_tracks
 from vedette.models.arguments import no_gaussians
 
 _ARRAYS = kernel_arrays("labels", "offsets", "log_weights", "means", "covs")
@@ -111,6 +114,12 @@ class TrackTable(Container):
         checks.check_array("tracks.labels", self.labels, np.int64, (None, 2))
         checks.check_mixtures("tracks.", self.offsets, self.log_weights, self.means, self.covs, self.num_tracks, error)
 
+    def check_form(self) -> None:
+        """Raise `InputError` unless every array has its type and shape, so that tables can be stacked."""
+        checks.check_array("tracks.labels", self.labels, np.int64, (None, 2))
+        mixtures = self.offsets, self.log_weights, self.means, self.covs
+        checks.check_form_of_mixtures("tracks.", *mixtures, self.num_tracks)
+
 
 def log_weights(field: str, weights: Any) -> Floats:
     """Logs of a user's linear weights. Raises `InputError` for a weight that is negative or not finite."""
@@ -146,11 +155,32 @@ def gaussian_tracks(labels: Ints, means: Floats, covs: Floats) -> TrackTable:
     return unchecked(TrackTable, labels, np.arange(num + 1), np.zeros(num), means, covs)
 
 
+def place_labels(tables: Sequence[Ints]) -> tuple[Ints, Ints]:
+    """(num_labels, 2) the labels of several tables in increasing order, and (num_labels, num_tables) their places.
+
+    A table has no label twice. The place is -1 where it lacks the label.
+    """
+    labels, row = checks.distinct_labels(np.concatenate(tables))
+    places, ends = np.full((len(labels), len(tables)), -1), checks.offsets_of([len(table) for table in tables])
+    for t, (low, high) in enumerate(pairwise(ends.tolist())):
+        places[row[low:high], t] = np.arange(high - low)
+    return labels, places
+
+
 def single_gaussians(tracks: TrackTable) -> TrackTable:
     """The tracks with each mixture replaced by one Gaussian of its moments."""
     if len(tracks.log_weights) == tracks.num_tracks:
         return tracks
     return gaussian_tracks(tracks.labels, *track_moments(tracks))
+
+
+def reduced_tracks(tracks: kt.Tracks, caps: MixtureCaps) -> kt.Tracks:
+    """The tracks with their mixtures reduced by the caps."""
+    num = len(tracks.labels)
+    if len(tracks.log_weights) == num:
+        return tracks
+    each = np.arange(num + 1)
+    return pooled_tracks(tracks, tracks.labels, each, each[:-1].copy(), np.ones(num), caps)
 
 
 def mixture_moments(log_weights: Floats, means: Floats, covs: Floats) -> tuple[Floats, Floats]:

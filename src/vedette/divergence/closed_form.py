@@ -8,8 +8,8 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from vedette.densities import LMB, FactoredGLMB, Labelled, Poisson, as_lmb
-from vedette.densities.conversions import as_glmb, on_label_sets_of
-from vedette.densities.label_sets import in_label_order, join_factors, lmb_of_factors
+from vedette.densities.conversions import as_glmb, lmb_on_label_sets
+from vedette.densities.label_sets import in_label_order, join_factors, label_sets, lmb_of_factors
 from vedette.densities.labelled import LABELLED
 from vedette.errors import InputError, NumericalError
 from vedette.kernels.base.types import Glmb, Tracks
@@ -156,8 +156,8 @@ def _of_parts(
     if a.is_lmb:
         cross, own_b, own_a = _of_parts(b, a, log_unit_volume, common, self_terms)
         return cross, own_a, own_b
-    on_sets = on_label_sets_of(b, a).as_hypotheses()
-    cross, own_a, own_b = _glmbs(a.as_hypotheses(), on_sets, log_unit_volume, common, self_terms)
+    on_sets = lmb_on_label_sets(as_lmb(b), label_sets(a).sets) if b.is_lmb else b
+    cross, own_a, own_b = _glmbs(a.as_hypotheses(), on_sets.as_hypotheses(), log_unit_volume, common, self_terms)
     if b.is_lmb and not common:
         own_b = _lmbs(as_lmb(b), as_lmb(b), log_unit_volume, False)[0]
     return cross, own_a, own_b

@@ -7,9 +7,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from vedette.densities import GLMB, Labelled, Poisson, as_lmb, track_moments
+from vedette.densities import GLMB, LMB, Labelled, Poisson, as_lmb, track_moments
 from vedette.densities.cases import LabelledCases
-from vedette.densities.conversions import collapsed, on_label_sets_of
+from vedette.densities.conversions import collapsed, lmb_on_label_sets
+from vedette.densities.label_sets import label_sets
 from vedette.densities.labelled import LABELLED
 from vedette.densities.products import Share, check_exponents, lay_out_products
 from vedette.divergence.closed_form import (
@@ -129,12 +130,13 @@ def _of_singles(
         swapped = [(b, a) for a, b in pairs]
         return _of_singles(q, p, swapped, unit_volume, support)
     found = np.empty(len(pairs))
-    on_sets = on_label_sets_of(p, q)
+    lmb = as_lmb(p)
+    on_sets = lmb_on_label_sets(lmb, label_sets(q).sets)
     for i, (a, b) in enumerate(pairs):
         if support == "full" and 0.0 in (a, b):
             own = p if b == 0.0 else q
             found[i] = _of_singles(own, own, ((a, b),), unit_volume, support)[0]
-        elif support == "full" and b < 0.0 and _has_more_sets(p, on_sets):
+        elif support == "full" and b < 0.0 and _has_more_sets(lmb, on_sets):
             found[i] = math.inf
         else:
             views = LabelledCases.of(on_sets), LabelledCases.of(q)
@@ -142,9 +144,9 @@ def _of_singles(
     return found
 
 
-def _has_more_sets(lmb: Labelled, on_sets: GLMB) -> bool:
+def _has_more_sets(lmb: LMB, on_sets: GLMB) -> bool:
     """Whether the LMB has label sets of positive weight beyond these."""
-    num_sets = int(2 ** np.count_nonzero(np.isfinite(as_lmb(lmb).existence_logit)))
+    num_sets = int(2 ** np.count_nonzero(np.isfinite(lmb.existence_logit)))
     return bool(num_sets > np.count_nonzero(on_sets.hyp_log_weights > -math.inf))
 
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vedette.densities import LMB, FactoredGLMB, TrackTable
+from vedette.densities import GLMB, LMB, FactoredGLMB
 from vedette.densities.checks import distinct_labels, offsets_of
 from vedette.densities.containers import unchecked
 from vedette.densities.conversions import as_glmb, reduced_lmb
@@ -118,7 +118,8 @@ def _one_a_group(belief: FactoredGLMB, groups: Ints, num_groups: int, max_produc
     ends = np.searchsorted(groups[order], np.arange(num_groups + 1))
     counts = np.diff(ends)
     single, none = np.flatnonzero(counts == 1), np.flatnonzero(counts == 0)
-    parts = [take_factors(belief, order[ends[single]]), _nobody(len(none), belief.state_dim)]
+    nobody = FactoredGLMB.of(GLMB.empty(belief.state_dim))
+    parts = [take_factors(belief, order[ends[single]]), take_factors(nobody, np.zeros(len(none), np.int64))]
     several = np.flatnonzero(counts > 1)
     for group in several.tolist():
         factors = take_factors(belief, order[ends[group] : ends[group + 1]])
@@ -128,21 +129,6 @@ def _one_a_group(belief: FactoredGLMB, groups: Ints, num_groups: int, max_produc
         parts.append(FactoredGLMB.of(product))
     place = np.argsort(np.concatenate([single, none, several]))
     return take_factors(FactoredGLMB.product(parts, belief.state_dim), place), log_kept
-
-
-def _nobody(num_factors: int, state_dim: int) -> FactoredGLMB:
-    """So many factors that are certain of no target."""
-    nothing = np.zeros(num_factors + 1, np.int64)
-    none = np.empty(0, np.int64)
-    return unchecked(
-        FactoredGLMB,
-        TrackTable.empty(state_dim),
-        nothing,
-        nothing.copy(),
-        none,
-        np.zeros(num_factors),
-        np.arange(num_factors + 1),
-    )
 
 
 def tidied(marginalised: FactoredGLMB) -> FactoredGLMB:

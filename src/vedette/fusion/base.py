@@ -9,8 +9,7 @@ from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
-from vedette.densities import Labelled, TrackTable
-from vedette.densities.checks import label_step_up
+from vedette.densities import Labelled, TrackTable, checks
 from vedette.errors import InputError
 from vedette.fusion.views import Views
 from vedette.kernels.base.types import Bools, Floats, Ints
@@ -111,44 +110,21 @@ def all_valid(beliefs: Sequence[Any]) -> bool:
 
     At little more than the cost of one of them.
     """
-    if not beliefs or not all(isinstance(belief, Labelled) and belief.is_lmb and _formed(belief) for belief in beliefs):
+    if not beliefs or not all(isinstance(belief, Labelled) and belief.is_lmb for belief in beliefs):
         return False
-    if len({belief.state_dim for belief in beliefs}) > 1:
-        return False
-    table = TrackTable.from_kernel(stack_tracks([belief.tracks.to_kernel() for belief in beliefs]))
     try:
+        for belief in beliefs:
+            belief.tracks.check_form()
+            checks.check_array("existence_logit", belief.existence_logit, np.float64, (belief.tracks.num_tracks,))
+        if len({belief.state_dim for belief in beliefs}) > 1:
+            return False
+        table = TrackTable.from_kernel(stack_tracks([belief.tracks.to_kernel() for belief in beliefs]))
         table.validate(error=InputError)
     except InputError:
         return False
-    in_order = label_step_up(table.labels)
-    firsts = np.cumsum([belief.tracks.num_tracks for belief in beliefs])
-    in_order[firsts[(firsts > 0) & (firsts < len(table.labels))] - 1] = True
-    return bool(in_order.all()) and not any(np.isnan(belief.existence_logit).any() for belief in beliefs)
-
-
-def _formed(belief: Any) -> bool:
-    """Whether the arrays have their types and shapes, so that they may be stacked."""
-    tracks = belief.tracks
-    if not (_is(tracks.labels, np.int64, 2) and _is(tracks.means, np.float64, 2)):
-        return False
-    (num, width), (components, dim) = tracks.labels.shape, tracks.means.shape
-    return (
-        width == 2
-        and _is(tracks.offsets, np.int64, 1)
-        and tracks.offsets.shape == (num + 1,)
-        and tracks.offsets[0] == 0
-        and tracks.offsets[-1] == components
-        and _is(tracks.log_weights, np.float64, 1)
-        and tracks.log_weights.shape == (components,)
-        and _is(tracks.covs, np.float64, 3)
-        and tracks.covs.shape == (components, dim, dim)
-        and _is(belief.existence_logit, np.float64, 1)
-        and belief.existence_logit.shape == (num,)
-    )
-
-
-def _is(array: Any, dtype: type, ndim: int) -> bool:
-    return type(array) is np.ndarray and array.dtype == dtype and array.ndim == ndim
+    ends = checks.offsets_of([belief.tracks.num_tracks for belief in beliefs])
+    in_order = checks.labels_increase(table.labels, ends).all()
+    return bool(in_order) and not any(np.isnan(belief.existence_logit).any() for belief in beliefs)
 
 
 def check_weights(weights: Sequence[float] | Floats) -> tuple[float, ...]:

@@ -14,6 +14,7 @@ from vedette.densities.checks import offsets_of
 from vedette.densities.containers import unchecked
 from vedette.densities.conversions import reduced_lmb
 from vedette.densities.products import PowerProducts, Share, lay_out_products
+from vedette.densities.tracks import reduced_tracks
 from vedette.fusion.base import (
     FusionInfo,
     LinearRule,
@@ -29,7 +30,6 @@ from vedette.fusion.powers import (
     check_power,
     fused_tracks,
     power_rule,
-    reduced_tracks,
 )
 from vedette.fusion.views import AlignedLmbs, Views, align_lmbs, require_views, sum_over_sensors, weights_by_view
 from vedette.kernels.base.types import Bools, Floats, Ints, Lmb

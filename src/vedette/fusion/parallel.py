@@ -14,7 +14,7 @@ from vedette.densities.checks import offsets_of
 from vedette.densities.containers import unchecked
 from vedette.densities.conversions import marginalised_factors
 from vedette.densities.label_sets import WHOLE, in_label_order, join_factors
-from vedette.densities.tracks import places_of
+from vedette.densities.tracks import places_of, reduced_tracks
 from vedette.errors import InputError, NumericalError
 from vedette.fusion.base import FusionInfo, LinearRule, ValidBeliefs, check_beliefs, info_of_labels
 from vedette.fusion.parallel_sets import (
@@ -27,7 +27,7 @@ from vedette.fusion.parallel_sets import (
     posteriors_of,
     updated_logs,
 )
-from vedette.fusion.powers import ONE, FusionLimits, check_limits, reduced_tracks
+from vedette.fusion.powers import ONE, FusionLimits, check_limits
 from vedette.fusion.views import Views
 from vedette.kernels.base.types import Floats, Ints, Tracks
 from vedette.kernels.labelled.parallel import update_in_parallel

@@ -9,10 +9,10 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from vedette.densities import TrackTable
+from vedette.densities.tracks import reduced_tracks
 from vedette.errors import InputError, NumericalError
 from vedette.kernels.base.types import Floats, Ints, Tracks
 from vedette.kernels.gaussian.mixtures import MixtureCaps
-from vedette.kernels.gaussian.pooling import pooled_tracks
 from vedette.kernels.labelled.gci import fuse_tracks
 from vedette.models.arguments import instance, one_of, real
 from vedette.models.fields import Count, NonNegative, check_fields
@@ -120,15 +120,6 @@ def fused_tracks(
         log_overlaps = np.minimum(log_overlaps, 0.0)
     fused = Tracks(labels, offsets, log_weights, means, covs)
     return TrackTable.from_kernel(reduced_tracks(fused, rule.caps)), log_overlaps
-
-
-def reduced_tracks(tracks: Tracks, caps: MixtureCaps) -> Tracks:
-    """The tracks with their mixtures reduced by the caps."""
-    num = len(tracks.labels)
-    if len(tracks.log_weights) == num:
-        return tracks
-    each = np.arange(num + 1)
-    return pooled_tracks(tracks, tracks.labels, each, each[:-1].copy(), np.ones(num), caps)
 
 
 def _simplex(dim: int) -> Floats:

@@ -11,7 +11,7 @@ import numpy as np
 
 from vedette.densities import Labelled, TrackTable
 from vedette.densities.labelled import LABELLED
-from vedette.densities.tracks import take_tracks
+from vedette.densities.tracks import place_labels, take_tracks
 from vedette.errors import InputError
 from vedette.kernels.base.types import Bools, Floats, Ints, Lmb, Tracks
 from vedette.kernels.labelled.stacking import stack_tracks
@@ -91,25 +91,17 @@ def align_lmbs(sensors: Sequence[Lmb], missing_existence: float) -> AlignedLmbs:
     it has.
     """
     floor = math.log(missing_existence) - math.log1p(-missing_existence) if missing_existence > 0.0 else -math.inf
-    places = [_places(sensor) for sensor in sensors]
-    labels = sorted(set().union(*places))
-    chosen, logits = np.full((len(labels), len(sensors)), -1), np.empty((len(labels), len(sensors)))
-    start = 0
+    known = [np.flatnonzero(sensor.existence_logit > -math.inf) for sensor in sensors]
+    labels, places = place_labels([sensor.tracks.labels[own] for sensor, own in zip(sensors, known, strict=True)])
+    chosen, logits, start = np.full(places.shape, -1), np.empty(places.shape), 0
     for s, sensor in enumerate(sensors):
-        own = np.array([place for place, label in enumerate(labels) if label in places[s]], np.int64)
-        tracks = np.array([places[s][labels[place]] for place in own.tolist()], np.int64)
+        held = places[:, s] >= 0
+        tracks = known[s][places[held, s]]
         logits[:, s] = min(floor, float(sensor.existence_logit[tracks].min(initial=math.inf)))
-        logits[own, s] = sensor.existence_logit[tracks]
-        chosen[own, s] = start + tracks
+        logits[held, s] = sensor.existence_logit[tracks]
+        chosen[held, s] = start + tracks
         start += len(sensor.existence_logit)
-    table = stack_tracks([sensor.tracks for sensor in sensors])
-    return AlignedLmbs(np.array(labels, np.int64).reshape(-1, 2), chosen, table, logits)
-
-
-def _places(lmb: Lmb) -> dict[tuple[int, int], int]:
-    """Place of each label of positive existence."""
-    labels = lmb.tracks.labels.tolist()
-    return {(labels[i][0], labels[i][1]): i for i in np.flatnonzero(lmb.existence_logit > -math.inf).tolist()}
+    return AlignedLmbs(labels, chosen, stack_tracks([sensor.tracks for sensor in sensors]), logits)
 
 
 def weights_by_view(aligned: AlignedLmbs, weights: Floats, views: Views, active: Sequence[int]) -> Floats:
