@@ -158,15 +158,6 @@ def check_mixtures(
 
     field: what goes before the names of the arrays. `InputError` for faults of form, `error` for faults of value.
     """
-    check_form_of_mixtures(field, offsets, log_weights, means, covs, count)
-    check_log_weights(f"{field}log_weights", log_weights, error)
-    check_normalised(f"{field}log_weights", log_weights, offsets, error)
-    check_finite(f"{field}means", means, error)
-    check_covariances(f"{field}covs", covs, error)
-
-
-def check_form_of_mixtures(field: str, offsets: Any, log_weights: Any, means: Any, covs: Any, count: int) -> None:
-    """Raise `InputError` unless these have the types and shapes of `count` Gaussian mixtures, flat with offsets."""
     check_array(f"{field}means", means, np.float64, (None, None))
     num_components, dim = means.shape
     if dim == 0:
@@ -174,6 +165,10 @@ def check_form_of_mixtures(field: str, offsets: Any, log_weights: Any, means: An
     check_array(f"{field}log_weights", log_weights, np.float64, (num_components,))
     check_array(f"{field}covs", covs, np.float64, (num_components, dim, dim))
     check_offsets(f"{field}offsets", offsets, count, num_components, empty_allowed=False)
+    check_log_weights(f"{field}log_weights", log_weights, error)
+    check_normalised(f"{field}log_weights", log_weights, offsets, error)
+    check_finite(f"{field}means", means, error)
+    check_covariances(f"{field}covs", covs, error)
 
 
 def label_step_up(labels: Ints) -> Bools:

@@ -114,12 +114,6 @@ class TrackTable(Container):
         checks.check_array("tracks.labels", self.labels, np.int64, (None, 2))
         checks.check_mixtures("tracks.", self.offsets, self.log_weights, self.means, self.covs, self.num_tracks, error)
 
-    def check_form(self) -> None:
-        """Raise `InputError` unless every array has its type and shape, so that tables can be stacked."""
-        checks.check_array("tracks.labels", self.labels, np.int64, (None, 2))
-        mixtures = self.offsets, self.log_weights, self.means, self.covs
-        checks.check_form_of_mixtures("tracks.", *mixtures, self.num_tracks)
-
 
 def log_weights(field: str, weights: Any) -> Floats:
     """Logs of a user's linear weights. Raises `InputError` for a weight that is negative or not finite."""

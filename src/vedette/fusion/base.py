@@ -9,7 +9,8 @@ from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
-from vedette.densities import Labelled, TrackTable, checks
+from vedette.densities import Labelled, TrackTable
+from vedette.densities.checks import labels_increase, offsets_of
 from vedette.errors import InputError
 from vedette.fusion.views import Views
 from vedette.kernels.base.types import Bools, Floats, Ints
@@ -19,6 +20,10 @@ from vedette.text import either
 
 # Existence from which a sensor is sure of a label, and below which the fusion has lost it.
 SURE, LOST = 0.9, 0.5
+
+# Type and number of dimensions of the arrays of an LMB: labels, offsets, log weights, means, covariances, logits.
+_INT, _FLOAT = np.dtype(np.int64), np.dtype(np.float64)
+_FORMS = ((_INT, 2), (_INT, 1), (_FLOAT, 1), (_FLOAT, 2), (_FLOAT, 3), (_FLOAT, 1))
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,19 +117,29 @@ def all_valid(beliefs: Sequence[Any]) -> bool:
     """
     if not beliefs or not all(isinstance(belief, Labelled) and belief.is_lmb for belief in beliefs):
         return False
+    if not all(map(_formed, beliefs)) or len({belief.state_dim for belief in beliefs}) > 1:
+        return False
+    table = TrackTable.from_kernel(stack_tracks([belief.tracks.to_kernel() for belief in beliefs]))
     try:
-        for belief in beliefs:
-            belief.tracks.check_form()
-            checks.check_array("existence_logit", belief.existence_logit, np.float64, (belief.tracks.num_tracks,))
-        if len({belief.state_dim for belief in beliefs}) > 1:
-            return False
-        table = TrackTable.from_kernel(stack_tracks([belief.tracks.to_kernel() for belief in beliefs]))
         table.validate(error=InputError)
     except InputError:
         return False
-    ends = checks.offsets_of([belief.tracks.num_tracks for belief in beliefs])
-    in_order = checks.labels_increase(table.labels, ends).all()
+    in_order = labels_increase(table.labels, offsets_of([belief.tracks.num_tracks for belief in beliefs])).all()
     return bool(in_order) and not any(np.isnan(belief.existence_logit).any() for belief in beliefs)
+
+
+def _formed(belief: Any) -> bool:
+    """Whether the arrays of an LMB have their types and shapes, so that they may be stacked."""
+    tracks, logits = belief.tracks, belief.existence_logit
+    arrays = tracks.labels, tracks.offsets, tracks.log_weights, tracks.means, tracks.covs, logits
+    for array, (dtype, ndim) in zip(arrays, _FORMS, strict=True):
+        if type(array) is not np.ndarray or array.dtype != dtype or array.ndim != ndim:
+            return False
+    num, (components, dim) = len(tracks.labels), tracks.means.shape
+    shapes = (num, 2), (num + 1,), (components,), (components, dim), (components, dim, dim), (num,)
+    if tuple(array.shape for array in arrays) != shapes:
+        return False
+    return bool(tracks.offsets[0] == 0 and tracks.offsets[-1] == components)
 
 
 def check_weights(weights: Sequence[float] | Floats) -> tuple[float, ...]:

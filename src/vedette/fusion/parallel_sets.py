@@ -13,7 +13,7 @@ from vedette.densities.checks import offsets_of
 from vedette.densities.containers import unchecked
 from vedette.densities.conversions import as_glmb
 from vedette.densities.label_sets import JoinedFactors, laid_out
-from vedette.densities.tracks import places_of
+from vedette.densities.tracks import place_labels, places_of
 from vedette.errors import InputError, NumericalError
 from vedette.fusion.base import count_lost
 from vedette.fusion.powers import ONE
@@ -35,18 +35,18 @@ class Posteriors(NamedTuple):
 
 def posteriors_of(prediction: LMB, beliefs: Sequence[LMB], missing_existence: float) -> Posteriors:
     """The posteriors aligned. Raises `InputError` for a label that the prediction lacks."""
-    shape = prediction.tracks.num_tracks, len(beliefs)
-    floor = math.log(missing_existence) - math.log1p(-missing_existence)
-    logits = np.minimum(prediction.existence_logit, floor)[:, None].repeat(len(beliefs), axis=1)
-    chosen, start = np.full(shape, -1), 0
-    for s, belief in enumerate(beliefs):
-        own = places_of(belief.tracks.labels, prediction.tracks.labels)
-        if (own < 0).any():
-            raise unknown_label(s, belief.tracks.labels[int(np.argmax(own < 0))])
-        chosen[own, s] = start + np.arange(len(own))
-        logits[own, s] = belief.existence_logit
-        start += len(own)
-    return Posteriors(chosen, stack_tracks([belief.tracks.to_kernel() for belief in beliefs]), logits)
+    labels, places = place_labels([prediction.tracks.labels, *(belief.tracks.labels for belief in beliefs)])
+    own = places[:, 1:]
+    unknown = (own >= 0) & (places[:, :1] < 0)
+    if unknown.any():
+        sensor = int(unknown.any(axis=0).argmax())
+        raise unknown_label(sensor, labels[int(unknown[:, sensor].argmax())])
+    starts = offsets_of([belief.tracks.num_tracks for belief in beliefs])[:-1]
+    floors = np.minimum(prediction.existence_logit, math.log(missing_existence) - math.log1p(-missing_existence))
+    chosen = np.where(own >= 0, own + starts, -1)
+    logits = np.concatenate([*(belief.existence_logit for belief in beliefs), np.zeros(1)])  # the last is nobody's
+    tracks = stack_tracks([belief.tracks.to_kernel() for belief in beliefs])
+    return Posteriors(chosen, tracks, np.where(chosen >= 0, logits[chosen], floors[:, None]))
 
 
 def unknown_label(sensor: int, label: Ints) -> InputError:

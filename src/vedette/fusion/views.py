@@ -10,8 +10,9 @@ from typing import NamedTuple
 import numpy as np
 
 from vedette.densities import Labelled, TrackTable
+from vedette.densities.checks import distinct_labels
 from vedette.densities.labelled import LABELLED
-from vedette.densities.tracks import place_labels, take_tracks
+from vedette.densities.tracks import take_tracks
 from vedette.errors import InputError
 from vedette.kernels.base.types import Bools, Floats, Ints, Lmb, Tracks
 from vedette.kernels.labelled.stacking import stack_tracks
@@ -91,17 +92,15 @@ def align_lmbs(sensors: Sequence[Lmb], missing_existence: float) -> AlignedLmbs:
     it has.
     """
     floor = math.log(missing_existence) - math.log1p(-missing_existence) if missing_existence > 0.0 else -math.inf
-    known = [np.flatnonzero(sensor.existence_logit > -math.inf) for sensor in sensors]
-    labels, places = place_labels([sensor.tracks.labels[own] for sensor, own in zip(sensors, known, strict=True)])
-    chosen, logits, start = np.full(places.shape, -1), np.empty(places.shape), 0
-    for s, sensor in enumerate(sensors):
-        held = places[:, s] >= 0
-        tracks = known[s][places[held, s]]
-        logits[:, s] = min(floor, float(sensor.existence_logit[tracks].min(initial=math.inf)))
-        logits[held, s] = sensor.existence_logit[tracks]
-        chosen[held, s] = start + tracks
-        start += len(sensor.existence_logit)
-    return AlignedLmbs(labels, chosen, stack_tracks([sensor.tracks for sensor in sensors]), logits)
+    table = stack_tracks([sensor.tracks for sensor in sensors])
+    own_logits = np.concatenate([sensor.existence_logit for sensor in sensors])
+    known = np.flatnonzero(own_logits > -math.inf)
+    labels, row = distinct_labels(table.labels[known])
+    owner = np.repeat(np.arange(len(sensors)), [len(sensor.existence_logit) for sensor in sensors])[known]
+    chosen, floors = np.full((len(labels), len(sensors)), -1), np.full(len(sensors), floor)
+    chosen[row, owner] = known
+    np.minimum.at(floors, owner, own_logits[known])
+    return AlignedLmbs(labels, chosen, table, np.where(chosen >= 0, own_logits[chosen], floors))
 
 
 def weights_by_view(aligned: AlignedLmbs, weights: Floats, views: Views, active: Sequence[int]) -> Floats:
