@@ -19,10 +19,10 @@ from vedette.errors import InputError, NumericalError
 from vedette.fusion.base import FusionInfo, LinearRule, ValidBeliefs, check_beliefs, info_of_labels
 from vedette.fusion.parallel_sets import (
     check_evidence,
-    check_known_labels,
     check_single,
     fused_groups,
     grouped_sets,
+    known_places,
     lost_labels,
     posteriors_of,
     updated_logs,
@@ -156,7 +156,7 @@ class ParallelUpdate:
             for belief, power in zip(beliefs, weights.tolist(), strict=True)
         ]
         joined = join_factors([prediction, *marginal])
-        check_known_labels(joined)
+        known_places(prediction.tracks.labels, [belief.tracks.labels for belief in marginal])
         predicted, *updated = joined.lmbs_alone()
         alone, info = self._fused_lmbs(predicted, updated, weights)
         tables = [belief.tracks for belief in joined.densities]

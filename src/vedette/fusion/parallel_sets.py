@@ -10,7 +10,7 @@ import numpy as np
 
 from vedette.densities import GLMB, LMB, FactoredGLMB, TrackTable
 from vedette.densities.checks import offsets_of
-from vedette.densities.containers import unchecked
+from vedette.densities.containers import for_kernel, unchecked
 from vedette.densities.conversions import as_glmb
 from vedette.densities.label_sets import JoinedFactors, laid_out
 from vedette.densities.tracks import place_labels, places_of
@@ -35,12 +35,7 @@ class Posteriors(NamedTuple):
 
 def posteriors_of(prediction: LMB, beliefs: Sequence[LMB], missing_existence: float) -> Posteriors:
     """The posteriors aligned. Raises `InputError` for a label that the prediction lacks."""
-    labels, places = place_labels([prediction.tracks.labels, *(belief.tracks.labels for belief in beliefs)])
-    own = places[:, 1:]
-    unknown = (own >= 0) & (places[:, :1] < 0)
-    if unknown.any():
-        sensor = int(unknown.any(axis=0).argmax())
-        raise unknown_label(sensor, labels[int(unknown[:, sensor].argmax())])
+    own = known_places(prediction.tracks.labels, [belief.tracks.labels for belief in beliefs])
     starts = offsets_of([belief.tracks.num_tracks for belief in beliefs])[:-1]
     floors = np.minimum(prediction.existence_logit, math.log(missing_existence) - math.log1p(-missing_existence))
     chosen = np.where(own >= 0, own + starts, -1)
@@ -49,11 +44,20 @@ def posteriors_of(prediction: LMB, beliefs: Sequence[LMB], missing_existence: fl
     return Posteriors(chosen, tracks, np.where(chosen >= 0, logits[chosen], floors[:, None]))
 
 
-def unknown_label(sensor: int, label: Ints) -> InputError:
-    """The error of a posterior with a label that the prediction lacks."""
-    return InputError(
-        f"beliefs[{sensor}]: expected labels of views.prediction, from which it was updated; got {label.tolist()}"
-    )
+def known_places(prediction: Ints, posteriors: Sequence[Ints]) -> Ints:
+    """(num_labels, num_sensors) where posteriors have the labels of the prediction, in increasing order; -1: nowhere.
+
+    Raises `InputError` where one has a label that the prediction lacks.
+    """
+    labels, places = place_labels([prediction, *posteriors])
+    unknown = (places >= 0) & (places[:, :1] < 0)
+    if unknown.any():
+        sensor = int(unknown.any(axis=0).argmax())
+        label = labels[int(unknown[:, sensor].argmax())].tolist()
+        raise InputError(
+            f"beliefs[{sensor - 1}]: expected labels of views.prediction, from which it was updated; got {label}"
+        )
+    return places[:, 1:]
 
 
 def updated_logs(prior: Floats, posteriors: Floats, weights: Floats) -> Floats:
@@ -102,8 +106,9 @@ def grouped_sets(
     prediction, kept.
     """
     labels = np.unique(np.concatenate([part.tracks.labels for part in joined.parts(group)]), axis=0)
-    members, log_weights, log_kept = _predicted_sets(joined, group, labels, max_sets)
-    prior, chosen = log_weights.copy(), np.full((*members.shape, len(weights)), -1)
+    product, lost = as_glmb(joined.parts(group)[0], max_hypotheses=max_sets)
+    members, prior = _members(product, labels), for_kernel(product.hyp_log_weights)
+    log_weights, chosen = prior.copy(), np.full((*members.shape, len(weights)), -1)
     num_missing = np.zeros(len(weights), np.int64)
     for s, power in enumerate(weights.tolist()):
         density, groups = joined.densities[1 + s], joined.groups[1 + s]
@@ -122,13 +127,9 @@ def grouped_sets(
     distinct, place = np.unique(rows, axis=0, return_inverse=True)
     places = np.full(members.shape, -1)
     places[members] = place.ravel()
-    return GroupedSets(labels, log_weights, places, distinct[:, 0], distinct[:, 1:], num_missing, log_kept)
-
-
-def _predicted_sets(joined: JoinedFactors, group: int, labels: Ints, max_sets: int) -> tuple[Bools, Floats, float]:
-    """(num_sets, num_labels) who is in each set of the prediction, log weights, and log of what the cap left."""
-    product, lost = as_glmb(joined.parts(group)[0], max_hypotheses=max_sets)
-    return _members(product, labels), product.hyp_log_weights.copy(), float(np.log1p(-lost))
+    return GroupedSets(
+        labels, log_weights, places, distinct[:, 0], distinct[:, 1:], num_missing, float(np.log1p(-lost))
+    )
 
 
 def _members(glmb: GLMB, labels: Ints) -> Bools:
@@ -183,15 +184,6 @@ def check_single(prediction: FactoredGLMB) -> None:
             f"views.prediction: expected one Gaussian for each of its {num_labels} labels, the same in all hypotheses, "
             f"as of what a parallel update has fused; got {len(tracks.log_weights)} Gaussians"
         )
-
-
-def check_known_labels(joined: JoinedFactors) -> None:
-    """Raise `InputError` where a posterior has a label that the prediction lacks."""
-    prediction, *posteriors = joined.densities
-    for s, posterior in enumerate(posteriors):
-        unknown = places_of(posterior.tracks.labels, prediction.tracks.labels) < 0
-        if unknown.any():
-            raise unknown_label(s, posterior.tracks.labels[int(unknown.argmax())])
 
 
 def fused_groups(
