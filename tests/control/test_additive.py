@@ -37,7 +37,7 @@ from vedette.control.rewards import (
 from vedette.control.rewards.base import reward_value
 from vedette.control.search import all_joint_actions
 from vedette.densities import LMB
-from vedette.densities.label_sets import single_gaussians
+from vedette.densities.tracks import single_gaussians
 from vedette.fusion import ParallelUpdate
 from vedette.kernels.planning.ascent import Allowed
 

@@ -11,7 +11,7 @@ from vedette.control.constraints import Constraint, Mask, Situation, mask_of
 from vedette.control.priors import predicted
 from vedette.control.rewards.base import LabelReward, PowerReward
 from vedette.control.rewards.power import ExpectedLossReward
-from vedette.control.settings import LABELLED, MobileSensor, PlanningSettings
+from vedette.control.settings import MobileSensor, PlanningSettings
 from vedette.densities import Labelled
 from vedette.errors import InputError
 from vedette.filters import shared_targets
@@ -21,7 +21,6 @@ from vedette.kernels.planning.ascent import Allowed
 from vedette.models import TargetModel
 from vedette.models.arguments import float_array, instance, reject, sequence, tell_degrees
 from vedette.platforms import Options, options_at
-from vedette.text import either
 from vedette.tracking import State
 
 
@@ -80,18 +79,16 @@ def check_state(sensors: Sequence[MobileSensor], state: State) -> None:
     state_dim = sensors[0].filter.targets.state_dim
     checked: set[int] = set()
     for i, (belief, sensor) in enumerate(zip(state.local, sensors, strict=True)):
-        if not sensor.beliefs:
+        if sensor.belief is None:
             raise reject(f"sensors[{i}].filter", "one that labels its targets", type(sensor.filter).__name__)
-        _check_density(f"state.local[{i}]", belief, sensor.beliefs, state_dim, checked)
-    _check_density("state.fused", state.fused, LABELLED, state_dim, checked)
+        _check_density(f"state.local[{i}]", belief, sensor.belief, state_dim, checked)
+    _check_density("state.fused", state.fused, Labelled, state_dim, checked)
 
 
-def _check_density(
-    name: str, density: Any, kinds: tuple[type[Labelled], ...], state_dim: int, checked: set[int]
-) -> None:
+def _check_density(name: str, density: Any, kind: type[Any], state_dim: int, checked: set[int]) -> None:
     """checked: identities of densities that are known to be valid, of which one tracker's sensors may share one."""
-    if not isinstance(density, kinds):
-        expected = either([kind.__name__ for kind in kinds])
+    if not isinstance(density, kind):
+        expected = "GLMB, LMB or FactoredGLMB" if kind is Labelled else kind.__name__
         raise InputError(f"{name}: expected {expected}; got {type(density).__name__}")
     if density.state_dim != state_dim:
         raise InputError(f"{name}: expected states of dimension {state_dim}, as its filter; got {density.state_dim}")

@@ -17,9 +17,7 @@ from vedette.control.rewards.base import LabelReward, PowerReward, Reward, speak
 from vedette.control.rewards.power import ExpectedLossReward
 from vedette.control.settings import MobileSensor, PlanningSettings
 from vedette.densities import (
-    GLMB,
     LMB,
-    FactoredGLMB,
     Labelled,
     as_lmb,
     at_peaks,
@@ -150,7 +148,7 @@ def check_sums(
 def stay_glmbs(sensors: Sequence[MobileSensor], fusion: Fusion, settings: PlanningSettings, reward: AnyReward) -> bool:
     """Whether beliefs of these filters may be planned on as GLMBs, hypothesis by hypothesis."""
     initial = [sensor.filter.initial() for sensor in sensors]
-    return any(isinstance(own, GLMB) for own in initial) and not _why_lmbs(
+    return any(isinstance(own, Labelled) and not (own.is_lmb or own.is_product) for own in initial) and not _why_lmbs(
         len(sensors), fusion, settings, reward, initial
     )
 
@@ -184,7 +182,7 @@ def planned_on(
         state = replace(state, local=local, fused=converted[id(state.fused)])
         notes = (f"planned on the LMBs of the GLMB beliefs: {why}",)
         fusion = _of_lmbs(fusion)
-    if isinstance(reward, ExpectedLossReward) and isinstance(state.fused, LMB):
+    if isinstance(reward, ExpectedLossReward) and state.fused.is_lmb:
         state = replace(state, fused=at_peaks(state.fused))
     if from_one:
         state = replace(state, local=(state.fused,) * num_sensors)
@@ -203,7 +201,7 @@ def _clmb(weights: tuple[float, ...]) -> Clmb:
 
 
 def _has_glmb(beliefs: Sequence[Labelled]) -> bool:
-    return any([isinstance(belief, GLMB | FactoredGLMB) for belief in beliefs])
+    return not all([belief.is_lmb for belief in beliefs])
 
 
 def _why_lmbs(
@@ -214,7 +212,7 @@ def _why_lmbs(
         return "the expected loss asks for no more"
     if shares_prediction(fusion):
         return f"{type(fusion).__name__} fuses LMBs"
-    if any(isinstance(belief, FactoredGLMB) for belief in beliefs):
+    if any(belief.is_product for belief in beliefs):
         return "products of GLMBs always are"
     expected = float(existence_probabilities(beliefs[-1])[1].sum())
     if num_sensors > settings.max_glmb_sensors:

@@ -4,24 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import lru_cache
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
 from vedette.control.settings import IDEAL_MODES, Belief, MobileSensor, PlanningSettings
-from vedette.densities import (
-    GLMB,
-    LMB,
-    Labelled,
-    MultiTargetSamples,
-    TrackTable,
-    marginalise,
-    sample_glmb,
-    sample_lmb,
-    track_moments,
-)
-from vedette.densities.containers import unchecked
-from vedette.densities.label_sets import places_of, take_hypotheses
+from vedette.densities import Labelled, MultiTargetSamples, track_moments
+from vedette.densities.conversions import collapsed
+from vedette.densities.label_sets import possible
+from vedette.densities.samples import sample_labelled
+from vedette.densities.tracks import gaussian_tracks, places_of
 from vedette.filters import shared_targets
 from vedette.filters.inputs import model_errors, nobody
 from vedette.kernels.base.types import Bools, Floats, Ints, Motion, Sensor
@@ -71,18 +63,12 @@ def predicted(fused: _Labelled, motion: MotionModel, num_steps: int, period: flo
     Tracks are first collapsed to one Gaussian each (GLMBs are marginalised), as those of the pseudo-updates are. Label
     sets of weight zero are left out of a GLMB.
     """
-    single: Any = fused
-    if not isinstance(fused, LMB):
-        single = marginalise(single, max_components=1)
-    if isinstance(single, GLMB):
-        single = take_hypotheses(single, np.flatnonzero(single.hyp_log_weights > -np.inf))
+    single = possible(collapsed(fused))
     means, covs = track_moments(single.tracks)
     with model_errors():
         paths = predict_paths(kernel_motion(motion, ALWAYS_SURVIVES), float(period), int(num_steps), means, covs)
-    labels, num = single.tracks.labels, len(single.tracks.labels)
     ends = np.ascontiguousarray(paths.means[:, -1]), np.ascontiguousarray(paths.covs[:, -1])
-    tracks = unchecked(TrackTable, labels, np.arange(num + 1), np.zeros(num), *ends)
-    return unchecked(type(fused), tracks, *single.to_kernel()[1:])
+    return single.with_fields(tracks=gaussian_tracks(single.tracks.labels, *ends))
 
 
 def draw_paths(
@@ -90,8 +76,7 @@ def draw_paths(
 ) -> tuple[MultiTargetSamples, Floats]:
     """Samples of the fused density, and (horizon_steps, num_targets, state_dim) where they go without noise."""
     targets = shared_targets([sensor.filter for sensor in sensors])
-    draw: Any = sample_glmb if isinstance(fused, GLMB) else sample_lmb
-    samples: MultiTargetSamples = draw(fused, settings.num_samples, rng=rng)
+    samples = sample_labelled(fused, settings.num_samples, rng=rng)
     with model_errors():
         motion = kernel_motion(targets.motion, targets.survival)
         states = propagate_samples(motion, samples.states, float(settings.horizon_period), int(settings.horizon_steps))

@@ -20,8 +20,9 @@ from vedette.densities import (
 )
 from vedette.densities.cases import LabelledCases
 from vedette.densities.checks import offsets_of
-from vedette.densities.containers import for_kernel, unchecked
-from vedette.densities.label_sets import label_sets, single_gaussians, take_hypotheses, take_tracks
+from vedette.densities.containers import for_kernel
+from vedette.densities.label_sets import label_sets, relinked, take_hypotheses
+from vedette.densities.tracks import single_gaussians
 from vedette.filters.inputs import model_errors
 from vedette.filters.lmb import association_of
 from vedette.kernels.association.marginals import Association
@@ -71,7 +72,7 @@ def pseudo_posteriors(
     """
     decision = decision_of(sensor, courses, futures, settings, scans)
     num_cases = len(courses) * settings.num_samples
-    if isinstance(belief, GLMB):
+    if not belief.is_lmb:
         return _run_glmb(belief, decision, settings, num_cases)
     targets = targets_of(belief.tracks.labels, labels, futures.offsets)
     return _run_lmb(belief, decision, association_of(sensor.filter), settings, num_cases, targets)
@@ -79,7 +80,7 @@ def pseudo_posteriors(
 
 def _run_glmb(belief: GLMB, decision: Decision, settings: PlanningSettings, num_cases: int) -> LabelledCases:
     heaviest = heaviest_hypotheses(belief, settings.max_prior_hypotheses)
-    single = unchecked(GLMB, single_gaussians(heaviest.tracks), *heaviest.to_kernel()[1:])
+    single = heaviest.with_fields(tracks=single_gaussians(heaviest.tracks))
     prior = share_versions(single, settings.max_version_divergence)
     found, dim = label_sets(prior), prior.tracks.state_dim
     set_offsets = offsets_of([len(labels) for labels in found.sets])
@@ -111,7 +112,7 @@ def _run_lmb(
     results = LmbResults(
         np.empty((num_cases, num)), np.empty((num_cases, num, dim)), np.empty((num_cases, num, dim, dim))
     )
-    prior = unchecked(LMB, single_gaussians(belief.tracks), belief.existence_logit).to_kernel()
+    prior = belief.with_fields(tracks=single_gaussians(belief.tracks)).to_kernel()
 
     with model_errors():
         if settings.association == "known":
@@ -143,7 +144,7 @@ def heaviest_hypotheses(belief: GLMB, most: int) -> GLMB:
     order = np.argsort(-belief.hyp_log_weights, kind="stable")[:most]
     taken = take_hypotheses(belief, order[belief.hyp_log_weights[order] > -np.inf])
     log_weights = taken.hyp_log_weights - log_sum(for_kernel(taken.hyp_log_weights))
-    return unchecked(GLMB, taken.tracks, taken.hyp_offsets, taken.hyp_tracks, log_weights)
+    return taken.with_fields(hyp_log_weights=log_weights)
 
 
 def share_versions(belief: GLMB, most: float) -> GLMB:
@@ -155,20 +156,7 @@ def share_versions(belief: GLMB, most: float) -> GLMB:
     """
     if most == 0.0 or len(belief.hyp_tracks) == 0:
         return belief
-    leaders = _leaders(belief, _divergences(belief.tracks.means, belief.tracks.covs), most)
-    weights: dict[tuple[int, ...], float] = {}
-    for hyp, log_weight in enumerate(belief.hyp_log_weights.tolist()):
-        members = tuple(leaders[belief.hyp_tracks[belief.hyp_offsets[hyp] : belief.hyp_offsets[hyp + 1]]].tolist())
-        weights[members] = float(np.logaddexp(weights[members], log_weight)) if members in weights else log_weight
-    kept, renumbered = np.unique(leaders, return_inverse=True)
-    places = dict(zip(leaders.tolist(), renumbered.tolist(), strict=True))
-    return unchecked(
-        GLMB,
-        take_tracks(belief.tracks, kept),
-        offsets_of([len(members) for members in weights]),
-        np.array([places[track] for members in weights for track in members], np.int64),
-        np.array(list(weights.values())),
-    )
+    return relinked(belief, _leaders(belief, _divergences(belief.tracks.means, belief.tracks.covs), most))
 
 
 def _divergences(means: Floats, covs: Floats) -> Floats:

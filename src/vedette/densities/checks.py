@@ -62,6 +62,13 @@ def check_log_weights(field: str, log_weights: Floats, error: type[VedetteError]
         raise error(f"{field}[{place}]: expected a log weight (a number or -inf); got {log_weights[place]}")
 
 
+def check_logits(field: str, logits: Floats, error: type[VedetteError] = NumericalError) -> None:
+    """Raise `error` unless every entry is the log-odds of a probability: a number or an infinity."""
+    faulty = np.isnan(logits)
+    if faulty.any():
+        raise error(f"{field}[{_first(faulty)}]: expected a number; got nan")
+
+
 def check_offsets(field: str, offsets: Any, count: int, total: int, *, empty_allowed: bool) -> None:
     """Raise `InputError` unless `offsets` cuts `total` entries into `count` runs."""
     check_array(field, offsets, np.int64, (count + 1,))
@@ -183,6 +190,21 @@ def labels_increase(labels: Ints, offsets: Ints) -> Bools:
 def as_floats(field: str, values: Any, shape: Sequence[int | None]) -> Floats:
     """A fresh float64 array of a user's numbers. Raises `InputError` for another shape or for what is no number."""
     return np.array(_given(field, values, "fiu", "numbers", shape), dtype=np.float64, order="C")
+
+
+def as_gaussians(means: Any, covs: Any, num: int) -> tuple[Floats, Floats]:
+    """Fresh (num, dim) and (num, dim, dim) arrays of a user's means and covariances, which are not checked further."""
+    checked = as_floats("means", means, (num, None))
+    return checked, as_floats("covs", covs, (num, checked.shape[1], checked.shape[1]))
+
+
+def as_logits(field: str, probabilities: Any, num: int | None) -> Floats:
+    """(num,) log-odds of a user's probabilities. Raises `InputError` for numbers that are none."""
+    checked = as_floats(field, probabilities, (num,))
+    if not np.all((checked >= 0.0) & (checked <= 1.0)):
+        raise InputError(f"{field}: expected probabilities; got {checked.tolist()}")
+    with np.errstate(divide="ignore"):
+        return np.asarray(np.log(checked) - np.log1p(-checked))
 
 
 def as_ints(field: str, values: Any, shape: Sequence[int | None]) -> Ints:

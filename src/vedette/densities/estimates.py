@@ -11,17 +11,13 @@ import numpy as np
 
 from vedette.densities import checks
 from vedette.densities.checks import distinct_labels
-from vedette.densities.containers import unchecked
 from vedette.densities.conversions import settled_lmb
-from vedette.densities.factored import LABELLED, FactoredGLMB, Labelled
-from vedette.densities.glmb import GLMB
-from vedette.densities.iid_cluster import IidCluster
-from vedette.densities.lmb import LMB
+from vedette.densities.glmb import Hypotheses
+from vedette.densities.labelled import LMB, Labelled
 from vedette.densities.multi_bernoulli import MultiBernoulli
-from vedette.densities.poisson import Poisson
-from vedette.densities.sharing import heaviest_tracks
-from vedette.densities.statistics import cardinality_distribution, existence_probabilities
-from vedette.densities.tracks import TrackTable
+from vedette.densities.statistics import cardinality_distribution, heaviest_tracks, labelled
+from vedette.densities.tracks import TrackTable, gaussian_tracks
+from vedette.densities.unlabelled import IidCluster, Poisson
 from vedette.errors import InputError, NumericalError, VedetteError
 from vedette.kernels.base.types import Floats, Ints
 from vedette.models.arguments import no_gaussians
@@ -88,42 +84,21 @@ def map_estimate(density: Labelled) -> Estimate:
     earlier hypothesis; the smaller label. A track that is a mixture is estimated by its heaviest component,
     as the mean of two rival components may lie where the target cannot be.
     """
-    if isinstance(density, GLMB):
-        return _map_of_glmb(density)
+    number = int(np.argmax(cardinality_distribution(labelled(density))))
     if isinstance(density, LMB):
-        number = int(np.argmax(cardinality_distribution(density)))
         chosen = np.sort(np.argsort(-density.existence_logit, kind="stable")[:number])
         return _peaks(density.tracks, chosen, density.existence[chosen])
-    if isinstance(density, FactoredGLMB):
-        return _map_of_factors(density)
-    raise InputError(f"density: expected {LABELLED}, which have labels; got {type(density).__name__}")
+    assert isinstance(density, Hypotheses)
+    chosen = heaviest_tracks(density, number)
+    labels, existence = density.label_existence()
+    # Both come in increasing label order, and every chosen label is one of those.
+    _, place = distinct_labels(np.concatenate([labels, density.tracks.labels[chosen]]))
+    return _peaks(density.tracks, chosen, existence[place[len(labels) :]])
 
 
 def best_estimate(density: Any, step: int) -> Estimate:
     """An `Estimator` of every density: `map_estimate` where it has labels, else `unlabelled_estimate`."""
     return map_estimate(density) if isinstance(density, Labelled) else unlabelled_estimate(density, step)
-
-
-def _map_of_glmb(density: GLMB) -> Estimate:
-    weights = np.exp(density.hyp_log_weights)
-    sizes = np.diff(density.hyp_offsets)
-    number = int(np.argmax(np.bincount(sizes, weights=weights)))
-    candidates = np.flatnonzero(sizes == number)
-    best = int(candidates[np.argmax(density.hyp_log_weights[candidates])])
-    chosen = density.hyp_tracks[density.hyp_offsets[best] : density.hyp_offsets[best + 1]]
-    labels = density.tracks.labels
-    same = (labels[:, None, 0] == labels[chosen, 0]) & (labels[:, None, 1] == labels[chosen, 1])
-    entry_weights = np.repeat(weights, sizes)
-    track_weights = np.bincount(density.hyp_tracks, weights=entry_weights, minlength=len(labels))
-    return _peaks(density.tracks, chosen, np.minimum(track_weights @ same, 1.0))
-
-
-def _map_of_factors(density: FactoredGLMB) -> Estimate:
-    chosen = heaviest_tracks(density, int(np.argmax(cardinality_distribution(density))))
-    labels, existence = existence_probabilities(density)
-    # Both come in increasing label order, and every chosen label is one of those.
-    _, place = distinct_labels(np.concatenate([labels, density.tracks.labels[chosen]]))
-    return _peaks(density.tracks, chosen, existence[place[len(labels) :]])
 
 
 def marginal_estimate(density: Labelled, threshold: float = 0.5) -> Estimate:
@@ -137,9 +112,7 @@ def marginal_estimate(density: Labelled, threshold: float = 0.5) -> Estimate:
     """
     if not 0.0 <= threshold < 1.0:
         raise InputError(f"threshold: expected a probability below 1; got {threshold}")
-    if not isinstance(density, Labelled):
-        raise InputError(f"density: expected {LABELLED}, which have labels; got {type(density).__name__}")
-    lmb = settled_lmb(density, max_components=_MARGINAL_COMPONENTS)
+    lmb = settled_lmb(labelled(density), max_components=_MARGINAL_COMPONENTS)
     chosen = np.flatnonzero(lmb.existence > threshold)
     return _peaks(lmb.tracks, chosen, lmb.existence[chosen])
 
@@ -160,10 +133,7 @@ def at_peaks(density: LMB) -> LMB:
     if len(tracks.log_weights) == num:
         return density
     peaks = _heaviest(tracks, np.arange(num))
-    single = unchecked(
-        TrackTable, tracks.labels, np.arange(num + 1), np.zeros(num), tracks.means[peaks], tracks.covs[peaks]
-    )
-    return unchecked(LMB, single, density.existence_logit)
+    return density.with_fields(tracks=gaussian_tracks(tracks.labels, tracks.means[peaks], tracks.covs[peaks]))
 
 
 def _heaviest(mixtures: TrackTable | MultiBernoulli, chosen: Ints) -> Ints:

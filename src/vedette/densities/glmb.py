@@ -1,26 +1,89 @@
-"""Generalized labelled multi-Bernoulli density with Gaussian-mixture tracks."""
+"""Densities of listed hypotheses, and the one of a single list: the generalized labelled multi-Bernoulli."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 
 from vedette.densities import checks
-from vedette.densities.containers import Container, kernel_arrays, unchecked
+from vedette.densities.containers import kernel_arrays, unchecked
+from vedette.densities.labelled import Labelled
 from vedette.densities.tracks import TrackTable, log_weights
-from vedette.errors import InputError, NumericalError, VedetteError
+from vedette.errors import InputError, VedetteError
 from vedette.kernels.base import types as kt
 from vedette.kernels.base.types import Floats, Ints
+from vedette.kernels.labelled.cardinality import convolved
 from vedette.kernels.labelled.labels import group_by_label_set
 
-_ARRAYS = kernel_arrays("hyp_offsets", "hyp_tracks", "hyp_log_weights")
+_HYPOTHESES = kernel_arrays("hyp_offsets", "hyp_tracks", "hyp_log_weights")
+
+
+class Hypotheses(Labelled):
+    """Factors of listed hypotheses, each a set of tracks with its weight in its factor."""
+
+    __slots__ = ()
+    hyp_offsets: Ints
+    hyp_tracks: Ints
+    hyp_log_weights: Floats
+    is_lmb: ClassVar[Literal[False]] = False
+
+    def __post_init__(self) -> None:
+        self._own_parts()
+
+    @property
+    def num_hyps(self) -> int:
+        """Number of hypotheses, of all factors together."""
+        return len(self.hyp_log_weights)
+
+    @property
+    def is_marginalised(self) -> bool:
+        """Whether every label set occurs once in its factor."""
+        return len(sets_of_factors(self.as_hypotheses(), self.factor_of)[1]) == self.num_hyps
+
+    @property
+    def factor_of(self) -> Ints:
+        """(num_hyps,) number of the factor of each hypothesis."""
+        ends = self.to_factors().factor_offsets
+        return np.repeat(np.arange(len(ends) - 1), np.diff(ends))
+
+    @property
+    def track_existence(self) -> Floats:
+        """(num_tracks,) probability that there is a target and that it has this track."""
+        weights = np.repeat(np.exp(self.hyp_log_weights), np.diff(self.hyp_offsets))
+        return np.bincount(self.hyp_tracks, weights, self.tracks.num_tracks).astype(np.float64)
+
+    def label_existence(self) -> tuple[Ints, Floats]:
+        """See `vedette.densities.existence_probabilities`."""
+        labels, place = checks.distinct_labels(self.tracks.labels)
+        label_of = place[self.hyp_tracks]
+        weights = np.repeat(np.exp(self.hyp_log_weights), np.diff(self.hyp_offsets))
+        held = np.bincount(label_of, minlength=len(labels)) > 0  # a table may have more
+        return labels[held], np.minimum(np.bincount(label_of, weights, len(labels))[held], 1.0)
+
+    def cardinality(self) -> Floats:
+        """Probabilities of as many targets as the largest hypotheses of all factors have together, and of fewer."""
+        sizes = np.diff(self.hyp_offsets)
+        offsets = self.size_offsets()
+        chances = np.bincount(offsets[self.factor_of] + sizes, np.exp(self.hyp_log_weights), minlength=offsets[-1])
+        return convolved(np.asarray(chances, np.float64), offsets)
+
+    def size_offsets(self) -> Ints:
+        """(num_factors + 1,) offsets of runs with a place for each number of targets of a factor, from 0 up."""
+        sizes, starts = np.diff(self.hyp_offsets), self.to_factors().factor_offsets[:-1]
+        return checks.offsets_of((np.maximum.reduceat(sizes, starts) if len(starts) else sizes) + 1)
+
+    def with_labels(self, labels: Ints) -> Self:
+        """The same under other labels (num_tracks, 2), of which no two that differed are the same."""
+        members, hyps = labels[self.hyp_tracks], np.repeat(np.arange(self.num_hyps), np.diff(self.hyp_offsets))
+        order = np.lexsort((members[:, 1], members[:, 0], hyps))
+        return self.with_fields(tracks=self.tracks.with_fields(labels=labels), hyp_tracks=self.hyp_tracks[order])
 
 
 @dataclass(frozen=True, slots=True)
-class GLMB(Container):
+class GLMB(Hypotheses):
     """delta-GLMB density (paper eq. 4); marginalised delta-GLMB (eq. 10) where every label set occurs once.
 
     Attributes:
@@ -39,31 +102,16 @@ class GLMB(Container):
     hyp_offsets: Ints
     hyp_tracks: Ints
     hyp_log_weights: Floats
-
-    def __post_init__(self) -> None:
-        self._own_arrays()
-        if not isinstance(self.tracks, TrackTable):
-            raise InputError(f"tracks: expected a TrackTable; got {type(self.tracks).__name__}")
-        self._validate_hypotheses(InputError)
-
-    @property
-    def num_hyps(self) -> int:
-        """Number of hypotheses."""
-        return len(self.hyp_log_weights)
-
-    @property
-    def state_dim(self) -> int:
-        """Length of a target's state."""
-        return int(self.tracks.means.shape[1])
-
-    @property
-    def is_marginalised(self) -> bool:
-        """Whether every label set occurs once."""
-        return len(group_by_label_set(self.to_kernel())[1]) == self.num_hyps
+    is_product: ClassVar[Literal[False]] = False
 
     def to_kernel(self) -> kt.Glmb:
         """The same arrays as the bundle that kernels take."""
-        return kt.Glmb(self.tracks.to_kernel(), *_ARRAYS(self))
+        return kt.Glmb(self.tracks.to_kernel(), *_HYPOTHESES(self))
+
+    def to_factors(self) -> kt.FactoredGlmb:
+        """The one factor, as kernels take several."""
+        own, tracks_end = self.to_kernel(), np.array([0, self.tracks.num_tracks])
+        return kt.FactoredGlmb(own.tracks, tracks_end, *own[1:], np.array([0, self.num_hyps]))
 
     @classmethod
     def from_kernel(cls, glmb: kt.Glmb) -> GLMB:
@@ -93,16 +141,7 @@ class GLMB(Container):
         hyp_offsets = np.cumsum([0, *(len(hyp) for hyp in hyps)])
         return cls(tracks, hyp_offsets, np.concatenate([np.empty(0, np.int64), *hyps]), hyp_log_weights)
 
-    def validate(self, *, error: type[VedetteError] = NumericalError) -> None:
-        """Raise unless this is a normalised density over tracks that exist, in label order, no label twice in one.
-
-        `InputError` for faults of form; `error` for values that are not finite, not normalised to 1e-9 or covariances
-        that are not symmetric positive definite.
-        """
-        self.tracks.validate(error=error)
-        self._validate_hypotheses(error)
-
-    def _validate_hypotheses(self, error: type[VedetteError]) -> None:
+    def _validate_form(self, error: type[VedetteError]) -> None:
         checks.check_array("hyp_log_weights", self.hyp_log_weights, np.float64, (None,))
         if self.num_hyps == 0:
             raise InputError("hyp_log_weights: expected at least one hypothesis; got none")
@@ -125,3 +164,17 @@ def _check_indices(field: str, indices: Ints, num_tracks: int) -> None:
     if faulty.any():
         place = int(np.flatnonzero(faulty)[0])
         raise InputError(f"{field}[{place}]: expected an index into {num_tracks} tracks; got {indices[place]}")
+
+
+def sets_of_factors(hypotheses: kt.Glmb, factor_of: Ints) -> tuple[Ints, Ints]:
+    """As `group_by_label_set`, where hypotheses of different factors (num_hyps,) have different sets."""
+    set_of, first = group_by_label_set(hypotheses)
+    if (factor_of == factor_of[:1]).all():
+        return set_of, first
+    numbers = set_of * (factor_of.max() + 1) + factor_of
+    _, first, place = np.unique(numbers, return_index=True, return_inverse=True)
+    order = np.argsort(first)
+    return np.argsort(order)[place], first[order]
+
+
+__all__ = ["GLMB", "Hypotheses", "sets_of_factors"]

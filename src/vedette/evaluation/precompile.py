@@ -70,8 +70,6 @@ def _belief(experiment: Experiment, num_targets: int) -> Labelled:
     sites = slice(num_targets)
     belief = LMB.from_bernoullis(labels, birth.existence[sites], birth.means[sites], birth.covs[sites])
     initial = experiment.tracker.initial().fused
-    if isinstance(initial, LMB):
-        return belief
-    if isinstance(initial, FactoredGLMB):
-        return FactoredGLMB.from_lmb(belief)
+    if initial.is_lmb or initial.is_product:
+        return belief if initial.is_lmb else FactoredGLMB.of(belief)
     return GLMB.from_hypotheses(belief.tracks, [list(range(num_targets))], [1.0])

@@ -10,7 +10,7 @@ from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
-from vedette.densities import LMB, FactoredGLMB, Labelled, UndetectedIntensity
+from vedette.densities import FactoredGLMB, Labelled, UndetectedIntensity
 from vedette.errors import InputError
 from vedette.filters import FilterInfo
 from vedette.kernels.base.types import Floats
@@ -159,9 +159,10 @@ def bytes_of_belief(belief: Any) -> int:
     tracks = belief.tracks
     num, dim = len(tracks.labels), int(tracks.means.shape[1])
     numbers = 2 * num + len(tracks.log_weights) * (1 + dim + dim * (dim + 1) // 2)
-    if isinstance(belief, LMB):
+    if belief.is_lmb:
         return NUMBER * (numbers + num)
-    own = len(belief.hyp_log_weights) + len(belief.hyp_tracks)
-    if isinstance(belief, FactoredGLMB):
-        own -= 2 * int(np.count_nonzero(belief.is_bernoulli))  # of which an existence says all
-    return NUMBER * (numbers + own)
+    own = belief.to_factors()
+    hyps = len(own.hyp_log_weights) + len(own.hyp_tracks)
+    # Of those of one label an existence says all.
+    singles = int(np.count_nonzero(FactoredGLMB.of(belief).is_bernoulli)) if belief.is_product else 0
+    return NUMBER * (numbers + hyps - 2 * singles)

@@ -12,7 +12,7 @@ import numpy as np
 
 from vedette.densities import LMB, Labelled, TrackTable, as_lmb
 from vedette.densities.containers import unchecked
-from vedette.densities.factored import LABELLED
+from vedette.densities.labelled import LABELLED
 from vedette.errors import InputError
 from vedette.filters import Limits
 from vedette.filters.inputs import births_at, births_within, model_errors, nobody

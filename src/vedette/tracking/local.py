@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from vedette.densities import LMB
-from vedette.densities.factored import as_factored
+from vedette.densities import LMB, FactoredGLMB, Labelled
 from vedette.errors import InputError
 from vedette.filters import FactoredGlmbFilter, Filter, FilterInfo, LmbFilter, TwoStepFilter, shared_targets
 from vedette.filters.base import NO_POSE, NO_SCAN, SingleSensorFilter, blind_sensor
@@ -105,8 +104,8 @@ class LocalFilters:
 
     def _as_kept(self, belief: Any) -> Any:
         """The same density as the filters keep it: an LMB as a product of GLMBs where they keep these."""
-        own = self.filters[0]
-        return as_factored(belief) if isinstance(own, FactoredGlmbFilter) and isinstance(belief, LMB) else belief
+        factored = isinstance(self.filters[0], FactoredGlmbFilter) and isinstance(belief, Labelled)
+        return FactoredGLMB.of(belief) if factored else belief
 
     def _for_fusion(self, beliefs: Sequence[Any]) -> Sequence[Any]:
         """What was made of the filters' beliefs at this step, to be fused: checked where a filter is the user's own."""

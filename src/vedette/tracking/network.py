@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from vedette.densities import LMB, FactoredGLMB, Labelled
+from vedette.densities import FactoredGLMB, Labelled, as_lmb
 from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.models.arguments import reject
 from vedette.models.fields import Count, Limit, Natural, Share, check_fields
@@ -130,11 +130,11 @@ def parts_of_belief(belief: Any) -> dict[bytes, int]:
         return {}
     tracks, dim = belief.tracks, belief.state_dim
     of_component = 1 + dim + dim * (dim + 1) // 2
-    if isinstance(belief, LMB):
+    if belief.is_lmb:
         firsts, own = np.arange(tracks.num_tracks + 1), np.ones(tracks.num_tracks, np.int64)
-        others = [belief.existence_logit[i : i + 1].tobytes() for i in range(tracks.num_tracks)]
+        others = [logit.tobytes() for logit in as_lmb(belief).existence_logit]
     else:
-        factored = belief if isinstance(belief, FactoredGLMB) else FactoredGLMB.from_glmb(belief)
+        factored = FactoredGLMB.of(belief)
         firsts, hyps = factored.track_offsets, factored.factor_offsets
         entries = factored.hyp_offsets[hyps]
         own = np.diff(hyps) + np.diff(entries) - 2 * factored.is_bernoulli

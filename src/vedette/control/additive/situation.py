@@ -12,7 +12,7 @@ from vedette.control.settings import IDEAL_MODES, MobileSensor, PlanningSettings
 from vedette.densities import LMB
 from vedette.densities.checks import offsets_of
 from vedette.densities.containers import unchecked
-from vedette.densities.label_sets import places_of, single_gaussians, take_tracks
+from vedette.densities.tracks import places_of, single_gaussians, take_tracks
 from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.kernels.planning.ideal import EXPECTED, IDEAL, Decision, Futures
 from vedette.kernels.planning.known import rows_without_scans

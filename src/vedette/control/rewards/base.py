@@ -10,7 +10,7 @@ from typing import Any, Literal, Protocol, TypeAlias, runtime_checkable
 import numpy as np
 
 from vedette.densities import GLMB, LMB, as_lmb, existence_probabilities, track_moments
-from vedette.densities.label_sets import places_of
+from vedette.densities.tracks import places_of
 from vedette.divergence import power_integrals, reference_unit_volume
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats
