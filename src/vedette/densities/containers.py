@@ -6,7 +6,7 @@ written into one of them later would have a kernel read memory that is not its o
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Callable
 from operator import attrgetter
 from typing import Any, Self, TypeVar
@@ -45,7 +45,7 @@ class Container:
         return type(self), tuple(getattr(self, name) for name in self.__match_args__)  # type: ignore[attr-defined]
 
 
-class MultiTarget(Container, ABC):
+class MultiTarget(Container):
     """A density of a set of targets."""
 
     __slots__ = ()

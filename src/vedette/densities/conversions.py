@@ -10,8 +10,8 @@ import numpy as np
 
 from vedette.densities.checks import distinct_labels, offsets_of, take_runs
 from vedette.densities.containers import unchecked
-from vedette.densities.factored import FactoredGLMB
-from vedette.densities.glmb import GLMB, sets_of_factors
+from vedette.densities.factored import FactoredGLMB, sets_of_factors
+from vedette.densities.glmb import GLMB
 from vedette.densities.label_sets import take_factors
 from vedette.densities.labelled import LMB, Labelled
 from vedette.densities.tracks import TrackTable, reduced_tracks, single_gaussians, take_tracks

@@ -12,11 +12,12 @@ import numpy as np
 from vedette.densities import checks
 from vedette.densities.checks import distinct_labels
 from vedette.densities.conversions import settled_lmb
-from vedette.densities.glmb import Hypotheses
+from vedette.densities.factored import FactoredGLMB
+from vedette.densities.glmb import GLMB
 from vedette.densities.labelled import LMB, Labelled
 from vedette.densities.multi_bernoulli import MultiBernoulli
 from vedette.densities.statistics import cardinality_distribution, heaviest_tracks, labelled
-from vedette.densities.tracks import TrackTable, gaussian_tracks
+from vedette.densities.tracks import TrackTable, gaussian_tracks, heaviest_components
 from vedette.densities.unlabelled import IidCluster, Poisson
 from vedette.errors import InputError, NumericalError, VedetteError
 from vedette.kernels.base.types import Floats, Ints
@@ -88,8 +89,9 @@ def map_estimate(density: Labelled) -> Estimate:
     if isinstance(density, LMB):
         chosen = np.sort(np.argsort(-density.existence_logit, kind="stable")[:number])
         return _peaks(density.tracks, chosen, density.existence[chosen])
-    assert isinstance(density, Hypotheses)
-    chosen = heaviest_tracks(density, number)
+    if isinstance(density, GLMB):
+        return _peaks(density.tracks, *density.heaviest(number))
+    chosen = heaviest_tracks(FactoredGLMB.of(density), number)
     labels, existence = density.label_existence()
     # Both come in increasing label order, and every chosen label is one of those.
     _, place = distinct_labels(np.concatenate([labels, density.tracks.labels[chosen]]))
@@ -119,7 +121,7 @@ def marginal_estimate(density: Labelled, threshold: float = 0.5) -> Estimate:
 
 def _peaks(tracks: TrackTable, chosen: Ints, existence: Floats) -> Estimate:
     """The heaviest component of each chosen track."""
-    heaviest = _heaviest(tracks, chosen)
+    heaviest = heaviest_components(tracks.log_weights, tracks.offsets, chosen)
     return Estimate(tracks.labels[chosen], tracks.means[heaviest], tracks.covs[heaviest], existence)
 
 
@@ -132,21 +134,8 @@ def at_peaks(density: LMB) -> LMB:
     tracks, num = density.tracks, density.tracks.num_tracks
     if len(tracks.log_weights) == num:
         return density
-    peaks = _heaviest(tracks, np.arange(num))
+    peaks = heaviest_components(tracks.log_weights, tracks.offsets, np.arange(num))
     return density.with_fields(tracks=gaussian_tracks(tracks.labels, tracks.means[peaks], tracks.covs[peaks]))
-
-
-def _heaviest(mixtures: TrackTable | MultiBernoulli, chosen: Ints) -> Ints:
-    """(len(chosen),) the heaviest component of each chosen mixture, the first of several."""
-    starts, sizes = mixtures.offsets[chosen], np.diff(mixtures.offsets)[chosen]
-    ends = np.cumsum(sizes)
-    if len(chosen) == 0:
-        return starts
-    components = np.repeat(starts - ends + sizes, sizes) + np.arange(ends[-1])
-    log_weights = mixtures.log_weights[components]
-    peaks = np.maximum.reduceat(log_weights, ends - sizes)
-    at_peak = np.flatnonzero(log_weights == np.repeat(peaks, sizes))
-    return np.asarray(components[at_peak[np.searchsorted(at_peak, ends - sizes)]])
 
 
 def unlabelled_estimate(density: Poisson | IidCluster | MultiBernoulli, step: int) -> Estimate:
@@ -162,7 +151,8 @@ def unlabelled_estimate(density: Poisson | IidCluster | MultiBernoulli, step: in
     if isinstance(density, MultiBernoulli):
         number = int(np.argmax(cardinality_distribution(density)))
         chosen = np.argsort(-density.existence_logit, kind="stable")[:number]
-        components, existence = _heaviest(density, chosen), density.existence[chosen]
+        components = heaviest_components(density.log_weights, density.offsets, chosen)
+        existence = density.existence[chosen]
     elif isinstance(density, IidCluster):
         number = int(np.argmax(density.log_cardinality))
         components, existence = _by_units(density.expected_number * np.exp(density.log_weights), number)

@@ -16,6 +16,8 @@ from vedette.densities.tracks import TrackTable
 from vedette.errors import InputError, VedetteError
 from vedette.kernels.base import types as kt
 from vedette.kernels.base.types import Bools, Floats, Ints
+from vedette.kernels.labelled.cardinality import convolved
+from vedette.kernels.labelled.labels import group_by_label_set
 from vedette.kernels.labelled.stacking import join_offsets, stack_glmbs
 
 _FACTORS = kernel_arrays("track_offsets", "hyp_offsets", "hyp_tracks", "hyp_log_weights", "factor_offsets")
@@ -64,6 +66,28 @@ class FactoredGLMB(Hypotheses):
         sizes = np.diff(self.hyp_offsets)
         found[found] = (sizes[first[found]] == 0) & (sizes[first[found] + 1] == 1)
         return np.asarray(found)
+
+    @property
+    def factor_of(self) -> Ints:
+        """(num_hyps,) number of the factor of each hypothesis."""
+        return np.repeat(np.arange(self.num_factors), np.diff(self.factor_offsets))
+
+    @property
+    def is_marginalised(self) -> bool:
+        """Whether every label set occurs once in its factor."""
+        return len(sets_of_factors(self.as_hypotheses(), self.factor_of)[1]) == self.num_hyps
+
+    def cardinality(self) -> Floats:
+        """Probabilities of as many targets as the largest hypotheses of all factors have together, and of fewer."""
+        sizes, offsets = np.diff(self.hyp_offsets), self.size_offsets()
+        chances = np.bincount(offsets[self.factor_of] + sizes, np.exp(self.hyp_log_weights), minlength=offsets[-1])
+        return convolved(np.asarray(chances, np.float64), offsets)
+
+    def size_offsets(self) -> Ints:
+        """(num_factors + 1,) offsets of runs with a place for each number of targets of a factor, from 0 up."""
+        sizes = np.diff(self.hyp_offsets)
+        largest = np.maximum.reduceat(sizes, self.factor_offsets[:-1]) if self.num_factors else sizes
+        return checks.offsets_of(largest + 1)
 
     def factor(self, index: int) -> GLMB:
         """One factor, as a GLMB."""
@@ -172,8 +196,7 @@ class FactoredGLMB(Hypotheses):
 
     def _factors_fit(self) -> bool:
         """Whether each factor by itself is a normalised GLMB; all at once, for there may be thousands."""
-        factor = np.repeat(np.arange(self.num_factors), np.diff(self.factor_offsets))
-        owner = np.repeat(factor, np.diff(self.hyp_offsets))
+        owner = np.repeat(self.factor_of, np.diff(self.hyp_offsets))
         if not (
             (self.track_offsets[owner] <= self.hyp_tracks) & (self.hyp_tracks < self.track_offsets[owner + 1])
         ).all():
@@ -197,3 +220,14 @@ class FactoredGLMB(Hypotheses):
             raise InputError(
                 f"tracks.labels: expected each label in one factor; got {labels[order[place]].tolist()} in {pair}"
             )
+
+
+def sets_of_factors(hypotheses: kt.Glmb, factor_of: Ints) -> tuple[Ints, Ints]:
+    """As `group_by_label_set`, where hypotheses of different factors (num_hyps,) have different sets."""
+    set_of, first = group_by_label_set(hypotheses)
+    if (factor_of == factor_of[:1]).all():
+        return set_of, first
+    numbers = set_of * (factor_of.max() + 1) + factor_of
+    _, first, place = np.unique(numbers, return_index=True, return_inverse=True)
+    order = np.argsort(first)
+    return np.argsort(order)[place], first[order]

@@ -15,7 +15,6 @@ from vedette.densities.tracks import TrackTable, log_weights
 from vedette.errors import InputError, VedetteError
 from vedette.kernels.base import types as kt
 from vedette.kernels.base.types import Floats, Ints
-from vedette.kernels.labelled.cardinality import convolved
 from vedette.kernels.labelled.labels import group_by_label_set
 
 _HYPOTHESES = kernel_arrays("hyp_offsets", "hyp_tracks", "hyp_log_weights")
@@ -39,17 +38,6 @@ class Hypotheses(Labelled):
         return len(self.hyp_log_weights)
 
     @property
-    def is_marginalised(self) -> bool:
-        """Whether every label set occurs once in its factor."""
-        return len(sets_of_factors(self.as_hypotheses(), self.factor_of)[1]) == self.num_hyps
-
-    @property
-    def factor_of(self) -> Ints:
-        """(num_hyps,) number of the factor of each hypothesis."""
-        ends = self.to_factors().factor_offsets
-        return np.repeat(np.arange(len(ends) - 1), np.diff(ends))
-
-    @property
     def track_existence(self) -> Floats:
         """(num_tracks,) probability that there is a target and that it has this track."""
         weights = np.repeat(np.exp(self.hyp_log_weights), np.diff(self.hyp_offsets))
@@ -62,18 +50,6 @@ class Hypotheses(Labelled):
         weights = np.repeat(np.exp(self.hyp_log_weights), np.diff(self.hyp_offsets))
         held = np.bincount(label_of, minlength=len(labels)) > 0  # a table may have more
         return labels[held], np.minimum(np.bincount(label_of, weights, len(labels))[held], 1.0)
-
-    def cardinality(self) -> Floats:
-        """Probabilities of as many targets as the largest hypotheses of all factors have together, and of fewer."""
-        sizes = np.diff(self.hyp_offsets)
-        offsets = self.size_offsets()
-        chances = np.bincount(offsets[self.factor_of] + sizes, np.exp(self.hyp_log_weights), minlength=offsets[-1])
-        return convolved(np.asarray(chances, np.float64), offsets)
-
-    def size_offsets(self) -> Ints:
-        """(num_factors + 1,) offsets of runs with a place for each number of targets of a factor, from 0 up."""
-        sizes, starts = np.diff(self.hyp_offsets), self.to_factors().factor_offsets[:-1]
-        return checks.offsets_of((np.maximum.reduceat(sizes, starts) if len(starts) else sizes) + 1)
 
     def with_labels(self, labels: Ints) -> Self:
         """The same under other labels (num_tracks, 2), of which no two that differed are the same."""
@@ -103,6 +79,24 @@ class GLMB(Hypotheses):
     hyp_tracks: Ints
     hyp_log_weights: Floats
     is_product: ClassVar[Literal[False]] = False
+
+    @property
+    def is_marginalised(self) -> bool:
+        """Whether every label set occurs once."""
+        return len(group_by_label_set(self.to_kernel())[1]) == self.num_hyps
+
+    def cardinality(self) -> Floats:
+        """Probabilities of 0, 1, ... targets, up to the size of the largest hypothesis."""
+        return np.asarray(np.bincount(np.diff(self.hyp_offsets), np.exp(self.hyp_log_weights)), np.float64)
+
+    def heaviest(self, number: int) -> tuple[Ints, Floats]:
+        """(number,) tracks of the heaviest hypothesis of so many targets, and how probably each one's label exists."""
+        candidates = np.flatnonzero(np.diff(self.hyp_offsets) == number)
+        best = int(candidates[np.argmax(self.hyp_log_weights[candidates])])
+        chosen = self.hyp_tracks[self.hyp_offsets[best] : self.hyp_offsets[best + 1]]
+        labels = self.tracks.labels
+        same = (labels[:, None, 0] == labels[chosen, 0]) & (labels[:, None, 1] == labels[chosen, 1])
+        return chosen, np.minimum(self.track_existence @ same, 1.0)
 
     def to_kernel(self) -> kt.Glmb:
         """The same arrays as the bundle that kernels take."""
@@ -166,15 +160,4 @@ def _check_indices(field: str, indices: Ints, num_tracks: int) -> None:
         raise InputError(f"{field}[{place}]: expected an index into {num_tracks} tracks; got {indices[place]}")
 
 
-def sets_of_factors(hypotheses: kt.Glmb, factor_of: Ints) -> tuple[Ints, Ints]:
-    """As `group_by_label_set`, where hypotheses of different factors (num_hyps,) have different sets."""
-    set_of, first = group_by_label_set(hypotheses)
-    if (factor_of == factor_of[:1]).all():
-        return set_of, first
-    numbers = set_of * (factor_of.max() + 1) + factor_of
-    _, first, place = np.unique(numbers, return_index=True, return_inverse=True)
-    order = np.argsort(first)
-    return np.argsort(order)[place], first[order]
-
-
-__all__ = ["GLMB", "Hypotheses", "sets_of_factors"]
+__all__ = ["GLMB", "Hypotheses"]

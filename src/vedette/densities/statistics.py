@@ -8,7 +8,7 @@ import numpy as np
 
 from vedette.densities.checks import take_runs
 from vedette.densities.containers import MultiTarget
-from vedette.densities.glmb import Hypotheses
+from vedette.densities.factored import FactoredGLMB
 from vedette.densities.labelled import LABELLED, Labelled
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats, Ints
@@ -39,7 +39,7 @@ def labelled(density: Any) -> Labelled:
     return density
 
 
-def heaviest_tracks(density: Hypotheses, number: int) -> Ints:
+def heaviest_tracks(density: FactoredGLMB, number: int) -> Ints:
     """(number,) tracks, in label order, of the heaviest product of one hypothesis of each factor that has so many.
 
     number: of targets, of positive probability. Of equal weights: the smaller number in an earlier factor; the earlier
@@ -48,7 +48,7 @@ def heaviest_tracks(density: Hypotheses, number: int) -> Ints:
     offsets, best, hyps = _best_of_sizes(density)
     at_most = np.diff(offsets) - 1
     singles = np.flatnonzero(at_most == 1)
-    first_labels = density.tracks.labels[density.to_factors().track_offsets[singles]]
+    first_labels = density.tracks.labels[density.track_offsets[singles]]
     order = singles[np.lexsort((*first_labels.T[::-1], best[offsets[singles]] - best[offsets[singles] + 1]))]
     there, absent = best[offsets[order] + 1], best[offsets[order]]
     # Of factors of one target, the best k are those that gain most by it.
@@ -62,7 +62,7 @@ def heaviest_tracks(density: Hypotheses, number: int) -> Ints:
     least, most = max(0, number - len(singles)), min(number, len(of_several) - 1)
     split = np.arange(least, most + 1)
     taken = int(split[np.argmax(of_several[split] + of_singles[number - split])])
-    sizes_taken = np.zeros(len(at_most), np.int64)
+    sizes_taken = np.zeros(density.num_factors, np.int64)
     sizes_taken[order[: number - taken]] = 1
     if len(several):
         sizes_taken[several] = _shared_out(levels, taken)
@@ -71,7 +71,7 @@ def heaviest_tracks(density: Hypotheses, number: int) -> Ints:
     return np.asarray(tracks[np.lexsort(density.tracks.labels[tracks].T[::-1])])
 
 
-def _best_of_sizes(density: Hypotheses) -> tuple[Ints, Floats, Ints]:
+def _best_of_sizes(density: FactoredGLMB) -> tuple[Ints, Floats, Ints]:
     """For each factor and number of targets from 0 up, the log weight of the heaviest hypothesis, and which it is.
 
     Returns (num_factors + 1,) offsets of the factors, and what is at each of their places.

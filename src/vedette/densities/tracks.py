@@ -204,3 +204,16 @@ def _run_moments(weights: Floats, means: Floats, covs: Floats, offsets: Ints) ->
     deviations = means - np.repeat(run_means, lengths, axis=0)
     seconds = covs + deviations[:, :, None] * deviations[:, None, :]
     return run_means, np.add.reduceat(weights[:, None, None] * seconds, starts)
+
+
+def heaviest_components(log_weights: Floats, offsets: Ints, chosen: Ints) -> Ints:
+    """(len(chosen),) the heaviest component of each chosen mixture, cut by offsets; the first of several."""
+    starts, sizes = offsets[chosen], np.diff(offsets)[chosen]
+    ends = np.cumsum(sizes)
+    if len(chosen) == 0:
+        return starts
+    components = np.repeat(starts - ends + sizes, sizes) + np.arange(ends[-1])
+    taken = log_weights[components]
+    peaks = np.maximum.reduceat(taken, ends - sizes)
+    at_peak = np.flatnonzero(taken == np.repeat(peaks, sizes))
+    return np.asarray(components[at_peak[np.searchsorted(at_peak, ends - sizes)]])

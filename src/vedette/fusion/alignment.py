@@ -11,7 +11,7 @@ from vedette.densities import GLMB, LMB, FactoredGLMB
 from vedette.densities.checks import distinct_labels, offsets_of
 from vedette.densities.containers import unchecked
 from vedette.densities.conversions import as_glmb, reduced_lmb
-from vedette.densities.glmb import sets_of_factors
+from vedette.densities.factored import sets_of_factors
 from vedette.densities.label_sets import in_label_order, join_factors, possible, take_factors
 from vedette.densities.tracks import take_tracks
 from vedette.fusion.powers import PowerRule
