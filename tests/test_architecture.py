@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import importlib.util
 import re
 import sys
@@ -67,3 +68,41 @@ def test_no_file_of_control_does_so_for_a_type_either() -> None:
     names = graph.find_descendants("vedette.control")
     imports = {name: graph.find_modules_directly_imported_by(name) & names for name in names}
     TopologicalSorter(imports).prepare()
+
+
+KINDS = {"GLMB", "LMB", "FactoredGLMB"}
+
+
+def _kinds_asked_for(source: str) -> list[int]:
+    """Lines that ask which labelled density something is: by isinstance, issubclass, a comparison or a case."""
+    lines = []
+    for node in ast.walk(ast.parse(source)):
+        asked: list[ast.AST] = []
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and len(node.args) > 1:
+            asked = [node.args[1]] if node.func.id in ("isinstance", "issubclass") else []
+        elif isinstance(node, ast.Compare):
+            asked = [node.left, *node.comparators]
+        elif isinstance(node, ast.MatchClass):
+            asked = [node.cls]
+        else:
+            continue
+        named = {name.id for part in asked for name in ast.walk(part) if isinstance(name, ast.Name)}
+        lines += [node.lineno] if named & KINDS else []
+    return lines
+
+
+def test_nobody_but_densities_asks_which_labelled_density_one_is() -> None:
+    source = ROOT / "src/vedette"
+    others = [file for file in source.rglob("*.py") if file.parent != source / "densities"]
+    assert len(others) > 300
+    found = {str(file.relative_to(source)): _kinds_asked_for(file.read_text("utf-8")) for file in others}
+    assert {name: lines for name, lines in found.items() if lines} == {}
+
+
+@pytest.mark.parametrize(
+    "asks",
+    ["isinstance(x, LMB)", "isinstance(x, GLMB | LMB)", "issubclass(k, (Poisson, FactoredGLMB))", "type(x) is LMB"],
+)
+def test_who_asks_which_labelled_density_one_is_is_found(asks: str) -> None:
+    assert _kinds_asked_for(f"found = {asks}") == [1]
+    assert _kinds_asked_for(f"match x:\n    case LMB():\n        found = {asks}") == [2, 3]

@@ -36,11 +36,6 @@ def implausible(field: str, expected: str, got: str, meant: str) -> None:
         warnings.warn(f"{field}: expected {expected}; got {got} ({meant}?)", ImplausibleWarning, stacklevel=3)
 
 
-def seems_degrees(heading: float) -> bool:
-    """Whether a heading in rad is rather one in degrees: a whole number from 10 to two turns of these."""
-    return 10.0 <= abs(heading) <= 720.0 and heading == round(heading)
-
-
 def seem_degrees(corners: Floats) -> bool:
     """Whether (n, 2) corners of an area are rather longitudes and latitudes than metres."""
     extent = float(np.ptp(corners, axis=0).max())

@@ -29,19 +29,18 @@ def run_chunks(work: Callable[[int, int], None], num_items: int, num_threads: in
         pieces.run()
     else:
         with ThreadPoolExecutor(num_workers) as pool:
+            running = set[Future[None]]()
             try:
-                _wait_for({pool.submit(pieces.run) for _ in range(num_workers)})
+                while len(running) < num_workers:
+                    running.add(pool.submit(pieces.run))
+                while running:  # without an end, a wait could not be interrupted everywhere
+                    finished, running = wait(running, timeout=_WAIT_TIME)
+                    for one in finished:
+                        one.result()
             finally:
                 pieces.stop()
     if pieces.faults:
         raise min(pieces.faults, key=lambda fault: fault[0])[1]
-
-
-def _wait_for(running: set[Future[None]]) -> None:
-    while running:
-        finished, running = wait(running, timeout=_WAIT_TIME)  # without an end, it could not be interrupted everywhere
-        for one in finished:
-            one.result()
 
 
 @dataclass(slots=True)

@@ -25,7 +25,7 @@ from control.examples import (
 from control.known_association import followed, measurement_moments
 from vedette import models
 from vedette.control import CauchySchwarzReward, RenyiReward
-from vedette.control.bounds import best_values
+from vedette.control.problem import best_values
 from vedette.control.pseudo import draw_futures
 from vedette.control.rewards import (
     CardinalityVarianceReward,
@@ -37,7 +37,7 @@ from vedette.control.rewards import (
 from vedette.control.rewards.base import reward_value
 from vedette.control.search import all_joint_actions
 from vedette.densities import LMB
-from vedette.densities.label_sets import single_gaussians
+from vedette.densities.tracks import single_gaussians
 from vedette.fusion import ParallelUpdate
 from vedette.kernels.planning.ascent import Allowed
 

@@ -20,10 +20,10 @@ from vedette.control import (
     JointPlanner,
     KullbackLeiblerReward,
 )
-from vedette.control.additive.look_on import at_all, continued, look_on
-from vedette.control.bounds import best_values, bound_of
+from vedette.control.evaluator import at_all, continued, look_on
 from vedette.control.evidence import Evidence
 from vedette.control.inputs import options_of
+from vedette.control.problem import best_values, bound_of
 from vedette.control.search import all_joint_actions
 from vedette.densities import LMB, UndetectedIntensity
 from vedette.filters import LmbFilter

@@ -34,7 +34,7 @@ from vedette.control.pseudo import draw_futures
 from vedette.control.rewards import ExpectedLossReward
 from vedette.control.search import all_joint_actions
 from vedette.densities import LMB, UndetectedIntensity
-from vedette.densities.label_sets import single_gaussians
+from vedette.densities.tracks import single_gaussians
 from vedette.errors import InputError
 from vedette.fusion import ParallelUpdate
 from vedette.models import CellGrid, Region

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from densities.examples import random_factored, random_glmb, random_lmb
 from vedette.densities import GLMB, LMB, FactoredGLMB, as_lmb, marginalise
 from vedette.divergence import cauchy_schwarz, log_inner_product, power_integrals, reference_unit_volume, renyi
-from vedette.divergence.parts import MAX_PRODUCTS
+from vedette.divergence.closed_form import MAX_PRODUCTS
 from vedette.errors import InputError
 
 PAIRS = ((1.0, 1.0), (2.0, 0.0), (0.0, 2.0), (0.5, 0.5), (0.3, 0.7), (1.0, 0.0), (0.0, 1.0))

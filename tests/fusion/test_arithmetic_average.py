@@ -8,8 +8,7 @@ from scipy.special import expit
 
 from densities.examples import random_glmb, random_lmb
 from fusion.sights import LABELS, belief, informed, views
-from vedette.densities import LMB, Poisson, as_lmb
-from vedette.densities.statistics import track_moments
+from vedette.densities import LMB, Poisson, as_lmb, track_moments
 from vedette.errors import InputError
 from vedette.fusion import ArithmeticAverage, FusionLimits
 from vedette.models import constant_detection

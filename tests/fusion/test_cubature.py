@@ -7,7 +7,7 @@ import itertools
 import numpy as np
 import pytest
 
-from vedette.fusion.cubature import MAX_DIM, fifth_degree_rule
+from vedette.fusion.powers import MAX_DIM, fifth_degree_rule
 
 _NORMAL_MOMENTS = [1.0, 0.0, 1.0, 0.0, 3.0, 0.0]
 

@@ -12,7 +12,7 @@ from vedette.densities import LMB, TrackTable
 from vedette.densities.containers import unchecked
 from vedette.errors import InputError
 from vedette.fusion import Clmb, CmDeltaGlmb, ValidBeliefs
-from vedette.fusion.validity import all_valid
+from vedette.fusion.base import all_valid
 
 
 def spoilt(belief: LMB, field: str, value: Any) -> LMB:

@@ -17,7 +17,7 @@ from vedette.control.settings import IDEAL_MODES
 from vedette.densities import marginal_estimate
 from vedette.filters import Limits
 from vedette.fusion import ArithmeticAverage, Clmb, CmDeltaGlmb, ParallelUpdate
-from vedette.fusion.base import _MERGE_DISTANCE
+from vedette.fusion.powers import _MERGE_DISTANCE
 from vedette.recorded import Cleaning
 from vedette.recorded import RecordedTargets as RecordedSource
 from vedette.scenarios import json_schema

@@ -10,8 +10,8 @@ import numpy as np
 from tracking.scenes import lmb, sensor
 from vedette.densities import GLMB, FactoredGLMB, Labelled, TrackTable, as_lmb
 from vedette.models import BirthModel, MeasurementBirth
+from vedette.tracking.base import bytes_of_belief
 from vedette.tracking.births import births_from_scans
-from vedette.tracking.messages import bytes_of_belief
 
 STD = np.array([10.0, 10.0, 5.0, 5.0])
 BIRTH = replace(BirthModel.none(4), from_measurements=MeasurementBirth(expected=0.4, max_existence=0.3, std=STD))

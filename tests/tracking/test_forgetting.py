@@ -15,7 +15,7 @@ from vedette.errors import InputError
 from vedette.filters import FactoredGlmbFilter, LmbFilter
 from vedette.fusion import Clmb, Matched, Views
 from vedette.tracking import Distributed, State
-from vedette.tracking.forgetting import without_forgotten
+from vedette.tracking.losing import without_forgotten
 
 BORN = models.MeasurementBirth(0.5, 0.03, np.array([20.0, 20.0, 8.0, 8.0]))
 WORLD = models.TargetModel(

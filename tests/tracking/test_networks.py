@@ -16,8 +16,8 @@ from vedette.fusion import ArithmeticAverage, Clmb, CmDeltaGlmb, FusionLimits, M
 from vedette.fusion.rebasing import rebased, with_labels_of
 from vedette.models import MeasurementBirth
 from vedette.tracking import BeliefNetwork, Central, Distributed, Network, ScanNetwork, State, Tracker
-from vedette.tracking.messages import bytes_of_belief, bytes_of_messages, parts_of_belief
-from vedette.tracking.network import NEVER, hop_counts, metropolis_weights
+from vedette.tracking.base import bytes_of_belief
+from vedette.tracking.network import NEVER, bytes_of_messages, hop_counts, metropolis_weights, parts_of_belief
 
 EQUAL = (1 / 3, 1 / 3, 1 / 3)
 MERGING = Clmb(EQUAL, by_views=True)

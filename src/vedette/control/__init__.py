@@ -1,6 +1,6 @@
 """Where to send the sensors next: ideal measurements, rewards, joint action search, constraints, planners."""
 
-from vedette.control.baselines import FixedPlanner, Planner, RandomPlanner, WatchedPlanner
+from vedette.control.baselines import FixedPlanner, KnowsTruth, Planner, RandomPlanner, WatchedPlanner
 from vedette.control.constraints import (
     Constraint,
     KeepOut,
@@ -8,7 +8,10 @@ from vedette.control.constraints import (
     Separation,
     Situation,
     StayInside,
+    Timeless,
     VoidProbability,
+    WithReach,
+    WithViolations,
     mask_of,
     void_probability,
 )
@@ -24,10 +27,12 @@ from vedette.control.rewards import (
     ExpectedLossReward,
     KullbackLeiblerReward,
     LabelReward,
+    LinearReward,
     PeecsReward,
     PowerReward,
     RenyiReward,
     Reward,
+    WithUnitVolume,
 )
 from vedette.control.rules_of_thumb import RulePlanner
 from vedette.control.search import (
@@ -64,8 +69,10 @@ __all__ = [
     "JointProblem",
     "JointSearch",
     "KeepOut",
+    "KnowsTruth",
     "KullbackLeiblerReward",
     "LabelReward",
+    "LinearReward",
     "Mask",
     "MobileSensor",
     "PeecsReward",
@@ -87,9 +94,13 @@ __all__ = [
     "Situation",
     "StayInside",
     "TargetGains",
+    "Timeless",
     "TreeSearch",
     "VoidProbability",
     "WatchedPlanner",
+    "WithReach",
+    "WithUnitVolume",
+    "WithViolations",
     "mask_of",
     "planning_limits",
     "void_probability",

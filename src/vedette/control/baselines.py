@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
-from vedette.control.allowed import beliefs_ahead, mask_of_decision
 from vedette.control.constraints import Constraint, Situation, repaired, violated
-from vedette.control.inputs import check_poses, check_steering, options_of
+from vedette.control.inputs import beliefs_ahead, check_poses, check_steering, mask_of_decision, options_of
 from vedette.control.plan import Plan
 from vedette.control.settings import MobileSensor, PlanningSettings
 from vedette.filters import labels_targets
@@ -30,6 +29,15 @@ class Planner(Protocol):
 
     def plan(self, state: State, poses: Floats, *, rng: np.random.Generator) -> Plan:
         """Decide from what a tracker believes after a scan and the poses (num_sensors, 3 or more)."""
+        ...
+
+
+@runtime_checkable
+class KnowsTruth(Protocol):
+    """A planner that is told the true targets at the beginning of a run; `vedette.simulation.simulate` does."""
+
+    def told(self, truth: Any) -> Planner:
+        """The planner for these targets, a `vedette.simulation.Truth`."""
         ...
 
 
@@ -134,9 +142,9 @@ class WatchedPlanner:
         return self.planner.name
 
     def told(self, truth: Any) -> WatchedPlanner:
-        """The same, where the planner is one that is told the targets of a run (`vedette.simulation.KnowsTruth`)."""
-        tell = getattr(self.planner, "told", None)
-        return self if tell is None else replace(self, planner=tell(truth))
+        """The same, where the planner is one that is told the targets of a run."""
+        planner = self.planner
+        return replace(self, planner=planner.told(truth)) if isinstance(planner, KnowsTruth) else self
 
     def plan(self, state: State, poses: Floats, *, rng: np.random.Generator) -> Plan:
         """What the planner decides; raises what it raises, and `InputError` as `mask_of`."""

@@ -14,7 +14,6 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from vedette.control.inputs import Belief
 from vedette.control.pseudo import draw_futures, pseudo_posteriors
 from vedette.control.rewards.base import (
     LabelReward,
@@ -25,7 +24,7 @@ from vedette.control.rewards.base import (
     speaks_for,
     unit_volume_of,
 )
-from vedette.control.settings import MobileSensor, PlanningSettings
+from vedette.control.settings import Belief, MobileSensor, PlanningSettings
 from vedette.densities.cases import LabelledCases
 from vedette.errors import NumericalError, SlowRewardWarning
 from vedette.fusion import Fusion, LaidOut, LaysOut, Views, lay_out_alone
@@ -90,10 +89,6 @@ class CaseRewards:
         return cls(
             tuple(sensors), fusion, settings, reward, tuple(options), prediction, posteriors, scanned, counts, {}
         )
-
-    @property
-    def additive(self) -> None:
-        """They are no sums over labels."""
 
     def joint(self) -> SampleRewards:
         """Of all sensors, fused."""

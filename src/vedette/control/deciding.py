@@ -10,15 +10,14 @@ from typing import Any, Literal
 
 import numpy as np
 
-from vedette.control.allowed import single_mask
-from vedette.control.bounds import beyond_cutoff, bound_of
 from vedette.control.evaluator import Evaluator
-from vedette.control.evidence import Evidence
-from vedette.control.explaining import Part, Questions
+from vedette.control.evidence import Evidence, Part
+from vedette.control.explaining import Questions
 from vedette.control.explanation import Bound
-from vedette.control.plan import Certainty, Plan
+from vedette.control.inputs import single_mask
+from vedette.control.plan import Certainty, Plan, RewardTable
 from vedette.control.preparation import Preparation
-from vedette.control.problem import searched
+from vedette.control.problem import beyond_cutoff, bound_of, searched
 from vedette.control.racing import FIRST_ROUND, Race, next_total
 from vedette.control.search import JointSearch, all_joint_actions, first_best
 from vedette.kernels.base.types import Floats, Ints
@@ -119,7 +118,7 @@ def decide_jointly(
     it was picked by speak for it; so are those that a mask allows.
     """
     settings, races, mask = preparation.settings, preparation.races, preparation.mask
-    num_joint = math.prod(len(own.courses) for own in preparation.options)
+    num_joint = math.prod([len(own.courses) for own in preparation.options])
     size = FIRST_ROUND if num_joint <= _MOST_OF_ALL else _SEARCHED
     rounds = Rounds.begin(preparation, size if races else settings.num_samples, rng=rng)
     evaluator, keeps = rounds.evaluator, races and num_joint <= _MOST_OF_ALL
@@ -182,12 +181,18 @@ def plan_of(
     notes, more_notes: what is told before and after what came up. fields: further ones of the plan.
     """
     evaluator = parts[0].evidence.evaluator
-    courses = tuple(course for part in parts for course in part.chosen)
+    courses, tables, actions, chosen = list[int](), list[RewardTable](), list[Actions](), list[int]()
+    for part in parts:
+        courses += part.chosen
+        tables += part.evidence.tables(part.chosen)
+    for own, course in zip(evaluator.options, courses, strict=True):
+        actions.append(own.actions)
+        chosen.append(own.first_action(course))
     return Plan(
         name,
-        tuple(own.actions for own in evaluator.options),
-        tuple(own.first_action(course) for own, course in zip(evaluator.options, courses, strict=True)),
-        tuple(table for part in parts for table in part.evidence.tables(part.chosen)),
+        tuple(actions),
+        tuple(chosen),
+        tuple(tables),
         dict(evaluator.counts),
         (*notes, *evaluator.notes, *more_notes, *beyond_cutoff(evaluator, courses)),
         questions=Questions(name, tuple(parts), fields.get("bound")),

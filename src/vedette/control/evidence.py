@@ -5,9 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
+from vedette.control.additive.rewards import AdditiveRewards
 from vedette.control.cases import SampleRewards
 from vedette.control.evaluator import Evaluator
 from vedette.control.plan import RewardTable, SearchCurve
@@ -34,7 +36,7 @@ class Evidence:
         rewards: their sample rewards.
         shape: number of different courses of each of the sensors.
         keeps: whether `evaluate` keeps the rewards of all samples.
-        most_by_target: what `vedette.control.bounds` found, where it was asked.
+        most_by_target: what `vedette.control.problem` found, where it was asked.
     """
 
     evaluator: Evaluator
@@ -50,7 +52,7 @@ class Evidence:
 
     def __post_init__(self) -> None:
         shape = self.evaluator.joint_shape()
-        self.shape = tuple(shape[s] for s in self.which)
+        self.shape = tuple([shape[s] for s in self.which])
 
     def evaluate(self, actions: Ints) -> Floats:
         """(num,) mean rewards of joint actions (num, num_sensors); -inf where one is no number.
@@ -64,7 +66,8 @@ class Evidence:
         checked = checked.astype(np.int64)
         size = max(1, _BLOCK // self.evaluator.settings.num_samples)
         means = [np.empty(0)]
-        for part in (checked[i : i + size] for i in range(0, len(checked), size)):
+        for first in range(0, len(checked), size):
+            part = checked[first : first + size]
             rewards = self.rewards(part)
             if self.keeps:
                 self._samples.append((part, rewards))
@@ -112,10 +115,10 @@ class Evidence:
 
     def is_complete(self) -> bool:
         """Whether every joint action was evaluated."""
-        num = math.prod(self.shape)
-        if sum(len(actions) for actions, _, _ in self._noted) < num:
+        num, noted = math.prod(self.shape), [actions for actions, _, _ in self._noted]
+        if sum(map(len, noted)) < num:
             return False
-        return len(np.unique(np.ravel_multi_index(tuple(self._all()[0].T), self.shape))) == num
+        return len(np.unique(np.ravel_multi_index(tuple(np.concatenate(noted).T), self.shape))) == num
 
     def mean_of(self, choice: Sequence[int]) -> float:
         """Mean reward of a joint action that was evaluated."""
@@ -167,14 +170,15 @@ class Evidence:
 
     def holds(self, choice: Sequence[int]) -> bool:
         """Whether this joint action has been evaluated."""
-        return any((actions == np.array(choice)).all(axis=1).any() for actions, _, _ in self._noted)
+        noted = [actions for actions, _, _ in self._noted]
+        return bool(noted) and bool((np.concatenate(noted) == np.array(choice)).all(axis=1).any())
 
     def tables(self, choice: Sequence[int]) -> tuple[RewardTable, ...]:
         """One table of all that was evaluated, gaps elsewhere; or, where it would be too large, a line a sensor.
 
         A line holds one sensor's actions with the others at their `choice`.
         """
-        num_entries = math.prod(len(self.evaluator.options[s].actions) for s in self.which)
+        num_entries = math.prod([len(self.evaluator.options[s].which) for s in self.which])
         actions, means, errors = self._all()
         if num_entries <= MAX_TABLE and len(self.which) <= _MAX_AXES:
             return (self._table(self.which, actions, means, errors),)
@@ -189,9 +193,8 @@ class Evidence:
     def _table(self, sensors: tuple[int, ...], actions: Ints, means: Floats, errors: Floats) -> RewardTable:
         """Rewards of joint actions (num, num of `sensors`), numbers of courses, spread over the actions."""
         options = [self.evaluator.options[s] for s in sensors]
-        spread = np.ix_(*(own.which for own in options))
-        filled = []
-        shape = tuple(len(own.courses) for own in options)
+        spread, filled = np.ix_(*[own.which for own in options]), []
+        shape = [len(own.courses) for own in options]
         # The first evaluation holds: a later one, along a line, may differ from it in the last digit.
         places, first = np.unique(np.ravel_multi_index(tuple(actions.T), shape), return_index=True)
         for values in (means, errors):
@@ -199,3 +202,22 @@ class Evidence:
             table.flat[places] = values[first]
             filled.append(table[spread])
         return RewardTable(sensors, *filled)
+
+
+class Part(NamedTuple):
+    """A decision that is made by itself: that of all sensors together, or of one alone."""
+
+    evidence: Evidence
+    chosen: tuple[int, ...]  # courses of its sensors
+    additive: AdditiveRewards | None  # its rewards, where they are made of sums over labels
+
+    @classmethod
+    def together(cls, evidence: Evidence, chosen: Sequence[int]) -> Part:
+        """Of all sensors."""
+        return cls(evidence, tuple(chosen), evidence.evaluator.additive)
+
+    @classmethod
+    def alone(cls, evidence: Evidence, course: int) -> Part:
+        """Of the one sensor of the evidence."""
+        additive, (sensor,) = evidence.evaluator.additive, evidence.which
+        return cls(evidence, (course,), None if additive is None else additive.alone(sensor))

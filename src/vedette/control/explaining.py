@@ -6,12 +6,11 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from vedette.control.additive.rewards import AdditiveRewards
-from vedette.control.evidence import Evidence
+from vedette.control.evidence import Part
 from vedette.control.explanation import Bound, Explanation, Had, RunnerUp, TargetGains
 from vedette.control.shares import Shares, shares_of
 from vedette.errors import InputError
@@ -24,25 +23,6 @@ _NOT_LINEAR = "this reward is not a sum over targets"
 _NOT_FINITE = "a reward without some of the scans is no finite number"
 _ONLY_ONE = "no other joint action was evaluated"
 _SAME_NUMBER = 1e-6
-
-
-class Part(NamedTuple):
-    """A decision that is made by itself: that of all sensors together, or of one alone."""
-
-    evidence: Evidence
-    chosen: tuple[int, ...]  # courses of its sensors
-    additive: AdditiveRewards | None  # its rewards, where they are made of sums over labels
-
-    @classmethod
-    def together(cls, evidence: Evidence, chosen: Sequence[int]) -> Part:
-        """Of all sensors."""
-        return cls(evidence, tuple(chosen), evidence.evaluator.additive)
-
-    @classmethod
-    def alone(cls, evidence: Evidence, course: int) -> Part:
-        """Of the one sensor of the evidence."""
-        additive, (sensor,) = evidence.evaluator.additive, evidence.which
-        return cls(evidence, (course,), None if additive is None else additive.alone(sensor))
 
 
 @dataclass(frozen=True, eq=False)

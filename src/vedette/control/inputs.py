@@ -1,29 +1,27 @@
-"""Checks of what a planner is given."""
+"""Checks of what a planner is given, and what its sensors may do."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 
-from vedette.control.constraints.protocol import Constraint
+from vedette.control.constraints import Constraint, Mask, Situation, mask_of
+from vedette.control.priors import predicted
 from vedette.control.rewards.base import LabelReward, PowerReward
 from vedette.control.rewards.power import ExpectedLossReward
 from vedette.control.settings import MobileSensor, PlanningSettings
-from vedette.densities import GLMB, LMB, FactoredGLMB, Labelled
+from vedette.densities import Labelled
 from vedette.errors import InputError
 from vedette.filters import shared_targets
 from vedette.fusion import Fusion
 from vedette.kernels.base.types import Floats
+from vedette.kernels.planning.ascent import Allowed
 from vedette.models import TargetModel
 from vedette.models.arguments import float_array, instance, reject, sequence, tell_degrees
 from vedette.platforms import Options, options_at
-from vedette.text import either
 from vedette.tracking import State
-
-Belief: TypeAlias = GLMB | LMB  # that is planned on
-_KINDS: tuple[type[Labelled], ...] = (GLMB, LMB, FactoredGLMB)
 
 
 def check_sensors(sensors: Sequence[MobileSensor]) -> TargetModel:
@@ -63,13 +61,13 @@ def check_poses(poses: Any, num_sensors: int) -> Floats:
 
 
 def options_of(sensors: Sequence[MobileSensor], poses: Any, settings: PlanningSettings) -> tuple[Options, ...]:
-    """For each sensor what it may do over the horizon; `InputError` for sensors, poses or platforms that do not fit."""
-    check_sensors(sensors)
-    at, times = check_poses(poses, len(sensors)), settings.horizon_times()
-    return tuple(
-        options_at(f"sensors[{s}].platform", sensor.platform, pose, times)
-        for s, (sensor, pose) in enumerate(zip(sensors, at, strict=True))
-    )
+    """For each sensor of a planner what it may do over the horizon; `InputError` for poses or platforms that do not
+    fit.
+    """
+    at, times, found = check_poses(poses, len(sensors)), settings.horizon_times(), []
+    for s, sensor in enumerate(sensors):
+        found.append(options_at(f"sensors[{s}].platform", sensor.platform, at[s], times))
+    return tuple(found)
 
 
 def check_state(sensors: Sequence[MobileSensor], state: State) -> None:
@@ -78,23 +76,19 @@ def check_state(sensors: Sequence[MobileSensor], state: State) -> None:
         raise InputError(f"state: expected a State; got {type(state).__name__}")
     if len(state.local) != len(sensors):
         raise InputError(f"state.local: expected {len(sensors)} beliefs, one a sensor; got {len(state.local)}")
-    state_dim = shared_targets([sensor.filter for sensor in sensors]).state_dim
+    state_dim = sensors[0].filter.targets.state_dim
     checked: set[int] = set()
     for i, (belief, sensor) in enumerate(zip(state.local, sensors, strict=True)):
-        initial = sensor.filter.initial()
-        if not isinstance(initial, _KINDS):
+        if sensor.belief is None:
             raise reject(f"sensors[{i}].filter", "one that labels its targets", type(sensor.filter).__name__)
-        kinds = tuple(kind for kind in _KINDS if isinstance(initial, kind))
-        _check_density(f"state.local[{i}]", belief, kinds, state_dim, checked)
-    _check_density("state.fused", state.fused, _KINDS, state_dim, checked)
+        _check_density(f"state.local[{i}]", belief, sensor.belief, state_dim, checked)
+    _check_density("state.fused", state.fused, Labelled, state_dim, checked)
 
 
-def _check_density(
-    name: str, density: Any, kinds: tuple[type[Labelled], ...], state_dim: int, checked: set[int]
-) -> None:
+def _check_density(name: str, density: Any, kind: type[Any], state_dim: int, checked: set[int]) -> None:
     """checked: identities of densities that are known to be valid, of which one tracker's sensors may share one."""
-    if not isinstance(density, kinds):
-        expected = either([kind.__name__ for kind in kinds])
+    if not isinstance(density, kind):
+        expected = "GLMB, LMB or FactoredGLMB" if kind is Labelled else kind.__name__
         raise InputError(f"{name}: expected {expected}; got {type(density).__name__}")
     if density.state_dim != state_dim:
         raise InputError(f"{name}: expected states of dimension {state_dim}, as its filter; got {density.state_dim}")
@@ -113,4 +107,72 @@ def check_choice(name: str, choice: Any, shape: tuple[int, ...]) -> tuple[int, .
     fits = array.shape == (len(shape),) and array.dtype.kind in "iu" and bool(((array >= 0) & (array < shape)).all())
     if not fits:
         raise InputError(f"{name}: expected one action of each sensor, numbers below {shape}; got {choice!r}")
-    return tuple(int(action) for action in array)
+    return tuple(array.tolist())
+
+
+# A table of which courses go together is formed for so many courses at most; beyond, searches ask the mask.
+_MOST_COURSES = 20_000
+
+
+def mask_of_decision(
+    constraints: Sequence[Constraint],
+    sensors: Sequence[MobileSensor],
+    options: Sequence[Options],
+    fused: Any,
+    poses: Floats,
+    settings: PlanningSettings,
+) -> Mask | None:
+    """What constraints allow; None where there are none.
+
+    fused: the fused belief now, of which constraints may ask where targets will be.
+    Raises `InputError` as `mask_of`.
+    """
+    if not constraints:
+        return None
+    beliefs = beliefs_ahead(constraints, sensors, fused, settings, 1, settings.horizon_steps)
+    situation = Situation(tuple(own.courses for own in options), settings.horizon_times(), beliefs, poses)
+    return mask_of(constraints, situation)
+
+
+def beliefs_ahead(
+    constraints: Sequence[Constraint],
+    sensors: Sequence[MobileSensor],
+    fused: Any,
+    settings: PlanningSettings,
+    first: int,
+    last: int,
+) -> tuple[Labelled, ...]:
+    """The fused belief predicted by `first` to `last` steps of the horizon; none where no constraint looks at it.
+
+    Raises `InputError` for one without labels.
+    """
+    asking = [constraint.name for constraint in constraints if constraint.needs_beliefs]
+    if fused is None or not asking:
+        return ()
+    if not isinstance(fused, Labelled):
+        expected = f"a density with labels, as the constraint {asking[0]} asks where targets will be"
+        raise reject("state.fused", expected, type(fused).__name__)
+    motion = shared_targets([sensor.filter for sensor in sensors]).motion
+    return tuple(predicted(fused, motion, step, settings.horizon_period) for step in range(first, last + 1))
+
+
+def single_mask(mask: Mask | None, sensor: int, num_courses: int) -> np.ndarray:
+    """(num_courses,) what one sensor may do, whatever the others do."""
+    return np.ones(num_courses, np.bool_) if mask is None else mask.single[sensor]
+
+
+def allowed_of(mask: Mask | None, shape: Sequence[int]) -> Allowed | None:
+    """The mask as the compiled ascent takes it; None where it would be too large."""
+    none, num = np.ones((0, 0), np.bool_), sum(shape)
+    if mask is None:
+        return Allowed(np.ones(num, np.bool_), none)
+    single = np.concatenate(mask.single)
+    if not mask.together:
+        return Allowed(single, none)
+    if num > _MOST_COURSES:
+        return None
+    together, firsts = np.ones((num, num), np.bool_), np.concatenate([[0], np.cumsum(shape)])
+    for (i, j), table in mask.together.items():
+        rows, columns = slice(firsts[i], firsts[i + 1]), slice(firsts[j], firsts[j + 1])
+        together[rows, columns], together[columns, rows] = table, table.T
+    return Allowed(single, together)

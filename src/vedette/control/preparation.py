@@ -4,34 +4,35 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-from vedette.control.allowed import mask_of_decision
 from vedette.control.constraints import Constraint, Mask
 from vedette.control.evaluator import Evaluator
-from vedette.control.inputs import check_state, options_of
+from vedette.control.inputs import check_state, mask_of_decision, options_of
 from vedette.control.plan import Certainty
 from vedette.control.rewards.base import LabelReward, PowerReward, Reward, speaks_for
 from vedette.control.rewards.power import ExpectedLossReward
 from vedette.control.settings import MobileSensor, PlanningSettings
 from vedette.densities import (
-    GLMB,
     LMB,
-    FactoredGLMB,
     Labelled,
     as_lmb,
     at_peaks,
     existence_probabilities,
     settled_lmb,
 )
-from vedette.fusion import Clmb, CmDeltaGlmb, Fusion, Linear, LinearRule, ParallelUpdate
+from vedette.fusion import Clmb, CmDeltaGlmb, Fusion, Linear, LinearRule, ParallelUpdate, shares_prediction
 from vedette.models.arguments import reject
 from vedette.platforms import Options
 from vedette.tracking import State
 
 AnyReward: TypeAlias = Reward | PowerReward | LabelReward | ExpectedLossReward
+
+
+_PARALLEL = ParallelUpdate()  # how the expected loss adds up
 
 
 class Planned(NamedTuple):
@@ -147,7 +148,7 @@ def check_sums(
 def stay_glmbs(sensors: Sequence[MobileSensor], fusion: Fusion, settings: PlanningSettings, reward: AnyReward) -> bool:
     """Whether beliefs of these filters may be planned on as GLMBs, hypothesis by hypothesis."""
     initial = [sensor.filter.initial() for sensor in sensors]
-    return any(isinstance(own, GLMB) for own in initial) and not _why_lmbs(
+    return any(isinstance(own, Labelled) and not (own.is_lmb or own.is_product) for own in initial) and not _why_lmbs(
         len(sensors), fusion, settings, reward, initial
     )
 
@@ -169,16 +170,19 @@ def planned_on(
     beliefs = (*state.local, state.fused)
     notes: tuple[str, ...] = ()
     # What divides by the common prediction needs beliefs that have one.
-    from_one = getattr(fusion, "shares_prediction", False) or isinstance(reward, ExpectedLossReward)
+    from_one = isinstance(reward, ExpectedLossReward) or shares_prediction(fusion)
     if _has_glmb(beliefs) and (why := why or _why_lmbs(num_sensors, fusion, settings, reward, beliefs)):
         # Of one belief, open names are settled; of several, each would settle them in its own way.
-        as_planned = settled_lmb if from_one or len({id(belief) for belief in beliefs}) == 1 else as_lmb
-        converted: dict[int, LMB] = {id(belief): as_planned(belief) for belief in beliefs}
-        local = tuple(converted[id(belief)] for belief in state.local)
+        as_planned = settled_lmb if from_one or len(set(map(id, beliefs))) == 1 else as_lmb
+        converted: dict[int, LMB] = {}
+        for belief in (state.fused,) if from_one else beliefs:
+            if id(belief) not in converted:
+                converted[id(belief)] = as_planned(belief)
+        local = state.local if from_one else tuple([converted[id(belief)] for belief in state.local])
         state = replace(state, local=local, fused=converted[id(state.fused)])
         notes = (f"planned on the LMBs of the GLMB beliefs: {why}",)
         fusion = _of_lmbs(fusion)
-    if isinstance(reward, ExpectedLossReward) and isinstance(state.fused, LMB):
+    if isinstance(reward, ExpectedLossReward) and state.fused.is_lmb:
         state = replace(state, fused=at_peaks(state.fused))
     if from_one:
         state = replace(state, local=(state.fused,) * num_sensors)
@@ -187,11 +191,17 @@ def planned_on(
 
 
 def _of_lmbs(fusion: Fusion) -> Fusion:
-    return Clmb(fusion.weights) if isinstance(fusion, CmDeltaGlmb) else fusion
+    return _clmb(tuple(fusion.weights)) if isinstance(fusion, CmDeltaGlmb) else fusion
+
+
+@lru_cache(maxsize=100)
+def _clmb(weights: tuple[float, ...]) -> Clmb:
+    """Made once, as its weights were checked."""
+    return Clmb(weights)
 
 
 def _has_glmb(beliefs: Sequence[Labelled]) -> bool:
-    return any(isinstance(belief, GLMB | FactoredGLMB) for belief in beliefs)
+    return not all([belief.is_lmb for belief in beliefs])
 
 
 def _why_lmbs(
@@ -200,9 +210,9 @@ def _why_lmbs(
     """Why GLMBs are planned on their LMBs; empty where they are not. beliefs: the fused one last."""
     if isinstance(reward, ExpectedLossReward):
         return "the expected loss asks for no more"
-    if getattr(fusion, "shares_prediction", False):
+    if shares_prediction(fusion):
         return f"{type(fusion).__name__} fuses LMBs"
-    if any(isinstance(belief, FactoredGLMB) for belief in beliefs):
+    if any(belief.is_product for belief in beliefs):
         return "products of GLMBs always are"
     expected = float(existence_probabilities(beliefs[-1])[1].sum())
     if num_sensors > settings.max_glmb_sensors:
@@ -215,7 +225,7 @@ def _why_lmbs(
 def _rule_of_lmbs(num_sensors: int, fusion: Fusion, settings: PlanningSettings, reward: AnyReward) -> LinearRule | None:
     """How densities are summed where they are LMBs; None where the decision is no sum."""
     if isinstance(reward, ExpectedLossReward):
-        return ParallelUpdate().linear_rule(num_sensors)
+        return _PARALLEL.linear_rule(num_sensors)
     if settings.association != "known":
         return None
     if not isinstance(reward, PowerReward | LabelReward) or not speaks_for(reward, "combine", "__call__"):

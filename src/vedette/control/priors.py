@@ -1,39 +1,60 @@
-"""Where a decision starts: local posteriors cut to what a planner asks, and the fused density predicted ahead.
-
-A filter keeps a density for each label of each hypothesis. What one hypothesis says of a label differs from what
-another says by how they explain other labels' measurements, which is often nothing to speak of: of the 26 tracks that
-ten label sets of `paper-a` hold under an M-delta-GLMB, each label's are within 1e-3 nats of one another. A planner that
-predicts and updates all of them does the same work six times.
-"""
+"""Where a decision starts: the fused density predicted ahead, and what the pseudo-updates of a sensor depend on."""
 
 from __future__ import annotations
 
-from typing import Any, TypeVar
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import TypeVar
 
 import numpy as np
 
-from vedette.densities import GLMB, LMB, Labelled, TrackTable, marginalise, track_moments
-from vedette.densities.checks import offsets_of
-from vedette.densities.containers import for_kernel, unchecked
-from vedette.densities.label_sets import take_hypotheses, take_tracks
-from vedette.filters.inputs import model_errors
-from vedette.kernels.base.types import Floats, Ints
-from vedette.kernels.gaussian.linalg import log_sum
+from vedette.control.settings import IDEAL_MODES, Belief, MobileSensor, PlanningSettings
+from vedette.densities import Labelled, MultiTargetSamples, track_moments
+from vedette.densities.conversions import collapsed
+from vedette.densities.label_sets import possible
+from vedette.densities.samples import sample_labelled
+from vedette.densities.tracks import gaussian_tracks, places_of
+from vedette.filters import shared_targets
+from vedette.filters.inputs import model_errors, nobody
+from vedette.kernels.base.types import Bools, Floats, Ints, Motion, Sensor
+from vedette.kernels.gaussian.sigma_points import LINEARISED
+from vedette.kernels.planning.forms import ANY, BEARING_RANGE, CONSTANT, GAUSSIAN, GROWING, POSITION, SAME, Forms
+from vedette.kernels.planning.ideal import Decision, Futures, Horizon, propagate_samples
 from vedette.kernels.planning.reach import predict_paths
-from vedette.models import MotionModel, constant_survival, kernel_motion
+from vedette.models import (
+    MotionModel,
+    bearing_range,
+    constant_detection,
+    constant_noise,
+    constant_survival,
+    constant_velocity,
+    gaussian_detection,
+    kernel_motion,
+    position,
+    range_dependent_noise,
+)
+from vedette.models.detection_functions import MAX_PROB_DETECTION
+from vedette.models.functions import ModelFunction
+
+# By the functions themselves: a model of a user's own is none of these.
+_LINEAR = {
+    (own.transition, own.process_noise_cov)
+    for own in (constant_velocity(1.0, acceleration=kind) for kind in ("held", "continuous"))
+}
+
+_MEASUREMENTS = {bearing_range().function: BEARING_RANGE, position().function: POSITION}
+
+_NOISES = {
+    range_dependent_noise(1.0, 0.0, 1.0, 0.0).function: GROWING,
+    constant_noise([1.0]).function: CONSTANT,
+}
+
+_DETECTIONS = {gaussian_detection(1.0).function: GAUSSIAN, constant_detection(0.5).function: SAME}
 
 _Labelled = TypeVar("_Labelled", bound=Labelled)
 
 # Over the horizon nobody dies. One model for all decisions, by which what kernels take of a motion is found again.
 ALWAYS_SURVIVES = constant_survival(1.0)
-
-
-def heaviest_hypotheses(belief: GLMB, most: int) -> GLMB:
-    """The `most` heaviest hypotheses of positive weight, normalised; of equal weights the first."""
-    order = np.argsort(-belief.hyp_log_weights, kind="stable")[:most]
-    taken = take_hypotheses(belief, order[belief.hyp_log_weights[order] > -np.inf])
-    log_weights = taken.hyp_log_weights - log_sum(for_kernel(taken.hyp_log_weights))
-    return unchecked(GLMB, taken.tracks, taken.hyp_offsets, taken.hyp_tracks, log_weights)
 
 
 def predicted(fused: _Labelled, motion: MotionModel, num_steps: int, period: float) -> _Labelled:
@@ -42,62 +63,97 @@ def predicted(fused: _Labelled, motion: MotionModel, num_steps: int, period: flo
     Tracks are first collapsed to one Gaussian each (GLMBs are marginalised), as those of the pseudo-updates are. Label
     sets of weight zero are left out of a GLMB.
     """
-    single: Any = fused
-    if not isinstance(fused, LMB):
-        single = marginalise(single, max_components=1)
-    if isinstance(single, GLMB):
-        single = take_hypotheses(single, np.flatnonzero(single.hyp_log_weights > -np.inf))
+    single = possible(collapsed(fused))
     means, covs = track_moments(single.tracks)
     with model_errors():
         paths = predict_paths(kernel_motion(motion, ALWAYS_SURVIVES), float(period), int(num_steps), means, covs)
-    num, ends = single.tracks.num_tracks, (np.ascontiguousarray(own[:, -1]) for own in paths)
-    tracks = unchecked(TrackTable, single.tracks.labels, np.arange(num + 1), np.zeros(num), *ends)
-    return unchecked(type(fused), tracks, *single.to_kernel()[1:])
+    ends = np.ascontiguousarray(paths.means[:, -1]), np.ascontiguousarray(paths.covs[:, -1])
+    return single.with_fields(tracks=gaussian_tracks(single.tracks.labels, *ends))
 
 
-def share_versions(belief: GLMB, most: float) -> GLMB:
-    """The belief with tracks of one label replaced by one from which they diverge by at most `most` nats.
+def draw_paths(
+    fused: Belief, sensors: Sequence[MobileSensor], settings: PlanningSettings, *, rng: np.random.Generator
+) -> tuple[MultiTargetSamples, Floats]:
+    """Samples of the fused density, and (horizon_steps, num_targets, state_dim) where they go without noise."""
+    targets = shared_targets([sensor.filter for sensor in sensors])
+    samples = sample_labelled(fused, settings.num_samples, rng=rng)
+    with model_errors():
+        motion = kernel_motion(targets.motion, targets.survival)
+        states = propagate_samples(motion, samples.states, float(settings.horizon_period), int(settings.horizon_steps))
+    return samples, states
 
-    belief: of one Gaussian a track, its hypotheses heaviest first. The tracks of heavier hypotheses stay, and lighter
-    ones' go to the first of them that is near enough. Hypotheses that then hold the same tracks become one, of the sum
-    of their weights. most: 0 leaves everything as it is.
+
+def decision_of(
+    sensor: MobileSensor,
+    courses: Floats,
+    futures: Futures,
+    settings: PlanningSettings,
+    scans: Bools,
+    detection_at: str | None = None,
+) -> Decision:
+    """What the pseudo-updates of a sensor depend on besides its prior.
+
+    scans: (horizon_steps,) at which of them it scans. detection_at: as of `SensorModel.to_kernel`.
     """
-    if most == 0.0 or len(belief.hyp_tracks) == 0:
-        return belief
-    leaders = _leaders(belief, _divergences(belief.tracks.means, belief.tracks.covs), most)
-    weights: dict[tuple[int, ...], float] = {}
-    for hyp, log_weight in enumerate(belief.hyp_log_weights.tolist()):
-        members = tuple(leaders[belief.hyp_tracks[belief.hyp_offsets[hyp] : belief.hyp_offsets[hyp + 1]]].tolist())
-        weights[members] = float(np.logaddexp(weights[members], log_weight)) if members in weights else log_weight
-    kept, renumbered = np.unique(leaders, return_inverse=True)
-    places = dict(zip(leaders.tolist(), renumbered.tolist(), strict=True))
-    return unchecked(
-        GLMB,
-        take_tracks(belief.tracks, kept),
-        offsets_of([len(members) for members in weights]),
-        np.array([places[track] for members in weights for track in members], np.int64),
-        np.array(list(weights.values())),
+    horizon = Horizon(
+        np.ascontiguousarray(courses),
+        scans,
+        float(settings.horizon_period),
+        IDEAL_MODES[settings.ideal_measurements],
+        float(settings.detection_threshold),
+    )
+    targets, own = sensor.filter.targets, sensor.filter.sensor
+    motion, sees = kernel_motion(targets.motion, ALWAYS_SURVIVES), own.to_kernel(detection_at)
+    return Decision(
+        nobody(targets.state_dim),
+        motion,
+        sees,
+        forms_of(motion, sees, horizon.dt, targets.state_dim),
+        horizon,
+        futures,
+        settings.limits.truncation(own.meas_dim),
     )
 
 
-def _divergences(means: Floats, covs: Floats) -> Floats:
-    """(num, num) Kullback-Leibler divergence of Gaussian i from Gaussian j, in nats."""
-    precisions, log_dets = np.linalg.inv(covs), np.linalg.slogdet(covs)[1]
-    offsets = means[:, np.newaxis] - means
-    traces = np.einsum("iab,jba->ij", covs, precisions)
-    squares = np.einsum("ija,jab,ijb->ij", offsets, precisions, offsets, optimize=True)
-    return np.asarray(0.5 * (traces + squares - means.shape[1] + log_dets - log_dets[:, np.newaxis]))
+def targets_of(table: Ints, labels: Ints, offsets: Ints) -> Ints:
+    """(num_labels, num_samples) place of the target of each label of `table` in each sample, -1 where it is not there.
+
+    labels: of the sampled targets, which are `offsets[i]:offsets[i + 1]` of sample i.
+    """
+    rows = places_of(labels, table)
+    of_sample = np.repeat(np.arange(len(offsets) - 1), np.diff(offsets))
+    targets, known = np.full((len(table), len(offsets) - 1), -1), rows >= 0
+    targets[rows[known], of_sample[known]] = np.flatnonzero(known)
+    return targets
 
 
-def _leaders(belief: GLMB, divergences: Floats, most: float) -> Ints:
-    """(num_tracks,) the track that each is replaced by; its own number where it stays, or where nobody holds it."""
-    labels, leaders = belief.tracks.labels.tolist(), np.arange(belief.tracks.num_tracks)
-    known: dict[tuple[int, ...], list[int]] = {}
-    for track in dict.fromkeys(belief.hyp_tracks.tolist()):
-        own = known.setdefault(tuple(labels[track]), [])
-        near = [leader for leader in own if divergences[track, leader] <= most]
-        if near:
-            leaders[track] = near[0]
-        else:
-            own.append(track)
-    return leaders
+def forms_of(motion: Motion, sensor: Sensor, dt: float, state_dim: int) -> Forms:
+    """The forms of models as kernels take them, over steps of `dt` seconds."""
+    is_linear = motion.method == LINEARISED and (motion.transition, motion.process_noise_cov) in _LINEAR
+    if is_linear:
+        functions = motion.transition_jacobian, motion.process_noise_cov
+        step = _linear_step(
+            *functions, motion.transition_params.tobytes(), motion.noise_params.tobytes(), dt, state_dim
+        )
+    else:
+        step = np.zeros((2, state_dim, state_dim))
+    return Forms(
+        int(is_linear),
+        step[0],
+        step[1],
+        _MEASUREMENTS.get(sensor.measurement, ANY),
+        _NOISES.get(sensor.measurement_noise_cov, ANY),
+        _DETECTIONS.get(sensor.prob_detection, ANY),
+        MAX_PROB_DETECTION,
+    )
+
+
+@lru_cache(maxsize=100)
+def _linear_step(
+    jacobian: ModelFunction, noise_cov: ModelFunction, params: bytes, noise_params: bytes, dt: float, state_dim: int
+) -> Floats:
+    """(2, state_dim, state_dim) transition and noise of a linear motion, the same at every state."""
+    anywhere, step = np.zeros(state_dim), np.zeros((2, state_dim, state_dim))
+    jacobian(anywhere, dt, np.frombuffer(params).copy(), step[0])
+    noise_cov(anywhere, dt, np.frombuffer(noise_params).copy(), step[1])
+    return step

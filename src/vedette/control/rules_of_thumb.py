@@ -8,9 +8,8 @@ from typing import Literal, TypeAlias, get_args
 
 import numpy as np
 
-from vedette.control.allowed import mask_of_decision, single_mask
 from vedette.control.constraints import Constraint, repaired
-from vedette.control.inputs import check_steering, options_of
+from vedette.control.inputs import check_steering, mask_of_decision, options_of, single_mask
 from vedette.control.plan import Plan
 from vedette.control.search import first_best
 from vedette.control.settings import MobileSensor, PlanningSettings

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Literal, TypeAlias
 
 import numpy as np
 
+from vedette.densities import GLMB, LMB, Labelled
 from vedette.errors import InputError
 from vedette.filters import Filter, Limits
 from vedette.kernels.base.types import Bools, Floats
@@ -28,6 +29,7 @@ from vedette.models.fields import (
 from vedette.platforms import Platform
 from vedette.platforms.base import check_platform
 
+Belief: TypeAlias = GLMB | LMB  # that is planned on
 IDEAL_MODES = {"ideal": IDEAL, "expected": EXPECTED, "sampled": SAMPLED}
 
 
@@ -134,6 +136,7 @@ class MobileSensor:
         platform: what it may do, and where that takes it.
         scan_times: s, increasing, as `State.time`: when it scans; None: whenever a decision looks ahead to. A
             pseudo-update counts where it scans at least once in the period that ends with it.
+        belief: the kind of labelled density that the filter believes in; None where it does not label its targets.
 
     Raises:
         InputError: something else than a filter, a platform, or times in order.
@@ -142,11 +145,14 @@ class MobileSensor:
     filter: Filter
     platform: Platform
     scan_times: Floats | None = None
+    belief: type[Labelled] | None = field(init=False)
 
     def __post_init__(self) -> None:
         if not isinstance(self.filter, Filter):
             raise reject("filter", "a Filter, with targets, sensor, initial() and step()", self.filter)
         check_platform("platform", self.platform)
+        initial = self.filter.initial()
+        object.__setattr__(self, "belief", type(initial) if isinstance(initial, Labelled) else None)
         if self.scan_times is not None:
             times = float_array("scan_times", self.scan_times, (None,))
             if (np.diff(times) <= 0.0).any():

@@ -17,13 +17,11 @@ from vedette.densities.estimates import (
     track_histories,
     unlabelled_estimate,
 )
-from vedette.densities.factored import FactoredGLMB, Labelled
+from vedette.densities.factored import FactoredGLMB
 from vedette.densities.files import load_density, save_density
 from vedette.densities.glmb import GLMB
-from vedette.densities.iid_cluster import IidCluster
-from vedette.densities.lmb import LMB
+from vedette.densities.labelled import LMB, Labelled
 from vedette.densities.multi_bernoulli import MultiBernoulli
-from vedette.densities.poisson import Poisson
 from vedette.densities.samples import (
     MultiTargetSamples,
     sample_glmb,
@@ -32,14 +30,10 @@ from vedette.densities.samples import (
     sample_multi_bernoulli,
     sample_poisson,
 )
-from vedette.densities.statistics import (
-    cardinality_distribution,
-    existence_probabilities,
-    mixture_moments,
-    track_moments,
-)
-from vedette.densities.tracks import TrackTable
+from vedette.densities.statistics import cardinality_distribution, existence_probabilities
+from vedette.densities.tracks import TrackTable, mixture_moments, track_moments
 from vedette.densities.undetected import UndetectedIntensity
+from vedette.densities.unlabelled import IidCluster, Poisson
 
 __all__ = [
     "GLMB",

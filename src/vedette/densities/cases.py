@@ -11,9 +11,9 @@ import numpy as np
 from vedette.densities.checks import offsets_of
 from vedette.densities.containers import for_kernel, unchecked
 from vedette.densities.glmb import GLMB
-from vedette.densities.label_sets import Label, LabelSet, label_sets, single_gaussians, take_hypotheses
-from vedette.densities.lmb import LMB
-from vedette.densities.tracks import TrackTable
+from vedette.densities.label_sets import Label, LabelSet, label_sets, possible
+from vedette.densities.labelled import LMB, Labelled
+from vedette.densities.tracks import gaussian_tracks, single_gaussians
 from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.kernels.labelled.case_conversions import LmbCases, glmb_cases_to_lmb
 from vedette.kernels.labelled.power_integrals import SensorCases
@@ -73,15 +73,21 @@ class LabelledCases:
         return cls(LMB, factors, offsets, sets, log_weights, means, covs, **counts)
 
     @classmethod
-    def of(cls, density: GLMB | LMB) -> LabelledCases:
-        """One density as the only case; a GLMB must be marginalised, a mixture is replaced by one of its moments."""
+    def of(cls, density: Labelled) -> LabelledCases:
+        """One LMB or marginalised GLMB as the only case; a mixture is replaced by one Gaussian of its moments."""
         tracks = single_gaussians(density.tracks).to_kernel()
         if isinstance(density, LMB):
             labels = [tuple(label) for label in tracks.labels.tolist()]
             return cls.of_lmbs(labels, density.existence_logit[None], tracks.means[None], tracks.covs[None])
+        assert isinstance(density, GLMB)
         means, covs = tracks.means[density.hyp_tracks], tracks.covs[density.hyp_tracks]
         log_weights = for_kernel(density.hyp_log_weights)
         return cls.of_glmbs(label_sets(density).sets, log_weights[None], means[None], covs[None])
+
+    @property
+    def is_lmb(self) -> bool:
+        """Whether every label is a factor of its own."""
+        return self.kind.is_lmb
 
     @property
     def num_cases(self) -> int:
@@ -114,22 +120,18 @@ class LabelledCases:
     def possible(self) -> Bools:
         """(num_cases, num_sets) false for the sets of weight zero of a GLMB, and for a label of an LMB that cannot
         exist."""
-        if self.kind is GLMB:
+        if not self.is_lmb:
             return np.asarray(self.log_weights > -np.inf)
         return np.repeat(self.log_weights[:, 1::2] > -np.inf, 2, axis=1)
 
     def density(self, case: int) -> GLMB | LMB:
         """One case as a container: an LMB, or a marginalised GLMB without sets of weight zero."""
         labels = np.array([label for labels in self.sets for label in labels], np.int64).reshape(-1, 2)
-        num = len(labels)
-        tracks = unchecked(
-            TrackTable, labels, np.arange(num + 1), np.zeros(num), self.means[case].copy(), self.covs[case].copy()
-        )
-        if self.kind is LMB:
+        tracks = gaussian_tracks(labels, self.means[case].copy(), self.covs[case].copy())
+        if self.is_lmb:
             return unchecked(LMB, tracks, self.existence_logits[case].copy())
-        log_weights = self.log_weights[case].copy()
-        glmb = unchecked(GLMB, tracks, self.set_offsets, np.arange(num), log_weights)
-        return take_hypotheses(glmb, np.flatnonzero(log_weights > -np.inf))
+        members = np.arange(len(labels))
+        return possible(unchecked(GLMB, tracks, self.set_offsets, members, self.log_weights[case].copy()))
 
 
 def lmb_cases(own: LabelledCases) -> LabelledCases:

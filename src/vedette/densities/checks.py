@@ -28,14 +28,16 @@ def check_array(field: str, array: Any, dtype: type, shape: Sequence[int | None]
         raise InputError(f"{field}: expected an array of {np.dtype(dtype)}; got {type(array).__name__}")
     if array.dtype != np.dtype(dtype):
         raise InputError(f"{field}: expected an array of {np.dtype(dtype)}; got one of {array.dtype}")
-    check_shape(field, array, shape)
+    if array.shape != shape:
+        check_shape(field, array, shape)
 
 
 def check_shape(field: str, array: NDArray[Any], shape: Sequence[int | None]) -> None:
     """Raise `InputError` unless `array` has this shape (None: any length)."""
-    if array.shape != tuple(shape) and (
-        array.ndim != len(shape) or any(want not in (None, have) for want, have in zip(shape, array.shape, strict=True))
-    ):
+    fits = array.ndim == len(shape)
+    for want, have in zip(shape, array.shape, strict=False):
+        fits = fits and want in (None, have)
+    if not fits:
         wanted = ", ".join("any" if length is None else str(length) for length in shape)
         raise InputError(f"{field}: expected shape ({wanted}); got {array.shape}")
 
@@ -58,6 +60,13 @@ def check_log_weights(field: str, log_weights: Floats, error: type[VedetteError]
     if faulty.any():
         place = _first(faulty)
         raise error(f"{field}[{place}]: expected a log weight (a number or -inf); got {log_weights[place]}")
+
+
+def check_logits(field: str, logits: Floats, error: type[VedetteError] = NumericalError) -> None:
+    """Raise `error` unless every entry is the log-odds of a probability: a number or an infinity."""
+    faulty = np.isnan(logits)
+    if faulty.any():
+        raise error(f"{field}[{_first(faulty)}]: expected a number; got nan")
 
 
 def check_offsets(field: str, offsets: Any, count: int, total: int, *, empty_allowed: bool) -> None:
@@ -181,6 +190,21 @@ def labels_increase(labels: Ints, offsets: Ints) -> Bools:
 def as_floats(field: str, values: Any, shape: Sequence[int | None]) -> Floats:
     """A fresh float64 array of a user's numbers. Raises `InputError` for another shape or for what is no number."""
     return np.array(_given(field, values, "fiu", "numbers", shape), dtype=np.float64, order="C")
+
+
+def as_gaussians(means: Any, covs: Any, num: int) -> tuple[Floats, Floats]:
+    """Fresh (num, dim) and (num, dim, dim) arrays of a user's means and covariances, which are not checked further."""
+    checked = as_floats("means", means, (num, None))
+    return checked, as_floats("covs", covs, (num, checked.shape[1], checked.shape[1]))
+
+
+def as_logits(field: str, probabilities: Any, num: int | None) -> Floats:
+    """(num,) log-odds of a user's probabilities. Raises `InputError` for numbers that are none."""
+    checked = as_floats(field, probabilities, (num,))
+    if not np.all((checked >= 0.0) & (checked <= 1.0)):
+        raise InputError(f"{field}: expected probabilities; got {checked.tolist()}")
+    with np.errstate(divide="ignore"):
+        return np.asarray(np.log(checked) - np.log1p(-checked))
 
 
 def as_ints(field: str, values: Any, shape: Sequence[int | None]) -> Ints:

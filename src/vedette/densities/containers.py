@@ -6,12 +6,15 @@ written into one of them later would have a kernel read memory that is not its o
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Callable
 from operator import attrgetter
-from typing import Any, TypeVar
+from typing import Any, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+
+from vedette.kernels.base.types import Floats
 
 _Container = TypeVar("_Container", bound="Container")
 
@@ -32,9 +35,29 @@ class Container:
             if type(value) is np.ndarray:
                 object.__setattr__(self, name, _held(np.array(value, order="C")))
 
+    def with_fields(self, **changed: Any) -> Self:
+        """The same with other values of some fields, which are the library's own; see `unchecked`."""
+        names = self.__match_args__  # type: ignore[attr-defined]
+        return unchecked(type(self), *(changed[name] if name in changed else getattr(self, name) for name in names))
+
     def __reduce__(self) -> tuple[Any, ...]:
         """Through the constructor and its checks: what is unpickled may have been written by anybody."""
         return type(self), tuple(getattr(self, name) for name in self.__match_args__)  # type: ignore[attr-defined]
+
+
+class MultiTarget(Container):
+    """A density of a set of targets."""
+
+    __slots__ = ()
+
+    @property
+    @abstractmethod
+    def state_dim(self) -> int:
+        """Length of a target's state."""
+
+    @abstractmethod
+    def cardinality(self) -> Floats:
+        """Probabilities of 0, 1, ..., n targets; see `vedette.densities.cardinality_distribution`."""
 
 
 def unchecked(container: type[_Container], *fields: Any) -> _Container:
@@ -77,4 +100,4 @@ def _held(array: NDArray[Any]) -> NDArray[Any]:
     return view
 
 
-__all__ = ["Container", "for_kernel", "kernel_arrays", "unchecked"]
+__all__ = ["Container", "MultiTarget", "for_kernel", "kernel_arrays", "unchecked"]

@@ -4,26 +4,26 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TypeVar
+from typing import Any, TypeVar, cast
 
 import numpy as np
 
 from vedette.densities.checks import distinct_labels, offsets_of, take_runs
 from vedette.densities.containers import unchecked
-from vedette.densities.factored import FactoredGLMB, Labelled, as_factored
+from vedette.densities.factored import FactoredGLMB, sets_of_factors
 from vedette.densities.glmb import GLMB
-from vedette.densities.label_sets import sets_of_factors, take_factors, take_tracks
-from vedette.densities.lmb import LMB
-from vedette.densities.tracks import TrackTable
+from vedette.densities.label_sets import take_factors
+from vedette.densities.labelled import LMB, Labelled
+from vedette.densities.tracks import TrackTable, reduced_tracks, single_gaussians, take_tracks
 from vedette.errors import InputError
 from vedette.kernels.association.names import settled_names
 from vedette.kernels.base.types import Lmb
 from vedette.kernels.gaussian.mixtures import MixtureCaps
-from vedette.kernels.gaussian.pooling import pooled_tracks
 from vedette.kernels.labelled import conversions as kernels
 from vedette.probabilities import log_expit
 
 _Glmb = TypeVar("_Glmb", GLMB, FactoredGLMB)
+_Labelled = TypeVar("_Labelled", bound=Labelled)
 
 DEFAULT_LOG_MIN_WEIGHT = math.log(1e-5)
 DEFAULT_MERGE_DISTANCE = 2.0
@@ -74,12 +74,8 @@ def marginalised_factors(density: FactoredGLMB, caps: MixtureCaps) -> FactoredGL
     if bernoulli.all() and len(density.tracks.log_weights) == density.num_factors:
         return density
     singles, several = np.flatnonzero(bernoulli), np.flatnonzero(~bernoulli)
-    alone, num = take_factors(density, singles), len(singles)
-    if len(alone.tracks.log_weights) > num:
-        each = np.arange(num + 1)
-        own = alone.tracks.to_kernel()
-        tracks = pooled_tracks(own, own.labels, each, each[:-1].copy(), np.ones(num), caps)
-        alone = unchecked(FactoredGLMB, TrackTable.from_kernel(tracks), *alone.to_kernel()[1:])
+    alone = take_factors(density, singles)
+    alone = alone.with_fields(tracks=TrackTable.from_kernel(reduced_tracks(alone.tracks.to_kernel(), caps)))
     others = _marginalised_glmbs(take_factors(density, several), caps)
     order = np.argsort(np.concatenate([singles, several]))
     return take_factors(FactoredGLMB.product([alone, others], density.state_dim), order)
@@ -87,8 +83,7 @@ def marginalised_factors(density: FactoredGLMB, caps: MixtureCaps) -> FactoredGL
 
 def _marginalised_glmbs(density: FactoredGLMB, caps: MixtureCaps) -> FactoredGLMB:
     """All factors marginalised at once, each one's hypotheses by descending weight."""
-    num, hypotheses = density.num_factors, density.as_hypotheses()
-    factor_of = np.repeat(np.arange(num), np.diff(density.factor_offsets))
+    num, hypotheses, factor_of = density.num_factors, density.as_hypotheses(), density.factor_of
     set_of, first = sets_of_factors(hypotheses, factor_of)
     marginal, number = kernels.marginalise_sets(hypotheses, set_of, first, caps)
     factor = factor_of[first][number]
@@ -124,23 +119,21 @@ def as_lmb(
     return LMB.from_kernel(reduced_lmb(density, caps))
 
 
-def reduced_lmb(density: GLMB | FactoredGLMB, caps: MixtureCaps, *, settled: bool = False) -> Lmb:
-    """The LMB of a GLMB or of a product of them, its mixtures reduced; settled: under the names of `settled_lmb`."""
-    if isinstance(density, GLMB):
-        if not settled:
-            return kernels.glmb_to_lmb(density.to_kernel(), caps)
-        density = FactoredGLMB.from_glmb(density)
+def reduced_lmb(density: Labelled, caps: MixtureCaps, *, settled: bool = False) -> Lmb:
+    """The LMB of a density, its mixtures reduced where it is not one; settled: under the names of `settled_lmb`."""
+    if isinstance(density, LMB):
+        return density.to_kernel()
+    factors, hypotheses = density.to_factors(), density.as_hypotheses()
     all_labels, place = distinct_labels(density.tracks.labels)
-    place_of_entry = place[density.hyp_tracks]
+    place_of_entry = place[factors.hyp_tracks]
     if settled:
-        own = density.to_kernel()
-        place_of_entry = settled_names(density.as_hypotheses(), own.factor_offsets, own.track_offsets, place, _APART)
+        place_of_entry = settled_names(hypotheses, factors.factor_offsets, factors.track_offsets, place, _APART)
     used = np.bincount(place_of_entry, minlength=len(all_labels)) > 0  # a table may have more
     factor = np.empty(len(all_labels), np.int64)
-    factor[place] = np.repeat(np.arange(density.num_factors), np.diff(density.track_offsets))
-    firsts, ends = density.factor_offsets[factor[used]], density.factor_offsets[factor[used] + 1]
+    factor[place] = np.repeat(np.arange(len(factors.factor_offsets) - 1), np.diff(factors.track_offsets))
+    firsts, ends = factors.factor_offsets[factor[used]], factors.factor_offsets[factor[used] + 1]
     label_of = (np.cumsum(used) - 1)[place_of_entry]
-    return kernels.factors_to_lmb(density.as_hypotheses(), all_labels[used], label_of, firsts, ends, caps)
+    return kernels.factors_to_lmb(hypotheses, all_labels[used], label_of, firsts, ends, caps)
 
 
 def settled_lmb(
@@ -165,6 +158,21 @@ def settled_lmb(
     return LMB.from_kernel(reduced_lmb(density, caps, settled=True))
 
 
+def collapsed(density: _Labelled) -> _Labelled:
+    """The density with one Gaussian for each mixture: that of its moments; GLMBs are marginalised."""
+    if density.is_lmb:
+        return density.with_fields(tracks=single_gaussians(density.tracks))
+    given: Any = density
+    return cast(_Labelled, marginalise(given, max_components=1))
+
+
+def names_settled(density: Labelled, max_components: int) -> Labelled:
+    """The density; where it is a product of GLMBs that leave names open, that of its `settled_lmb`."""
+    if not isinstance(density, FactoredGLMB) or density.is_bernoulli.all():
+        return density
+    return FactoredGLMB.of(settled_lmb(density, max_components=max_components))
+
+
 def as_glmb(density: Labelled, *, max_hypotheses: int) -> tuple[GLMB, float]:
     """GLMB of the `max_hypotheses` heaviest products of one hypothesis of each factor, and the weight of the others.
 
@@ -175,8 +183,7 @@ def as_glmb(density: Labelled, *, max_hypotheses: int) -> tuple[GLMB, float]:
     if max_hypotheses < 1:
         raise InputError(f"max_hypotheses: expected at least 1; got {max_hypotheses}")
     labels, label_of = distinct_labels(density.tracks.labels)
-    factors = as_factored(density).to_kernel()
-    glmb, discarded_weight = kernels.factored_to_glmb(factors, label_of, len(labels), int(max_hypotheses))
+    glmb, discarded_weight = kernels.factored_to_glmb(density.to_factors(), label_of, len(labels), int(max_hypotheses))
     return GLMB.from_kernel(glmb), float(discarded_weight)
 
 
@@ -198,9 +205,11 @@ __all__ = [
     "DEFAULT_MERGE_DISTANCE",
     "as_glmb",
     "as_lmb",
+    "collapsed",
     "lmb_on_label_sets",
     "marginalise",
     "marginalised_factors",
+    "names_settled",
     "reduced_lmb",
     "settled_lmb",
 ]

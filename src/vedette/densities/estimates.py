@@ -11,17 +11,14 @@ import numpy as np
 
 from vedette.densities import checks
 from vedette.densities.checks import distinct_labels
-from vedette.densities.containers import unchecked
 from vedette.densities.conversions import settled_lmb
-from vedette.densities.factored import LABELLED, FactoredGLMB, Labelled
+from vedette.densities.factored import FactoredGLMB
 from vedette.densities.glmb import GLMB
-from vedette.densities.iid_cluster import IidCluster
-from vedette.densities.lmb import LMB
+from vedette.densities.labelled import LMB, Labelled
 from vedette.densities.multi_bernoulli import MultiBernoulli
-from vedette.densities.poisson import Poisson
-from vedette.densities.sharing import heaviest_tracks
-from vedette.densities.statistics import cardinality_distribution, existence_probabilities
-from vedette.densities.tracks import TrackTable
+from vedette.densities.statistics import cardinality_distribution, heaviest_tracks, labelled
+from vedette.densities.tracks import TrackTable, gaussian_tracks, heaviest_components
+from vedette.densities.unlabelled import IidCluster, Poisson
 from vedette.errors import InputError, NumericalError, VedetteError
 from vedette.kernels.base.types import Floats, Ints
 from vedette.models.arguments import no_gaussians
@@ -88,42 +85,22 @@ def map_estimate(density: Labelled) -> Estimate:
     earlier hypothesis; the smaller label. A track that is a mixture is estimated by its heaviest component,
     as the mean of two rival components may lie where the target cannot be.
     """
-    if isinstance(density, GLMB):
-        return _map_of_glmb(density)
+    number = int(np.argmax(cardinality_distribution(labelled(density))))
     if isinstance(density, LMB):
-        number = int(np.argmax(cardinality_distribution(density)))
         chosen = np.sort(np.argsort(-density.existence_logit, kind="stable")[:number])
         return _peaks(density.tracks, chosen, density.existence[chosen])
-    if isinstance(density, FactoredGLMB):
-        return _map_of_factors(density)
-    raise InputError(f"density: expected {LABELLED}, which have labels; got {type(density).__name__}")
+    if isinstance(density, GLMB):
+        return _peaks(density.tracks, *density.heaviest(number))
+    chosen = heaviest_tracks(FactoredGLMB.of(density), number)
+    labels, existence = density.label_existence()
+    # Both come in increasing label order, and every chosen label is one of those.
+    _, place = distinct_labels(np.concatenate([labels, density.tracks.labels[chosen]]))
+    return _peaks(density.tracks, chosen, existence[place[len(labels) :]])
 
 
 def best_estimate(density: Any, step: int) -> Estimate:
     """An `Estimator` of every density: `map_estimate` where it has labels, else `unlabelled_estimate`."""
     return map_estimate(density) if isinstance(density, Labelled) else unlabelled_estimate(density, step)
-
-
-def _map_of_glmb(density: GLMB) -> Estimate:
-    weights = np.exp(density.hyp_log_weights)
-    sizes = np.diff(density.hyp_offsets)
-    number = int(np.argmax(np.bincount(sizes, weights=weights)))
-    candidates = np.flatnonzero(sizes == number)
-    best = int(candidates[np.argmax(density.hyp_log_weights[candidates])])
-    chosen = density.hyp_tracks[density.hyp_offsets[best] : density.hyp_offsets[best + 1]]
-    labels = density.tracks.labels
-    same = (labels[:, None, 0] == labels[chosen, 0]) & (labels[:, None, 1] == labels[chosen, 1])
-    entry_weights = np.repeat(weights, sizes)
-    track_weights = np.bincount(density.hyp_tracks, weights=entry_weights, minlength=len(labels))
-    return _peaks(density.tracks, chosen, np.minimum(track_weights @ same, 1.0))
-
-
-def _map_of_factors(density: FactoredGLMB) -> Estimate:
-    chosen = heaviest_tracks(density, int(np.argmax(cardinality_distribution(density))))
-    labels, existence = existence_probabilities(density)
-    # Both come in increasing label order, and every chosen label is one of those.
-    _, place = distinct_labels(np.concatenate([labels, density.tracks.labels[chosen]]))
-    return _peaks(density.tracks, chosen, existence[place[len(labels) :]])
 
 
 def marginal_estimate(density: Labelled, threshold: float = 0.5) -> Estimate:
@@ -137,16 +114,14 @@ def marginal_estimate(density: Labelled, threshold: float = 0.5) -> Estimate:
     """
     if not 0.0 <= threshold < 1.0:
         raise InputError(f"threshold: expected a probability below 1; got {threshold}")
-    if not isinstance(density, Labelled):
-        raise InputError(f"density: expected {LABELLED}, which have labels; got {type(density).__name__}")
-    lmb = settled_lmb(density, max_components=_MARGINAL_COMPONENTS)
+    lmb = settled_lmb(labelled(density), max_components=_MARGINAL_COMPONENTS)
     chosen = np.flatnonzero(lmb.existence > threshold)
     return _peaks(lmb.tracks, chosen, lmb.existence[chosen])
 
 
 def _peaks(tracks: TrackTable, chosen: Ints, existence: Floats) -> Estimate:
     """The heaviest component of each chosen track."""
-    heaviest = _heaviest(tracks, chosen)
+    heaviest = heaviest_components(tracks.log_weights, tracks.offsets, chosen)
     return Estimate(tracks.labels[chosen], tracks.means[heaviest], tracks.covs[heaviest], existence)
 
 
@@ -159,24 +134,8 @@ def at_peaks(density: LMB) -> LMB:
     tracks, num = density.tracks, density.tracks.num_tracks
     if len(tracks.log_weights) == num:
         return density
-    peaks = _heaviest(tracks, np.arange(num))
-    single = unchecked(
-        TrackTable, tracks.labels, np.arange(num + 1), np.zeros(num), tracks.means[peaks], tracks.covs[peaks]
-    )
-    return unchecked(LMB, single, density.existence_logit)
-
-
-def _heaviest(mixtures: TrackTable | MultiBernoulli, chosen: Ints) -> Ints:
-    """(len(chosen),) the heaviest component of each chosen mixture, the first of several."""
-    starts, sizes = mixtures.offsets[chosen], np.diff(mixtures.offsets)[chosen]
-    ends = np.cumsum(sizes)
-    if len(chosen) == 0:
-        return starts
-    components = np.repeat(starts - ends + sizes, sizes) + np.arange(ends[-1])
-    log_weights = mixtures.log_weights[components]
-    peaks = np.maximum.reduceat(log_weights, ends - sizes)
-    at_peak = np.flatnonzero(log_weights == np.repeat(peaks, sizes))
-    return np.asarray(components[at_peak[np.searchsorted(at_peak, ends - sizes)]])
+    peaks = heaviest_components(tracks.log_weights, tracks.offsets, np.arange(num))
+    return density.with_fields(tracks=gaussian_tracks(tracks.labels, tracks.means[peaks], tracks.covs[peaks]))
 
 
 def unlabelled_estimate(density: Poisson | IidCluster | MultiBernoulli, step: int) -> Estimate:
@@ -192,7 +151,8 @@ def unlabelled_estimate(density: Poisson | IidCluster | MultiBernoulli, step: in
     if isinstance(density, MultiBernoulli):
         number = int(np.argmax(cardinality_distribution(density)))
         chosen = np.argsort(-density.existence_logit, kind="stable")[:number]
-        components, existence = _heaviest(density, chosen), density.existence[chosen]
+        components = heaviest_components(density.log_weights, density.offsets, chosen)
+        existence = density.existence[chosen]
     elif isinstance(density, IidCluster):
         number = int(np.argmax(density.log_cardinality))
         components, existence = _by_units(density.expected_number * np.exp(density.log_weights), number)

@@ -4,25 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import ClassVar, Literal
 
 import numpy as np
 
 from vedette.densities import checks
-from vedette.densities.containers import Container, kernel_arrays, unchecked
-from vedette.densities.glmb import GLMB
-from vedette.densities.lmb import LMB
+from vedette.densities.containers import kernel_arrays, unchecked
+from vedette.densities.glmb import GLMB, Hypotheses
+from vedette.densities.labelled import LMB, Labelled
 from vedette.densities.tracks import TrackTable
-from vedette.errors import InputError, NumericalError, VedetteError
+from vedette.errors import InputError, VedetteError
 from vedette.kernels.base import types as kt
 from vedette.kernels.base.types import Bools, Floats, Ints
+from vedette.kernels.labelled.cardinality import convolved
+from vedette.kernels.labelled.labels import group_by_label_set
 from vedette.kernels.labelled.stacking import join_offsets, stack_glmbs
 
-_ARRAYS = kernel_arrays("track_offsets", "hyp_offsets", "hyp_tracks", "hyp_log_weights", "factor_offsets")
+_FACTORS = kernel_arrays("track_offsets", "hyp_offsets", "hyp_tracks", "hyp_log_weights", "factor_offsets")
 
 
 @dataclass(frozen=True, slots=True)
-class FactoredGLMB(Container):
+class FactoredGLMB(Hypotheses):
     """Product of independent GLMBs (factors), no two of which share a label.
 
     A GLMB is one factor, an LMB one factor a label. What one factor says of its targets does not depend on another's:
@@ -49,12 +51,7 @@ class FactoredGLMB(Container):
     hyp_tracks: Ints
     hyp_log_weights: Floats
     factor_offsets: Ints
-
-    def __post_init__(self) -> None:
-        self._own_arrays()
-        if not isinstance(self.tracks, TrackTable):
-            raise InputError(f"tracks: expected a TrackTable; got {type(self.tracks).__name__}")
-        self._validate_factors(InputError)
+    is_product: ClassVar[Literal[True]] = True
 
     @property
     def num_factors(self) -> int:
@@ -71,14 +68,26 @@ class FactoredGLMB(Container):
         return np.asarray(found)
 
     @property
-    def num_hyps(self) -> int:
-        """Number of hypotheses, of all factors together."""
-        return len(self.hyp_log_weights)
+    def factor_of(self) -> Ints:
+        """(num_hyps,) number of the factor of each hypothesis."""
+        return np.repeat(np.arange(self.num_factors), np.diff(self.factor_offsets))
 
     @property
-    def state_dim(self) -> int:
-        """Length of a target's state."""
-        return int(self.tracks.means.shape[1])
+    def is_marginalised(self) -> bool:
+        """Whether every label set occurs once in its factor."""
+        return len(sets_of_factors(self.as_hypotheses(), self.factor_of)[1]) == self.num_hyps
+
+    def cardinality(self) -> Floats:
+        """Probabilities of as many targets as the largest hypotheses of all factors have together, and of fewer."""
+        sizes, offsets = np.diff(self.hyp_offsets), self.size_offsets()
+        chances = np.bincount(offsets[self.factor_of] + sizes, np.exp(self.hyp_log_weights), minlength=offsets[-1])
+        return convolved(np.asarray(chances, np.float64), offsets)
+
+    def size_offsets(self) -> Ints:
+        """(num_factors + 1,) offsets of runs with a place for each number of targets of a factor, from 0 up."""
+        sizes = np.diff(self.hyp_offsets)
+        largest = np.maximum.reduceat(sizes, self.factor_offsets[:-1]) if self.num_factors else sizes
+        return checks.offsets_of(largest + 1)
 
     def factor(self, index: int) -> GLMB:
         """One factor, as a GLMB."""
@@ -104,11 +113,11 @@ class FactoredGLMB(Container):
 
     def to_kernel(self) -> kt.FactoredGlmb:
         """The same arrays as the bundle that kernels take."""
-        return kt.FactoredGlmb(self.tracks.to_kernel(), *_ARRAYS(self))
+        return kt.FactoredGlmb(self.tracks.to_kernel(), *_FACTORS(self))
 
-    def as_hypotheses(self) -> kt.Glmb:
-        """The hypotheses of all factors as one list, which is no density: its weights sum to the number of factors."""
-        return kt.Glmb(self.tracks.to_kernel(), *_ARRAYS(self)[1:4])
+    def to_factors(self) -> kt.FactoredGlmb:
+        """The same arrays."""
+        return self.to_kernel()
 
     @classmethod
     def from_kernel(cls, density: kt.FactoredGlmb) -> FactoredGLMB:
@@ -131,13 +140,22 @@ class FactoredGLMB(Container):
             if not isinstance(factor, GLMB) or factor.state_dim != state_dim:
                 got = f"{type(factor).__name__} of {getattr(factor, 'state_dim', 'no')} dimensions"
                 raise InputError(f"factors[{index}]: expected a GLMB of states of dimension {state_dim}; got {got}")
-        return cls.product([cls.from_glmb(factor) for factor in factors], state_dim)
+        return cls.product([cls.of(factor) for factor in factors], state_dim)
+
+    @classmethod
+    def of(cls, density: Labelled) -> FactoredGLMB:
+        """The same density: a GLMB as one factor, an LMB as one a label (that it is absent, then that it is there)."""
+        return density if isinstance(density, cls) else unchecked(cls, density.tracks, *density.to_factors()[1:])
 
     @classmethod
     def from_glmb(cls, glmb: GLMB) -> FactoredGLMB:
         """The same density, as one factor."""
-        ends = np.array([0, glmb.tracks.num_tracks]), np.array([0, glmb.num_hyps])
-        return unchecked(cls, glmb.tracks, ends[0], glmb.hyp_offsets, glmb.hyp_tracks, glmb.hyp_log_weights, ends[1])
+        return cls.of(glmb)
+
+    @classmethod
+    def from_lmb(cls, lmb: LMB) -> FactoredGLMB:
+        """The same density: a factor a label, with the hypotheses that it is absent and that it is there."""
+        return cls.of(lmb)
 
     @classmethod
     def product(cls, parts: Sequence[FactoredGLMB], state_dim: int) -> FactoredGLMB:
@@ -159,28 +177,7 @@ class FactoredGLMB(Container):
         made._validate_labels()
         return made
 
-    @classmethod
-    def from_lmb(cls, lmb: LMB) -> FactoredGLMB:
-        """The same density: a factor a label, with the hypotheses that it is absent and that it is there."""
-        num = lmb.tracks.num_tracks
-        log_weights = np.empty((num, 2))
-        log_weights[:, 0] = -np.logaddexp(0.0, lmb.existence_logit)
-        log_weights[:, 1] = -np.logaddexp(0.0, -lmb.existence_logit)
-        ends = np.repeat(np.arange(num + 1), 2)
-        return unchecked(
-            cls, lmb.tracks, np.arange(num + 1), ends[:-1], np.arange(num), log_weights.ravel(), 2 * np.arange(num + 1)
-        )
-
-    def validate(self, *, error: type[VedetteError] = NumericalError) -> None:
-        """Raise unless these are normalised GLMBs over tracks of their own, no label in two of them.
-
-        `InputError` for faults of form; `error` for values that are not finite, not normalised to 1e-9 or covariances
-        that are not symmetric positive definite.
-        """
-        self.tracks.validate(error=error)
-        self._validate_factors(error)
-
-    def _validate_factors(self, error: type[VedetteError]) -> None:
+    def _validate_form(self, error: type[VedetteError]) -> None:
         checks.check_array("hyp_log_weights", self.hyp_log_weights, np.float64, (None,))
         checks.check_array("hyp_tracks", self.hyp_tracks, np.int64, (None,))
         checks.check_array("factor_offsets", self.factor_offsets, np.int64, (None,))
@@ -192,15 +189,14 @@ class FactoredGLMB(Container):
             num = 0  # there is no fault to be named
         for index in range(num):
             try:
-                self.factor(index)._validate_hypotheses(error)
+                self.factor(index)._validate_form(error)
             except VedetteError as fault:
                 raise type(fault)(f"factor {index}: {fault}") from None
         self._validate_labels()
 
     def _factors_fit(self) -> bool:
         """Whether each factor by itself is a normalised GLMB; all at once, for there may be thousands."""
-        factor = np.repeat(np.arange(self.num_factors), np.diff(self.factor_offsets))
-        owner = np.repeat(factor, np.diff(self.hyp_offsets))
+        owner = np.repeat(self.factor_of, np.diff(self.hyp_offsets))
         if not (
             (self.track_offsets[owner] <= self.hyp_tracks) & (self.hyp_tracks < self.track_offsets[owner + 1])
         ).all():
@@ -226,13 +222,12 @@ class FactoredGLMB(Container):
             )
 
 
-# A density that names its targets, and how messages call it.
-Labelled: TypeAlias = GLMB | LMB | FactoredGLMB
-LABELLED = "a GLMB, an LMB or a FactoredGLMB"
-
-
-def as_factored(density: Labelled) -> FactoredGLMB:
-    """A GLMB as one factor, an LMB as one a label."""
-    if isinstance(density, LMB):
-        return FactoredGLMB.from_lmb(density)
-    return FactoredGLMB.from_glmb(density) if isinstance(density, GLMB) else density
+def sets_of_factors(hypotheses: kt.Glmb, factor_of: Ints) -> tuple[Ints, Ints]:
+    """As `group_by_label_set`, where hypotheses of different factors (num_hyps,) have different sets."""
+    set_of, first = group_by_label_set(hypotheses)
+    if (factor_of == factor_of[:1]).all():
+        return set_of, first
+    numbers = set_of * (factor_of.max() + 1) + factor_of
+    _, first, place = np.unique(numbers, return_index=True, return_inverse=True)
+    order = np.argsort(first)
+    return np.argsort(order)[place], first[order]

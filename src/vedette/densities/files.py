@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
+from dataclasses import fields
+from operator import attrgetter
 from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy as np
 
-from vedette.densities.factored import FactoredGLMB, Labelled
+from vedette.densities.factored import FactoredGLMB
 from vedette.densities.glmb import GLMB
-from vedette.densities.iid_cluster import IidCluster
-from vedette.densities.lmb import LMB
+from vedette.densities.labelled import LMB, Labelled
 from vedette.densities.multi_bernoulli import MultiBernoulli
-from vedette.densities.poisson import Poisson
 from vedette.densities.tracks import TrackTable
+from vedette.densities.unlabelled import IidCluster, Poisson
 from vedette.errors import InputError, VedetteError
 from vedette.files import write_whole
 from vedette.reading import read_arrays, read_file, said, unreadable
@@ -23,16 +24,6 @@ from vedette.text import shown
 
 FORMAT_NAME = "vedette-density"
 FORMAT_VERSION = 1
-
-_TRACK_FIELDS = ("labels", "offsets", "log_weights", "means", "covs")
-_OWN_FIELDS: dict[str, tuple[str, ...]] = {
-    "glmb": ("hyp_offsets", "hyp_tracks", "hyp_log_weights"),
-    "lmb": ("existence_logit",),
-    "factored_glmb": ("track_offsets", "hyp_offsets", "hyp_tracks", "hyp_log_weights", "factor_offsets"),
-    "poisson": ("log_weights", "means", "covs"),
-    "iid_cluster": ("log_cardinality", "log_weights", "means", "covs"),
-    "multi_bernoulli": ("existence_logit", "offsets", "log_weights", "means", "covs"),
-}
 
 Density: TypeAlias = Labelled | Poisson | IidCluster | MultiBernoulli
 _KINDS: dict[str, type[Density]] = {
@@ -54,9 +45,7 @@ def save_density(path: str | os.PathLike[str], density: Density) -> None:
     if kind is None:
         raise InputError(f"density: expected a multi-target density; got {type(density).__name__}")
     arrays: dict[str, Any] = {"format": FORMAT_NAME, "version": FORMAT_VERSION, "kind": kind}
-    if isinstance(density, Labelled):
-        arrays |= {f"tracks.{name}": getattr(density.tracks, name) for name in _TRACK_FIELDS}
-    arrays |= {name: getattr(density, name) for name in _OWN_FIELDS[kind]}
+    arrays |= {name: attrgetter(name)(density) for name in _names(type(density))}
     target = Path(path)
     try:
         write_whole(target, lambda file: np.savez(file, **arrays))
@@ -92,17 +81,23 @@ def _kind_of(source: Path, arrays: Mapping[str, Any]) -> str:
     if str(arrays.get("version")) != str(FORMAT_VERSION):
         raise InputError(f"{source}: expected format version {FORMAT_VERSION}; got {said(arrays.get('version'))}")
     kind = str(arrays.get("kind"))
-    if kind not in _OWN_FIELDS:
-        raise InputError(f"{source}: expected a kind of density among {', '.join(_OWN_FIELDS)}; got {shown(kind)}")
+    if kind not in _KINDS:
+        raise InputError(f"{source}: expected a kind of density among {', '.join(_KINDS)}; got {shown(kind)}")
     return kind
 
 
+def _names(container: type[Any]) -> list[str]:
+    """Of a container's arrays in a file, in the order of its fields, those of its track table first."""
+    of_tracks = [f"tracks.{field.name}" for field in fields(TrackTable)] if issubclass(container, Labelled) else []
+    return of_tracks + [field.name for field in fields(container) if field.name != "tracks"]
+
+
 def _build(kind: str, arrays: Mapping[str, Any]) -> Density:
-    own = [arrays[name] for name in _OWN_FIELDS[kind]]
-    container: Callable[..., Density] = _KINDS[kind]
-    if kind not in ("glmb", "lmb", "factored_glmb"):
-        return container(*own)
-    return container(TrackTable(*(arrays[f"tracks.{name}"] for name in _TRACK_FIELDS)), *own)
+    container: Any = _KINDS[kind]
+    own = [arrays[name] for name in _names(container)]
+    num = len(own) - len(fields(container)) + 1
+    made: Density = container(TrackTable(*own[:num]), *own[num:]) if num > 1 else container(*own)
+    return made
 
 
 __all__ = ["FORMAT_NAME", "FORMAT_VERSION", "load_density", "save_density"]

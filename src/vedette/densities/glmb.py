@@ -1,26 +1,65 @@
-"""Generalized labelled multi-Bernoulli density with Gaussian-mixture tracks."""
+"""Densities of listed hypotheses, and the one of a single list: the generalized labelled multi-Bernoulli."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 
 from vedette.densities import checks
-from vedette.densities.containers import Container, kernel_arrays, unchecked
+from vedette.densities.containers import kernel_arrays, unchecked
+from vedette.densities.labelled import Labelled
 from vedette.densities.tracks import TrackTable, log_weights
-from vedette.errors import InputError, NumericalError, VedetteError
+from vedette.errors import InputError, VedetteError
 from vedette.kernels.base import types as kt
 from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.labelled.labels import group_by_label_set
 
-_ARRAYS = kernel_arrays("hyp_offsets", "hyp_tracks", "hyp_log_weights")
+_HYPOTHESES = kernel_arrays("hyp_offsets", "hyp_tracks", "hyp_log_weights")
+
+
+class Hypotheses(Labelled):
+    """Factors of listed hypotheses, each a set of tracks with its weight in its factor."""
+
+    __slots__ = ()
+    hyp_offsets: Ints
+    hyp_tracks: Ints
+    hyp_log_weights: Floats
+    is_lmb: ClassVar[Literal[False]] = False
+
+    def __post_init__(self) -> None:
+        self._own_parts()
+
+    @property
+    def num_hyps(self) -> int:
+        """Number of hypotheses, of all factors together."""
+        return len(self.hyp_log_weights)
+
+    @property
+    def track_existence(self) -> Floats:
+        """(num_tracks,) probability that there is a target and that it has this track."""
+        weights = np.repeat(np.exp(self.hyp_log_weights), np.diff(self.hyp_offsets))
+        return np.bincount(self.hyp_tracks, weights, self.tracks.num_tracks).astype(np.float64)
+
+    def label_existence(self) -> tuple[Ints, Floats]:
+        """See `vedette.densities.existence_probabilities`."""
+        labels, place = checks.distinct_labels(self.tracks.labels)
+        label_of = place[self.hyp_tracks]
+        weights = np.repeat(np.exp(self.hyp_log_weights), np.diff(self.hyp_offsets))
+        held = np.bincount(label_of, minlength=len(labels)) > 0  # a table may have more
+        return labels[held], np.minimum(np.bincount(label_of, weights, len(labels))[held], 1.0)
+
+    def with_labels(self, labels: Ints) -> Self:
+        """The same under other labels (num_tracks, 2), of which no two that differed are the same."""
+        members, hyps = labels[self.hyp_tracks], np.repeat(np.arange(self.num_hyps), np.diff(self.hyp_offsets))
+        order = np.lexsort((members[:, 1], members[:, 0], hyps))
+        return self.with_fields(tracks=self.tracks.with_fields(labels=labels), hyp_tracks=self.hyp_tracks[order])
 
 
 @dataclass(frozen=True, slots=True)
-class GLMB(Container):
+class GLMB(Hypotheses):
     """delta-GLMB density (paper eq. 4); marginalised delta-GLMB (eq. 10) where every label set occurs once.
 
     Attributes:
@@ -39,31 +78,34 @@ class GLMB(Container):
     hyp_offsets: Ints
     hyp_tracks: Ints
     hyp_log_weights: Floats
-
-    def __post_init__(self) -> None:
-        self._own_arrays()
-        if not isinstance(self.tracks, TrackTable):
-            raise InputError(f"tracks: expected a TrackTable; got {type(self.tracks).__name__}")
-        self._validate_hypotheses(InputError)
-
-    @property
-    def num_hyps(self) -> int:
-        """Number of hypotheses."""
-        return len(self.hyp_log_weights)
-
-    @property
-    def state_dim(self) -> int:
-        """Length of a target's state."""
-        return int(self.tracks.means.shape[1])
+    is_product: ClassVar[Literal[False]] = False
 
     @property
     def is_marginalised(self) -> bool:
         """Whether every label set occurs once."""
         return len(group_by_label_set(self.to_kernel())[1]) == self.num_hyps
 
+    def cardinality(self) -> Floats:
+        """Probabilities of 0, 1, ... targets, up to the size of the largest hypothesis."""
+        return np.asarray(np.bincount(np.diff(self.hyp_offsets), np.exp(self.hyp_log_weights)), np.float64)
+
+    def heaviest(self, number: int) -> tuple[Ints, Floats]:
+        """(number,) tracks of the heaviest hypothesis of so many targets, and how probably each one's label exists."""
+        candidates = np.flatnonzero(np.diff(self.hyp_offsets) == number)
+        best = int(candidates[np.argmax(self.hyp_log_weights[candidates])])
+        chosen = self.hyp_tracks[self.hyp_offsets[best] : self.hyp_offsets[best + 1]]
+        labels = self.tracks.labels
+        same = (labels[:, None, 0] == labels[chosen, 0]) & (labels[:, None, 1] == labels[chosen, 1])
+        return chosen, np.minimum(self.track_existence @ same, 1.0)
+
     def to_kernel(self) -> kt.Glmb:
         """The same arrays as the bundle that kernels take."""
-        return kt.Glmb(self.tracks.to_kernel(), *_ARRAYS(self))
+        return kt.Glmb(self.tracks.to_kernel(), *_HYPOTHESES(self))
+
+    def to_factors(self) -> kt.FactoredGlmb:
+        """The one factor, as kernels take several."""
+        own, tracks_end = self.to_kernel(), np.array([0, self.tracks.num_tracks])
+        return kt.FactoredGlmb(own.tracks, tracks_end, *own[1:], np.array([0, self.num_hyps]))
 
     @classmethod
     def from_kernel(cls, glmb: kt.Glmb) -> GLMB:
@@ -93,16 +135,7 @@ class GLMB(Container):
         hyp_offsets = np.cumsum([0, *(len(hyp) for hyp in hyps)])
         return cls(tracks, hyp_offsets, np.concatenate([np.empty(0, np.int64), *hyps]), hyp_log_weights)
 
-    def validate(self, *, error: type[VedetteError] = NumericalError) -> None:
-        """Raise unless this is a normalised density over tracks that exist, in label order, no label twice in one.
-
-        `InputError` for faults of form; `error` for values that are not finite, not normalised to 1e-9 or covariances
-        that are not symmetric positive definite.
-        """
-        self.tracks.validate(error=error)
-        self._validate_hypotheses(error)
-
-    def _validate_hypotheses(self, error: type[VedetteError]) -> None:
+    def _validate_form(self, error: type[VedetteError]) -> None:
         checks.check_array("hyp_log_weights", self.hyp_log_weights, np.float64, (None,))
         if self.num_hyps == 0:
             raise InputError("hyp_log_weights: expected at least one hypothesis; got none")
@@ -125,3 +158,6 @@ def _check_indices(field: str, indices: Ints, num_tracks: int) -> None:
     if faulty.any():
         place = int(np.flatnonzero(faulty)[0])
         raise InputError(f"{field}[{place}]: expected an index into {num_tracks} tracks; got {indices[place]}")
+
+
+__all__ = ["GLMB", "Hypotheses"]

@@ -1,9 +1,11 @@
-"""Label sets of a GLMB, and parts of densities: some of its hypotheses, some tracks of a table."""
+"""Label sets of a GLMB, and parts of densities: some of their hypotheses, labels or factors, side by side."""
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple, TypeAlias, TypeVar
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Any, NamedTuple, TypeAlias, TypeVar, cast
 
 import numpy as np
 
@@ -11,17 +13,16 @@ from vedette.densities.checks import distinct_labels, offsets_of, take_runs
 from vedette.densities.containers import unchecked
 from vedette.densities.factored import FactoredGLMB
 from vedette.densities.glmb import GLMB
-from vedette.densities.lmb import LMB
-from vedette.densities.statistics import existence_probabilities, track_moments
-from vedette.densities.tracks import TrackTable
-from vedette.kernels.base.types import Bools, Glmb, Ints
+from vedette.densities.labelled import LMB, Labelled
+from vedette.densities.tracks import take_tracks
+from vedette.kernels.base.types import Bools, Ints
 from vedette.kernels.gaussian.mixtures import MixtureCaps
 from vedette.kernels.labelled.conversions import glmb_to_lmb
 from vedette.kernels.labelled.labels import group_by_label_set
 
 Label: TypeAlias = tuple[int, ...]
 LabelSet: TypeAlias = tuple[Label, ...]
-_Labelled = TypeVar("_Labelled", GLMB, LMB, FactoredGLMB)
+_Labelled = TypeVar("_Labelled", bound=Labelled)
 WHOLE = MixtureCaps(-math.inf, 0.0, 2**62)  # which leave mixtures as they are
 
 
@@ -32,33 +33,13 @@ class LabelSets(NamedTuple):
     groups: Ints
 
 
-def label_sets(belief: GLMB) -> LabelSets:
+def label_sets(belief: Labelled) -> LabelSets:
     """The label sets of a GLMB and which of them each hypothesis has."""
-    groups, firsts = group_by_label_set(belief.to_kernel())
-    labels, offsets = belief.tracks.labels.tolist(), belief.hyp_offsets
-    sets = tuple(
-        tuple(tuple(labels[track]) for track in belief.hyp_tracks[offsets[h] : offsets[h + 1]]) for h in firsts.tolist()
-    )
+    hyps, labels = belief.as_hypotheses(), belief.tracks.labels.tolist()
+    groups, firsts = group_by_label_set(hyps)
+    members = [hyps.hyp_tracks[hyps.hyp_offsets[h] : hyps.hyp_offsets[h + 1]] for h in firsts.tolist()]
+    sets = tuple(tuple(tuple(labels[track]) for track in own) for own in members)
     return LabelSets(sets, groups)
-
-
-def places_of(labels: Ints, table: Ints) -> Ints:
-    """(num_labels,) place of each label among the distinct labels of a table, -1 where it is none of them."""
-    place = {tuple(label): i for i, label in enumerate(table.tolist())}
-    return np.array([place.get(tuple(label), -1) for label in labels.tolist()], np.int64)
-
-
-def take_tracks(tracks: TrackTable, places: Ints) -> TrackTable:
-    """The tracks at `places`, in that order."""
-    offsets, components = take_runs(tracks.offsets, places)
-    return unchecked(
-        TrackTable,
-        tracks.labels[places],
-        offsets,
-        tracks.log_weights[components],
-        tracks.means[components],
-        tracks.covs[components],
-    )
 
 
 def take_hypotheses(belief: GLMB, places: Ints) -> GLMB:
@@ -72,25 +53,6 @@ def take_hypotheses(belief: GLMB, places: Ints) -> GLMB:
         np.asarray(renumbered, np.int64),
         belief.hyp_log_weights[places],
     )
-
-
-def single_gaussians(tracks: TrackTable) -> TrackTable:
-    """The tracks with each mixture replaced by one Gaussian of its moments."""
-    num = tracks.num_tracks
-    if len(tracks.log_weights) == num:
-        return tracks
-    return unchecked(TrackTable, tracks.labels, np.arange(num + 1), np.zeros(num), *track_moments(tracks))
-
-
-def sets_of_factors(hypotheses: Glmb, factor_of: Ints) -> tuple[Ints, Ints]:
-    """As `group_by_label_set`, where hypotheses of different factors (num_hyps,) have different sets."""
-    set_of, first = group_by_label_set(hypotheses)
-    if (factor_of == factor_of[:1]).all():
-        return set_of, first
-    numbers = set_of * (factor_of.max() + 1) + factor_of
-    _, first, place = np.unique(numbers, return_index=True, return_inverse=True)
-    order = np.argsort(first)
-    return np.argsort(order)[place], first[order]
 
 
 def take_factors(density: FactoredGLMB, places: Ints) -> FactoredGLMB:
@@ -119,15 +81,37 @@ def in_label_order(density: FactoredGLMB) -> FactoredGLMB:
     return take_factors(density, np.argsort(np.minimum.reduceat(place, density.track_offsets[:-1])))
 
 
+def lmb_of_factors(density: FactoredGLMB, factors: Ints) -> LMB:
+    """Factors of one label each, laid out as by `FactoredGLMB.from_lmb` and in label order, with their tracks."""
+    first = density.factor_offsets[factors]
+    logits = density.hyp_log_weights[first + 1] - density.hyp_log_weights[first]
+    return unchecked(LMB, take_tracks(density.tracks, density.track_offsets[factors]), logits)
+
+
 def laid_out(glmb: GLMB) -> FactoredGLMB:
     """A GLMB as one factor; of one label, as `FactoredGLMB.from_lmb` lays it out, of none, no factor at all.
 
     Nothing is lost: the tracks of one label become one mixture of all their components.
     """
     labels, _ = distinct_labels(glmb.tracks.labels[glmb.hyp_tracks])
-    if len(labels) > 1:
-        return FactoredGLMB.from_glmb(glmb)
-    return FactoredGLMB.from_lmb(LMB.from_kernel(glmb_to_lmb(glmb.to_kernel(), WHOLE)))
+    whole = LMB.from_kernel(glmb_to_lmb(glmb.to_kernel(), WHOLE)) if len(labels) < 2 else glmb
+    return FactoredGLMB.of(whole)
+
+
+def possible(belief: _Labelled) -> _Labelled:
+    """The belief without hypotheses of weight zero; of a product, all tracks stay."""
+    given: Any = belief
+    if belief.is_lmb or (kept := given.hyp_log_weights > -math.inf).all():
+        return belief
+    if not belief.is_product:
+        return cast(_Labelled, take_hypotheses(given, np.flatnonzero(kept)))
+    offsets, entries = take_runs(given.hyp_offsets, np.flatnonzero(kept))
+    return belief.with_fields(
+        hyp_offsets=offsets,
+        hyp_tracks=given.hyp_tracks[entries],
+        hyp_log_weights=given.hyp_log_weights[kept],
+        factor_offsets=offsets_of(kept.astype(np.int64))[given.factor_offsets],
+    )
 
 
 def without_labels(belief: _Labelled, labels: Ints) -> tuple[_Labelled, float]:
@@ -137,15 +121,14 @@ def without_labels(belief: _Labelled, labels: Ints) -> tuple[_Labelled, float]:
     """
     if len(labels) == 0:
         return belief, 0.0
-    known, existence = existence_probabilities(belief)
+    known, existence = belief.label_existence()
     dropped = float(existence[_are_among(known, labels)].sum())
     kept = ~_are_among(belief.tracks.labels, labels)
-    if isinstance(belief, LMB):
-        places = np.flatnonzero(kept)
-        return unchecked(LMB, take_tracks(belief.tracks, places), belief.existence_logit[places]), dropped
-    if isinstance(belief, FactoredGLMB):
-        return _factors_without(belief, kept), dropped
-    return _glmb_without(belief, kept), dropped
+    given: Any = belief
+    if belief.is_lmb:
+        return given.take(np.flatnonzero(kept)), dropped
+    found: Any = (_factors_without if belief.is_product else _glmb_without)(given, kept)
+    return found, dropped
 
 
 def _are_among(labels: Ints, table: Ints) -> Bools:
@@ -166,17 +149,76 @@ def _factors_without(belief: FactoredGLMB, kept: Bools) -> FactoredGLMB:
 
 
 def _glmb_without(belief: GLMB, kept: Bools) -> GLMB:
+    fewer = relinked(belief, np.where(kept, np.arange(len(kept)), -1))
+    return take_hypotheses(fewer, np.argsort(-fewer.hyp_log_weights, kind="stable"))
+
+
+def relinked(belief: GLMB, links: Ints) -> GLMB:
+    """The GLMB with each track replaced by that of its label that `links` (num_tracks,) has, or left out where -1.
+
+    Hypotheses that then hold the same tracks become one, of the sum of their weights, in the order of the first.
+    """
     weights: dict[tuple[int, ...], float] = {}
     for hyp, log_weight in enumerate(belief.hyp_log_weights.tolist()):
-        tracks = belief.hyp_tracks[belief.hyp_offsets[hyp] : belief.hyp_offsets[hyp + 1]]
-        members = tuple(tracks[kept[tracks]].tolist())
-        weights[members] = float(np.logaddexp(weights.get(members, -np.inf), log_weight))
-    order = sorted(weights, key=lambda members: -weights[members])
-    renumbered = np.cumsum(kept) - 1
-    return unchecked(
-        GLMB,
-        take_tracks(belief.tracks, np.flatnonzero(kept)),
-        offsets_of([len(members) for members in order]),
-        np.array([renumbered[track] for members in order for track in members], np.int64),
-        np.array([weights[members] for members in order]),
-    )
+        tracks = links[belief.hyp_tracks[belief.hyp_offsets[hyp] : belief.hyp_offsets[hyp + 1]]]
+        members = tuple(tracks[tracks >= 0].tolist())
+        weights[members] = float(np.logaddexp(weights[members], log_weight)) if members in weights else log_weight
+    used = np.unique(links[links >= 0])
+    entries = np.array([track for members in weights for track in members], np.int64)
+    offsets, log_weights = offsets_of([len(members) for members in weights]), np.array(list(weights.values()))
+    return unchecked(GLMB, take_tracks(belief.tracks, used), offsets, np.searchsorted(used, entries), log_weights)
+
+
+class JoinedFactors(NamedTuple):
+    """The smallest groups of the factors of several densities of which no two share a label, in increasing order of
+    their first labels. Each density is the product of its parts in the groups; factors without labels are in none.
+
+    densities: whose factors they are. groups: for each density, (num_factors,) the group of each factor, or -1.
+    alone: (num_groups,) whether all factors in the group are of its only label, laid out as by
+    `FactoredGLMB.from_lmb`.
+    """
+
+    densities: tuple[FactoredGLMB, ...]
+    groups: tuple[Ints, ...]
+    alone: Bools
+
+    def lmbs_alone(self) -> list[LMB]:
+        """What each density says of the labels that are alone in all their factors."""
+        found = []
+        for density, groups in zip(self.densities, self.groups, strict=True):
+            factors = np.argsort(groups, kind="stable")[np.count_nonzero(groups < 0) :]
+            found.append(lmb_of_factors(density, factors[self.alone[groups[factors]]]))
+        return found
+
+    def parts(self, group: int) -> list[FactoredGLMB]:
+        """What each density has in a group."""
+        return [
+            take_factors(density, np.flatnonzero(groups == group))
+            for density, groups in zip(self.densities, self.groups, strict=True)
+        ]
+
+
+def join_factors(densities: Sequence[FactoredGLMB]) -> JoinedFactors:
+    """The factors of densities of one state dimension, at least one, gathered."""
+    distinct, place = distinct_labels(np.concatenate([density.tracks.labels for density in densities]))
+    firsts = offsets_of([density.tracks.num_tracks for density in densities])
+    places = [place[low:high] for low, high in pairwise(firsts.tolist())]
+    sizes = [np.diff(density.track_offsets) for density in densities]
+    root, before = np.arange(len(distinct)), np.empty(0, np.int64)
+    while not np.array_equal(root, before):
+        before = root.copy()
+        for density, own, counts in zip(densities, places, sizes, strict=True):
+            if len(own):
+                least = np.minimum.reduceat(root[own], density.track_offsets[:-1][counts > 0])
+                np.minimum.at(root, own, np.repeat(least, counts[counts > 0]))
+        root = root[root]  # a shortcut through those that are joined already
+    _, group_of_label = np.unique(root, return_inverse=True)
+    groups = []
+    for density, own, counts in zip(densities, places, sizes, strict=True):
+        found = np.full(density.num_factors, -1, np.int64)
+        found[counts > 0] = group_of_label[own[density.track_offsets[:-1][counts > 0]]]
+        groups.append(found)
+    alone = np.ones(len(np.unique(root)), np.bool_)
+    for density, found in zip(densities, groups, strict=True):
+        alone[found[(found >= 0) & ~density.is_bernoulli]] = False
+    return JoinedFactors(tuple(densities), tuple(groups), alone)

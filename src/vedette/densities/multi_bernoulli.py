@@ -8,8 +8,10 @@ from typing import Any
 import numpy as np
 
 from vedette.densities import checks
-from vedette.densities.containers import Container, kernel_arrays, unchecked
-from vedette.errors import InputError, NumericalError, VedetteError
+from vedette.densities.containers import kernel_arrays, unchecked
+from vedette.densities.labelled import poisson_binomial
+from vedette.densities.unlabelled import Unlabelled
+from vedette.errors import NumericalError, VedetteError
 from vedette.kernels.base import types as kt
 from vedette.kernels.base.types import Floats, Ints
 from vedette.models.arguments import no_gaussians
@@ -19,7 +21,7 @@ _ARRAYS = kernel_arrays("existence_logit", "offsets", "log_weights", "means", "c
 
 
 @dataclass(frozen=True, slots=True)
-class MultiBernoulli(Container):
+class MultiBernoulli(Unlabelled):
     """Independent Bernoullis: each is a target with its probability of existence, or nothing. An LMB without labels.
 
     Attributes:
@@ -41,10 +43,6 @@ class MultiBernoulli(Container):
     means: Floats
     covs: Floats
 
-    def __post_init__(self) -> None:
-        self._own_arrays()
-        self.validate(error=InputError)
-
     @property
     def num_bernoullis(self) -> int:
         """Number of Bernoullis."""
@@ -56,14 +54,13 @@ class MultiBernoulli(Container):
         return expit(self.existence_logit)
 
     @property
-    def state_dim(self) -> int:
-        """Length of a target's state."""
-        return int(self.means.shape[1])
-
-    @property
     def expected_number(self) -> float:
         """Mean number of targets."""
         return float(self.existence.sum())
+
+    def cardinality(self) -> Floats:
+        """Probabilities of 0, 1, ..., num_bernoullis targets."""
+        return poisson_binomial(self.existence_logit)
 
     def to_kernel(self) -> kt.Lmb:
         """The same arrays as the bundle that kernels take, every label (-1, -1)."""
@@ -89,16 +86,9 @@ class MultiBernoulli(Container):
         state_dim). Raises `InputError` for another shape, a probability outside [0, 1], or a covariance that is not
         symmetric positive definite.
         """
-        probabilities = checks.as_floats("existence", existence, (None,))
-        if not np.all((probabilities >= 0.0) & (probabilities <= 1.0)):
-            raise InputError(f"existence: expected probabilities; got {probabilities.tolist()}")
-        num = len(probabilities)
-        checked_means = checks.as_floats("means", means, (num, None))
-        dim = checked_means.shape[1]
-        with np.errstate(divide="ignore"):
-            logit = np.log(probabilities) - np.log1p(-probabilities)
-        checked_covs = checks.as_floats("covs", covs, (num, dim, dim))
-        return cls(logit, np.arange(num + 1), np.zeros(num), checked_means, checked_covs)
+        logit = checks.as_logits("existence", existence, None)
+        num = len(logit)
+        return cls(logit, np.arange(num + 1), np.zeros(num), *checks.as_gaussians(means, covs, num))
 
     def validate(self, *, error: type[VedetteError] = NumericalError) -> None:
         """Raise unless existences are logits and every Bernoulli's mixture is a probability density.
@@ -109,6 +99,4 @@ class MultiBernoulli(Container):
         checks.check_array("existence_logit", self.existence_logit, np.float64, (None,))
         num = self.num_bernoullis
         checks.check_mixtures("", self.offsets, self.log_weights, self.means, self.covs, num, error)
-        faulty = np.isnan(self.existence_logit)
-        if faulty.any():
-            raise error(f"existence_logit[{int(np.flatnonzero(faulty)[0])}]: expected a number; got nan")
+        checks.check_logits("existence_logit", self.existence_logit, error)

@@ -10,13 +10,11 @@ import numpy as np
 
 from vedette.densities import checks
 from vedette.densities.glmb import GLMB
-from vedette.densities.iid_cluster import IidCluster
-from vedette.densities.lmb import LMB
+from vedette.densities.labelled import LMB, Labelled
 from vedette.densities.multi_bernoulli import MultiBernoulli
-from vedette.densities.poisson import Poisson
-from vedette.densities.tracks import TrackTable
+from vedette.densities.unlabelled import IidCluster, Poisson
 from vedette.errors import InputError, NumericalError, VedetteError
-from vedette.kernels.base.types import Floats, Ints
+from vedette.kernels.base.types import Floats, Ints, Lmb, Tracks
 from vedette.models.arguments import generator
 
 _MOST_TARGETS = 1e9
@@ -64,20 +62,21 @@ def sample_glmb(density: GLMB, num_samples: int, *, rng: np.random.Generator) ->
     """Independent samples of a GLMB: a hypothesis, then a state of each of its tracks."""
     _check(num_samples, rng)
     hyps = _choose(density.hyp_log_weights, np.array([0, density.num_hyps]), np.zeros(num_samples, np.int64), rng)
-    sizes = np.diff(density.hyp_offsets)[hyps]
-    offsets = np.concatenate([np.zeros(1, np.int64), np.cumsum(sizes)])
-    within = np.arange(offsets[-1]) - np.repeat(offsets[:-1], sizes)
-    tracks = density.hyp_tracks[np.repeat(density.hyp_offsets[hyps], sizes) + within]
-    return MultiTargetSamples(offsets, density.tracks.labels[tracks], _draw_states(density.tracks, tracks, rng))
+    offsets, entries = checks.take_runs(density.hyp_offsets, hyps)
+    return _drawn(offsets, density.to_kernel().tracks, density.hyp_tracks[entries], rng)
 
 
 def sample_lmb(density: LMB, num_samples: int, *, rng: np.random.Generator) -> MultiTargetSamples:
     """Independent samples of an LMB: each track exists or not, then a state of each that does."""
-    _check(num_samples, rng)
-    exists = rng.random((num_samples, density.tracks.num_tracks)) < density.existence
-    tracks = np.nonzero(exists)[1]
-    offsets = np.concatenate([np.zeros(1, np.int64), np.cumsum(exists.sum(axis=1))])
-    return MultiTargetSamples(offsets, density.tracks.labels[tracks], _draw_states(density.tracks, tracks, rng))
+    return _independent(density.to_kernel(), density.existence, num_samples, rng)
+
+
+def sample_labelled(density: Labelled, num_samples: int, *, rng: np.random.Generator) -> MultiTargetSamples:
+    """Independent samples of an LMB or of a GLMB."""
+    if isinstance(density, LMB):
+        return sample_lmb(density, num_samples, rng=rng)
+    assert isinstance(density, GLMB)
+    return sample_glmb(density, num_samples, rng=rng)
 
 
 def sample_poisson(density: Poisson, num_samples: int, *, rng: np.random.Generator) -> MultiTargetSamples:
@@ -106,33 +105,30 @@ def sample_multi_bernoulli(
     density: MultiBernoulli, num_samples: int, *, rng: np.random.Generator
 ) -> MultiTargetSamples:
     """Independent samples of a multi-Bernoulli: each Bernoulli exists or not, then a state of each that does."""
+    return _independent(density.to_kernel(), density.existence, num_samples, rng)
+
+
+def _independent(density: Lmb, existence: Floats, num_samples: int, rng: np.random.Generator) -> MultiTargetSamples:
+    """Samples of independent targets of these probabilities of existence."""
     _check(num_samples, rng)
-    exists = rng.random((num_samples, density.num_bernoullis)) < density.existence
-    chosen = np.nonzero(exists)[1]
-    offsets = np.concatenate([np.zeros(1, np.int64), np.cumsum(exists.sum(axis=1))])
-    return _unlabelled(offsets, density, density.offsets, chosen, rng)
+    exists = rng.random((num_samples, len(existence))) < existence
+    return _drawn(checks.offsets_of(exists.sum(axis=1)), density.tracks, np.nonzero(exists)[1], rng)
 
 
 def _alike(density: Poisson | IidCluster, numbers: Ints, rng: np.random.Generator) -> MultiTargetSamples:
     """Samples of these numbers of targets, all drawn from the density's one mixture."""
-    offsets = np.concatenate([np.zeros(1, np.int64), np.cumsum(numbers)])
-    runs = np.array([0, len(density.log_weights)])
-    return _unlabelled(offsets, density, runs, np.zeros(int(offsets[-1]), np.int64), rng)
+    offsets, whole = checks.offsets_of(numbers), np.array([0, len(density.log_weights)])
+    mixture = Tracks(np.full((1, 2), -1), whole, density.log_weights, density.means, density.covs)
+    return _drawn(offsets, mixture, np.zeros(int(offsets[-1]), np.int64), rng)
 
 
-def _unlabelled(
-    offsets: Ints,
-    density: Poisson | IidCluster | MultiBernoulli,
-    mixtures: Ints,
-    chosen: Ints,
-    rng: np.random.Generator,
-) -> MultiTargetSamples:
-    """One state of each of the `chosen` mixtures, which are cut out by offsets."""
-    labels = np.full((len(chosen), 2), -1, np.int64)
-    if len(chosen) == 0:
-        return MultiTargetSamples(offsets, labels, np.empty((0, density.state_dim)))
-    components = _choose(density.log_weights, mixtures, chosen, rng)
-    return MultiTargetSamples(offsets, labels, _draw_gaussians(density.means, density.covs, components, rng))
+def _drawn(offsets: Ints, tracks: Tracks, chosen: Ints, rng: np.random.Generator) -> MultiTargetSamples:
+    """Samples of the `chosen` tracks (num_targets,), cut by offsets: one state of each."""
+    states = np.empty((0, tracks.means.shape[1]))
+    if len(chosen):
+        components = _choose(tracks.log_weights, tracks.offsets, chosen, rng)
+        states = _draw_gaussians(tracks.means, tracks.covs, components, rng)
+    return MultiTargetSamples(offsets, tracks.labels[chosen], states)
 
 
 def _check(num_samples: Any, rng: Any) -> None:
@@ -157,14 +153,6 @@ def _choose(log_weights: Floats, offsets: Ints, runs: Ints, rng: np.random.Gener
     return np.asarray(np.searchsorted(edges, points, side="right"), np.int64)
 
 
-def _draw_states(tracks: TrackTable, chosen: Ints, rng: np.random.Generator) -> Floats:
-    """One state of each of the `chosen` tracks."""
-    if len(chosen) == 0:
-        return np.empty((0, tracks.state_dim))
-    components = _choose(tracks.log_weights, tracks.offsets, chosen, rng)
-    return _draw_gaussians(tracks.means, tracks.covs, components, rng)
-
-
 def _draw_gaussians(means: Floats, covs: Floats, components: Ints, rng: np.random.Generator) -> Floats:
     used, which = np.unique(components, return_inverse=True)
     try:
@@ -179,6 +167,7 @@ __all__ = [
     "MultiTargetSamples",
     "sample_glmb",
     "sample_iid_cluster",
+    "sample_labelled",
     "sample_lmb",
     "sample_multi_bernoulli",
     "sample_poisson",

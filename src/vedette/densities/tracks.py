@@ -1,9 +1,11 @@
-"""The track table that labelled densities share: labels and Gaussian mixtures, flat with offsets."""
+"""The track table that labelled densities share: labels and Gaussian mixtures, flat with offsets; parts and moments."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -13,6 +15,8 @@ from vedette.densities.containers import Container, kernel_arrays, unchecked
 from vedette.errors import InputError, NumericalError, VedetteError
 from vedette.kernels.base import types as kt
 from vedette.kernels.base.types import Floats, Ints
+from vedette.kernels.gaussian.mixtures import MixtureCaps
+from vedette.kernels.gaussian.pooling import pooled_tracks
 from vedette.models.arguments import no_gaussians
 
 _ARRAYS = kernel_arrays("labels", "offsets", "log_weights", "means", "covs")
@@ -79,10 +83,7 @@ class TrackTable(Container):
         """
         checked = checks.as_ints("labels", labels, (None, 2))
         num = len(checked)
-        checked_means = checks.as_floats("means", means, (num, None))
-        dim = checked_means.shape[1]
-        checked_covs = checks.as_floats("covs", covs, (num, dim, dim))
-        return cls(checked, np.arange(num + 1), np.zeros(num), checked_means, checked_covs)
+        return cls(checked, np.arange(num + 1), np.zeros(num), *checks.as_gaussians(means, covs, num))
 
     @classmethod
     def from_mixtures(cls, labels: Any, mixtures: Sequence[tuple[Any, Any, Any]]) -> TrackTable:
@@ -121,3 +122,98 @@ def log_weights(field: str, weights: Any) -> Floats:
         raise InputError(f"{field}: expected numbers of at least 0; got {linear.tolist()}")
     with np.errstate(divide="ignore"):
         return np.asarray(np.log(linear))
+
+
+def take_tracks(tracks: TrackTable, places: Ints) -> TrackTable:
+    """The tracks at `places`, in that order."""
+    offsets, components = checks.take_runs(tracks.offsets, places)
+    return unchecked(
+        TrackTable,
+        tracks.labels[places],
+        offsets,
+        tracks.log_weights[components],
+        tracks.means[components],
+        tracks.covs[components],
+    )
+
+
+def places_of(labels: Ints, table: Ints) -> Ints:
+    """(num_labels,) place of each label among the distinct labels of a table, -1 where it is none of them."""
+    place = {tuple(label): i for i, label in enumerate(table.tolist())}
+    return np.array([place.get(tuple(label), -1) for label in labels.tolist()], np.int64)
+
+
+def gaussian_tracks(labels: Ints, means: Floats, covs: Floats) -> TrackTable:
+    """As `TrackTable.from_gaussians`, of arrays of the library's own."""
+    num = len(labels)
+    return unchecked(TrackTable, labels, np.arange(num + 1), np.zeros(num), means, covs)
+
+
+def place_labels(tables: Sequence[Ints]) -> tuple[Ints, Ints]:
+    """(num_labels, 2) the labels of several tables in increasing order, and (num_labels, num_tables) their places.
+
+    A table has no label twice. The place is -1 where it lacks the label.
+    """
+    labels, row = checks.distinct_labels(np.concatenate(tables))
+    places, ends = np.full((len(labels), len(tables)), -1), checks.offsets_of([len(table) for table in tables])
+    for t, (low, high) in enumerate(pairwise(ends.tolist())):
+        places[row[low:high], t] = np.arange(high - low)
+    return labels, places
+
+
+def single_gaussians(tracks: TrackTable) -> TrackTable:
+    """The tracks with each mixture replaced by one Gaussian of its moments."""
+    if len(tracks.log_weights) == tracks.num_tracks:
+        return tracks
+    return gaussian_tracks(tracks.labels, *track_moments(tracks))
+
+
+def reduced_tracks(tracks: kt.Tracks, caps: MixtureCaps) -> kt.Tracks:
+    """The tracks with their mixtures reduced by the caps."""
+    num = len(tracks.labels)
+    if len(tracks.log_weights) == num:
+        return tracks
+    each = np.arange(num + 1)
+    return pooled_tracks(tracks, tracks.labels, each, each[:-1].copy(), np.ones(num), caps)
+
+
+def mixture_moments(log_weights: Floats, means: Floats, covs: Floats) -> tuple[Floats, Floats]:
+    """Mean (state_dim,) and covariance (state_dim, state_dim) of one Gaussian mixture of any total weight.
+
+    Raises `InputError` for a mixture of weight zero.
+    """
+    offsets = np.array([0, len(log_weights)])
+    log_total = checks.run_log_sums(log_weights, offsets)[0] if len(log_weights) else -math.inf
+    if log_total == -math.inf:
+        raise InputError("log_weights: expected a mixture of positive weight; got none")
+    mean, cov = _run_moments(np.exp(log_weights - log_total), means, covs, offsets)
+    return mean[0], cov[0]
+
+
+def track_moments(tracks: TrackTable) -> tuple[Floats, Floats]:
+    """Mean (num_tracks, state_dim) and covariance (num_tracks, state_dim, state_dim) of every track."""
+    if len(tracks.log_weights) == tracks.num_tracks:
+        return tracks.means.copy(), tracks.covs.copy()
+    return _run_moments(np.exp(tracks.log_weights), tracks.means, tracks.covs, tracks.offsets)
+
+
+def _run_moments(weights: Floats, means: Floats, covs: Floats, offsets: Ints) -> tuple[Floats, Floats]:
+    """Moments of consecutive mixtures of linear weights that sum to one, none of them empty."""
+    starts, lengths = offsets[:-1], np.diff(offsets)
+    run_means = np.add.reduceat(weights[:, None] * means, starts)
+    deviations = means - np.repeat(run_means, lengths, axis=0)
+    seconds = covs + deviations[:, :, None] * deviations[:, None, :]
+    return run_means, np.add.reduceat(weights[:, None, None] * seconds, starts)
+
+
+def heaviest_components(log_weights: Floats, offsets: Ints, chosen: Ints) -> Ints:
+    """(len(chosen),) the heaviest component of each chosen mixture, cut by offsets; the first of several."""
+    starts, sizes = offsets[chosen], np.diff(offsets)[chosen]
+    ends = np.cumsum(sizes)
+    if len(chosen) == 0:
+        return starts
+    components = np.repeat(starts - ends + sizes, sizes) + np.arange(ends[-1])
+    taken = log_weights[components]
+    peaks = np.maximum.reduceat(taken, ends - sizes)
+    at_peak = np.flatnonzero(taken == np.repeat(peaks, sizes))
+    return np.asarray(components[at_peak[np.searchsorted(at_peak, ends - sizes)]])

@@ -1,8 +1,7 @@
 """How far apart two beliefs are: Cauchy-Schwarz and Renyi divergences, and the power integrals they are made of."""
 
 from vedette.divergence.closed_form import Density, Support, cauchy_schwarz, log_inner_product
-from vedette.divergence.power import power_integral, power_integrals, renyi
-from vedette.divergence.unit_volume import reference_unit_volume
+from vedette.divergence.power import power_integral, power_integrals, reference_unit_volume, renyi
 
 __all__ = [
     "Density",

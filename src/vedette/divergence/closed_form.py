@@ -7,11 +7,10 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
-from vedette.densities import GLMB, LMB, Labelled, Poisson
-from vedette.densities.conversions import lmb_on_label_sets
-from vedette.densities.factored import LABELLED
-from vedette.densities.label_sets import label_sets
-from vedette.divergence.parts import Part, paired_parts
+from vedette.densities import LMB, FactoredGLMB, Labelled, Poisson, as_lmb
+from vedette.densities.conversions import as_glmb, lmb_on_label_sets
+from vedette.densities.label_sets import in_label_order, join_factors, label_sets, lmb_of_factors
+from vedette.densities.labelled import LABELLED
 from vedette.errors import InputError, NumericalError
 from vedette.kernels.base.types import Glmb, Tracks
 from vedette.kernels.labelled.inner_products import log_glmbs, log_lmbs, log_tracks
@@ -20,6 +19,8 @@ from vedette.models.arguments import positive
 
 Density: TypeAlias = Labelled | Poisson
 Support = Literal["full", "common"]
+
+MAX_PRODUCTS = 100_000
 
 # Of the magnitude of the logs: rounding of sums over a million pairs of hypotheses stays below.
 _ROUNDING = 1e-11
@@ -111,18 +112,55 @@ def log_inner_products(
     return cross, own_a, own_b
 
 
-def _of_parts(a: Part, b: Part, log_unit_volume: float, common: bool, self_terms: bool) -> tuple[float, float, float]:
-    if isinstance(a, GLMB) and isinstance(b, GLMB):
-        return _glmbs(a.to_kernel(), b.to_kernel(), log_unit_volume, common, self_terms)
-    if isinstance(a, LMB) and isinstance(b, LMB):
-        return _lmbs(a, b, log_unit_volume, common)
-    if isinstance(a, LMB) and isinstance(b, GLMB):
+def paired_parts(p: Labelled, q: Labelled) -> list[tuple[Labelled, Labelled]]:
+    """Parts of which p and q are the products, pair by pair of the same labels, no two pairs sharing one.
+
+    The densities themselves where neither is a product. Labels that are alone in both come together in one pair of
+    LMBs. The parts of the other pairs are GLMBs of all products of their factors, or LMBs where each factor is of one
+    label.
+
+    Raises `InputError` for more than `MAX_PRODUCTS` products of factors of one density in one pair.
+    """
+    if not (p.is_product or q.is_product):
+        return [(p, q)]
+    joined = join_factors([FactoredGLMB.of(p), FactoredGLMB.of(q)])
+    pairs: list[tuple[Labelled, Labelled]] = []
+    if joined.alone.any():
+        first, second = joined.lmbs_alone()
+        pairs.append((first, second))
+    for group in np.flatnonzero(~joined.alone).tolist():
+        own_p, own_q = joined.parts(group)
+        pairs.append((_part(own_p), _part(own_q)))
+    return pairs
+
+
+def _part(product: FactoredGLMB) -> Labelled:
+    if product.is_bernoulli.all():
+        return lmb_of_factors(in_label_order(product), np.arange(product.num_factors))
+    if product.num_factors == 1:
+        return product.factor(0)
+    num_products = math.prod(np.diff(product.factor_offsets).tolist())
+    if num_products > MAX_PRODUCTS:
+        raise InputError(
+            f"p, q: expected factors that share labels with at most {MAX_PRODUCTS} products of their hypotheses; got "
+            f"{num_products}"
+        )
+    return as_glmb(product, max_hypotheses=MAX_PRODUCTS)[0]
+
+
+def _of_parts(
+    a: Labelled, b: Labelled, log_unit_volume: float, common: bool, self_terms: bool
+) -> tuple[float, float, float]:
+    if a.is_lmb and b.is_lmb:
+        return _lmbs(as_lmb(a), as_lmb(b), log_unit_volume, common)
+    if a.is_lmb:
         cross, own_b, own_a = _of_parts(b, a, log_unit_volume, common, self_terms)
         return cross, own_a, own_b
-    assert isinstance(a, GLMB)
-    assert isinstance(b, LMB)
-    cross, own_a, own_b = _glmbs(a.to_kernel(), _on_label_sets(b, a), log_unit_volume, common, self_terms)
-    return cross, own_a, own_b if common else _lmbs(b, b, log_unit_volume, False)[0]
+    on_sets = lmb_on_label_sets(as_lmb(b), label_sets(a).sets) if b.is_lmb else b
+    cross, own_a, own_b = _glmbs(a.as_hypotheses(), on_sets.as_hypotheses(), log_unit_volume, common, self_terms)
+    if b.is_lmb and not common:
+        own_b = _lmbs(as_lmb(b), as_lmb(b), log_unit_volume, False)[0]
+    return cross, own_a, own_b
 
 
 def _glmbs(a: Glmb, b: Glmb, log_unit_volume: float, common: bool, self_terms: bool) -> tuple[float, float, float]:
@@ -136,11 +174,6 @@ def _lmbs(a: LMB, b: LMB, log_unit_volume: float, common: bool) -> tuple[float, 
     logits = np.concatenate([a.existence_logit, b.existence_logit])
     cross, own_a, own_b = log_lmbs(tracks, logits, len(a.existence_logit), log_unit_volume, common)
     return float(cross), float(own_a), float(own_b)
-
-
-def _on_label_sets(lmb: LMB, glmb: GLMB) -> Glmb:
-    """The LMB's hypotheses on those label sets of `glmb` that it has; their weights do not sum to one."""
-    return lmb_on_label_sets(lmb, label_sets(glmb).sets).to_kernel()
 
 
 def _intensities(a: Poisson, b: Poisson) -> Tracks:

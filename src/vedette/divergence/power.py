@@ -1,4 +1,4 @@
-"""Power integrals of two labelled densities, and the Renyi divergence that is made of them."""
+"""Power integrals of two labelled densities, the Renyi divergence made of them, and a unit of hyper-volume for both."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from vedette.densities import GLMB, LMB, Labelled, marginalise
+from vedette.densities import GLMB, LMB, Labelled, Poisson, as_lmb, track_moments
 from vedette.densities.cases import LabelledCases
-from vedette.densities.containers import unchecked
-from vedette.densities.conversions import lmb_on_label_sets
-from vedette.densities.label_sets import label_sets, single_gaussians
+from vedette.densities.conversions import collapsed, lmb_on_label_sets
+from vedette.densities.label_sets import label_sets
+from vedette.densities.labelled import LABELLED
 from vedette.densities.products import Share, check_exponents, lay_out_products
 from vedette.divergence.closed_form import (
     Support,
@@ -19,8 +19,8 @@ from vedette.divergence.closed_form import (
     check_densities,
     check_support,
     log_inner_products,
+    paired_parts,
 )
-from vedette.divergence.parts import Part, paired_parts
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats
 from vedette.models.arguments import real, reject
@@ -76,7 +76,9 @@ def power_integrals(
     return found
 
 
-def _of_parts(p: Part, q: Part, pairs: Sequence[tuple[float, float]], unit_volume: float, support: Support) -> Floats:
+def _of_parts(
+    p: Labelled, q: Labelled, pairs: Sequence[tuple[float, float]], unit_volume: float, support: Support
+) -> Floats:
     mixed = not (_is_single(p) and _is_single(q))
     if not mixed:
         return _of_singles(p, q, pairs, unit_volume, support)
@@ -87,7 +89,7 @@ def _of_parts(p: Part, q: Part, pairs: Sequence[tuple[float, float]], unit_volum
                 "mixtures"
             )
     products = log_inner_products(p, q, math.log(unit_volume), support == "common", self_terms=True)
-    masses = dict(zip(_MASSES, _of_singles(_single(p), _single(q), _MASSES, 1.0, support), strict=True))
+    masses = dict(zip(_MASSES, _of_singles(collapsed(p), collapsed(q), _MASSES, 1.0, support), strict=True))
     return np.array([products[_INNER_PRODUCTS[pair]] if pair in _INNER_PRODUCTS else masses[pair] for pair in pairs])
 
 
@@ -115,33 +117,26 @@ def renyi(p: Labelled, q: Labelled, order: float, *, support: Support = "full") 
     return at_least_zero(divergence, max(abs(z), abs(log_p), abs(log_q)), "Renyi")
 
 
-def _is_single(density: Part) -> bool:
-    single = len(density.tracks.log_weights) == density.tracks.num_tracks
-    return single and (isinstance(density, LMB) or density.is_marginalised)
+def _is_single(density: Labelled) -> bool:
+    return len(density.tracks.log_weights) == density.tracks.num_tracks and density.is_marginalised
 
 
-def _single(density: Part) -> Part:
-    """The density with the same weights and one Gaussian for each mixture."""
-    if isinstance(density, GLMB):
-        return marginalise(density, max_components=1)
-    return unchecked(LMB, single_gaussians(density.tracks), density.existence_logit)
-
-
-def _of_singles(p: Part, q: Part, pairs: Sequence[tuple[float, float]], unit_volume: float, support: Support) -> Floats:
-    if isinstance(p, GLMB) == isinstance(q, GLMB):
+def _of_singles(
+    p: Labelled, q: Labelled, pairs: Sequence[tuple[float, float]], unit_volume: float, support: Support
+) -> Floats:
+    if p.is_lmb == q.is_lmb:
         return _of_one_kind(LabelledCases.of(p), LabelledCases.of(q), pairs, unit_volume, support)
-    if isinstance(p, GLMB):
+    if q.is_lmb:
         swapped = [(b, a) for a, b in pairs]
         return _of_singles(q, p, swapped, unit_volume, support)
-    assert isinstance(p, LMB)
-    assert isinstance(q, GLMB)
     found = np.empty(len(pairs))
-    on_sets = lmb_on_label_sets(p, label_sets(q).sets)
+    lmb = as_lmb(p)
+    on_sets = lmb_on_label_sets(lmb, label_sets(q).sets)
     for i, (a, b) in enumerate(pairs):
         if support == "full" and 0.0 in (a, b):
             own = p if b == 0.0 else q
             found[i] = _of_singles(own, own, ((a, b),), unit_volume, support)[0]
-        elif support == "full" and b < 0.0 and _has_more_sets(p, on_sets):
+        elif support == "full" and b < 0.0 and _has_more_sets(lmb, on_sets):
             found[i] = math.inf
         else:
             views = LabelledCases.of(on_sets), LabelledCases.of(q)
@@ -160,7 +155,7 @@ def _of_one_kind(
 ) -> Floats:
     if support == "full":
         p, q = _extended(p, q), _extended(q, p)
-    elif p.kind is GLMB and not set(p.sets) & set(q.sets):
+    elif not p.is_lmb and not set(p.sets) & set(q.sets):
         raise InputError("support: 'common' is for densities that share a label set; got two that share none")
     whole = Share.whole(q, np.ones_like(q.possible))
     laid = lay_out_products([whole], p)
@@ -174,7 +169,7 @@ def _extended(own: LabelledCases, other: LabelledCases) -> LabelledCases:
     members = np.array([m for i in lacking for m in range(starts[i], starts[i + 1])], np.int64)
     means = np.concatenate([own.means, other.means[:, members]], axis=1)
     covs = np.concatenate([own.covs, other.covs[:, members]], axis=1)
-    if own.kind is LMB:
+    if own.is_lmb:
         labels = [labels[0] for labels in (*own.sets, *(other.sets[i] for i in lacking)) if labels]
         logits = np.full((1, len(labels)), -math.inf)
         logits[:, : len(own.factors)] = own.existence_logits
@@ -184,4 +179,28 @@ def _extended(own: LabelledCases, other: LabelledCases) -> LabelledCases:
     return LabelledCases.of_glmbs((*own.sets, *(other.sets[i] for i in lacking)), log_weights, means, covs)
 
 
-__all__ = ["power_integral", "power_integrals", "renyi"]
+def reference_unit_volume(density: Labelled | Poisson) -> float:
+    """(4 pi)^(d / 2) sqrt(det P_ref): the K under which K <p, p> is 1 for a Gaussian p of covariance P_ref.
+
+    P_ref is the arithmetic mean of the track covariances (of a mixture's moments), each weighted by the probability
+    of its track: GLMB, the weights of the hypotheses that hold it; LMB, its existence. Poisson: of the components'
+    covariances, weighted by their expected numbers. With K = 1 in SI units K <p, p> is 1e-6 to 1e-8 for a 4-D state,
+    and a divergence is then about whether targets exist more than about where they are.
+
+    Raises `InputError` for a density that is not valid or expects no target.
+    """
+    if not isinstance(density, Labelled | Poisson):
+        raise InputError(f"density: expected {LABELLED} or a Poisson; got {type(density).__name__}")
+    density.validate(error=InputError)
+    if isinstance(density, Poisson):
+        weights, covs = np.exp(density.log_weights), density.covs
+    else:
+        weights, covs = density.track_existence, track_moments(density.tracks)[1]
+    total = float(weights.sum())
+    if not total > 0.0:
+        raise InputError("density: expected one that expects a target; got an expected number of 0")
+    mean_cov = np.einsum("k,kij->ij", weights / total, covs)
+    return float(math.exp(0.5 * (density.state_dim * math.log(4.0 * math.pi) + np.linalg.slogdet(mean_cov)[1])))
+
+
+__all__ = ["power_integral", "power_integrals", "reference_unit_volume", "renyi"]

@@ -10,6 +10,7 @@ import numpy as np
 
 from vedette.control import JointPlanner
 from vedette.densities import GLMB, LMB, FactoredGLMB, Labelled
+from vedette.fusion import shares_prediction
 from vedette.processes import as_children, end_with_parent
 from vedette.scenarios import Scenario
 from vedette.scenarios.build import build_experiment, build_planner
@@ -56,8 +57,7 @@ def _compile_planning(scenario: Scenario) -> None:
     assert isinstance(planner, JointPlanner)
     num_sites, num_others = experiment.tracker.targets.birth.num_sites, experiment.num_sensors - 1
     beliefs = (_belief(experiment, num_sites), *(_belief(experiment, max(num_sites - 1, 1)),) * num_others)
-    shared = getattr(planner.fusion, "shares_prediction", False)
-    fused = beliefs[0] if shared else planner.fusion.fuse(beliefs)[0]
+    fused = beliefs[0] if shares_prediction(planner.fusion) else planner.fusion.fuse(beliefs)[0]
     experiment.estimate(fused, 1)
     quick = replace(planner, settings=replace(planner.settings, **_QUICK))
     state = State(beliefs, fused, undetected=experiment.tracker.initial().undetected)
@@ -70,8 +70,6 @@ def _belief(experiment: Experiment, num_targets: int) -> Labelled:
     sites = slice(num_targets)
     belief = LMB.from_bernoullis(labels, birth.existence[sites], birth.means[sites], birth.covs[sites])
     initial = experiment.tracker.initial().fused
-    if isinstance(initial, LMB):
-        return belief
-    if isinstance(initial, FactoredGLMB):
-        return FactoredGLMB.from_lmb(belief)
+    if initial.is_lmb or initial.is_product:
+        return belief if initial.is_lmb else FactoredGLMB.of(belief)
     return GLMB.from_hypotheses(belief.tracks, [list(range(num_targets))], [1.0])

@@ -4,16 +4,13 @@ from typing import TypeAlias
 
 from vedette.densities import IidCluster, Labelled, MultiBernoulli, Poisson
 from vedette.filters.assignment import Assignment, BeliefPropagation, Gibbs, Marginals, Ranked
-from vedette.filters.base import Filter, TwoStepFilter, labels_targets, shared_targets
-from vedette.filters.cbmember import CbMemberFilter
-from vedette.filters.cphd import CphdFilter
 from vedette.filters.factored import FactoredGlmbFilter, SequentialFactoredFilter
 from vedette.filters.glmb import DeltaGlmbFilter, MultiSensorGlmbFilter
-from vedette.filters.info import FilterInfo
 from vedette.filters.limits import Limits
 from vedette.filters.lmb import LmbFilter, SequentialLmbFilter
 from vedette.filters.multi_sensor_lmb import MultiSensorLmbFilter
-from vedette.filters.phd import PhdFilter
+from vedette.filters.protocols import Filter, FilterInfo, TwoStepFilter, labels_targets, shared_targets
+from vedette.filters.unlabelled import CbMemberFilter, CphdFilter, PhdFilter
 
 Belief: TypeAlias = Labelled | Poisson | IidCluster | MultiBernoulli
 

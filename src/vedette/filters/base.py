@@ -1,23 +1,31 @@
-"""What every filter is, and what the filters of one sensor share: models, checks, what they hand to their kernels."""
+"""What the filters of one sensor share: models, checks, what they hand to their kernels."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, Generic, NamedTuple, Protocol, TypeAlias, TypeVar, runtime_checkable
+from functools import cache
+from typing import Any, ClassVar, Generic, NamedTuple, TypeAlias, TypeVar
 
 import numpy as np
 
-from vedette.densities import GLMB, LMB, FactoredGLMB, Labelled
+from vedette.densities import LMB, Labelled
 from vedette.errors import InputError
-from vedette.filters.blind import NO_POSE, NO_SCAN
-from vedette.filters.info import FilterInfo
-from vedette.filters.inputs import births_for, check_belief, check_scan, model_errors
+from vedette.filters.inputs import births_for, blame_model, check_belief, check_scan, nobody
 from vedette.filters.limits import Limits
+from vedette.filters.protocols import FilterInfo
 from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.types import Floats, Motion, ScanInput, Sensor
-from vedette.models import SensorModel, TargetModel, kernel_motion
+from vedette.models import (
+    SensorModel,
+    TargetModel,
+    constant_detection,
+    constant_noise,
+    kernel_motion,
+    measurement_space_clutter,
+    position,
+)
 from vedette.models.arguments import generator, pose_vector, positive
 
 BeliefT = TypeVar("BeliefT", bound=Labelled)
@@ -39,78 +47,19 @@ class SensorStep(NamedTuple):
     rng: np.random.Generator | None = None
 
 
-@runtime_checkable
-class Filter(Protocol):
-    """How one sensor's belief meets time and a scan; one of your own is as good as those that are here.
-
-    What it believes may be anything that the fusion and the estimator after it take. A filter labels its targets if
-    that is a `GLMB`, an `LMB` or a `FactoredGLMB`; decisions need one that does.
-    """
-
-    @property
-    def targets(self) -> TargetModel:
-        """The targets, the same object for all sensors."""
-        ...
-
-    @property
-    def sensor(self) -> SensorModel:
-        """What the sensor sees."""
-        ...
-
-    def initial(self) -> Any:
-        """The belief before the first scan."""
-        ...
-
-    def step(
-        self, belief: Any, scan: Any, pose: Any, dt: float, step: int, *, rng: np.random.Generator
-    ) -> tuple[Any, FilterInfo]:
-        """Predict over `dt` seconds and update with a scan; see `DeltaGlmbFilter.step`."""
-        ...
+@cache
+def blind_sensor() -> SensorModel:
+    """One that never detects and has no clutter: with it a step is a prediction; any position will do for it."""
+    return SensorModel(
+        position(),
+        constant_noise([1.0, 1.0]),
+        constant_detection(0.0),
+        measurement_space_clutter(0.0, [0.0, 0.0], [1.0, 1.0]),
+    )
 
 
-@runtime_checkable
-class TwoStepFilter(Filter, Protocol):
-    """A filter whose prediction and update can also be had apart: for several scans at one time, or none.
-
-    Needed of a filter of your own where a sensor may miss a scan, where sensors share their prediction, and where
-    targets are born of measurements: `births` then stand in for the sites of the targets' model.
-    """
-
-    def step(
-        self,
-        belief: Any,
-        scan: Any,
-        pose: Any,
-        dt: float,
-        step: int,
-        *,
-        rng: np.random.Generator,
-        births: LMB | None = None,
-    ) -> tuple[Any, FilterInfo]:
-        """Predict over `dt` seconds and update with a scan; see `DeltaGlmbFilter.step`."""
-        ...
-
-    def predict(self, belief: Any, dt: float, step: int, *, births: LMB | None = None) -> tuple[Any, FilterInfo]:
-        """The belief `dt` seconds later, with those who may have been born by then; see `DeltaGlmbFilter.predict`."""
-        ...
-
-    def update(self, belief: Any, scan: Any, pose: Any, *, rng: np.random.Generator) -> tuple[Any, FilterInfo]:
-        """The belief after a scan of its own time; see `DeltaGlmbFilter.update`."""
-        ...
-
-
-def labels_targets(tracker: Filter) -> bool:
-    """Whether the filter's belief is a `GLMB`, an `LMB` or a `FactoredGLMB`."""
-    return isinstance(tracker.initial(), Labelled)
-
-
-def shared_targets(filters: Sequence[Filter]) -> TargetModel:
-    """The one model of the targets that all these filters hold; `InputError` if they do not."""
-    targets = filters[0].targets
-    for i, other in enumerate(filters):
-        if other.targets != targets:
-            raise InputError(f"filters[{i}].targets: expected the target model of filters[0]; got another")
-    return targets
+NO_SCAN = np.empty((0, 2))
+NO_POSE = np.zeros(3)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -144,38 +93,29 @@ class SingleSensorFilter:
         prior: whose labels those of the births must not repeat; None where there are none. births: instead of those of
         the targets' model.
         """
-        targets = self.targets
-        period = positive("dt", dt)
-        birth = births_for(targets.birth, period, step, prior, births).to_kernel()
+        targets, sensor, period = self.targets, self.sensor, positive("dt", dt)
+        birth = births_for(targets.birth, period, step, prior, births)
+        given = ScanInput(birth, scan, pose_vector("pose", pose), period)
         motion = kernel_motion(targets.motion, targets.survival)
-        return (ScanInput(birth, scan, pose_vector("pose", pose), period), motion, *self._own())
+        return given, motion, sensor.to_kernel(), self.limits.truncation(sensor.meas_dim)
 
     def _update_inputs(self, scan: Floats, pose: Any) -> tuple[ScanInput, None, Sensor, Truncation]:
         """As `_inputs`, of a scan of the prior's own time."""
-        nobody = LMB.empty(self.targets.state_dim).to_kernel()
-        return (ScanInput(nobody, scan, pose_vector("pose", pose), 0.0), None, *self._own())
-
-    def _own(self) -> tuple[Sensor, Truncation]:
-        return self.sensor.to_kernel(), self.limits.truncation(self.sensor.meas_dim)
-
-    def _check_scan(self, scan: Any, rng: Any) -> tuple[Floats, int]:
-        generator(rng)
-        return check_scan(scan, self.sensor)
+        given = ScanInput(nobody(self.targets.state_dim), scan, pose_vector("pose", pose), 0.0)
+        return given, None, self.sensor.to_kernel(), self.limits.truncation(self.sensor.meas_dim)
 
 
 class OfKind(ABC, Generic[BeliefT]):
     """What filters of one kind of labelled belief have in common, whatever the number of their sensors."""
 
     __slots__ = ()
-    kind: ClassVar[type[GLMB] | type[LMB] | type[FactoredGLMB]]  # of the belief
+    kind: ClassVar[type[Any]]  # of the belief: a `GLMB`, an `LMB` or a `FactoredGLMB`
     targets: TargetModel
 
     def initial(self) -> BeliefT:
         """The belief before the first scan: no target."""
-        return self.kind.empty(self.targets.state_dim)  # type: ignore[return-value]
-
-    def _prior(self, belief: object) -> BeliefT:
-        return check_belief(belief, self.kind, self.targets.state_dim)  # type: ignore[type-var,return-value]
+        empty: BeliefT = self.kind.empty(self.targets.state_dim)
+        return empty
 
     @abstractmethod
     def _check(self, posterior: Any, report: Any, place: str) -> float:
@@ -227,8 +167,9 @@ class LabelledFilter(SingleSensorFilter, OfKind[BeliefT]):
             ModelError: a model function raised or gave a value that is none of its kind.
             NumericalError: no hypothesis has positive weight.
         """
-        measurements, num_duplicates = self._check_scan(scan, rng)
-        prior = self._prior(belief)
+        generator(rng)
+        measurements, num_duplicates = check_scan(scan, self.sensor)
+        prior = check_belief(belief, self.kind, self.targets.state_dim)
         inputs = self._inputs(measurements, pose, dt, step, prior, births)
         return self._taken(prior, inputs, rng, num_duplicates, f"step {step}: ")
 
@@ -239,14 +180,16 @@ class LabelledFilter(SingleSensorFilter, OfKind[BeliefT]):
 
         What is cut here is cut as it weighs before the scan is seen, which in `step` is not so.
         """
-        prior, blind = self._prior(belief), self._blind()
+        prior, blind = check_belief(belief, self.kind, self.targets.state_dim), self._blind()
         inputs = blind._inputs(NO_SCAN, NO_POSE, dt, step, prior, births)
         return blind._taken(prior, inputs, None, 0, f"step {step}: ")
 
     def update(self, belief: Labelled, scan: Any, pose: Any, *, rng: np.random.Generator) -> tuple[BeliefT, FilterInfo]:
         """The belief after a scan of its own time; nobody moves, dies or is born. Arguments and errors as of `step`."""
-        measurements, num_duplicates = self._check_scan(scan, rng)
-        prior, inputs = self._prior(belief), self._update_inputs(measurements, pose)
+        generator(rng)
+        measurements, num_duplicates = check_scan(scan, self.sensor)
+        prior = check_belief(belief, self.kind, self.targets.state_dim)
+        inputs = self._update_inputs(measurements, pose)
         return self._taken(prior, inputs, rng, num_duplicates, "")
 
     def _taken(
@@ -257,8 +200,11 @@ class LabelledFilter(SingleSensorFilter, OfKind[BeliefT]):
         num_duplicates: int,
         place: str,
     ) -> tuple[BeliefT, FilterInfo]:
-        with model_errors():
+        try:
             posterior, report = self._stepped(prior.to_kernel(), SensorStep(inputs, self.limits, rng=rng))
+        except Exception as error:
+            blame_model(error)
+            raise
         log_likelihood = self._check(posterior, report, place) + report.log_clutter - self.sensor.clutter.rate
         return self._concluded(posterior, [report], log_likelihood=log_likelihood, num_duplicates=num_duplicates)
 

@@ -13,12 +13,10 @@ from vedette.densities import FactoredGLMB
 from vedette.densities.checks import offsets_of
 from vedette.densities.label_sets import take_factors
 from vedette.errors import InputError, NumericalError
-from vedette.filters.base import LabelledFilter, OfKind, SensorStep
-from vedette.filters.blind import blind_sensor
-from vedette.filters.info import FilterInfo
+from vedette.filters.base import LabelledFilter, OfKind, SensorStep, blind_sensor
 from vedette.filters.limits import Limits
 from vedette.filters.multi_sensor import InTurn, MultiSensorFilter
-from vedette.filters.posteriors import factored_posterior
+from vedette.filters.protocols import FilterInfo
 from vedette.kernels.base.types import Bools, FactoredGlmb
 from vedette.kernels.steps.factored import FactoredReport, Factoring, step_factored
 from vedette.kernels.steps.in_view import in_view
@@ -56,8 +54,20 @@ class _OfFactors(OfKind[FactoredGLMB]):
     def _concluded(
         self, posterior: FactoredGlmb, reports: Sequence[FactoredReport], *, log_likelihood: float, num_duplicates: int
     ) -> tuple[FactoredGLMB, FilterInfo]:
-        return factored_posterior(
-            posterior, reports, self.limits, log_likelihood=log_likelihood, num_duplicates=num_duplicates
+        found, dropped, is_full = self.limits.without_excess(FactoredGLMB.from_kernel(posterior))
+        return found, FilterInfo(
+            log_likelihood=log_likelihood,
+            num_hypotheses=found.num_hyps,
+            num_tracks=found.tracks.num_tracks,
+            discarded_weight_bound=max(0.0, -math.expm1(sum(report.log_kept for report in reports))),
+            dropped_existence=sum(float(report.dropped_existence) for report in reports) + dropped,
+            num_clutter_raised=sum(int(report.num_raised) for report in reports),
+            num_duplicates=num_duplicates,
+            num_inexact_clusters=0,
+            search_cut=any(bool(report.cut) for report in reports),
+            cap_met=is_full or any(bool(report.full) for report in reports),
+            factoring_error=min(2.0, sum(float(report.split_error + 2.0 * report.taken_twice) for report in reports)),
+            reduction_error=min(2.0, sum(float(report.reduction_error) for report in reports)),
         )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import ClassVar
@@ -9,13 +10,12 @@ from typing import ClassVar
 from vedette.densities import GLMB
 from vedette.errors import InputError, NumericalError
 from vedette.filters.assignment import Gibbs, OfChoices, Ranked
-from vedette.filters.base import LabelledFilter, OfKind, SensorStep
-from vedette.filters.blind import blind_sensor
-from vedette.filters.info import FilterInfo
+from vedette.filters.base import LabelledFilter, OfKind, SensorStep, blind_sensor
 from vedette.filters.limits import Limits
 from vedette.filters.multi_sensor import InTurn
-from vedette.filters.posteriors import glmb_posterior
+from vedette.filters.protocols import FilterInfo
 from vedette.kernels.base.types import Glmb
+from vedette.kernels.labelled.conversions import marginalise
 from vedette.kernels.steps.glmb import StepReport, step_gibbs, step_ranked
 from vedette.models.arguments import flag
 
@@ -39,13 +39,21 @@ class _OfGlmb(OfKind[GLMB]):
     def _concluded(
         self, posterior: Glmb, reports: Sequence[StepReport], *, log_likelihood: float, num_duplicates: int
     ) -> tuple[GLMB, FilterInfo]:
-        return glmb_posterior(
-            posterior,
-            reports,
-            self.limits,
+        if self.marginalised:
+            posterior = marginalise(posterior, self.limits.track_caps())
+        kept, spread = self.limits.without_spread(GLMB.from_kernel(posterior))
+        _, log_kept, _, num_raised, cut, full = zip(*reports, strict=True)
+        return kept, FilterInfo(
             log_likelihood=log_likelihood,
+            num_hypotheses=len(kept.hyp_log_weights),
+            num_tracks=len(kept.tracks.labels),
+            discarded_weight_bound=max(0.0, -math.expm1(sum(log_kept))),
+            dropped_existence=spread,
+            num_clutter_raised=sum(num_raised),
             num_duplicates=num_duplicates,
-            marginalised=self.marginalised,
+            num_inexact_clusters=0,
+            search_cut=any(cut),
+            cap_met=any(full),
         )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager
-from functools import lru_cache
+from functools import cache, lru_cache
 from pathlib import Path
 from traceback import walk_tb
 from typing import Any, TypeVar
@@ -15,7 +15,7 @@ import numpy as np
 from vedette.densities import GLMB, LMB, FactoredGLMB, IidCluster, Labelled, MultiBernoulli, Poisson, TrackTable
 from vedette.densities.containers import unchecked
 from vedette.errors import InputError, ModelError, VedetteError
-from vedette.kernels.base.types import Bools, Floats
+from vedette.kernels.base.types import Bools, Floats, Lmb
 from vedette.models import BirthModel, SensorModel
 from vedette.models.arguments import as_array, reject, step_number
 from vedette.models.measurement import MeasurementModel, wrap_angular
@@ -41,7 +41,9 @@ def check_scan(scan: Any, sensor: SensorModel) -> tuple[Floats, int]:
     expected = f"an array of shape (num_measurements, {meas_dim}), empty for a scan without measurements"
     if scan is None:
         raise InputError(f"scan: expected {expected}; got None")
-    given = as_array("scan", scan, "fiu", f"numbers in {expected}")
+    given = scan
+    if type(scan) is not np.ndarray or scan.dtype != np.float64:
+        given = as_array("scan", scan, "fiu", f"numbers in {expected}")
     if given.size == 0 and given.ndim <= 2:
         return np.empty((0, meas_dim)), 0
     if given.ndim != 2 or given.shape[1] != meas_dim:
@@ -52,7 +54,7 @@ def check_scan(scan: Any, sensor: SensorModel) -> tuple[Floats, int]:
         raise InputError(f"scan: expected finite numbers; got {array[bad[0]].tolist()} in row {bad[0]}")
     if (array < measurement.least).any():
         _tell_negative(array, measurement, sensor.noise.least_stds)
-    if measurement.angular.any():
+    if np.abs(array[:, measurement.angular]).max(initial=0.0) > 3.14:  # few scans
         array = _in_one_turn(array, measurement.angular)
     column = np.sort(array[:, 0])
     if (column[1:] != column[:-1]).all():  # most scans
@@ -73,8 +75,6 @@ def _tell_negative(scan: Floats, measurement: MeasurementModel, stds: Floats | N
 
 def _in_one_turn(scan: Floats, angular: Bools) -> Floats:
     sizes = np.abs(scan[:, angular])
-    if sizes.max() <= 3.14:  # most scans
-        return scan
     if sizes.max() > 2.0 * math.pi:
         row = int(np.argmax(sizes.max(axis=1)))
         raise InputError(
@@ -95,24 +95,31 @@ def check_belief(belief: object, kind: type[_Density], state_dim: int, name: str
 
 def births_for(
     birth: BirthModel, dt: float, step: Any, belief: Labelled | None = None, births: LMB | None = None
-) -> LMB:
-    """Who may be born within the `dt` seconds of a step: `births`, or the sites of the model where that is None.
+) -> Lmb:
+    """Who may be born within the `dt` seconds of a step, as kernels take it: `births`; at the model's sites where None.
 
     Raises:
         InputError: a step below 1; births of another kind or dimension; a belief with labels of that step or later
             ones, which those of the births could repeat.
     """
     number = step_number(step)
-    if births is None:
+    if births is not None:
+        born = check_belief(births, LMB, birth.state_dim, "births")
+    elif birth.is_active(number):
         born = births_within(births_at(birth, number), birth.period, dt)
     else:
-        born = check_belief(births, LMB, birth.state_dim, "births")
-    if belief is None or born.tracks.num_tracks == 0:
-        return born
-    newest = belief.tracks.labels[:, 0].max(initial=np.iinfo(np.int64).min)
-    if newest >= born.tracks.labels[:, 0].min():
-        raise reject("step", f"a step after those of the labels in the belief, of which the last is {newest}", step)
-    return born
+        return nobody(birth.state_dim)
+    if belief is not None and len(born.tracks.labels):
+        newest = belief.tracks.labels[:, 0].max(initial=np.iinfo(np.int64).min)
+        if newest >= born.tracks.labels[:, 0].min():
+            raise reject("step", f"a step after those of the labels in the belief, of which the last is {newest}", step)
+    return born.to_kernel()
+
+
+@cache
+def nobody(state_dim: int) -> Lmb:
+    """No births, as kernels take them."""
+    return LMB.empty(state_dim).to_kernel()
 
 
 def births_at(birth: BirthModel, step: int) -> LMB:
@@ -151,17 +158,22 @@ def _births_of(birth: BirthModel) -> LMB:
 
 @contextmanager
 def model_errors() -> Iterator[None]:
-    """Turn what a model function raised inside a kernel into a `ModelError` that says so.
-
-    Numba leaves the place in the traceback. What a kernel raises itself (`MemoryError`), or Numba, goes on as it is.
-    """
+    """As `blame_model`, of what is raised inside."""
     try:
         yield
-    except VedetteError:
-        raise
     except Exception as error:
-        places = [Path(frame.f_code.co_filename) for frame, _ in walk_tb(error.__traceback__)]
-        own = places[-1].is_relative_to(_PACKAGE) and not places[-1].is_relative_to(_PACKAGE / "models")
-        if own or any("numba" in place.parts for place in places):
-            raise
+        blame_model(error)
+        raise
+
+
+def blame_model(error: Exception) -> None:
+    """Raise a `ModelError` from what a model function raised inside a kernel.
+
+    Numba leaves the place in the traceback. What a kernel raises itself (`MemoryError`), or Numba, is let be.
+    """
+    if isinstance(error, VedetteError):
+        return
+    places = [Path(frame.f_code.co_filename) for frame, _ in walk_tb(error.__traceback__)]
+    own = places[-1].is_relative_to(_PACKAGE) and not places[-1].is_relative_to(_PACKAGE / "models")
+    if not own and not any("numba" in place.parts for place in places):
         raise ModelError(f"a model function raised {type(error).__name__}: {error}") from error

@@ -12,12 +12,10 @@ import numpy as np
 from vedette.densities import LMB
 from vedette.errors import NumericalError
 from vedette.filters.assignment import OfMarginals, Ranked, check_marginals
-from vedette.filters.base import Filter, LabelledFilter, OfKind, SensorStep
-from vedette.filters.blind import blind_sensor
-from vedette.filters.info import FilterInfo
+from vedette.filters.base import LabelledFilter, OfKind, SensorStep, blind_sensor
 from vedette.filters.limits import Limits
 from vedette.filters.multi_sensor import InTurn, MultiSensorFilter
-from vedette.filters.posteriors import lmb_posterior
+from vedette.filters.protocols import Filter, FilterInfo
 from vedette.kernels.association.marginals import Association
 from vedette.kernels.base.types import Bools, Lmb
 from vedette.kernels.steps.in_view import in_view, marked, put_back
@@ -41,8 +39,20 @@ class OfLmb(OfKind[LMB]):
     def _concluded(
         self, posterior: Lmb, reports: Sequence[LmbReport], *, log_likelihood: float, num_duplicates: int
     ) -> tuple[LMB, FilterInfo]:
-        return lmb_posterior(
-            posterior, reports, self.limits, log_likelihood=log_likelihood, num_duplicates=num_duplicates
+        kept, spread = self.limits.without_spread(LMB.from_kernel(posterior))
+        sums, _, num_raised, dropped, cut = zip(*reports, strict=True)
+        _, num_ranked, log_kept = zip(*sums, strict=True)
+        return kept, FilterInfo(
+            log_likelihood=log_likelihood,
+            num_hypotheses=1,
+            num_tracks=len(kept.tracks.labels),
+            discarded_weight_bound=max(-math.expm1(sum(log_kept)), 0.0),  # NaN stays
+            dropped_existence=sum(dropped) + spread,
+            num_clutter_raised=sum(num_raised),
+            num_duplicates=num_duplicates,
+            num_inexact_clusters=sum(num_ranked),
+            search_cut=any(cut),
+            cap_met=len(posterior.existence_logit) >= self.limits.max_labels,
         )
 
 

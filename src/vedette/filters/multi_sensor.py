@@ -11,12 +11,11 @@ import numpy as np
 
 from vedette.densities import LMB, Labelled
 from vedette.errors import InputError
-from vedette.filters.base import BeliefT, OfKind, SensorStep
-from vedette.filters.blind import NO_POSE, NO_SCAN, blind_sensor
-from vedette.filters.info import FilterInfo
-from vedette.filters.inputs import births_for, check_scan, model_errors
+from vedette.filters.base import NO_POSE, NO_SCAN, BeliefT, OfKind, SensorStep, blind_sensor
+from vedette.filters.inputs import births_for, check_belief, check_scan, model_errors, nobody
 from vedette.filters.limits import Limits
-from vedette.kernels.base.types import Bools, Floats, ScanInput
+from vedette.filters.protocols import FilterInfo
+from vedette.kernels.base.types import Bools, Floats, Lmb, ScanInput
 from vedette.models import SensorModel, TargetModel, kernel_motion
 from vedette.models.arguments import generator, one_a_sensor, pose_vector, positive, reject
 
@@ -30,15 +29,15 @@ class SensorScans(NamedTuple):
     poses: list[Floats]
     num_duplicates: int  # measurements that repeat another
 
-    def inputs(self, born: LMB, dt: float) -> list[ScanInput]:
+    def inputs(self, born: Lmb, dt: float) -> list[ScanInput]:
         """As kernels take them: each with the births and the period."""
-        return [ScanInput(born.to_kernel(), *own, dt) for own in zip(self.scans, self.poses, strict=True)]
+        return [ScanInput(born, *own, dt) for own in zip(self.scans, self.poses, strict=True)]
 
-    def inputs_in_turn(self, born: LMB, dt: float) -> list[ScanInput]:
+    def inputs_in_turn(self, born: Lmb, dt: float) -> list[ScanInput]:
         """As `inputs`, with births and a period for the first alone."""
-        nobody = LMB.empty(born.state_dim).to_kernel()
+        none = nobody(born.tracks.means.shape[1])
         first, *others = self.inputs(born, dt)
-        return [first, *(own._replace(birth=nobody, dt=0.0) for own in others)]
+        return [first, *(own._replace(birth=none, dt=0.0) for own in others)]
 
     def log_likelihood(self, log_total: float, log_clutters: Sequence[float]) -> float:
         """From joint weights relative to clutter to a density of the scans."""
@@ -109,14 +108,14 @@ class MultiSensorFilter(OfKind[BeliefT]):
             NumericalError: no association has positive weight.
         """
         taken = self._checked_scans(scans, poses, rng)
-        prior = self._prior(belief)
+        prior = check_belief(belief, self.kind, self.targets.state_dim)
         period = positive("dt", dt)
         born = births_for(self.targets.birth, period, step, prior, births)
         return self._updated(prior, born, taken, period, f"step {step}")
 
     @abstractmethod
     def _updated(
-        self, prior: BeliefT, born: LMB, taken: SensorScans, dt: float, place: str
+        self, prior: BeliefT, born: Lmb, taken: SensorScans, dt: float, place: str
     ) -> tuple[BeliefT, FilterInfo]:
         """The prediction of the prior, with those who may be born, after all scans. place: of errors."""
 
@@ -126,8 +125,7 @@ class MultiSensorFilter(OfKind[BeliefT]):
         Where none scanned, a blind look, with which an update is the prediction.
         """
         generator(rng)
-        one_a_sensor("scans", scans, len(self.sensors))
-        one_a_sensor("poses", poses, len(self.sensors))
+        one_a_sensor(len(self.sensors), scans=scans, poses=poses)
         taken = SensorScans([], [], [], [], 0)
         for s, sensor in enumerate(self.sensors):
             if scans[s] is None:
@@ -152,7 +150,7 @@ class InTurn(MultiSensorFilter[BeliefT]):
     """
 
     def _updated(
-        self, prior: BeliefT, born: LMB, taken: SensorScans, dt: float, place: str
+        self, prior: BeliefT, born: Lmb, taken: SensorScans, dt: float, place: str
     ) -> tuple[BeliefT, FilterInfo]:
         motion, posterior = kernel_motion(self.targets.motion, self.targets.survival), prior.to_kernel()
         keeping, settled = self.limits.keeping_labels(), np.zeros(0, np.bool_)

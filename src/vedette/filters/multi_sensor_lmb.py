@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from vedette.densities import LMB
-from vedette.filters.info import FilterInfo
 from vedette.filters.inputs import model_errors
 from vedette.filters.lmb import OfLmb
 from vedette.filters.multi_sensor import MultiSensorFilter, SensorScans
+from vedette.filters.protocols import FilterInfo
+from vedette.kernels.base.types import Lmb
 from vedette.kernels.steps.multi_sensor_combinations import extend_combinations, predict_combinations
 from vedette.kernels.steps.multi_sensor_lmb import lmb_of_combinations
 from vedette.models import kernel_motion
@@ -34,7 +35,7 @@ class MultiSensorLmbFilter(OfLmb, MultiSensorFilter[LMB]):
     Attributes and errors: as `MultiSensorGlmbFilter`.
     """
 
-    def _updated(self, prior: LMB, born: LMB, taken: SensorScans, dt: float, place: str) -> tuple[LMB, FilterInfo]:
+    def _updated(self, prior: LMB, born: Lmb, taken: SensorScans, dt: float, place: str) -> tuple[LMB, FilterInfo]:
         limits, num_columns, reports = self.limits, 0, []
         motion = kernel_motion(self.targets.motion, self.targets.survival)
         reduction = limits.reduction()

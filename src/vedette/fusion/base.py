@@ -1,32 +1,29 @@
-"""What all fusions share: the protocol, what they report, their limits, and the checks of what they are given."""
+"""What all fusions share: the protocol, what they report, and the checks of what they are given."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple, Protocol, runtime_checkable
+from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
+from vedette.densities import Labelled, TrackTable
+from vedette.densities.checks import labels_increase, offsets_of
 from vedette.errors import InputError
-from vedette.fusion.cubature import MAX_DIM, fifth_degree_rule
-from vedette.fusion.validity import ValidBeliefs, all_valid
 from vedette.fusion.views import Views
-from vedette.kernels.base.types import Floats, Ints
-from vedette.kernels.gaussian.mixtures import MixtureCaps
-from vedette.models.arguments import instance, one_of, real, reject, sequence
-from vedette.models.fields import Count, NonNegative, check_fields
+from vedette.kernels.base.types import Bools, Floats, Ints
+from vedette.kernels.labelled.stacking import stack_tracks
+from vedette.models.arguments import real, reject, sequence
 from vedette.text import either
-
-MixturePower = Literal["auto", "moment_matched", "component_wise", "quadrature"]
-MIXTURE_POWERS: tuple[MixturePower, ...] = ("auto", "moment_matched", "component_wise", "quadrature")
-
-# Within these distances a merged Gaussian is as near to the truth as the power is: docs/decisions/0003.
-_MERGE_DISTANCE = {"auto": 2.0, "moment_matched": 0.0, "component_wise": 2.0, "quadrature": 0.5}
 
 # Existence from which a sensor is sure of a label, and below which the fusion has lost it.
 SURE, LOST = 0.9, 0.5
+
+# Type and number of dimensions of the arrays of an LMB: labels, offsets, log weights, means, covariances, logits.
+_INT, _FLOAT = np.dtype(np.int64), np.dtype(np.float64)
+_FORMS = ((_INT, 2), (_INT, 1), (_FLOAT, 1), (_FLOAT, 2), (_FLOAT, 3), (_FLOAT, 1))
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,6 +78,31 @@ class Fusion(Protocol):
         ...
 
 
+@runtime_checkable
+class SharesPrediction(Protocol):
+    """A fusion that says whether its beliefs must all be updated from one prediction; one that does not: no."""
+
+    @property
+    def shares_prediction(self) -> bool:
+        """Whether they must."""
+        ...
+
+
+@runtime_checkable
+class MatchesLabels(Protocol):
+    """A fusion that says whether labels need not agree across sensors; of one that does not they must."""
+
+    @property
+    def matches_labels(self) -> bool:
+        """Whether they need not."""
+        ...
+
+
+def shares_prediction(fusion: Any) -> bool:
+    """Whether the fusion is of beliefs that were all updated from one prediction, as `ParallelUpdate` is."""
+    return isinstance(fusion, SharesPrediction) and bool(fusion.shares_prediction)
+
+
 class LinearRule(NamedTuple):
     """A fusion of LMBs whose log is linear in the sensors' logs, label by label.
 
@@ -104,33 +126,45 @@ class Linear(Protocol):
         ...
 
 
-class FusionLimits(NamedTuple):
-    """Caps on the cost of a fusion.
+class ValidBeliefs(tuple[Any, ...]):
+    """Beliefs that need no check of their values, as filters of this library have made them at this step.
 
-    Attributes:
-        log_min_component_weight: log of the weight below which components of a track's mixture are dropped before it is
-            raised to a power and after the fusion; unused when moment matched.
-        merge_distance: components within this Mahalanobis distance are merged then; none: 2 for component_wise, 0.5 for
-            quadrature powers.
-        max_components: most components of a track before its power is taken; unused when moment matched.
-        max_combinations: bound on the combinations of components of one label at all sensors, max_components^sensors;
-            under `auto` so many fewer components are kept.
-        max_hypotheses: most label sets of the fused density.
+    A fusion takes them like any other sequence. It still checks their kinds and state dimensions.
     """
 
-    log_min_component_weight: float = math.log(1e-5)
-    merge_distance: NonNegative | None = None
-    max_components: Count = 4
-    max_combinations: Count = 4096
-    max_hypotheses: Count = 1000
+    __slots__ = ()
 
 
-class PowerRule(NamedTuple):
-    """How powers of mixtures of one state dimension are taken."""
+def all_valid(beliefs: Sequence[Any]) -> bool:
+    """Whether all are LMBs of one state dimension that `validate` lets pass. It does not say what is wrong.
 
-    caps: MixtureCaps
-    points: Floats  # (num_points, state_dim) of a cubature rule for the standard normal, empty without quadrature
-    point_weights: Floats  # (num_points,)
+    At little more than the cost of one of them.
+    """
+    if not beliefs or not all(isinstance(belief, Labelled) and belief.is_lmb for belief in beliefs):
+        return False
+    if not all(map(_formed, beliefs)) or len({belief.state_dim for belief in beliefs}) > 1:
+        return False
+    table = TrackTable.from_kernel(stack_tracks([belief.tracks.to_kernel() for belief in beliefs]))
+    try:
+        table.validate(error=InputError)
+    except InputError:
+        return False
+    in_order = labels_increase(table.labels, offsets_of([belief.tracks.num_tracks for belief in beliefs])).all()
+    return bool(in_order) and not any(np.isnan(belief.existence_logit).any() for belief in beliefs)
+
+
+def _formed(belief: Any) -> bool:
+    """Whether the arrays of an LMB have their types and shapes, so that they may be stacked."""
+    tracks, logits = belief.tracks, belief.existence_logit
+    arrays = tracks.labels, tracks.offsets, tracks.log_weights, tracks.means, tracks.covs, logits
+    for array, (dtype, ndim) in zip(arrays, _FORMS, strict=True):
+        if type(array) is not np.ndarray or array.dtype != dtype or array.ndim != ndim:
+            return False
+    num, (components, dim) = len(tracks.labels), tracks.means.shape
+    shapes = (num, 2), (num + 1,), (components,), (components, dim), (components, dim, dim), (num,)
+    if tuple(array.shape for array in arrays) != shapes:
+        return False
+    return bool(tracks.offsets[0] == 0 and tracks.offsets[-1] == components)
 
 
 def check_weights(weights: Sequence[float] | Floats) -> tuple[float, ...]:
@@ -140,46 +174,6 @@ def check_weights(weights: Sequence[float] | Floats) -> tuple[float, ...]:
     if not checked or not all(weight >= 0.0 for weight in checked) or not abs(math.fsum(checked) - 1.0) <= 1e-9:
         raise reject("fusion weights", "non-negative numbers that sum to 1, one a sensor", checked)
     return checked
-
-
-def check_power(mixture_power: str, limits: FusionLimits, num_sensors: int) -> None:
-    """Raise `InputError` for an unknown power of mixtures or limits that cannot be kept."""
-    one_of("mixture_power", mixture_power, MIXTURE_POWERS)
-    check_limits(limits)
-    combinations = limits.max_components**num_sensors
-    if mixture_power in ("component_wise", "quadrature") and combinations > limits.max_combinations:
-        raise InputError(
-            f"limits.max_components: expected {limits.max_components}^{num_sensors} (components to the power of the "
-            f"number of sensors) to be at most max_combinations = {limits.max_combinations}; got {combinations}; "
-            f"lower max_components or use auto"
-        )
-
-
-def check_limits(limits: Any) -> None:
-    """Raise `InputError` unless these are caps that can be kept."""
-    instance("limits", limits, FusionLimits)
-    check_fields(limits, "limits.")
-    least = limits.log_min_component_weight
-    if not (isinstance(least, float) and least == -math.inf):
-        real("limits.log_min_component_weight", least)
-
-
-def power_rule(mixture_power: str, limits: FusionLimits, state_dim: int, num_sensors: int = 1) -> PowerRule:
-    """The caps and the cubature rule of a power of mixtures. Raises `InputError` where there is no rule."""
-    points, point_weights, most = np.empty((0, state_dim)), np.empty(0), int(limits.max_components)
-    if mixture_power == "auto":
-        most = min(most, int(limits.max_combinations ** (1.0 / num_sensors)) + 1)
-        while most > 1 and most**num_sensors > limits.max_combinations:
-            most -= 1
-    if mixture_power == "moment_matched" or (mixture_power == "auto" and most == 1):
-        return PowerRule(MixtureCaps(-math.inf, 0.0, 1), points, point_weights)
-    if mixture_power == "quadrature":
-        if state_dim > MAX_DIM:
-            raise InputError(f"mixture_power: quadrature needs at most {MAX_DIM} state dimensions; got {state_dim}")
-        points, point_weights = fifth_degree_rule(state_dim)
-    distance = limits.merge_distance if limits.merge_distance is not None else _MERGE_DISTANCE[mixture_power]
-    caps = MixtureCaps(float(limits.log_min_component_weight), float(distance), most)
-    return PowerRule(caps, points, point_weights)
 
 
 def check_kinds(given: Sequence[type], kinds: tuple[type, ...], num_sensors: int) -> None:
@@ -222,3 +216,29 @@ def by_sensor(counts: Ints, active: Sequence[int], num_sensors: int) -> tuple[in
     numbers = np.zeros(num_sensors, np.int64)
     numbers[list(active)] = counts
     return tuple(numbers.tolist())
+
+
+def info_of_labels(
+    lacking: Bools, active: Sequence[int], num_sensors: int, existence: Floats, fused: Floats, log_normaliser: float
+) -> FusionInfo:
+    """The report of a fusion label by label.
+
+    lacking: (num_labels, len(active)) whether a sensor that takes part at a label lacks it. existence: the same shape.
+    fused: (num_labels,) existence.
+    """
+    missing = by_sensor(np.count_nonzero(lacking, axis=0), active, num_sensors)
+    return FusionInfo(
+        missing_sets=missing,
+        missing_labels=missing,
+        num_sets=len(lacking),
+        num_lost_labels=count_lost(existence, fused),
+        empty_intersection=len(lacking) > 0 and bool(lacking.any(axis=1).all()),
+        log_normaliser=log_normaliser,
+        discarded_weight=0.0,
+    )
+
+
+def taking_part(weights: Sequence[float] | Floats) -> tuple[list[int], Floats]:
+    """The sensors of positive weight, and their weights."""
+    active = [i for i, weight in enumerate(weights) if weight > 0.0]
+    return active, np.array([weights[i] for i in active])

@@ -9,34 +9,29 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from vedette.densities import GLMB, LMB, FactoredGLMB, TrackTable
+from vedette.densities import GLMB, FactoredGLMB, Labelled, TrackTable
 from vedette.densities.cases import LabelledCases
 from vedette.densities.checks import offsets_of, take_runs
 from vedette.densities.containers import unchecked
 from vedette.densities.conversions import marginalised_factors
-from vedette.densities.factored import as_factored
-from vedette.densities.label_sets import take_tracks
+from vedette.densities.label_sets import possible
 from vedette.densities.products import PowerProducts, Share
+from vedette.densities.tracks import take_tracks
 from vedette.errors import NumericalError
-from vedette.fusion.alignment import Aligned, align
+from vedette.fusion.alignment import Aligned, align, side_by_side, tidied
 from vedette.fusion.base import (
     FusionInfo,
-    FusionLimits,
-    MixturePower,
-    PowerRule,
     by_sensor,
     check_beliefs,
     check_kinds,
-    check_power,
     check_weights,
     count_lost,
-    power_rule,
+    taking_part,
 )
-from vedette.fusion.factors import side_by_side, tidied
 from vedette.fusion.laid_out import lay_out_glmbs
-from vedette.fusion.tracks import fused_tracks
+from vedette.fusion.powers import FusionLimits, MixturePower, PowerRule, check_power, fused_tracks, power_rule
 from vedette.fusion.views import Views
-from vedette.kernels.base.types import Floats, Glmb
+from vedette.kernels.base.types import Floats
 from vedette.kernels.labelled.conversions import marginalise
 from vedette.kernels.labelled.groups import group_log_sums
 from vedette.models.arguments import real, reject
@@ -98,17 +93,15 @@ class CmDeltaGlmb:
         """
         check_beliefs(beliefs, (GLMB, FactoredGLMB), len(self.weights))
         rule = power_rule(self.mixture_power, self.limits, beliefs[0].state_dim, len(self.weights))
-        active = [i for i, weight in enumerate(self.weights) if weight > 0.0]
-        weights = np.array([self.weights[i] for i in active])
-        given: Sequence[GLMB | FactoredGLMB] = beliefs
-        glmbs = [belief for belief in given if isinstance(belief, GLMB)]
+        active, weights = taking_part(self.weights)
         fused: Any
-        if len(glmbs) == len(beliefs):
-            sensors = [FactoredGLMB.from_glmb(_marginalised(glmbs[i], rule)) for i in active]
+        if not any(belief.is_product for belief in beliefs):
+            marginal = [GLMB.from_kernel(marginalise(beliefs[i].as_hypotheses(), rule.caps)) for i in active]
+            sensors = [FactoredGLMB.of(possible(own)) for own in marginal]
             whole, info = self._fused(sensors, np.zeros(1), weights, rule)
             fused = whole.factor(0)
         else:
-            factored = [marginalised_factors(as_factored(given[i]), rule.caps) for i in active]
+            factored = [marginalised_factors(FactoredGLMB.of(beliefs[i]), rule.caps) for i in active]
             sensors, log_kept = side_by_side(factored, self.limits.max_hypotheses)
             whole, info = self._fused(sensors, log_kept, weights, rule)
             fused = tidied(whole)
@@ -144,7 +137,7 @@ class CmDeltaGlmb:
             discarded_weight=-math.expm1(left) + 0.0,  # no -0
         )
 
-    def lay_out(self, cases: Sequence[LabelledCases], prediction: GLMB | LMB) -> PowerProducts | None:
+    def lay_out(self, cases: Sequence[LabelledCases], prediction: Labelled) -> PowerProducts | None:
         """The fusions of any of the sensors' cases; None for an LMB prediction, or where the powers are not exact.
 
         cases: one a sensor. prediction: marginalised, of one Gaussian a track. Floors and stand-ins are as in
@@ -153,8 +146,8 @@ class CmDeltaGlmb:
         prediction.
         """
         check_kinds([own.kind for own in cases], (GLMB,), len(self.weights))
-        active = [i for i, weight in enumerate(self.weights) if weight > 0.0]
-        if not isinstance(prediction, GLMB):
+        active, _ = taking_part(self.weights)
+        if prediction.is_lmb:
             return None
         shares = [self._share(cases[i], self.weights[i]) for i in active]
         sets = {labels for share in shares for labels in share.cases.sets}
@@ -169,21 +162,6 @@ class CmDeltaGlmb:
         held = own.possible
         least = own.log_weights.min(axis=1, where=held, initial=self.missing_log_weight)
         return Share(own, weight, held, least[:, None])
-
-
-def _marginalised(belief: GLMB, rule: PowerRule) -> GLMB:
-    """One hypothesis a label set, of positive weight, with reduced mixtures."""
-    glmb = marginalise(belief.to_kernel(), rule.caps)
-    held = int(np.count_nonzero(glmb.hyp_log_weights > -math.inf))
-    # They come by descending weight, so those of weight zero are the last.
-    return GLMB.from_kernel(
-        Glmb(
-            glmb.tracks,
-            glmb.hyp_offsets[: held + 1],
-            glmb.hyp_tracks[: glmb.hyp_offsets[held]],
-            glmb.hyp_log_weights[:held],
-        )
-    )
 
 
 def _heaviest(

@@ -9,7 +9,6 @@ import numpy as np
 
 from vedette.densities import GLMB, LMB
 from vedette.densities.cases import LabelledCases
-from vedette.densities.containers import unchecked
 from vedette.densities.conversions import lmb_on_label_sets
 from vedette.densities.products import PowerProducts, Share, lay_out_products
 from vedette.errors import InputError
@@ -49,12 +48,11 @@ def lay_out_alone(own: LabelledCases, prediction: GLMB | LMB) -> PowerProducts |
 
     An LMB prediction is taken on a GLMB's label sets. Raises `InputError` for GLMBs without a label set in common.
     """
-    if own.kind is LMB:
-        if isinstance(prediction, GLMB):
-            return None
-        return lay_out_products([Share.whole(own, np.ones_like(own.possible))], LabelledCases.of(prediction))
-    compared = prediction if isinstance(prediction, GLMB) else _on_label_sets(prediction, own)
-    return lay_out_glmbs([Share.whole(own, own.possible)], LabelledCases.of(compared))
+    share = Share.whole(own, np.ones_like(own.possible) if own.is_lmb else own.possible)
+    if own.is_lmb:
+        return lay_out_products([share], LabelledCases.of(prediction)) if prediction.is_lmb else None
+    compared = _on_label_sets(prediction, own) if prediction.is_lmb else prediction
+    return lay_out_glmbs([share], LabelledCases.of(compared))
 
 
 def lay_out_glmbs(
@@ -80,4 +78,4 @@ def _on_label_sets(lmb: LMB, own: LabelledCases) -> GLMB:
     scale of the weights, and so it is defined also where the GLMB lacks that label in every set.
     """
     logits = np.clip(lmb.existence_logit, -_ALL_BUT_CERTAIN, _ALL_BUT_CERTAIN)
-    return lmb_on_label_sets(unchecked(LMB, lmb.tracks, logits), own.sets)
+    return lmb_on_label_sets(lmb.with_fields(existence_logit=logits), own.sets)

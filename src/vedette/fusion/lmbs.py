@@ -1,123 +1,230 @@
-"""Several LMBs on the union of their labels, and the weights that sensors have at each label."""
+"""Fusions of LMBs label by label: generalized covariance intersection, and the arithmetic average."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
 
-from vedette.densities import TrackTable
-from vedette.densities.label_sets import take_tracks
-from vedette.errors import InputError
-from vedette.fusion.views import Views
-from vedette.kernels.base.types import Bools, Floats, Ints, Lmb, Tracks
-from vedette.kernels.labelled.stacking import stack_tracks
-from vedette.models.arguments import instance
+from vedette.densities import GLMB, LMB, FactoredGLMB, Labelled, TrackTable
+from vedette.densities.cases import LabelledCases, lmb_cases
+from vedette.densities.checks import offsets_of
+from vedette.densities.containers import unchecked
+from vedette.densities.conversions import reduced_lmb
+from vedette.densities.products import PowerProducts, Share, lay_out_products
+from vedette.densities.tracks import reduced_tracks
+from vedette.fusion.base import (
+    FusionInfo,
+    LinearRule,
+    check_beliefs,
+    check_kinds,
+    check_weights,
+    info_of_labels,
+    taking_part,
+)
+from vedette.fusion.powers import (
+    FusionLimits,
+    MixturePower,
+    check_power,
+    fused_tracks,
+    power_rule,
+)
+from vedette.fusion.views import AlignedLmbs, Views, align_lmbs, require_views, sum_over_sensors, weights_by_view
+from vedette.kernels.base.types import Bools, Floats, Ints, Lmb
+from vedette.kernels.gaussian.mixtures import MixtureCaps
+from vedette.kernels.gaussian.pooling import pooled_tracks
+from vedette.models.arguments import chance, flag
+from vedette.probabilities import expit, log_expit, logit
 
-# At which existence a scan's information is taken: at 1 that of a sensor which misses nothing is infinite.
-SURE_EXISTENCE = 0.999
 
+@dataclass(frozen=True, slots=True)
+class Clmb:
+    """Consensus LMB fusion (paper eq. 12; Fantacci et al. 2015): GCI label by label.
 
-class AlignedLmbs(NamedTuple):
-    """All sensors on the union of their labels of positive existence."""
+    The logit of a fused existence is the weighted mean of the sensors' logits and the log of the integral of prod_i
+    p_i^(w_i), which is at most 0: one blind sensor pulls a target down (0.98 and 0.1 give about 0.69).
 
-    labels: Ints  # (num_labels, 2) increasing
-    chosen: Ints  # (num_labels, num_sensors) place in `tracks`, -1 where the sensor lacks the label
-    tracks: Tracks  # of all sensors
-    logits: Floats  # (num_labels, num_sensors) of existence; a floor where the sensor lacks the label
+    The fused labels are those that any sensor of positive weight has. Where a sensor lacks a label (or has it with
+    existence 0), its existence there is a floor, the least of `missing_existence` and the existences that it has, and
+    it is left out of the label's density, where the other sensors' weights are scaled to sum to one; counted in the
+    `FusionInfo`. A label in every hypothesis of a sensor's GLMB is certain there, and so in the fusion. (Truncation may
+    have cut off the rest; to bound its certainty as its absence is bounded makes joint decisions worse, not better.)
 
-    @property
-    def held(self) -> Bools:
-        """(num_labels, num_sensors) whether the sensor has the label."""
-        return np.asarray(self.chosen >= 0)
+    With plain weights it assumes that the sensors see the same part of the world: what one sensor surely sees is lost
+    where another does not see there. By views, the weights at a label are w_sl proportional to w_s P / (1 - .999 P),
+    where P = E[P_D^s(l)]: to the information that a scan has of the existence of a target that is there. So a sensor
+    which cannot see where a target is (or did not scan) has no say in it, neither of its existence nor of its density;
+    one that sees there and lacks the label has its floor. Where nobody who scanned sees a label, sensors count by how
+    well they would; where nobody would, those that have it keep their plain weights. Both ways a target must have one
+    label at all sensors (see `match_labels`).
 
+    Attributes:
+        weights: fusion weights, one a sensor, in the order of the beliefs; non-negative, sum 1. A sensor of weight 0
+            takes no part.
+        mixture_power: how a power of a mixture is taken; see `CmDeltaGlmb`.
+        missing_existence: floor for the existence probability of a label that a sensor lacks, in (0, 1).
+        limits: caps on the cost.
+        by_views: whether sensors count by how well they see each label; `fuse` then needs `views`.
 
-def align_lmbs(sensors: Sequence[Lmb], missing_existence: float) -> AlignedLmbs:
-    """Sensors' LMBs on the union of their labels.
-
-    Where a sensor lacks a label, its existence there is the least of `missing_existence`, in [0, 1), and of those that
-    it has.
+    Raises `InputError` for weights, a floor or limits that cannot be used.
     """
-    floor = math.log(missing_existence) - math.log1p(-missing_existence) if missing_existence > 0.0 else -math.inf
-    places = [_places(sensor) for sensor in sensors]
-    labels = sorted(set().union(*places))
-    chosen, logits = np.full((len(labels), len(sensors)), -1), np.empty((len(labels), len(sensors)))
-    start = 0
-    for s, sensor in enumerate(sensors):
-        own = np.array([place for place, label in enumerate(labels) if label in places[s]], np.int64)
-        tracks = np.array([places[s][labels[place]] for place in own.tolist()], np.int64)
-        logits[:, s] = min(floor, float(sensor.existence_logit[tracks].min(initial=math.inf)))
-        logits[own, s] = sensor.existence_logit[tracks]
-        chosen[own, s] = start + tracks
-        start += len(sensor.existence_logit)
-    table = stack_tracks([sensor.tracks for sensor in sensors])
-    return AlignedLmbs(np.array(labels, np.int64).reshape(-1, 2), chosen, table, logits)
+
+    weights: Sequence[float] | Floats
+    mixture_power: MixturePower = "auto"
+    missing_existence: float = 1e-4
+    limits: FusionLimits = field(default_factory=FusionLimits)
+    by_views: bool = False
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "weights", check_weights(self.weights))
+        check_power(self.mixture_power, self.limits, len(self.weights))
+        chance("missing_existence", self.missing_existence)
+        flag("by_views", self.by_views)
+
+    def fuse(self, beliefs: Sequence[Labelled], views: Views | None = None) -> tuple[LMB, FusionInfo]:
+        """Fused LMB of the sensors' LMBs (others are first converted), in increasing label order, and what was done.
+
+        views: what the sensors could see; not used with plain weights. Raises `InputError` for another number or kind
+        of beliefs, for state dimensions that differ, a density that is not valid or views that are missing, and
+        `NumericalError` where a product of track densities cannot be integrated.
+        """
+        check_beliefs(beliefs, (LMB, GLMB, FactoredGLMB), len(self.weights))
+        seen = require_views(self.by_views, views, len(self.weights))
+        rule = power_rule(self.mixture_power, self.limits, beliefs[0].state_dim, len(self.weights))
+        active, weights = taking_part(self.weights)
+        aligned = align_lmbs([_reduced(beliefs[i], rule.caps) for i in active], self.missing_existence)
+        powers = _Powers.plain(aligned, weights) if seen is None else _Powers.by_view(aligned, weights, seen, active)
+        tracks, log_overlaps = fused_tracks(aligned.labels, powers.chosen, powers.of_tracks, aligned.tracks, rule)
+        log_present = powers.mean(log_expit(aligned.logits)) + log_overlaps
+        log_absent = powers.mean(log_expit(-aligned.logits))
+        logits, lacking = powers.mean(aligned.logits) + log_overlaps, powers.taking_part & ~aligned.held
+        log_normaliser = float(np.logaddexp(log_present, log_absent).sum())
+        existence = expit(aligned.logits), expit(logits)
+        info = info_of_labels(lacking, active, len(beliefs), *existence, log_normaliser)
+        return unchecked(LMB, tracks, logits), info
+
+    def linear_rule(self, num_sensors: int) -> LinearRule | None:
+        """The weights; None by views."""
+        return None if self.by_views else LinearRule(0.0, tuple(self.weights), self.missing_existence)
+
+    def lay_out(self, cases: Sequence[LabelledCases], prediction: Labelled) -> PowerProducts | None:
+        """The fusions of any of the sensors' cases; None by views, for a GLMB prediction, or inexact powers.
+
+        cases: one a sensor; a GLMB is first converted, as by `fuse`. prediction: of one Gaussian a track. Raises
+        `InputError` for another number of cases.
+        """
+        check_kinds([own.kind for own in cases], (LMB, GLMB), len(self.weights))
+        # A GLMB's labels become mixtures, under auto matched by one; powers of an LMB's single Gaussians are exact.
+        exact = self.mixture_power in ("auto", "moment_matched") or all(own.is_lmb for own in cases)
+        if self.by_views or not exact or not prediction.is_lmb:
+            return None
+        active, _ = taking_part(self.weights)
+        shares = [self._share(cases[i], self.weights[i]) for i in active]
+        return lay_out_products(shares, LabelledCases.of(prediction), active)
+
+    def _share(self, own: LabelledCases, weight: float) -> Share:
+        lmbs = own if own.is_lmb else lmb_cases(own)
+        held, logits = lmbs.possible, lmbs.existence_logits
+        least = logits.min(axis=1, where=held[:, 1::2], initial=logit(self.missing_existence))
+        return Share(lmbs, weight, held, np.stack([log_expit(-least), log_expit(least)], axis=1))
 
 
-def _places(lmb: Lmb) -> dict[tuple[int, int], int]:
-    """Place of each label of positive existence."""
-    labels = lmb.tracks.labels.tolist()
-    return {(labels[i][0], labels[i][1]): i for i in np.flatnonzero(lmb.existence_logit > -math.inf).tolist()}
+class _Powers(NamedTuple):
+    """The powers to which the sensors' densities are raised, label by label."""
+
+    of_labels: Floats  # (num_labels, num_sensors) rows that sum to one, or (num_sensors,) of all labels alike
+    of_tracks: Floats  # the same, for the tracks that are `chosen`
+    chosen: Ints  # (num_labels, num_sensors) tracks, -1 of those that are left out
+    taking_part: Bools  # (num_labels, num_sensors)
+
+    @classmethod
+    def plain(cls, aligned: AlignedLmbs, weights: Floats) -> _Powers:
+        """The same weights at every label."""
+        return cls(weights, weights, aligned.chosen, np.ones(aligned.chosen.shape, np.bool_))
+
+    @classmethod
+    def by_view(cls, aligned: AlignedLmbs, weights: Floats, views: Views, active: Sequence[int]) -> _Powers:
+        """By how well each sensor sees each label."""
+        shares = weights_by_view(aligned, weights, views, active)
+        chosen = np.where(shares > 0.0, aligned.chosen, -1)
+        # Where all that see the place lack the label, its density is that of those that have it.
+        bare = (chosen < 0).all(axis=1, keepdims=True)
+        of_tracks = np.where(bare, weights, shares)
+        return cls(shares, of_tracks, np.where(bare, aligned.chosen, chosen), shares > 0.0)
+
+    def mean(self, values: Floats) -> Floats:
+        """(num_labels,) weighted mean of (num_labels, num_sensors) values, which may be infinite where none counts."""
+        if self.of_labels.ndim == 1:
+            return np.asarray(values @ self.of_labels)
+        return sum_over_sensors(self.of_labels * np.where(self.taking_part, values, 0.0))
 
 
-def weights_by_view(aligned: AlignedLmbs, weights: Floats, views: Views, active: Sequence[int]) -> Floats:
-    """(num_labels, len(active)) weights that each sensor has at each label, made to sum to one.
+def _reduced(belief: Labelled, caps: MixtureCaps) -> Lmb:
+    """An LMB with reduced mixtures."""
+    lmb = reduced_lmb(belief, caps)
+    return Lmb(reduced_tracks(lmb.tracks, caps), lmb.existence_logit) if belief.is_lmb else lmb
 
-    In proportion to w_s P / (1 - .999 P), P = E[P_D^s(l)]. P / (1 - r P) is, up to a factor, the information (Fisher's)
-    that a scan has of an existence r: where a target is there, a sensor that detects it in .98 of its scans says 190
-    times as much by detecting it or not as one that does in .2, so that many of these do not outvote it. 0 for a sensor
-    that cannot see the label. The mean is over the density of the sensor that is surest of the label, among those that
-    see it where they have it (of all that have it, where none does; of equals the first), so that what a blind sensor
-    believes changes nothing. Where nobody who scanned sees a label, sensors count by how well they would see it if they
-    scanned; where nobody would, those that have it keep their plain weights.
-    weights: (len(active),) of the sensors `active`, positive.
+
+@dataclass(frozen=True, slots=True)
+class ArithmeticAverage:
+    """Arithmetic average of LMBs: r = sum_s w_s r_s, p = sum_s w_s r_s p_s / r.
+
+    The minimiser of the weighted sum of the divergences from the sensors' densities to the fused one. The mean number
+    of targets is the sensors' mean, so that a sensor which does not see a target (r = 0 where it lacks the label) takes
+    its share of the existence away; nothing that sensors agree on becomes surer or narrower than at one of them.
+
+    By views, the weights at a label are by how well each sensor sees it, as in `Clmb`: a sensor that cannot see the
+    label is left out of it. A target must have one label at all sensors (see `match_labels`).
+
+    Attributes:
+        weights: one a sensor, in the order of the beliefs; non-negative, sum 1. A sensor of weight 0 takes no part.
+        by_views: whether sensors count by how well they see each label; `fuse` then needs `views`.
+        limits: caps on the fused mixtures (`log_min_component_weight`, `merge_distance`, None for 2,
+            `max_components`); the others are not used.
+
+    Raises `InputError` for weights or limits that cannot be used.
     """
-    detection = _detection(aligned, views, active)
-    unseen = ~(detection > 0.0).any(axis=1, keepdims=True)
-    if unseen.any() and not all(views.scanned):
-        detection = np.where(unseen, _detection(aligned, views.if_all_scanned(), active), detection)
-        unseen = ~(detection > 0.0).any(axis=1, keepdims=True)
-    shares = weights * np.where(unseen, aligned.held, detection / (1.0 - SURE_EXISTENCE * detection))
-    return np.asarray(shares / sum_over_sensors(shares)[:, None])
+
+    weights: Sequence[float] | Floats
+    by_views: bool = False
+    limits: FusionLimits = field(default_factory=FusionLimits)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "weights", check_weights(self.weights))
+        check_power("moment_matched", self.limits, len(self.weights))
+        flag("by_views", self.by_views)
+
+    def fuse(self, beliefs: Sequence[Labelled], views: Views | None = None) -> tuple[LMB, FusionInfo]:
+        """Fused LMB of the sensors' LMBs (others are first converted), in increasing label order, and what was done.
+
+        views: what the sensors could see; not used with plain weights. Labels that no sensor with a say has are left
+        out. Raises `InputError` for another number or kind of beliefs, for state dimensions that differ, a density that
+        is not valid or views that are missing.
+        """
+        check_beliefs(beliefs, (LMB, GLMB, FactoredGLMB), len(self.weights))
+        seen = require_views(self.by_views, views, len(self.weights))
+        caps = power_rule("component_wise", self.limits, beliefs[0].state_dim).caps
+        active, weights = taking_part(self.weights)
+        aligned = align_lmbs([reduced_lmb(beliefs[i], caps) for i in active], 0.0)
+        shares = np.tile(weights, (len(aligned.labels), 1))
+        if seen is not None:
+            shares = weights_by_view(aligned, weights, seen, active)
+        existence = expit(aligned.logits)
+        present = shares * existence
+        exists, absent = sum_over_sensors(present), sum_over_sensors(shares * expit(-aligned.logits))
+        kept = exists > 0.0
+        with np.errstate(divide="ignore"):
+            logits = np.log(exists) - np.log(absent)
+        fused = unchecked(LMB, _pooled(aligned, kept, present, caps), logits[kept])
+        return fused, info_of_labels((shares > 0.0) & ~aligned.held, active, len(beliefs), existence, exists, 0.0)
 
 
-def _detection(aligned: AlignedLmbs, views: Views, active: Sequence[int]) -> Floats:
-    """(num_labels, len(active)) E[P_D^s(l)] over the density of the surest that sees the label."""
-    table, held = TrackTable.from_kernel(aligned.tracks), aligned.held
-    existence = np.where(held, aligned.logits, -math.inf)
-    sure = np.full(held.shape, -math.inf)
-    for s, sensor in enumerate(active):
-        own = held[:, s]
-        seen = views.detection_by(sensor, take_tracks(table, aligned.chosen[own, s])) > 0.0
-        sure[own, s] = np.where(seen, existence[own, s], -math.inf)
-    unseen = (sure == -math.inf).all(axis=1)
-    surest = np.where(unseen[:, None], existence, sure).argmax(axis=1)
-    return views.detection(take_tracks(table, aligned.chosen[np.arange(len(held)), surest]))[:, list(active)]
-
-
-def sum_over_sensors(values: Floats) -> Floats:
-    """(num_labels,) sums of (num_labels, num_sensors) values, one sensor after the other.
-
-    NumPy's own sums add in another order where there are more terms: a sensor of nothing but zeros would change them.
-    """
-    total = np.zeros(len(values))
-    for column in values.T:
-        total += column
-    return total
-
-
-def require_views(by_views: bool, views: Views | None, num_sensors: int) -> Views | None:
-    """The views that a fusion goes by, None where it goes by none. Raises `InputError` where they are missing."""
-    if not by_views:
-        return None
-    if views is None:
-        raise InputError(
-            "views: expected the views of the sensors, as the fusion weights labels by_views; got None (a tracker "
-            "knows them; decisions do not, and go by a fusion of plain weights)"
-        )
-    instance("views", views, Views)
-    if len(views.sensors) != num_sensors:
-        raise InputError(f"views.sensors: expected {num_sensors}, one for each fusion weight; got {len(views.sensors)}")
-    return views
+def _pooled(aligned: AlignedLmbs, kept: Bools, present: Floats, caps: MixtureCaps) -> TrackTable:
+    """The mixture of each kept label's tracks under their weights (num_labels, num_sensors), reduced by the caps."""
+    pooled = (present > 0.0) & kept[:, None]
+    label, sensor = np.nonzero(pooled)
+    offsets = offsets_of(np.count_nonzero(pooled, axis=1)[kept])
+    places, weights = aligned.chosen[label, sensor], present[label, sensor]
+    return TrackTable.from_kernel(pooled_tracks(aligned.tracks, aligned.labels[kept], offsets, places, weights, caps))

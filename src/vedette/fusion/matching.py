@@ -8,12 +8,11 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from vedette.densities import GLMB, LMB, FactoredGLMB, Labelled, TrackTable, as_lmb, settled_lmb, track_moments
+from vedette.densities import GLMB, LMB, FactoredGLMB, Labelled, as_lmb, track_moments
 from vedette.densities.cases import LabelledCases
-from vedette.densities.containers import unchecked
-from vedette.densities.label_sets import Label, take_tracks
-from vedette.fusion.base import Fusion, FusionInfo, check_beliefs
-from vedette.fusion.validity import ValidBeliefs
+from vedette.densities.conversions import names_settled
+from vedette.densities.label_sets import Label
+from vedette.fusion.base import Fusion, FusionInfo, ValidBeliefs, check_beliefs
 from vedette.fusion.views import Views
 from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.gaussian.distances import near_pairs
@@ -161,21 +160,9 @@ def relabelled(belief: Labelled, names: dict[Label, Label]) -> Labelled:
     """The belief under other labels, of which no two are the same; labels without a new name keep theirs."""
     if all(old == new for old, new in names.items()):
         return belief
-    tracks = belief.tracks
     # A GLMB's table may have labels that are in no hypothesis.
-    labels = np.array([names.get(label, label) for label in map(tuple, tracks.labels.tolist())], np.int64)
-    named = unchecked(TrackTable, labels, tracks.offsets, tracks.log_weights, tracks.means, tracks.covs)
-    if isinstance(belief, LMB):
-        order = np.lexsort(labels.T[::-1])
-        return unchecked(LMB, take_tracks(named, order), belief.existence_logit[order])
-    members = labels[belief.hyp_tracks]
-    hyps = np.repeat(np.arange(belief.num_hyps), np.diff(belief.hyp_offsets))
-    order = np.lexsort((members[:, 1], members[:, 0], hyps))
-    members = belief.hyp_tracks[order]
-    if isinstance(belief, FactoredGLMB):
-        own = (belief.hyp_offsets, members, belief.hyp_log_weights, belief.factor_offsets)
-        return unchecked(FactoredGLMB, named, belief.track_offsets, *own)
-    return unchecked(GLMB, named, belief.hyp_offsets, members, belief.hyp_log_weights)
+    labels = [names.get(label, label) for label in map(tuple, belief.tracks.labels.tolist())]
+    return belief.with_labels(np.array(labels, np.int64))
 
 
 @dataclass(frozen=True, slots=True)
@@ -206,7 +193,8 @@ class Matched:
 
         Of several labels that may be one target's, each by itself would be matched as an improbable target.
         """
-        settled = [_settled(belief) for belief in sequence("beliefs", beliefs, "densities, one a sensor")]
+        given = sequence("beliefs", beliefs, "densities, one a sensor")
+        settled = [names_settled(belief, _COMPONENTS) for belief in given]
         return match_labels(settled, gate_probability=self.gate_probability)
 
     def fuse(self, beliefs: Sequence[Labelled], views: Views | None = None) -> tuple[Any, FusionInfo]:
@@ -216,12 +204,6 @@ class Matched:
     def lay_out(self, cases: Sequence[LabelledCases], prediction: GLMB | LMB) -> None:
         """None: which labels match differs from case to case. Of matched beliefs, ask the rule."""
         return None
-
-
-def _settled(belief: Labelled) -> Labelled:
-    if not isinstance(belief, FactoredGLMB) or belief.is_bernoulli.all():
-        return belief
-    return FactoredGLMB.from_lmb(settled_lmb(belief, max_components=_COMPONENTS))
 
 
 __all__ = ["GATE_PROBABILITY", "LIKELY", "OWN_LABELS", "Matched", "common_names", "match_labels", "relabelled"]

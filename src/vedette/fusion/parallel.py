@@ -9,36 +9,27 @@ from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 
-from vedette.densities import LMB, FactoredGLMB, TrackTable
+from vedette.densities import LMB, FactoredGLMB, Labelled, TrackTable, as_lmb
 from vedette.densities.checks import offsets_of
 from vedette.densities.containers import unchecked
 from vedette.densities.conversions import marginalised_factors
-from vedette.densities.factored import as_factored
-from vedette.densities.joining import join_factors
-from vedette.densities.label_sets import WHOLE, in_label_order, places_of
+from vedette.densities.label_sets import WHOLE, in_label_order, join_factors
+from vedette.densities.tracks import places_of, reduced_tracks
 from vedette.errors import InputError, NumericalError
-from vedette.fusion.base import (
-    FusionInfo,
-    FusionLimits,
-    LinearRule,
-    by_sensor,
-    check_beliefs,
-    check_limits,
-    count_lost,
-)
-from vedette.fusion.parallel_factors import (
-    ONE,
-    check_known_labels,
+from vedette.fusion.base import FusionInfo, LinearRule, ValidBeliefs, check_beliefs, info_of_labels
+from vedette.fusion.parallel_sets import (
+    check_evidence,
     check_single,
     fused_groups,
     grouped_sets,
-    lmbs_alone,
+    known_places,
     lost_labels,
+    posteriors_of,
+    updated_logs,
 )
-from vedette.fusion.parallel_lmbs import check_evidence, posteriors_of, single_tracks, updated_logs
-from vedette.fusion.validity import ValidBeliefs
+from vedette.fusion.powers import ONE, FusionLimits, check_limits
 from vedette.fusion.views import Views
-from vedette.kernels.base.types import Floats, Ints, Lmb, Tracks
+from vedette.kernels.base.types import Floats, Ints, Tracks
 from vedette.kernels.labelled.parallel import update_in_parallel
 from vedette.kernels.labelled.stacking import stack_tracks
 from vedette.models.arguments import chance, non_negative, sequence
@@ -121,20 +112,21 @@ class ParallelUpdate:
         integrated.
         """
         prediction = _prediction_of(views, check=not isinstance(beliefs, ValidBeliefs))
-        beliefs = beliefs if isinstance(beliefs, ValidBeliefs) else sequence("beliefs", beliefs, "one density a sensor")
-        num_sensors = len(beliefs) if self.weights is None else len(self.weights)
-        check_beliefs(beliefs, (LMB, FactoredGLMB), num_sensors)
-        if any(belief.state_dim != prediction.state_dim for belief in beliefs):
+        given: Sequence[Labelled] = (
+            beliefs if isinstance(beliefs, ValidBeliefs) else sequence("beliefs", beliefs, "one density a sensor")
+        )
+        num_sensors = len(given) if self.weights is None else len(self.weights)
+        check_beliefs(given, (LMB, FactoredGLMB), num_sensors)
+        if any(belief.state_dim != prediction.state_dim for belief in given):
             raise InputError(f"beliefs: expected states of dimension {prediction.state_dim}, as of views.prediction")
         weights = np.ones(num_sensors) if self.weights is None else np.array(self.weights)
         fused: Any
-        lmbs = [belief for belief in (prediction, *beliefs) if isinstance(belief, LMB)]
-        if len(lmbs) == num_sensors + 1:
-            single = [LMB.from_kernel(Lmb(single_tracks(own), own.existence_logit)) for own in lmbs]
+        if all(belief.is_lmb for belief in (prediction, *given)):
+            single = [_moment_matched(as_lmb(belief)) for belief in (prediction, *given)]
             fused, info = self._fused_lmbs(single[0], single[1:], weights)
         else:
-            factored = [as_factored(belief) for belief in beliefs]
-            fused, info = self._fused_factors(as_factored(prediction), factored, weights)
+            factored = [FactoredGLMB.of(belief) for belief in given]
+            fused, info = self._fused_factors(FactoredGLMB.of(prediction), factored, weights)
         return fused, info
 
     def _fused_lmbs(self, prediction: LMB, beliefs: Sequence[LMB], weights: Floats) -> tuple[LMB, FusionInfo]:
@@ -149,17 +141,10 @@ class ParallelUpdate:
             for sign in (1.0, -1.0)
         )
         active = np.flatnonzero(weights > 0.0).tolist()
-        lacking = (given.chosen < 0)[:, active]
-        missing = by_sensor(np.count_nonzero(lacking, axis=0), active, len(weights))
-        return unchecked(LMB, tracks, logits), FusionInfo(
-            missing_sets=missing,
-            missing_labels=missing,
-            num_sets=len(logits),
-            num_lost_labels=count_lost(expit(given.logits[:, active]), expit(logits)),
-            empty_intersection=len(logits) > 0 and bool(lacking.any(axis=1).all()),
-            log_normaliser=float(np.logaddexp(present + log_overlaps, absent).sum()),
-            discarded_weight=0.0,
-        )
+        lacking, existence = (given.chosen < 0)[:, active], expit(given.logits[:, active])
+        log_normaliser = float(np.logaddexp(present + log_overlaps, absent).sum())
+        info = info_of_labels(lacking, active, len(weights), existence, expit(logits), log_normaliser)
+        return unchecked(LMB, tracks, logits), info
 
     def _fused_factors(
         self, prediction: FactoredGLMB, beliefs: Sequence[FactoredGLMB], weights: Floats
@@ -171,8 +156,9 @@ class ParallelUpdate:
             for belief, power in zip(beliefs, weights.tolist(), strict=True)
         ]
         joined = join_factors([prediction, *marginal])
-        check_known_labels(joined)
-        alone, info = self._fused_lmbs(*lmbs_alone(joined), weights)
+        known_places(prediction.tracks.labels, [belief.tracks.labels for belief in marginal])
+        predicted, *updated = joined.lmbs_alone()
+        alone, info = self._fused_lmbs(predicted, updated, weights)
         tables = [belief.tracks for belief in joined.densities]
         starts = offsets_of([table.num_tracks for table in tables[1:]])
         groups = [
@@ -180,14 +166,14 @@ class ParallelUpdate:
             for group in np.flatnonzero(~joined.alone).tolist()
         ]
         if not groups:
-            return FactoredGLMB.from_lmb(alone), info
+            return FactoredGLMB.of(alone), info
         own = places_of(np.concatenate([group.labels[group.place_labels] for group in groups]), tables[0].labels)
         chosen = np.concatenate([group.chosen for group in groups])
         tracks = stack_tracks([table.to_kernel() for table in tables[1:]])
         prior = tables[0].means[own], tables[0].covs[own]
         means, covs, log_overlaps = self._updated_tracks(*prior, chosen, weights, tracks)
         joint, log_normaliser = fused_groups(groups, log_overlaps, means, covs, self.limits.max_hypotheses)
-        fused = in_label_order(FactoredGLMB.product([FactoredGLMB.from_lmb(alone), *joint], prediction.state_dim))
+        fused = in_label_order(FactoredGLMB.product([FactoredGLMB.of(alone), *joint], prediction.state_dim))
         missing = tuple((np.array(info.missing_labels) + sum(group.num_missing for group in groups)).tolist())
         return fused, replace(
             info,
@@ -209,9 +195,14 @@ class ParallelUpdate:
             raise NumericalError(f"fusion of tracks: {fault}") from None
 
 
-def _prediction_of(views: Views | None, *, check: bool) -> LMB | FactoredGLMB:
+def _moment_matched(belief: LMB) -> LMB:
+    """The LMB with one Gaussian a track."""
+    return belief.with_fields(tracks=TrackTable.from_kernel(reduced_tracks(belief.tracks.to_kernel(), ONE)))
+
+
+def _prediction_of(views: Views | None, *, check: bool) -> Labelled:
     prediction = views.prediction if isinstance(views, Views) else None
-    if not isinstance(prediction, LMB | FactoredGLMB):
+    if prediction is None or not (prediction.is_lmb or prediction.is_product):
         raise InputError(
             "views.prediction: expected the LMB or FactoredGLMB that all beliefs were updated from, each by its "
             f"sensor's own scan alone, which a parallel update divides by; got {type(prediction).__name__}"

@@ -6,21 +6,21 @@ import numpy as np
 
 from vedette.densities import LMB, TrackTable, track_moments
 from vedette.densities.containers import unchecked
-from vedette.densities.label_sets import Label, take_tracks
-from vedette.kernels.base.types import Floats, Ints
+from vedette.densities.tracks import gaussian_tracks, place_labels, take_tracks
+from vedette.kernels.base.types import Floats
 from vedette.kernels.labelled.stacking import stack_tracks
 
 
 def with_labels_of(prediction: LMB, others: LMB) -> LMB:
     """The prediction, and what it lacks of another's labels as the other has them."""
-    own = _places(prediction)
-    lacking = np.array([i for label, i in _places(others).items() if label not in own], np.int64)
+    _, places = place_labels([prediction.tracks.labels, others.tracks.labels])
+    lacking = places[places[:, 0] < 0, 1]
     if len(lacking) == 0:
         return prediction
     table = stack_tracks([prediction.tracks.to_kernel(), take_tracks(others.tracks, lacking).to_kernel()])
-    order = np.lexsort(table.labels.T[::-1])
     logits = np.concatenate([prediction.existence_logit, others.existence_logit[lacking]])
-    return unchecked(LMB, take_tracks(TrackTable.from_kernel(table), order), logits[order])
+    both: LMB = unchecked(LMB, TrackTable.from_kernel(table), logits)
+    return both.take(np.lexsort(table.labels.T[::-1]))
 
 
 def rebased(posterior: LMB, own: LMB, prediction: LMB) -> LMB:
@@ -38,27 +38,15 @@ def rebased(posterior: LMB, own: LMB, prediction: LMB) -> LMB:
         return posterior
     means, covs = track_moments(prediction.tracks)
     logits = prediction.existence_logit.copy()
-    at, before, after = _common(prediction, own, posterior)
+    _, places = place_labels([belief.tracks.labels for belief in (prediction, own, posterior)])
+    at, before, after = places[(places >= 0).all(axis=1)].T
     own_means, own_covs = (moment[before] for moment in track_moments(own.tracks))
     new_means, new_covs = (moment[after] for moment in track_moments(posterior.tracks))
     means[at], covs[at], gained = _updated((means[at], covs[at]), (own_means, own_covs), (new_means, new_covs))
     said, known = posterior.existence_logit[after], own.existence_logit[before]
     with np.errstate(invalid="ignore"):  # what was impossible or certain, and stays so, is no news
         logits[at] += np.where(said == known, 0.0, said - known) + gained
-    num = len(logits)
-    tracks = unchecked(TrackTable, prediction.tracks.labels, np.arange(num + 1), np.zeros(num), means, covs)
-    return unchecked(LMB, tracks, logits)
-
-
-def _places(lmb: LMB) -> dict[Label, int]:
-    return {tuple(label): i for i, label in enumerate(lmb.tracks.labels.tolist())}
-
-
-def _common(*lmbs: LMB) -> tuple[Ints, ...]:
-    """Places in each of the LMBs of the labels that all have."""
-    places = [_places(lmb) for lmb in lmbs]
-    labels = [label for label in places[0] if all(label in other for other in places[1:])]
-    return tuple(np.array([own[label] for label in labels], np.int64) for own in places)
+    return unchecked(LMB, gaussian_tracks(prediction.tracks.labels, means, covs), logits)
 
 
 def _updated(

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from vedette.covariances import covariance_fault
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats
-from vedette.plausible import implausible, seems_degrees
+from vedette.plausible import implausible
 from vedette.text import plain, printable
 
 _MAX_COUNT = 2**62
@@ -102,15 +102,16 @@ def sequence(field: str, values: Any, expected: str) -> tuple[Any, ...]:
     return tuple(values)
 
 
-def one_a_sensor(field: str, values: Any, num_sensors: int) -> None:
-    """Raise unless `values` is a list, tuple or array of so many items."""
-    if isinstance(values, list | tuple) and len(values) == num_sensors:  # asked at every scan
-        return
-    if not isinstance(values, Sequence | np.ndarray) or isinstance(values, str | bytes):
-        raise reject(field, f"{num_sensors}, one a sensor", None if values is None else type(values).__name__)
-    came = 0 if isinstance(values, np.ndarray) and values.ndim == 0 else len(values)
-    if came != num_sensors:
-        raise reject(field, f"{num_sensors}, one a sensor", came)
+def one_a_sensor(num_sensors: int, **fields: Any) -> None:
+    """Raise unless each field is a list, tuple or array of so many items."""
+    for field, values in fields.items():
+        if isinstance(values, list | tuple) and len(values) == num_sensors:  # asked at every scan
+            continue
+        if not isinstance(values, Sequence | np.ndarray) or isinstance(values, str | bytes):
+            raise reject(field, f"{num_sensors}, one a sensor", None if values is None else type(values).__name__)
+        came = 0 if isinstance(values, np.ndarray) and values.ndim == 0 else len(values)
+        if came != num_sensors:
+            raise reject(field, f"{num_sensors}, one a sensor", came)
 
 
 def dimension(field: str, value: Any) -> int:
@@ -158,7 +159,7 @@ def as_array(field: str, values: Any, kinds: str, expected: str) -> NDArray[Any]
     Raises `InputError` for what cannot be one without losing something: masked entries, imaginary parts, booleans,
     texts, objects, rows of several lengths.
     """
-    if _is_masked(values):
+    if type(values) is not np.ndarray and _is_masked(values):
         raise reject(field, f"{expected} without masked entries", "masked ones")
     try:
         array = np.asarray(values)
@@ -185,21 +186,15 @@ def float_array(field: str, values: Any, shape: tuple[int | None, ...], *, finit
         given = values
     else:
         given = as_array(field, values, "fiu", f"numbers in an array of shape {_shape_text(shape)}")
-    if not _has_shape(given, shape):
+    fits = given.ndim == len(shape)
+    for wanted, length in zip(shape, given.shape, strict=False):
+        fits = fits and wanted in (None, length)
+    if not fits:
         raise reject(field, f"an array of shape {_shape_text(shape)}", f"shape {given.shape}")
     array = np.array(given, dtype=np.float64, order="C")
     if not (np.isfinite(array).all() if finite else not np.isnan(array).any()):
         raise reject(field, "finite numbers" if finite else "numbers that are not NaN", values)
     return array
-
-
-def _has_shape(array: NDArray[Any], shape: tuple[int | None, ...]) -> bool:
-    if array.ndim != len(shape):
-        return False
-    for wanted, length in zip(shape, array.shape, strict=True):  # noqa: SIM110 (thrice as fast as a generator)
-        if wanted is not None and wanted != length:
-            return False
-    return True
 
 
 def _shape_text(shape: tuple[int | None, ...]) -> str:
@@ -221,8 +216,8 @@ def pose_vector(field: str, values: Any) -> Floats:
 
 
 def tell_degrees(field: str, heading: float) -> None:
-    """Warn of a heading of a pose that is rather in degrees."""
-    if seems_degrees(heading):
+    """Warn of a heading of a pose that is rather in degrees: a whole number from 10 to two turns of these."""
+    if 10.0 <= abs(heading) <= 720.0 and heading == round(heading):
         degrees = f"{heading:g} degrees are {math.radians(heading):.4f} rad"
         implausible(field, "a heading in radians", f"{heading:g}, a whole number", degrees)
 

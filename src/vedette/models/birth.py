@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -64,6 +64,8 @@ class BirthModel:
             there are none.
         period: s; the stretch of time within which births have these probabilities, those from measurements too; None:
             each step, whatever its length (the paper).
+        num_sites: number of birth sites.
+        state_dim: length of a target's state.
 
     Raises:
         InputError: names the field, what was expected and what came.
@@ -75,6 +77,8 @@ class BirthModel:
     steps: frozenset[int] | None = None
     from_measurements: MeasurementBirth | None = None
     period: float | None = None
+    num_sites: int = field(init=False)
+    state_dim: int = field(init=False)
 
     def __post_init__(self) -> None:
         means = float_array("BirthModel.means", self.means, (None, None))
@@ -96,16 +100,8 @@ class BirthModel:
             object.__setattr__(self, "period", positive("BirthModel.period", self.period))
         for name, value in (("existence", existence), ("means", means), ("covs", covs), ("steps", _steps(self.steps))):
             object.__setattr__(self, name, value)
-
-    @property
-    def num_sites(self) -> int:
-        """Number of birth sites."""
-        return len(self.existence)
-
-    @property
-    def state_dim(self) -> int:
-        """Length of a target's state."""
-        return int(self.means.shape[1])
+        for name, size in (("num_sites", num_sites), ("state_dim", state_dim)):
+            object.__setattr__(self, name, size)
 
     def is_active(self, step: int) -> bool:
         """Whether targets may be born at the sites at this filter step."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 
 import numpy as np
@@ -54,6 +54,7 @@ class SensorModel:
             known, or measurements are linear; the UKF where it is close, or the measurement has no Jacobian.
         detection_at: of a predicted Gaussian, the filters take the probability of detection at its "centre", as the
             paper does, or its "mean" over the Gaussian: by the model's `mean_function`, or by nodes over the position.
+        meas_dim: number of components of a measurement.
 
     Raises:
         InputError: a part of another type, parts for different numbers of measurement components or different angles,
@@ -66,11 +67,13 @@ class SensorModel:
     clutter: ClutterModel
     method: str = "auto"
     detection_at: str = "centre"
+    meas_dim: int = field(init=False)
 
     def __post_init__(self) -> None:
         for name, kind in _PARTS.items():
             if not isinstance(getattr(self, name), kind):
                 raise reject(f"SensorModel.{name}", f"a {kind.__name__}", getattr(self, name))
+        object.__setattr__(self, "meas_dim", self.measurement.meas_dim)
         for name, served in (("noise", self.noise.meas_dim), ("clutter", self.clutter.meas_dim)):
             if served is not None and served != self.meas_dim:
                 expected = f"a model for {self.meas_dim} measurement components"
@@ -95,11 +98,6 @@ class SensorModel:
             if stds[component] > math.pi:
                 raise reject(field, f"{expected}, up to pi", f"{got} ({meant}?)")
             implausible(field, expected, got, meant)
-
-    @property
-    def meas_dim(self) -> int:
-        """Number of components of a measurement."""
-        return self.measurement.meas_dim
 
     def to_kernel(self, detection_at: str | None = None) -> Sensor:
         """The bundle of functions and parameters that kernels take. detection_at: instead of the sensor's own."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field
 
 from vedette.errors import InputError
 from vedette.models.birth import BirthModel
@@ -21,6 +21,7 @@ class TargetModel:
         motion: how a target moves.
         survival: whether it goes on living.
         birth: where targets appear.
+        state_dim: length of a target's state.
 
     Raises:
         InputError: a part of another kind, or models of different state dimensions.
@@ -29,19 +30,16 @@ class TargetModel:
     motion: MotionModel
     survival: SurvivalModel
     birth: BirthModel
+    state_dim: int = field(init=False)
 
     def __post_init__(self) -> None:
-        for part in fields(self):
-            value, kind = getattr(self, part.name), _KINDS[part.name]
+        for name, kind in _KINDS.items():
+            value = getattr(self, name)
             if not isinstance(value, kind):
-                raise InputError(f"{part.name}: expected a {kind.__name__}; got {type(value).__name__}")
+                raise InputError(f"{name}: expected a {kind.__name__}; got {type(value).__name__}")
+        object.__setattr__(self, "state_dim", self.motion.state_dim)
         if self.birth.state_dim != self.state_dim:
             raise InputError(
                 f"birth.means: expected states of dimension {self.state_dim}, as the motion model; "
                 f"got {self.birth.state_dim}"
             )
-
-    @property
-    def state_dim(self) -> int:
-        """Length of a target's state."""
-        return self.motion.state_dim

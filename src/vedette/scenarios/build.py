@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from vedette.control import MobileSensor, Planner
-from vedette.densities import LMB
+from vedette.densities import Labelled
 from vedette.errors import InputError
 from vedette.filters import Filter, TwoStepFilter, labels_targets, shared_targets
 from vedette.fusion import Clmb, CmDeltaGlmb, Fusion, Matched, ParallelUpdate
@@ -157,13 +157,18 @@ def _tracker_of_found(scenario: Scenario, filters: tuple[Filter, ...]) -> Tracke
     central = _central_filter(scenario, filters)
     if model.network is None:
         return Distributed(filters, fusion, model.fusion.feeds_back) if central is None else Central(central)
-    of_lmbs = isinstance(filters[0].initial(), LMB)
+    of_lmbs = _keeps_lmbs(filters[0])
     own_labels = model.birth.from_measurements is not None
     merging = _merging(len(filters), of_lmbs=of_lmbs, own_labels=own_labels)
     if central is not None:
         return ScanNetwork(central, model.network.build(), merging)
     assert fusion is not None  # a single sensor has no network
     return BeliefNetwork(filters, fusion, model.network.build(), merging)
+
+
+def _keeps_lmbs(local: Filter) -> bool:
+    initial = local.initial()
+    return isinstance(initial, Labelled) and initial.is_lmb
 
 
 def _merging(num_sensors: int, *, of_lmbs: bool, own_labels: bool) -> Fusion:
@@ -293,4 +298,4 @@ def _fusion_of_decisions(scenario: Scenario, local: Filter) -> Fusion:
     section, num_sensors = scenario.model.fusion, len(scenario.model.sensors)
     if isinstance(section, CustomFusion):
         return section.build(num_sensors, scenario.folder)
-    return section.build_of_decisions(num_sensors, of_lmbs=isinstance(local.initial(), LMB))
+    return section.build_of_decisions(num_sensors, of_lmbs=_keeps_lmbs(local))

@@ -11,13 +11,12 @@ from typing import Any
 
 import numpy as np
 
-from vedette.control import Planner, RandomPlanner
+from vedette.control import KnowsTruth, Planner, RandomPlanner
 from vedette.errors import VedetteError
 from vedette.kernels.base.types import Bools
 from vedette.plausible import told_elsewhere
 from vedette.simulation.experiment import Experiment
 from vedette.simulation.journal import Journal, Score
-from vedette.simulation.oracle import KnowsTruth
 from vedette.simulation.records import RunRecord
 from vedette.simulation.scans import simulate_scans
 from vedette.simulation.truth import Truth

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple, Protocol, runtime_checkable
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,12 +14,10 @@ from vedette.control import (
     JointSearch,
     MobileSensor,
     Plan,
-    Planner,
     PlanningSettings,
 )
-from vedette.control.allowed import mask_of_decision
 from vedette.control.constraints import Mask, repaired
-from vedette.control.inputs import check_poses, check_steering, options_of
+from vedette.control.inputs import check_poses, check_steering, mask_of_decision, options_of
 from vedette.densities import Estimator, best_estimate
 from vedette.errors import InputError
 from vedette.filters import shared_targets
@@ -34,15 +32,6 @@ from vedette.tracking import State
 
 # Of a target that a belief has lost, the standard deviation of components beyond the position, relative to the cutoff.
 _LOST = 0.1
-
-
-@runtime_checkable
-class KnowsTruth(Protocol):
-    """A planner that is told the true targets at the beginning of a run; `vedette.simulation.simulate` does."""
-
-    def told(self, truth: Truth) -> Planner:
-        """The planner for these targets."""
-        ...
 
 
 class Timetable(NamedTuple):

@@ -1,6 +1,6 @@
 """All sensors' beliefs through time: filtered apart and fused, by one filter of all scans, or over a radio network."""
 
-from vedette.tracking.base import State, Tracker, TrackerInfo
+from vedette.tracking.base import Stages, State, Tracker, TrackerInfo, stage_of
 from vedette.tracking.belief_network import BeliefNetwork
 from vedette.tracking.central import Central, CentralFilter
 from vedette.tracking.distributed import Distributed
@@ -9,7 +9,6 @@ from vedette.tracking.network import Network
 from vedette.tracking.scan_network import ScanNetwork
 from vedette.tracking.searching import Searching
 from vedette.tracking.snapshots import load_snapshot, save_snapshot
-from vedette.tracking.stages import Stages, stage_of
 
 __all__ = [
     "BeliefNetwork",

@@ -1,14 +1,16 @@
-"""What every tracker is: its state between scans, what it reports, and the checks of what it is given."""
+"""What every tracker is: its state between scans, what it reports, its stopwatch, the checks of what it is given."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
+from time import perf_counter
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
-from vedette.densities import UndetectedIntensity
+from vedette.densities import FactoredGLMB, Labelled, UndetectedIntensity
 from vedette.errors import InputError
 from vedette.filters import FilterInfo
 from vedette.kernels.base.types import Floats
@@ -17,6 +19,8 @@ from vedette.models.arguments import float_array, one_a_sensor, real
 
 # s. The belief before the first scan holds no target, so that the time before it changes nothing.
 FIRST_PERIOD = 1.0
+NUMBER = 8  # bytes; each symmetric matrix is sent as its triangle, nothing is compressed
+_NOTE = "stage: "
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -105,10 +109,60 @@ def check_step(
     """The poses as an array, and the seconds since the last scan; `InputError` as `Tracker.step` says."""
     if not isinstance(state, State):
         raise InputError(f"state: expected a State; got {type(state).__name__}")
-    for name, given in (("scans", scans), ("poses", poses), ("rngs", rngs)):
-        one_a_sensor(name, given, num_sensors)
+    one_a_sensor(num_sensors, scans=scans, poses=poses, rngs=rngs)
     now = real("time", time)
     if state.time is not None and now <= state.time:
         raise InputError(f"time: expected one after that of the last scan, {state.time:g} s; got {now:g}")
     at = float_array("poses", poses, (num_sensors, None))
     return at, FIRST_PERIOD if state.time is None else now - state.time
+
+
+class Stages:
+    """A stopwatch for the parts of a step, which also notes on an exception in which part it was raised.
+
+    Attributes:
+        seconds: wall time by the name of the part, in order of their first start.
+    """
+
+    def __init__(self) -> None:
+        self.seconds: dict[str, float] = {}
+
+    @contextmanager
+    def timing(self, name: str, sensor: int | None = None) -> Iterator[None]:
+        """Take the time of what runs inside. sensor: counted from 0, where the part is of one sensor alone."""
+        start = perf_counter()
+        try:
+            yield
+        except BaseException as error:
+            if stage_of(error) is None:  # the innermost part says it best
+                error.add_note(f"{_NOTE}the {name}" + ("" if sensor is None else f" of sensor {sensor + 1}"))
+            raise
+        finally:
+            self.seconds[name] = self.seconds.get(name, 0.0) + perf_counter() - start
+
+
+def stage_of(error: BaseException) -> str | None:
+    """Where an exception was raised, as a stopwatch noted it: "the filter of sensor 2"; None where none did."""
+    notes = [note for note in getattr(error, "__notes__", ()) if note.startswith(_NOTE)]
+    return notes[0].removeprefix(_NOTE) if notes else None
+
+
+def bytes_of_scan(scan: Any, pose: Any) -> int:
+    """The measurements, and the pose that they were taken from; 0 where there was no scan."""
+    return 0 if scan is None else NUMBER * (np.size(scan) + len(pose))
+
+
+def bytes_of_belief(belief: Any) -> int:
+    """Labels, existences or hypotheses, and the components of all tracks; 0 of a density without labels."""
+    if not isinstance(belief, Labelled):
+        return 0
+    tracks = belief.tracks
+    num, dim = len(tracks.labels), int(tracks.means.shape[1])
+    numbers = 2 * num + len(tracks.log_weights) * (1 + dim + dim * (dim + 1) // 2)
+    if belief.is_lmb:
+        return NUMBER * (numbers + num)
+    own = belief.to_factors()
+    hyps = len(own.hyp_log_weights) + len(own.hyp_tracks)
+    # Of those of one label an existence says all.
+    singles = int(np.count_nonzero(FactoredGLMB.of(belief).is_bernoulli)) if belief.is_product else 0
+    return NUMBER * (numbers + hyps - 2 * singles)

@@ -11,19 +11,17 @@ import numpy as np
 from vedette.densities import LMB
 from vedette.errors import InputError
 from vedette.filters import FilterInfo
-from vedette.fusion import Fusion, FusionInfo, Matched, Views
+from vedette.fusion import Fusion, FusionInfo, Matched, Views, shares_prediction
 from vedette.fusion.matching import common_names, relabelled
 from vedette.fusion.rebasing import rebased, with_labels_of
 from vedette.kernels.base.types import Floats, Ints
 from vedette.models.arguments import reject
-from vedette.tracking.base import State, TrackerInfo, check_step
+from vedette.tracking.base import Stages, State, TrackerInfo, check_step
 from vedette.tracking.births import births_due, births_heard
-from vedette.tracking.distributed import check_labels_of_births, shares_prediction
+from vedette.tracking.distributed import check_labels_of_births
 from vedette.tracking.local import LocalFilters
 from vedette.tracking.merging import merged, views_of, with_weights
-from vedette.tracking.messages import bytes_of_messages
-from vedette.tracking.network import NEVER, Network, heard_by, hop_counts, metropolis_weights
-from vedette.tracking.stages import Stages
+from vedette.tracking.network import NEVER, Network, bytes_of_messages, heard_by, hop_counts, metropolis_weights
 
 
 class _Sent(NamedTuple):
@@ -58,6 +56,7 @@ class BeliefNetwork(LocalFilters):
 
     Attributes:
         filters: one a sensor; all hold the same targets.
+        targets, sensors: as of `Tracker`.
         fusion: of beliefs that are heard; its weights are replaced by equal ones, or those of the consensus.
         network: who hears whom.
         merging: fusion of predictions of different pasts, and of the one belief that is reported where sensors believe

@@ -12,10 +12,10 @@ import numpy as np
 
 from vedette.densities import LMB, Labelled, TrackTable, as_lmb
 from vedette.densities.containers import unchecked
-from vedette.densities.factored import LABELLED
+from vedette.densities.labelled import LABELLED
 from vedette.errors import InputError
 from vedette.filters import Limits
-from vedette.filters.inputs import births_at, births_within, model_errors
+from vedette.filters.inputs import births_at, births_within, model_errors, nobody
 from vedette.fusion.matching import OWN_LABELS
 from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.types import Floats, Ints, Lmb, ScanInput
@@ -127,16 +127,11 @@ def _unexplained(belief: Lmb, sensor: SensorModel, scan: Any, pose: Any, number:
     measurements = np.ascontiguousarray(scan, np.float64).reshape(-1, sensor.meas_dim)
     at = pose_vector("pose", pose)
     with model_errors():
-        given = ScanInput(_nobody(belief.tracks.means.shape[1]), measurements, at, 0.0)
+        given = ScanInput(nobody(belief.tracks.means.shape[1]), measurements, at, 0.0)
         explained = prob_explained(belief, given, sensor.to_kernel(), _truncation(sensor.meas_dim))
     free = np.flatnonzero(explained < 1.0 - LEAST_UNEXPLAINED)
     positions = sensor.measurement.positions(measurements[free], at)
     return Unexplained(positions, 1.0 - explained[free], np.full(len(free), number))
-
-
-@cache
-def _nobody(state_dim: int) -> Lmb:
-    return LMB.empty(state_dim).to_kernel()
 
 
 @cache

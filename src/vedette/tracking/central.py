@@ -13,10 +13,8 @@ from vedette.filters import FilterInfo
 from vedette.kernels.base.types import Floats
 from vedette.models import SensorModel, TargetModel
 from vedette.models.arguments import reject
-from vedette.tracking.base import State, TrackerInfo, check_step
+from vedette.tracking.base import Stages, State, TrackerInfo, bytes_of_scan, check_step
 from vedette.tracking.births import births_due, births_from_scans, check_measured_births
-from vedette.tracking.messages import bytes_of_scan
-from vedette.tracking.stages import Stages
 
 
 @runtime_checkable

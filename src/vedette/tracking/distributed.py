@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -11,16 +11,14 @@ import numpy as np
 from vedette.densities import LMB
 from vedette.errors import InputError
 from vedette.filters import FilterInfo
-from vedette.fusion import Fusion, Matched, Views
+from vedette.fusion import Fusion, Matched, MatchesLabels, Views, shares_prediction
 from vedette.kernels.base.types import Floats
-from vedette.models import TargetModel
+from vedette.models import MeasurementBirth, TargetModel
 from vedette.models.arguments import flag, instance, probability
-from vedette.tracking.base import State, TrackerInfo, check_step
+from vedette.tracking.base import Stages, State, TrackerInfo, bytes_of_belief, check_step
 from vedette.tracking.births import births_due, births_from_scans
-from vedette.tracking.forgetting import without_forgotten
 from vedette.tracking.local import LocalFilters
-from vedette.tracking.messages import bytes_of_belief
-from vedette.tracking.stages import Stages
+from vedette.tracking.losing import without_forgotten
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -29,6 +27,7 @@ class Distributed(LocalFilters):
 
     Attributes:
         filters: one a sensor; all hold the same targets.
+        targets, sensors: as of `Tracker`.
         fusion: of their beliefs, after every scan; None for a single sensor.
         feedback: whether the fused belief replaces the sensors' own (paper-notes 9). Without it a fusion by views
             counts a sensor that did not scan as if it had, since its belief is its own, of its earlier scans.
@@ -45,6 +44,7 @@ class Distributed(LocalFilters):
     fusion: Fusion | None = None
     feedback: bool = False
     min_detection: float = 0.1
+    _shares_prediction: bool = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         LocalFilters.__post_init__(self)  # slots replace the class that super() looks for
@@ -52,11 +52,12 @@ class Distributed(LocalFilters):
             raise InputError(f"fusion: expected one for {len(self.filters)} sensors; got none")
         if self.fusion is not None:
             instance("fusion", self.fusion, Fusion)
+        object.__setattr__(self, "_shares_prediction", shares_prediction(self.fusion))
         flag("feedback", self.feedback)
         probability("Distributed.min_detection", self.min_detection)
         if self.feedback or self.fusion is None:
             return
-        if shares_prediction(self.fusion):
+        if self._shares_prediction:
             raise InputError("feedback: expected true, as the fusion is of beliefs that share their prediction")
         check_labels_of_births(self.fusion, self.targets)
 
@@ -70,13 +71,15 @@ class Distributed(LocalFilters):
     ) -> tuple[State, TrackerInfo]:
         """Filter each sensor's scan, then fuse; see `Tracker.step`."""
         at, dt = check_step(state, scans, poses, time, rngs, len(self.filters))
-        step, stages = state.step + 1, Stages()
-        births = [births_due(self.targets.birth, step, dt, own) for own in state.memory or (None,) * len(self.filters)]
-        prediction, local, infos = None, [], []
-        if shares_prediction(self.fusion):
+        step, stages, num, birth = state.step + 1, Stages(), len(self.filters), self.targets.birth
+        births: Sequence[LMB | None] = (None,) * num
+        if birth.from_measurements is not None:
+            births = [births_due(birth, step, dt, own) for own in state.memory or births]
+        prediction, local, infos, scanned, sent = None, [], [], [], []
+        if self._shares_prediction:
             with stages.timing("filter"):
                 prediction, _ = self._predicted(0, state.fused, dt, step, births[0])
-        for s in range(len(self.filters)):
+        for s in range(num):
             with stages.timing("filter", s):
                 if prediction is None:
                     belief, info = self._stepped(s, state.local[s], scans[s], at[s], dt, step, births[s], rngs[s])
@@ -84,14 +87,15 @@ class Distributed(LocalFilters):
                     belief, info = self._updated(s, prediction, scans[s], at[s], rngs[s])
             local.append(belief)
             infos.append(info)
-        fused, report = local[0], None
-        sent = tuple(bytes_of_belief(belief) for belief in local)
-        if self.fusion is not None:
+            sent.append(bytes_of_belief(belief))
             # Without feedback a sensor still knows what it saw at earlier scans.
-            scanned = tuple(scan is not None or not self.feedback for scan in scans)
-            views, rule = Views(self.sensors, at, scanned, prediction), self.fusion
+            scanned.append(scans[s] is not None or not self.feedback)
+        fused, report, measured = local[0], None, None
+        if self.fusion is not None:
+            views, rule = Views(self.sensors, at, tuple(scanned), prediction), self.fusion
             with stages.timing("fusion"):
-                local, infos = self._without_forgotten(local, infos, views)
+                if birth.from_measurements is not None and not self.feedback and self.min_detection > 0.0:
+                    local, infos = self._without_forgotten(birth.from_measurements, local, infos, views)
                 made = self._for_fusion(local)
                 if isinstance(rule, Matched):
                     # Labels then outlast the sensor that led them, and are those that decisions need.
@@ -101,18 +105,17 @@ class Distributed(LocalFilters):
         if prediction is not None:
             fused = self._kept(fused)
         if self.feedback:
-            local = [self._as_kept(fused)] * len(local)
-        measured = self._measured(local, scans, at, step + 1, stages)
-        told = TrackerInfo(tuple(infos), report, stages.seconds, sent)
+            local = [self._as_kept(fused)] * num
+        if birth.from_measurements is not None:
+            with stages.timing("births"):
+                measured = self._measured(local, scans, at, step + 1)
+        told = TrackerInfo(tuple(infos), report, stages.seconds, tuple(sent))
         return State(tuple(local), fused, step, float(time), measured), told
 
     def _without_forgotten(
-        self, local: list[Any], infos: list[FilterInfo], views: Views
+        self, birth: MeasurementBirth, local: list[Any], infos: list[FilterInfo], views: Views
     ) -> tuple[list[Any], list[FilterInfo]]:
         """The sensors' own beliefs without what they have lost sight of, and their reports with what that was."""
-        birth = self.targets.birth.from_measurements
-        if self.feedback or birth is None or self.min_detection == 0.0:
-            return local, infos
         kept, dropped = zip(
             *(without_forgotten(belief, birth, views, s, self.min_detection) for s, belief in enumerate(local)),
             strict=True,
@@ -123,20 +126,15 @@ class Distributed(LocalFilters):
         ]
         return list(kept), told
 
-    def _measured(
-        self, local: Sequence[Any], scans: Sequence[Any], poses: Floats, step: int, stages: Stages
-    ) -> tuple[LMB | None, ...] | None:
+    def _measured(self, local: Sequence[Any], scans: Sequence[Any], poses: Floats, step: int) -> tuple[LMB | None, ...]:
         """For each sensor, who may be born at `step`: the same for all where they share a belief."""
         birth, sensors = self.targets.birth, self.sensors
-        if birth.from_measurements is None:
-            return None
-        with stages.timing("births"):
-            if self.feedback or len(local) == 1:
-                return (births_from_scans(birth, local[0], sensors, scans, poses, step),) * len(local)
-            return tuple(
-                births_from_scans(birth, belief, sensors[s : s + 1], scans[s : s + 1], poses[s : s + 1], step, owner=s)
-                for s, belief in enumerate(local)
-            )
+        if self.feedback or len(local) == 1:
+            return (births_from_scans(birth, local[0], sensors, scans, poses, step),) * len(local)
+        return tuple(
+            births_from_scans(birth, belief, sensors[s : s + 1], scans[s : s + 1], poses[s : s + 1], step, owner=s)
+            for s, belief in enumerate(local)
+        )
 
 
 def check_labels_of_births(fusion: Fusion, targets: TargetModel) -> None:
@@ -146,13 +144,8 @@ def check_labels_of_births(fusion: Fusion, targets: TargetModel) -> None:
     """
     if targets.birth.from_measurements is None or shares_prediction(fusion):
         return
-    if not getattr(fusion, "matches_labels", False):
+    if not (isinstance(fusion, MatchesLabels) and fusion.matches_labels):
         raise InputError(
             "fusion: expected one that matches labels, as sensors that do not share all they know make their own from "
             f"their measurements; got {type(fusion).__name__}, which fuses by label"
         )
-
-
-def shares_prediction(fusion: Fusion | None) -> bool:
-    """Whether the fusion is of beliefs that were all updated from one prediction, as `ParallelUpdate` is."""
-    return bool(getattr(fusion, "shares_prediction", False))

@@ -3,24 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from operator import attrgetter
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
-from vedette.densities import LMB
-from vedette.densities.factored import as_factored
+from vedette.densities import LMB, FactoredGLMB, Labelled
 from vedette.errors import InputError
 from vedette.filters import FactoredGlmbFilter, Filter, FilterInfo, LmbFilter, TwoStepFilter, shared_targets
-from vedette.filters.base import SingleSensorFilter
-from vedette.filters.blind import NO_POSE, NO_SCAN, blind_sensor
+from vedette.filters.base import NO_POSE, NO_SCAN, SingleSensorFilter, blind_sensor
 from vedette.fusion import ValidBeliefs
 from vedette.models import SensorModel, TargetModel
 from vedette.models.arguments import reject, sequence
 from vedette.tracking.births import check_measured_births
 
-_SENSOR = attrgetter("sensor")
 _BORN = "targets are born of measurements"
 
 
@@ -30,6 +26,8 @@ class LocalFilters:
 
     Attributes:
         filters: one a sensor; all hold the same targets.
+        targets: as all sensors know them.
+        sensors: what each sensor sees.
 
     Raises:
         InputError: no filter or something else, filters of different targets; where targets are born of measurements,
@@ -37,6 +35,9 @@ class LocalFilters:
     """
 
     filters: tuple[Filter, ...]
+    targets: TargetModel = field(init=False)
+    sensors: tuple[SensorModel, ...] = field(init=False)
+    _are_own: bool = field(init=False, repr=False)  # whether all filters are the library's
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "filters", sequence("filters", self.filters, "a Filter of each sensor"))
@@ -45,21 +46,14 @@ class LocalFilters:
         for s, local in enumerate(self.filters):
             if not isinstance(local, Filter):
                 raise reject(f"filters[{s}]", "a Filter, with targets, sensor, initial() and step()", local)
-        birth = shared_targets(self.filters).birth
+        object.__setattr__(self, "targets", shared_targets(self.filters))
+        object.__setattr__(self, "sensors", tuple(local.sensor for local in self.filters))
+        object.__setattr__(self, "_are_own", all(isinstance(local, SingleSensorFilter) for local in self.filters))
+        birth = self.targets.birth
         check_measured_births(birth, self.sensors)
         for s in range(len(self.filters)):
             if birth.from_measurements is not None:
                 self._two_step(s, _BORN)
-
-    @property
-    def targets(self) -> TargetModel:
-        """The targets as all sensors know them."""
-        return self.filters[0].targets
-
-    @property
-    def sensors(self) -> tuple[SensorModel, ...]:
-        """What each sensor sees."""
-        return tuple(map(_SENSOR, self.filters))
 
     def _stepped(
         self,
@@ -110,13 +104,12 @@ class LocalFilters:
 
     def _as_kept(self, belief: Any) -> Any:
         """The same density as the filters keep it: an LMB as a product of GLMBs where they keep these."""
-        own = self.filters[0]
-        return as_factored(belief) if isinstance(own, FactoredGlmbFilter) and isinstance(belief, LMB) else belief
+        factored = isinstance(self.filters[0], FactoredGlmbFilter) and isinstance(belief, Labelled)
+        return FactoredGLMB.of(belief) if factored else belief
 
     def _for_fusion(self, beliefs: Sequence[Any]) -> Sequence[Any]:
         """What was made of the filters' beliefs at this step, to be fused: checked where a filter is the user's own."""
-        own = all(isinstance(local, SingleSensorFilter) for local in self.filters)
-        return ValidBeliefs(beliefs) if own else beliefs
+        return ValidBeliefs(beliefs) if self._are_own else beliefs
 
     def _two_step(self, s: int, why: str) -> TwoStepFilter:
         own = self.filters[s]

@@ -1,29 +1,30 @@
-"""Where the targets are that a tracker has just dropped: undetected ones, as before they were found."""
+"""Labels that a sensor has lost sight of, and where the targets are whose labels a tracker has just dropped."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
-from vedette.densities import GLMB, LMB, FactoredGLMB, as_lmb, existence_probabilities
+from vedette.densities import LMB, Labelled, as_lmb, existence_probabilities, track_moments
 from vedette.densities.containers import for_kernel
 from vedette.densities.label_sets import without_labels
 from vedette.filters.inputs import model_errors
+from vedette.fusion import Views
 from vedette.kernels.base.types import Floats
 from vedette.kernels.gaussian.position_integrals import spread_nodes
 from vedette.kernels.planning.reach import predict_paths
-from vedette.models import CellGrid, SensorModel, TargetModel, kernel_motion
+from vedette.models import CellGrid, MeasurementBirth, SensorModel, TargetModel, kernel_motion
 
-_LABELLED = (GLMB, LMB, FactoredGLMB)
+_Labelled = TypeVar("_Labelled", bound=Labelled)
 _NODES = spread_nodes()
 _LEAST = 1e-300  # of a probability that is divided by
 
 
 def lost_labels(before: Any, after: Sequence[Any]) -> LMB | None:
     """The labels of a belief that none of the beliefs after the next scan holds; None where beliefs have no labels."""
-    if not all(isinstance(belief, _LABELLED) for belief in (before, *after)):
+    if not all(isinstance(belief, Labelled) for belief in (before, *after)):
         return None
     held = [existence_probabilities(belief)[0] for belief in {id(belief): belief for belief in after}.values()]
     return as_lmb(without_labels(before, np.concatenate(held))[0])
@@ -65,3 +66,25 @@ def expected_in_cells(states: Floats, shares: Floats, grid: CellGrid) -> Floats:
     """(num_cells,) sums of the shares (n,) of states (n, 2 or more) in each cell; nobody counts those outside."""
     cells = grid.cells_at(states)
     return np.bincount(cells[cells >= 0], shares[cells >= 0], grid.num_cells).astype(np.float64)
+
+
+def without_forgotten(
+    belief: _Labelled, birth: MeasurementBirth, views: Views, sensor: int, min_detection: float
+) -> tuple[_Labelled, float]:
+    """A sensor's own belief without the labels that it cannot see and knows too little of, and their summed existence.
+
+    Not seen is a label that the sensor detects with a probability below `min_detection`, on average over its density.
+    Known too little is one of which no place is likelier to hold a target than that of a birth at its most: r / sqrt
+    det of the covariance of its position is less than `max_existence` / (std_x std_y). Where such a target comes back
+    into view, the birth from its first measurement says more of it than the label.
+
+    views: of all sensors; who has just scanned is not asked.
+    """
+    lmb = as_lmb(belief)
+    covs = track_moments(lmb.tracks)[1][:, :2, :2]
+    spread = np.sqrt(np.maximum(covs[:, 0, 0] * covs[:, 1, 1] - covs[:, 0, 1] * covs[:, 1, 0], 0.0))
+    vague = lmb.existence * birth.std[0] * birth.std[1] < birth.max_existence * spread
+    if not vague.any():
+        return belief, 0.0
+    unseen = views.if_all_scanned().detection_by(sensor, lmb.tracks) < min_detection
+    return without_labels(belief, np.ascontiguousarray(lmb.tracks.labels[vague & unseen]))

@@ -13,13 +13,11 @@ from vedette.filters import FilterInfo
 from vedette.fusion import Fusion, Views
 from vedette.kernels.base.types import Floats, Ints
 from vedette.models.arguments import reject
-from vedette.tracking.base import State, TrackerInfo, check_step
+from vedette.tracking.base import Stages, State, TrackerInfo, bytes_of_scan, check_step
 from vedette.tracking.births import births_heard
 from vedette.tracking.central import OfAllScans
 from vedette.tracking.merging import merged
-from vedette.tracking.messages import bytes_of_messages, bytes_of_scan
-from vedette.tracking.network import Network, heard_by, hop_counts
-from vedette.tracking.stages import Stages
+from vedette.tracking.network import Network, bytes_of_messages, heard_by, hop_counts
 
 
 class _Known(NamedTuple):

@@ -14,10 +14,9 @@ from vedette.kernels.base.types import Floats
 from vedette.kernels.steps.undetected import survival_probabilities, take_out_detected
 from vedette.models import SensorModel, TargetModel, UndetectedModel, kernel_motion
 from vedette.models.arguments import float_array, reject
-from vedette.tracking.base import State, Tracker, TrackerInfo
+from vedette.tracking.base import Stages, State, Tracker, TrackerInfo
 from vedette.tracking.births import unexplained
 from vedette.tracking.losing import expected_in_cells, expected_of_lost, lost_labels
-from vedette.tracking.stages import Stages
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from vedette.control.rewards.base import LabelReward, PowerReward, combined, unit_volume_of
+from vedette.control.rewards.base import LabelReward, LinearReward, PowerReward, combined, unit_volume_of
 from vedette.control.rewards.labels import cardinality_variance_of_label
 from vedette.control.rewards.power import ExpectedLossReward
 from vedette.densities import LMB
@@ -57,13 +57,8 @@ class AdditiveRewards:
         """Of the sums, where the reward is linear in them; None where it is not known to be."""
         if self.reward is None:
             return np.ones(1)
-        found = getattr(self.reward, "coefficients", None)
+        found = self.reward.coefficients if isinstance(self.reward, LinearReward) else None
         return None if found is None else np.asarray(found, np.float64)
-
-    @property
-    def additive(self) -> AdditiveRewards:
-        """Themselves."""
-        return self
 
     def joint(self) -> AdditiveRewards:
         """Of all sensors, fused: themselves."""

@@ -7,15 +7,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vedette.control.pseudo import decision_of, draw_paths, targets_of
+from vedette.control.priors import decision_of, draw_paths, targets_of
 from vedette.control.settings import IDEAL_MODES, MobileSensor, PlanningSettings
 from vedette.densities import LMB
 from vedette.densities.checks import offsets_of
 from vedette.densities.containers import unchecked
-from vedette.densities.label_sets import places_of, single_gaussians, take_tracks
-from vedette.filters.inputs import model_errors
+from vedette.densities.tracks import places_of, single_gaussians, take_tracks
 from vedette.kernels.base.types import Bools, Floats, Ints
-from vedette.kernels.planning.bernoulli_rows import bernoulli_size
 from vedette.kernels.planning.ideal import EXPECTED, IDEAL, Decision, Futures
 from vedette.kernels.planning.known import rows_without_scans
 from vedette.kernels.planning.reach import Belief, label_radii, predict_paths
@@ -94,22 +92,20 @@ def starts_of(
     needs no samples, and takes the mean P_D over the predicted Gaussian.
     """
     samples = Samples.draw(state.fused, sensors, settings, rng=rng) if sampled else Samples.none(state.fused, settings)
-    with model_errors():
-        given = prediction.to_kernel()
-        references = given.tracks.means
-        prior = rows_without_scans(references, given.tracks.covs, given.existence_logit, references)
-        scans = [sensor.scans(state.time, settings) for sensor in sensors]
-        shared = IDEAL_MODES[settings.ideal_measurements] == IDEAL or not sampled
-        groups = tuple(
-            _group(members, prediction, state.local, sensors, courses, scans, samples, settings, sampled, rng)
-            for members in _alike(sensors, state.local, scans, shared=shared)
-        )
+    given = prediction.to_kernel()
+    references = given.tracks.means
+    prior = rows_without_scans(references, given.tracks.covs, given.existence_logit, references)
+    scans = [sensor.scans(state.time, settings) for sensor in sensors]
+    shared, groups = IDEAL_MODES[settings.ideal_measurements] == IDEAL or not sampled, []
+    for members in _alike(sensors, state.local, scans, shared=shared):
+        group = _group(members, prediction, state.local, sensors, courses, scans, samples, settings, sampled, rng)
+        groups.append(group)
     bases: list[Floats] = [prior] * len(sensors)
     for group in groups:
-        row = _spread(group, len(prior), prediction.state_dim, missing_existence)
+        row = _spread(group, prior, missing_existence)
         for s in group.members:
             bases[s] = row
-    return Start(groups, references, prior, tuple(bases), samples.targets.shape[1])
+    return Start(tuple(groups), references, prior, tuple(bases), samples.targets.shape[1])
 
 
 def _alike(
@@ -118,10 +114,11 @@ def _alike(
     """Sensors with the same belief, equal models and scans, together; each by itself unless `shared`."""
     found: dict[object, list[int]] = {}
     for s, (sensor, belief, when) in enumerate(zip(sensors, beliefs, scans, strict=True)):
-        bundle = (*sensor.filter.sensor.to_kernel(), when)
-        key = tuple(part.tobytes() if isinstance(part, np.ndarray) else part for part in bundle)
-        found.setdefault((id(belief), key) if shared else s, []).append(s)
-    return [tuple(members) for members in found.values()]
+        key: list[object] = [id(belief)]
+        for part in (*sensor.filter.sensor.to_kernel(), when):
+            key.append(part.tobytes() if isinstance(part, np.ndarray) else part)
+        found.setdefault(tuple(key) if shared else s, []).append(s)
+    return list(map(tuple, found.values()))
 
 
 def _group(
@@ -153,9 +150,9 @@ def _group(
     return SensorGroup(members, known, labels, decision, rows, offsets, sensor.filter.sensor.detection.reach)
 
 
-def _spread(group: SensorGroup, num_labels: int, dim: int, missing_existence: float) -> Floats:
+def _spread(group: SensorGroup, prior: Floats, missing_existence: float) -> Floats:
     """The rows on all labels; of one that the sensor lacks, an existence that it would hardly have missed."""
-    rows = np.zeros((num_labels, bernoulli_size(dim)))
+    rows = np.zeros_like(prior)
     rows[:, -2] = min(logit(missing_existence), float(group.rows[:, -2].min(initial=np.inf)))
     rows[group.labels] = group.rows
     return rows

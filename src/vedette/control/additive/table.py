@@ -54,17 +54,19 @@ def lay_out(
     """The rewards at the end of the horizon: each label followed over every course that reaches it."""
     sampled = not isinstance(reward, ExpectedLossReward)
     courses, missing = [own.courses for own in options], rule.missing_existence
-    start = starts_of(
-        prediction, state, sensors, courses, settings, missing_existence=missing, sampled=sampled, rng=rng
-    )
-    table = lay_out_changes(start, rule, settings.threads(), sampled=sampled)
+    num_threads = settings.threads()
+    with model_errors():
+        start = starts_of(
+            prediction, state, sensors, courses, settings, missing_existence=missing, sampled=sampled, rng=rng
+        )
+        table = lay_out_changes(start, rule, num_threads, sampled=sampled)
     valuation = valuation_of(reward, prediction, start.prior)
     if state.undetected is None or settings.undetected_worth == 0.0:
         cells = no_cells(len(table.offsets) - 1)
     else:
         cells = cells_of(start, state.undetected, settings.undetected_worth, table.first_courses, prediction.state_dim)
     own = reward if sampled else None
-    return AdditiveRewards(table, valuation, start.bases, own, cells, settings.threads())
+    return AdditiveRewards(table, valuation, start.bases, own, cells, num_threads)
 
 
 def lay_out_changes(start: Start, rule: LinearRule, num_threads: int, *, sampled: bool) -> Table:
@@ -75,8 +77,7 @@ def lay_out_changes(start: Start, rule: LinearRule, num_threads: int, *, sampled
         ModelError, NumericalError: as the models and the filters.
     """
     num_sensors, num_samples, size = len(start.bases), start.num_samples, start.prior.shape[1]
-    with model_errors():
-        reached = [_reach(group, num_threads, sampled=sampled) for group in start.groups]
+    reached = [_reach(group, num_threads, sampled=sampled) for group in start.groups]
     sizes, first_courses = _sizes(start.groups, reached, num_sensors)
     offsets = offsets_of(sizes)
     if offsets[-1] * num_samples * size * 8 > _MOST_BYTES:
@@ -86,14 +87,13 @@ def lay_out_changes(start: Start, rule: LinearRule, num_threads: int, *, sampled
         )
     labels, changes = np.empty(offsets[-1], np.int64), np.empty((int(offsets[-1]), size, num_samples))
     own = np.empty(len(labels), np.int64)
-    with model_errors():
-        for group, reach in zip(start.groups, reached, strict=True):
-            places = places_of_courses(group, first_courses)
-            entries = Entries(offsets[places], offsets[places + 1], own)
-            found, counts = np.nonzero(reach)[1], reach.sum(axis=1)
-            at = np.repeat(entries.first - offsets_of(counts)[:-1], counts) + np.arange(len(found))
-            own[at], labels[at] = found, group.labels[found]
-            run_chunks(_filling(group, entries, start, changes, sampled), len(places), num_threads, first_piece=_QUICK)
+    for group, reach in zip(start.groups, reached, strict=True):
+        places = places_of_courses(group, first_courses)
+        entries = Entries(offsets[places], offsets[places + 1], own)
+        found, counts = np.nonzero(reach)[1], reach.sum(axis=1)
+        at = np.repeat(entries.first - offsets_of(counts)[:-1], counts) + np.arange(len(found))
+        own[at], labels[at] = found, group.labels[found]
+        run_chunks(_filling(group, entries, start, changes, sampled), len(places), num_threads, first_piece=_QUICK)
     powers = np.array(rule.powers)
     joint = rule.prior_power * start.prior
     for s, power in enumerate(rule.powers):
@@ -125,11 +125,13 @@ def _reach(group: SensorGroup, num_threads: int, *, sampled: bool) -> Ints:
 def _sizes(groups: Sequence[SensorGroup], reached: Sequence[Ints], num_sensors: int) -> tuple[Ints, Ints]:
     """Entries of each course, sensor after sensor, and the first course of each sensor."""
     own: list[Ints] = [np.empty(0, np.int64)] * num_sensors
+    first_courses = np.zeros(num_sensors + 1, np.int64)
     for group, reach in zip(groups, reached, strict=True):
         counts = reach.sum(axis=1)
         for i, s in enumerate(group.members):
             own[s] = counts[group.course_offsets[i] : group.course_offsets[i + 1]]
-    return np.concatenate(own), offsets_of([len(counts) for counts in own])
+            first_courses[s + 1] = len(own[s])
+    return np.concatenate(own), first_courses.cumsum()
 
 
 def places_of_courses(group: SensorGroup, first_courses: Ints) -> Ints:

@@ -2,7 +2,14 @@
 
 from vedette.control.constraints.mask import Mask, opened, repaired
 from vedette.control.constraints.masks import courses_allowed, mask_of, pairs_allowed, violated, without_course
-from vedette.control.constraints.protocol import Constraint, Situation
+from vedette.control.constraints.protocol import (
+    Constraint,
+    Situation,
+    Timeless,
+    WithReach,
+    WithViolations,
+    reach_of,
+)
 from vedette.control.constraints.regions import KeepOut, StayInside
 from vedette.control.constraints.separation import Separation
 from vedette.control.constraints.void import VoidProbability, void_probability
@@ -14,11 +21,15 @@ __all__ = [
     "Separation",
     "Situation",
     "StayInside",
+    "Timeless",
     "VoidProbability",
+    "WithReach",
+    "WithViolations",
     "courses_allowed",
     "mask_of",
     "opened",
     "pairs_allowed",
+    "reach_of",
     "repaired",
     "violated",
     "void_probability",

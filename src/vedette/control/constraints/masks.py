@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from vedette.control.constraints.mask import Mask, opened
-from vedette.control.constraints.protocol import Constraint, Situation
+from vedette.control.constraints.protocol import Constraint, Situation, WithViolations, reach_of
 from vedette.errors import InputError
 from vedette.kernels.base.types import Bools, Floats
 
@@ -86,7 +86,7 @@ def _answers(constraint: Constraint, situation: Situation) -> list[Bools]:
 
 def _violations(constraint: Constraint, situation: Situation, answers: Sequence[Bools]) -> Sequence[Floats]:
     """(num_courses,) how much each course violates a constraint; one that does not say it, by 1 what it forbids."""
-    if not hasattr(constraint, "violations"):
+    if not isinstance(constraint, WithViolations):
         return [np.asarray(~own, np.float64) for own in answers]
     given = [np.asarray(own, np.float64) for own in constraint.violations(situation)]
     for s, own in enumerate(answers):
@@ -106,7 +106,7 @@ def pairs_allowed(constraints: Sequence[Constraint], situation: Situation) -> di
     gaps = _least_distances(situation)
     found: dict[tuple[int, int], Bools] = {}
     for constraint in constraints:
-        for first, second in _near(gaps, getattr(constraint, "reach", math.inf)):
+        for first, second in _near(gaps, reach_of(constraint)):
             answer = constraint.pairs(situation, first, second)
             if answer is not None:
                 shape = (len(situation.courses[first]), len(situation.courses[second]))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from itertools import accumulate
 from typing import NamedTuple, Protocol, TypeVar, runtime_checkable
 
@@ -44,14 +45,8 @@ class Situation(NamedTuple):
 class Constraint(Protocol):
     """Says which courses a sensor may take, and which courses of two sensors go together.
 
-    A constraint may have three more members. `reach`: `pairs` is then asked only about sensors of which some two
-    courses might come nearer to each other than so many metres; 0: about none. Without it, about all. `timeless`: true
-    where the answers hang on poses and courses alone, neither on times nor on beliefs; of decisions over several
-    periods it is then asked once about each place. `violations(situation)`: how much each course violates it, in arrays
-    as of `courses`, above 0 where it is not allowed; where a sensor has no course that all constraints allow, it may
-    take those of the least sum. Without it a course that is not allowed counts 1.
-
-    Such decisions show it one sensor, or two, at a time: the others have no courses then.
+    It may have more members: those of `WithReach`, `Timeless` and `WithViolations`. Decisions over several periods show
+    it one sensor, or two, at a time: the others have no courses then.
     """
 
     @property
@@ -71,6 +66,43 @@ class Constraint(Protocol):
     def pairs(self, situation: Situation, first: int, second: int) -> Bools | None:
         """(num_courses of first, of second) which courses of two sensors go together; None: all."""
         ...
+
+
+@runtime_checkable
+class WithReach(Protocol):
+    """A constraint that is asked about pairs of sensors only where they may come near each other."""
+
+    @property
+    def reach(self) -> float:
+        """m; so near some two of their courses might come. 0: it is asked about none; without it, about all."""
+        ...
+
+
+@runtime_checkable
+class Timeless(Protocol):
+    """A constraint that decisions over several periods may ask once about each place."""
+
+    @property
+    def timeless(self) -> bool:
+        """Whether answers hang on poses and courses alone, neither on times nor on beliefs; without it: no."""
+        ...
+
+
+@runtime_checkable
+class WithViolations(Protocol):
+    """A constraint that says how much courses violate it; otherwise one that is not allowed counts 1.
+
+    Where a sensor has no course that all constraints allow, it may take those of the least sum.
+    """
+
+    def violations(self, situation: Situation) -> tuple[Floats, ...]:
+        """(num_courses,) how much each course violates it, one array a sensor; above 0 where it is not allowed."""
+        ...
+
+
+def reach_of(constraint: Constraint) -> float:
+    """m; what lies within it is asked of pairs of sensors, see `WithReach`."""
+    return constraint.reach if isinstance(constraint, WithReach) else math.inf
 
 
 class Alone:

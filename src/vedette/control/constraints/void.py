@@ -8,12 +8,11 @@ import numpy as np
 
 from vedette.control.constraints.discs import disc_probabilities, near_pairs
 from vedette.control.constraints.protocol import Alone, Situation
-from vedette.densities import GLMB, LMB, FactoredGLMB, Labelled, TrackTable
-from vedette.densities.factored import LABELLED
-from vedette.kernels.base.types import Floats, Ints
+from vedette.densities import Labelled, TrackTable
+from vedette.densities.labelled import LABELLED
+from vedette.kernels.base.types import FactoredGlmb, Floats, Ints
 from vedette.models.arguments import float_array, positive, reject
 from vedette.models.fields import Positive, Probability, check_fields, part
-from vedette.probabilities import expit
 
 # Entries of the tables that a GLMB's hypotheses take at a time.
 _BLOCK = 1 << 21
@@ -74,14 +73,13 @@ def void_probability(belief: Labelled, centres: Floats, radius: float) -> Floats
         raise reject("belief", LABELLED, type(belief).__name__)
     places = float_array("centres", centres, (None, 2))
     disc, track, inside = _inside(belief.tracks, places, radius)
-    if isinstance(belief, LMB):
+    if belief.is_lmb:
         with np.errstate(divide="ignore"):
-            log_void = np.log1p(-expit(belief.existence_logit)[track] * inside)
+            log_void = np.log1p(-belief.track_existence[track] * inside)
         return np.asarray(np.exp(np.bincount(disc, log_void, minlength=len(places))))
     outside = np.ones((len(places), belief.tracks.num_tracks))
     outside[disc, track] = 1.0 - inside
-    ends = np.array([0, belief.num_hyps]) if isinstance(belief, GLMB) else belief.factor_offsets
-    return _over_hypotheses(belief, ends, outside)
+    return _over_hypotheses(belief.to_factors(), outside)
 
 
 def _inside(tracks: TrackTable, centres: Floats, radius: float) -> tuple[Ints, Ints, Floats]:
@@ -97,7 +95,7 @@ def _inside(tracks: TrackTable, centres: Floats, radius: float) -> tuple[Ints, I
     return disc[new], track[new], np.minimum(total, 1.0)
 
 
-def _over_hypotheses(belief: GLMB | FactoredGLMB, factor_offsets: Ints, outside: Floats) -> Floats:
+def _over_hypotheses(belief: FactoredGlmb, outside: Floats) -> Floats:
     """(num,) product over factors of the mean over hypotheses of the products of their tracks' columns of `outside`.
 
     outside: (num, num_tracks).
@@ -113,5 +111,5 @@ def _over_hypotheses(belief: GLMB | FactoredGLMB, factor_offsets: Ints, outside:
         terms = np.tile(weights, (len(columns), 1))
         # Between the starts of hypotheses with tracks there are no others' tracks.
         terms[:, filled] *= np.multiply.reduceat(columns, belief.hyp_offsets[filled], axis=1)
-        found[begun : begun + rows] = np.add.reduceat(terms, factor_offsets[:-1], axis=1).prod(axis=1)
+        found[begun : begun + rows] = np.add.reduceat(terms, belief.factor_offsets[:-1], axis=1).prod(axis=1)
     return found

@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
 
-from vedette.control.allowed import beliefs_ahead
-from vedette.control.constraints import Constraint, Mask, Situation, courses_allowed, mask_of, pairs_allowed
+from vedette.control.constraints import (
+    Constraint,
+    Mask,
+    Situation,
+    Timeless,
+    courses_allowed,
+    mask_of,
+    pairs_allowed,
+    reach_of,
+)
+from vedette.control.inputs import beliefs_ahead
 from vedette.control.settings import MobileSensor, PlanningSettings
 from vedette.densities import Labelled
 from vedette.kernels.base.types import Bools, Floats
@@ -66,9 +74,8 @@ class Ahead:
     _beliefs: dict[int, tuple[Labelled, ...]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        reaches = [getattr(constraint, "reach", math.inf) for constraint in self.constraints]
-        self.on_pairs = max(reaches) > 0.0
-        self._timeless = all(getattr(constraint, "timeless", False) for constraint in self.constraints)
+        self.on_pairs = max(map(reach_of, self.constraints)) > 0.0
+        self._timeless = all(isinstance(own, Timeless) and own.timeless for own in self.constraints)
 
     def mask(self, places: Mapping[int, Place]) -> Mask:
         """Of the first decision, of all sensors; opened where it has to be. Raises `InputError` as `mask_of`."""

@@ -11,12 +11,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vedette.control.bounds import bound_of
 from vedette.control.constraints import Constraint
 from vedette.control.deciding import plan_of
 from vedette.control.evaluator import Evaluator
-from vedette.control.evidence import Evidence
-from vedette.control.explaining import Part
+from vedette.control.evidence import Evidence, Part
 from vedette.control.inputs import check_poses, check_steering, check_valuing
 from vedette.control.lookahead.ahead import Ahead, Stages
 from vedette.control.lookahead.beam import BeamSearch
@@ -25,7 +23,7 @@ from vedette.control.lookahead.problem import Best, JointSequence, LaidCourses, 
 from vedette.control.lookahead.rules import Rules
 from vedette.control.plan import Plan
 from vedette.control.preparation import AnyReward, Planned, check_sums, notes_of_state, planned_on
-from vedette.control.problem import searched
+from vedette.control.problem import bound_of, searched
 from vedette.control.rewards import ExpectedLossReward
 from vedette.control.search import AutomaticSearch
 from vedette.control.settings import MobileSensor, PlanningSettings

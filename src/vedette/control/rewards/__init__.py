@@ -1,6 +1,6 @@
 """How much a planned update is worth."""
 
-from vedette.control.rewards.base import LabelReward, PowerReward, Reward
+from vedette.control.rewards.base import LabelReward, LinearReward, PowerReward, Reward, WithUnitVolume
 from vedette.control.rewards.labels import (
     CardinalityVarianceReward,
     ExpectedGospaReward,
@@ -16,8 +16,10 @@ __all__ = [
     "ExpectedLossReward",
     "KullbackLeiblerReward",
     "LabelReward",
+    "LinearReward",
     "PeecsReward",
     "PowerReward",
     "RenyiReward",
     "Reward",
+    "WithUnitVolume",
 ]

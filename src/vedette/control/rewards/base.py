@@ -10,7 +10,7 @@ from typing import Any, Literal, Protocol, TypeAlias, runtime_checkable
 import numpy as np
 
 from vedette.densities import GLMB, LMB, as_lmb, existence_probabilities, track_moments
-from vedette.densities.label_sets import places_of
+from vedette.densities.tracks import places_of
 from vedette.divergence import power_integrals, reference_unit_volume
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats
@@ -38,8 +38,7 @@ class PowerReward(Protocol):
 
     Z(a, b) is the log of the set integral of K^((a + b - 1) |X|) predicted(X)^a updated(X)^b over the label sets that
     both have (see `vedette.divergence.power_integral`). The update need not be normalised: exp(Z(0, 1)) is what it
-    integrates to. Where it has an attribute `unit_volume`, that is K: a number, or "reference" for
-    `vedette.divergence.reference_unit_volume` of the prediction; otherwise K is 1.
+    integrates to. It may have the members of `WithUnitVolume` and `LinearReward`, too; without the first K is 1.
     """
 
     @property
@@ -80,6 +79,26 @@ class LabelReward(Protocol):
         ...
 
 
+@runtime_checkable
+class WithUnitVolume(Protocol):
+    """A reward of densities that says what their unit of volume is."""
+
+    @property
+    def unit_volume(self) -> UnitVolume:
+        """K: a number, or "reference" for `vedette.divergence.reference_unit_volume` of the prediction."""
+        ...
+
+
+@runtime_checkable
+class LinearReward(Protocol):
+    """A reward whose `combine` is linear: searches then have bounds and compiled ascents, explanations targets."""
+
+    @property
+    def coefficients(self) -> Sequence[float] | Floats | None:
+        """(num,) of the numbers that are combined; None, as without it: it is not linear."""
+        ...
+
+
 def check_unit_volume(value: Any) -> None:
     """`InputError` unless K is a finite number above 0, or the word "reference"."""
     if isinstance(value, str) and value == "reference":
@@ -91,7 +110,7 @@ def check_unit_volume(value: Any) -> None:
 
 def unit_volume_of(reward: Any, predicted: GLMB | LMB) -> float:
     """K of a reward; "reference" is 1 for a prediction that expects no target, where K has no say."""
-    value = getattr(reward, "unit_volume", 1.0)
+    value = reward.unit_volume if isinstance(reward, WithUnitVolume) else 1.0
     check_unit_volume(value)
     if value != "reference":
         return float(value)

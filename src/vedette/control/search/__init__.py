@@ -2,8 +2,15 @@
 
 from vedette.control.search.ascent import AutomaticSearch, CoordinateAscent
 from vedette.control.search.cross_entropy import CrossEntropy
-from vedette.control.search.exhaustive import ExhaustiveSearch, SequentialGreedy
-from vedette.control.search.problem import JointProblem, JointSearch, all_joint_actions, first_best, tie_of
+from vedette.control.search.greedy import SequentialGreedy
+from vedette.control.search.problem import (
+    ExhaustiveSearch,
+    JointProblem,
+    JointSearch,
+    all_joint_actions,
+    first_best,
+    tie_of,
+)
 
 __all__ = [
     "AutomaticSearch",

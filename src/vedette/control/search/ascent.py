@@ -8,8 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vedette.control.search.exhaustive import ExhaustiveSearch
-from vedette.control.search.problem import Joint, JointProblem, Known
+from vedette.control.search.problem import Joint, JointProblem, Known, best_of_all
 from vedette.models.fields import Count, Repeats, check_fields, part
 
 # Beyond so many sensors, every joint action is more than a decision has time for.
@@ -98,7 +97,7 @@ class AutomaticSearch:
     def search(self, problem: JointProblem, *, rng: np.random.Generator) -> tuple[int, ...]:
         """As the search that it is."""
         if len(problem.shape) <= _MAX_SENSORS and math.prod(problem.shape) <= self.max_joint_actions:
-            return ExhaustiveSearch(self.max_joint_actions).search(problem, rng=rng)
+            return best_of_all(problem, self.max_joint_actions)
         known = Known(problem)
         ascents(known, first_starts(known, _NUM_RESTARTS, rng=rng))
         more = _FIRST_TRIES // sum(problem.shape) - _NUM_RESTARTS

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
 from vedette.control.constraints import Mask, opened, repaired
+from vedette.errors import InputError
 from vedette.kernels.base.types import Floats, Ints
+from vedette.models.fields import Count, check_fields, part
 
 # Rewards nearer than this, relative to the best or to 1, are equal: rounding tells them apart, not what they are worth.
 _TIE = 1e-9
@@ -22,17 +25,13 @@ def first_best(rewards: Floats) -> int:
 
     In a symmetric layout mirrored actions differ by rounding only; the decision must not hang on that (paper-notes 18).
     """
-    return int(np.argmax(rewards >= least_equal(float(rewards.max()))))
+    best = float(rewards.max())
+    return int(np.argmax(rewards >= best - tie_of(best)))
 
 
 def tie_of(reward: float) -> float:
     """Rewards that differ from one by no more than this are equal to it."""
     return _TIE * max(1.0, abs(reward))
-
-
-def least_equal(best: float) -> float:
-    """The least reward that is as good as the best."""
-    return best - tie_of(best)
 
 
 class JointProblem(NamedTuple):
@@ -139,5 +138,67 @@ class Known:
 
     def best(self) -> Joint:
         """The best of all that are known; of equal ones the first in printed order."""
-        least = least_equal(max(self.values.values()))
+        best = max(self.values.values())
+        least = best - tie_of(best)
         return min(joint for joint, value in self.values.items() if value >= least)
+
+
+@part("exhaustive", "search")
+@dataclass(frozen=True, slots=True)
+class ExhaustiveSearch:
+    """Every joint action (paper, Algorithm 2): the best there is, and the oracle for all other searches.
+
+    With a mask only the joint actions that it allows are formed; if there is none, the mask is opened first
+    (`vedette.control.constraints.opened`).
+
+    Attributes:
+        max_joint_actions: bound on their number, which grows as a power of the number of sensors.
+
+    Raises:
+        InputError: a bound below 1.
+    """
+
+    max_joint_actions: Count = 1_000_000
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+
+    def search(self, problem: JointProblem, *, rng: np.random.Generator) -> tuple[int, ...]:
+        """The best of all; nothing is drawn. Raises `InputError` for more joint actions than `max_joint_actions`."""
+        return best_of_all(problem, self.max_joint_actions)
+
+
+def best_of_all(problem: JointProblem, most: int) -> Joint:
+    """The best of all joint actions that are allowed; raises `InputError` for more than `most`."""
+    if problem.mask is None:
+        num_joint = math.prod(problem.shape)
+        if num_joint > most:
+            sizes = " x ".join(map(str, problem.shape))
+            raise _too_many(most, f"{sizes} = {num_joint}")
+        joint_actions = all_joint_actions(problem.shape)
+    else:
+        joint_actions = _allowed(opened(problem.mask)[0], most)
+    best = first_best(problem.evaluate(joint_actions))
+    return tuple(joint_actions[best].tolist())
+
+
+def _allowed(mask: Mask, most: int) -> Ints:
+    """(num_allowed, num_sensors) in printed order, sensor by sensor those that what went before allows."""
+    found = np.empty((1, 0), np.int64)
+    for s, own in enumerate(mask.single):
+        courses = np.flatnonzero(own)
+        ahead = np.repeat(found, len(courses), axis=0)
+        found = np.column_stack([ahead, np.tile(courses, len(found))])
+        for other, clash in mask.others(s).items():
+            if other < s:
+                found = found[clash[found[:, other], found[:, s]] == 0]
+        if len(found) > most:
+            raise _too_many(most, f"more than that, of {s + 1} of {len(mask.single)} sensors")
+    return np.ascontiguousarray(found)
+
+
+def _too_many(most: int, got: str) -> InputError:
+    return InputError(
+        f"joint actions: expected at most {most} for an exhaustive search; got {got}; "
+        "allow more, or search by CoordinateAscent"
+    )

@@ -23,7 +23,7 @@ _FOUND: dict[Any, Any] = {}
 
 # Bundles with their types by identity, held so that no other comes to the same place: those that models make once.
 _HELD_KINDS = {Motion, Sensor}
-_HELD: dict[int, tuple[Any, Any]] = {}
+HELD: dict[int, tuple[Any, Any]] = {}
 _MOST_HELD = 1000
 
 
@@ -46,7 +46,7 @@ def _key(bundle: tuple[Any, ...]) -> tuple[Any, ...]:
 
 def type_of_bundle(value: tuple[Any, ...], context: Any = None) -> Any:
     """The Numba type of a bundle."""
-    held = _HELD.get(id(value))
+    held = HELD.get(id(value))
     if held is not None:
         return held[1]
     key = _key(value)
@@ -56,9 +56,9 @@ def type_of_bundle(value: tuple[Any, ...], context: Any = None) -> Any:
 
         found = _FOUND[key] = types.NamedTuple([typeof(field) for field in value], type(value))
     if type(value) in _HELD_KINDS:
-        if len(_HELD) >= _MOST_HELD:
-            _HELD.clear()
-        _HELD[id(value)] = value, found
+        if len(HELD) >= _MOST_HELD:
+            HELD.clear()
+        HELD[id(value)] = value, found
     return found
 
 

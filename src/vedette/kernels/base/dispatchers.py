@@ -6,6 +6,7 @@ Loaded when the first of them is called, compiled or read from disk.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from numba import types
@@ -18,13 +19,43 @@ from numba.core.sigutils import normalize_signature
 from numba.experimental.function_type import FunctionModel
 from numba.extending import NativeValue, register_model, typeof_impl, unbox
 
-from vedette.kernels.base.bundle_types import TYPED_BY_FIELDS, type_of_bundle, when_typed
+from vedette.kernels.base.bundle_types import HELD, TYPED_BY_FIELDS, type_of_bundle, when_typed
 from vedette.kernels.base.compile import SIGNATURES, ModelFunction
 from vedette.kernels.base.disk_cache import OnDemand
 from vedette.kernels.base.libraries import PartLibrary, WholeLibrary, made_as
-from vedette.kernels.base.returned import Shape, naming, returned_without_python, shape_of
+from vedette.kernels.base.returned import NAMED, returned_without_python
+
+# What is returned: None for anything without names inside it, else its class and those of its fields.
+Shape = tuple[type, tuple[Any, ...]] | None
 
 when_typed(lambda bundle: typeof_impl.register(bundle)(type_of_bundle))
+
+
+def shape_of(kind: Any) -> Shape:
+    """The names in a return type."""
+    if not isinstance(kind, types.BaseTuple):
+        return None
+    fields = tuple(shape_of(field) for field in kind.types)
+    if isinstance(kind, NAMED):
+        return kind.instance_class, fields
+    return (tuple, fields) if any(fields) else None
+
+
+def naming(shape: Shape) -> Callable[[tuple[Any, ...]], Any]:
+    """What gives the plain tuples of a shape their names."""
+    assert shape is not None
+    bundle, fields = shape
+    if not any(fields):
+        return partial(tuple.__new__, bundle)
+    inner = [(place, naming(field)) for place, field in enumerate(fields) if field]
+
+    def name(values: tuple[Any, ...]) -> Any:
+        named = list(values)
+        for place, of_field in inner:
+            named[place] = of_field(values[place])
+        return tuple.__new__(bundle, named)
+
+    return name
 
 
 class PartKernel(CPUDispatcher):  # type: ignore[misc]
@@ -80,7 +111,8 @@ class WholeKernel(CPUDispatcher):  # type: ignore[misc]
         Numba's own way notes a bundle's type as in use, for which the types of all its fields are hashed.
         """
         if type(value) in TYPED_BY_FIELDS:
-            return type_of_bundle(value)
+            held = HELD.get(id(value))
+            return type_of_bundle(value) if held is None else held[1]
         return super().typeof_pyval(value)
 
 
@@ -157,4 +189,4 @@ def _named_model_function(context: Any, builder: Any, kind: Any, value: ModelFun
     return struct._getvalue()
 
 
-__all__ = ["ModelDispatcher", "NumbaError", "PartKernel", "WholeKernel", "addresses_of"]
+__all__ = ["ModelDispatcher", "NumbaError", "PartKernel", "WholeKernel", "addresses_of", "naming", "shape_of"]

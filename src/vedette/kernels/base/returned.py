@@ -8,9 +8,8 @@ comes before or after it, and takes less time.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
-from functools import partial
 from typing import Any
 
 from llvmlite import ir
@@ -20,10 +19,8 @@ from numba.core.boxing import box_tuple
 from numba.core.pythonapi import _boxers
 from numba.np.numpy_support import as_dtype
 
-_NAMED = (types.NamedTuple, types.NamedUniTuple)
-
-# What is returned: None for anything without names inside it, else its class and those of its fields.
-Shape = tuple[type, tuple[Any, ...]] | None
+# What a named tuple is to Numba.
+NAMED = (types.NamedTuple, types.NamedUniTuple)
 
 
 def _box_array(kind: Any, value: Any, c: Any) -> Any:
@@ -41,7 +38,7 @@ def _box_array(kind: Any, value: Any, c: Any) -> Any:
     return array
 
 
-_BOXERS = {types.Array: _box_array, **dict.fromkeys(_NAMED, box_tuple)}
+_BOXERS = {types.Array: _box_array, **dict.fromkeys(NAMED, box_tuple)}
 
 
 @contextmanager
@@ -55,31 +52,4 @@ def returned_without_python() -> Iterator[None]:
         _boxers.functions.update(before)
 
 
-def shape_of(kind: Any) -> Shape:
-    """The names in a return type."""
-    if not isinstance(kind, types.BaseTuple):
-        return None
-    fields = tuple(shape_of(field) for field in kind.types)
-    if isinstance(kind, _NAMED):
-        return kind.instance_class, fields
-    return (tuple, fields) if any(fields) else None
-
-
-def naming(shape: Shape) -> Callable[[tuple[Any, ...]], Any]:
-    """What gives the plain tuples of a shape their names."""
-    assert shape is not None
-    bundle, fields = shape
-    if not any(fields):
-        return partial(tuple.__new__, bundle)
-    inner = [(place, naming(field)) for place, field in enumerate(fields) if field]
-
-    def name(values: tuple[Any, ...]) -> Any:
-        named = list(values)
-        for place, of_field in inner:
-            named[place] = of_field(values[place])
-        return tuple.__new__(bundle, named)
-
-    return name
-
-
-__all__ = ["Shape", "naming", "returned_without_python", "shape_of"]
+__all__ = ["NAMED", "returned_without_python"]

@@ -39,7 +39,7 @@ Weights = Annotated[tuple[Probability, ...], Field(strict=False, min_length=1)]
 
 
 @derived(
-    "vedette.fusion.base:FusionLimits",
+    "vedette.fusion.powers:FusionLimits",
     without=("log_min_component_weight",),
     first=("max_hypotheses", "max_components", "min_component_weight"),
 )

@@ -1,4 +1,4 @@
-"""What posteriors of one common prediction say together of labels that belong together: the sets of a group of them."""
+"""What posteriors of one common prediction say together: of single labels, and of label sets where labels contend."""
 
 from __future__ import annotations
 
@@ -8,22 +8,74 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vedette.densities import GLMB, LMB, FactoredGLMB, TrackTable, existence_probabilities
+from vedette.densities import GLMB, LMB, FactoredGLMB, TrackTable
 from vedette.densities.checks import offsets_of
-from vedette.densities.containers import unchecked
+from vedette.densities.containers import for_kernel, unchecked
 from vedette.densities.conversions import as_glmb
-from vedette.densities.joining import JoinedFactors
-from vedette.densities.label_sets import laid_out, places_of, take_tracks
+from vedette.densities.label_sets import JoinedFactors, laid_out
+from vedette.densities.tracks import place_labels, places_of
 from vedette.errors import InputError, NumericalError
 from vedette.fusion.base import count_lost
-from vedette.fusion.parallel_lmbs import unknown_label
+from vedette.fusion.powers import ONE
+from vedette.fusion.views import sum_over_sensors
 from vedette.kernels.base.types import Bools, Floats, Ints, Tracks
-from vedette.kernels.gaussian.mixtures import MixtureCaps
 from vedette.kernels.gaussian.pooling import pooled_tracks
 from vedette.kernels.labelled.groups import group_log_sums
+from vedette.kernels.labelled.stacking import stack_tracks
 from vedette.probabilities import log_expit, logit
 
-ONE = MixtureCaps(-math.inf, 0.0, 1)  # which make of a mixture the Gaussian of its moments
+
+class Posteriors(NamedTuple):
+    """The sensors' posteriors on the labels of the prediction."""
+
+    chosen: Ints  # (num_labels, num_sensors) place in `tracks`, -1 where the sensor lacks the label
+    tracks: Tracks  # of all sensors
+    logits: Floats  # (num_labels, num_sensors)
+
+
+def posteriors_of(prediction: LMB, beliefs: Sequence[LMB], missing_existence: float) -> Posteriors:
+    """The posteriors aligned. Raises `InputError` for a label that the prediction lacks."""
+    own = known_places(prediction.tracks.labels, [belief.tracks.labels for belief in beliefs])
+    starts = offsets_of([belief.tracks.num_tracks for belief in beliefs])[:-1]
+    floors = np.minimum(prediction.existence_logit, math.log(missing_existence) - math.log1p(-missing_existence))
+    chosen = np.where(own >= 0, own + starts, -1)
+    logits = np.concatenate([*(belief.existence_logit for belief in beliefs), np.zeros(1)])  # the last is nobody's
+    tracks = stack_tracks([belief.tracks.to_kernel() for belief in beliefs])
+    return Posteriors(chosen, tracks, np.where(chosen >= 0, logits[chosen], floors[:, None]))
+
+
+def known_places(prediction: Ints, posteriors: Sequence[Ints]) -> Ints:
+    """(num_labels, num_sensors) where posteriors have the labels of the prediction, in increasing order; -1: nowhere.
+
+    Raises `InputError` where one has a label that the prediction lacks.
+    """
+    labels, places = place_labels([prediction, *posteriors])
+    unknown = (places >= 0) & (places[:, :1] < 0)
+    if unknown.any():
+        sensor = int(unknown.any(axis=0).argmax())
+        label = labels[int(unknown[:, sensor].argmax())].tolist()
+        raise InputError(
+            f"beliefs[{sensor - 1}]: expected labels of views.prediction, from which it was updated; got {label}"
+        )
+    return places[:, 1:]
+
+
+def updated_logs(prior: Floats, posteriors: Floats, weights: Floats) -> Floats:
+    """prior + sum_s v_s (posterior_s - prior), where what is infinite and stays so adds nothing."""
+    base = prior[:, None]
+    with np.errstate(invalid="ignore"):
+        change = np.where((posteriors == base) | (weights == 0.0), 0.0, posteriors - base)
+        return np.asarray(prior + sum_over_sensors(weights * change))
+
+
+def check_evidence(labels: Ints, logits: Floats) -> None:
+    """Raise `NumericalError` where a label is certain to one and impossible to another."""
+    faulty = np.isnan(logits)
+    if faulty.any():
+        label = labels[int(np.flatnonzero(faulty)[0])].tolist()
+        raise NumericalError(
+            f"fusion: label {label} is certain to one sensor or the prediction and impossible to another"
+        )
 
 
 class GroupedSets(NamedTuple):
@@ -54,8 +106,9 @@ def grouped_sets(
     prediction, kept.
     """
     labels = np.unique(np.concatenate([part.tracks.labels for part in joined.parts(group)]), axis=0)
-    members, log_weights, log_kept = _predicted_sets(joined, group, labels, max_sets)
-    prior, chosen = log_weights.copy(), np.full((*members.shape, len(weights)), -1)
+    product, lost = as_glmb(joined.parts(group)[0], max_hypotheses=max_sets)
+    members, prior = _members(product, labels), for_kernel(product.hyp_log_weights)
+    log_weights, chosen = prior.copy(), np.full((*members.shape, len(weights)), -1)
     num_missing = np.zeros(len(weights), np.int64)
     for s, power in enumerate(weights.tolist()):
         density, groups = joined.densities[1 + s], joined.groups[1 + s]
@@ -74,13 +127,9 @@ def grouped_sets(
     distinct, place = np.unique(rows, axis=0, return_inverse=True)
     places = np.full(members.shape, -1)
     places[members] = place.ravel()
-    return GroupedSets(labels, log_weights, places, distinct[:, 0], distinct[:, 1:], num_missing, log_kept)
-
-
-def _predicted_sets(joined: JoinedFactors, group: int, labels: Ints, max_sets: int) -> tuple[Bools, Floats, float]:
-    """(num_sets, num_labels) who is in each set of the prediction, log weights, and log of what the cap left."""
-    product, lost = as_glmb(joined.parts(group)[0], max_hypotheses=max_sets)
-    return _members(product, labels), product.hyp_log_weights.copy(), float(np.log1p(-lost))
+    return GroupedSets(
+        labels, log_weights, places, distinct[:, 0], distinct[:, 1:], num_missing, float(np.log1p(-lost))
+    )
 
 
 def _members(glmb: GLMB, labels: Ints) -> Bools:
@@ -137,28 +186,6 @@ def check_single(prediction: FactoredGLMB) -> None:
         )
 
 
-def check_known_labels(joined: JoinedFactors) -> None:
-    """Raise `InputError` where a posterior has a label that the prediction lacks."""
-    prediction, *posteriors = joined.densities
-    for s, posterior in enumerate(posteriors):
-        unknown = places_of(posterior.tracks.labels, prediction.tracks.labels) < 0
-        if unknown.any():
-            raise unknown_label(s, posterior.tracks.labels[int(unknown.argmax())])
-
-
-def lmbs_alone(joined: JoinedFactors) -> tuple[LMB, list[LMB]]:
-    """What the prediction and each posterior are of the labels that are alone in all their factors."""
-    columns = zip(joined.densities, joined.places().T, strict=True)
-    prediction, *posteriors = [_lmb(density, factors[factors >= 0]) for density, factors in columns]
-    return prediction, posteriors
-
-
-def _lmb(density: FactoredGLMB, factors: Ints) -> LMB:
-    first = density.factor_offsets[factors]
-    logits = density.hyp_log_weights[first + 1] - density.hyp_log_weights[first]
-    return unchecked(LMB, take_tracks(density.tracks, density.track_offsets[factors]), logits)
-
-
 def fused_groups(
     groups: Sequence[GroupedSets], log_overlaps: Floats, means: Floats, covs: Floats, max_sets: int
 ) -> tuple[list[FactoredGLMB], float]:
@@ -197,10 +224,10 @@ def _group(labels: Ints, places: Ints, log_weights: Floats, means: Floats, covs:
 
 def lost_labels(posteriors: Sequence[FactoredGLMB], weights: Floats, fused: FactoredGLMB) -> int:
     """Labels that a sensor is sure of and the fused density is not."""
-    labels, existence = existence_probabilities(fused)
+    labels, existence = fused.label_existence()
     surest = np.zeros(len(labels))
     for posterior in [own for own, power in zip(posteriors, weights.tolist(), strict=True) if power > 0.0]:
-        known, own = existence_probabilities(posterior)
+        known, own = posterior.label_existence()
         places = places_of(known, labels)
         np.maximum.at(surest, places[places >= 0], own[places >= 0])
     return count_lost(surest[:, None], existence)

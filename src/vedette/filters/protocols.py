@@ -1,8 +1,16 @@
-"""What a filter step reports beside its posterior."""
+"""What every filter is, and what it reports of a step beside its posterior."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any, Protocol, runtime_checkable
+
+import numpy as np
+
+from vedette.densities import LMB, Labelled
+from vedette.errors import InputError
+from vedette.models import SensorModel, TargetModel
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,3 +65,77 @@ class FilterInfo:
     cap_met: bool
     factoring_error: float = 0.0
     reduction_error: float = 0.0
+
+
+@runtime_checkable
+class Filter(Protocol):
+    """How one sensor's belief meets time and a scan; one of your own is as good as those that are here.
+
+    What it believes may be anything that the fusion and the estimator after it take. A filter labels its targets if
+    that is a `GLMB`, an `LMB` or a `FactoredGLMB`; decisions need one that does.
+    """
+
+    @property
+    def targets(self) -> TargetModel:
+        """The targets, the same object for all sensors."""
+        ...
+
+    @property
+    def sensor(self) -> SensorModel:
+        """What the sensor sees."""
+        ...
+
+    def initial(self) -> Any:
+        """The belief before the first scan."""
+        ...
+
+    def step(
+        self, belief: Any, scan: Any, pose: Any, dt: float, step: int, *, rng: np.random.Generator
+    ) -> tuple[Any, FilterInfo]:
+        """Predict over `dt` seconds and update with a scan; see `DeltaGlmbFilter.step`."""
+        ...
+
+
+@runtime_checkable
+class TwoStepFilter(Filter, Protocol):
+    """A filter whose prediction and update can also be had apart: for several scans at one time, or none.
+
+    Needed of a filter of your own where a sensor may miss a scan, where sensors share their prediction, and where
+    targets are born of measurements: `births` then stand in for the sites of the targets' model.
+    """
+
+    def step(
+        self,
+        belief: Any,
+        scan: Any,
+        pose: Any,
+        dt: float,
+        step: int,
+        *,
+        rng: np.random.Generator,
+        births: LMB | None = None,
+    ) -> tuple[Any, FilterInfo]:
+        """Predict over `dt` seconds and update with a scan; see `DeltaGlmbFilter.step`."""
+        ...
+
+    def predict(self, belief: Any, dt: float, step: int, *, births: LMB | None = None) -> tuple[Any, FilterInfo]:
+        """The belief `dt` seconds later, with those who may have been born by then; see `DeltaGlmbFilter.predict`."""
+        ...
+
+    def update(self, belief: Any, scan: Any, pose: Any, *, rng: np.random.Generator) -> tuple[Any, FilterInfo]:
+        """The belief after a scan of its own time; see `DeltaGlmbFilter.update`."""
+        ...
+
+
+def labels_targets(tracker: Filter) -> bool:
+    """Whether the filter's belief is a `GLMB`, an `LMB` or a `FactoredGLMB`."""
+    return isinstance(tracker.initial(), Labelled)
+
+
+def shared_targets(filters: Sequence[Filter]) -> TargetModel:
+    """The one model of the targets that all these filters hold; `InputError` if they do not."""
+    targets = filters[0].targets
+    for i, other in enumerate(filters):
+        if other.targets != targets:
+            raise InputError(f"filters[{i}].targets: expected the target model of filters[0]; got another")
+    return targets

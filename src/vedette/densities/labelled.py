@@ -1,0 +1,203 @@
+"""What densities that name their targets have in common, and the simplest of them, the labelled multi-Bernoulli."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from dataclasses import dataclass
+from typing import Any, ClassVar, Literal, Self
+
+import numpy as np
+
+from vedette.densities import checks
+from vedette.densities.containers import MultiTarget, for_kernel, unchecked
+from vedette.densities.tracks import TrackTable, take_tracks
+from vedette.errors import InputError, NumericalError, VedetteError
+from vedette.kernels.base import types as kt
+from vedette.kernels.base.types import Floats, Ints
+from vedette.kernels.labelled.cardinality import convolved
+from vedette.probabilities import expit
+
+LABELLED = "a GLMB, an LMB or a FactoredGLMB"  # how messages call one
+
+
+class Labelled(MultiTarget):
+    """A density that names its targets: a product of factors, each a weighted list of label sets, over one track table.
+
+    An LMB is one factor a label, with the sets {} and {l}; a GLMB is one factor; a FactoredGLMB any number of them.
+    What is asked of all of them is asked here: nobody needs to know which of them one is.
+
+    Attributes:
+        tracks: track table of all factors.
+        is_lmb: whether every label is a factor of its own, of one track.
+        is_product: whether it is kept as a product of GLMBs, whatever their number.
+    """
+
+    __slots__ = ()
+    tracks: TrackTable
+    is_lmb: ClassVar[bool]
+    is_product: ClassVar[bool]
+
+    def _own_parts(self) -> None:
+        self._own_arrays()
+        if not isinstance(self.tracks, TrackTable):
+            raise InputError(f"tracks: expected a TrackTable; got {type(self.tracks).__name__}")
+        self._validate_form(InputError)
+
+    @property
+    def state_dim(self) -> int:
+        """Length of a target's state."""
+        return int(self.tracks.means.shape[1])
+
+    @property
+    @abstractmethod
+    def is_marginalised(self) -> bool:
+        """Whether every label set occurs once in its factor."""
+
+    @property
+    @abstractmethod
+    def track_existence(self) -> Floats:
+        """(num_tracks,) probability that there is a target and that it has this track."""
+
+    @abstractmethod
+    def label_existence(self) -> tuple[Ints, Floats]:
+        """See `vedette.densities.existence_probabilities`."""
+
+    @abstractmethod
+    def to_kernel(self) -> Any:
+        """The same arrays as the bundle that kernels take."""
+
+    @abstractmethod
+    def to_factors(self) -> kt.FactoredGlmb:
+        """The factors as kernels take them."""
+
+    def as_hypotheses(self) -> kt.Glmb:
+        """The hypotheses of all factors as one list; its weights sum to the number of factors."""
+        factors = self.to_factors()
+        return kt.Glmb(factors.tracks, factors.hyp_offsets, factors.hyp_tracks, factors.hyp_log_weights)
+
+    @abstractmethod
+    def with_labels(self, labels: Ints) -> Self:
+        """The same under other labels (num_tracks, 2), of which no two that differed are the same."""
+
+    def validate(self, *, error: type[VedetteError] = NumericalError) -> None:
+        """Raise unless tracks are probability densities and sets of them normalised, in label order, as the class says.
+
+        `InputError` for faults of form; `error` for values that are not finite, not normalised to 1e-9 or covariances
+        that are not symmetric positive definite.
+        """
+        self.tracks.validate(error=error)
+        self._validate_form(error)
+
+    @abstractmethod
+    def _validate_form(self, error: type[VedetteError]) -> None:
+        """Raise where what is not in the track table is not as it should be."""
+
+
+@dataclass(frozen=True, slots=True)
+class LMB(Labelled):
+    """Labelled multi-Bernoulli density: independent tracks, each with a probability of existence.
+
+    Attributes:
+        tracks: one track a label, in increasing label order.
+        existence_logit: (num_tracks,) log r - log(1 - r); keeps full precision near r = 0 and r = 1, where it may be
+            -inf and inf.
+
+    The arrays are copied, checked once, here, and read-only from then on.
+
+    Raises:
+        InputError: as `validate`.
+    """
+
+    tracks: TrackTable
+    existence_logit: Floats
+    is_lmb: ClassVar[Literal[True]] = True
+    is_product: ClassVar[Literal[False]] = False
+
+    def __post_init__(self) -> None:
+        self._own_parts()
+
+    @property
+    def existence(self) -> Floats:
+        """(num_tracks,) probabilities of existence r."""
+        return expit(self.existence_logit)
+
+    @property
+    def track_existence(self) -> Floats:
+        """(num_tracks,) the same: of one track a label."""
+        return self.existence
+
+    @property
+    def is_marginalised(self) -> bool:
+        """Yes."""
+        return True
+
+    def label_existence(self) -> tuple[Ints, Floats]:
+        """See `vedette.densities.existence_probabilities`."""
+        return self.tracks.labels, self.existence
+
+    def cardinality(self) -> Floats:
+        """Probabilities of 0, 1, ..., num_tracks targets."""
+        return poisson_binomial(self.existence_logit)
+
+    def to_kernel(self) -> kt.Lmb:
+        """The same arrays as the bundle that kernels take."""
+        return kt.Lmb(self.tracks.to_kernel(), for_kernel(self.existence_logit))
+
+    def to_factors(self) -> kt.FactoredGlmb:
+        """A factor a label, with the hypotheses that it is absent and that it is there."""
+        num = self.tracks.num_tracks
+        log_weights = np.empty((num, 2))
+        log_weights[:, 0] = -np.logaddexp(0.0, self.existence_logit)
+        log_weights[:, 1] = -np.logaddexp(0.0, -self.existence_logit)
+        each = np.arange(num + 1)
+        ends = np.repeat(each, 2)[:-1]
+        return kt.FactoredGlmb(self.tracks.to_kernel(), each, ends, np.arange(num), log_weights.ravel(), 2 * each)
+
+    def with_labels(self, labels: Ints) -> LMB:
+        """The same under other labels, put in increasing order."""
+        return self.with_fields(tracks=self.tracks.with_fields(labels=labels)).take(np.lexsort(labels.T[::-1]))
+
+    def take(self, places: Ints) -> LMB:
+        """The labels at `places`, in that order."""
+        return unchecked(LMB, take_tracks(self.tracks, places), self.existence_logit[places])
+
+    @classmethod
+    def from_kernel(cls, lmb: kt.Lmb) -> LMB:
+        """The arrays of a bundle as they are; a kernel's own need no check."""
+        return unchecked(cls, TrackTable.from_kernel(lmb.tracks), lmb.existence_logit)
+
+    @classmethod
+    def empty(cls, state_dim: int) -> LMB:
+        """The density that is certain of no target."""
+        return unchecked(cls, TrackTable.empty(state_dim), np.empty(0))
+
+    @classmethod
+    def from_bernoullis(cls, labels: Any, existence: Any, means: Any, covs: Any) -> LMB:
+        """Density of one Gaussian a label, in any order; it is put in increasing label order.
+
+        labels: (num_tracks, 2) integers. existence: (num_tracks,) in [0, 1]. means: (num_tracks, state_dim).
+        covs: (num_tracks, state_dim, state_dim). Raises `InputError` for another shape, a label twice, a probability
+        outside [0, 1], or a covariance that is not symmetric positive definite.
+        """
+        given = TrackTable.from_gaussians(labels, means, covs)
+        logit = checks.as_logits("existence", existence, given.num_tracks)
+        order = np.lexsort(given.labels.T[::-1])
+        return cls(take_tracks(given, order), logit[order])
+
+    def _validate_form(self, error: type[VedetteError]) -> None:
+        checks.check_array("existence_logit", self.existence_logit, np.float64, (self.tracks.num_tracks,))
+        in_order = checks.label_step_up(self.tracks.labels)
+        if not in_order.all():
+            place = int(np.flatnonzero(~in_order)[0])
+            pair = self.tracks.labels[place : place + 2].tolist()
+            raise InputError(f"tracks.labels[{place}]: expected distinct labels in increasing order; got {pair}")
+        checks.check_logits("existence_logit", self.existence_logit, error)
+
+
+def poisson_binomial(existence_logit: Floats) -> Floats:
+    """Distribution of the number of independent targets that exist."""
+    chances = np.stack([expit(-existence_logit), expit(existence_logit)], axis=1)
+    return convolved(chances.ravel(), 2 * np.arange(len(chances) + 1))
+
+
+__all__ = ["LABELLED", "LMB", "Labelled", "poisson_binomial"]

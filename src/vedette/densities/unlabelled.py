@@ -1,0 +1,207 @@
+"""Densities of targets without names that are all drawn alike: Poisson, independent identically distributed cluster."""
+
+from __future__ import annotations
+
+import math
+from abc import abstractmethod
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from vedette.densities import checks
+from vedette.densities.containers import MultiTarget, kernel_arrays, unchecked
+from vedette.densities.tracks import log_weights as logs_of
+from vedette.errors import InputError, NumericalError, VedetteError
+from vedette.kernels.base import types as kt
+from vedette.kernels.base.types import Floats
+from vedette.models.arguments import no_gaussians
+
+_POISSON = kernel_arrays("log_weights", "means", "covs")
+_CLUSTER = kernel_arrays("log_cardinality", "log_weights", "means", "covs")
+
+
+class Unlabelled(MultiTarget):
+    """A density of Gaussian components that name no target. The arrays are copied, checked once, and read-only."""
+
+    __slots__ = ()
+    log_weights: Floats
+    means: Floats
+    covs: Floats
+
+    def __post_init__(self) -> None:
+        self._own_arrays()
+        self.validate(error=InputError)
+
+    @property
+    def state_dim(self) -> int:
+        """Length of a target's state."""
+        return int(self.means.shape[1])
+
+    @property
+    @abstractmethod
+    def expected_number(self) -> float:
+        """Mean number of targets."""
+
+    @abstractmethod
+    def validate(self, *, error: type[VedetteError] = NumericalError) -> None:
+        """Raise unless the arrays fit each other and are a density."""
+
+
+@dataclass(frozen=True, slots=True)
+class Poisson(Unlabelled):
+    """Poisson density of intensity sum over i of exp(log_weights[i]) N(.; means[i], covs[i]).
+
+    Attributes:
+        log_weights: (num_components,) log of the expected number of targets that each component carries.
+        means: (num_components, state_dim).
+        covs: (num_components, state_dim, state_dim).
+
+    The arrays are copied, checked once, here, and read-only from then on.
+
+    Raises:
+        InputError: as `validate`.
+    """
+
+    log_weights: Floats
+    means: Floats
+    covs: Floats
+
+    @property
+    def expected_number(self) -> float:
+        """Mean number of targets."""
+        with np.errstate(over="ignore"):  # more than any number
+            return float(np.exp(self.log_weights).sum())
+
+    def cardinality(self) -> Floats:
+        """Probabilities of 0, 1, ... targets, up to a number beyond which less than 1e-20 remains."""
+        from scipy.special import gammaln
+
+        mean = self.expected_number
+        if not mean > 0.0:
+            return np.ones(1)
+        numbers = np.arange(math.ceil(mean + 12.0 * math.sqrt(mean)) + 41)
+        return np.asarray(np.exp(numbers * math.log(mean) - mean - gammaln(numbers + 1.0)))
+
+    def to_kernel(self) -> kt.Mixture:
+        """The same arrays as the bundle that kernels take."""
+        return kt.Mixture(*_POISSON(self))
+
+    @classmethod
+    def from_kernel(cls, mixture: kt.Mixture) -> Poisson:
+        """The arrays of a bundle as they are; a kernel's own need no check."""
+        return unchecked(cls, *mixture)
+
+    @classmethod
+    def empty(cls, state_dim: int) -> Poisson:
+        """The density that is certain of no target."""
+        return cls(np.empty(0), *no_gaussians(state_dim))
+
+    @classmethod
+    def from_gaussians(cls, expected_numbers: Any, means: Any, covs: Any) -> Poisson:
+        """Density from the expected number, mean and covariance of each component.
+
+        expected_numbers: (num_components,) linear. means: (num_components, state_dim).
+        covs: (num_components, state_dim, state_dim). Raises `InputError` for another shape, a negative number, or a
+        covariance that is not symmetric positive definite.
+        """
+        logs = logs_of("expected_numbers", expected_numbers)
+        return cls(logs, *checks.as_gaussians(means, covs, len(logs)))
+
+    def validate(self, *, error: type[VedetteError] = NumericalError) -> None:
+        """Raise unless every array has its type and shape and every component is a Gaussian.
+
+        `InputError` for faults of form; `error` for values that are not finite or covariances that are not symmetric
+        positive definite.
+        """
+        checks.check_array("means", self.means, np.float64, (None, None))
+        num_components, dim = self.means.shape
+        if dim == 0:
+            raise InputError("means: expected a state of at least 1 dimension; got 0")
+        checks.check_array("log_weights", self.log_weights, np.float64, (num_components,))
+        checks.check_array("covs", self.covs, np.float64, (num_components, dim, dim))
+        checks.check_log_weights("log_weights", self.log_weights, error)
+        checks.check_finite("means", self.means, error)
+        checks.check_covariances("covs", self.covs, error)
+
+
+@dataclass(frozen=True, slots=True)
+class IidCluster(Unlabelled):
+    """A number of targets from a cardinality distribution, each drawn from one density by itself.
+
+    The intensity is the expected number times that density.
+
+    Attributes:
+        log_cardinality: (most + 1,) log probabilities of 0, 1, ..., most targets, normalised.
+        log_weights: (num_components,) log mixture weights of the density of one target, normalised; there may be none
+            where the density is certain of no target.
+        means: (num_components, state_dim).
+        covs: (num_components, state_dim, state_dim).
+
+    The arrays are copied, checked once, here, and read-only from then on.
+
+    Raises:
+        InputError: as `validate`.
+    """
+
+    log_cardinality: Floats
+    log_weights: Floats
+    means: Floats
+    covs: Floats
+
+    @property
+    def expected_number(self) -> float:
+        """Mean number of targets."""
+        return float(np.exp(self.log_cardinality) @ np.arange(len(self.log_cardinality)))
+
+    def cardinality(self) -> Floats:
+        """Probabilities of 0, 1, ..., most targets."""
+        return np.asarray(np.exp(self.log_cardinality))
+
+    def to_kernel(self) -> tuple[Floats, kt.Mixture]:
+        """Log cardinality distribution and density of one target, as kernels take them."""
+        log_cardinality, *mixture = _CLUSTER(self)
+        return log_cardinality, kt.Mixture(*mixture)
+
+    @classmethod
+    def from_kernel(cls, log_cardinality: Floats, mixture: kt.Mixture) -> IidCluster:
+        """The arrays of a bundle as they are; a kernel's own need no check."""
+        return unchecked(cls, log_cardinality, *mixture)
+
+    @classmethod
+    def empty(cls, state_dim: int) -> IidCluster:
+        """The density that is certain of no target."""
+        return cls(np.zeros(1), np.empty(0), *no_gaussians(state_dim))
+
+    @classmethod
+    def from_gaussians(cls, cardinality: Any, weights: Any, means: Any, covs: Any) -> IidCluster:
+        """Density from linear probabilities of 0, 1, ... targets and the Gaussian mixture of one target.
+
+        cardinality: (most + 1,). weights: (num_components,), summing to one. means: (num_components, state_dim).
+        covs: (num_components, state_dim, state_dim). Raises `InputError` for another shape, probabilities or weights
+        that are negative or do not sum to one, or a covariance that is not symmetric positive definite.
+        """
+        log_cardinality, logs = logs_of("cardinality", cardinality), logs_of("weights", weights)
+        return cls(log_cardinality, logs, *checks.as_gaussians(means, covs, len(logs)))
+
+    def validate(self, *, error: type[VedetteError] = NumericalError) -> None:
+        """Raise unless the cardinalities and the weights are normalised and every component is a Gaussian.
+
+        `InputError` for faults of form; `error` for values that are not finite, not normalised to 1e-9 or covariances
+        that are not symmetric positive definite, and where there may be targets but no density of one.
+        """
+        checks.check_array("log_cardinality", self.log_cardinality, np.float64, (None,))
+        if len(self.log_cardinality) == 0:
+            raise InputError("log_cardinality: expected at least the probability of no target; got none")
+        checks.check_log_weights("log_cardinality", self.log_cardinality, error)
+        whole = np.array([0, len(self.log_cardinality)])
+        checks.check_normalised("log_cardinality", self.log_cardinality, whole, error)
+        checks.check_array("log_weights", self.log_weights, np.float64, (None,))
+        num = len(self.log_weights)
+        offsets = np.array([0, num] if num else [0])
+        checks.check_mixtures("", offsets, self.log_weights, self.means, self.covs, len(offsets) - 1, error)
+        if num == 0 and np.any(self.log_cardinality[1:] > -np.inf):
+            raise error("log_weights: expected the density of a target, as there may be some; got no component")
+
+
+__all__ = ["IidCluster", "Poisson", "Unlabelled"]

@@ -1,0 +1,138 @@
+"""The filters without labels: PHD, CPHD and CB-MeMBer."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Generic, TypeVar
+
+import numpy as np
+
+from vedette.densities import IidCluster, MultiBernoulli, Poisson
+from vedette.errors import NumericalError
+from vedette.filters.base import SingleSensorFilter
+from vedette.filters.inputs import check_belief, check_scan, model_errors
+from vedette.filters.protocols import FilterInfo
+from vedette.kernels.association.truncation import Truncation
+from vedette.kernels.base.types import Motion, ScanInput, Sensor
+from vedette.kernels.steps.cbmember import step_cb_member
+from vedette.kernels.steps.cphd import step_cphd
+from vedette.kernels.steps.phd import step_phd
+from vedette.models.arguments import generator
+
+_Density = TypeVar("_Density", Poisson, IidCluster, MultiBernoulli)
+_Inputs = tuple[ScanInput, Motion, Sensor, Truncation]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class UnlabelledFilter(SingleSensorFilter, ABC, Generic[_Density]):
+    """A filter of one sensor without labels: what they have in common.
+
+    Attributes and errors: as `SingleSensorFilter`.
+    """
+
+    kind: ClassVar[type[Any]]  # of the belief
+
+    def initial(self) -> _Density:
+        """The belief before the first scan: no target."""
+        empty: _Density = self.kind.empty(self.targets.state_dim)
+        return empty
+
+    def step(
+        self, belief: _Density, scan: Any, pose: Any, dt: float, step: int, *, rng: np.random.Generator
+    ) -> tuple[_Density, FilterInfo]:
+        """Predict over `dt` seconds and update with a scan; arguments, results and errors as `DeltaGlmbFilter.step`.
+
+        Nothing is drawn from `rng`; it is taken so that filters are interchangeable.
+        """
+        generator(rng)
+        measurements, num_duplicates = check_scan(scan, self.sensor)
+        prior = check_belief(belief, self.kind, self.targets.state_dim)
+        inputs = self._inputs(measurements, pose, dt, step)
+        with model_errors():
+            posterior, info = self._updated(prior, inputs, f"step {step}: ")
+        return posterior, replace(info, num_duplicates=num_duplicates)
+
+    @abstractmethod
+    def _updated(self, prior: _Density, inputs: _Inputs, place: str) -> tuple[_Density, FilterInfo]:
+        """The posterior and a report without `num_duplicates`. place: of errors."""
+
+    def _info(self, report: Any, num_tracks: int, most: int, log_likelihood: float, discarded: float) -> FilterInfo:
+        """What is alike in all reports. most: as many as the posterior may have."""
+        return FilterInfo(
+            log_likelihood=log_likelihood,
+            num_hypotheses=1,
+            num_tracks=num_tracks,
+            discarded_weight_bound=discarded,
+            dropped_existence=0.0,
+            num_clutter_raised=int(report.num_raised),
+            num_duplicates=0,
+            num_inexact_clusters=0,
+            search_cut=False,
+            cap_met=num_tracks >= most,
+        )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PhdFilter(UnlabelledFilter[Poisson]):
+    """Gaussian-mixture PHD filter of one sensor (Vo and Ma 2006).
+
+    Believes in a Poisson density; its intensity after a scan is that of the exact posterior of such a prior. Births
+    enter with their intensity, the existence of each site times its density, which is exact as well.
+
+    Attributes and errors: as `LmbFilter`.
+    """
+
+    kind: ClassVar[type[Poisson]] = Poisson
+
+    def _updated(self, prior: Poisson, inputs: _Inputs, place: str) -> tuple[Poisson, FilterInfo]:
+        posterior, report = step_phd(prior.to_kernel(), *inputs, self.limits.intensity_caps())
+        log_likelihood = report.log_total + report.log_clutter - self.sensor.clutter.rate
+        num, most = len(posterior.log_weights), self.limits.max_intensity_components
+        return Poisson.from_kernel(posterior), self._info(report, num, most, log_likelihood, 0.0)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CphdFilter(UnlabelledFilter[IidCluster]):
+    """Gaussian-mixture CPHD filter of one sensor (Vo, Vo and Cantoni 2007).
+
+    Believes in an iid cluster; its cardinality distribution and intensity after a scan are those of the exact posterior
+    of such a prior. The cardinality distribution of the births is that of the multi-Bernoulli birth (not a Poisson one
+    of the same mean), so that the predicted cardinality distribution is exact too.
+
+    Attributes and errors: as `LmbFilter`.
+    """
+
+    kind: ClassVar[type[IidCluster]] = IidCluster
+
+    def _updated(self, prior: IidCluster, inputs: _Inputs, place: str) -> tuple[IidCluster, FilterInfo]:
+        log_cardinality, mixture = prior.to_kernel()
+        cardinality, posterior, report = step_cphd(log_cardinality, mixture, *inputs, self.limits.intensity_caps())
+        if report.log_total == -math.inf:
+            raise NumericalError(f"{place}no number of targets can have given this scan; do the models forbid it?")
+        log_likelihood = report.log_total + report.log_clutter - self.sensor.clutter.rate
+        num, most = len(posterior.log_weights), self.limits.max_intensity_components
+        info = self._info(report, num, most, log_likelihood, -math.expm1(report.log_kept))
+        return IidCluster.from_kernel(cardinality, posterior), info
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CbMemberFilter(UnlabelledFilter[MultiBernoulli]):
+    """Gaussian-mixture cardinality-balanced multi-target multi-Bernoulli filter (Vo, Vo and Cantoni 2009).
+
+    Believes in a multi-Bernoulli density, to which the births are added as they are; prediction is exact. The update
+    approximates the posterior by a Bernoulli for each one missed and for each measurement. It takes detection to be
+    probable and clutter not too dense; then the expected number of targets is not biased, as Mahler's plain
+    multi-Bernoulli update is.
+
+    Attributes and errors: as `LmbFilter`.
+    """
+
+    kind: ClassVar[type[MultiBernoulli]] = MultiBernoulli
+
+    def _updated(self, prior: MultiBernoulli, inputs: _Inputs, place: str) -> tuple[MultiBernoulli, FilterInfo]:
+        limits = self.limits
+        posterior, report = step_cb_member(prior.to_kernel(), *inputs, limits.reduction(), limits.max_existence_logit)
+        info = self._info(report, len(posterior.existence_logit), limits.max_labels, math.nan, math.nan)
+        return MultiBernoulli.from_kernel(posterior), replace(info, dropped_existence=float(report.dropped_existence))

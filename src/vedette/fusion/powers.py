@@ -1,0 +1,152 @@
+"""Powers of mixtures and what a fusion may spend on them, and the fusion of track densities label by label."""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+
+from vedette.densities import TrackTable
+from vedette.densities.tracks import reduced_tracks
+from vedette.errors import InputError, NumericalError
+from vedette.kernels.base.types import Floats, Ints, Tracks
+from vedette.kernels.gaussian.mixtures import MixtureCaps
+from vedette.kernels.labelled.gci import fuse_tracks
+from vedette.models.arguments import instance, one_of, real
+from vedette.models.fields import Count, NonNegative, check_fields
+
+MixturePower = Literal["auto", "moment_matched", "component_wise", "quadrature"]
+MIXTURE_POWERS: tuple[MixturePower, ...] = ("auto", "moment_matched", "component_wise", "quadrature")
+
+ONE = MixtureCaps(-math.inf, 0.0, 1)  # which make of a mixture the Gaussian of its moments
+# Within these distances a merged Gaussian is as near to the truth as the power is: docs/decisions/0003.
+_MERGE_DISTANCE = {"auto": 2.0, "moment_matched": 0.0, "component_wise": 2.0, "quadrature": 0.5}
+
+MAX_DIM = 7  # of a state whose cubature rule has no negative weight
+
+
+class FusionLimits(NamedTuple):
+    """Caps on the cost of a fusion.
+
+    Attributes:
+        log_min_component_weight: log of the weight below which components of a track's mixture are dropped before it is
+            raised to a power and after the fusion; unused when moment matched.
+        merge_distance: components within this Mahalanobis distance are merged then; none: 2 for component_wise, 0.5 for
+            quadrature powers.
+        max_components: most components of a track before its power is taken; unused when moment matched.
+        max_combinations: bound on the combinations of components of one label at all sensors, max_components^sensors;
+            under `auto` so many fewer components are kept.
+        max_hypotheses: most label sets of the fused density.
+    """
+
+    log_min_component_weight: float = math.log(1e-5)
+    merge_distance: NonNegative | None = None
+    max_components: Count = 4
+    max_combinations: Count = 4096
+    max_hypotheses: Count = 1000
+
+
+class PowerRule(NamedTuple):
+    """How powers of mixtures of one state dimension are taken."""
+
+    caps: MixtureCaps
+    points: Floats  # (num_points, state_dim) of a cubature rule for the standard normal, empty without quadrature
+    point_weights: Floats  # (num_points,)
+
+
+def check_power(mixture_power: str, limits: FusionLimits, num_sensors: int) -> None:
+    """Raise `InputError` for an unknown power of mixtures or limits that cannot be kept."""
+    one_of("mixture_power", mixture_power, MIXTURE_POWERS)
+    check_limits(limits)
+    combinations = limits.max_components**num_sensors
+    if mixture_power in ("component_wise", "quadrature") and combinations > limits.max_combinations:
+        raise InputError(
+            f"limits.max_components: expected {limits.max_components}^{num_sensors} (components to the power of the "
+            f"number of sensors) to be at most max_combinations = {limits.max_combinations}; got {combinations}; "
+            f"lower max_components or use auto"
+        )
+
+
+def check_limits(limits: Any) -> None:
+    """Raise `InputError` unless these are caps that can be kept."""
+    instance("limits", limits, FusionLimits)
+    check_fields(limits, "limits.")
+    least = limits.log_min_component_weight
+    if not (isinstance(least, float) and least == -math.inf):
+        real("limits.log_min_component_weight", least)
+
+
+def power_rule(mixture_power: str, limits: FusionLimits, state_dim: int, num_sensors: int = 1) -> PowerRule:
+    """The caps and the cubature rule of a power of mixtures. Raises `InputError` where there is no rule."""
+    points, point_weights, most = np.empty((0, state_dim)), np.empty(0), int(limits.max_components)
+    if mixture_power == "auto":
+        most = min(most, int(limits.max_combinations ** (1.0 / num_sensors)) + 1)
+        while most > 1 and most**num_sensors > limits.max_combinations:
+            most -= 1
+    if mixture_power == "moment_matched" or (mixture_power == "auto" and most == 1):
+        return PowerRule(ONE, points, point_weights)
+    if mixture_power == "quadrature":
+        if state_dim > MAX_DIM:
+            raise InputError(f"mixture_power: quadrature needs at most {MAX_DIM} state dimensions; got {state_dim}")
+        points, point_weights = fifth_degree_rule(state_dim)
+    distance = limits.merge_distance if limits.merge_distance is not None else _MERGE_DISTANCE[mixture_power]
+    caps = MixtureCaps(float(limits.log_min_component_weight), float(distance), most)
+    return PowerRule(caps, points, point_weights)
+
+
+def fused_tracks(
+    labels: Ints, chosen: Ints, weights: Floats, tracks: Tracks, rule: PowerRule
+) -> tuple[TrackTable, Floats]:
+    """Fused track of each label and log of the integral of the product of the powers (paper eqs. 11 and 12).
+
+    labels: (num, 2). chosen: (num, S) each sensor's track in `tracks`, -1 where it does not know the label; of
+    mixtures already reduced. weights: (S,) or (num, S) fusion weights, positive where a track is chosen. The fused
+    mixtures are reduced by the rule's caps. Raises `NumericalError` where a product of powers is no density.
+    """
+    try:
+        offsets, log_weights, means, covs, log_overlaps = fuse_tracks(
+            chosen,
+            np.array(np.broadcast_to(weights, chosen.shape)),
+            tracks,
+            rule.points,
+            rule.point_weights,
+        )
+    except FloatingPointError as fault:
+        raise NumericalError(f"fusion of tracks: {fault}") from None
+    if len(rule.points) > 0:
+        # Hoelder: the integral is at most 1, which cubature may overshoot.
+        log_overlaps = np.minimum(log_overlaps, 0.0)
+    fused = Tracks(labels, offsets, log_weights, means, covs)
+    return TrackTable.from_kernel(reduced_tracks(fused, rule.caps)), log_overlaps
+
+
+def _simplex(dim: int) -> Floats:
+    """(dim + 1, dim) corners of a regular simplex on the unit sphere."""
+    corners = np.zeros((dim + 1, dim))
+    for i in range(dim):
+        corners[i, i] = math.sqrt((dim + 1) * (dim - i) / (dim * (dim - i + 1)))
+        corners[i + 1 :, i] = -corners[i, i] / (dim - i)
+    return corners
+
+
+@cache
+def fifth_degree_rule(dim: int) -> tuple[Floats, Floats]:
+    """Points and weights that integrate all polynomials of degree 5 and less under the standard normal of `dim` <= 7.
+
+    The centre, the corners of a regular simplex and its opposite, and the midpoints of their edges pushed out to the
+    same sphere: dim^2 + 3 dim + 3 points (Lu and Darmofal 2004, "Higher-dimensional integration with Gaussian weight
+    for applications in probabilistic design", after Mysovskikh). No weight is negative, so a covariance taken with
+    these points is never indefinite; for larger `dim` one would be.
+    """
+    corners = _simplex(dim)
+    first, second = np.triu_indices(dim + 1, 1)
+    edges = corners[first] + corners[second]
+    edges *= math.sqrt(dim / (2.0 * (dim - 1))) if dim > 1 else 0.0
+    radius = math.sqrt(dim + 2.0)
+    points = radius * np.concatenate([np.zeros((1, dim)), corners, -corners, edges, -edges])
+    weights = np.full(len(points), 2.0 * (dim - 1) ** 2 / ((dim + 1) ** 2 * (dim + 2) ** 2))
+    weights[: 2 * dim + 3] = dim**2 * (7 - dim) / (2.0 * (dim + 1) ** 2 * (dim + 2) ** 2)
+    weights[0] = 2.0 / (dim + 2)
+    return points, weights

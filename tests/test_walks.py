@@ -1,0 +1,73 @@
+"""The road of a scan and of a decision: how many calls it takes, and that `docs/architecture.md` names its files."""
+
+import re
+import sys
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+from types import FrameType
+from typing import Any
+
+import numpy as np
+import pytest
+
+import vedette
+from vedette.kernels.base.compile import JIT_ENABLED
+from vedette.scenarios import load_scenario, with_fields
+from vedette.scenarios.build import build_experiment, build_planner
+from vedette.simulation.loop import sensor_streams
+from vedette.simulation.scans import simulate_scans
+
+SOURCE = str(Path(vedette.__file__).parent)
+WALKS = (Path(__file__).parents[1] / "docs/architecture.md").read_text().split("## How one decision flows")[1]
+ROOMS = ("tracking", "filters", "control")
+
+pytestmark = pytest.mark.skipif(not JIT_ENABLED, reason="what is compiled is called as Python then")
+
+
+def calls_of(work: Callable[[], Any]) -> Counter[str]:
+    """How many frames of each of the library's files a call takes in this thread."""
+    found: Counter[str] = Counter()
+
+    def note(frame: FrameType, event: str, argument: Any) -> None:
+        name = frame.f_code.co_filename
+        if event == "call" and name.startswith(SOURCE):
+            found[Path(name).relative_to(SOURCE).as_posix()] += 1
+
+    sys.setprofile(note)
+    try:
+        work()
+    finally:
+        sys.setprofile(None)
+    return found
+
+
+@pytest.fixture(scope="module")
+def walks() -> dict[str, Counter[str]]:
+    """Of the fifth scan of `paper-a` and of a second decision by the expected loss after it, when all is warm."""
+    scenario = with_fields(load_scenario("paper-a"), {"control.reward": {"kind": "expected_loss", "cutoff": 100.0}})
+    experiment, planner = build_experiment(scenario), build_planner(scenario, "jdm", num_threads=1)
+    assert planner is not None
+    tracker, poses, rng = experiment.tracker, experiment.poses, np.random.default_rng(0)
+    truth = experiment.targets.truth(experiment.times, rng=rng)
+    rngs, found = sensor_streams(1, 0, 0, experiment.num_sensors), Counter[str]()
+    state = tracker.initial()
+    for step in range(1, 6):
+        scans = simulate_scans(truth.at(step - 1)[1], poses, experiment.sensors_at(step), rngs=rngs)
+        given = state, [None if scan is None else scan.measurements for scan in scans], poses, float(step)
+        found = calls_of(lambda given=given: tracker.step(*given, rngs=rngs))  # type: ignore[misc]
+        state, _ = tracker.step(*given, rngs=rngs)
+    planner.plan(state, poses, rng=rng)
+    return {"scan": found, "decision": calls_of(lambda: planner.plan(state, poses, rng=rng))}
+
+
+@pytest.mark.parametrize(("walk", "most"), [("scan", 250), ("decision", 600)])
+def test_it_takes_few_calls(walks: dict[str, Counter[str]], walk: str, most: int) -> None:
+    assert 50 < walks[walk].total() <= most, walks[walk].most_common()
+
+
+def test_every_file_on_the_way_is_in_the_lists(walks: dict[str, Counter[str]]) -> None:
+    named = set(re.findall(r"(\w+)\.py", WALKS))
+    on_the_way = {file for walk in walks.values() for file in walk if file.split("/")[0] in ROOMS}
+    assert len(on_the_way) > 10
+    assert {file for file in on_the_way if Path(file).stem not in named} == {"control/settings.py"}  # data
