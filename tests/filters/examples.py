@@ -101,7 +101,9 @@ def _polar(pose: Floats) -> tuple[Callable[[Floats], Floats], Callable[[Floats],
     return measure, jacobian
 
 
-def linear_scene(existence: float = 0.3, prob_survival: float = 0.9, prob_detection: float = 0.85) -> Scene:
+def linear_scene(
+    existence: float = 0.3, prob_survival: float = 0.9, prob_detection: float = 0.85, method: str = "ekf"
+) -> Scene:
     """Two sites a stone's throw apart seen in position: every measurement may be anyone's."""
     transition, noise = cv_matrices(3.0)
     rows = np.eye(2, 4)
@@ -113,7 +115,7 @@ def linear_scene(existence: float = 0.3, prob_survival: float = 0.9, prob_detect
         np.array([[119.0, 57.0]]),
     ]
     return Scene(
-        models.constant_velocity(3.0),
+        models.constant_velocity(3.0, method=method),
         models.constant_survival(prob_survival),
         models.BirthModel(np.array([existence, 0.2]), means, covs, steps=frozenset({1, 2})),
         models.SensorModel(
@@ -121,6 +123,7 @@ def linear_scene(existence: float = 0.3, prob_survival: float = 0.9, prob_detect
             models.constant_noise([12.0, 9.0]),
             models.constant_detection(prob_detection),
             models.region_clutter(200.0, REGION, "position"),
+            method=method,
         ),
         np.zeros(3),
         scans,
@@ -135,6 +138,7 @@ def linear_scene(existence: float = 0.3, prob_survival: float = 0.9, prob_detect
             prob_detection=lambda x: prob_detection,
             clutter_intensity=lambda z: 200.0 / 4e6,
             angular=(False, False),
+            method=method,
         ),
     )
 
@@ -199,6 +203,7 @@ def polar_scene(method: str) -> Scene:
 
 SCENES: dict[str, Callable[[], Scene]] = {
     "linear": linear_scene,
+    "linear ukf": lambda: linear_scene(method="ukf"),
     "ekf": lambda: polar_scene("ekf"),
     "ukf": lambda: polar_scene("ukf"),
     "ckf": lambda: polar_scene("ckf"),
@@ -238,6 +243,15 @@ def assert_same_mixtures(got: reference.Mixture, expected: reference.Mixture, to
         assert abs(w - expected_w) <= tolerance
         np.testing.assert_allclose(m / stds, expected_m / stds, rtol=0.0, atol=10.0 * tolerance)
         np.testing.assert_allclose(c / np.outer(stds, stds), expected_c / np.outer(stds, stds), atol=10.0 * tolerance)
+
+
+def assert_same_lmb(got: LMB, expected: reference.Lmb, tolerance: float = 1e-10) -> None:
+    """The same labels, existences and mixtures, in which equal components are one."""
+    found = plain_lmb(got)
+    assert found.keys() == expected.keys()
+    for label, (existence, mixture) in expected.items():
+        assert abs(found[label][0] - existence) <= tolerance
+        assert_same_mixtures(together(found[label][1]), together(mixture))
 
 
 def together(mixture: reference.Mixture) -> reference.Mixture:

@@ -15,7 +15,7 @@ from reference import glmb as oracle
 from reference.l1 import l1_distance
 from vedette import models
 from vedette.densities import GLMB, LMB, FactoredGLMB, TrackTable
-from vedette.errors import InputError, NumericalError
+from vedette.errors import NumericalError
 from vedette.filters import DeltaGlmbFilter, FactoredGlmbFilter, Limits
 from vedette.kernels.association.children import Parents
 from vedette.kernels.association.products import product_of
@@ -288,26 +288,3 @@ def test_products_of_many_factors_stay_few_and_lose_no_hypothesis():
 def test_the_error_bound_over_many_scenes():
     for seed in range(1000, 2000):
         assert_bound_holds(seed)
-
-
-def test_prediction_and_update_apart():
-    scene, rng = linear_scene(), np.random.default_rng(0)
-    tracker = FactoredGlmbFilter(scene.targets, scene.sensor, Limits.none(), 0.0)
-    together_, _ = tracker.step(tracker.initial(), scene.scans[0], scene.pose, DT, 1, rng=rng)
-    ahead, info = tracker.predict(tracker.initial(), DT, 1)
-    assert info.factoring_error == 0.0
-    after, _ = tracker.update(ahead, scene.scans[0], scene.pose, rng=rng)
-    got, wanted = terms_of(expanded(after)), terms_of(expanded(together_))
-    assert got.keys() == wanted.keys()
-    assert max(abs(got[key] - wanted[key]) for key in wanted) < 1e-10
-
-
-def test_faults_are_named():
-    scene, rng = linear_scene(), np.random.default_rng(0)
-    with pytest.raises(InputError, match="max_split_error: expected at most 2"):
-        FactoredGlmbFilter(scene.targets, scene.sensor, max_split_error=3.0)
-    with pytest.raises(InputError, match="max_factor_labels"):
-        FactoredGlmbFilter(scene.targets, scene.sensor, max_factor_labels=0)
-    tracker = FactoredGlmbFilter(scene.targets, scene.sensor)
-    with pytest.raises(InputError, match="belief: expected a FactoredGLMB"):
-        tracker.step(GLMB.empty(4), scene.scans[0], scene.pose, DT, 1, rng=rng)

@@ -219,3 +219,13 @@ def test_beliefs_that_cannot_be_fused():
         CmDeltaGlmb(HALVES).fuse([unchecked(GLMB, bad, one.hyp_offsets, one.hyp_tracks, one.hyp_log_weights), one])
     with pytest.raises(InputError, match="quadrature"):
         CmDeltaGlmb(HALVES, "quadrature").fuse([GLMB.empty(9)] * 2)
+
+
+def test_sensors_that_contradict_each_other_beyond_all_measure():
+    def belief(at, weights):
+        means = [[at, 0.0, 0.0, 0.0], [at, 5.0, 0.0, 0.0]]
+        tracks = TrackTable.from_gaussians([A, B], means, [1e-6 * np.eye(4)] * 2)
+        return GLMB.from_hypotheses(tracks, [[0], [1], [0, 1]], weights)
+
+    fused, _ = CmDeltaGlmb(HALVES).fuse([belief(0.0, [0.2, 0.3, 0.5]), belief(1e6, [0.4, 0.5, 0.1])])
+    fused.validate()
