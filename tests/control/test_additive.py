@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from control.examples import (
+    KNOWN,
     SETTINGS,
     A,
     B,
@@ -40,8 +41,6 @@ from vedette.densities import LMB
 from vedette.densities.label_sets import single_gaussians
 from vedette.fusion import ParallelUpdate
 from vedette.kernels.planning.ascent import Allowed
-
-KNOWN = replace(SETTINGS, association="known")
 
 
 def shared(num_sensors: int = 2, seed: int = 3, **parts: Any) -> Situation:
@@ -235,12 +234,3 @@ def test_the_expected_loss_is_what_its_formula_says(steps: int, order: float, me
             losses = [min(np.sqrt(np.trace(each[:2, :2])), 60.0) ** order for each in (seen, cov)]
             total -= prediction.existence[i] * ((1.0 - missed) * losses[0] + missed * losses[1])
         np.testing.assert_allclose(value, total, rtol=1e-9)
-
-
-def test_threads_change_nothing() -> None:
-    """The same bytes from one thread and from three."""
-    tables = []
-    for num_threads in (1, 3):
-        example = replace(shared(3, 2), settings=replace(KNOWN, num_threads=num_threads))
-        tables.append(additive_of(example).joint()(all_joint_actions((3, 3, 3))))
-    np.testing.assert_array_equal(tables[0], tables[1])
