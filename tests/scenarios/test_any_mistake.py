@@ -4,36 +4,35 @@ from __future__ import annotations
 
 import json
 import re
-from typing import Any
+from pathlib import Path
 
 import numpy as np
-from hypothesis import given, settings
-from hypothesis import strategies as st
+import pytest
 
+from fuzz.combinations import combination, lay_beside
 from fuzz.mutations import spoil_data
-from scenarios.strategies import scenarios
 from vedette.errors import ScenarioError
 from vedette.scenarios import parse_scenario
 
 
-@settings(max_examples=100)
-@given(scenarios(), st.integers(0, 2**32 - 1))
-def test_any_mistake_is_told_with_its_place(data: Any, seed: int) -> None:
-    """A valid scenario with a few of its values replaced, changed, left out, renamed or added to."""
-    text = json.dumps(spoil_data(np.random.default_rng(seed), data, 4), indent=1)
-    for word, number in (("-Infinity", "-.inf"), ("Infinity", ".inf"), ("NaN", ".nan")):
-        text = text.replace(word, number)
-    lines = [line_of(fault) for fault in faults(text)]
-    assert lines == sorted(lines)
-    assert all(1 <= line <= text.count("\n") + 1 for line in lines)
-
-
-def faults(text: str) -> list[str]:
-    try:
-        parse_scenario(text, "f.yaml")
-    except ScenarioError as error:
-        return error.faults
-    return []
+@pytest.mark.parametrize("seed", range(4))
+def test_any_mistake_is_told_with_its_place(seed: int, tmp_path: Path) -> None:
+    """Scenarios with a few of their values replaced, changed, left out, renamed or added to."""
+    lay_beside(tmp_path)
+    told = 0
+    for number in range(50):
+        rng = np.random.default_rng([seed, number])
+        text = json.dumps(spoil_data(rng, combination(rng), 4), indent=1)
+        for word, other in (("-Infinity", "-.inf"), ("Infinity", ".inf"), ("NaN", ".nan")):
+            text = text.replace(word, other)
+        try:
+            parse_scenario(text, "f.yaml", folder=tmp_path)
+        except ScenarioError as error:
+            lines = [line_of(fault) for fault in error.faults]
+            assert lines == sorted(lines)
+            assert all(1 <= line <= text.count("\n") + 1 for line in lines)
+            told += 1
+    assert told > 25
 
 
 def line_of(fault: str) -> int:
