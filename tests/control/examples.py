@@ -157,6 +157,18 @@ def situation(
     return Situation(sensors, fusion, settings, beliefs, fusion.fuse(beliefs)[0], POSES[:num_sensors])
 
 
+# Of two steps of 4 s each, from 1 s on.
+FIRST: Any = [3.0, 11.0]
+SECOND: Any = [1.0, 9.0]
+NEVER: Any = [0.5, 1.0, 9.5]
+
+
+def scanning(example: Situation, *times: Any) -> Situation:
+    """The sensors with these scan times."""
+    sensors = tuple(replace(own, scan_times=when) for own, when in zip(example.sensors, times, strict=True))
+    return replace(example, sensors=sensors)
+
+
 def crowded(num_targets: int) -> Situation:
     """Targets so near each other that each may have given any of the measurements."""
     rng = np.random.default_rng(4)

@@ -9,7 +9,10 @@ import numpy as np
 import pytest
 
 from control.examples import (
+    FIRST,
     KNOWN,
+    NEVER,
+    SECOND,
     SETTINGS,
     A,
     B,
@@ -20,6 +23,7 @@ from control.examples import (
     evaluator_of,
     lmb,
     mobile_sensor,
+    scanning,
     situation,
     sums_of,
 )
@@ -60,10 +64,12 @@ def single(example: Situation) -> Situation:
 
 
 @pytest.mark.lanes
-@pytest.mark.parametrize("method", ["auto", "ekf"])
-def test_labels_are_followed_as_in_plain_numpy(method: str) -> None:
-    """Existence, mean, covariance of every course, sample and label, at both sensors."""
-    example = situation("lmb", seed=2, settings=KNOWN, method=method)
+@pytest.mark.parametrize(
+    ("method", "times"), [("auto", None), ("ekf", None), ("auto", FIRST), ("auto", SECOND), ("auto", NEVER)]
+)
+def test_labels_are_followed_as_in_plain_numpy(method: str, times: Any) -> None:
+    """Existence, mean, covariance of every course, sample and label, at both sensors; one may not scan always."""
+    example = scanning(situation("lmb", seed=2, settings=KNOWN, method=method), times, None)
     evaluator = evaluator_of(example)
     labels, futures = draw_futures(example.fused, example.sensors, KNOWN, rng=np.random.default_rng(5))
     for s, (belief, sensor) in enumerate(zip(example.beliefs, example.sensors, strict=True)):
@@ -87,6 +93,8 @@ def test_labels_are_followed_as_in_plain_numpy(method: str) -> None:
                 np.testing.assert_allclose(ends.existence_logit[i], logit, rtol=1e-9, atol=1e-9)
                 np.testing.assert_allclose(ends.tracks.means[i], mean, rtol=1e-9)
                 np.testing.assert_allclose(ends.tracks.covs[i], cov, rtol=1e-8, atol=1e-9)
+    mine, its = (own.joint()(all_joint_actions((3, 3))).mean() for own in (additive_of(example), evaluator))
+    np.testing.assert_allclose(mine, its, rtol=0.2)
 
 
 @pytest.mark.parametrize(

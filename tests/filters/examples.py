@@ -10,10 +10,12 @@ from typing import Any
 import numpy as np
 
 import reference
+from densities.examples import plain_glmb as plain_glmb
+from densities.examples import plain_lmb as plain_lmb
 from reference import Floats
 from reference.glmb import Model
 from vedette import models
-from vedette.densities import GLMB, LMB, TrackTable
+from vedette.densities import LMB
 from vedette.filters import DeltaGlmbFilter, Limits, LmbFilter
 
 DT = 1.5
@@ -208,30 +210,6 @@ SCENES: dict[str, Callable[[], Scene]] = {
     "ukf": lambda: polar_scene("ukf"),
     "ckf": lambda: polar_scene("ckf"),
 }
-
-
-def plain_tracks(tracks: TrackTable) -> list[tuple[reference.Label, reference.Mixture]]:
-    """Label and mixture of each track."""
-    plain = []
-    for i, (step, index) in enumerate(tracks.labels.tolist()):
-        run = slice(tracks.offsets[i], tracks.offsets[i + 1])
-        weights = np.exp(tracks.log_weights[run])
-        mixture = [(float(w), m, c) for w, m, c in zip(weights, tracks.means[run], tracks.covs[run], strict=True)]
-        plain.append(((step, index), mixture))
-    return plain
-
-
-def plain_glmb(glmb: GLMB) -> reference.Glmb:
-    tracks = plain_tracks(glmb.tracks)
-    return [
-        (float(np.exp(log_weight)), dict(tracks[t] for t in glmb.hyp_tracks[low:high]))
-        for log_weight, low, high in zip(glmb.hyp_log_weights, glmb.hyp_offsets[:-1], glmb.hyp_offsets[1:], strict=True)
-    ]
-
-
-def plain_lmb(lmb: LMB) -> reference.Lmb:
-    tracks = plain_tracks(lmb.tracks)
-    return {label: (float(r), mixture) for r, (label, mixture) in zip(lmb.existence, tracks, strict=True)}
 
 
 def assert_same_mixtures(got: reference.Mixture, expected: reference.Mixture, tolerance: float = 1e-10) -> None:

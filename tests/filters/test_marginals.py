@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from filters.tables import choices_of, make_options, tables
+from filters.tables import make_options, marginals_of, tables
 from vedette.kernels.association.assignment import ABSENT, MISSED
 from vedette.kernels.association.marginals import option_marginals
 from vedette.kernels.association.search import SearchCaps
@@ -17,18 +17,6 @@ from vedette.kernels.association.search import SearchCaps
 pytestmark = pytest.mark.lanes
 
 UNLIMITED = SearchCaps(2**62, math.inf, 2**62)
-
-
-def marginals_of(options):
-    """Log total weight of all joint choices, and the log marginal probability of each option, by enumeration."""
-    choices = choices_of(options, range(len(options.offsets) - 1))
-    marginals = np.full(len(options.columns), -np.inf)
-    if not choices:
-        return -math.inf, marginals
-    for weight, chosen in choices:
-        marginals[list(chosen)] = np.logaddexp(marginals[list(chosen)], weight)
-    total = float(np.logaddexp.reduce([weight for weight, _ in choices]))
-    return total, marginals - total
 
 
 def assert_marginals(options, num_ranked=None):
