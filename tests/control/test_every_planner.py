@@ -36,18 +36,16 @@ from vedette.control import (
     KullbackLeiblerReward,
     MobileSensor,
     Plan,
-    PlanningSettings,
     RandomPlanner,
     RewardTable,
     Separation,
     TreeSearch,
-    planning_limits,
 )
 from vedette.control.racing import FIRST_ROUND
 from vedette.densities import GLMB, LMB, Poisson, UndetectedIntensity
 from vedette.densities.containers import unchecked
 from vedette.errors import InputError, ModelError, NumericalError
-from vedette.filters import CbMemberFilter, CphdFilter, Limits, PhdFilter
+from vedette.filters import CbMemberFilter, CphdFilter, PhdFilter
 from vedette.fusion import Clmb, CmDeltaGlmb
 from vedette.platforms import Actions, Courses
 from vedette.tracking import State
@@ -274,40 +272,6 @@ def test_an_ideal_scan_that_the_models_forbid(kind: str) -> None:
     assert message.endswith("do the models forbid the ideal scan?")
 
 
-@pytest.mark.parametrize(
-    ("changes", "message"),
-    [
-        ({"horizon_steps": 0}, "horizon_steps: expected a whole number of at least 1; got 0"),
-        ({"horizon_steps": 2.5}, "horizon_steps: expected a whole number"),
-        ({"num_samples": 0}, "num_samples: expected a whole number"),
-        ({"num_samples": "40"}, "num_samples: expected a whole number"),
-        ({"max_prior_hypotheses": -1}, "max_prior_hypotheses: expected a whole number"),
-        ({"horizon_period": 0.0}, "horizon_period: expected a number above 0; got 0.0"),
-        ({"horizon_period": np.inf}, "horizon_period: expected a finite number"),
-        ({"horizon_period": np.nan}, "horizon_period: expected a finite number"),
-        ({"detection_threshold": 1.5}, "detection_threshold: expected a probability"),
-        ({"ideal_measurements": "perfect"}, "ideal_measurements: expected one of ideal, expected, sampled"),
-        ({"num_threads": -1}, "num_threads: expected a whole number"),
-        ({"num_threads": 1.5}, "num_threads: expected a whole number"),
-        ({"limits": Limits()}, "limits: expected max_components 1, min_existence 0 and min_track_weight 1"),
-        ({"limits": replace(planning_limits(), max_components=2)}, "limits: expected max_components 1"),
-        ({"limits": replace(planning_limits(), min_track_weight=0.1)}, "limits: expected max_components 1"),
-        ({"confidence": 1.0}, "confidence: expected .*above 0 and below 1"),
-        ({"confidence": 0}, "confidence: expected .*above 0 and below 1"),
-        ({"confidence": "high"}, "confidence: expected .*finite number"),
-        ({"indifference": -0.1}, r"indifference: expected .*in \[0, 1\)"),
-        ({"indifference": 1.0}, r"indifference: expected .*in \[0, 1\)"),
-        ({"max_samples": 23}, "max_samples: expected .*at least 24"),
-        ({"max_samples": 100.5}, "max_samples: expected .*whole number"),
-        ({"max_seconds": 0.0}, "max_seconds: expected .*above 0"),
-        ({"end": np.nan}, "end: expected .*; got nan"),
-    ],
-)
-def test_settings(changes: dict[str, Any], message: str) -> None:
-    with pytest.raises(InputError, match=message):
-        PlanningSettings(**changes)
-
-
 def test_sensors() -> None:
     local = mobile_sensor("lmb").filter
     with pytest.raises(InputError, match="filter: expected a Filter, with targets, sensor"):
@@ -325,12 +289,6 @@ def test_filters_without_labels_cannot_be_planned_with(planner: Any, kind: Any) 
     belief = local.initial()
     with pytest.raises(InputError, match=rf"sensors\[0\].filter: expected one that labels its .*; got {kind.__name__}"):
         planner(sensors, Clmb((1.0,))).plan(State((belief,), belief), np.zeros((1, 3)), rng=np.random.default_rng(0))
-
-
-@pytest.mark.parametrize("value", [0.0, -1.0, np.nan, np.inf, "unit", True])
-def test_unit_volumes(value: Any) -> None:
-    with pytest.raises(InputError, match="unit_volume: expected a finite number above 0 or 'reference'"):
-        CauchySchwarzReward(value)
 
 
 def test_fixed_and_random_courses() -> None:

@@ -210,19 +210,6 @@ def test_bad_arguments(arguments: dict[str, Any], message: str) -> None:
         planner(lmbs(), **arguments)
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ({"exploration": -0.1}, "exploration"),
-        ({"rollout": "greedy"}, "rollout: expected one of random, kept"),
-        ({"batch": 0}, "batch"),
-    ],
-)
-def test_bad_searches(arguments: dict[str, Any], message: str) -> None:
-    with pytest.raises(InputError, match=message):
-        TreeSearch(**arguments)
-
-
 def test_what_is_no_sum_over_labels_is_refused() -> None:
     given = lmbs()
     with pytest.raises(InputError, match=r"reward, fusion: expected .* sums over labels"):

@@ -177,15 +177,6 @@ def test_more_joint_actions_than_allowed() -> None:
         ExhaustiveSearch().search(many, rng=rng())
 
 
-@pytest.mark.parametrize("number", [0, -1, 1.5, True, "many"])
-def test_numbers_that_are_none(number: Any) -> None:
-    with pytest.raises(InputError, match="max_joint_actions: expected a whole number"):
-        ExhaustiveSearch(number)
-    if number != 0:
-        with pytest.raises(InputError, match="num_restarts: expected a whole number"):
-            CoordinateAscent(number)
-
-
 def joint_plan(example: Situation, search: JointSearch) -> Plan:
     planner = JointPlanner(example.sensors, example.fusion, example.settings, CauchySchwarzReward("reference"), search)
     plan = planner.plan(*example.arguments, rng=np.random.default_rng(5))

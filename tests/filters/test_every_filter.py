@@ -228,31 +228,6 @@ def test_births_must_be_new(kind: Any) -> None:
 
 
 @pytest.mark.parametrize(
-    ("field", "values"),
-    [
-        ("max_hypotheses", (0, -1, 2.5, "many", 2**62 + 1, 10**30)),
-        ("max_search_nodes", (0,)),
-        ("max_components", (0,)),
-        ("max_labels", (0,)),
-        ("max_intensity_components", (0, 1.5)),
-        ("max_existence", (0.0, 1.0, -0.1, math.nan)),
-        ("min_relative_weight", (-0.1, 1.0, math.nan)),
-        ("min_component_weight", (-0.1, 1.0, math.nan)),
-        ("min_existence", (-0.1, 1.0, math.nan)),
-        ("min_track_weight", (-0.1, 1.1, math.nan)),
-        ("gate_probability", (0.0, 1.1, math.nan)),
-        ("merge_distance", (-1.0, math.nan)),
-        ("min_log_clutter", (-math.inf, math.inf, math.nan)),
-        ("max_position_std", (math.nan,)),
-    ],
-)
-def test_limits_out_of_range(field: str, values: tuple[Any, ...]) -> None:
-    for value in values:
-        with pytest.raises(InputError, match=rf"Limits\.{field}: expected .*; got "):
-            dataclasses.replace(Limits(), **{field: value})
-
-
-@pytest.mark.parametrize(
     ("kind", "field", "value", "message"),
     [
         (DeltaGlmbFilter, "assignment", "murty", "assignment: expected Ranked or Gibbs; got str"),
