@@ -9,13 +9,26 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fuzz.objects import everything
+from fuzz.objects import Made, everything, sensor
 from vedette import models
 from vedette.control import planning_limits
 from vedette.errors import InputError
+from vedette.evaluation import TrackedShare
 from vedette.filters import Limits
+from vedette.recorded import Cleaning
+from vedette.scenarios import GeneratedCrowd
+from vedette.scenarios.generated import GeneratedScene
+from vedette.simulation import ScriptedTargets
 
-GOOD = everything()
+GOOD = everything() | {  # and what is made of files and settings
+    "Cleaning": Made(Cleaning, {}),
+    "GeneratedCrowd": Made(GeneratedCrowd, {}),
+    "GeneratedScene": Made(GeneratedScene, {"num_sensors": 2}),
+    "ScriptedTargets": Made(
+        ScriptedTargets, {"motion": models.constant_velocity(5.0), "initial_states": np.ones((3, 4))}
+    ),
+    "TrackedShare": Made(TrackedShare, {"sensors": (sensor(),) * 2, "cutoff": 2.0, "order": 1.0}),
+}
 NAN, INF = math.nan, math.inf
 MEANS = np.array([[1.0, 2.0, 0.0, 0.0], [3.0, 4.0, 0.0, 0.0]])
 COVS = np.array([np.diag([50.0, 50.0, 25.0, 25.0]) ** 2] * 2)
@@ -90,6 +103,36 @@ REFUSED: list[Case] = [
     *each("Pointing", "half_widths_deg", [0.0], words="angles in"),
     *each("Pointing", "turn_rate_deg", 0.0, words="a number above 0"),
     ("Carried", {"carrier": GOOD["Carried"].arguments["pointing"]}, "pointing: expected columns other than"),
+    *each("Sequences", "platform", None, words="a platform"),
+    *each("Sequences", "period", 0.0),
+    *each("Sequences", "depth", 0),
+    *each("Cleaning", "max_gap", 0.0),
+    *each("Cleaning", "min_speed", -1.0),
+    *each("Cleaning", "max_speed", 0.0),
+    *each("Cleaning", "region", 3),
+    *each("GeneratedScene", "num_sensors", 0, 2.0, words="a whole number from 1 to 1000; got "),
+    *each("GeneratedScene", "num_targets", 0, words="a whole number from 1 to 2000; got 0"),
+    *each("GeneratedScene", "decide_every", 60, words="a whole number from 1 to 59; got 60"),
+    *each("GeneratedScene", "seed", -1, words="a whole number from 0 to"),
+    *each("GeneratedScene", "pattern", "swarm", words="one of spread, crowd; got 'swarm'"),
+    *each("GeneratedScene", "view", "none", words="one of full, limited; got 'none'"),
+    *each("GeneratedCrowd", "num_targets", 0, 2.0, words="a whole number from 1 to 100000; got "),
+    *each("GeneratedCrowd", "num_steps", True, words="a whole number from 1 to 10000; got True"),
+    *each("GeneratedCrowd", "density", 0, NAN, words=r"a number from 0.001 to 1e\+06; got "),
+    *each("GeneratedCrowd", "clutter", -1.0, words="a number from 0 to 100; got -1.0"),
+    *each("GeneratedCrowd", "measured", "range", words="one of position, bearing_range; got 'range'"),
+    *each("ScriptedTargets", "initial_states", np.ones((3, 3)), np.full((3, 4), NAN)),
+    *each("ScriptedTargets", "start_times", [1.0], [1.0, 2.0, NAN]),
+    ("ScriptedTargets", {"start_times": [1.0, 2.0, 3.0], "end_times": [9.0, 9.0, 2.0]}, "ScriptedTargets.end_times"),
+    *each("ScriptedTargets", "process_noise", [True], 3),
+    *each("ScriptedTargets", "initial_stds", np.ones((2, 4)), -np.ones((3, 4))),
+    *each("TrackedShare", "cutoff", 0.0, INF),
+    *each("TrackedShare", "order", 0.5),
+    *each("TrackedShare", "min_detection", 1.5),
+    *each("HorizonPlanner", "depth", 0),
+    *each("HorizonPlanner", "budget", 0),
+    *each("HorizonPlanner", "discount", 1.5),
+    *each("HorizonPlanner", "period", -1.0),
     *each("Carried", "carrier", 5, words="a platform"),
     *each("PlanningSettings", "horizon_steps", 0, words="a whole number of at least 1; got 0"),
     *each("PlanningSettings", "horizon_steps", 2.5, words="a whole number"),
