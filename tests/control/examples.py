@@ -10,7 +10,15 @@ from typing import Any
 import numpy as np
 
 from vedette import models
-from vedette.control import CauchySchwarzReward, Evaluator, MobileSensor, Plan, PlanningSettings, planning_limits
+from vedette.control import (
+    CauchySchwarzReward,
+    Evaluator,
+    JointPlanner,
+    MobileSensor,
+    Plan,
+    PlanningSettings,
+    planning_limits,
+)
 from vedette.control.additive.rewards import AdditiveRewards
 from vedette.control.cases import CaseRewards
 from vedette.control.inputs import options_of
@@ -43,6 +51,7 @@ SETTINGS = PlanningSettings(
     limits=EXACT_LIMITS,
     num_threads=1,
 )
+KNOWN = replace(SETTINGS, association="known")
 
 
 def sensor_model(**parts: Any) -> models.SensorModel:
@@ -148,6 +157,18 @@ def situation(
     return Situation(sensors, fusion, settings, beliefs, fusion.fuse(beliefs)[0], POSES[:num_sensors])
 
 
+# Of two steps of 4 s each, from 1 s on.
+FIRST: Any = [3.0, 11.0]
+SECOND: Any = [1.0, 9.0]
+NEVER: Any = [0.5, 1.0, 9.5]
+
+
+def scanning(example: Situation, *times: Any) -> Situation:
+    """The sensors with these scan times."""
+    sensors = tuple(replace(own, scan_times=when) for own, when in zip(example.sensors, times, strict=True))
+    return replace(example, sensors=sensors)
+
+
 def crowded(num_targets: int) -> Situation:
     """Targets so near each other that each may have given any of the measurements."""
     rng = np.random.default_rng(4)
@@ -163,6 +184,37 @@ def crowded(num_targets: int) -> Situation:
     sensors = tuple(mobile_sensor("lmb", platform=Courses(30.0, (-90.0, 30.0))) for _ in range(2))
     settings = replace(SETTINGS, limits=planning_limits(), num_samples=4)
     return Situation(sensors, fusion, settings, beliefs, fusion.fuse(beliefs)[0], POSES[:2])
+
+
+def decided(
+    example: Situation,
+    kind: Any = JointPlanner,
+    reward: Any = None,
+    *,
+    seed: int = 1,
+    undetected: Any = None,
+    **parts: Any,
+) -> Plan:
+    """A valid plan, by a planner of this kind; by default joint, by K that weighs number and places alike."""
+    reward = CauchySchwarzReward("reference") if reward is None else reward
+    planner = kind(example.sensors, example.fusion, example.settings, reward, **parts)
+    state = replace(example.state, undetected=undetected)
+    plan: Plan = planner.plan(state, example.poses, rng=np.random.default_rng(seed))
+    plan.validate()
+    return plan
+
+
+def assert_same_plan(one: Plan, other: Plan) -> None:
+    """To the last bit."""
+    assert (one.chosen, one.bound, one.certainty, one.counts) == (
+        other.chosen,
+        other.bound,
+        other.certainty,
+        other.counts,
+    )
+    for mine, its in zip(one.tables, other.tables, strict=True):
+        np.testing.assert_array_equal(mine.mean, its.mean)
+        np.testing.assert_array_equal(mine.standard_error, its.standard_error)
 
 
 def evaluator_of(situation: Situation, reward: Any = None, seed: int = 5) -> Evaluator:

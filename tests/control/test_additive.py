@@ -9,6 +9,10 @@ import numpy as np
 import pytest
 
 from control.examples import (
+    FIRST,
+    KNOWN,
+    NEVER,
+    SECOND,
     SETTINGS,
     A,
     B,
@@ -19,6 +23,7 @@ from control.examples import (
     evaluator_of,
     lmb,
     mobile_sensor,
+    scanning,
     situation,
     sums_of,
 )
@@ -41,8 +46,6 @@ from vedette.densities.tracks import single_gaussians
 from vedette.fusion import ParallelUpdate
 from vedette.kernels.planning.ascent import Allowed
 
-KNOWN = replace(SETTINGS, association="known")
-
 
 def shared(num_sensors: int = 2, seed: int = 3, **parts: Any) -> Situation:
     """All sensors believe the same, and take their scans in full."""
@@ -61,10 +64,12 @@ def single(example: Situation) -> Situation:
 
 
 @pytest.mark.lanes
-@pytest.mark.parametrize("method", ["auto", "ekf"])
-def test_labels_are_followed_as_in_plain_numpy(method: str) -> None:
-    """Existence, mean, covariance of every course, sample and label, at both sensors."""
-    example = situation("lmb", seed=2, settings=KNOWN, method=method)
+@pytest.mark.parametrize(
+    ("method", "times"), [("auto", None), ("ekf", None), ("auto", FIRST), ("auto", SECOND), ("auto", NEVER)]
+)
+def test_labels_are_followed_as_in_plain_numpy(method: str, times: Any) -> None:
+    """Existence, mean, covariance of every course, sample and label, at both sensors; one may not scan always."""
+    example = scanning(situation("lmb", seed=2, settings=KNOWN, method=method), times, None)
     evaluator = evaluator_of(example)
     labels, futures = draw_futures(example.fused, example.sensors, KNOWN, rng=np.random.default_rng(5))
     for s, (belief, sensor) in enumerate(zip(example.beliefs, example.sensors, strict=True)):
@@ -88,6 +93,8 @@ def test_labels_are_followed_as_in_plain_numpy(method: str) -> None:
                 np.testing.assert_allclose(ends.existence_logit[i], logit, rtol=1e-9, atol=1e-9)
                 np.testing.assert_allclose(ends.tracks.means[i], mean, rtol=1e-9)
                 np.testing.assert_allclose(ends.tracks.covs[i], cov, rtol=1e-8, atol=1e-9)
+    mine, its = (own.joint()(all_joint_actions((3, 3))).mean() for own in (additive_of(example), evaluator))
+    np.testing.assert_allclose(mine, its, rtol=0.2)
 
 
 @pytest.mark.parametrize(
@@ -235,12 +242,3 @@ def test_the_expected_loss_is_what_its_formula_says(steps: int, order: float, me
             losses = [min(np.sqrt(np.trace(each[:2, :2])), 60.0) ** order for each in (seen, cov)]
             total -= prediction.existence[i] * ((1.0 - missed) * losses[0] + missed * losses[1])
         np.testing.assert_allclose(value, total, rtol=1e-9)
-
-
-def test_threads_change_nothing() -> None:
-    """The same bytes from one thread and from three."""
-    tables = []
-    for num_threads in (1, 3):
-        example = replace(shared(3, 2), settings=replace(KNOWN, num_threads=num_threads))
-        tables.append(additive_of(example).joint()(all_joint_actions((3, 3, 3))))
-    np.testing.assert_array_equal(tables[0], tables[1])

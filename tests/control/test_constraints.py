@@ -269,21 +269,3 @@ def test_courses_of_too_few_sensors() -> None:
 def test_beliefs_for_all_times_are_enough() -> None:
     beliefs = (LMB.empty(4),)
     assert mask_of([Own(needs_beliefs=True)], three()._replace(beliefs=beliefs)).notes == ()
-
-
-@pytest.mark.parametrize(
-    ("make", "message"),
-    [
-        (lambda: Separation(0.0), "distance: expected a number above 0; got 0"),
-        (lambda: StayInside((0, 1, 0, 1)), "region: expected a Region"),  # type: ignore[arg-type]
-        (
-            lambda: KeepOut(CORNERS[:2]),
-            "area: expected a Region, or a polygon of at least 3 corners; got 2 corners",
-        ),
-        (lambda: KeepOut(np.zeros((1, 3))), "area: expected an array of shape"),
-        (lambda: KeepOut("here"), "area: expected"),  # type: ignore[arg-type]
-    ],
-)
-def test_fields_out_of_range(make: Any, message: str) -> None:
-    with pytest.raises(InputError, match=message):
-        make()

@@ -8,13 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from control.examples import SETTINGS, Situation, situation
+from control.examples import KNOWN, Situation, decided, situation
 from vedette.control import ExpectedLossReward, HorizonPlanner, IndependentPlanner, JointPlanner, KullbackLeiblerReward
 from vedette.control.priors import predicted
 from vedette.densities import LMB, at_peaks
 from vedette.probabilities import expit
 
-KNOWN = replace(SETTINGS, association="known")
 PLANNERS = (JointPlanner, IndependentPlanner, HorizonPlanner)
 
 
@@ -29,10 +28,6 @@ def alone(of: Situation, label: int) -> Situation:
     return replace(of, beliefs=(one,) * len(of.sensors), fused=one)
 
 
-def plan(kind: Any, of: Situation, reward: Any) -> Any:
-    return kind(of.sensors, of.fusion, of.settings, reward).plan(*of.arguments, rng=np.random.default_rng(1))
-
-
 def errors(of: Situation, chosen: tuple[int, ...]) -> Any:
     """(num_labels,) existence and error at the end if detected, out of rewards under a cutoff that cuts nothing off."""
     existence = expit(of.fused.existence_logit)
@@ -41,13 +36,13 @@ def errors(of: Situation, chosen: tuple[int, ...]) -> Any:
     ).tracks.covs
     found = []
     for label, own in enumerate(existence):
-        loss = -plan(JointPlanner, alone(of, label), ExpectedLossReward(1e6, 2.0)).tables[0].mean[chosen] / own
+        loss = -decided(alone(of, label), JointPlanner, ExpectedLossReward(1e6, 2.0)).tables[0].mean[chosen] / own
         # Where nothing is detected the error is that of the prediction; a cutoff between the two tells them apart.
         unseen = covs[label, 0, 0] + covs[label, 1, 1]
-        tiny = -plan(JointPlanner, alone(of, label), ExpectedLossReward(1e-3)).tables[0].mean[chosen] / own
+        tiny = -decided(alone(of, label), JointPlanner, ExpectedLossReward(1e-3)).tables[0].mean[chosen] / own
         assert tiny == pytest.approx(1e-3, rel=1e-6)
         between = np.sqrt(0.5 * (loss + unseen))
-        cut = -plan(JointPlanner, alone(of, label), ExpectedLossReward(between, 2.0)).tables[0].mean[chosen] / own
+        cut = -decided(alone(of, label), JointPlanner, ExpectedLossReward(between, 2.0)).tables[0].mean[chosen] / own
         detected = 1.0 - (loss - cut) / (unseen - between**2)
         found.append(np.sqrt((loss - (1.0 - detected) * unseen) / detected))
     return existence, np.array(found)
@@ -57,7 +52,7 @@ def errors(of: Situation, chosen: tuple[int, ...]) -> Any:
 def test_a_plan_tells_of_targets_that_do_not_count(kind: Any) -> None:
     of = given()
     for cutoff in (5.0, 12.0, 15.0, 20.0, 25.0, 30.0, 60.0):
-        made = plan(kind, of, ExpectedLossReward(cutoff))
+        made = decided(of, kind, ExpectedLossReward(cutoff))
         existence, error = errors(of, made.chosen)
         lost = existence[error > cutoff].sum() > 0.1 * existence.sum()
         told = [note for note in made.notes if note.startswith("cutoff of the expected loss")]
@@ -71,7 +66,7 @@ def test_a_plan_tells_of_targets_that_do_not_count(kind: Any) -> None:
 def test_nothing_is_told_of_others(kind: Any) -> None:
     of = given()
     for reward in (ExpectedLossReward(), KullbackLeiblerReward()):
-        assert not [note for note in plan(kind, of, reward).notes if "cutoff" in note]
+        assert not [note for note in decided(of, kind, reward).notes if "cutoff" in note]
 
 
 def test_targets_out_of_view_are_none_of_the_cutoff_s_doing() -> None:
@@ -79,4 +74,4 @@ def test_targets_out_of_view_are_none_of_the_cutoff_s_doing() -> None:
     of = situation("lmb", settings=KNOWN)
     far = LMB(of.fused.tracks, of.fused.existence_logit)
     away = replace(of, fused=far, poses=of.poses + np.array([1e5, 0.0, 0.0]))
-    assert not [note for note in plan(JointPlanner, away, ExpectedLossReward(5.0)).notes if "cutoff" in note]
+    assert not [note for note in decided(away, JointPlanner, ExpectedLossReward(5.0)).notes if "cutoff" in note]

@@ -11,8 +11,18 @@ import numpy as np
 import pytest
 from scipy.special import expit
 
-from control.examples import SETTINGS, Situation, additive_of, cases_of, evaluator_of, situation, sums_of
-from control.test_additive import KNOWN, shared, single
+from control.examples import (
+    KNOWN,
+    SETTINGS,
+    Situation,
+    additive_of,
+    cases_of,
+    decided,
+    evaluator_of,
+    situation,
+    sums_of,
+)
+from control.test_additive import shared, single
 from vedette.control import (
     CauchySchwarzReward,
     Explanation,
@@ -50,9 +60,7 @@ LINEAR = [
 
 def planned(example: Situation, reward: Any, kind: Any = JointPlanner) -> tuple[Plan, AdditiveRewards]:
     """A plan, and the rewards that it was made on."""
-    plan = kind(example.sensors, example.fusion, example.settings, reward).plan(
-        *example.arguments, rng=np.random.default_rng(5)
-    )
+    plan = decided(example, kind, reward, seed=5)
     return plan, sums_of(additive_of(example, reward))
 
 
@@ -253,11 +261,9 @@ def test_an_independent_decision_is_the_sum_of_the_sensors_own() -> None:
 @pytest.mark.parametrize("planner", [JointPlanner, IndependentPlanner])
 def test_decisions_case_by_case_say_what_they_cannot_tell(kind: str, planner: Any) -> None:
     example = situation(kind, 2, 1, SETTINGS)
-    plan = planner(example.sensors, example.fusion, example.settings, CauchySchwarzReward()).plan(
-        *example.arguments, rng=np.random.default_rng(2)
-    )
+    plan = decided(example, planner, CauchySchwarzReward(), seed=2)
     why = plan.explain()
-    assert why.of_targets is why.of_sensors is why.without is why.baseline is None
+    assert [why.of_targets, why.of_sensors, why.without, why.baseline] == [None] * 4
     assert "case by case" in why.missing["without"]
     assert why.runner_up is not None
     had = why.had(0, why.runner_up.actions[0])

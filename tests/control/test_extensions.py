@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from control.examples import SETTINGS, cases_of, evaluator_of, sample_rewards, situation
-from vedette.control import CauchySchwarzReward, IndependentPlanner, JointPlanner, RenyiReward
+from control.examples import SETTINGS, cases_of, decided, evaluator_of, sample_rewards, situation
+from vedette.control import CauchySchwarzReward, ExpectedLossReward, IndependentPlanner, JointPlanner, RenyiReward
 from vedette.control.cases import warn_slow
 from vedette.densities import cardinality_distribution
 from vedette.divergence import cauchy_schwarz
@@ -69,9 +69,7 @@ class TurnsAtMost:
 
 def test_actions_of_the_users_own() -> None:
     example = situation("marginal", platform=TurnsAtMost(0.6))
-    plan = JointPlanner(example.sensors, example.fusion, SETTINGS).plan(
-        *example.arguments, rng=np.random.default_rng(5)
-    )
+    plan = decided(example, JointPlanner, ExpectedLossReward(), seed=5)
     for own in plan.actions:
         assert own.columns == ("turn_rad", "reach")
         np.testing.assert_array_equal(own.values, [[-0.6, 1.0], [0.0, 1.0], [0.6, 1.0]])
@@ -95,9 +93,7 @@ def test_a_fusion_of_the_users_own(kind: str) -> None:
     rewards = sample_rewards(evaluator, (0, 1), example.fusion)
     alone = sample_rewards(evaluator, (0,), None)
     np.testing.assert_allclose(rewards, np.repeat(alone, 3, axis=0), rtol=1e-9)
-    plan = JointPlanner(example.sensors, example.fusion, SETTINGS, CauchySchwarzReward()).plan(
-        *example.arguments, rng=np.random.default_rng(5)
-    )
+    plan = decided(example, JointPlanner, CauchySchwarzReward(), seed=5)
     assert plan.chosen == (int(alone.mean(axis=1).argmax()), 0)
 
 

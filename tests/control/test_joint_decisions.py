@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from control.examples import SETTINGS, A, B, C, Situation, lmb, mobile_sensor, situation
+from control.examples import KNOWN, A, B, C, Situation, lmb, mobile_sensor, situation
 from vedette import models
 from vedette.control import (
     AutomaticSearch,
@@ -29,8 +29,6 @@ from vedette.densities import LMB, UndetectedIntensity
 from vedette.fusion import Clmb, ParallelUpdate
 from vedette.platforms import Courses
 from vedette.tracking import State
-
-KNOWN = replace(SETTINGS, association="known")
 
 
 def planner_of(
@@ -100,18 +98,6 @@ def test_greedy_has_half_of_the_best_where_nothing_is_lost_by_more_scans() -> No
     assert best.bound is not None
     assert greedy.bound is not None
     assert greedy.bound.reward >= 0.5 * best.bound.reward
-
-
-@pytest.mark.parametrize("reward", [CauchySchwarzReward(), ExpectedLossReward(100.0)])
-def test_nothing_known_is_a_decision_of_no_worth(reward: Any) -> None:
-    """No label at all: every reward is 0, and the first action is taken."""
-    example = crowd(2)
-    empty = LMB.empty(4)
-    plan = planner_of(example, reward).plan(
-        State((empty,) * 2, empty, 1, 1.0), example.poses, rng=np.random.default_rng(1)
-    )
-    assert plan.chosen == (0, 0)
-    assert plan.expected_rewards[0] == (0.0, 0.0)
 
 
 def test_glmbs_of_many_sensors_are_planned_on_their_lmbs() -> None:

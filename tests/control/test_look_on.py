@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 import pytest
 
-from control.examples import HEADINGS, SETTINGS, Situation, mobile_sensor, sums_of, target_model
+from control.examples import HEADINGS, KNOWN, Situation, assert_same_plan, decided, mobile_sensor, sums_of, target_model
 from vedette import models
 from vedette.control import (
     Evaluator,
@@ -19,6 +18,7 @@ from vedette.control import (
     IndependentPlanner,
     JointPlanner,
     KullbackLeiblerReward,
+    Plan,
 )
 from vedette.control.evaluator import at_all, continued, look_on
 from vedette.control.evidence import Evidence
@@ -31,7 +31,6 @@ from vedette.fusion import ParallelUpdate
 from vedette.platforms import Carried, Courses, Options, Pointing, Steps, Still
 from vedette.platforms.base import options_at
 
-KNOWN = replace(SETTINGS, association="known")  # two steps of 4 s
 HORIZON = KNOWN.horizon_times()
 TIMES = np.array([2.0, 4.0, 5.0, 8.0, 10.0, 12.0, 16.0, 18.5, 24.0, 40.0])
 SIGHT, SPEED = 200.0, 30.0
@@ -63,10 +62,8 @@ def placed(belief: LMB, poses: Any, sensors: Any = None, **settings: Any) -> Sit
     )
 
 
-def plan(kind: Any, of: Situation, reward: Any = REWARD, undetected: Any = None, **arguments: Any) -> Any:
-    state = replace(of.state, undetected=undetected)
-    made = kind(of.sensors, of.fusion, of.settings, reward, **arguments)
-    return made.plan(state, of.poses, rng=np.random.default_rng(1))
+def made_by(kind: Any, of: Situation, reward: Any = REWARD, **parts: Any) -> Plan:
+    return decided(of, kind, reward, **parts)
 
 
 # continued
@@ -293,27 +290,28 @@ def test_a_sensor_goes_towards_a_target_three_horizons_away(kind: Any) -> None:
     """Where the horizon ends all courses are worth the same, and the first was taken."""
     compass = tuple(float(own) for own in range(-135, 181, 45))
     of = placed(bernoullis(AWAY), [EAST], short_sighted(1, Courses(SPEED, compass)))
-    made = plan(kind, of)
+    made = made_by(kind, of)
     assert compass[made.chosen[0]] == 180.0
     assert np.ptp(prepared(of).joint()(all_joint_actions((8,)))) == 0.0
     if kind is not HorizonPlanner:  # which looks three horizons far
-        assert plan(kind, of, KullbackLeiblerReward()).chosen == (0,)
+        assert made_by(kind, of, KullbackLeiblerReward()).chosen == (0,)
 
 
 def test_two_sensors_share_two_targets_far_off() -> None:
     belief, sensors = bernoullis([[-900.0, 30.0], [900.0, -30.0]]), short_sighted(2, Courses(SPEED, (90.0, 0.0, 180.0)))
-    assert sorted(plan(JointPlanner, placed(belief, [EAST, EAST], sensors)).chosen) == [1, 2]
+    assert sorted(made_by(JointPlanner, placed(belief, [EAST, EAST], sensors)).chosen) == [1, 2]
 
 
 @pytest.mark.parametrize("hidden", [False, True])
 def test_explanations_still_add_up(hidden: bool) -> None:
     of = placed(bernoullis(FAR), POSES, undetected_worth=50.0 if hidden else 0.0)
-    made = plan(JointPlanner, of, undetected=undetected() if hidden else None)
+    made = made_by(JointPlanner, of, undetected=undetected() if hidden else None)
     why = made.explain()
     assert why.of_targets is not None
     assert why.of_sensors is not None
     assert why.of_targets.labels.tolist() == [[0, 0], [0, 1], [0, 2]]
     assert made.expected_rewards[0][0] == why.reward
+    assert why.of_undetected is not None
     assert (why.of_undetected > 0.0) == hidden
     np.testing.assert_allclose(why.baseline + why.of_targets.total.sum() + why.of_undetected, why.reward, rtol=1e-9)
     np.testing.assert_allclose(why.baseline + why.of_sensors.sum(), why.reward, rtol=1e-9)
@@ -325,26 +323,21 @@ def test_explanations_still_add_up(hidden: bool) -> None:
 def test_a_sequence_of_one_decision_is_a_single_one(hidden: bool) -> None:
     of = placed(bernoullis(FAR), POSES, undetected_worth=50.0 if hidden else 0.0)
     searched = undetected() if hidden else None
-    single = plan(JointPlanner, of, undetected=searched)
-    ahead = plan(HorizonPlanner, of, undetected=searched, depth=1)
-    assert ahead.chosen == single.chosen
-    for mine, other in zip(ahead.tables, single.tables, strict=True):
-        np.testing.assert_array_equal(mine.mean, other.mean)
-    assert ahead.bound == single.bound
-    assert ahead.counts == single.counts
+    single = made_by(JointPlanner, of, undetected=searched)
+    ahead = made_by(HorizonPlanner, of, undetected=searched, depth=1)
+    assert_same_plan(ahead, single)
 
 
 def test_longer_plans_contain_the_single_one() -> None:
     of = placed(bernoullis(FAR), POSES)
-    single = plan(JointPlanner, of)
-    worth = [plan(HorizonPlanner, of, depth=depth, discount=0.25).expected_rewards[0][0] for depth in (1, 2)]
+    single = made_by(JointPlanner, of)
+    worth = [made_by(HorizonPlanner, of, depth=depth, discount=0.25).expected_rewards[0][0] for depth in (1, 2)]
     assert worth[0] == single.expected_rewards[0][0]
     # The first decision is valued with its looks in longer plans, too.
-    none = plan(HorizonPlanner, of, depth=2, discount=0.0)
+    none = made_by(HorizonPlanner, of, depth=2, discount=0.0)
     np.testing.assert_allclose(none.tables[0].mean, single.tables[0].mean, rtol=1e-12)
 
 
 def test_threads_change_nothing() -> None:
-    one, three = (plan(JointPlanner, placed(bernoullis(FAR), POSES, num_threads=num)) for num in (1, 3))
-    for mine, other in pairwise([one.tables[0].mean, three.tables[0].mean]):
-        np.testing.assert_array_equal(mine, other)
+    one, three = (made_by(JointPlanner, placed(bernoullis(FAR), POSES, num_threads=num)) for num in (1, 3))
+    assert_same_plan(one, three)

@@ -10,14 +10,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from control.examples import HEADINGS, SETTINGS, Situation, mobile_sensor, situation
+from control.examples import HEADINGS, KNOWN, SETTINGS, Situation, decided, mobile_sensor, situation
 from vedette import models
 from vedette.control import (
     BeamSearch,
     CauchySchwarzReward,
     ExpectedLossReward,
     HorizonPlanner,
-    IndependentPlanner,
     JointPlanner,
     KullbackLeiblerReward,
     MobileSensor,
@@ -33,7 +32,6 @@ from vedette.scenarios import load_scenario, with_fields
 from vedette.scenarios.build import build_experiment, build_planner
 from vedette.simulation import simulate
 
-KNOWN = replace(SETTINGS, association="known")
 REWARDS = [CauchySchwarzReward(), KullbackLeiblerReward(), ExpectedLossReward()]
 SEARCHES = [BeamSearch(), BeamSearch(2), TreeSearch(), TreeSearch(rollout="kept", batch=1)]
 
@@ -58,32 +56,7 @@ def of_sequences(given: Situation, reward: Any, depth: int, period: float, num_s
     """All joint sequences as joint actions of another platform: the oracle."""
     sensors = tuple(MobileSensor(own.filter, Sequences(own.platform, period, depth)) for own in given.sensors)
     settings = replace(given.settings, horizon_steps=num_steps)
-    return decide(JointPlanner(sensors, given.fusion, settings, reward), given)
-
-
-@pytest.mark.parametrize("reward", REWARDS, ids=lambda reward: type(reward).__name__)
-@pytest.mark.parametrize("mode", ["ideal", "expected", "sampled"])
-def test_one_decision_is_that_of_the_joint_planner(reward: Any, mode: Any) -> None:
-    given = lmbs()
-    given = replace(given, settings=replace(given.settings, ideal_measurements=mode))
-    joint = decide(JointPlanner(given.sensors, given.fusion, given.settings, reward), given)
-    ahead = decide(planner(given, reward, depth=1), given)
-    assert ahead.chosen == joint.chosen
-    assert ahead.counts == joint.counts
-    assert ahead.bound == joint.bound
-    for mine, other in zip(ahead.tables, joint.tables, strict=True):
-        np.testing.assert_array_equal(mine.mean, other.mean)
-        np.testing.assert_array_equal(mine.standard_error, other.standard_error)
-    assert [rows.tolist() for rows in ahead.sequence] == [[row.tolist()] for row in joint.chosen_actions]
-
-
-def test_one_decision_is_explained_as_that_of_the_joint_planner() -> None:
-    given, reward = lmbs(), ExpectedLossReward()
-    one = decide(planner(given, reward, depth=1), given).explain()
-    joint = decide(JointPlanner(given.sensors, given.fusion, given.settings, reward), given).explain()
-    assert str(one).removeprefix("lookahead") == str(joint).removeprefix("jdm")
-    with pytest.raises(InputError, match="left its evidence behind"):
-        decide(planner(given, reward, depth=2), given).explain()
+    return decided(replace(given, sensors=sensors, settings=settings), JointPlanner, reward)
 
 
 @pytest.mark.parametrize("reward", REWARDS, ids=lambda reward: type(reward).__name__)
@@ -105,7 +78,7 @@ def test_values_are_those_of_sequences_as_joint_actions(reward: Any, period: flo
 
 def test_a_discount_adds_what_each_decision_gains() -> None:
     given, reward = lmbs(), ExpectedLossReward()
-    single = decide(JointPlanner(given.sensors, given.fusion, given.settings, reward), given).tables[0].mean
+    single = decided(given, JointPlanner, reward).tables[0].mean
     double = of_sequences(given, reward, 2, 8.0, 4).tables[0].mean.reshape((3,) * 4)
     total = single[:, np.newaxis, :, np.newaxis] + 0.7 * double
     ahead = decide(planner(given, reward, depth=2, discount=0.7), given)
@@ -214,17 +187,6 @@ def test_glmbs_are_planned_on_as_lmbs_and_the_plan_says_so() -> None:
     )
 
 
-def test_a_seed_gives_one_plan() -> None:
-    given = lmbs()
-    for search in (BeamSearch(3), TreeSearch()):
-        first, second = (decide(planner(given, depth=3, search=search, budget=90), given, seed=4) for _ in range(2))
-        threads = replace(given, settings=replace(given.settings, num_threads=2))
-        third = decide(planner(threads, depth=3, search=search, budget=90), threads, seed=4)
-        for other in (second, third):
-            assert first.chosen == other.chosen
-            np.testing.assert_array_equal(first.tables[0].mean, other.tables[0].mean)
-
-
 def test_combined_beams_find_what_no_sensor_finds_alone() -> None:
     """Of all joint sequences none is better than by combining whole beams."""
     given = lmbs()
@@ -233,51 +195,20 @@ def test_combined_beams_find_what_no_sensor_finds_alone() -> None:
     assert found == pytest.approx(best, rel=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ({"depth": 0}, "depth"),
-        ({"budget": 0}, "budget"),
-        ({"discount": 1.5}, "discount"),
-        ({"period": -1.0}, "period"),
-        ({"period": 6.0}, "period: expected a whole multiple of the horizon_period, 4; got 6.0"),
-    ],
-)
-def test_bad_arguments(arguments: dict[str, Any], message: str) -> None:
-    with pytest.raises(InputError, match=message):
-        planner(lmbs(), **arguments)
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ({"exploration": -0.1}, "exploration"),
-        ({"rollout": "greedy"}, "rollout: expected one of random, kept"),
-        ({"batch": 0}, "batch"),
-    ],
-)
-def test_bad_searches(arguments: dict[str, Any], message: str) -> None:
-    with pytest.raises(InputError, match=message):
-        TreeSearch(**arguments)
+def test_a_period_of_no_whole_number_of_steps_is_refused() -> None:
+    with pytest.raises(InputError, match=r"period: expected a whole multiple of the horizon_period, 4; got 6.0"):
+        planner(lmbs(), period=6.0)
 
 
 def test_what_is_no_sum_over_labels_is_refused() -> None:
     given = lmbs()
     with pytest.raises(InputError, match=r"reward, fusion: expected .* sums over labels"):
         decide(planner(given, reward=lambda predicted, updated: 1.0), given)
+    with pytest.raises(InputError, match="left its evidence behind"):
+        decide(planner(given, depth=2), given).explain()
     full = replace(given, settings=SETTINGS)
     with pytest.raises(InputError, match="association: expected known"):
         decide(planner(full), full)
-
-
-@pytest.mark.parametrize("other", [IndependentPlanner, JointPlanner])
-def test_random_numbers_are_used_as_by_a_single_decision(other: Any) -> None:
-    """What comes after the decision draws the same numbers."""
-    given = lmbs()
-    mine, its = np.random.default_rng(3), np.random.default_rng(3)
-    planner(given, depth=1).plan(*given.arguments, rng=mine)
-    other(given.sensors, given.fusion, given.settings, CauchySchwarzReward()).plan(*given.arguments, rng=its)
-    assert mine.random() == its.random()
 
 
 def test_all_joint_sequences_are_counted() -> None:
@@ -291,7 +222,7 @@ def test_all_joint_sequences_are_counted() -> None:
 @pytest.mark.parametrize("discount", [None, 0.25, 1.0])
 def test_the_best_single_decision_stays_inside_the_search(search: Any, discount: float | None) -> None:
     given, reward = lmbs(num_sensors=3), ExpectedLossReward()
-    single = decide(JointPlanner(given.sensors, given.fusion, given.settings, reward), given)
+    single = decided(given, JointPlanner, reward)
     for budget in (1, 20, 300):
         plan = decide(planner(given, reward, depth=3, search=search, budget=budget, discount=discount), given)
         kept = float(plan.tables[0].mean[single.chosen])
@@ -332,8 +263,6 @@ def test_decisions_after_the_end_are_not_planned_for() -> None:
     timeless = replace(ended.state, time=None)
     plan = planner(ended, depth=2).plan(timeless, ended.poses, rng=np.random.default_rng(1))
     assert len(plan.sequence[0]) == 2
-    with pytest.raises(InputError, match=r"end: expected .*; got nan"):
-        replace(given.settings, end=np.nan)
 
 
 def test_depth_does_not_harm_where_a_single_decision_is_best() -> None:

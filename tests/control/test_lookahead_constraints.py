@@ -9,20 +9,28 @@ from typing import Any
 import numpy as np
 import pytest
 
-from control.examples import HEADINGS, POSES, SETTINGS, Situation, mobile_sensor, situation, told
+from control.examples import (
+    HEADINGS,
+    KNOWN,
+    POSES,
+    Situation,
+    assert_same_plan,
+    decided,
+    mobile_sensor,
+    situation,
+    told,
+)
+from control.test_lookahead import SEARCHES, of_sequences
 from vedette import models
 from vedette.control import (
-    BeamSearch,
     ExpectedLossReward,
     HorizonPlanner,
     JointPlanner,
     KeepOut,
     KullbackLeiblerReward,
-    MobileSensor,
     Plan,
     Separation,
     StayInside,
-    TreeSearch,
     VoidProbability,
     void_probability,
 )
@@ -31,10 +39,8 @@ from vedette.control.lookahead import rules as rules_module
 from vedette.control.lookahead.ahead import Stages
 from vedette.densities import LMB, track_moments
 from vedette.fusion import Clmb
-from vedette.platforms import Sequences, Steps
+from vedette.platforms import Steps
 
-KNOWN = replace(SETTINGS, association="known")
-SEARCHES = [BeamSearch(), BeamSearch(2), TreeSearch(), TreeSearch(rollout="kept", batch=1)]
 BOX = (-480.0, -100.0, -200.0, 310.0)  # that is not entered
 INSIDE = (-900.0, 700.0, -700.0, 700.0)  # that is not left
 VOID = (150.0, 0.965)
@@ -75,10 +81,7 @@ def lmbs(num_sensors: int = 2) -> Situation:
 def decide(given: Situation, constraints: Any, reward: Any = None, **arguments: Any) -> Plan:
     reward = ExpectedLossReward() if reward is None else reward
     arguments = {"discount": None, "constraints": tuple(constraints), **arguments}
-    planner = HorizonPlanner(given.sensors, given.fusion, given.settings, reward, **arguments)
-    plan: Plan = planner.plan(*given.arguments, rng=np.random.default_rng(1))
-    plan.validate()
-    return plan
+    return decided(given, HorizonPlanner, reward, **arguments)
 
 
 def ways(sensor: int, depth: int, stride: int) -> Any:
@@ -160,11 +163,8 @@ def oracle(given: Situation, names: Any, depth: int, stride: int) -> Any:
 
 def values(given: Situation, depth: int, period: float, num_steps: int, reward: Any = None) -> Any:
     """Mean rewards of all joint sequences, as joint actions of another platform."""
-    sensors = tuple(MobileSensor(own.filter, Sequences(own.platform, period, depth)) for own in given.sensors)
-    settings = replace(given.settings, horizon_steps=num_steps)
     reward = ExpectedLossReward() if reward is None else reward
-    plan = JointPlanner(sensors, given.fusion, settings, reward).plan(*given.arguments, rng=np.random.default_rng(1))
-    return plan.tables[0].mean
+    return of_sequences(given, reward, depth, period, num_steps).tables[0].mean
 
 
 def places(plan: Plan) -> tuple[int, ...]:
@@ -178,12 +178,10 @@ def places(plan: Plan) -> tuple[int, ...]:
 def test_one_decision_is_that_of_the_joint_planner(num_sensors: int, names: Any) -> None:
     given, constraints = lmbs(num_sensors), tuple(CONSTRAINTS[name] for name in names)
     for reward in (ExpectedLossReward(), KullbackLeiblerReward()):
-        single = JointPlanner(given.sensors, given.fusion, given.settings, reward, constraints=constraints)
-        joint = single.plan(*given.arguments, rng=np.random.default_rng(1))
+        joint = decided(given, JointPlanner, reward, constraints=constraints)
         ahead = decide(given, constraints, reward, depth=1)
-        assert (ahead.chosen, ahead.notes) == (joint.chosen, joint.notes)
-        np.testing.assert_array_equal(ahead.tables[0].mean, joint.tables[0].mean)
-        np.testing.assert_array_equal(ahead.tables[0].standard_error, joint.tables[0].standard_error)
+        assert_same_plan(ahead, joint)
+        assert ahead.notes == joint.notes
 
 
 @pytest.mark.parametrize("names", [*([name] for name in CONSTRAINTS), ["keep out", "separation", "own"]], ids=", ".join)
@@ -251,8 +249,7 @@ def scene(poses: Any, targets: Any, directions: Any, **steps: Any) -> Situation:
 
 
 def single(given: Situation, constraints: Any) -> Plan:
-    planner = JointPlanner(given.sensors, given.fusion, given.settings, ExpectedLossReward(), constraints=constraints)
-    return planner.plan(*given.arguments, rng=np.random.default_rng(1))
+    return decided(given, JointPlanner, ExpectedLossReward(), constraints=constraints)
 
 
 POCKET = (

@@ -9,14 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from control.examples import SETTINGS, mobile_sensor, situation, told
+from control.examples import KNOWN, mobile_sensor, told
 from vedette import models
 from vedette.control import (
     BeamSearch,
     ExpectedLossReward,
     HorizonPlanner,
     JointPlanner,
-    KullbackLeiblerReward,
     TreeSearch,
 )
 from vedette.densities import LMB, UndetectedIntensity
@@ -28,7 +27,6 @@ HEADINGS = (0.0, 90.0, 180.0)
 SPEED, PERIOD, RANGE, WORTH = 100.0, 2.0, 100.0, 3.0
 GRID = models.CellGrid.covering(models.Region(-700.0, 700.0, -700.0, 700.0), 50.0)
 STARTS = np.array([[0.0, 0.0, 0.0], [200.0, -250.0, 0.0]])
-KNOWN = replace(SETTINGS, association="known")
 ONE = replace(KNOWN, horizon_steps=1, horizon_period=PERIOD, undetected_worth=WORTH)
 
 
@@ -68,29 +66,6 @@ def oracle(expected: Any, depth: int, discount: float | None) -> Any:
         by_then = WORTH * (expected * (1.0 - miss)).sum(axis=1)
         found[place] = by_then[-1] if discount is None else (discount ** np.arange(depth) * by_then).sum()
     return found
-
-
-@pytest.mark.parametrize("reward", [ExpectedLossReward(), KullbackLeiblerReward()], ids=lambda own: type(own).__name__)
-def test_one_decision_is_that_of_the_joint_planner(reward: Any) -> None:
-    given = situation("lmb", settings=replace(KNOWN, undetected_worth=2.0))
-    expected = np.random.default_rng(1).uniform(0.0, 0.01, GRID.num_cells)
-    there = replace(given.state, undetected=UndetectedIntensity(GRID, expected))
-    made = [
-        kind(given.sensors, given.fusion, given.settings, reward).plan(there, given.poses, rng=np.random.default_rng(1))
-        for kind in (JointPlanner, single_decision)
-    ]
-    assert made[0].chosen == made[1].chosen
-    assert made[0].notes == made[1].notes == ()
-    assert made[0].bound == made[1].bound
-    np.testing.assert_array_equal(made[0].tables[0].mean, made[1].tables[0].mean)
-    without = JointPlanner(given.sensors, given.fusion, given.settings, reward).plan(
-        given.state, given.poses, rng=np.random.default_rng(1)
-    )
-    assert (made[1].tables[0].mean > without.tables[0].mean).all()
-
-
-def single_decision(sensors: Any, fusion: Any, settings: Any, reward: Any) -> HorizonPlanner:
-    return HorizonPlanner(sensors, fusion, settings, reward, depth=1)
 
 
 @pytest.mark.parametrize(("depth", "discount"), [(1, None), (2, None), (2, 0.7), (3, None), (3, 0.9)])

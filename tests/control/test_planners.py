@@ -212,21 +212,6 @@ def test_the_order_of_the_sensors_turns_the_table_and_nothing_else(kind: str) ->
         np.testing.assert_allclose(table.mean, alone.tables[order[s]].mean, rtol=1e-9)
 
 
-@pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("mode", ["ideal", "sampled"])
-def test_a_seed_gives_the_same_bytes_whatever_the_number_of_threads(kind: str, mode: Any) -> None:
-    settings = replace(SETTINGS, ideal_measurements=mode)
-    expected = [plan_bytes(plan) for plan in plans(situation(kind, settings=settings))]
-    for num_threads in (1, 2, 3, 7):
-        again = plans(situation(kind, settings=replace(settings, num_threads=num_threads)))
-        assert [plan_bytes(plan) for plan in again] == expected
-    assert [plan_bytes(plan) for plan in plans(situation(kind, settings=settings), seed=6)] != expected
-
-
-def plan_bytes(plan: Plan) -> Any:
-    return plan.chosen, [(table.mean.tobytes(), table.standard_error.tobytes()) for table in plan.tables]
-
-
 def test_an_action_has_the_same_reward_whatever_the_others_are() -> None:
     example = situation("marginal")
     fewer = replace(
@@ -280,17 +265,6 @@ def test_one_sensor_with_one_action() -> None:
     assert joint.chosen == independent.chosen == (0,)
     assert joint.tables[0].mean.shape == (1,)
     np.testing.assert_allclose(joint.tables[0].mean, independent.tables[0].mean, rtol=1e-9)
-
-
-@pytest.mark.parametrize("kind", ["marginal", "lmb"])
-@pytest.mark.parametrize("unit_volume", [1.0, "reference"])
-def test_with_no_target_known_nothing_is_worth_anything(kind: str, unit_volume: Any) -> None:
-    example = situation(kind)
-    nothing: Any = LMB.empty(4) if kind == "lmb" else GLMB.empty(4)
-    example = replace(example, beliefs=(nothing, nothing), fused=nothing)
-    for plan in plans(example, CauchySchwarzReward(unit_volume)):
-        assert all((table.mean == 0.0).all() for table in plan.tables)
-        assert plan.chosen == (0, 0)
 
 
 def test_a_sensor_that_knows_of_no_target_has_nothing_to_gain() -> None:

@@ -16,10 +16,9 @@ from control.examples import (
     crowded,
     evaluator_of,
     mobile_sensor,
-    sample_rewards,
     situation,
 )
-from control.plain_loop import plain_rewards
+from control.test_plain_loop import assert_equals_plain_loop
 from vedette import models
 from vedette.control.pseudo import draw_futures, pseudo_posteriors
 from vedette.densities import GLMB, sample_glmb
@@ -132,8 +131,4 @@ def test_targets_may_contend_for_more_measurements_than_there_was_room_for(num_t
     sizes = np.diff(futures.offsets)
     if num_targets > MAX_EXACT_MEASUREMENTS:
         assert sizes.min() <= MAX_EXACT_MEASUREMENTS < sizes.max()
-    joint, alone = plain_rewards(example, 1.0, seed=5)
-    evaluator = evaluator_of(example, seed=5)
-    np.testing.assert_allclose(sample_rewards(evaluator, (0, 1), example.fusion), joint, rtol=1e-9, atol=1e-9)
-    for s, expected in enumerate(alone):
-        np.testing.assert_allclose(sample_rewards(evaluator, (s,), None), expected, rtol=1e-9, atol=1e-9)
+    assert_equals_plain_loop(example)

@@ -10,21 +10,17 @@ import numpy as np
 import pytest
 from scipy.stats import t as student
 
-from control.examples import SETTINGS, Situation, situation
+from control.examples import SETTINGS, Situation, decided, situation
 from vedette.control import (
     CauchySchwarzReward,
     CoordinateAscent,
     ExpectedLossReward,
     IndependentPlanner,
-    JointPlanner,
-    Plan,
-    PlanningSettings,
     deciding,
 )
 from vedette.control.preparation import Preparation
 from vedette.control.racing import FIRST_ROUND, Race, next_total
 from vedette.control.search import all_joint_actions
-from vedette.errors import InputError
 from vedette.platforms import Courses
 
 REWARD = CauchySchwarzReward("reference")
@@ -142,13 +138,6 @@ def certain(example: Situation, **settings: Any) -> Situation:
     return replace(example, settings=replace(example.settings, confidence=0.95, max_samples=64, **settings))
 
 
-def plan_of(example: Situation, kind: Any = JointPlanner, **parts: Any) -> Plan:
-    planner = kind(example.sensors, example.fusion, example.settings, **({"reward": REWARD} | parts))
-    plan = planner.plan(*example.arguments, rng=np.random.default_rng(5))
-    plan.validate()
-    return plan
-
-
 def sample_rewards(example: Situation, sizes: list[int]) -> list[Any]:
     """Rewards of all joint actions, and of each sensor alone, round after round."""
     prepared = Preparation.of(example.sensors, example.fusion, example.settings, REWARD, *example.arguments)
@@ -169,7 +158,7 @@ def test_tables_hold_means_over_the_samples_that_an_action_got(kind: str, associ
     while totals[-1] < 64:
         totals.append(next_total(totals[-1], 64))
     joint, *alone = sample_rewards(example, np.diff(totals).tolist())
-    joint_plan, own_plan = plan_of(example), plan_of(example, IndependentPlanner)
+    joint_plan, own_plan = decided(example, seed=5), decided(example, IndependentPlanner, seed=5)
     tables = [*zip((joint_plan, *[own_plan] * 2), (*joint_plan.tables, *own_plan.tables), (joint, *alone), strict=True)]
     for plan, table, rewards in tables:
         assert plan.certainty is not None
@@ -191,20 +180,6 @@ def test_tables_hold_means_over_the_samples_that_an_action_got(kind: str, associ
     assert str(joint_plan.certainty) in joint_plan.notes
 
 
-@pytest.mark.parametrize("planner", [JointPlanner, IndependentPlanner])
-@pytest.mark.parametrize("indifference", [0.0, 0.05])
-def test_threads_and_repetition_change_nothing(planner: Any, indifference: float) -> None:
-    plans = []
-    for num_threads in (1, 1, 3):
-        example = certain(situation("lmb", 3, 2), association="known", num_threads=num_threads)
-        example = replace(example, settings=replace(example.settings, indifference=indifference))
-        plans.append(plan_of(example, planner))
-    for plan in plans[1:]:
-        assert (plan.chosen, plan.certainty, plan.counts) == (plans[0].chosen, plans[0].certainty, plans[0].counts)
-        for table, first in zip(plan.tables, plans[0].tables, strict=True):
-            np.testing.assert_array_equal(table.mean, first.mean)
-
-
 def test_a_plan_says_why_it_ended() -> None:
     example = certain(situation("lmb", 2, 3), association="known")
     reasons = {}
@@ -215,7 +190,7 @@ def test_a_plan_says_why_it_ended() -> None:
     }
     for name, settings in cases.items():
         own = replace(example, settings=replace(example.settings, **settings))
-        reasons[name] = plan_of(own).certainty
+        reasons[name] = decided(own).certainty
     for name, certainty in reasons.items():
         assert certainty is not None
         assert certainty.reason == name
@@ -230,7 +205,7 @@ def test_a_plan_says_why_it_ended() -> None:
 def test_a_reward_without_samples_is_certain_at_once() -> None:
     example = certain(situation("lmb", 2, 3))
     plan, plain = (
-        plan_of(each, reward=ExpectedLossReward(60.0)) for each in (example, situation("lmb", 2, 3, SETTINGS))
+        decided(each, reward=ExpectedLossReward(60.0)) for each in (example, situation("lmb", 2, 3, SETTINGS))
     )
     assert plan.certainty is not None
     assert plan.certainty.reason == "no samples"
@@ -244,7 +219,7 @@ def test_what_a_search_picks_races_on_fresh_samples(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(deciding, "_MOST_OF_ALL", 1)
     example = situation("lmb", 3, 2, platform=Courses(30.0))
     example = certain(example, association="known", indifference=0.02)
-    plan = plan_of(example, search=CoordinateAscent(1))
+    plan = decided(example, search=CoordinateAscent(1))
     assert plan.certainty is not None
     assert plan.curve is not None
     assert plan.certainty.samples >= 3 * FIRST_ROUND
@@ -252,32 +227,3 @@ def test_what_a_search_picks_races_on_fresh_samples(monkeypatch: pytest.MonkeyPa
     (table,) = plan.tables
     assert np.isfinite(table.mean).sum() >= plan.certainty.started[0]
     assert table.standard_error[plan.chosen] > 0.0
-
-
-def test_nothing_to_track() -> None:
-    from vedette.densities import LMB
-
-    example = certain(situation("lmb"), association="known")
-    example = replace(example, beliefs=(LMB.empty(4),) * 2, fused=LMB.empty(4))
-    plan = plan_of(example)
-    assert plan.chosen == (0, 0)
-    assert plan.certainty is not None
-    assert (plan.certainty.reason, plan.certainty.samples) == ("indifferent", FIRST_ROUND)
-
-
-@pytest.mark.parametrize(
-    ("field", "value", "expected"),
-    [
-        ("confidence", 1.0, "above 0 and below 1"),
-        ("confidence", 0, "above 0 and below 1"),
-        ("confidence", "high", "finite number"),
-        ("indifference", -0.1, r"in \[0, 1\)"),
-        ("indifference", 1.0, r"in \[0, 1\)"),
-        ("max_samples", 23, "at least 24"),
-        ("max_samples", 100.5, "whole number"),
-        ("max_seconds", 0.0, "above 0"),
-    ],
-)
-def test_settings_that_are_none(field: str, value: Any, expected: str) -> None:
-    with pytest.raises(InputError, match=f"{field}: expected .*{expected}"):
-        PlanningSettings(**{field: value})

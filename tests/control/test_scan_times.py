@@ -9,20 +9,20 @@ import numpy as np
 import pytest
 
 from control.examples import (
+    FIRST,
+    NEVER,
+    SECOND,
     SETTINGS,
     A,
     B,
     C,
     Situation,
     additive_of,
-    cases_of,
-    evaluator_of,
     lmb,
-    sample_rewards,
+    scanning,
     situation,
 )
-from control.known_association import followed
-from control.plain_loop import plain_rewards
+from control.test_plain_loop import assert_equals_plain_loop
 from vedette.control import (
     CauchySchwarzReward,
     HorizonPlanner,
@@ -30,28 +30,14 @@ from vedette.control import (
     JointPlanner,
     PlanningSettings,
 )
-from vedette.control.pseudo import draw_futures
 from vedette.control.rewards import ExpectedLossReward
 from vedette.control.search import all_joint_actions
-from vedette.densities import LMB, UndetectedIntensity
-from vedette.densities.tracks import single_gaussians
+from vedette.densities import UndetectedIntensity
 from vedette.errors import InputError
 from vedette.fusion import ParallelUpdate
 from vedette.models import CellGrid, Region
 from vedette.scenarios import load_scenario, with_fields
 from vedette.scenarios.build import build_sensors
-
-# Of two steps of 4 s each, from 1 s on.
-FIRST: Any
-SECOND: Any
-NEVER: Any
-FIRST, SECOND, NEVER = [3.0, 11.0], [1.0, 9.0], [0.5, 1.0, 9.5]
-
-
-def scanning(example: Situation, *times: Any) -> Situation:
-    """The sensors with these scan times."""
-    sensors = tuple(replace(own, scan_times=when) for own, when in zip(example.sensors, times, strict=True))
-    return replace(example, sensors=sensors)
 
 
 def shared() -> Situation:
@@ -91,39 +77,7 @@ def test_scan_times_are_times_in_order(times: Any) -> None:
 @pytest.mark.parametrize("times", [(FIRST, SECOND), (SECOND, None), (NEVER, FIRST)])
 def test_case_by_case_as_the_filters_themselves(kind: str, times: Any) -> None:
     """GLMB and LMB filters, joint and alone, against plain loops."""
-    example = scanning(situation(kind), *times)
-    joint, alone = plain_rewards(example, 1.0, 5)
-    evaluator = evaluator_of(example, CauchySchwarzReward())
-    np.testing.assert_allclose(sample_rewards(evaluator, (0, 1), example.fusion), joint, rtol=1e-9, atol=1e-9)
-    for s, expected in enumerate(alone):
-        np.testing.assert_allclose(sample_rewards(evaluator, (s,), None), expected, rtol=1e-9, atol=1e-9)
-
-
-@pytest.mark.parametrize("times", [FIRST, SECOND, NEVER])
-def test_by_sums_as_in_plain_numpy(times: Any) -> None:
-    known = replace(SETTINGS, association="known")
-    example = scanning(situation("lmb", seed=2, settings=known), times, None)
-    evaluator = evaluator_of(example)
-    labels, (futures, _) = draw_futures(example.fused, example.sensors, known, rng=np.random.default_rng(5))
-    belief, sensor, cases = example.beliefs[0], example.sensors[0], cases_of(evaluator).posteriors[0]
-    tracks = single_gaussians(belief.tracks)
-    for course, sample in np.ndindex(len(evaluator.options[0].courses), known.num_samples):
-        ends = cases.density(course * known.num_samples + sample)
-        assert isinstance(ends, LMB)
-        span = range(*futures.offsets[sample : sample + 2].tolist())
-        for i, label in enumerate(tracks.labels.tolist()):
-            at = [place for place in span if labels[place].tolist() == label]
-            target = futures.states[:, at[0]] if at else None
-            path = evaluator.options[0].courses[course]
-            start = belief.existence_logit[i], tracks.means[i], tracks.covs[i]
-            logit, mean, cov, _ = followed(*start, target, sensor, path, known)
-            np.testing.assert_allclose(ends.existence_logit[i], logit, rtol=1e-9, atol=1e-9)
-            np.testing.assert_allclose(ends.tracks.means[i], mean, rtol=1e-9)
-            np.testing.assert_allclose(ends.tracks.covs[i], cov, rtol=1e-8, atol=1e-9)
-    actions = all_joint_actions((3, 3))
-    np.testing.assert_allclose(
-        additive_of(example).joint()(actions).mean(), evaluator.joint()(actions).mean(), rtol=0.2
-    )
+    assert_equals_plain_loop(scanning(situation(kind), *times), least=0.0)
 
 
 @pytest.mark.parametrize("reward", [CauchySchwarzReward(), ExpectedLossReward()])

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from control.examples import SETTINGS, Situation, situation
+from control.examples import SETTINGS, Situation, decided, situation
 from vedette.control import (
     AutomaticSearch,
     CauchySchwarzReward,
@@ -177,15 +177,6 @@ def test_more_joint_actions_than_allowed() -> None:
         ExhaustiveSearch().search(many, rng=rng())
 
 
-@pytest.mark.parametrize("number", [0, -1, 1.5, True, "many"])
-def test_numbers_that_are_none(number: Any) -> None:
-    with pytest.raises(InputError, match="max_joint_actions: expected a whole number"):
-        ExhaustiveSearch(number)
-    if number != 0:
-        with pytest.raises(InputError, match="num_restarts: expected a whole number"):
-            CoordinateAscent(number)
-
-
 def joint_plan(example: Situation, search: JointSearch) -> Plan:
     planner = JointPlanner(example.sensors, example.fusion, example.settings, CauchySchwarzReward("reference"), search)
     plan = planner.plan(*example.arguments, rng=np.random.default_rng(5))
@@ -206,9 +197,7 @@ def test_a_partial_search_has_the_rewards_of_the_exhaustive_one(kind: str, seed:
     np.testing.assert_array_equal(some.mean[evaluated], table.mean[evaluated])
     np.testing.assert_array_equal(some.standard_error[evaluated], table.standard_error[evaluated])
     assert table.mean[partial.chosen] == some.mean[evaluated].max()
-    alone = IndependentPlanner(example.sensors, example.fusion, SETTINGS, CauchySchwarzReward("reference")).plan(
-        *example.arguments, rng=np.random.default_rng(5)
-    )
+    alone = decided(example, IndependentPlanner, CauchySchwarzReward("reference"), seed=5)
     assert table.mean[alone.chosen] <= table.mean[partial.chosen] <= table.mean[full.chosen]
     # -180 and 180 degrees are one direction, counted once.
     num_evaluated = int(evaluated[1:, 1:, 1:].sum())

@@ -248,22 +248,6 @@ def test_cross_entropy_draws_to_the_best_and_stops() -> None:
 
 
 @pytest.mark.parametrize(
-    ("make", "message"),
-    [
-        (lambda: CrossEntropy(num_samples=0), "num_samples: expected a whole number"),
-        (lambda: CrossEntropy(max_rounds=1.5), "max_rounds: expected a whole number"),  # type: ignore[arg-type]
-        (lambda: CrossEntropy(elite_share=0.0), "elite_share: expected a probability above 0 and below 1; got 0.0"),
-        (lambda: CrossEntropy(smoothing=1.5), "smoothing: expected a number above 0, up to 1; got 1.5"),
-        (lambda: SequentialGreedy("worst"), "order: expected one of printed, best_first; got worst"),  # type: ignore[arg-type]
-        (lambda: AutomaticSearch(0), "max_joint_actions: expected a whole number"),
-    ],
-)
-def test_fields_out_of_range(make: Any, message: str) -> None:
-    with pytest.raises(InputError, match=message):
-        make()
-
-
-@pytest.mark.parametrize(
     ("shape", "exhaustive"), [((4, 5), True), ((3, 3, 3), True), ((3, 3, 4), False), ((2,) * 4, False)]
 )
 def test_automatic_is_exhaustive_up_to_three_sensors(shape: Joint, exhaustive: bool) -> None:

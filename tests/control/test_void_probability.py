@@ -187,12 +187,3 @@ def test_courses_keep_it_at_every_time() -> None:
         InputError, match="constraint void_probability: expected 3 predicted beliefs, one a time; got 0"
     ):
         mask_of([constraint], scene._replace(beliefs=()))
-
-
-@pytest.mark.parametrize(
-    ("radius", "chance", "message"),
-    [(0.0, 0.5, "radius: expected a number above 0"), (1.0, 1.5, "probability: expected a probability")],
-)
-def test_fields_out_of_range(radius: float, chance: float, message: str) -> None:
-    with pytest.raises(InputError, match=message):
-        VoidProbability(radius, chance)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from control.examples import A, B, C, Situation, lmb, mobile_sensor, situation
+from control.examples import A, B, C, Situation, decided, lmb, mobile_sensor, situation
 from vedette.control import (
     HorizonPlanner,
     IndependentPlanner,
@@ -90,9 +90,7 @@ def test_who_starts_inside_a_zone_leaves_it_by_the_shortest(which: int) -> None:
 
 def test_lookahead_goes_back_at_every_decision_of_a_sequence() -> None:
     given = scene(np.array([[650.0, 0.0, 0.0]]))
-    plan = HorizonPlanner(given.sensors, given.fusion, given.settings, depth=3, constraints=(FENCE,)).plan(
-        *given.arguments, rng=np.random.default_rng(0)
-    )
+    plan = decided(given, HorizonPlanner, depth=3, constraints=(FENCE,), seed=0)
     assert plan.sequence[0].tolist() == [[180.0]] * 3
     assert len([note for note in plan.notes if "no course" in note]) == 3
 

@@ -31,7 +31,7 @@ from vedette.densities import (
     existence_probabilities,
     marginalise,
 )
-from vedette.errors import InputError
+from vedette.errors import InputError, NumericalError
 
 EXACT: dict[str, Any] = {"max_components": 10**9, "log_min_weight": -np.inf, "merge_distance": 0.0}
 LIMITS = st.sampled_from([{}, EXACT, {"max_components": 3}])
@@ -243,3 +243,12 @@ def test_conversions_leave_their_input_alone(limits):
     as_glmb(as_lmb(glmb, **limits), max_hypotheses=5)
     for array, copy in zip((*glmb.tracks.to_kernel(), *glmb.to_kernel()[1:]), before, strict=True):
         assert np.array_equal(array, copy)
+
+
+def test_targets_too_far_apart_for_one_gaussian():
+    tracks = TrackTable.from_gaussians([[0, 0], [0, 0]], [[0.0] * 4, [1e9, 1e9, 0.0, 0.0]], [1e-4 * np.eye(4)] * 2)
+    glmb = GLMB.from_hypotheses(tracks, [[0], [1]], [0.5, 0.5])
+    for convert in (marginalise, as_lmb):
+        with pytest.raises(NumericalError, match="positive definite within the precision"):
+            convert(glmb)
+        convert(glmb, max_components=2).validate()

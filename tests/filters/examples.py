@@ -10,10 +10,12 @@ from typing import Any
 import numpy as np
 
 import reference
+from densities.examples import plain_glmb as plain_glmb
+from densities.examples import plain_lmb as plain_lmb
 from reference import Floats
 from reference.glmb import Model
 from vedette import models
-from vedette.densities import GLMB, LMB, TrackTable
+from vedette.densities import LMB
 from vedette.filters import DeltaGlmbFilter, Limits, LmbFilter
 
 DT = 1.5
@@ -101,7 +103,9 @@ def _polar(pose: Floats) -> tuple[Callable[[Floats], Floats], Callable[[Floats],
     return measure, jacobian
 
 
-def linear_scene(existence: float = 0.3, prob_survival: float = 0.9, prob_detection: float = 0.85) -> Scene:
+def linear_scene(
+    existence: float = 0.3, prob_survival: float = 0.9, prob_detection: float = 0.85, method: str = "ekf"
+) -> Scene:
     """Two sites a stone's throw apart seen in position: every measurement may be anyone's."""
     transition, noise = cv_matrices(3.0)
     rows = np.eye(2, 4)
@@ -113,7 +117,7 @@ def linear_scene(existence: float = 0.3, prob_survival: float = 0.9, prob_detect
         np.array([[119.0, 57.0]]),
     ]
     return Scene(
-        models.constant_velocity(3.0),
+        models.constant_velocity(3.0, method=method),
         models.constant_survival(prob_survival),
         models.BirthModel(np.array([existence, 0.2]), means, covs, steps=frozenset({1, 2})),
         models.SensorModel(
@@ -121,6 +125,7 @@ def linear_scene(existence: float = 0.3, prob_survival: float = 0.9, prob_detect
             models.constant_noise([12.0, 9.0]),
             models.constant_detection(prob_detection),
             models.region_clutter(200.0, REGION, "position"),
+            method=method,
         ),
         np.zeros(3),
         scans,
@@ -135,6 +140,7 @@ def linear_scene(existence: float = 0.3, prob_survival: float = 0.9, prob_detect
             prob_detection=lambda x: prob_detection,
             clutter_intensity=lambda z: 200.0 / 4e6,
             angular=(False, False),
+            method=method,
         ),
     )
 
@@ -199,34 +205,11 @@ def polar_scene(method: str) -> Scene:
 
 SCENES: dict[str, Callable[[], Scene]] = {
     "linear": linear_scene,
+    "linear ukf": lambda: linear_scene(method="ukf"),
     "ekf": lambda: polar_scene("ekf"),
     "ukf": lambda: polar_scene("ukf"),
     "ckf": lambda: polar_scene("ckf"),
 }
-
-
-def plain_tracks(tracks: TrackTable) -> list[tuple[reference.Label, reference.Mixture]]:
-    """Label and mixture of each track."""
-    plain = []
-    for i, (step, index) in enumerate(tracks.labels.tolist()):
-        run = slice(tracks.offsets[i], tracks.offsets[i + 1])
-        weights = np.exp(tracks.log_weights[run])
-        mixture = [(float(w), m, c) for w, m, c in zip(weights, tracks.means[run], tracks.covs[run], strict=True)]
-        plain.append(((step, index), mixture))
-    return plain
-
-
-def plain_glmb(glmb: GLMB) -> reference.Glmb:
-    tracks = plain_tracks(glmb.tracks)
-    return [
-        (float(np.exp(log_weight)), dict(tracks[t] for t in glmb.hyp_tracks[low:high]))
-        for log_weight, low, high in zip(glmb.hyp_log_weights, glmb.hyp_offsets[:-1], glmb.hyp_offsets[1:], strict=True)
-    ]
-
-
-def plain_lmb(lmb: LMB) -> reference.Lmb:
-    tracks = plain_tracks(lmb.tracks)
-    return {label: (float(r), mixture) for r, (label, mixture) in zip(lmb.existence, tracks, strict=True)}
 
 
 def assert_same_mixtures(got: reference.Mixture, expected: reference.Mixture, tolerance: float = 1e-10) -> None:
@@ -238,6 +221,15 @@ def assert_same_mixtures(got: reference.Mixture, expected: reference.Mixture, to
         assert abs(w - expected_w) <= tolerance
         np.testing.assert_allclose(m / stds, expected_m / stds, rtol=0.0, atol=10.0 * tolerance)
         np.testing.assert_allclose(c / np.outer(stds, stds), expected_c / np.outer(stds, stds), atol=10.0 * tolerance)
+
+
+def assert_same_lmb(got: LMB, expected: reference.Lmb, tolerance: float = 1e-10) -> None:
+    """The same labels, existences and mixtures, in which equal components are one."""
+    found = plain_lmb(got)
+    assert found.keys() == expected.keys()
+    for label, (existence, mixture) in expected.items():
+        assert abs(found[label][0] - existence) <= tolerance
+        assert_same_mixtures(together(found[label][1]), together(mixture))
 
 
 def together(mixture: reference.Mixture) -> reference.Mixture:

@@ -66,6 +66,18 @@ def choices_of(options: Options, rows: Any) -> list[tuple[float, tuple[int, ...]
     return found
 
 
+def marginals_of(options: Options) -> tuple[float, Any]:
+    """Log total weight of all joint choices, and the log marginal probability of each option, by enumeration."""
+    choices = choices_of(options, range(len(options.offsets) - 1))
+    marginals = np.full(len(options.columns), -np.inf)
+    if not choices:
+        return -np.inf, marginals
+    for weight, chosen in choices:
+        marginals[list(chosen)] = np.logaddexp(marginals[list(chosen)], weight)
+    total = float(np.logaddexp.reduce([weight for weight, _ in choices]))
+    return total, marginals - total
+
+
 def children_of(options: Options, parents: Parents) -> list[tuple[float, int, tuple[int, ...]]]:
     """Log weight, parent and options of every child of positive weight, heaviest first."""
     found = []

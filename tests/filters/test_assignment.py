@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 
 from control.examples import crowded, evaluator_of
 from filters.examples import SCENES, assert_same_mixtures, linear_scene, plain_lmb
-from filters.tables import choices_of, make_options
+from filters.tables import make_options, marginals_of
 from reference import iterated_corrector as plain
 from reference.test_iterated_corrector import SENSORS, world
 from scenarios.minimal import changed
@@ -55,11 +55,8 @@ def propagated(options: Any, tolerance: float = 0.0) -> tuple[float, Floats]:
 
 
 def summed(options: Any) -> tuple[float, Floats]:
-    chances = np.zeros(len(options.columns))
-    for weight, chosen in choices_of(options, range(len(options.offsets) - 1)):
-        chances[list(chosen)] += math.exp(weight)
-    total = chances[: options.offsets[1]].sum()
-    return math.log(total), chances / total
+    log_total, log_chances = marginals_of(options)
+    return log_total, np.exp(log_chances)
 
 
 def rows_of(claims: list[Any], draw: Any) -> list[list[tuple[int, float]]]:

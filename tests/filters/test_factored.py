@@ -10,12 +10,14 @@ from typing import Any
 import numpy as np
 import pytest
 
+from densities.examples import plain_product
 from filters.examples import DT, REGION, SCENES, assert_same_mixtures, linear_scene, plain_glmb, plain_lmb, together
+from filters.test_exactness import enumerated
 from reference import glmb as oracle
 from reference.l1 import l1_distance
 from vedette import models
 from vedette.densities import GLMB, LMB, FactoredGLMB, TrackTable
-from vedette.errors import InputError, NumericalError
+from vedette.errors import NumericalError
 from vedette.filters import DeltaGlmbFilter, FactoredGlmbFilter, Limits
 from vedette.kernels.association.children import Parents
 from vedette.kernels.association.products import product_of
@@ -36,25 +38,9 @@ def terms_of(glmb: Any) -> Terms:
     return terms
 
 
-def expanded(density: FactoredGLMB) -> Any:
-    """All products of the factors' hypotheses."""
-    products: list[tuple[float, dict[Any, Any]]] = [(1.0, {})]
-    for factor in density.factors:
-        products = [(w * v, {**a, **b}) for w, a in products for v, b in plain_glmb(factor)]
-    return products
-
-
 def distance(a: Terms, b: Terms) -> float:
     """L1."""
     return sum(abs(a.get(key, 0.0) - b.get(key, 0.0)) for key in a.keys() | b.keys())
-
-
-def enumerated(scene: Any, num_steps: int) -> Any:
-    hypotheses = oracle.no_target()
-    for step, scan in enumerate(scene.scans[:num_steps], 1):
-        hypotheses, total = oracle.step(hypotheses, scene.plain_births(step), list(scan), scene.plain)
-        log_clutter = sum(math.log(scene.plain.clutter_intensity(z)) for z in scan)
-        yield oracle.as_glmb(hypotheses), math.log(total) + log_clutter - scene.sensor.clutter.rate
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -62,10 +48,10 @@ def test_without_splits_it_equals_enumeration(name):
     scene = SCENES[name]()
     tracker, rng = FactoredGlmbFilter(scene.targets, scene.sensor, Limits.none(), 0.0), np.random.default_rng(0)
     belief = tracker.initial()
-    for step, (expected, log_likelihood) in enumerate(enumerated(scene, 2), 1):
+    for step, (hypotheses, log_likelihood) in enumerate(enumerated(name)[:2], 1):
         belief, info = tracker.step(belief, scene.scans[step - 1], scene.pose, DT, step, rng=rng)
         belief.validate()
-        got, wanted = terms_of(expanded(belief)), terms_of(expected)
+        got, wanted = terms_of(plain_product(belief)), terms_of(oracle.as_glmb(hypotheses))
         assert got.keys() == wanted.keys()
         assert max(abs(got[key] - wanted[key]) for key in wanted) < 1e-10
         assert info.log_likelihood == pytest.approx(log_likelihood, abs=1e-10)
@@ -117,7 +103,7 @@ def test_targets_far_apart_never_share_a_factor_nor_a_list():
         assert info.factoring_error == 0.0
         assert info.discarded_weight_bound == 0.0
     sets = oracle.label_set_weights(plain_glmb(whole))
-    assert oracle.label_set_weights(expanded(belief)) == pytest.approx(sets, abs=1e-5)
+    assert oracle.label_set_weights(plain_product(belief)) == pytest.approx(sets, abs=1e-5)
 
 
 def random_prior(rng: np.random.Generator) -> FactoredGLMB:
@@ -185,7 +171,7 @@ def assert_bound_holds(seed: int) -> tuple[float, float]:
         targets, sensor, loose, float(rng.choice([1e-4, 0.02, 0.3, 2.0])), int(rng.integers(1, 6))
     )
     got, info = tracker.step(prior, scan, np.zeros(3), DT, 2, rng=rng)
-    error = distance(terms_of(expanded(got)), terms_of(plain_glmb(exact)))
+    error = distance(terms_of(plain_product(got)), terms_of(plain_glmb(exact)))
     bound = info.factoring_error + 4.0 * info.discarded_weight_bound
     assert error <= bound + 1e-9, f"seed {seed}: error {error}, bound {bound}"
     return bound, error
@@ -202,7 +188,7 @@ def one_scan(prior: FactoredGLMB, scan: Any, sensor: Any, targets: Any, **dials:
     exact, _ = DeltaGlmbFilter(targets, sensor, Limits.none()).step(as_one(prior), scan, np.zeros(3), DT, 2, rng=rng)
     tracker = FactoredGlmbFilter(targets, sensor, **dials)
     got, info = tracker.step(prior, scan, np.zeros(3), DT, 2, rng=rng)
-    error, spread = l1_distance(expanded(got), plain_glmb(exact), 1000, rng)
+    error, spread = l1_distance(plain_product(got), plain_glmb(exact), 1000, rng)
     stated = info.factoring_error + info.reduction_error + 4.0 * info.discarded_weight_bound
     return error, spread, stated + 2.0 * info.dropped_existence
 
@@ -288,26 +274,3 @@ def test_products_of_many_factors_stay_few_and_lose_no_hypothesis():
 def test_the_error_bound_over_many_scenes():
     for seed in range(1000, 2000):
         assert_bound_holds(seed)
-
-
-def test_prediction_and_update_apart():
-    scene, rng = linear_scene(), np.random.default_rng(0)
-    tracker = FactoredGlmbFilter(scene.targets, scene.sensor, Limits.none(), 0.0)
-    together_, _ = tracker.step(tracker.initial(), scene.scans[0], scene.pose, DT, 1, rng=rng)
-    ahead, info = tracker.predict(tracker.initial(), DT, 1)
-    assert info.factoring_error == 0.0
-    after, _ = tracker.update(ahead, scene.scans[0], scene.pose, rng=rng)
-    got, wanted = terms_of(expanded(after)), terms_of(expanded(together_))
-    assert got.keys() == wanted.keys()
-    assert max(abs(got[key] - wanted[key]) for key in wanted) < 1e-10
-
-
-def test_faults_are_named():
-    scene, rng = linear_scene(), np.random.default_rng(0)
-    with pytest.raises(InputError, match="max_split_error: expected at most 2"):
-        FactoredGlmbFilter(scene.targets, scene.sensor, max_split_error=3.0)
-    with pytest.raises(InputError, match="max_factor_labels"):
-        FactoredGlmbFilter(scene.targets, scene.sensor, max_factor_labels=0)
-    tracker = FactoredGlmbFilter(scene.targets, scene.sensor)
-    with pytest.raises(InputError, match="belief: expected a FactoredGLMB"):
-        tracker.step(GLMB.empty(4), scene.scans[0], scene.pose, DT, 1, rng=rng)

@@ -13,7 +13,7 @@ import reference
 from filters.examples import (
     SCENES,
     assert_same_glmb,
-    assert_same_mixtures,
+    assert_same_lmb,
     cv_matrices,
     plain_glmb,
     plain_lmb,
@@ -22,8 +22,7 @@ from filters.examples import (
 from reference import glmb as oracle
 from reference import multi_sensor
 from vedette import models
-from vedette.densities import LMB, TrackTable, as_glmb, marginalise
-from vedette.errors import InputError, NumericalError
+from vedette.densities import LMB, TrackTable, marginalise
 from vedette.filters import DeltaGlmbFilter, Limits, LmbFilter, MultiSensorGlmbFilter, MultiSensorLmbFilter
 from vedette.kernels.base.compile import JIT_ENABLED
 
@@ -55,11 +54,6 @@ def easting(state, pose, params, out):
 def easting_jacobian(state, pose, params, out):
     out[0, 0] = 1.0
     out[0, 1] = out[0, 2] = out[0, 3] = 0.0
-
-
-@models.model_function("prob_detection")
-def always(state, pose, params):
-    return 1.0
 
 
 def sensor(measurement: models.MeasurementModel, stds: list[float], prob: float, rate: float) -> models.SensorModel:
@@ -132,14 +126,6 @@ def test_lmb_equals_enumeration_in_any_order(order):
         assert (info.num_inexact_clusters, info.discarded_weight_bound, info.search_cut) == (0, 0.0, False)
 
 
-def assert_same_lmb(belief, expected):
-    got = plain_lmb(belief)
-    assert got.keys() == expected.keys()
-    for label, (existence, mixture) in expected.items():
-        assert got[label][0] == pytest.approx(existence, abs=1e-10)
-        assert_same_mixtures(together(got[label][1]), together(mixture))
-
-
 def test_certain_and_impossible_tracks():
     tracks = TrackTable.from_gaussians([[-2, 0], [-1, 0]], BIRTH.means, BIRTH.covs)
     belief = LMB(tracks, np.array([math.inf, -math.inf]))
@@ -195,36 +181,3 @@ def test_what_is_cut_is_bounded(limits):
     assert glmb.num_hyps == 3
     assert glmb_info.cap_met
     assert 0.0 < glmb_info.discarded_weight_bound < 1.0
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_bad_input_is_named(kind):
-    tracker, rng = make(kind), np.random.default_rng(0)
-    belief, scans = tracker.initial(), SCANS[0]
-    with pytest.raises(InputError, match="scans: expected 3, one a sensor; got 2"):
-        tracker.step(belief, scans[:2], POSES, DT, 1, rng=rng)
-    with pytest.raises(InputError, match="poses: expected 3, one a sensor; got None"):
-        tracker.step(belief, scans, None, DT, 1, rng=rng)
-    with pytest.raises(InputError, match=r"scans\[2\]: .*\(num_measurements, 1\)"):
-        tracker.step(belief, [*scans[:2], [[1.0, 2.0]]], POSES, DT, 1, rng=rng)
-    with pytest.raises(InputError, match=r"poses\[1\]"):
-        tracker.step(belief, scans, [POSES[0], [0.0], POSES[2]], DT, 1, rng=rng)
-    with pytest.raises(InputError, match="sensors: expected a sequence of at least one SensorModel"):
-        kind(TARGETS, [])
-    with pytest.raises(InputError, match=r"sensors\[0\]: expected a SensorModel; got str"):
-        kind(TARGETS, ["radar"])
-    with pytest.raises(InputError, match="targets: expected a TargetModel"):
-        kind(SENSORS[0], SENSORS)
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_scans_that_the_models_forbid(kind):
-    never_misses = models.DetectionModel(always)
-    certain = dataclasses.replace(SENSORS[0], detection=never_misses)
-    tracker = kind(dataclasses.replace(TARGETS, survival=models.constant_survival(1.0)), [certain, certain], Limits())
-    tracks = TrackTable.from_gaussians([[-2, 0]], BIRTH.means[:1], BIRTH.covs[:1])
-    belief: Any = LMB(tracks, np.array([math.inf]))
-    if kind is MultiSensorGlmbFilter:
-        belief, _ = as_glmb(belief, max_hypotheses=2)
-    with pytest.raises(NumericalError, match="positive weight"):
-        tracker.step(belief, [[], []], POSES[:2], DT, 5, rng=np.random.default_rng(0))

@@ -8,20 +8,16 @@ from typing import Any
 import numpy as np
 import pytest
 
+from filters.members import LABELLED, UNLABELLED, expected_number
 from vedette import models
-from vedette.densities import LMB, cardinality_distribution
+from vedette.densities import LMB
 from vedette.errors import InputError
 from vedette.filters import (
-    CbMemberFilter,
-    CphdFilter,
-    DeltaGlmbFilter,
     FactoredGlmbFilter,
     LmbFilter,
-    PhdFilter,
 )
 from vedette.tracking import Distributed
 
-LABELLED = [DeltaGlmbFilter, LmbFilter, FactoredGlmbFilter]
 COV = np.diag([50.0, 50.0, 5.0, 5.0]) ** 2
 SITES = np.array([[0.0, 400.0, 0.0, 0.0], [300.0, -200.0, 0.0, 0.0]])
 SENSOR = models.SensorModel(
@@ -35,11 +31,6 @@ SENSOR = models.SensorModel(
 def targets(existence: float, survival: float, period: float | None) -> models.TargetModel:
     birth = models.BirthModel(np.full(2, existence), SITES, np.array([COV, COV]), period=period)
     return models.TargetModel(models.constant_velocity(5.0), models.constant_survival(survival, period), birth)
-
-
-def expected_number(belief: Any) -> float:
-    numbers = cardinality_distribution(belief)
-    return float(numbers @ np.arange(len(numbers)))
 
 
 def predicted(own: Any, belief: Any, seconds: float, steps: int) -> Any:
@@ -69,7 +60,7 @@ def test_births_of_twenty_seconds_are_as_many_at_one_scan_a_second_and_at_twenty
     assert expected_number(fast) == pytest.approx(2 * 400 * -np.expm1(np.log(0.98) / 20), rel=1e-3)
 
 
-@pytest.mark.parametrize("kind", [*LABELLED, PhdFilter, CphdFilter, CbMemberFilter])
+@pytest.mark.parametrize("kind", LABELLED | UNLABELLED)
 def test_a_period_of_the_step_is_the_papers_constant(kind: Any) -> None:
     scan, pose, rng = np.array([[0.0, 380.0]]), np.array([0.0, 20.0, 0.0]), np.random.default_rng(1)
     made = []

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import replace
 from typing import Any
@@ -33,8 +34,8 @@ def test_the_bound_covers_what_was_discarded(name, assignment):
     exact, belief = scene.glmb_filter(), scene.glmb_filter().initial()
     for at in range(len(scene.scans)):
         _, whole = step(exact, belief, scene, at)
-        for most in (1, 2, 5, 20):
-            limits = replace(Limits.none(), max_hypotheses=most)
+        for most, least in itertools.product((1, 2, 5, 20), (1.0, Limits.none().min_track_weight)):
+            limits = replace(Limits.none(), max_hypotheses=most, min_track_weight=least)
             tracker = scene.glmb_filter(limits=limits, assignment=assignment)
             kept, info = step(tracker, belief, scene, at)
             kept.validate()
@@ -52,6 +53,20 @@ def far_apart():
     covs = np.broadcast_to(np.diag([20.0, 20.0, 5.0, 5.0]) ** 2, (2, 4, 4))
     tracks = TrackTable.from_gaussians([[-1, 0], [-1, 1]], [[-500.0, 0, 0, 0], [500.0, 0, 0, 0]], covs)
     return scene, GLMB.from_hypotheses(tracks, [[0, 1]], [1.0]), np.array([[-490.0, 5.0], [495.0, -9.0]])
+
+
+@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("most", [1, 2, 3, 4, 6])
+def test_the_bound_is_attained_where_nothing_was_measured(name, most):
+    scene = SCENES[name]()
+    none = replace(Limits.none(), min_track_weight=1.0)
+    infos = [
+        tracker.step(tracker.initial(), np.empty((0, 2)), scene.pose, DT, 1, rng=np.random.default_rng(0))[1]
+        for tracker in (scene.glmb_filter(), scene.glmb_filter(limits=replace(none, max_hypotheses=most)))
+    ]
+    discarded = -math.expm1(infos[1].log_likelihood - infos[0].log_likelihood)
+    assert infos[1].discarded_weight_bound == pytest.approx(discarded, abs=1e-12)
+    assert (discarded > 0.0) == (most < 4)
 
 
 def test_the_bound_is_attained_where_nothing_is_contested():

@@ -9,115 +9,21 @@ from typing import Any
 import numpy as np
 import pytest
 
-from filters.test_bad_input import NEAR, birth, given, make, step
+from filters.members import UNLABELLED, believed, birth, make, step
 from filters.test_caps import Scene
 from vedette import models
 from vedette.densities import (
-    LMB,
-    IidCluster,
-    MultiBernoulli,
-    Poisson,
     cardinality_distribution,
     unlabelled_estimate,
 )
-from vedette.errors import InputError, NumericalError
 from vedette.filters import CbMemberFilter, CphdFilter, Limits, PhdFilter
 from vedette.kernels.base.compile import JIT_ENABLED
 from vedette.scenarios import load_scenario
 from vedette.scenarios.build import build_sensors
 from vedette.simulation import simulate_scan
 
-BELIEFS = {PhdFilter: Poisson, CphdFilter: IidCluster, CbMemberFilter: MultiBernoulli}
-each_kind = pytest.mark.parametrize("kind", BELIEFS)
+each_kind = pytest.mark.parametrize("kind", UNLABELLED)
 lanes = pytest.mark.lanes
-GAUSSIAN = (np.full((1, 4), 10.0), np.eye(4)[None])
-
-
-def certain_target(kind: Any) -> Any:
-    if kind is PhdFilter:
-        return Poisson.from_gaussians([1.0], *GAUSSIAN)
-    if kind is CphdFilter:
-        return IidCluster.from_gaussians([0.0, 1.0], [1.0], *GAUSSIAN)
-    return MultiBernoulli.from_gaussians([1.0], *GAUSSIAN)
-
-
-@lanes
-@each_kind
-def test_beliefs(kind: Any) -> None:
-    tracker, name = make(kind), BELIEFS[kind].__name__
-    with pytest.raises(InputError, match=f"belief: expected a {name}; got LMB"):
-        step(tracker, belief=LMB.empty(4))
-    with pytest.raises(InputError, match="belief: expected states of dimension 4; got 5"):
-        step(tracker, belief=type(tracker.initial()).empty(5))
-    tracker.initial().validate()
-    assert tracker.initial().expected_number == 0.0
-
-
-@lanes
-@each_kind
-def test_an_empty_scan_makes_births_less_likely_and_repeats_are_left_out(kind: Any) -> None:
-    belief, info = step(make(kind), [])
-    belief.validate()
-    assert 0.0 < belief.expected_number < 0.1
-    assert info.num_duplicates == 0
-    twice, repeated = step(make(kind), [[10.0, 10.0], [50.0, 51.0], [10.0, 10.0]])
-    once, _ = step(make(kind), [[10.0, 10.0], [50.0, 51.0]])
-    assert repeated.num_duplicates == 1
-    assert twice.expected_number == once.expected_number
-
-
-@lanes
-@each_kind
-def test_no_births_and_no_targets(kind: Any) -> None:
-    belief, info = step(make(kind, birth=models.BirthModel.none(4)), NEAR)
-    belief.validate()
-    assert (belief.expected_number, info.num_tracks) == (0.0, 0)
-    assert unlabelled_estimate(belief, 0).num_targets == 0
-
-
-@lanes
-@each_kind
-def test_certain_detection(kind: Any) -> None:
-    """At which a miss is the end of a target, and of the density of one."""
-    tracker = make(kind, detection=models.DetectionModel(given, np.ones(1)))
-    belief, _ = step(tracker, [[10.0, 10.0], [50.0, 50.0]])
-    belief.validate()
-    assert belief.expected_number == pytest.approx(2.0, abs=0.2)
-    later, info = step(tracker, [], belief, number=2)
-    later.validate()
-    assert later.expected_number < 1e-6
-    assert info.num_tracks == 0
-
-
-@lanes
-@each_kind
-def test_certain_death(kind: Any) -> None:
-    tracker = make(kind, survival=models.constant_survival(0.0), birth=models.BirthModel.none(4))
-    belief, _ = step(tracker, NEAR, certain_target(kind))
-    belief.validate()
-    assert belief.expected_number == 0.0
-
-
-@lanes
-@each_kind
-def test_clutter_that_is_impossible_is_raised_and_counted(kind: Any) -> None:
-    belief, info = step(
-        make(kind, clutter=models.region_clutter(0.0, models.Region(-1.0, 99.0, -1.0, 99.0), "position"))
-    )
-    belief.validate()
-    assert info.num_clutter_raised == 1
-    assert 0.9 < belief.expected_number < 1.1
-
-
-@lanes
-def test_a_scan_that_no_number_of_targets_can_have_given() -> None:
-    parts: dict[str, Any] = {
-        "detection": models.DetectionModel(given, np.ones(1)),
-        "survival": models.constant_survival(1.0),
-        "birth": models.BirthModel.none(4),
-    }
-    with pytest.raises(NumericalError, match="step 4: no number of targets can have given this scan"):
-        step(make(CphdFilter, **parts), [], certain_target(CphdFilter), number=4)
 
 
 @lanes
@@ -161,7 +67,7 @@ def test_bernoullis_beyond_the_caps_are_counted() -> None:
 @lanes
 def test_a_certain_bernoulli_is_bounded_so_that_the_scan_counts() -> None:
     parts: dict[str, Any] = {"survival": models.constant_survival(1.0), "birth": models.BirthModel.none(4)}
-    prior = certain_target(CbMemberFilter)
+    prior = believed(CbMemberFilter, 1.0, np.full((1, 4), 10.0), np.eye(4)[None])
     belief, info = step(make(CbMemberFilter, **parts), [[11.0, 11.0]], prior)
     belief.validate()
     assert info.dropped_existence == pytest.approx(1e-3, abs=1e-9)

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.special import expit
 
 from densities.examples import random_glmb, random_lmb
 from fusion.sights import LABELS, belief, informed, views
-from vedette.densities import LMB, Poisson, as_lmb, track_moments
-from vedette.errors import InputError
+from vedette.densities import as_lmb, track_moments
 from vedette.fusion import ArithmeticAverage, FusionLimits
 from vedette.models import constant_detection
 
@@ -69,18 +67,3 @@ def test_by_views_a_label_is_averaged_over_those_that_see_it() -> None:
     assert fused.tracks.labels.tolist() == [list(LABELS[0]), list(LABELS[2])]  # who sees the second lacks it
     np.testing.assert_allclose(fused.existence, [float(informed(0.9, 0.3) @ np.array([0.9, 0.6])), 0.4], rtol=1e-12)
     assert info.missing_labels == (0, 1)
-
-
-def test_nothing_at_all_and_what_is_refused() -> None:
-    fused, info = ArithmeticAverage((0.5, 0.5)).fuse([LMB.empty(4)] * 2)
-    assert (fused.tracks.num_tracks, info.empty_intersection) == (0, False)
-    assert expit(fused.existence_logit).size == 0
-    unlabelled = Poisson(np.zeros(0), np.zeros((0, 4)), np.zeros((0, 4, 4)))
-    with pytest.raises(InputError, match=r"beliefs\[1\]: expected LMB, GLMB or FactoredGLMB; got Poisson"):
-        ArithmeticAverage((0.5, 0.5)).fuse([LMB.empty(4), unlabelled])  # type: ignore[list-item]
-    with pytest.raises(InputError, match="sum to 1"):
-        ArithmeticAverage((0.5, 0.4))
-    with pytest.raises(InputError, match=r"limits.max_components"):
-        ArithmeticAverage((0.5, 0.5), limits=FusionLimits(max_components=0))
-    with pytest.raises(InputError, match="by_views; got None"):
-        ArithmeticAverage((0.5, 0.5), by_views=True).fuse([LMB.empty(4)] * 2)

@@ -10,11 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.special import logit
 
-from densities.examples import lmbs, random_glmb, random_lmb
-from fusion.examples import A, B, C, lmb, mixture_track
-from vedette.densities import LMB, Poisson, TrackTable, as_lmb
-from vedette.densities.containers import unchecked
-from vedette.errors import InputError
+from densities.examples import random_glmb
+from fusion.examples import A, B, lmb, mixture_track
+from vedette.densities import LMB, as_lmb
 from vedette.fusion import Clmb
 
 HALVES = (0.5, 0.5)
@@ -25,24 +23,6 @@ def _assert_same(a: LMB, b: LMB, tolerance: float) -> None:
     for name in ("means", "covs", "log_weights"):
         np.testing.assert_allclose(getattr(a.tracks, name), getattr(b.tracks, name), rtol=tolerance, atol=tolerance)
     np.testing.assert_allclose(a.existence_logit, b.existence_logit, rtol=tolerance, atol=tolerance)
-
-
-@given(lmbs())
-def test_equal_beliefs_of_single_gaussians_are_returned(belief):
-    fused, info = Clmb((0.2, 0.5, 0.3)).fuse([belief] * 3)
-    _assert_same(fused, belief, 1e-9)
-    assert info.log_normaliser == pytest.approx(0.0, abs=1e-9)
-
-
-@given(st.integers(0, 2**32 - 1), st.permutations(range(3)))
-def test_the_order_of_sensors_changes_nothing(seed, order):
-    rng = np.random.default_rng(seed)
-    beliefs, weights = [random_lmb(rng, 4) for _ in range(3)], rng.dirichlet(np.ones(3))
-    fused, info = Clmb(weights).fuse(beliefs)
-    fused.validate()
-    again, info_again = Clmb(weights[order]).fuse([beliefs[i] for i in order])
-    _assert_same(fused, again, 1e-8)
-    assert info.num_missing_labels == info_again.num_missing_labels
 
 
 def test_one_blind_sensor_pulls_a_target_down():
@@ -59,15 +39,6 @@ def test_existence_is_never_above_the_mean_log_odds(seed):
     beliefs = [lmb((A, B), rng.uniform(0.01, 0.99, 2), rng) for _ in range(2)]
     fused, _ = Clmb(HALVES).fuse(beliefs)
     assert np.all(fused.existence_logit <= 0.5 * sum(belief.existence_logit for belief in beliefs) + 1e-12)
-
-
-@pytest.mark.parametrize("weights", [(1.0, 0.0), (0.0, 1.0)])
-def test_a_sensor_of_weight_zero_takes_no_part(weights):
-    rng = np.random.default_rng(5)
-    beliefs = [lmb((A, B), (0.5, 0.9), rng), lmb((C,), (0.3,), rng)]
-    fused, info = Clmb(weights).fuse(beliefs)
-    _assert_same(fused, beliefs[int(np.argmax(weights))], 1e-12)
-    assert info.num_missing_labels == 0
 
 
 def test_a_label_that_a_sensor_lacks():
@@ -87,16 +58,6 @@ def test_existence_zero_counts_as_missing_and_one_is_exact():
     assert fused.existence[0] == 1.0
     assert Clmb(HALVES).fuse([surely, surely])[1].log_normaliser == pytest.approx(0.0, abs=1e-12)
     assert Clmb(HALVES).fuse([never, never])[0].tracks.num_tracks == 0
-
-
-def test_nothing_in_common_and_nothing_at_all():
-    rng = np.random.default_rng(2)
-    fused, info = Clmb(HALVES).fuse([lmb((A,), (0.9,), rng), lmb((B,), (0.9,), rng)])
-    fused.validate()
-    assert (info.num_missing_labels, info.empty_intersection) == (2, True)
-    fused, info = Clmb(HALVES).fuse([LMB.empty(4), LMB.empty(4)])
-    fused.validate()
-    assert (fused.state_dim, info.empty_intersection, info.log_normaliser) == (4, False, 0.0)
 
 
 def test_a_glmb_is_converted_first():
@@ -125,17 +86,3 @@ def test_mixtures_are_reduced_to_the_limit(mixture_power):
     fused, _ = Clmb(HALVES, mixture_power).fuse([belief, belief])
     fused.validate()
     assert len(fused.tracks.log_weights) == 4
-
-
-def test_bad_input():
-    rng = np.random.default_rng(2)
-    belief = lmb((A,), (0.9,), rng)
-    with pytest.raises(InputError, match="missing_existence"):
-        Clmb(HALVES, missing_existence=0.0)
-    with pytest.raises(InputError, match=r"beliefs\[1\]: expected LMB, GLMB or FactoredGLMB; got Poisson"):
-        Clmb(HALVES).fuse([belief, Poisson(np.zeros(0), np.zeros((0, 1)), np.zeros((0, 1, 1)))])  # type: ignore[list-item]
-    with pytest.raises(InputError, match="sum to 1"):
-        Clmb((0.5, 0.4))
-    tracks = TrackTable.from_gaussians([B, A], [[0.0], [1.0]], np.ones((2, 1, 1)))
-    with pytest.raises(InputError, match=r"beliefs\[0\].*increasing order"):
-        Clmb(HALVES).fuse([unchecked(LMB, tracks, np.zeros(2)), belief])

@@ -38,7 +38,7 @@ def combination(rng: Rng) -> Data:
         "region": REGION,
         "motion": _motion(rng, dim),
         "survival": pick(rng, [{"kind": "constant", "probability": 0.95}, own_model("survival")]),
-        "birth": _birth(rng, dim, num_steps),
+        "birth": _birth(rng, dim, num_steps, sensors),
         "targets": _targets(rng, dim, num_steps),
         "sensors": sensors,
         "filter": _filter(rng, len(sensors)),
@@ -55,6 +55,10 @@ def combination(rng: Rng) -> Data:
         data["network"] = _network(rng)
     if rng.random() < 0.3:
         data["undetected"] = _undetected(rng)
+    elif rng.random() < 0.95:
+        data["control"].pop("undetected_worth", None)
+    if "lookahead" in data["control"] and rng.random() < 0.95:
+        data["control"]["association"] = "known"
     return data
 
 
@@ -82,12 +86,15 @@ def _motion(rng: Rng, dim: int) -> Data:
     )
 
 
-def _birth(rng: Rng, dim: int, last: int) -> Data:
+def _birth(rng: Rng, dim: int, last: int, sensors: list[Data]) -> Data:
     std = [20.0, 20.0, 3.0, 3.0, 0.05][:dim]
     site: Data = {"existence": 0.1, "mean": _vector(rng, dim)}
     site |= {"std": std} if rng.random() < 0.7 else {"cov": np.diag(np.square(std)).tolist()}
-    birth: Data = {"steps": pick(rng, ["every", "every", [1], [1, last], []]), "sites": [site] * int(rng.integers(3))}
-    if rng.random() < 0.3 or not birth["sites"]:
+    sees = all(MEASURED[own["measurement"]["kind"]] == 2 for own in sensors) or rng.random() < 0.05
+    least = 0 if sees else 1
+    birth: Data = {"steps": pick(rng, ["every", "every", [1], [1, last], []])}
+    birth["sites"] = [site] * int(rng.integers(least, 3))
+    if (sees and rng.random() < 0.3) or not birth["sites"]:
         birth["from_measurements"] = {"std": std}
     return birth
 

@@ -10,99 +10,30 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
+from fuzz.mutations import JUNK, pick, spoil_bytes, spoil_data
+
 Generator = np.random.Generator
 
 DEEP = 100_000  # levels; more than any reader's stack
 
 
-def value_of(rng: Generator) -> Any:
-    """A value of any type that JSON can hold, and some that it cannot."""
-    values: list[Any] = [
-        *(None, True, False, 0, 1, -1, 2, 3, 7, 2**31, 2**63, -(2**63) - 1, 10**400, 0.5, -0.0, 1e308, 1e-320),
-        *(float("nan"), float("inf"), float("-inf"), "", " ", "0", "jdm", "still", "paper-a", "x" * 100_000),
-        *("\ud800", "\x00", "\x1b[2J", "[/bold]x", "²", "../../etc/passwd", "/dev/zero", "a\nb", "<script>", "{{7*7}}"),
-        *("planner", "os:system", "sensors.*.clutter.rate", "1e999", "null", [], {}, [[]], {"": None}, [1, 2, 3]),
-        *([0.1] * 1000, {str(i): i for i in range(100)}, ["jdm"], {"kind": "custom", "function": "os:system"}),
-    ]
-    return values[rng.integers(len(values))]
-
-
-def _places(data: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
-    found = [path]
-    items = data.items() if isinstance(data, dict) else enumerate(data) if isinstance(data, list) else ()
-    for key, item in items:
-        found += _places(item, (*path, key))
-    return found
-
-
-def edit_data(data: Any, rng: Generator) -> Any:
-    """The plain data with something else at one place, or one place gone, doubled or filled."""
-    data = json.loads(json.dumps(data))
-    places = _places(data)
-    path = places[rng.integers(len(places))]
-    if not path:
-        return value_of(rng)
-    holder = data
-    for key in path[:-1]:
-        holder = holder[key]
-    what, old = rng.integers(8), holder[path[-1]]
-    if what == 0:
-        del holder[path[-1]]
-    elif what == 1 and isinstance(holder, list):
-        holder.insert(path[-1], old)
-    elif what == 2 and isinstance(holder, dict):
-        holder[f"{path[-1]}x"] = old
-    elif what == 3 and isinstance(old, str) and old:
-        place = int(rng.integers(len(old)))
-        holder[path[-1]] = old[:place] + str(value_of(rng))[:50] + old[place + int(rng.integers(3)) :]
-    elif what == 4 and isinstance(old, int | float):
-        holder[path[-1]] = old * float(rng.choice([-1.0, 0.5, 1e3, 1e300])) if rng.integers(2) else old + 1
-    elif what == 5:
-        holder[path[-1]] = [old]
-    else:
-        holder[path[-1]] = value_of(rng)
-    return data
-
-
 def edit_json(text: bytes, rng: Generator) -> bytes:
     """JSON text edited as data or as text."""
     if rng.integers(3):
-        data = json.loads(text)
-        for _ in range(rng.integers(1, 4)):
-            data = edit_data(data, rng)
+        data = pick(rng, JUNK) if rng.random() < 0.03 else spoil_data(rng, json.loads(text))
         return json.dumps(data).encode()
     what = rng.integers(6)
     if what == 0:  # a key twice
         data = json.loads(text)
         if isinstance(data, dict) and data:
             key = list(data)[rng.integers(len(data))]
-            twice = f"{{{json.dumps(key)}: {json.dumps(value_of(rng))}, "
+            twice = f"{{{json.dumps(key)}: {json.dumps(pick(rng, JUNK))}, "
             return (json.dumps(data)[:-1] + f', {twice[1:]}"z": 0}}').encode()
     if what == 1:
         return b"[" * DEEP + (b"]" * DEEP if rng.integers(2) else b"")
     if what == 2:
         return b'{"a":' * DEEP + b"1" + b"}" * DEEP
-    return edit_bytes(text, rng)
-
-
-def edit_bytes(content: bytes, rng: Generator) -> bytes:
-    """The bytes cut short, with some flipped, taken out, put in or written over."""
-    what, place = rng.integers(6), int(rng.integers(len(content) + 1))
-    if what == 0:
-        return content[:place]
-    if what == 1:
-        return content + rng.bytes(int(rng.integers(1, 100)))
-    if what == 2:
-        return content[:place] + rng.bytes(int(rng.integers(1, 9))) + content[place:]
-    if what == 3:
-        return content[:place] + content[place + int(rng.integers(1, 50)) :]
-    if what == 4:
-        return rng.bytes(int(rng.integers(100)))
-    edited = bytearray(content)
-    for each in rng.integers(0, max(len(content), 1), int(rng.integers(1, 6))):
-        if content:
-            edited[each] ^= int(rng.integers(1, 256))
-    return bytes(edited)
+    return spoil_bytes(rng, text)
 
 
 def edit_array(array: np.ndarray[Any, Any], rng: Generator) -> np.ndarray[Any, Any]:
@@ -150,7 +81,7 @@ def edit_arrow(content: bytes, rng: Generator) -> bytes:
     """An Arrow file with other bytes, columns, types, rows or nulls; in several batches, or packed."""
     what = rng.integers(8)
     if what < 3:
-        return edit_bytes(content, rng)
+        return spoil_bytes(rng, content)
     table = pa.ipc.open_file(content).read_all()
     if what == 3:
         table = pa.table({name: np.zeros(2_000_000) for name in table.schema.names[:1]})
@@ -194,7 +125,7 @@ def _edit_column(table: pa.Table, place: int, rng: Generator) -> pa.Table:
 def edit_npz(content: bytes, rng: Generator) -> bytes:
     """An archive of arrays and JSON with a member edited, replaced, gone, doubled or inflated."""
     if not rng.integers(5):
-        return edit_bytes(content, rng)
+        return spoil_bytes(rng, content)
     with zipfile.ZipFile(io.BytesIO(content)) as archive:
         members = [(name, archive.read(name)) for name in archive.namelist()]
     place = int(rng.integers(len(members)))
@@ -203,7 +134,7 @@ def edit_npz(content: bytes, rng: Generator) -> bytes:
     if what == 0:
         del members[place]
     elif what == 1:
-        members[place] = (name, edit_bytes(old, rng))
+        members[place] = (name, spoil_bytes(rng, old))
     elif what == 2:
         members[place] = (name, huge_npy(rng))
     elif what == 3:

@@ -9,141 +9,40 @@ from typing import Any
 import numpy as np
 
 TOKENS = [
-    '"\\UFFFFFFFF"',
-    '"\\U00110000"',
-    '"\\ud800": 1',
-    '"\\udfff"',
-    '"\\u0000"',
-    '"\\x1b[31m"',
-    "[" * 60,
-    "[" * 3000,
-    "{a: " * 60,
-    "[[" * 200 + "]]" * 200,
-    "a." * 500,
-    "&a [*a]",
-    "*a",
-    "&a",
-    "<<: *a",
-    "!!python/object:os.system",
-    "!!float",
-    "!<tag:x>",
-    "%YAML 1.1\n---\n",
-    "---\n",
-    "...\n",
-    ".inf",
-    "-.inf",
-    ".nan",
-    "inf",
-    "nan",
-    "1e400",
-    "-1e400",
-    "5e-324",
-    "1e308",
-    "1e-308",
-    "9" * 400,
-    "0x" + "F" * 400,
-    "0" * 5000,
-    "1_0",
-    "2024-02-30",
-    "2024-02-29T12:00:00Z",
-    "99:99:99",
-    "²",
-    "٣",
-    "é" * 300,
-    "x" * 10_000,
-    "\ufeff",
-    "\u2028",
-    "\u202e",
-    "\x00",
-    "\x7f",
-    "\x85",
-    "\t",
-    "\r",
-    "\n",
-    " ",
-    "#",
-    ":",
-    ",",
-    "-",
-    "?",
-    "|",
-    ">",
-    "'",
-    '"',
-    "true",
-    "null",
-    "~",
-    "0",
-    "-0.0",
-    "-1",
-    "1e18",
-    "18446744073709551616",
+    *('"\\UFFFFFFFF"', '"\\U00110000"', '"\\ud800": 1', '"\\udfff"', '"\\u0000"', '"\\x1b[31m"'),
+    *("[" * 60, "[" * 3000, "{a: " * 60, "[[" * 200 + "]]" * 200, "a." * 500),
+    *("&a [*a]", "*a", "&a", "<<: *a", "!!python/object:os.system", "!!float", "!<tag:x>"),
+    *("%YAML 1.1\n---\n", "---\n", "...\n", ".inf", "-.inf", ".nan", "inf", "nan"),
+    *("1e400", "-1e400", "5e-324", "1e308", "1e-308", "9" * 400, "0x" + "F" * 400, "0" * 5000, "1_0"),
+    *("2024-02-30", "2024-02-29T12:00:00Z", "99:99:99", "²", "٣", "é" * 300, "x" * 10_000),
+    *("\ufeff", "\u2028", "\u202e", "\x00", "\x7f", "\x85", "\t", "\r", "\n", " "),
+    *("#", ":", ",", "-", "?", "|", ">", "'", '"', "true", "null", "~"),
+    *("0", "-0.0", "-1", "1e18", "18446744073709551616"),
 ]
 
 _MANY = {f"unknown {number}": number for number in range(300)}
 
 JUNK: list[Any] = [
-    None,
-    True,
-    False,
-    0,
-    1,
-    -1,
-    2,
-    3.5,
-    -0.0,
-    0.5,
-    1.0 - 1e-16,
-    1e-300,
-    5e-324,
-    1e-12,
-    1e6,
-    1e18,
-    1e300,
-    1.7e308,
-    -1e300,
-    2**31,
-    2**63,
-    10**30,
-    10**400,
-    float("inf"),
-    float("-inf"),
-    float("nan"),
-    "",
-    " ",
-    "x",
-    "x" * 10_000,
-    "²",
-    "[/bold]x",
-    "\x1b[31m",
-    "\u202eabc",
-    "every",
-    "none",
-    "reference",
-    "2024-01-01T00:00:00Z",
-    "data.csv",
-    ".",
-    "..",
-    "/",
-    "~",
-    "a\x00b",
-    [],
-    [[]],
-    [1, "a"],
-    [0.0] * 2,
-    [1e300] * 2,
-    [1.0] * 4,
-    [[1.0, 0.0], [0.0, 1.0]],
-    [1] * 1000,
-    {},
-    {"kind": "custom"},
-    {"kind": "custom", "function": "os:system"},
+    *(None, True, False, 0, 1, -1, 2, 3, 7, 3.5, -0.0, 0.5, 1.0 - 1e-16, 1e-300, 1e-320, 5e-324, 1e-12),
+    *(1e6, 1e18, 1e300, 1e308, 1.7e308, -1e300, 2**31, 2**63, -(2**63) - 1, 10**30, 10**400),
+    *(float("inf"), float("-inf"), float("nan"), "", " ", "0", "x", "x" * 10_000, "x" * 100_000, "²", "\ud800"),
+    *("\x00", "[/bold]x", "\x1b[31m", "\x1b[2J", "\u202eabc", "a\nb", "a\x00b", "<script>", "{{7*7}}", "1e999", "null"),
+    *(
+        "every",
+        "none",
+        "reference",
+        "2024-01-01T00:00:00Z",
+        "jdm",
+        "still",
+        "planner",
+        "paper-a",
+        "sensors.*.clutter.rate",
+    ),
+    *("data.csv", ".", "..", "/", "~", "../../etc/passwd", "/dev/zero", "os:system"),
+    *([], [[]], [1, "a"], [1, 2, 3], ["jdm"], [0.0] * 2, [1e300] * 2, [1.0] * 4, [[1.0, 0.0], [0.0, 1.0]]),
+    *([1] * 1000, [0.1] * 1000, {}, {"kind": []}, {"kind": "x" * 5000}, {"": {}}, {"": None}, {"x" * 10_000: 1}, _MANY),
+    *({"kind": "custom"}, {"kind": "custom", "function": "os:system"}),
     {"kind": "custom", "function": "own.py:motion", "state_dim": 4},
-    {"kind": []},
-    {"kind": "x" * 5000},
-    {"": {}},
-    {"x" * 10_000: 1},
-    _MANY,
 ]
 
 
@@ -168,22 +67,23 @@ def spoil_text(rng: np.random.Generator, text: str) -> bytes:
 
 
 def spoil_bytes(rng: np.random.Generator, raw: bytes) -> bytes:
-    """Bytes with some of them changed, cut off, or put in."""
-    spoilt = bytearray(raw)
-    for _ in range(int(rng.integers(1, 5))):
-        if not spoilt:
-            break
-        place = int(rng.integers(len(spoilt)))
-        how = rng.random()
-        if how < 0.6:
-            spoilt[place] ^= 1 << int(rng.integers(8))
+    """Bytes cut short, with some flipped, put in, taken out, added at the end or written over."""
+    for _ in range(int(rng.integers(1, 4))):
+        place, how = int(rng.integers(len(raw) + 1)), rng.random()
+        if how < 0.5 and raw:
+            edited = bytearray(raw)
+            for each in rng.integers(0, len(raw), int(rng.integers(1, 6))):
+                edited[each] ^= int(rng.integers(1, 256))
+            raw = bytes(edited)
+        elif how < 0.65:
+            raw = raw[:place] + rng.bytes(int(rng.integers(1, 9))) + raw[place:]
         elif how < 0.8:
-            spoilt[place:place] = rng.bytes(int(rng.integers(1, 4)))
-        elif how < 0.95:
-            del spoilt[place : place + int(rng.integers(1, 20))]
+            raw = raw[:place] + raw[place + int(rng.integers(1, 50)) :]
+        elif how < 0.9:
+            raw = raw[:place]
         else:
-            del spoilt[place:]
-    return bytes(spoilt)
+            raw = raw + rng.bytes(int(rng.integers(1, 100))) if how < 0.97 else rng.bytes(int(rng.integers(100)))
+    return raw
 
 
 def _put(rng: np.random.Generator, text: str) -> str:
@@ -259,7 +159,7 @@ def spoil_data(rng: np.random.Generator, data: Any, most: int = 3) -> Any:
 
 
 def nudged(rng: np.random.Generator, value: Any) -> Any:
-    """A number a little or much larger or smaller, a list of another length; other things as they are."""
+    """A number a little or much larger or smaller, a text with something in it, a list of another length."""
     if isinstance(value, bool):
         return not value
     if isinstance(value, int | float):
@@ -267,7 +167,10 @@ def nudged(rng: np.random.Generator, value: Any) -> Any:
         return value * factor if isinstance(value, float) else int(min(abs(min(value, 10**18) * factor), 1e12))
     if isinstance(value, list) and value:
         return pick(rng, [value[:-1], value + value[-1:], value[::-1], value * 20])
-    return value
+    if isinstance(value, str) and value:
+        place = int(rng.integers(len(value)))
+        return value[:place] + str(pick(rng, JUNK))[:50] + value[place + int(rng.integers(3)) :]
+    return [value]
 
 
 def covariance(rng: np.random.Generator, dim: int) -> list[list[float]]:

@@ -12,7 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from fuzz.edits import edit_arrow, edit_bytes, edit_json, edit_npz, value_of
+from fuzz.edits import edit_arrow, edit_json, edit_npz
+from fuzz.mutations import JUNK, pick, spoil_bytes
 from vedette.campaigns.manifest import contents_checksum
 
 Generator = np.random.Generator
@@ -84,14 +85,14 @@ def edit_database(folder: Path, rng: Generator) -> None:
         path.unlink()
         ask(folder, ("CREATE TABLE songs (title TEXT)", ()))
     elif what == 3:
-        path.write_bytes(edit_bytes(path.read_bytes(), rng))
+        path.write_bytes(spoil_bytes(rng, path.read_bytes()))
     elif what == 4:
         ask(folder, *((statement, ()) for statement in _VIEW))
     elif what == 5:
         column = ["cell", "run", "session", "payload", "payload_sha256", "metrics", "timings", "timings_sha256"][
             rng.integers(8)
         ]
-        value = _storable(value_of(rng))
+        value = _storable(pick(rng, JUNK))
         change = (f"UPDATE runs SET {column} = ? WHERE run = 0", (value,))
         ask(folder, *((statement, ()) for statement in _UNTYPED), change)
     else:

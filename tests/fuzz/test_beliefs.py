@@ -64,7 +64,7 @@ def fields_of(container: Any) -> dict[str, Any]:
 
 def one_case(rng: np.random.Generator) -> None:
     """A belief with a mistake through everything that takes beliefs; what comes out is valid."""
-    from filters.test_bad_input import POSE, make
+    from filters.members import POSE, make
     from vedette import densities as d
     from vedette.divergence import cauchy_schwarz
     from vedette.filters import CbMemberFilter, CphdFilter, DeltaGlmbFilter, LmbFilter, PhdFilter

@@ -22,6 +22,7 @@ from campaigns.filled import make_campaign
 from densities.examples import random_glmb, random_lmb, random_poisson
 from evaluation.synthetic import make_record
 from fuzz import edits, store_edits
+from fuzz.mutations import spoil_bytes
 from vedette.campaigns.cells import Campaign
 from vedette.campaigns.codec import encode
 from vedette.campaigns.results import CampaignResults, open_results
@@ -239,7 +240,7 @@ def _edit_saved(folder: Path, rng: np.random.Generator) -> bool:
     elif name.endswith(".arrow"):
         new = edits.edit_arrow(old, rng)
     else:
-        new = edits.edit_bytes(old, rng)
+        new = spoil_bytes(rng, old)
     path.write_bytes(new)
     if name == "manifest.json":
         return True  # the facts of a run stand nowhere else

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 
-from vedette.errors import InputError
 from vedette.models import BirthModel
 
 MEANS = np.array([[1.0, 2.0, 0.0, 0.0], [3.0, 4.0, 0.0, 0.0]])
@@ -23,24 +21,3 @@ def test_every_step_and_never():
     assert BirthModel(np.array([0.02, 0.03]), MEANS, COVS).is_active(7)
     never = BirthModel.none(4)
     assert (never.num_sites, never.state_dim, never.is_active(1)) == (0, 4, False)
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"existence": [0.1]}, r"BirthModel.existence: expected an array of shape \(2,\); got shape \(1,\)"),
-        ({"existence": [0.1, 1.0]}, "BirthModel.existence: expected probabilities"),
-        ({"existence": [0.1, 0.0]}, "BirthModel.existence"),
-        ({"means": MEANS[0]}, "BirthModel.means"),
-        ({"means": MEANS[:, :1], "covs": COVS[:, :1, :1]}, "BirthModel.means: expected states of at least 2"),
-        ({"covs": COVS[:1]}, "BirthModel.covs"),
-        ({"covs": COVS * np.array([1.0, -1.0])[:, None, None]}, r"BirthModel.covs\[1\]: expected a positive definite"),
-        ({"covs": COVS + np.eye(4, k=1)}, r"BirthModel.covs\[0\]: expected a symmetric"),
-        ({"steps": [1.5]}, "BirthModel.steps"),
-        ({"steps": 3}, "BirthModel.steps"),
-        ({"steps": "all"}, "BirthModel.steps"),
-    ],
-)
-def test_bad_input_is_named(change, message):
-    with pytest.raises(InputError, match=message):
-        BirthModel(**{"existence": [0.1, 0.1], "means": MEANS, "covs": COVS, "steps": None, **change})

@@ -11,7 +11,6 @@ from scipy import stats
 from scipy.integrate import quad
 
 from vedette import models
-from vedette.errors import InputError
 
 pytestmark = pytest.mark.lanes
 
@@ -164,27 +163,6 @@ def test_same_seed_same_clutter():
         for _ in range(2)
     )
     np.testing.assert_array_equal(first, second)
-
-
-@pytest.mark.parametrize(
-    ("make", "field"),
-    [
-        (lambda: models.Region(0.0, 0.0, 0.0, 1.0), "Region.x_max"),
-        (lambda: models.Region(0.0, 1.0, 2.0, 1.0), "Region.y_max"),
-        (lambda: models.Region(0.0, math.inf, 2.0, 1.0), "Region.x_max"),
-        (lambda: models.region_clutter(-1.0, REGION, "position"), "rate"),
-        (lambda: models.region_clutter(1.0, REGION, "doppler"), "kind"),
-        (lambda: models.region_clutter(1.0, (0, 1, 0, 1), "position"), "region"),  # type: ignore[arg-type]
-        (lambda: models.measurement_space_clutter(1.0, [0.0, 0.0], [1.0]), "high"),
-        (lambda: models.measurement_space_clutter(1.0, [0.0], [0.0]), "high"),
-        (lambda: models.measurement_space_clutter(1.0, [], []), "high"),
-        (lambda: models.measurement_space_clutter(1.0, [0.0], [7.0], angular=[True]), "high"),
-        (lambda: models.measurement_space_clutter(1.0, [0.0], [1.0], angular=[True, False]), "angular"),
-    ],
-)
-def test_bad_input_is_named(make, field):
-    with pytest.raises(InputError, match=field):
-        make()
 
 
 def test_region():

@@ -9,7 +9,6 @@ import pytest
 from scipy import stats
 
 from vedette import models
-from vedette.errors import InputError
 
 pytestmark = pytest.mark.lanes
 
@@ -100,20 +99,3 @@ def test_it_checks_with_its_sensor():
     clutter = models.around_sensor(10.0, "bearing_range", radius=800.0, half_width_rad=1.0)
     noise, detection = models.constant_noise([0.01, 1.0]), models.constant_detection(0.9)
     models.SensorModel(models.bearing_range(), noise, detection, clutter).check([[320.0, -200.0, 0.0, 0.0]], POSE)
-
-
-@pytest.mark.parametrize(
-    ("options", "field"),
-    [
-        ({"kind": "bearing_only", "radius": 1.0}, "kind"),
-        ({}, "radius, half_side"),
-        ({"radius": 1.0, "half_side": 1.0}, "radius, half_side"),
-        ({"radius": -1.0}, "radius"),
-        ({"half_side": 0.0}, "half_side"),
-        ({"radius": 1.0, "half_width_rad": 4.0}, "half_width_rad"),
-        ({"radius": 1.0, "rate": -1.0}, "rate"),
-    ],
-)
-def test_bad_arguments_are_named(options, field):
-    with pytest.raises(InputError, match=field):
-        models.around_sensor(**{"rate": 1.0, "kind": "position", **options})

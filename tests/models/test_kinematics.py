@@ -12,7 +12,6 @@ from scipy.integrate import solve_ivp
 
 from reference.differences import central_differences
 from vedette import models
-from vedette.errors import InputError
 
 pytestmark = pytest.mark.lanes
 
@@ -115,20 +114,3 @@ def test_constant_survival():
     survival = models.constant_survival(0.98)
     survival.check(STATES)
     np.testing.assert_array_equal(survival.prob(STATES, 2.0), [0.98, 0.98, 0.98])
-
-
-@pytest.mark.parametrize(
-    ("make", "field"),
-    [
-        (lambda: models.constant_velocity(-1.0), "sigma_v"),
-        (lambda: models.constant_velocity(math.nan), "sigma_v"),
-        (lambda: models.constant_velocity(1.0, acceleration="jerk"), "acceleration"),  # type: ignore[arg-type]
-        (lambda: models.constant_velocity("5"), "sigma_v"),  # type: ignore[arg-type]
-        (lambda: models.coordinated_turn(1.0, -0.1), "sigma_turn_rate"),
-        (lambda: models.constant_survival(1.2), "prob_survival"),
-        (lambda: models.constant_velocity(1.0, method="kalman"), "MotionModel.method"),
-    ],
-)
-def test_bad_numbers_are_named(make, field):
-    with pytest.raises(InputError, match=field):
-        make()

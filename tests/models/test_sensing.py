@@ -169,37 +169,6 @@ def test_a_soft_sector_far_away_and_at_the_sensor():
 
 
 @pytest.mark.parametrize(
-    ("make", "field"),
-    [
-        (lambda: models.range_dependent_noise(), "sigma_range, sigma_bearing"),
-        (lambda: models.range_dependent_noise(10.0, eta_bearing=1.0), "eta_bearing"),
-        (lambda: models.range_dependent_noise(0.0), "sigma_range"),
-        (lambda: models.range_dependent_noise(1.0, -1.0), "eta_range"),
-        (lambda: models.constant_noise([]), "stds"),
-        (lambda: models.constant_noise([1.0, 0.0]), "stds"),
-        (lambda: models.constant_noise([[1.0]]), "stds"),
-        (lambda: models.constant_detection(1.5), "prob_detection"),
-        (lambda: models.gaussian_detection(0.0), "sigma"),
-        (lambda: models.limited_range(0.5, -1.0), "max_range"),
-        (lambda: models.limited_sector(0.5, 10.0, 0.0), "half_width_rad"),
-        (lambda: models.limited_sector(0.5, 10.0, 3.2), "half_width_rad"),
-        (lambda: models.limited_range(0.5, 10.0, 1.1), "outside"),
-        (lambda: models.limited_sector(0.5, 10.0, 1.0, -0.1), "outside"),
-        (lambda: models.soft_sector(0.5, 10.0, 4.0, range_slope=1.0), "half_width_rad"),
-        (lambda: models.soft_sector(0.5, 10.0, range_slope=0.0), "range_slope"),
-        (lambda: models.soft_sector(0.5, 10.0, range_slope=1.0, angle_slope=-1.0), "angle_slope"),
-        (lambda: models.soft_sector(0.5, 10.0, range_slope=1.0, cut="yes"), "cut"),  # type: ignore[arg-type]
-        (lambda: models.axis_noise([1.0], [0.0]), "std"),
-        (lambda: models.axis_noise([1.0, 0.0], [0.0, 0.0]), "std"),
-        (lambda: models.axis_noise([1.0, 1.0], [0.0, -1.0]), "growth"),
-    ],
-)
-def test_bad_numbers_are_named(make, field):
-    with pytest.raises(InputError, match=field):
-        make()
-
-
-@pytest.mark.parametrize(
     ("detection", "reach"),
     [
         (models.limited_range(0.9, 600.0), 600.0),

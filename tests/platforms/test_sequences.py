@@ -99,19 +99,6 @@ def test_more_sequences_than_can_be_listed_are_refused():
         Sequences(Courses(5.0), 2.0, 8).actions(POSE)
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ((None, 1.0, 2), "platform: expected a platform"),
-        ((Courses(1.0), 0.0, 2), "period"),
-        ((Courses(1.0), 1.0, 0), "depth"),
-    ],
-)
-def test_bad_sequences(arguments, message):
-    with pytest.raises(InputError, match=message):
-        Sequences(*arguments)
-
-
 def test_waypoints_are_chosen_anew():
     platform = Sequences(Waypoints([[0.0, 0.0], [100.0, 0.0]], 5.0), 1.0, 2)
     course = platform.course(np.array([50.0, 0.0, 0.0]), np.array([1.0, 2.0]), np.array([1.0, 2.0]))

@@ -8,7 +8,6 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from vedette.errors import InputError
 from vedette.platforms import Options, Steps, Still, Waypoints, options_at
 
 POSE = np.array([10.0, -5.0, 0.3, 0.7])
@@ -81,19 +80,3 @@ def test_a_closed_path_goes_round_and_round():
 def test_a_path_of_one_point_where_it_is_leads_nowhere(closed):
     course = Waypoints([[10.0, -5.0]], 7.0, closed).course(POSE, np.array([1.0]), TIMES)
     np.testing.assert_array_equal(course, np.tile(POSE, (5, 1)))
-
-
-@pytest.mark.parametrize(
-    ("build", "message"),
-    [
-        (lambda: Steps(0.0, 1.0), "length: expected a number above 0"),
-        (lambda: Steps(1.0, -1.0), "speed: expected a number above 0"),
-        (lambda: Steps(1.0, 1.0, ()), "directions_deg: expected at least one angle"),
-        (lambda: Waypoints([], 1.0), "points: expected"),
-        (lambda: Waypoints([[0.0, np.nan]], 1.0), "points: expected finite"),
-        (lambda: Waypoints([[0.0, 1.0]], -1.0), "speed: expected a number of at least 0"),
-    ],
-)
-def test_bad_input(build, message):
-    with pytest.raises(InputError, match=message):
-        build()

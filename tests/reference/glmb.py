@@ -167,10 +167,12 @@ def to_lmb(glmb: Glmb) -> Lmb:
     return {label: normalised(mixture) for label, mixture in sorted(pooled.items())}
 
 
-def lmb_step(lmb: Lmb, births: Lmb, scan: Sequence[Floats], model: Model) -> Lmb:
-    """Prediction and update of an LMB: all subsets, all associations, then the marginals of each label."""
-    prior: Hypotheses = {}
-    for weight, tracks in expand_lmb(lmb):
-        prior[tuple((label, ()) for label in sorted(tracks))] = (weight, tracks)
-    posterior, _ = step(prior, births, scan, model)
-    return to_lmb(as_glmb(posterior))
+def lmb_step(lmb: Lmb, births: Lmb, scan: Sequence[Floats], model: Model) -> tuple[Lmb, float]:
+    """Prediction and update of an LMB: all subsets, all associations, then each label's marginals; sum of weights."""
+    posterior, total = step(hypotheses_of(lmb), births, scan, model)
+    return to_lmb(as_glmb(posterior)), total
+
+
+def hypotheses_of(lmb: Lmb) -> Hypotheses:
+    """All its label subsets, as if nothing had happened before."""
+    return {tuple((label, ()) for label in sorted(tracks)): (weight, tracks) for weight, tracks in expand_lmb(lmb)}

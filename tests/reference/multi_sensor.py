@@ -14,7 +14,7 @@ from typing import TypeAlias
 import numpy as np
 
 from reference import Floats, Lmb, Mixture, gaussian
-from reference.glmb import ABSENT, MISSED, Hypotheses, as_glmb, expand_lmb, normalised, to_lmb
+from reference.glmb import ABSENT, MISSED, Hypotheses, as_glmb, hypotheses_of, normalised, to_lmb
 
 # What each target takes: ABSENT, or a measurement (or MISSED) of every sensor.
 Taken: TypeAlias = int | tuple[int, ...]
@@ -126,11 +126,6 @@ def step(
 
 
 def lmb_step(lmb: Lmb, births: Lmb, scans: Sequence[Sequence[Floats]], model: LinearModel) -> tuple[Lmb, float]:
-    """Prediction and update of an LMB: all subsets, all joint choices, then the marginals of each label; and the sum of
-    all weights.
-    """
-    prior: Hypotheses = {}
-    for weight, tracks in expand_lmb(lmb):
-        prior[tuple((label, ()) for label in sorted(tracks))] = (weight, tracks)
-    posterior, total = step(prior, births, scans, model)
+    """Prediction and update of an LMB: all subsets, all joint choices, then each label's marginals; sum of weights."""
+    posterior, total = step(hypotheses_of(lmb), births, scans, model)
     return to_lmb(as_glmb(posterior)), total

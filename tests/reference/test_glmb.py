@@ -49,7 +49,7 @@ def test_association_count():
 
 
 def test_lmb_step_by_hand():
-    lmb = glmb.lmb_step(BIRTHS, {}, SCAN, MODEL)
+    lmb, _ = glmb.lmb_step(BIRTHS, {}, SCAN, MODEL)
     predicted = 0.5 * 0.75
     detected = 0.9 * gaussian_pdf(np.ones(1), np.zeros(1), 4.0 * ONE) / 0.2
     odds = predicted / (1.0 - predicted) * (0.1 + detected)

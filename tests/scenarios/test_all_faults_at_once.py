@@ -17,44 +17,6 @@ def faults(text: str) -> list[str]:
     return error.value.faults
 
 
-def test_faults_of_schema_and_of_sense_come_together_in_file_order() -> None:
-    text = changed(
-        ("num_steps: 20", "num_stps: 20, num_steps: 20"),
-        ("existence: 0.1", "existence: 2"),
-        ("end_step: 18", "end_step: 1"),
-        ("std: [0.02, 3.0]", "std: [0.02]"),
-        ("heading_deg: 4.0", "heading_deg: fast"),
-        ("weights: [0.5, 0.5]", "weights: [0.5, 0.6], mixture_power: cubic"),
-        ("decision_steps: [4, 8]", "decision_steps: [4, 50], num_samples: 0"),
-    )
-    lines = faults(text)
-    assert [line.split(" expected ")[0] for line in lines] == [
-        "f:2:8: time.num_stps:",
-        "f:9:19: birth.sites[0].existence:",
-        "f:13:63: targets.tracks[0].end_step:",
-        "f:15:32: sensor_defaults.noise.std:",
-        "f:17:55: sensors[0].heading_deg:",
-        "f:20:40: fusion.weights:",
-        "f:20:67: fusion.mixture_power:",
-        "f:22:31: control.decision_steps[1]:",
-        "f:22:49: control.num_samples:",
-    ]
-
-
-def test_a_fault_in_the_defaults_is_named_once_and_where_it_stands() -> None:
-    assert faults(changed(("kind: constant, std", "kind: constant, sdt"))) == [
-        "f:15:3: sensor_defaults.noise.std: expected a value, as it is required, got nothing",
-        "f:15:27: sensor_defaults.noise.sdt: expected one of kind, std, got an unknown key (did you mean std?)",
-    ]
-
-
-def test_a_sensor_with_its_own_value_has_its_own_faults() -> None:
-    text = changed(("heading_deg: 4.0", "noise: {kind: constant, std: [1.0]}"))
-    assert faults(text) == [
-        "f:17:71: sensors[0].noise.std: expected 2 numbers, as a bearing_range measurement has, got a list of 1"
-    ]
-
-
 @pytest.mark.parametrize("text", ["", "# nothing\n"])
 def test_an_empty_file_is_no_scenario(text: str) -> None:
     assert faults(text) == ["f:1:1: expected a mapping of the sections of a scenario, got nothing"]
@@ -62,19 +24,6 @@ def test_an_empty_file_is_no_scenario(text: str) -> None:
 
 def test_a_list_is_no_scenario() -> None:
     assert faults("- a\n- b\n") == ["f:1:1: expected a mapping of the sections of a scenario, got a list of 2"]
-
-
-def test_a_key_twice_and_a_wrong_value_are_both_told() -> None:
-    text = changed(("name: small", "name: small\nname: large"), ("cutoff: 50.0", "cutoff: wide"))
-    assert faults(text) == [
-        "f:2:1: name: expected each key once, got it again, after line 1",
-        'f:24:16: ospa.cutoff: expected a number, got "wide"',
-    ]
-
-
-def test_merge_keys_get_a_hint() -> None:
-    (fault,) = faults(changed(("heading_deg: 4.0", "<<: {heading_deg: 4.0}")))
-    assert fault.endswith("(YAML 1.2 has no merge keys; sensor_defaults holds what sensors share)")
 
 
 def test_numbers_as_people_write_them() -> None:

@@ -2,82 +2,37 @@
 
 from __future__ import annotations
 
-import copy
 import json
 import re
-from typing import Any
+from pathlib import Path
 
-from hypothesis import given, settings
-from hypothesis import strategies as st
+import numpy as np
+import pytest
 
-from scenarios.strategies import scenarios
+from fuzz.combinations import combination, lay_beside
+from fuzz.mutations import spoil_data
 from vedette.errors import ScenarioError
 from vedette.scenarios import parse_scenario
 
-JUNK: st.SearchStrategy[Any] = st.sampled_from(
-    [
-        None,
-        True,
-        0,
-        -1,
-        1e300,
-        10**30,
-        "",
-        "every",
-        "none",
-        [],
-        [[]],
-        [1, "a"],
-        {},
-        {"kind": "custom"},
-        {"kind": []},
-        {"": {}},
-    ]
-).map(copy.deepcopy)
 
-
-def places(data: Any) -> list[tuple[Any, Any]]:
-    """Every collection in the data with each of its keys."""
-    if not isinstance(data, dict | list):
-        return []
-    keys = list(data) if isinstance(data, dict) else list(range(len(data)))
-    return [(data, key) for key in keys] + [place for key in keys for place in places(data[key])]
-
-
-@st.composite
-def mistaken(draw: st.DrawFn) -> Any:
-    """A valid scenario with a few of its values replaced, left out, renamed or added to."""
-    data = copy.deepcopy(draw(scenarios()))
-    for _ in range(draw(st.integers(1, 4))):
-        found = places(data)
-        collection, key = found[draw(st.integers(0, len(found) - 1))]
-        what = draw(st.sampled_from(["replace", "remove", "add"]))
-        if what == "replace":
-            collection[key] = draw(JUNK)
-        elif what == "remove":
-            del collection[key]
-        elif isinstance(collection, dict):
-            collection[str(key) + "x"] = draw(JUNK)
-        else:
-            collection.append(draw(JUNK))
-    return data
-
-
-@settings(max_examples=100)
-@given(mistaken())
-def test_any_mistake_is_told_with_its_place(data: Any) -> None:
-    text = json.dumps(data, indent=1)
-    lines = [line_of(fault) for fault in faults(text)]
-    assert lines == sorted(lines)
-    assert all(1 <= line <= text.count("\n") + 1 for line in lines)
-
-
-def faults(text: str) -> list[str]:
-    try:
-        parse_scenario(text, "f.yaml")
-    except ScenarioError as error:
-        return error.faults
-    return []
+@pytest.mark.parametrize("seed", range(4))
+def test_any_mistake_is_told_with_its_place(seed: int, tmp_path: Path) -> None:
+    """Scenarios with a few of their values replaced, changed, left out, renamed or added to."""
+    lay_beside(tmp_path)
+    told = 0
+    for number in range(50):
+        rng = np.random.default_rng([seed, number])
+        text = json.dumps(spoil_data(rng, combination(rng), 4), indent=1)
+        for word, other in (("-Infinity", "-.inf"), ("Infinity", ".inf"), ("NaN", ".nan")):
+            text = text.replace(word, other)
+        try:
+            parse_scenario(text, "f.yaml", folder=tmp_path)
+        except ScenarioError as error:
+            lines = [line_of(fault) for fault in error.faults]
+            assert lines == sorted(lines)
+            assert all(1 <= line <= text.count("\n") + 1 for line in lines)
+            told += 1
+    assert told > 25
 
 
 def line_of(fault: str) -> int:

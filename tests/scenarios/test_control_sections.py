@@ -1,4 +1,3 @@
-# ruff: noqa: E501
 """Searches and constraints as a scenario says them: what is built, what is refused, and a run with them."""
 
 from __future__ import annotations
@@ -23,7 +22,6 @@ from vedette.control import (
     StayInside,
     VoidProbability,
 )
-from vedette.errors import ScenarioError
 from vedette.evaluation import run_scenario
 from vedette.scenarios import Scenario, load_scenario, parse_scenario, with_fields
 from vedette.scenarios.build import build_planner
@@ -88,34 +86,6 @@ def test_a_constraint_of_ones_own(tmp_path: Path) -> None:
     )
     (own,) = scenario.model.control.build_constraints(scenario.folder)
     assert (own.name, own.needs_beliefs) == ("odd_ones", False)
-
-
-KINDS = "one of keep_out, separation, stay_inside, void_probability, custom"
-
-
-@pytest.mark.parametrize(
-    ("text", "fault"),
-    [
-        ("search: {kind: annealing}", 'control.search.kind: expected one of automatic, coordinate_ascent, cross_entropy, exhaustive, sequential_greedy, custom, got "annealing"'),
-        ("search: {kind: coordinate_ascent, num_restarts: -1}", "control.search.num_restarts: expected a number of at least 0, got -1"),
-        ("search: {kind: sequential_greedy, order: last}", 'control.search.order: expected one of printed, best_first, got "last"'),
-        ("search: {kind: cross_entropy, elite_share: 1.0}", "control.search.elite_share: expected a number below 1, got 1.0"),
-        ("search: {kind: cross_entropy, smoothing: 0.0}", "control.search.smoothing: expected a number above 0, got 0.0"),
-        ("search: {kind: automatic, num_restarts: 2}", "control.search.num_restarts: expected one of kind, max_joint_actions, got an unknown key"),
-        ("constraints: [{kind: distance}]", f'control.constraints[0].kind: expected {KINDS}, got "distance"'),
-        ("constraints: [{distance: 3.0}]", f"control.constraints[0]: expected a mapping with kind: {KINDS}, got no kind"),
-        ("constraints: [{kind: separation, distance: 0.0}]", "control.constraints[0].distance: expected a number above 0, got 0.0"),
-        ("constraints: [{kind: separation}]", "control.constraints[0].distance: expected a value, as it is required, got nothing"),
-        ("constraints: [{kind: keep_out}]", "control.constraints[0]: expected either region, polygon or geojson, got none"),
-        ("constraints: [{kind: keep_out, polygon: [[0, 0], [1, 1]]}]", "control.constraints[0].polygon: expected"),
-        ("constraints: [{kind: stay_inside, region: {x_min: 1.0, x_max: 0.0, y_min: 0.0, y_max: 1.0}}]", "control.constraints[0].region.x_max: expected a number above x_min, 1, got 0.0"),
-        ("constraints: [{kind: separation, distance: 3.0}, {kind: void_probability, radius: 5.0, probability: 2.0}]", "control.constraints[1].probability: expected a number of at most 1, got 2.0"),
-    ],
-)  # fmt: skip
-def test_what_is_refused(tmp_path: Path, text: str, fault: str) -> None:
-    with pytest.raises(ScenarioError) as caught:
-        written(tmp_path, text)
-    assert fault in str(caught.value)
 
 
 @pytest.mark.parametrize("kind", ["automatic", "exhaustive", "coordinate_ascent", "cross_entropy"])

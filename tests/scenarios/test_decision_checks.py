@@ -17,7 +17,7 @@ from vedette.control import (
     SequentialGreedy,
     VoidProbability,
 )
-from vedette.errors import InputError, ScenarioError
+from vedette.errors import InputError
 from vedette.scenarios import Scenario, parse_scenario
 from vedette.scenarios.build import build_planner, build_sensors
 from vedette.scenarios.code_checks import code_faults
@@ -31,56 +31,13 @@ PHD = (
 )
 
 
-def with_control(text: str, *changes: tuple[str, str], more: str = "") -> str:
-    return changed(("{decision_steps: [4, 8]}", f"{{decision_steps: [4, 8], {text}}}{more}"), *changes)
-
-
-def scenario(text: str, *changes: tuple[str, str], more: str = "") -> Scenario:
-    return Scenario(parse_scenario(with_control(text, *changes, more=more)), Path("scenario.yaml"))
-
-
-def fault(text: str) -> str:
-    with pytest.raises(ScenarioError) as error:
-        parse_scenario(text, "f.yaml")
-    (only,) = error.value.faults
-    return only
+def scenario(text: str, *changes: tuple[str, str]) -> Scenario:
+    given = changed(("{decision_steps: [4, 8]}", f"{{decision_steps: [4, 8], {text}}}"), *changes)
+    return Scenario(parse_scenario(given), Path("scenario.yaml"))
 
 
 GREEDY = "search: {kind: sequential_greedy}"
 SAMPLED = "reward: {kind: cauchy_schwarz}"
-OWN = "\nplanners: {mine: {kind: joint, search: {kind: sequential_greedy}}}"
-
-
-@pytest.mark.parametrize(
-    ("text", "place", "wanted"),
-    [
-        (
-            with_control(f"{GREEDY}, {SAMPLED}"),
-            "22:50: control.search.kind",
-            "as decisions on m_delta_glmb beliefs are no sums over",
-        ),
-        (
-            with_control(f"{GREEDY}, association: full, {SAMPLED}", *LMB),
-            "22:50: control.search.kind",
-            "with control.association",
-        ),
-        (with_control(SAMPLED, more=OWN), "23:47: planners.mine.search.kind", "m_delta_glmb beliefs"),
-        (
-            with_control("constraints: [{kind: void_probability, radius: 5, probability: 0.9}]", *PHD),
-            "20:56: control.constraints[0].kind",
-            "another constraint, as phd filters have no labels to look ahead by",
-        ),
-        (
-            changed(*PHD, ("heading_deg: 4.0", "heading_deg: 4.0, scans: {every: 2}")),
-            "17:67: sensors[0].scans",
-            "every step, as phd filters go on from each scan",
-        ),
-    ],
-)
-def test_the_check_says_where(text: str, place: str, wanted: str) -> None:
-    told = fault(text)
-    assert told.startswith(f"f.yaml:{place}: expected "), told
-    assert wanted in told
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from vedette.errors import InputError
 from vedette.evaluation import measure_run, own_metrics, run_scenario
 from vedette.scenarios import Scenario, parse_scenario, with_fields
 from vedette.scenarios.build import build_targets
@@ -97,23 +96,6 @@ def test_sensors_are_spread_evenly_over_an_area_that_grows_with_their_number(num
     assert np.abs(sensors).max() <= 0.5 * scene.side
     gaps = np.linalg.norm(sensors[:, None] - sensors[None], axis=2) + 1e9 * np.eye(num_sensors)
     assert gaps.min() > 200.0
-
-
-@pytest.mark.parametrize(
-    ("settings", "message"),
-    [
-        ({"num_sensors": 0}, "num_sensors: expected a whole number from 1 to 1000; got 0"),
-        ({"num_sensors": 2.0}, "num_sensors: expected a whole number from 1 to 1000; got 2.0"),
-        ({"num_sensors": 2, "num_targets": 0}, "num_targets: expected a whole number from 1 to 2000; got 0"),
-        ({"num_sensors": 2, "decide_every": 60}, "decide_every: expected a whole number from 1 to 59; got 60"),
-        ({"num_sensors": 2, "seed": -1}, "seed: expected a whole number from 0 to"),
-        ({"num_sensors": 2, "pattern": "swarm"}, "pattern: expected one of spread, crowd; got 'swarm'"),
-        ({"num_sensors": 2, "view": "none"}, "view: expected one of full, limited; got 'none'"),
-    ],
-)
-def test_settings_that_cannot_be(settings: dict[str, Any], message: str) -> None:
-    with pytest.raises(InputError, match=message):
-        GeneratedScene(**settings)
 
 
 @pytest.mark.parametrize("view", VIEWS)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from vedette.errors import InputError, ScenarioError
+from vedette.errors import ScenarioError
 from vedette.evaluation import run_scenario
 from vedette.scenarios import GeneratedCrowd, Scenario, crowd_text, list_builtin, parse_scenario, with_fields
 from vedette.scenarios.build import build_targets
@@ -58,23 +58,6 @@ def test_a_crowd_says_the_settings_that_differ_from_the_usual() -> None:
 def test_the_built_in_crowd_is_the_usual_one() -> None:
     text = list_builtin()["crowd"].read_text(encoding="utf-8")
     assert text == crowd_text(GeneratedCrowd()).replace("name: crowd-100", "name: crowd")
-
-
-@pytest.mark.parametrize(
-    ("settings", "message"),
-    [
-        ({"num_targets": 0}, "num_targets: expected a whole number from 1 to 100000; got 0"),
-        ({"num_targets": 2.0}, "num_targets: expected a whole number from 1 to 100000; got 2.0"),
-        ({"num_steps": True}, "num_steps: expected a whole number from 1 to 10000; got True"),
-        ({"density": 0}, "density: expected a number from 0.001 to 1e\\+06; got 0"),
-        ({"density": float("nan")}, "density: expected a number from 0.001 to 1e\\+06; got nan"),
-        ({"clutter": -1.0}, "clutter: expected a number from 0 to 100; got -1.0"),
-        ({"measured": "range"}, "measured: expected one of position, bearing_range; got 'range'"),
-    ],
-)
-def test_settings_that_cannot_be(settings: dict[str, Any], message: str) -> None:
-    with pytest.raises(InputError, match=message):
-        GeneratedCrowd(**settings)
 
 
 def test_components_that_do_not_fit_the_motion() -> None:

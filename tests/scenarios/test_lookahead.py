@@ -67,41 +67,6 @@ def test_constraints_are_those_of_all_strategies(gap: Scenario) -> None:
     assert np.sqrt((between**2).sum(axis=2)).min() >= 12.0
 
 
-@pytest.mark.parametrize(
-    ("fields", "message"),
-    [
-        ({"control.lookahead": {"depth": 0}}, "control.lookahead.depth"),
-        ({"control.lookahead": {"method": "forest"}}, "control.lookahead.method"),
-        (
-            {"control.lookahead": {"method": "tree", "beam_width": 4}},
-            "control.lookahead.beam_width: expected none, as it is of method beam, got 4",
-        ),
-        (
-            {"control.lookahead": {"rollout": "kept"}},
-            'control.lookahead.rollout: expected none, as it is of method tree, got "kept"',
-        ),
-        (
-            {"control.lookahead": {"period": 1.5}},
-            "control.lookahead.period: expected a whole multiple of control.horizon_period, 1, got 1.5",
-        ),
-        (
-            {"control.lookahead": {}, "control.association": "full"},
-            'control.association: expected known, with a lookahead, got "full"',
-        ),
-    ],
-)
-def test_faults(plain: Scenario, fields: dict[str, Any], message: str) -> None:
-    with pytest.raises(ScenarioError) as fault:
-        with_fields(plain, fields)
-    assert message in str(fault.value)
-
-
-def test_of_what_cannot_be_read_no_more_is_said(plain: Scenario) -> None:
-    with pytest.raises(ScenarioError) as fault:
-        with_fields(plain, {"control.lookahead": {"exploration": -1}})
-    assert str(fault.value) == "control.lookahead.exploration: expected a number of at least 0, got -1"
-
-
 def test_who_looks_ahead_crosses_the_gap(gap: Scenario) -> None:
     """A single decision that ends with its horizon has nothing to gain there; one that looks on goes, too."""
     ends = with_fields(gap, {"control.reward": {"kind": "kullback_leibler"}})

@@ -97,75 +97,6 @@ def test_show_says_what_is_sent_and_where_targets_are_born() -> None:
     assert told["births"] == "no site; 0.4 a scan from measurements"
 
 
-FAULTS = [
-    (
-        "lmb",
-        "{kind: sequential}\nnetwork: {consensus_rounds: 3}",
-        (),
-        "expected none, as under sequential sensors send scans, of which there is no average, got 3",
-    ),
-    (
-        "lmb",
-        "{kind: parallel}\nnetwork: {delay: 2}",
-        (),
-        "network.delay: expected 0, as parallel divides by the prediction of the same time, got 2",
-    ),
-    (
-        "lmb",
-        "{kind: clmb}\nnetwork: {}",
-        (),
-        "fusion.feedback: expected true, as sensors of a network go on from what they have fused, got false",
-    ),
-    (
-        "lmb",
-        "{kind: parallel}\nnetwork: {consensus_rounds: 3, delay: 2}",
-        (),
-        "network.delay: expected none with consensus_rounds, got 2",
-    ),
-    ("lmb", "{kind: parallel}\nnetwork: {loss: 1.0}", (), "network.loss: expected a number below 1, got 1.0"),
-    (
-        "lmb",
-        "{kind: clmb}",
-        ((SITES, SITES + MEASURED),),
-        "fusion.matching: expected assignment, as without feedback sensors make labels of their own from their "
-        'measurements, got "labels"',
-    ),
-    (
-        "lmb",
-        "{kind: sequential}",
-        ((SITES, MEASURED.replace(", 2.0]", "]")),),
-        "birth.from_measurements.std: expected 4 numbers, as a state under motion has, got a list of 3",
-    ),
-    (
-        "lmb",
-        "{kind: sequential}",
-        ((SITES, MEASURED.replace("9.0", "0.0")),),
-        "birth.from_measurements.std[0]: expected a number above 0, got 0.0",
-    ),
-    (
-        "lmb",
-        "{kind: sequential}",
-        (
-            (SITES, MEASURED),
-            (
-                "noise: {kind: constant, std: [0.02, 3.0]}",
-                "measurement: {kind: bearing_only}\n  noise: {kind: constant, std: [0.02]}",
-            ),
-        ),
-        "sensor_defaults.measurement.kind: expected a measurement that says where a target is, for "
-        'birth.from_measurements, got "bearing_only"',
-    ),
-]
-
-
-@pytest.mark.parametrize(("kind", "fusion", "changes", "message"), FAULTS)
-def test_what_does_not_go_together_is_refused(kind: str, fusion: str, changes: Any, message: str) -> None:
-    text = changed((FILTER, f"kind: {kind}"), (FUSION, f"fusion: {fusion}"), *changes)
-    with pytest.raises(ScenarioError) as raised:
-        parse_scenario(text, "f.yaml")
-    assert any(fault.endswith(message) for fault in str(raised.value).splitlines()), str(raised.value)
-
-
 def test_beliefs_that_are_late_and_births_that_are_later_are_warned_of(tmp_path: Path) -> None:
     file = tmp_path / "late.yaml"
     for fusion, warned in (("{kind: clmb, feedback: true}", True), ("{kind: sequential}", False)):
@@ -179,3 +110,22 @@ def test_beliefs_that_are_late_and_births_that_are_later_are_warned_of(tmp_path:
         told = [line for line in cautions(load_scenario(file)) if "come 2 or more scans late" in line]
         assert bool(told) == warned
         assert all("take fusion: {kind: sequential}" in line for line in told)
+
+
+@pytest.mark.parametrize(
+    ("network", "feedback", "when"),
+    [("", "false", "without feedback"), ("", "true", None), ("network: {hops: 1}\n", "true", "over a network")],
+)
+def test_labels_that_sensors_make_from_measurements_are_to_be_matched(network: str, feedback: str, when: Any) -> None:
+    measured = "  from_measurements: {std: [5.0, 5.0, 2.0, 2.0]}\n"
+    births = "  steps: [1, 5]\n", f"  steps: [1, 5]\n{measured}"
+    rule = "fusion: {kind: cm_delta_glmb, weights: [0.5, 0.5]}"
+    for matching in ("labels", "assignment"):
+        fusion = f"{network}fusion: {{kind: cm_delta_glmb, feedback: {feedback}, matching: {matching}}}"
+        text = changed(births, (rule, fusion))
+        if (matching == "labels") == (when is None):
+            parse_scenario(text)
+            continue
+        wanted = f"assignment, as {when} sensors make labels" if when else "labels, as with feedback all sensors share"
+        with pytest.raises(ScenarioError, match=f"fusion.matching: expected {wanted}"):
+            parse_scenario(text)

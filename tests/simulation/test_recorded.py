@@ -216,16 +216,6 @@ def test_bad_options_are_named(options, message):
 
 
 @pytest.mark.parametrize(
-    ("options", "field"),
-    [({"max_gap": 0.0}, "max_gap"), ({"min_speed": -1.0}, "min_speed"), ({"max_speed": 0.0}, "max_speed"),
-     ({"region": 3}, "region")],
-)  # fmt: skip
-def test_bad_cleaning_is_named(options, field):
-    with pytest.raises(InputError, match=field):
-        Cleaning(**options)
-
-
-@pytest.mark.parametrize(
     ("text", "message"),
     [
         ("", "expected a column 'time'; got columns none"),

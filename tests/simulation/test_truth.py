@@ -104,25 +104,6 @@ def test_semidefinite_factor(dt):
             semidefinite_factor(bad)
 
 
-@pytest.mark.parametrize(
-    ("change", "field"),
-    [
-        ({"initial_states": STARTS[:, :3]}, "initial_states"),
-        ({"initial_states": STARTS * np.nan}, "initial_states"),
-        ({"start_times": [1.0]}, "start_times"),
-        ({"start_times": [1.0, 2.0, np.nan]}, "start_times"),
-        ({"start_times": [1.0, 2.0, 3.0], "end_times": [9.0, 9.0, 2.0]}, "end_times"),
-        ({"process_noise": [True]}, "process_noise"),
-        ({"process_noise": 3}, "process_noise"),
-        ({"initial_stds": STARTS[:2]}, "initial_stds"),
-        ({"initial_stds": -np.ones((3, 4))}, "initial_stds"),
-    ],
-)
-def test_bad_targets_are_named(change, field):
-    with pytest.raises(InputError, match=f"ScriptedTargets.{field}"):
-        ScriptedTargets(models.constant_velocity(5.0), **{"initial_states": STARTS, **change})
-
-
 @pytest.mark.parametrize("times", [[], [1.0, 1.0], [2.0, 1.0], [math.nan], 3.0])
 def test_bad_scan_times(times):
     with pytest.raises(InputError, match="times: expected"):
