@@ -232,7 +232,7 @@ def test_steps_that_cannot_be_made(experiment: Experiment, which: str) -> None:
         ({"scans": None}, "scans: expected 2, one a sensor; got None"),
         ({"poses": experiment.poses[:1]}, "poses: expected 2, one a sensor; got 1"),
         ({"rngs": [rng]}, "rngs: expected 2, one a sensor; got 1"),
-        ({"time": 1.0}, "time: expected one after that of the last scan, 1 s; got 1"),
+        ({"time": 0.5}, "time: expected one from that of the last scan on, 1 s; got 0.5"),
         ({"time": np.nan}, "time: expected a finite number"),
     ):
         bad: Any = given | {"time": 2.0} | change

@@ -152,7 +152,7 @@ class LabelledFilter(SingleSensorFilter, OfKind[BeliefT]):
             belief: posterior of the previous step.
             scan: (num, meas_dim) measurements in any order; angles in radians, in (-pi, pi].
             pose: (3 or more,) [px, py, heading_rad, ...] of the sensor.
-            dt: seconds since the previous step.
+            dt: seconds since the previous step; 0: as `update`, nobody moves, dies or is born.
             step: number of this step, from 1 on; births at the sites of the targets' model are labelled with it.
             rng: drawn from only by Gibbs sampling; taken by all so that filters are interchangeable.
             births: who may have been born since the previous step, instead of at those sites; labels later than the
@@ -170,7 +170,7 @@ class LabelledFilter(SingleSensorFilter, OfKind[BeliefT]):
         generator(rng)
         measurements, num_duplicates = check_scan(scan, self.sensor)
         prior = check_belief(belief, self.kind, self.targets.state_dim)
-        inputs = self._inputs(measurements, pose, dt, step, prior, births)
+        inputs = self._inputs_after(dt, measurements, pose, step, prior, births)
         return self._taken(prior, inputs, rng, num_duplicates, f"step {step}: ")
 
     def predict(
@@ -181,7 +181,7 @@ class LabelledFilter(SingleSensorFilter, OfKind[BeliefT]):
         What is cut here is cut as it weighs before the scan is seen, which in `step` is not so.
         """
         prior, blind = check_belief(belief, self.kind, self.targets.state_dim), self._blind()
-        inputs = blind._inputs(NO_SCAN, NO_POSE, dt, step, prior, births)
+        inputs = blind._inputs_after(dt, NO_SCAN, NO_POSE, step, prior, births)
         return blind._taken(prior, inputs, None, 0, f"step {step}: ")
 
     def update(self, belief: Labelled, scan: Any, pose: Any, *, rng: np.random.Generator) -> tuple[BeliefT, FilterInfo]:
@@ -191,6 +191,14 @@ class LabelledFilter(SingleSensorFilter, OfKind[BeliefT]):
         prior = check_belief(belief, self.kind, self.targets.state_dim)
         inputs = self._update_inputs(measurements, pose)
         return self._taken(prior, inputs, rng, num_duplicates, "")
+
+    def _inputs_after(
+        self, dt: Any, scan: Floats, pose: Any, step: Any, prior: BeliefT, births: LMB | None
+    ) -> StepInputs:
+        """As `_inputs`; at the prior's own time those of an update."""
+        if dt == 0.0:
+            return self._update_inputs(scan, pose)
+        return self._inputs(scan, pose, dt, step, prior, births)
 
     def _taken(
         self,

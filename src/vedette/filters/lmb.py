@@ -127,7 +127,7 @@ class SequentialLmbFilter(OfLmb, InTurn[LMB]):
 def _by_combinations(prior: Lmb, step: SensorStep) -> tuple[Lmb, LmbReport]:
     """Exact sums as of several sensors, which cut what is surely improbable (docs/decisions/0014)."""
     scan, motion, sensor, truncation = step.inputs
-    before = standing_combinations(prior) if motion is None else predict_combinations(prior, scan, 1, motion)
+    before = standing_combinations(prior, 1) if motion is None else predict_combinations(prior, scan, 1, motion)
     return update_lmb(before, scan, sensor, truncation, step.limits.reduction())
 
 

@@ -15,7 +15,7 @@ from vedette.filters.base import NO_POSE, NO_SCAN, BeliefT, OfKind, SensorStep, 
 from vedette.filters.inputs import births_for, check_belief, check_scan, model_errors, nobody
 from vedette.filters.limits import Limits
 from vedette.filters.protocols import FilterInfo
-from vedette.kernels.base.types import Bools, Floats, Lmb, ScanInput
+from vedette.kernels.base.types import Bools, Floats, Lmb, Motion, ScanInput
 from vedette.models import SensorModel, TargetModel, kernel_motion
 from vedette.models.arguments import generator, one_a_sensor, pose_vector, positive, reject
 
@@ -93,7 +93,7 @@ class MultiSensorFilter(OfKind[BeliefT]):
             scans: one a sensor, in their order: (num, meas_dim) measurements in any order; angles in radians, in
                 (-pi, pi]; None of a sensor that did not scan.
             poses: one a sensor: [px, py, heading_rad, ...].
-            dt: seconds since the previous step.
+            dt: seconds since the previous step; 0: nobody moves, dies or is born.
             step: number of this step, from 1 on; births are labelled with it.
             rng: nothing is drawn from it; it is taken so that filters are interchangeable.
             births: as of `DeltaGlmbFilter.step`.
@@ -109,9 +109,15 @@ class MultiSensorFilter(OfKind[BeliefT]):
         """
         taken = self._checked_scans(scans, poses, rng)
         prior = check_belief(belief, self.kind, self.targets.state_dim)
+        if dt == 0.0:
+            return self._updated(prior, nobody(self.targets.state_dim), taken, 0.0, f"step {step}")
         period = positive("dt", dt)
         born = births_for(self.targets.birth, period, step, prior, births)
         return self._updated(prior, born, taken, period, f"step {step}")
+
+    def _motion(self, dt: float) -> Motion | None:
+        """As kernels take it; None of scans of the belief's own time."""
+        return kernel_motion(self.targets.motion, self.targets.survival) if dt > 0.0 else None
 
     @abstractmethod
     def _updated(
@@ -152,7 +158,7 @@ class InTurn(MultiSensorFilter[BeliefT]):
     def _updated(
         self, prior: BeliefT, born: Lmb, taken: SensorScans, dt: float, place: str
     ) -> tuple[BeliefT, FilterInfo]:
-        motion, posterior = kernel_motion(self.targets.motion, self.targets.survival), prior.to_kernel()
+        motion, posterior = self._motion(dt), prior.to_kernel()
         keeping, settled = self.limits.keeping_labels(), np.zeros(0, np.bool_)
         reports, log_total, last = list[Any](), 0.0, len(taken.names) - 1
         given = zip(taken.names, taken.sensors, taken.inputs_in_turn(born, dt), strict=True)

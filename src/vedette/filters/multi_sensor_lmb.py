@@ -10,9 +10,12 @@ from vedette.filters.lmb import OfLmb
 from vedette.filters.multi_sensor import MultiSensorFilter, SensorScans
 from vedette.filters.protocols import FilterInfo
 from vedette.kernels.base.types import Lmb
-from vedette.kernels.steps.multi_sensor_combinations import extend_combinations, predict_combinations
+from vedette.kernels.steps.multi_sensor_combinations import (
+    extend_combinations,
+    predict_combinations,
+    standing_combinations,
+)
 from vedette.kernels.steps.multi_sensor_lmb import lmb_of_combinations
-from vedette.models import kernel_motion
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -37,11 +40,14 @@ class MultiSensorLmbFilter(OfLmb, MultiSensorFilter[LMB]):
 
     def _updated(self, prior: LMB, born: Lmb, taken: SensorScans, dt: float, place: str) -> tuple[LMB, FilterInfo]:
         limits, num_columns, reports = self.limits, 0, []
-        motion = kernel_motion(self.targets.motion, self.targets.survival)
+        motion, before = self._motion(dt), prior.to_kernel()
         reduction = limits.reduction()
         with model_errors():
             inputs = taken.inputs(born, dt)
-            combinations = predict_combinations(prior.to_kernel(), inputs[0], len(inputs), motion)
+            if motion is None:
+                combinations = standing_combinations(before, len(inputs))
+            else:
+                combinations = predict_combinations(before, inputs[0], len(inputs), motion)
             for s, (sensor, scan) in enumerate(zip(taken.sensors, inputs, strict=True)):
                 truncation = limits.truncation(sensor.meas_dim)
                 combinations, report = extend_combinations(

@@ -89,14 +89,15 @@ class Tracker(Protocol):
             scans: one a sensor: (num, meas_dim) measurements, in any order; angles in radians. Empty where a scan
                 has found nothing; None of a sensor that did not scan at `time`.
             poses: (num_sensors, 3 or more) [px, py, heading_rad, ...] of each sensor at `time`.
-            time: s, after `state.time`.
+            time: s, after `state.time`; or the same, for scans of that time that come apart: nobody then moves, dies
+                or is born in between. Networks, whose messages take scans, and filters without labels take none.
             rngs: one a sensor, for filters that draw.
 
         Returns:
             The state after these scans, and a report.
 
         Raises:
-            InputError: another number of scans, poses or generators than of sensors; a time that is not after the last.
+            InputError: another number of scans, poses or generators than of sensors; a time before the last.
             ModelError, NumericalError: as the filters and the fusion. Any exception has a note that says in which
                 stage it was raised (`vedette.tracking.stage_of`).
         """
@@ -104,15 +105,26 @@ class Tracker(Protocol):
 
 
 def check_step(
-    state: State, scans: Sequence[Any], poses: Any, time: float, rngs: Sequence[Any], num_sensors: int
+    state: State,
+    scans: Sequence[Any],
+    poses: Any,
+    time: float,
+    rngs: Sequence[Any],
+    num_sensors: int,
+    *,
+    same_time: bool = True,
 ) -> tuple[Floats, float]:
-    """The poses as an array, and the seconds since the last scan; `InputError` as `Tracker.step` says."""
+    """The poses as an array, and the seconds since the last scan; `InputError` as `Tracker.step` says.
+
+    same_time: whether the time may be that of the last scan again.
+    """
     if not isinstance(state, State):
         raise InputError(f"state: expected a State; got {type(state).__name__}")
     one_a_sensor(num_sensors, scans=scans, poses=poses, rngs=rngs)
     now = real("time", time)
-    if state.time is not None and now <= state.time:
-        raise InputError(f"time: expected one after that of the last scan, {state.time:g} s; got {now:g}")
+    if state.time is not None and (now < state.time or (now == state.time and not same_time)):
+        wanted = f"one {'from' if same_time else 'after'} that of the last scan{' on' if same_time else ''}"
+        raise InputError(f"time: expected {wanted}, {state.time:g} s; got {now:g}")
     at = float_array("poses", poses, (num_sensors, None))
     return at, FIRST_PERIOD if state.time is None else now - state.time
 

@@ -90,7 +90,7 @@ class BeliefNetwork(LocalFilters):
         self, state: State, scans: Sequence[Any], poses: Any, time: float, *, rngs: Sequence[np.random.Generator]
     ) -> tuple[State, TrackerInfo]:
         """Filter each sensor's scan, send, and fuse what has arrived; see `Tracker.step`."""
-        at, dt = check_step(state, scans, poses, time, rngs, len(self.filters))
+        at, dt = check_step(state, scans, poses, time, rngs, len(self.filters), same_time=False)
         step, stages, num = state.step + 1, Stages(), len(self.filters)
         hops = hop_counts(self.network.links(at, rngs[0]))
         with stages.timing("filter"):

@@ -13,6 +13,7 @@ import numpy as np
 from vedette.densities import LMB, Labelled, TrackTable, as_lmb
 from vedette.densities.containers import unchecked
 from vedette.densities.labelled import LABELLED
+from vedette.densities.tracks import take_tracks
 from vedette.errors import InputError
 from vedette.filters import Limits
 from vedette.filters.inputs import births_at, births_within, model_errors, nobody
@@ -90,6 +91,22 @@ def births_from_scans(
     pooled = unexplained(model, belief, sensors, scans, poses)
     first = birth.num_sites if owner is None else OWN_LABELS * (owner + 1)
     return _born(pooled, model, step, first)
+
+
+def births_waiting(birth: BirthModel, before: LMB | None, found: LMB | None) -> LMB | None:
+    """Who may be born after scans of one time that came apart: those of the first, and of the others who is not near.
+
+    before, found: as `births_from_scans` gave of the scans before and of these.
+    """
+    model = birth.from_measurements
+    if model is None or found is None or before is None:
+        return found if before is None else before
+    places, new = before.tracks.means[:, :2], found.tracks.means[:, :2]
+    apart = ((new[:, np.newaxis] - places) / model.std[:2]) ** 2
+    far = np.flatnonzero((apart.sum(axis=-1) > _SAME_TARGET).all(axis=1))
+    kept = take_tracks(found.tracks, far)
+    tracks = TrackTable.from_kernel(stack_tracks([before.tracks.to_kernel(), kept.to_kernel()]))
+    return unchecked(LMB, tracks, np.concatenate([before.existence_logit, found.existence_logit[far]]))
 
 
 def unexplained(

@@ -14,7 +14,7 @@ from vedette.kernels.base.types import Floats
 from vedette.models import SensorModel, TargetModel
 from vedette.models.arguments import reject
 from vedette.tracking.base import Stages, State, TrackerInfo, bytes_of_scan, check_step
-from vedette.tracking.births import births_due, births_from_scans, check_measured_births
+from vedette.tracking.births import births_due, births_from_scans, births_waiting, check_measured_births
 
 
 @runtime_checkable
@@ -109,6 +109,8 @@ class Central(OfAllScans):
         with stages.timing("filter"):
             belief, info = self._filtered(state.fused, state.memory, scans, at, dt, step, rngs[0])
             measured = births_from_scans(self.targets.birth, belief, self.sensors, scans, at, step + 1)
+            if dt == 0.0:
+                measured = births_waiting(self.targets.birth, state.memory, measured)
         sent = tuple(bytes_of_scan(scan, pose) for scan, pose in zip(scans, at, strict=True))
         return self._state(belief, step, float(time), measured), TrackerInfo((info,), None, stages.seconds, sent)
 

@@ -16,7 +16,7 @@ from vedette.kernels.base.types import Floats
 from vedette.models import MeasurementBirth, TargetModel
 from vedette.models.arguments import flag, instance, probability
 from vedette.tracking.base import Stages, State, TrackerInfo, bytes_of_belief, check_step
-from vedette.tracking.births import births_due, births_from_scans
+from vedette.tracking.births import births_due, births_from_scans, births_waiting
 from vedette.tracking.local import LocalFilters
 from vedette.tracking.losing import without_forgotten
 
@@ -109,6 +109,8 @@ class Distributed(LocalFilters):
         if birth.from_measurements is not None:
             with stages.timing("births"):
                 measured = self._measured(local, scans, at, step + 1)
+                if dt == 0.0:
+                    measured = tuple(births_waiting(birth, *own) for own in zip(state.memory, measured, strict=True))
         told = TrackerInfo(tuple(infos), report, stages.seconds, tuple(sent))
         return State(tuple(local), fused, step, float(time), measured), told
 

@@ -82,7 +82,7 @@ class ScanNetwork(OfAllScans):
         self, state: State, scans: Sequence[Any], poses: Any, time: float, *, rngs: Sequence[np.random.Generator]
     ) -> tuple[State, TrackerInfo]:
         """Send the scans and filter what has arrived; see `Tracker.step`. Only the first of `rngs` is drawn from."""
-        at, dt = check_step(state, scans, poses, time, rngs, len(self.sensors))
+        at, dt = check_step(state, scans, poses, time, rngs, len(self.sensors), same_time=False)
         stages, step, num = Stages(), state.step + 1, len(self.sensors)
         hops = hop_counts(self.network.links(at, rngs[0]))
         frame = _Frame(step, dt, tuple(scans), at, self.network.arrivals(hops, step))

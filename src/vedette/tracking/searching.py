@@ -96,6 +96,8 @@ class Searching:
         if state.time is None:
             return before.expected
         dt = float(time) - state.time
+        if dt == 0.0:
+            return before.expected
         return self.model.predict(before.expected, dt, self._survival(dt))
 
     def _lost(

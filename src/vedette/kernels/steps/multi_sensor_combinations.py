@@ -83,9 +83,9 @@ def predict_combinations(prior: Lmb, scan: ScanInput, num_sensors: int, motion: 
 
 
 @kernel
-def standing_combinations(prior: Lmb) -> Combinations:
-    """One combination a track, as it is at the time of one sensor's scan, without births, deaths or motion."""
-    return _one_each(prior, standing_rows(prior.tracks, 0), 1)
+def standing_combinations(prior: Lmb, num_sensors: int) -> Combinations:
+    """One combination a track, as it is at the time of the scans, without births, deaths or motion."""
+    return _one_each(prior, standing_rows(prior.tracks, 0), num_sensors)
 
 
 @kernel

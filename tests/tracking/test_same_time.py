@@ -1,0 +1,113 @@
+"""Scans of one time that come apart: nobody moves, dies or is born in between."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tracking.scenes import filters, rngs, scans_of, sensor, targets
+from vedette import models
+from vedette.densities import LMB, as_lmb
+from vedette.errors import InputError
+from vedette.filters import (
+    DeltaGlmbFilter,
+    FactoredGlmbFilter,
+    Limits,
+    LmbFilter,
+    MultiSensorGlmbFilter,
+    MultiSensorLmbFilter,
+    PhdFilter,
+    SequentialLmbFilter,
+)
+from vedette.fusion import Clmb
+from vedette.tracking import Central, Distributed, Network, ScanNetwork, Tracker
+
+TRUTH = np.array([[2.0, 1.0, 1.0, 0.0], [98.0, 3.0, 0.0, 1.0]])
+POSES = np.zeros((2, 3))
+OPEN = Limits(
+    max_hypotheses=10_000, min_relative_weight=0.0, min_existence=0.0, merge_distance=0.0, max_components=1000
+)
+SENSORS = (sensor(5.0, rate=1.0), sensor(2.0, rate=0.5))
+
+
+def central(kind: Any) -> Tracker:
+    return Central(kind(targets(), SENSORS, OPEN))
+
+
+@pytest.mark.parametrize("kind", [MultiSensorGlmbFilter, MultiSensorLmbFilter, SequentialLmbFilter])
+def test_scans_that_come_apart_are_those_that_come_together(kind: Any) -> None:
+    tracker, rng = central(kind), np.random.default_rng(1)
+    together = apart = tracker.initial()
+    for time in (1.0, 2.5, 3.0):
+        scans = scans_of(TRUTH, SENSORS, POSES, rng)
+        together, _ = tracker.step(together, scans, POSES, time, rngs=rngs(2))
+        apart, _ = tracker.step(apart, [scans[0], None], POSES, time, rngs=rngs(2))
+        apart, _ = tracker.step(apart, [None, scans[1]], POSES, time, rngs=rngs(2))
+    one, other = as_lmb(together.fused), as_lmb(apart.fused)
+    assert (together.step, apart.step, apart.time) == (3, 6, 3.0)
+    np.testing.assert_array_equal(one.tracks.labels, other.tracks.labels)
+    tolerance = 1e-9 if kind is not SequentialLmbFilter else 1e-12
+    if kind is MultiSensorLmbFilter:  # an LMB in between forgets which measurements went together
+        tolerance = 0.02
+    np.testing.assert_allclose(one.existence, other.existence, atol=tolerance)
+
+
+@pytest.mark.parametrize("kind", [DeltaGlmbFilter, LmbFilter, FactoredGlmbFilter])
+def test_a_step_of_no_time_is_an_update(kind: Any) -> None:
+    filter_ = kind(targets(), SENSORS[0], Limits(max_components=1))
+    rng = np.random.default_rng(2)
+    scan, again = (scans_of(TRUTH, SENSORS[:1], POSES[:1], rng)[0] for _ in range(2))
+    belief, _ = filter_.step(filter_.initial(), scan, POSES[0], 1.0, 1, rng=rng)
+    stepped, said = filter_.step(belief, again, POSES[0], 0.0, 2, rng=rng)
+    updated, told = filter_.update(belief, again, POSES[0], rng=rng)
+    assert as_lmb(stepped).existence_logit.tobytes() == as_lmb(updated).existence_logit.tobytes()
+    assert stepped.tracks.means.tobytes() == updated.tracks.means.tobytes()
+    assert said.log_likelihood == told.log_likelihood
+    waited, _ = filter_.predict(belief, 0.0, 2)
+    np.testing.assert_allclose(as_lmb(waited).existence, as_lmb(belief).existence, atol=1e-12)
+
+
+def test_nobody_dies_and_none_is_born_of_no_time() -> None:
+    world = targets((0.5, 0.3))
+    world = replace(world, birth=replace(world.birth, steps=None))  # at every step
+    tracker = Distributed(filters(world, SENSORS), Clmb((0.5, 0.5)))
+    state, _ = tracker.step(tracker.initial(), [np.zeros((0, 2))] * 2, POSES, 1.0, rngs=rngs(2))
+    again, _ = tracker.step(state, [None, None], POSES, 1.0, rngs=rngs(2))
+    for before, after in zip(state.local, again.local, strict=True):
+        np.testing.assert_array_equal(before.tracks.labels, after.tracks.labels)
+        np.testing.assert_allclose(before.existence, after.existence, rtol=1e-12)
+        np.testing.assert_allclose(before.tracks.covs, after.tracks.covs, rtol=1e-12)
+    later, _ = tracker.step(again, [None, None], POSES, 2.0, rngs=rngs(2))
+    assert later.local[0].tracks.num_tracks == 2 * again.local[0].tracks.num_tracks
+
+
+def test_who_was_measured_at_one_time_by_scans_that_came_apart_is_born_once() -> None:
+    born = models.MeasurementBirth(expected=0.5, max_existence=0.1, std=[20.0, 20.0, 5.0, 5.0])
+    world = targets((), born)
+    tracker = Central(SequentialLmbFilter(world, SENSORS))
+    here, there = np.array([[10.0, 0.0]]), np.array([[12.0, 1.0], [300.0, 0.0]])
+    state, _ = tracker.step(tracker.initial(), [here, None], POSES, 1.0, rngs=rngs(2))
+    state, _ = tracker.step(state, [None, there], POSES, 1.0, rngs=rngs(2))
+    waiting: LMB = state.memory
+    np.testing.assert_array_equal(waiting.tracks.means[:, :2], [[10.0, 0.0], [300.0, 0.0]])
+    state, _ = tracker.step(state, [None, None], POSES, 2.0, rngs=rngs(2))
+    assert state.fused.tracks.num_tracks == 2
+
+
+def test_time_does_not_run_back_and_networks_and_filters_without_labels_wait_for_it() -> None:
+    tracker = central(SequentialLmbFilter)
+    nothing = [np.zeros((0, 2))] * 2
+    state, _ = tracker.step(tracker.initial(), nothing, POSES, 1.0, rngs=rngs(2))
+    with pytest.raises(InputError, match=r"time: expected one from that of the last scan on, 1 s; got 0.5"):
+        tracker.step(state, nothing, POSES, 0.5, rngs=rngs(2))
+    radio = ScanNetwork(SequentialLmbFilter(targets(), SENSORS), Network(), Clmb((0.5, 0.5)))
+    state, _ = radio.step(radio.initial(), nothing, POSES, 1.0, rngs=rngs(2))
+    with pytest.raises(InputError, match=r"time: expected one after that of the last scan, 1 s; got 1"):
+        radio.step(state, nothing, POSES, 1.0, rngs=rngs(2))
+    alone = Distributed((PhdFilter(targets(), SENSORS[0]),))
+    state, _ = alone.step(alone.initial(), nothing[:1], POSES[:1], 1.0, rngs=rngs(1))
+    with pytest.raises(InputError, match=r"dt: expected a number above 0; got 0"):
+        alone.step(state, nothing[:1], POSES[:1], 1.0, rngs=rngs(1))
