@@ -17,6 +17,8 @@ EXTRA_OF = {
     "matplotlib": "report",
     "distributed": "cluster",
     "xarray": "xarray",
+    "asterix": "readers",
+    "pyais": "readers",
 }
 
 

@@ -64,7 +64,7 @@ def test_bad_rows_are_refused_or_skipped_by_name(place: Path) -> None:
         (("absent.csv", "--sensors", "radars.yaml"), "absent.csv: no such file"),
         (("scans.csv", "--sensors", "absent.yaml"), "absent.yaml: no such file"),
         (("scans.csv", "--sensors", "radars.yaml", "--truth", "absent.csv"), "no such file"),
-        (("radars.yaml", "--sensors", "radars.yaml"), "expected a .csv or .parquet file"),
+        (("radars.yaml", "--sensors", "radars.yaml"), "expected a file that ends with .csv, .parquet"),
         (("scans.csv", "--sensors", "scans.csv"), "expected a mapping with `sensors`"),
     ],
 )

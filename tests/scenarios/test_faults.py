@@ -17,7 +17,7 @@ from vedette.scenarios import parse_scenario
 WORLD = r"""
 name: small -> nane: small
     1:1: name: expected a value, as it is required, got nothing
-    1:1: nane: expected one of birth, control, description, estimator, filter, format, fusion, metrics, motion, name, network, ospa, planners, region, sensor_defaults, sensors, survival, targets, time, undetected, got an unknown key (did you mean name?)
+    1:1: nane: expected one of birth, control, description, estimator, filter, format, fusion, metrics, motion, name, network, origin, ospa, planners, recording, region, sensor_defaults, sensors, survival, targets, time, undetected, got an unknown key (did you mean name?)
 name: small -> name: ''
     1:7: name: expected a name of one or more printable characters, got ""
 name: small -> name: small\nformat: 2
@@ -98,7 +98,7 @@ targets:\n  kind: scripted\n  tracks:\n    - {state: [1.0, 2.0, 0.5, -0.5], star
 SENSORS = r"""
 targets:\n  kind: scripted\n  tracks:\n    - {state: [1.0, 2.0, 0.5, -0.5], start_step: 2, end_step: 18}
 -> targets:\n  {kind: recorded, path: ships.txt, columns: {longitude: lon}}
-    11:26: targets.path: expected a .csv or .parquet file, got "ships.txt"
+    11:26: targets.path: expected a file that ends with .csv, .parquet, .nmea, .ais, .ast, .asterix, got "ships.txt"
     11:46: targets.columns: expected longitude and latitude together, got only longitude
 std: [0.02, 3.0] -> std: [0.02]
     15:32: sensor_defaults.noise.std: expected 2 numbers, as a bearing_range measurement has, got a list of 1

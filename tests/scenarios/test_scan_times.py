@@ -18,7 +18,7 @@ from vedette.simulation.replay import scans_of
 
 def of(**fields: Any) -> Any:
     """A short scenario; sections of scan times are whole, as a field by its path must be."""
-    whole: dict[str, Any] = {"every": 1, "first": 1, "period": None, "offset": None, "drop_out": 0.0}
+    whole: dict[str, Any] = {"every": 1, "first": 1, "period": None, "offset": None, "drop_out": None}
     given = {path: {**whole, **value} for path, value in fields.items()}
     short = {"time.num_steps": 12, "control.decision_steps": [4], "ospa.from_step": None, "ospa.to_step": None}
     return with_fields(load_scenario("paper-e"), {**short, **given})

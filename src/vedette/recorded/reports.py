@@ -17,6 +17,7 @@ import numpy as np
 from vedette.errors import InputError
 from vedette.extras import need
 from vedette.kernels.base.types import Floats, Ints
+from vedette.recorded.foreign import AIS_ENDINGS, ASTERIX_ENDINGS, read_ais, read_asterix
 from vedette.recorded.geography import Origin
 from vedette.text import elided, printable, shown
 
@@ -28,6 +29,7 @@ _SAME_TIME = 1e-6  # s; two reports of one target nearer in time than this are o
 _MOST_BYTES = 500_000_000
 _MOST_REPORTS = 5_000_000
 _MOST_NAMES = 20
+ENDINGS = (".csv", ".parquet", *AIS_ENDINGS, *ASTERIX_ENDINGS)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,11 +59,15 @@ class Reports:
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """Columns as they came, the row number of each entry in its file, and a name for messages."""
+    """Columns as they came, the row number of each entry in its file, and a name for messages.
+
+    bearings: from where the format counts them, "north" or "east"; None: it does not say.
+    """
 
     columns: Mapping[str, Sequence[Any]]
     rows: Sequence[int]
     source: str
+    bearings: str | None = None
 
     def column(self, name: str) -> Sequence[Any]:
         """The cells of a column, or an error that says which there are."""
@@ -147,19 +153,24 @@ def seconds(time: Any) -> float:
 
 
 def read_table(path: str | Path) -> Table:
-    """A .csv file with a header line, or a .parquet file.
+    """A .csv file with a header line, a .parquet file, AIS messages (.nmea, .ais) or radar plots (.ast, .asterix).
 
     Raises:
+        MissingPackageError: what reads it is not installed.
         InputError: not there, another ending, not readable as what it says it is, rows not as long as the header.
     """
     file = Path(path)
     named = elided(printable(str(file)), 200)
-    if file.suffix.lower() not in (".csv", ".parquet"):
-        raise InputError(f"{named}: expected a .csv or .parquet file")
+    if file.suffix.lower() not in ENDINGS:
+        raise InputError(f"{named}: expected a file that ends with {', '.join(ENDINGS)}")
     if not os.path.isfile(file):  # a name can be too long, or hold what no name can: for pathlib, an error
         raise InputError(f"{named}: no such file; expected a table of records")
     if (size := file.stat().st_size) > _MOST_BYTES:
         raise InputError(f"{named}: expected a file of at most {_MOST_BYTES} bytes; got {size}")
+    if file.suffix.lower() in AIS_ENDINGS:
+        return Table(*read_ais(file), str(file))
+    if file.suffix.lower() in ASTERIX_ENDINGS:
+        return Table(*read_asterix(file), str(file), "north")
     return _read_csv(file) if file.suffix.lower() == ".csv" else _read_parquet(file)
 
 

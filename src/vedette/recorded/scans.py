@@ -166,6 +166,7 @@ class _Rows:
 
     def __init__(self, table: Table, sites: Sequence[Site], conventions: Conventions, origin: Origin | None) -> None:
         self.table, self.sites, self.conventions, self.origin = table, sites, conventions, origin
+        self.bearings = conventions.bearings or table.bearings
         self._columns: dict[str, tuple[str, float]] = {}
         for quantity, units in QUANTITIES.items():
             if (found := self._found(quantity, units)) is not None:
@@ -218,7 +219,7 @@ class _Rows:
                     wanted = f"a column of {quantity}, as sensor {shown(site.name)} measures {site.kind}"
                     raise InputError(f"{self.table.source}: expected {wanted}; got columns {have}")
         angles = {"bearing", "own_heading"} & set(self._columns)
-        if angles and self.conventions.bearings is None:
+        if angles and self.bearings is None:
             wanted = "bearings: north (clockwise, a compass) or east (counter-clockwise)"
             name = shown(self._columns[min(angles)][0])
             raise InputError(f"{self.table.source}, column {name}: expected {wanted}; got none")
@@ -271,7 +272,7 @@ class _Rows:
             limits = f"from {0 if quantity == 'range' else -most / unit:g} to {most / unit:g}"
             raise self.table.fault(i, name, f"a number {limits}")
         if quantity in ("bearing", "own_heading"):
-            turned = math.pi / 2.0 - value if self.conventions.bearings == "north" else value
+            turned = math.pi / 2.0 - value if self.bearings == "north" else value
             return math.remainder(turned, 2.0 * math.pi)
         return value
 

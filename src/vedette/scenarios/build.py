@@ -135,7 +135,7 @@ def build_true_sensors(scenario: Scenario, known: Sequence[SensorModel]) -> tupl
 
 def drop_outs(scenario: Scenario) -> tuple[float, ...]:
     """Probability of each sensor that a scan does not take place; () where all do."""
-    found = tuple(sensor.scans.drop_out for sensor in scenario.model.sensors)
+    found = tuple(sensor.scans.drop_out or 0.0 for sensor in scenario.model.sensors)
     return found if any(found) else ()
 
 

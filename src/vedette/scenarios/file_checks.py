@@ -32,8 +32,11 @@ def recorded_findings(model: ScenarioModel, folder: FilePath) -> Iterator[Findin
     if not isinstance(recorded, RecordedTargets):
         return
     file = folder / recorded.path
-    if file.suffix.lower() not in (".csv", ".parquet"):
-        yield ("targets", "path"), "a .csv or .parquet file", describe(recorded.path)
+    from vedette.recorded.reports import ENDINGS
+
+    if file.suffix.lower() not in ENDINGS:
+        wanted = f"a file that ends with {', '.join(ENDINGS)}"
+        yield ("targets", "path"), wanted, describe(recorded.path)
     elif not os.path.isfile(file):  # a name can be too long, or hold what no name can: for pathlib, an error
         yield ("targets", "path"), "a file, relative to the scenario file", _absent(recorded.path)
     else:

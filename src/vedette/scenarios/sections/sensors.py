@@ -123,8 +123,9 @@ class ScanTimes(Section):
     offset: NonNegative | None = Field(
         default=None, description="Time of the first scan after the first step, instead of first [s]."
     )
-    drop_out: Share = Field(
-        default=0.0, description="Probability that a scan does not take place, of which decisions know nothing [-]."
+    drop_out: Share | None = Field(
+        default=None,
+        description="Probability that a scan does not take place, of which decisions know nothing; none: all do [-].",
     )
 
     @check

@@ -1,0 +1,129 @@
+"""Recordings in the formats of others, in files made here, byte by byte as they are sent."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from asterix.generated import manifest
+from pyais import encode_dict
+
+from recordings import ORIGIN, SHIPS
+from vedette.errors import InputError
+from vedette.evaluation.runs import run_scenario
+from vedette.recorded import Origin, RecordedTargets
+from vedette.recorded.reports import read_table
+from vedette.scenarios.of_recording import scenario_of_recording
+
+CATS: Any = manifest["CATS"]
+KNOT = 1852.0 / 3600.0  # m/s
+
+
+def ais(time: float | None, **said: Any) -> str:
+    """A position report, after a tag block with the receiver's time."""
+    (line,) = encode_dict({"type": 1, "speed": 10.0, "course": 90.0, **said}, talker_id="AI")
+    if time is None:
+        return str(line)
+    body = f"s:rx,c:{time:.0f}"
+    total = 0
+    for letter in body:
+        total ^= ord(letter)
+    return f"\\{body}*{total:02X}\\{line}"
+
+
+def plot(time: float, rho: float, theta: float, sic: int = 2) -> bytes:
+    category = CATS[48][-1]
+    record = category.cv_record.create(
+        {
+            "010": (("SAC", 1), ("SIC", sic)),
+            "140": ((time, "s")),
+            "040": (("RHO", (rho, "NM")), ("THETA", (theta, "°"))),
+        }
+    )
+    block: bytes = category.create([record]).unparse().to_bytes()
+    return block
+
+
+def other_category() -> bytes:
+    category = CATS[34][-1]
+    record = category.cv_record.create({"000": 1, "010": (("SAC", 1), ("SIC", 2))})
+    block: bytes = category.create([record]).unparse().to_bytes()
+    return block
+
+
+def test_ships_report_themselves(tmp_path: Path) -> None:
+    lines = [ais(1452603741 + 10 * k, mmsi="235000001", lon=-1.11 + 1e-4 * k, lat=50.79) for k in range(6)]
+    lines += ["!AIVDM,1,1,,A,garbage*00", "no message", ais(None, mmsi="235000002", lon=-1.1, lat=50.8)]
+    lines += [ais(1452603741, mmsi="235000003", lon=181.0, lat=91.0)]  # it does not know where it is
+    (tmp_path / "ships.nmea").write_text("\n".join(lines) + "\n", "ascii")
+    table = read_table(tmp_path / "ships.nmea")
+    assert table.rows == [1, 2, 3, 4, 5, 6]
+    np.testing.assert_allclose(table.columns["vx"], 10.0 * KNOT)
+    targets = RecordedTargets.from_file(tmp_path / "ships.nmea", origin_deg=(-1.11, 50.79))
+    truth = targets.truth([0.0, 25.0], rng=np.random.default_rng(0))
+    expected = Origin(-1.11, 50.79).to_plane([-1.11 + 2.5e-4], [50.79])
+    np.testing.assert_allclose(truth.states[1:, :2], expected, atol=8.0)  # AIS rounds to a few metres
+
+
+def test_a_ship_without_a_speed_has_none_for_all(tmp_path: Path) -> None:
+    lines = [ais(10, mmsi="235000001", lon=1.0, lat=50.0), ais(20, mmsi="235000001", lon=1.0, lat=50.0, speed=102.3)]
+    (tmp_path / "ships.ais").write_text("\n".join(lines), "ascii")
+    assert "vx" not in read_table(tmp_path / "ships.ais").columns
+
+
+def test_radars_say_what_they_see(tmp_path: Path) -> None:
+    content = plot(46941.5, 10.0, 45.0) + other_category() + plot(46942.0, 3.25, 271.0, sic=7)
+    (tmp_path / "radar.ast").write_bytes(content)
+    table = read_table(tmp_path / "radar.ast")
+    assert table.columns["sensor"] == ["1/2", "1/7"]
+    assert table.columns["range_nmi"] == [10.0, 3.25]
+    np.testing.assert_allclose(table.columns["bearing_deg"], [45.0, 271.0], atol=360.0 / 2**16)
+    assert (table.columns["time"], table.bearings) == ([46941.5, 46942.0], "north")
+
+
+def test_midnight_is_passed(tmp_path: Path) -> None:
+    (tmp_path / "radar.ast").write_bytes(b"".join(plot(time, 5.0, 10.0) for time in (86399.5, 0.5, 4.5)))
+    assert read_table(tmp_path / "radar.ast").columns["time"] == [86399.5, 86400.5, 86404.5]
+
+
+def test_plots_are_tracked(tmp_path: Path) -> None:
+    rng, content = np.random.default_rng(0), b""
+    for time in np.arange(0.0, 100.0, 4.0).tolist():
+        for state in SHIPS:
+            offset = state[:2] + state[2:] * time + rng.normal(0.0, 15.0, 2)
+            azimuth = float(np.degrees(np.arctan2(offset[0], offset[1]))) % 360.0
+            turned = ((azimuth + 90.0) % 360.0) / 90.0  # s, at four a turn, from the west on
+            content += plot(40000.0 + time + turned, float(np.hypot(*offset)) / 1852.0, azimuth)
+    (tmp_path / "radar.ast").write_bytes(content)
+    (tmp_path / "radar.yaml").write_text(
+        "origin: {lon: -1.1171, lat: 50.7865}\nrecording: {gather: 3.5}\n"
+        'sensors:\n  - {name: "1/2", position: [0, 0], detection: {kind: constant, probability: 0.95}, '
+        "noise: {kind: range_dependent, sigma_range: 20.0, eta_range: 0.0, sigma_bearing_deg: 0.5, eta_bearing: 0.0}, "
+        "clutter: {kind: region, rate: 0.5}}\n",
+        "utf-8",
+    )
+    made = scenario_of_recording(tmp_path / "radar.yaml", tmp_path / "radar.ast")
+    assert {len(scan) for scans in made.recording.scans for scan in scans if scan is not None} == {3}
+    last = run_scenario(made.scenario, "still", seed=0).estimates[-1]
+    truth = SHIPS[:, :2] + SHIPS[:, 2:] * 98.0
+    assert last.num_targets == 3
+    assert max(min(np.hypot(*(mean[:2] - ship)) for ship in truth) for mean in last.means) < 60.0
+    assert ORIGIN.to_degrees(last.means[:, :2]).shape == (3, 2)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "message"),
+    [
+        ("a.nmea", b"nothing\n", "a.nmea: expected AIS positions with times in tag blocks; got none"),
+        ("a.ast", b"\x30\x00", "a.ast: expected ASTERIX data blocks; got other bytes"),
+        ("a.ast", b"\x30\x00\x05\xff\xff", "a.ast: expected records of category 048 in data block 1"),
+        ("a.asterix", b"", "a.asterix: expected plots of category 048; got none"),
+    ],
+)
+def test_other_bytes_are_refused(tmp_path: Path, name: str, content: bytes, message: str) -> None:
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(InputError) as error:
+        read_table(tmp_path / name)
+    assert message in str(error.value)
