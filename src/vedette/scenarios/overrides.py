@@ -71,10 +71,13 @@ def _set(data: Any, path: str, value: Any) -> Iterator[str]:
 
 
 def _left_out(present: Any, value: Any) -> list[str]:
-    """Keys of a section without which a new one would fall back on defaults unseen; one of another kind may."""
+    """Keys of a section without which a new one would fall back on defaults unseen; one of another kind may.
+
+    What is null falls back on nothing.
+    """
     if not isinstance(present, dict) or not isinstance(value, dict) or "kind" in value:
         return []
-    return sorted(present.keys() - value.keys())
+    return sorted({key for key, own in present.items() if own is not None} - value.keys())
 
 
 def _keys(holder: Any, place: Path, part: str, path: str) -> tuple[list[Any], str]:
