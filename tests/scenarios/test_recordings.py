@@ -14,7 +14,7 @@ from recordings import ORIGIN, RADARS, SHIPS, write_recording
 from vedette.errors import InputError, ScenarioError
 from vedette.evaluation.runs import run_scenario
 from vedette.evaluation.track_table import table_of_run, write_tracks
-from vedette.recorded import Conventions, Origin, RecordedScans, Site, parse_scans
+from vedette.recorded import Conventions, Origin, RecordedScans, Site, parse_scans, table_of
 from vedette.recorded.reports import Table
 from vedette.scenarios import load_scenario
 from vedette.scenarios.dumping import dump_scenario
@@ -65,6 +65,28 @@ def test_rows_of_one_time_and_sensor_are_a_scan_and_empty_cells_a_scan_of_nothin
     assert third[1] is not None
     assert third[1].shape == (0, 2)
     np.testing.assert_array_equal(found.poses[:, 1, :2], [[100.0, 0.0]] * 3)
+
+
+def test_frames_are_tables() -> None:
+    class Frame:
+        """As pandas and Polars have theirs."""
+
+        columns = ("time", "sensor", "range", "bearing_rad")
+
+        def __getitem__(self, name: str) -> Any:
+            empty = {"range": [math.nan], "bearing_rad": [math.nan]}
+            return [*[row[name] for row in ROWS[:4]], *empty.get(name, [ROWS[4][name]])]
+
+    found, expected = parse_scans(table_of(Frame()), SITES, Conventions({}, {}, "east")), parsed()
+    assert found.times.tolist() == expected.times.tolist()
+    scans = list(found.arrivals())
+    assert [(scan.sensor, scan.time, len(scan.measurements)) for scan in scans] == [
+        (0, 0.0, 1), (1, 0.0, 1), (0, 2.5, 2), (1, 5.0, 0),
+    ]  # fmt: skip
+    with pytest.raises(InputError, match="table: expected columns by name, or a data frame; got int"):
+        table_of(3)
+    with pytest.raises(InputError, match="table: expected columns of one length"):
+        table_of({"time": [1.0], "sensor": []})
 
 
 def test_rows_may_come_in_any_order() -> None:

@@ -2,6 +2,7 @@
 
 from vedette.recorded.cleaning import Cleaning, CleaningCounts, RecordedTrack
 from vedette.recorded.geography import Origin
+from vedette.recorded.reports import read_table, table_of
 from vedette.recorded.scans import Conventions, RecordedScans, Site, parse_scans
 from vedette.recorded.targets import RecordedTargets
 
@@ -15,4 +16,6 @@ __all__ = [
     "RecordedTrack",
     "Site",
     "parse_scans",
+    "read_table",
+    "table_of",
 ]

@@ -119,6 +119,21 @@ class Table:
         return labels
 
 
+def table_of(frame: Any, source: str = "table") -> Table:
+    """A table of columns in memory: a mapping, or a data frame of pandas or Polars; rows count from 1 in messages.
+
+    Raises `InputError` for something else, or columns of different lengths.
+    """
+    names = frame if isinstance(frame, Mapping) else getattr(frame, "columns", None)
+    if names is None or isinstance(names, str):
+        raise InputError(f"{source}: expected columns by name, or a data frame; got {type(frame).__name__}")
+    columns = {str(name): list(frame[name]) for name in names}
+    lengths = {name: len(cells) for name, cells in columns.items()}
+    if len(set(lengths.values())) > 1:
+        raise InputError(f"{source}: expected columns of one length; got {shown(str(lengths))}")
+    return Table(columns, range(1, max(lengths.values(), default=0) + 1), source)
+
+
 def column_names(names: Iterable[str]) -> str:
     """Names of columns in a message."""
     listed = [elided(printable(name)) for name in names]

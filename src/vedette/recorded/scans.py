@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from vedette.models.arguments import reject
 from vedette.recorded.geography import Origin
 from vedette.recorded.reports import FARTHEST, LATEST, Table, column_names, is_number, number, seconds
 from vedette.text import shown
+from vedette.tracking import SensorScan
 
 # What a row may say: the quantity, and the units that the end of a column's name may give it.
 _LENGTHS = {"m": 1.0, "km": 1000.0, "nmi": 1852.0}
@@ -123,6 +124,13 @@ class RecordedScans:
     scans: tuple[tuple[Floats | None, ...], ...]
     poses: Floats
     skipped: tuple[str, ...] = ()
+
+    def arrivals(self) -> Iterator[SensorScan]:
+        """Every scan by itself, in order of time, as `LateScans` takes them; times as of `times`."""
+        for time, scans, poses in zip(self.times.tolist(), self.scans, self.poses, strict=True):
+            for s, scan in enumerate(scans):
+                if scan is not None:
+                    yield SensorScan(s, time, scan, poses[s])
 
     @property
     def num_measurements(self) -> int:
@@ -282,7 +290,7 @@ class _Rows:
         if site.kind == "position" and "lon" in self._columns:
             quantities = ("lon", "lat")
         cells = [self.table.columns[self._columns[quantity][0]][i] for quantity in quantities]
-        if all(cell is None or str(cell).strip() == "" for cell in cells):
+        if all(map(_is_empty, cells)):
             return None
         values = [self._value(i, quantity) for quantity in quantities]
         return self._plane(values) if quantities[0] == "lon" else tuple(values)
@@ -325,6 +333,11 @@ def _at_instants(
         poses[k] = at
         found.append(tuple(_scan(scans[time][s], sites[s]) if s in scans[time] else None for s in range(len(sites))))
     return RecordedScans(np.array(times) - times[0], times[0], is_utc, tuple(found), poses, skipped)
+
+
+def _is_empty(cell: Any) -> bool:
+    """Whether nothing stands there: None, an empty text, or what data frames have in its place."""
+    return cell is None or cell != cell or str(cell).strip() == ""
 
 
 def _groups(rows: list[_Row], gather: float) -> list[list[_Row]]:

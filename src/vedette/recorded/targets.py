@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from vedette.errors import InputError
 from vedette.models.arguments import real, reject
 from vedette.recorded.cleaning import Cleaning, CleaningCounts, RecordedTrack
-from vedette.recorded.reports import Reports, Table, parse_reports, read_table, seconds
+from vedette.recorded.reports import Reports, parse_reports, read_table, seconds, table_of
 from vedette.simulation.truth import TIME_TOLERANCE, Truth, scan_times
 
 
@@ -84,19 +84,15 @@ class RecordedTargets:
     @classmethod
     def from_columns(
         cls,
-        table: Mapping[str, Sequence[Any]],
+        table: Any,
         *,
         columns: Mapping[str, str] | None = None,
         origin_deg: tuple[float, float] | None = None,
         time_origin: float | str | None = None,
         cleaning: Cleaning | None = None,
     ) -> RecordedTargets:
-        """Of columns in memory; rows count from 1 in messages. See `from_file`."""
-        lengths = {name: len(cells) for name, cells in table.items()}
-        if len(set(lengths.values())) > 1:
-            raise reject("table", "columns of one length", lengths)
-        rows = range(1, max(lengths.values(), default=0) + 1)
-        reports = parse_reports(Table(table, rows, "table"), columns=columns, origin_deg=origin_deg)
+        """Of columns in memory, a mapping or a data frame; rows count from 1 in messages. See `from_file`."""
+        reports = parse_reports(table_of(table), columns=columns, origin_deg=origin_deg)
         return cls(reports, time_origin, cleaning or Cleaning())
 
     def truth(self, times: ArrayLike, *, rng: np.random.Generator) -> Truth:
