@@ -94,7 +94,7 @@ def test_a_track_out_of_view_is_one_that_the_scan_leaves_as_it_was(off: float, m
     scan = ScanInput(nobody, np.array([[off, 0.0]] if measured else np.empty((0, 2))), np.zeros(3), 0.0)
     limits = Limits()
     rest = scan, soft.to_kernel(), limits.truncation(2)
-    after, _ = update_lmb(standing_combinations(prior), *rest, limits.keeping_labels().reduction())
+    after, _ = update_lmb(standing_combinations(prior, 1), *rest, limits.keeping_labels().reduction())
     changed = abs(after.existence_logit[0] - prior.existence_logit[0])
     if in_view(prior.tracks, *rest)[0]:
         assert changed > 1e-16

@@ -236,7 +236,7 @@ def test_bad_csv_is_named(tmp_path, text, message):
 def test_files_that_are_not_tables(tmp_path):
     with pytest.raises(InputError, match="no such file; expected a table of records"):
         RecordedTargets.from_file(tmp_path / "none.csv")
-    with pytest.raises(InputError, match=r"a \.csv or \.parquet file"):
+    with pytest.raises(InputError, match=r"expected a file that ends with \.csv, \.parquet"):
         RecordedTargets.from_file(tmp_path / "tracks.xlsx")
     (tmp_path / "bytes.csv").write_bytes(b"time,id\n\xff\xfe,1\n")
     with pytest.raises(InputError, match="cannot be read as CSV in UTF-8"):

@@ -85,7 +85,7 @@ def test_nobody_dies_and_none_is_born_of_no_time() -> None:
 
 
 def test_who_was_measured_at_one_time_by_scans_that_came_apart_is_born_once() -> None:
-    born = models.MeasurementBirth(expected=0.5, max_existence=0.1, std=[20.0, 20.0, 5.0, 5.0])
+    born = models.MeasurementBirth(expected=0.5, max_existence=0.1, std=np.array([20.0, 20.0, 5.0, 5.0]))
     world = targets((), born)
     tracker = Central(SequentialLmbFilter(world, SENSORS))
     here, there = np.array([[10.0, 0.0]]), np.array([[12.0, 1.0], [300.0, 0.0]])
