@@ -225,6 +225,14 @@ def test_a_recording_is_tracked_by_what_is_known_of_its_sensors_alone(folder: Pa
     assert max(min(np.hypot(*(place - ship)) for ship in truth) for place in places) < 150.0
 
 
+def test_the_example_is_tracked() -> None:
+    place = Path(__file__).parents[2] / "examples/recording"
+    made = scenario_of_recording(place / "radars.yaml", place / "scans.csv", place / "truth.csv")
+    record = run_scenario(made.scenario, "still", seed=0)
+    assert (record.num_scans, record.estimates[-1].num_targets) == (98, 3)
+    assert record.ospa[:, 0].mean() < 40.0
+
+
 def test_without_the_targets_reports_nothing_is_scored(folder: Path) -> None:
     made = scenario_of_recording(folder / "radars.yaml", folder / "scans.csv")
     record = run_scenario(made.scenario, "still", seed=0)
