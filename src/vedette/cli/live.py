@@ -135,8 +135,10 @@ async def _from_clients(keeping: Keeping, address: tuple[str, int], token: str |
     server = await Server(take, token, note).listen(*address)
     host, port = server.sockets[0].getsockname()[:2]
     note(f"listens on {host}:{port}")
-    async with server:
-        await server.serve_forever()
+    try:
+        await asyncio.Event().wait()  # for ever: Ctrl-C ends it, and waits for no client
+    finally:
+        server.close()
 
 
 def _document(keeping: Keeping) -> dict[str, Any]:

@@ -95,7 +95,7 @@ class Server:
             else:
                 self._clients.add(writer)
                 await self._serve(reader, writer)
-        except ConnectionError:
+        except (ConnectionError, asyncio.CancelledError):  # it is gone, or the server is
             pass
         finally:
             self._num_open -= 1
