@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 
 from recordings import write_recording
-from vedette.live import Live, encoded
-from vedette.live.building import live_of
+from vedette.live import Live, encoded, live_of
 from vedette.scenarios.of_recording import scenario_of_sensors
 
 REGION = "region: {x_min: -6000.0, x_max: 6000.0, y_min: -6000.0, y_max: 6000.0}\n"

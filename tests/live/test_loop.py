@@ -12,8 +12,7 @@ import pytest
 
 from live.examples import SYNCHRONOUS, answered, line, small, walk, write_live
 from vedette.errors import InputError
-from vedette.live import MOST_BYTES, Live
-from vedette.live.building import live_of
+from vedette.live import MOST_BYTES, Live, live_of
 from vedette.recorded import Conventions, Origin, Site, parse_scans
 from vedette.recorded.reports import read_table
 from vedette.scenarios.build import build_experiment

@@ -65,8 +65,7 @@ def live(
     trust: Trust = False,
 ) -> None:
     """Track scans while they come in, a line of JSON each; estimates, and plans when they are due, as lines go out."""
-    from vedette.live import Keeping
-    from vedette.live.building import live_of
+    from vedette.live import Keeping, live_of
     from vedette.live.serving import check_address
     from vedette.scenarios.of_recording import scenario_of_sensors
 

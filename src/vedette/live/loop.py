@@ -36,7 +36,8 @@ class LiveState:
         start: s, what is added to the times of the timeline to have them as they came; None before the first scan.
         is_utc: whether that makes them seconds since 1970.
         latest: (num_sensors,) s, the latest scan of each sensor; -inf before its first.
-        claimed: s, the time that a scan far ahead has claimed, and `num_claims`, how many in a row.
+        claimed: s, the time that a scan far ahead has claimed; inf: none.
+        num_claims: how many in a row agreed on it.
         due: s, of the next decision; inf: there is none.
         num_decisions: that were made.
     """
@@ -93,8 +94,8 @@ class Live:
         """Take a line.
 
         Returns:
-            The state after it, and the answers to be sent: the estimates, and a plan where one was due; or the error,
-            where nothing of it was taken. `encoded` makes lines of them.
+            The state after it, and the answers to be sent as lines (`encoded`): the estimates and, where it was due,
+            a plan, or what was wrong with the line.
         """
         state = replace(state, num_lines=state.num_lines + 1)
         place = f"line {state.num_lines}"
