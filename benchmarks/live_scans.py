@@ -55,8 +55,9 @@ def lines(experiment: Experiment, run: int, scans: int, apart: bool) -> Iterator
         found = simulate_scans(states, experiment.poses, experiment.sensors_at(step + 1), rngs=rngs)
         for s, scan in enumerate(found):
             if scan is not None:
+                seen = scan.measurements[scan.measurements[:, 1] >= 0.0]  # no radar tells of another range
                 told = {"sensor": s + 1, "time": now + (s / num if apart else 0.0)}
-                yield json.dumps({**told, "measurements": scan.measurements.tolist()}).encode()
+                yield json.dumps({**told, "measurements": seen.tolist()}).encode()
 
 
 def timed(live: Live, sent: list[bytes]) -> tuple[list[float], list[float], list[int]]:

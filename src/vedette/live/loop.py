@@ -91,11 +91,10 @@ class Live:
         return LiveState(self.late.initial(), latest=(-math.inf,) * len(self.sites))
 
     def take(self, state: LiveState, line: bytes) -> tuple[LiveState, tuple[Answer, ...]]:
-        """Take a line.
+        """Take a line, and answer by the estimates and, where it was due, a plan; or by what is wrong with the line.
 
         Returns:
-            The state after it, and the answers to be sent as lines (`encoded`): the estimates and, where it was due,
-            a plan, or what was wrong with the line.
+            The state after it, and the answers, of which `encoded` makes lines.
         """
         state = replace(state, num_lines=state.num_lines + 1)
         place = f"line {state.num_lines}"
