@@ -32,7 +32,8 @@ def live(
     ],
     window: Annotated[float, typer.Option("--window", min=0.001, help="s that a scan may be late.")] = 30.0,
     ahead: Annotated[
-        float, typer.Option("--ahead", min=0.001, help="s that a scan may be ahead of all others, unless three agree.")
+        float,
+        typer.Option("--ahead", min=0.001, help="s that a scan may be ahead of all others, unless several agree."),
     ] = 60.0,
     speed: Annotated[
         float,

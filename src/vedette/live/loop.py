@@ -21,8 +21,9 @@ from vedette.simulation.loop import PLANNER, cause_of
 from vedette.tracking import LateScans, Timeline
 
 Answer: TypeAlias = dict[str, Any]
-# So many scans in a row that agree about a time far ahead are believed: all was silent for long.
-_AGREEING = 3
+# So many scans in a row that agree about a time far ahead are believed, as all may have been silent for long; of one
+# sensor among several it takes more, as that one may just be the fastest.
+_AGREEING, _ALONE = 3, 10
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -37,7 +38,7 @@ class LiveState:
         is_utc: whether that makes them seconds since 1970.
         latest: (num_sensors,) s, the latest scan of each sensor; -inf before its first.
         claimed: s, the time that a scan far ahead has claimed; inf: none.
-        num_claims: how many in a row agreed on it.
+        claimants: the sensors of the scans in a row that agreed on it.
         due: s, of the next decision; inf: there is none.
         num_decisions: that were made.
     """
@@ -49,7 +50,7 @@ class LiveState:
     is_utc: bool = False
     latest: tuple[float, ...] = ()
     claimed: float = math.inf
-    num_claims: int = 0
+    claimants: tuple[int, ...] = ()
     due: float = math.inf
     num_decisions: int = 0
 
@@ -70,7 +71,7 @@ class Live:
         decision_times: s, of the decisions, increasing.
         decide_every: s from one decision to the next, from the first scan on, instead of these.
         ahead: s; a scan further ahead of all others is refused, as one wrong clock would end the window of all others;
-            unless three in a row agree.
+            unless several in a row agree.
         seed: of the decisions.
     """
 
@@ -101,8 +102,9 @@ class Live:
         try:
             message = read_message(line, place, self.sites, self.conventions, self.origin)
             checked, time = self._on_clock(state, message, place)
-            if checked.num_claims:
+            if checked.claimants:
                 wanted = f"at most {self.ahead:g} s after the latest, or {_AGREEING} scans in a row that agree"
+                wanted += f" ({_ALONE} of one sensor)" if len(self.sites) > 1 else ""
                 fault = str(reject(f"{place}, time", wanted, f"{time - (state.timeline.newest or 0.0):g} s after it"))
                 return _failed(checked, fault)
             timeline, _ = self.late.take(state.timeline, [replace(message.scan, time=time)])
@@ -121,7 +123,7 @@ class Live:
     def _on_clock(self, state: LiveState, message: Message, place: str) -> tuple[LiveState, float]:
         """The state that knows how times are told, and the scan's time on the clock of the tracker.
 
-        `num_claims` is above 0 where the scan is not believed.
+        It has claimants where the scan is not believed.
         """
         told = message.scan.time
         if state.start is None:
@@ -133,9 +135,11 @@ class Live:
         assert state.start is not None
         time, newest = told - state.start, state.timeline.newest
         if newest is None or time <= newest + self.ahead:
-            return replace(state, claimed=math.inf, num_claims=0), time
-        num = state.num_claims + 1 if abs(time - state.claimed) <= self.ahead else 1
-        return replace(state, claimed=time, num_claims=num % _AGREEING), time
+            return replace(state, claimed=math.inf, claimants=()), time
+        agreed = state.claimants if abs(time - state.claimed) <= self.ahead else ()
+        claimants = (*agreed, message.scan.sensor)
+        enough = _AGREEING if len(set(claimants)) > 1 or len(self.sites) == 1 else _ALONE
+        return replace(state, claimed=time, claimants=() if len(claimants) >= enough else claimants), time
 
     def _told(self, state: LiveState, time: float) -> Answer:
         """A time of the tracker's clock as times come in."""
