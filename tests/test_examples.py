@@ -59,6 +59,7 @@ SHOWN = {
     ],
     "docs/filters.md": ["target at"],
     "docs/fusion.md": ["ParallelUpdate ", "Clmb by views "],
+    "docs/live.md": ['"line": 12, "time": 5.0, "tracks": [{"label":'],
     "docs/metrics.md": ["True"],
     "docs/recordings.md": ["5 scans, 1 late, 0 dropped", "at 10.0 s"],
     "docs/report.md": [],

@@ -54,6 +54,7 @@ LIGHT = [
     ["show", "bay.yaml"],
     ["schema"],
     ["run", "linear-10", "--planner", "still"],
+    ["live", "--sensors", "bay.yaml"],
 ]
 HEAVY = {
     ("show", "linear-10", "--out", "picture.png"): ("matplotlib", "report"),

@@ -55,6 +55,7 @@ CALLS: list[tuple[tuple[str, ...], set[str]]] = [
     (("run", "short.yaml", "--planner", "still", "--out", "run"), {"decisions", "ospa", "seconds", "health", "folder"}),
     (("results", "run"), {"decisions", "ospa", "written"}),
     (("track", "scans.csv", "--sensors", "radars.yaml", "--out", "tracked"), {"ospa", "assumed", "skipped", "folder"}),
+    (("live", "--sensors", "short.yaml"), {"lines", "errors", "scans", "dropped"}),
     (("campaign", "spec.toml", "--dry-run"), {"cells", "compared", "warnings"}),
     (("campaign", "spec.toml", "--workers", "1"), {"folder", "finished", "failed"}),
     (("results", "trial-results", "--export", "tables"), {"comparisons", "missing", "written"}),

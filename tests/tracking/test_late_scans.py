@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pickle
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -137,6 +138,17 @@ def test_no_more_is_kept_than_the_window_needs() -> None:
     timeline = one_by_one(late, [scan(k % 2, 0.5 * k) for k in range(1, 200)])
     assert len(timeline.instants) == 11
     assert timeline.state.step == 199
+
+
+def test_of_more_times_than_are_kept_the_oldest_are_settled() -> None:
+    late = replace(small(window=5.0), max_instants=4)
+    timeline = one_by_one(late, [scan(0, 0.5 * k) for k in range(1, 10)])
+    assert [instant.time for instant in timeline.instants] == [3.0, 3.5, 4.0, 4.5]
+    for time, num_dropped in ((2.6, 0), (2.5, 1), (2.1, 1)):  # that of the last settled one is over
+        after, _ = late.take(timeline, [scan(1, time)])
+        assert (after.num_dropped, len(after.instants)) == (num_dropped, 4)
+    with pytest.raises(InputError, match="max_instants: expected a whole number of at least 1; got 0"):
+        replace(small(), max_instants=0)
 
 
 def test_a_scan_that_comes_again_is_counted_and_one_that_differs_is_refused() -> None:

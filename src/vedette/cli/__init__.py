@@ -9,6 +9,7 @@ import typer
 from vedette import __version__
 from vedette.cli.campaign import campaign
 from vedette.cli.errors import Commands
+from vedette.cli.live import live
 from vedette.cli.output import speaking
 from vedette.cli.reproducing import reproduce
 from vedette.cli.results import report, results, upgrade
@@ -51,6 +52,7 @@ app.command()(speaking(show))
 app.command()(speaking(schema))
 app.command()(speaking(run))
 app.command()(speaking(track))
+app.command()(speaking(live))
 app.command()(speaking(reproduce))
 app.command()(speaking(campaign))
 app.command()(speaking(results))

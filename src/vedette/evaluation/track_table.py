@@ -61,7 +61,7 @@ def track_table(
     times = [float(record.times[row[0]]) + start for row in rows]
     table: dict[str, list[Any]] = {"time_s": times}
     if is_utc:
-        table["utc"] = [_utc(time) for time in times]
+        table["utc"] = [utc_text(time) for time in times]
     table["label"] = [f"{label[0]}.{label[1]}" for _, label, *_ in rows]
     columns = ("x_m", "y_m", "vx_mps", "vy_mps")
     dim = len(rows[0][2]) if rows else len(columns)
@@ -118,7 +118,8 @@ def _name(target: int | None, names: Sequence[str]) -> str | None:
     return names[target] if target < len(names) else str(target + 1)
 
 
-def _utc(time: float) -> str:
+def utc_text(time: float) -> str:
+    """Seconds since 1970 as ISO 8601, to the millisecond."""
     return (_EPOCH + timedelta(seconds=time)).isoformat(timespec="milliseconds").replace("+00:00", "Z")
 
 
@@ -166,4 +167,4 @@ def _most_common(names: Sequence[str | None]) -> str | None:
     return max(sorted(set(found)), key=found.count) if found else None
 
 
-__all__ = ["ENDINGS", "table_of_run", "track_table", "write_tracks"]
+__all__ = ["ENDINGS", "table_of_run", "track_table", "utc_text", "write_tracks"]

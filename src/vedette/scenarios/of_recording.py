@@ -1,8 +1,8 @@
-"""A scenario of recorded scans: what a file about the sensors says, and for the rest what the scans themselves say."""
+"""A scenario of scans that were recorded, or are to come: what a file about the sensors says, the rest of the scans."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path as FilePath
 from typing import Any, NamedTuple
@@ -12,10 +12,10 @@ import numpy as np
 from vedette.errors import InputError, ScenarioError
 from vedette.kernels.base.types import Floats
 from vedette.reading import read_text
-from vedette.recorded import RecordedScans
+from vedette.recorded import Conventions, RecordedScans
 from vedette.scenarios.loading import Scenario, diagnose
 from vedette.scenarios.sections import ScenarioModel
-from vedette.scenarios.yaml_reader import MOST_BYTES, read_yaml
+from vedette.scenarios.yaml_reader import MOST_BYTES, Document, read_yaml
 
 # What a file about sensors need not say; a scenario must.
 _STAND_INS: dict[str, Any] = {
@@ -26,6 +26,8 @@ _MARGIN = 0.05  # of the extent of what was measured, around it
 _EXISTENCE = 0.03  # of a birth where something was measured
 _LOST_PER_SECOND = 0.001
 _BIRTH_STDS = 2.0  # of the noise across, where most was measured
+_ENDLESS = 1_000_000  # steps, the most of a scenario
+_MOST_STEPS = 100  # of a horizon
 
 
 class OfRecording(NamedTuple):
@@ -56,9 +58,7 @@ def scenario_of_recording(
         InputError: a file that is not there, or rows that cannot be read.
         ScenarioError: with every fault of the file about sensors.
     """
-    document = read_yaml(read_text(sensors, "file about sensors", MOST_BYTES), str(sensors))
-    if not isinstance(document.data, Mapping):
-        raise InputError(f"{sensors}: expected a mapping with `sensors`; got {type(document.data).__name__}")
+    document = _document(sensors)
     said = {key: value for key, value in document.data.items() if key not in ("control", "planners", "time")}
     own = said.get("recording")
     said.setdefault("name", scans.stem)
@@ -75,16 +75,82 @@ def scenario_of_recording(
         said["targets"] = {"kind": "unknown"}
     first = {**_STAND_INS, "birth": _measured_birth(100.0, speed, _state_dim(said)), **said}
     first["targets"] = {"kind": "unknown"}
-    model, faults = diagnose(replace(document, data=first), sensors.parent)
-    if model is None:
-        raise ScenarioError([fault.message(str(sensors)) for fault in faults])
+    model = _model(document, first, sensors)
     assert model.recording is not None
     recording = model.recording.build(model, sensors.parent)
     told, assumed = _assumed(said, model, recording, sensors.parent, speed)
-    model, faults = diagnose(replace(document, data={**said, **told}), sensors.parent)
+    return OfRecording(Scenario(_model(document, {**said, **told}, sensors), sensors), recording, assumed)
+
+
+class OfSensors(NamedTuple):
+    """A scenario of scans that are to come.
+
+    scenario: which a loop takes scans by. conventions: of what they say. assumed: what nobody said, in words.
+    """
+
+    scenario: Scenario
+    conventions: Conventions
+    assumed: tuple[str, ...]
+
+
+def scenario_of_sensors(sensors: FilePath, *, speed: float = 10.0, decide_every: float | None = None) -> OfSensors:
+    """The scenario of scans that are to come.
+
+    Args:
+        sensors: a YAML file as of `scenario_of_recording`, in which `region` must stand, or a whole scenario. Of
+            `recording` the units and bearings count, and of `targets` nothing.
+        speed: m/s, likewise.
+        decide_every: s from one decision to the next, in place of the times that `control` says; the horizon is as
+            long, unless `control` says another.
+
+    Raises:
+        InputError: a file that is not there, units or bearings that are none, no region.
+        ScenarioError: with every fault of the file.
+    """
+    document = _document(sensors)
+    said = {key: value for key, value in document.data.items() if key not in ("recording", "targets")}
+    own = document.data.get("recording")
+    own = own if isinstance(own, Mapping) else {}
+    conventions = Conventions({}, own.get("units") or {}, own.get("bearings"))
+    if "region" not in said:
+        raise InputError(f"{sensors}: expected a region, as no scan has yet said where targets may be; got none")
+    words = list[str]()
+    told = {**_STAND_INS, "name": sensors.stem, **said, "targets": {"kind": "scripted", "tracks": []}}
+    told |= _assumed_motion(said, speed, words)
+    if decide_every is not None:
+        told |= _endless(told, decide_every)
+    model = _model(document, {"birth": _measured_birth(100.0, speed, _state_dim(said)), **told}, sensors)
+    if "birth" not in said:
+        side = max(model.region.x_max - model.region.x_min, model.region.y_max - model.region.y_min)
+        measured = [[np.array([[0.0, side / 4.0]])]] * len(model.sensors)
+        model = _model(document, {**told, **_assumed_birth(model, measured, sensors.parent, speed, words)}, sensors)
+    return OfSensors(Scenario(model, sensors), conventions, tuple(words))
+
+
+def _endless(said: Mapping[str, Any], decide_every: float) -> dict[str, Any]:
+    """Time and decisions of a scenario that decides for as long as scans come."""
+    time = said["time"] if isinstance(said["time"], Mapping) else {}
+    own = said.get("control")
+    control = {key: value for key, value in own.items() if not key.startswith("decision_")} if own else {}
+    period = control.get("horizon_period") or time.get("step_period", 1.0)
+    if "horizon_steps" not in control and isinstance(period, int | float) and period > 0.0:
+        control["horizon_steps"] = round(min(max(decide_every / period, 1.0), _MOST_STEPS))
+    return {"time": {**time, "num_steps": _ENDLESS}, "control": control}
+
+
+def _document(sensors: FilePath) -> Document:
+    document = read_yaml(read_text(sensors, "file about sensors", MOST_BYTES), str(sensors))
+    if not isinstance(document.data, Mapping):
+        raise InputError(f"{sensors}: expected a mapping with `sensors`; got {type(document.data).__name__}")
+    return document
+
+
+def _model(document: Document, data: Mapping[str, Any], sensors: FilePath) -> ScenarioModel:
+    """The scenario of a document with other data; raises for its faults."""
+    model, faults = diagnose(replace(document, data=data), sensors.parent)
     if model is None:
         raise ScenarioError([fault.message(str(sensors)) for fault in faults])
-    return OfRecording(Scenario(model, sensors), recording, assumed)
+    return model
 
 
 def _are_recorded(targets: Any) -> bool:
@@ -96,24 +162,42 @@ def _assumed(
 ) -> tuple[dict[str, Any], tuple[str, ...]]:
     """The sections that are missing, by the scans; and in words what they say."""
     told: dict[str, Any] = {"time": _time(recording)}
-    words = []
+    words = list[str]()
     if "region" not in said:
         told["region"] = region = _extent(model, recording)
         words.append("region: x from {x_min:g} to {x_max:g} m, y from {y_min:g} to {y_max:g} m".format(**region))
+    told |= _assumed_motion(said, speed, words)
+    if "birth" not in said:
+        measured = [
+            [scan for scans in recording.scans if (scan := scans[s]) is not None and len(scan)]
+            for s in range(len(model.sensors))
+        ]
+        told |= _assumed_birth(model, measured, folder, speed, words)
+    told |= _assumed_clutter(said, model, recording, words)
+    if _are_recorded(said["targets"]) and "time_origin" not in said["targets"]:
+        told["targets"] = {**said["targets"], "time_origin": recording.start}
+    return told, tuple(words)
+
+
+def _assumed_motion(said: Mapping[str, Any], speed: float, words: list[str]) -> dict[str, Any]:
+    """How targets move and live, where it is not said."""
+    told: dict[str, Any] = {}
     if "motion" not in said:
         told["motion"] = {"kind": "constant_velocity", "sigma_v": speed / 20.0}
         words.append(f"motion: constant_velocity, sigma_v {speed / 20.0:g} m/s^2 (speed {speed:g} m/s)")
     if "survival" not in said:
         told["survival"] = {"kind": "constant", "probability": 1.0 - _LOST_PER_SECOND, "period": 1.0}
         words.append(f"survival: {1.0 - _LOST_PER_SECOND:g} a second")
-    if "birth" not in said:
-        std = _BIRTH_STDS * _spread(model, recording, folder)
-        told["birth"] = _measured_birth(std, speed, model.motion.state_dim)
-        words.append(f"birth: of measurements, std {std:.3g} m and {speed:g} m/s, existence up to {_EXISTENCE:g}")
-    told |= _assumed_clutter(said, model, recording, words)
-    if _are_recorded(said["targets"]) and "time_origin" not in said["targets"]:
-        told["targets"] = {**said["targets"], "time_origin": recording.start}
-    return told, tuple(words)
+    return told
+
+
+def _assumed_birth(
+    model: ScenarioModel, measured: Sequence[Sequence[Floats]], folder: FilePath, speed: float, words: list[str]
+) -> dict[str, Any]:
+    """Births of what is measured, by the scans of each sensor."""
+    std = _BIRTH_STDS * _spread(model, measured, folder)
+    words.append(f"birth: of measurements, std {std:.3g} m and {speed:g} m/s, existence up to {_EXISTENCE:g}")
+    return {"birth": _measured_birth(std, speed, model.motion.state_dim)}
 
 
 def _state_dim(said: Mapping[str, Any]) -> int:
@@ -179,13 +263,12 @@ def _extent(model: ScenarioModel, recording: RecordedScans) -> dict[str, float]:
     return {"x_min": x_min, "x_max": x_max, "y_min": y_min, "y_max": y_max}
 
 
-def _spread(model: ScenarioModel, recording: RecordedScans, folder: FilePath) -> float:
+def _spread(model: ScenarioModel, measured: Sequence[Sequence[Floats]], folder: FilePath) -> float:
     """Standard deviation of where was measured, m: the upper quartile over all measurements that say a place."""
     region, method = model.region.build(), model.filter.gaussian_method
     found = []
-    for s, section in enumerate(model.sensors):
+    for section, scans in zip(model.sensors, measured, strict=True):
         stds = section.build(region, method, folder, model.filter.detection_at).noise.least_stds
-        scans = [scan for scans in recording.scans if (scan := scans[s]) is not None and len(scan)]
         if stds is None or not scans:
             continue
         if section.measurement.kind == "bearing_range":

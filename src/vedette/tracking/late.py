@@ -14,7 +14,7 @@ import numpy as np
 from vedette.errors import InputError
 from vedette.filters.inputs import check_scan
 from vedette.kernels.base.types import Floats
-from vedette.models.arguments import count, instance, pose_vector, positive, real, reject
+from vedette.models.arguments import count, dimension, instance, pose_vector, positive, real, reject
 from vedette.tracking.base import State, Tracker, TrackerInfo
 
 _TIME = attrgetter("time")
@@ -122,15 +122,17 @@ class LateScans:
         poses: (num_sensors, 3 or more) where each sensor is before its first scan.
         window: s, from the latest scan back.
         seed: of the random numbers of filters that draw; those of a step are the same whenever it is made.
+        max_instants: most times of scans that are kept; of more, as in a flood, the window becomes shorter.
 
     Raises:
-        InputError: something else than a tracker, not one pose a sensor, no positive window.
+        InputError: something else than a tracker, not one pose a sensor, no positive window or number of instants.
     """
 
     tracker: Tracker
     poses: Any
     window: float = 30.0
     seed: int = 0
+    max_instants: int = 10_000
     _start: Floats = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -138,6 +140,7 @@ class LateScans:
         if self.window != math.inf:
             positive("window", self.window)
         count("seed", self.seed)
+        dimension("max_instants", self.max_instants)
         num = len(self.tracker.sensors)
         given = [pose_vector(f"poses[{s}]", pose) for s, pose in enumerate(self.poses)]
         if len(given) != num:
@@ -171,7 +174,7 @@ class LateScans:
         taken = late = repeated = 0
         for given in scans:
             scan = self._checked(given)
-            if newest is not None and scan.time < newest - self.window:
+            if newest is not None and (scan.time < newest - self.window or _is_settled(timeline, scan.time)):
                 dropped.append(scan)
                 continue
             before = _scans_at(timeline, scan.time) | came.get(scan.time, {})
@@ -257,7 +260,7 @@ class LateScans:
         """Without the instants that no scan can come before any more."""
         if timeline.newest is None:
             return timeline
-        past = _place(timeline, timeline.newest - self.window)
+        past = max(_place(timeline, timeline.newest - self.window), len(timeline.instants) - self.max_instants)
         if past == 0:
             return timeline
         last = timeline.instants[past - 1]
@@ -267,6 +270,11 @@ class LateScans:
 def _place(timeline: Timeline, time: float) -> int:
     """How many instants are before a time."""
     return bisect_left(timeline.instants, time, key=_TIME)
+
+
+def _is_settled(timeline: Timeline, time: float) -> bool:
+    """Whether a time is not after all that no scan changes any more."""
+    return timeline.settled.time is not None and time <= timeline.settled.time
 
 
 def _scans_at(timeline: Timeline, time: float) -> dict[int, SensorScan]:

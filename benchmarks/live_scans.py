@@ -1,0 +1,112 @@
+"""How long it is from a line to its estimates and to a plan, and how many scans a second a live loop takes.
+
+    python benchmarks/live_scans.py [--sensors N] [--targets N] [--scans N] [--runs N]
+    python benchmarks/live_scans.py --write docs/live.md
+
+Sensors of a generated scene (`vedette generate`) scan every second, all at one time (`together`) or each at its own
+part of the second (`apart`); every line is taken by `vedette.live.Live.take` and its answers made lines, in wall time
+of this process, the reading of the JSON included, without pipe or network. A line after which a plan is due is counted
+under plans: its time is from the line to the plan, with the explanation. The first run is not counted. What is printed
+are quantiles over all lines of all runs, and the lines a second that were taken without plans. Sensors see 250 m
+(`limited`) or all of the region (`full`).
+"""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+import json
+import tempfile
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pages import write_between
+
+from vedette.live import Live, encoded, live_of
+from vedette.scenarios import GeneratedScene, load_scenario, scene_text
+from vedette.scenarios.build import build_experiment
+from vedette.scenarios.of_recording import scenario_of_sensors
+from vedette.simulation.experiment import Experiment
+from vedette.simulation.loop import SCANS, TRUTH, run_stream, sensor_streams
+from vedette.simulation.scans import simulate_scans
+
+DECIDE_EVERY = 5.0  # s
+SEED = 5
+
+
+def scene(sensors: int, targets: int, view: Any, folder: Path) -> tuple[Experiment, Live]:
+    """What is simulated, and the loop that takes it."""
+    path = folder / "scene.yaml"
+    path.write_text(scene_text(GeneratedScene(num_sensors=sensors, num_targets=targets, view=view)), "utf-8")
+    known = scenario_of_sensors(path, decide_every=DECIDE_EVERY)
+    return build_experiment(load_scenario(path)), live_of(known, decide_every=DECIDE_EVERY)
+
+
+def lines(experiment: Experiment, run: int, scans: int, apart: bool) -> Iterator[bytes]:
+    """The scans of a run as lines."""
+    times = experiment.times[:scans]
+    truth = experiment.targets.truth(experiment.times, rng=run_stream(SEED, run, TRUTH))
+    rngs, num = sensor_streams(SEED, run, SCANS, experiment.num_sensors), experiment.num_sensors
+    for step, now in enumerate(times.tolist()):
+        states = truth.at(step)[1]
+        found = simulate_scans(states, experiment.poses, experiment.sensors_at(step + 1), rngs=rngs)
+        for s, scan in enumerate(found):
+            if scan is not None:
+                seen = scan.measurements[scan.measurements[:, 1] >= 0.0]  # no radar tells of another range
+                told = {"sensor": s + 1, "time": now + (s / num if apart else 0.0)}
+                yield json.dumps({**told, "measurements": seen.tolist()}).encode()
+
+
+def timed(live: Live, sent: list[bytes]) -> tuple[list[float], list[float], list[int]]:
+    """Milliseconds to estimates and to plans, and how many targets were estimated."""
+    state = live.initial()
+    estimates, plans, tracks = list[float](), list[float](), list[int]()
+    for line in sent:
+        begun = time.perf_counter()
+        state, answers = live.take(state, line)
+        for answer in answers:
+            encoded(answer)
+        spent = 1e3 * (time.perf_counter() - begun)
+        if "error" in answers[-1]:
+            raise SystemExit(answers[-1]["error"])
+        (plans if "plan" in answers[-1] else estimates).append(spent)
+        tracks.append(len(answers[0]["tracks"]))
+    return estimates, plans, tracks
+
+
+def table(sensors: int, targets: int, scans: int, runs: int) -> Iterator[str]:
+    """The lines of the table."""
+    yield "| view, scans | targets found | to estimates, p50, ms | p99 | to a plan, p50, ms | p99 | scans a second |"
+    yield "| --- | ---: | ---: | ---: | ---: | ---: | ---: |"
+    for view, apart in itertools.product(("limited", "full"), (False, True)):
+        with tempfile.TemporaryDirectory() as folder:
+            experiment, live = scene(sensors, targets, view, Path(folder))
+        found = [timed(live, list(lines(experiment, run, scans, apart))) for run in range(runs + 1)][1:]
+        estimates, plans, tracks = ([value for each in found for value in each[i]] for i in range(3))
+        cells = [f"{view}, {'apart' if apart else 'together'}", f"{np.median(tracks):.0f}"]
+        cells += [f"{np.quantile(values, q):.1f}" for values in (estimates, plans) for q in (0.5, 0.99)]
+        yield "| " + " | ".join([*cells, f"{1e3 * len(estimates) / sum(estimates):.0f}"]) + " |"
+    yield ""
+    yield f"{sensors} sensors, {targets} targets, {runs} runs of {scans} s, a plan every {DECIDE_EVERY:g} s."
+
+
+def main() -> None:
+    """Read the arguments and print."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--sensors", type=int, default=4)
+    parser.add_argument("--targets", type=int, default=20)
+    parser.add_argument("--scans", type=int, default=50)
+    parser.add_argument("--runs", type=int, default=10)
+    parser.add_argument("--write", type=Path)
+    given = parser.parse_args()
+    text = "\n".join(table(given.sensors, given.targets, given.scans, given.runs))
+    print(text)
+    if given.write is not None:
+        write_between(given.write, "live_scans.py", text)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,145 @@
+"""What a live loop leaves on disk, to go on from after any end: the lines as they came, and snapshots of its state."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import fields
+from pathlib import Path
+from typing import Any, BinaryIO
+
+from vedette.errors import InputError
+from vedette.live.loop import Answer, Live, LiveState
+from vedette.live.messages import MOST_BYTES
+from vedette.live.serving import LineSplitter
+from vedette.tracking import load_snapshot, save_snapshot
+
+_CHUNK = 1 << 16
+
+
+class Keeping:
+    """A live loop with its files.
+
+    A line is written to the record before it is taken. After whatever end, the next loop has the state of the snapshot,
+    takes the lines that the record has after it, and goes on: all is as if nothing had been, but that the answers to
+    those lines are given a second time.
+
+    Args:
+        live: the loop.
+        of: by which a snapshot is known to be of this loop, such as a digest of its files.
+        snapshot: the file of the state; None: none.
+        every: s between snapshots.
+        record: the file of the lines; None: none.
+        clock: s, by which it is time for a snapshot.
+        tell: is told of a snapshot that could not be written; the loop goes on.
+
+    Raises:
+        InputError: a file that cannot be read or written, or is of another loop.
+    """
+
+    def __init__(
+        self,
+        live: Live,
+        *,
+        of: str = "",
+        snapshot: Path | None = None,
+        every: float = 10.0,
+        record: Path | None = None,
+        clock: Callable[[], float] = time.monotonic,
+        tell: Callable[[str], object] = print,
+    ) -> None:
+        self.live, self.state = live, live.initial()
+        self._of, self._snapshot, self._every, self._clock, self._tell = of, snapshot, every, clock, tell
+        self._saved_at, self._saved_lines = clock(), 0
+        if snapshot is not None and os.path.lexists(snapshot):
+            self.state = _state_of(load_snapshot(snapshot), snapshot, of)
+            self._saved_lines = self.state.num_lines
+        self._path, self._record = record, None if record is None else _opened(record)
+
+    def resume(self) -> Iterator[tuple[Answer, ...]]:
+        """Take the lines that the record has beyond the snapshot; the answers to each."""
+        if self._record is None:
+            return
+        before, num = self.state.num_lines, 0
+        self._record.seek(0)
+        for num, line in enumerate(_lines(self._record), start=1):
+            if num > before:
+                self.state, answers = self.live.take(self.state, line)
+                yield answers
+        if num < before:
+            wanted = f"at least the {before} lines that the snapshot has taken"
+            raise InputError(f"{self._path}: expected {wanted}; got {num}")
+        _cut(self._record)
+
+    def take(self, line: bytes) -> tuple[Answer, ...]:
+        """Write a line down, take it, and save the state when it is time."""
+        if self._record is not None:
+            self._record.write(line + b"\n")
+            self._record.flush()
+        self.state, answers = self.live.take(self.state, line)
+        if self._snapshot is not None and self._clock() - self._saved_at >= self._every:
+            self.save()
+        return answers
+
+    def save(self) -> None:
+        """Save the state, where there is a file for it and something has come since."""
+        if self._snapshot is None or self.state.num_lines == self._saved_lines:
+            return
+        try:
+            save_snapshot(self._snapshot, {"of": self._of, **_parts(self.state)})
+            self._saved_lines = self.state.num_lines
+        except InputError as error:
+            self._tell(f"no snapshot: {error}")
+        self._saved_at = self._clock()
+
+    def close(self) -> None:
+        """Save what is not, and close the record."""
+        self.save()
+        if self._record is not None:
+            self._record.close()
+
+
+def _parts(state: LiveState) -> dict[str, Any]:
+    return {field.name: getattr(state, field.name) for field in fields(state)}
+
+
+def _state_of(parts: dict[str, Any], path: Path, of: str) -> LiveState:
+    if set(parts) != {"of", *(field.name for field in fields(LiveState))}:
+        raise InputError(f"{path}: expected a snapshot of a live loop; got one of {', '.join(map(str, parts))}")
+    if parts.pop("of") != of:
+        raise InputError(f"{path}: expected a snapshot of the same sensors and options; got one of others")
+    return LiveState(**parts)
+
+
+def _opened(path: Path) -> BinaryIO:
+    try:
+        return path.open("r+b" if path.exists() else "w+b")
+    except OSError as error:
+        raise InputError(f"{path}: expected a file that can be written; {error.strerror}") from error
+
+
+def _lines(file: BinaryIO) -> Iterator[bytes]:
+    """The whole lines of a record."""
+    splitter = LineSplitter(MOST_BYTES)
+    while chunk := file.read(_CHUNK):
+        yield from splitter.feed(chunk)
+
+
+def _cut(file: BinaryIO) -> None:
+    """Behind the last whole line, without what was half written when the loop ended."""
+    size = end = file.seek(0, os.SEEK_END)
+    while end > 0:
+        start = max(end - _CHUNK, 0)
+        file.seek(start)
+        place = file.read(end - start).rfind(b"\n")
+        if place >= 0:
+            end = start + place + 1
+            break
+        end = start
+    if end < size:
+        file.truncate(end)
+    file.seek(end)
+
+
+__all__ = ["Keeping"]

@@ -1,0 +1,231 @@
+"""The loop of scans that come in: (state, line) to (state, lines out), and nothing else of the world."""
+
+from __future__ import annotations
+
+import json
+import math
+from bisect import bisect_right
+from dataclasses import dataclass, replace
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from vedette.control import Planner
+from vedette.densities import Estimator
+from vedette.errors import VedetteError
+from vedette.evaluation.track_table import utc_text
+from vedette.live.messages import Message, read_message
+from vedette.models.arguments import reject
+from vedette.recorded import Conventions, Origin, Site
+from vedette.simulation.loop import PLANNER, cause_of
+from vedette.tracking import LateScans, Timeline
+
+Answer: TypeAlias = dict[str, Any]
+# So many scans in a row that agree about a time far ahead are believed, as all may have been silent for long; of one
+# sensor among several it takes more, as that one may just be the fastest.
+_AGREEING, _ALONE = 3, 10
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LiveState:
+    """All that the loop knows.
+
+    Attributes:
+        timeline: of the scans that were taken.
+        num_lines: lines that came.
+        num_errors: of these, how many could not be taken.
+        start: s, what is added to the times of the timeline to have them as they came; None before the first scan.
+        is_utc: whether that makes them seconds since 1970.
+        latest: (num_sensors,) s, the latest scan of each sensor; -inf before its first.
+        claimed: s, the time that a scan far ahead has claimed; inf: none.
+        claimants: the sensors of the scans in a row that agreed on it.
+        due: s, of the next decision; inf: there is none.
+        num_decisions: that were made.
+    """
+
+    timeline: Timeline
+    num_lines: int = 0
+    num_errors: int = 0
+    start: float | None = None
+    is_utc: bool = False
+    latest: tuple[float, ...] = ()
+    claimed: float = math.inf
+    claimants: tuple[int, ...] = ()
+    due: float = math.inf
+    num_decisions: int = 0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Live:
+    """A loop that takes lines with scans, in whatever order they come, and answers each.
+
+    The same lines in the same order have the same answers, byte for byte.
+
+    Attributes:
+        late: puts the scans in their places.
+        sites: the sensors, as `read_message` takes them.
+        estimate: reads the targets off.
+        conventions, origin: of what lines say.
+        first: s, where on the clock of the tracker the first scan is whose time is a date; other times are as they are.
+        planner: decides; None: nobody.
+        decision_times: s, of the decisions, increasing.
+        decide_every: s from one decision to the next, from the first scan on, instead of these.
+        ahead: s; a scan further ahead of all others is refused, as one wrong clock would end the window of all others;
+            unless several in a row agree.
+        seed: of the decisions.
+    """
+
+    late: LateScans
+    sites: tuple[Site, ...]
+    estimate: Estimator
+    conventions: Conventions
+    origin: Origin | None = None
+    first: float = 0.0
+    planner: Planner | None = None
+    decision_times: tuple[float, ...] = ()
+    decide_every: float | None = None
+    ahead: float = 60.0
+    seed: int = 0
+
+    def initial(self) -> LiveState:
+        """Before the first line."""
+        return LiveState(self.late.initial(), latest=(-math.inf,) * len(self.sites))
+
+    def take(self, state: LiveState, line: bytes) -> tuple[LiveState, tuple[Answer, ...]]:
+        """Take a line, and answer by the estimates and, where it was due, a plan; or by what is wrong with the line.
+
+        Returns:
+            The state after it, and the answers, of which `encoded` makes lines.
+        """
+        state = replace(state, num_lines=state.num_lines + 1)
+        place = f"line {state.num_lines}"
+        try:
+            message = read_message(line, place, self.sites, self.conventions, self.origin)
+            checked, time = self._on_clock(state, message, place)
+            if checked.claimants:
+                wanted = f"at most {self.ahead:g} s after the latest, or {_AGREEING} scans in a row that agree"
+                wanted += f" ({_ALONE} of one sensor)" if len(self.sites) > 1 else ""
+                fault = str(reject(f"{place}, time", wanted, f"{time - (state.timeline.newest or 0.0):g} s after it"))
+                return _failed(checked, fault)
+            timeline, _ = self.late.take(state.timeline, [replace(message.scan, time=time)])
+            latest = list(state.latest)
+            latest[message.scan.sensor] = max(latest[message.scan.sensor], time)
+            taken = replace(checked, timeline=timeline, latest=tuple(latest))
+            answer = self._estimates(taken)
+        except Exception as error:  # of whatever code of the user's own it comes, the next line is another
+            text = str(error) if isinstance(error, VedetteError) else cause_of(error)
+            return _failed(state, text if text.startswith(place) else f"{place}: {text}")
+        if self._is_due(taken):
+            taken, plan = self._decided(taken)
+            return taken, (answer, plan)
+        return taken, (answer,)
+
+    def _on_clock(self, state: LiveState, message: Message, place: str) -> tuple[LiveState, float]:
+        """The state that knows how times are told, and the scan's time on the clock of the tracker.
+
+        It has claimants where the scan is not believed.
+        """
+        told = message.scan.time
+        if state.start is None:
+            start = told - self.first if message.is_utc else 0.0
+            time = told - start
+            state = replace(state, start=start, is_utc=message.is_utc, due=self._due_after(time, time))
+        elif message.is_utc != state.is_utc:
+            raise reject(f"{place}, time", "dates, as before" if state.is_utc else "seconds, as before", f"{told:g}")
+        assert state.start is not None
+        time, newest = told - state.start, state.timeline.newest
+        if newest is None or time <= newest + self.ahead:
+            return replace(state, claimed=math.inf, claimants=()), time
+        agreed = state.claimants if abs(time - state.claimed) <= self.ahead else ()
+        claimants = (*agreed, message.scan.sensor)
+        enough = _AGREEING if len(set(claimants)) > 1 or len(self.sites) == 1 else _ALONE
+        return replace(state, claimed=time, claimants=() if len(claimants) >= enough else claimants), time
+
+    def _told(self, state: LiveState, time: float) -> Answer:
+        """A time of the tracker's clock as times come in."""
+        told = time + (state.start or 0.0)
+        return {"time": told, "utc": utc_text(told)} if state.is_utc else {"time": told}
+
+    def _estimates(self, state: LiveState) -> Answer:
+        timeline = state.timeline
+        belief = timeline.state
+        assert belief.time is not None  # a scan was taken, or one before it
+        found = self.estimate(belief.fused, belief.step)
+        names = ("x", "y", "vx", "vy")[: 4 if found.means.shape[1] >= 4 else 2]
+        stds = np.sqrt(np.diagonal(found.covs, axis1=1, axis2=2))[:, : len(names)]
+        tracks: list[Answer] = []
+        for label, mean, std, existence in zip(
+            found.labels.tolist(), found.means.tolist(), stds.tolist(), found.existence.tolist(), strict=True
+        ):
+            named = dict(zip(names, mean, strict=False))
+            tracks.append({"label": ".".join(map(str, label)), **named, "std": std, "existence": existence})
+        if self.origin is not None and tracks:
+            for track, (lon, lat) in zip(tracks, self.origin.to_degrees(found.means[:, :2]).tolist(), strict=True):
+                track.update(lon=lon, lat=lat)
+        counts = {"late": timeline.num_late, "dropped": timeline.num_dropped, "repeated": timeline.num_repeated}
+        return {"line": state.num_lines, **self._told(state, belief.time), "tracks": tracks, **counts}
+
+    def _due_after(self, first: float, now: float) -> float:
+        """s, of the first decision after a time."""
+        if self.planner is None:
+            return math.inf
+        if self.decide_every is not None:
+            return first + (math.floor((now - first) / self.decide_every) + 1.0) * self.decide_every
+        place = bisect_right(self.decision_times, now)
+        return self.decision_times[place] if place < len(self.decision_times) else math.inf
+
+    def _is_due(self, state: LiveState) -> bool:
+        """Whether all scans of the time of a decision have come, or one after it."""
+        newest = state.timeline.newest
+        return newest is not None and (newest > state.due or min(state.latest) >= state.due)
+
+    def _decided(self, state: LiveState) -> tuple[LiveState, Answer]:
+        """A decision on what is believed now; the error where it cannot be made, which the next may."""
+        assert self.planner is not None
+        timeline, now = state.timeline, state.timeline.state.time
+        assert now is not None
+        after = replace(state, due=self._due_after(state.due, now), num_decisions=state.num_decisions + 1)
+        seeds = np.random.SeedSequence(self.seed, spawn_key=(0, PLANNER, state.num_decisions))
+        try:
+            plan = self.planner.plan(timeline.state, timeline.poses, rng=np.random.default_rng(seeds))
+            actions = [
+                {"sensor": site.name, **dict(zip(own.columns, row.tolist(), strict=True))}
+                for site, own, row in zip(self.sites, plan.actions, plan.chosen_actions, strict=True)
+            ]
+            rewards = [{"mean": mean, "standard_error": error} for mean, error in plan.expected_rewards]
+            told = {**self._told(state, now), "planner": plan.planner, "actions": actions}
+            return after, {"line": state.num_lines, "plan": {**told, "expected_rewards": rewards, "why": _why(plan)}}
+        except Exception as error:  # as above; the scan was taken
+            told = {"line": state.num_lines, "error": f"line {state.num_lines}, plan at {now:g} s: {cause_of(error)}"}
+            return replace(after, num_errors=after.num_errors + 1), told
+
+
+def _why(plan: Any) -> str:
+    try:
+        return str(plan.explain())
+    except VedetteError as error:
+        return f"not known: {error}"
+
+
+def _failed(state: LiveState, text: str) -> tuple[LiveState, tuple[Answer, ...]]:
+    return replace(state, num_errors=state.num_errors + 1), ({"line": state.num_lines, "error": text},)
+
+
+def encoded(answer: Answer) -> bytes:
+    """A line of JSON, with its end. Numbers that are none become null."""
+    try:
+        text = json.dumps(answer, ensure_ascii=False, allow_nan=False)
+    except ValueError:
+        text = json.dumps(_finite(answer), ensure_ascii=False, allow_nan=False)
+    return text.encode("utf-8", "replace") + b"\n"
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _finite(each) for key, each in value.items()}
+    if isinstance(value, list):
+        return [_finite(each) for each in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+__all__ = ["Answer", "Live", "LiveState", "encoded"]

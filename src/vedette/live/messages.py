@@ -1,0 +1,143 @@
+"""A scan as a line of JSON, read strictly: whatever is wrong with it is said, and nothing of it is taken."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+from vedette.errors import InputError
+from vedette.models.arguments import reject
+from vedette.reading import parse_json, said
+from vedette.recorded import Conventions, Origin, Site, parse_scans
+from vedette.recorded.reports import Table, is_number
+from vedette.recorded.scans import COMPONENTS
+from vedette.text import shown
+from vedette.tracking import SensorScan
+
+MOST_BYTES = 1_000_000  # of a line
+MOST_MEASUREMENTS = 2000  # of a scan
+_KEYS = ("sensor", "time", "measurements", "pose")
+
+
+class Message(NamedTuple):
+    """A scan, at its time as it was told; and whether that is seconds since 1970 UTC."""
+
+    scan: SensorScan
+    is_utc: bool
+
+
+def read_message(
+    line: bytes, place: str, sites: Sequence[Site], conventions: Conventions, origin: Origin | None = None
+) -> Message:
+    """The scan that a line tells of.
+
+    `{"sensor": name or number from 1, "time": s or ISO 8601, "measurements": [[...], ...], "pose": ...}`: measurements
+    as `vedette.recorded.scans.COMPONENTS` has them, in rad and m unless `conventions.units` says another; angles count
+    as `conventions.bearings` says, else from the east. The pose, which may be left out, is `[x, y, heading_rad, ...]`,
+    or `{"lon": , "lat": , "heading_deg": }`, whose heading may be left out and else needs `bearings`.
+
+    Args:
+        line: of UTF-8 text.
+        place: what messages call it.
+        sites: the sensors, in the order of the tracker's.
+        conventions: units and bearings; of the rest nothing counts.
+        origin: of longitudes and latitudes.
+
+    Raises:
+        InputError: names the field, what was expected and what came.
+    """
+    data = _object(line, place)
+    number = _sensor(data["sensor"], place, sites)
+    site, time = sites[number], data["time"]
+    if not isinstance(time, str) and (isinstance(time, bool) or not isinstance(time, int | float)):
+        raise reject(f"{place}, time", "seconds, or a text in ISO 8601", time)
+    rows = _rows(data["measurements"], f"{place}, measurements", site)
+    pose, more = _pose(data.get("pose"), f"{place}, pose", site)
+    if "pose.heading_deg" not in pose and conventions.bearings is None:
+        conventions = replace(conventions, bearings="east")
+    num, names = max(len(rows), 1), COMPONENTS[site.kind]
+    columns: dict[str, list[Any]] = {"time": [time] * num, "sensor": [site.name] * num}
+    columns |= {name: [row[j] for row in rows] if rows else [None] for j, name in enumerate(names)}
+    columns |= {name: [value] * num for name, value in pose.items()}
+    units = {"bearing": "rad", **{name: unit for name, unit in conventions.units.items() if name in names}}
+    named = {_OF_POSE[name]: name for name in pose}
+    read = parse_scans(
+        Table(columns, range(1, num + 1), place), [site], replace(conventions, columns=named, units=units), origin
+    )
+    at = read.poses[0, 0].copy()
+    at[3 : 3 + len(more)] = more
+    return Message(SensorScan(number, read.start, read.scans[0][0], at), read.is_utc)
+
+
+_OF_POSE = {
+    "pose.x": "own_x",
+    "pose.y": "own_y",
+    "pose.heading_rad": "own_heading",
+    "pose.lon": "own_lon",
+    "pose.lat": "own_lat",
+    "pose.heading_deg": "own_heading",
+}
+
+
+def _object(line: bytes, place: str) -> Mapping[str, Any]:
+    if len(line) > MOST_BYTES:
+        raise reject(place, f"at most {MOST_BYTES} bytes", "more")
+    try:
+        data = parse_json(line)
+    except ValueError as fault:
+        raise InputError(f"{place}: expected a JSON object; it is damaged: {said(fault)}") from None
+    if not isinstance(data, dict):
+        raise reject(place, "a JSON object", data)
+    for key in data:
+        if key not in _KEYS:
+            raise InputError(f"{place}: expected keys among {', '.join(_KEYS)}; got {shown(key)}")
+    for key in _KEYS[:3]:
+        if key not in data:
+            raise reject(f"{place}, {key}", "it in every line", "none")
+    return data
+
+
+def _sensor(given: Any, place: str, sites: Sequence[Site]) -> int:
+    """Its number, from 0."""
+    for number, site in enumerate(sites):
+        if given == site.name or (type(given) is int and given == number + 1):
+            return number
+    names = ", ".join(shown(site.name) for site in sites)
+    raise InputError(f"{place}, sensor: expected one of {names}, or its number from 1; got {shown(given)}")
+
+
+def _rows(given: Any, field: str, site: Site) -> list[list[float]]:
+    names = COMPONENTS[site.kind]
+    if not isinstance(given, list):
+        raise reject(field, f"a list of [{', '.join(names)}]", given)
+    if len(given) > MOST_MEASUREMENTS:
+        raise reject(field, f"at most {MOST_MEASUREMENTS} of a scan", len(given))
+    for i, row in enumerate(given):
+        if not isinstance(row, list) or len(row) != len(names) or not all(map(_is_number, row)):
+            raise reject(f"{field}[{i}]", f"numbers [{', '.join(names)}]", row)
+    return given
+
+
+def _pose(given: Any, field: str, site: Site) -> tuple[dict[str, float], list[float]]:
+    """What it says as columns of a table; and components beyond the heading."""
+    if given is None:
+        return {}, []
+    if isinstance(given, dict):
+        if not {"lon", "lat"} <= set(given) <= {"lon", "lat", "heading_deg"}:
+            raise reject(field, "lon, lat and, if it is known, heading_deg", ", ".join(map(str, given)) or "nothing")
+        for name, value in given.items():
+            if not _is_number(value):
+                raise reject(f"{field}.{name}", "a number", value)
+        return {f"pose.{name}": value for name, value in given.items()}, []
+    if not isinstance(given, list) or not 3 <= len(given) <= len(site.pose) or not all(map(_is_number, given)):
+        wanted = "[x, y, heading_rad" + (", ...]" if len(site.pose) > 3 else "]")
+        raise reject(field, f"numbers {wanted}, or lon and lat", given)
+    return dict(zip(("pose.x", "pose.y", "pose.heading_rad"), given, strict=False)), given[3:]
+
+
+def _is_number(value: Any) -> bool:
+    return not isinstance(value, str) and is_number(value)
+
+
+__all__ = ["MOST_BYTES", "MOST_MEASUREMENTS", "Message", "read_message"]

@@ -1,0 +1,89 @@
+"""After whatever end the loop goes on as if nothing had been."""
+
+from __future__ import annotations
+
+import itertools
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from live.examples import answered, line, small, walk
+from vedette.errors import InputError
+from vedette.live import MOST_BYTES, Keeping, LineSplitter, Live, encoded
+
+LINES = [*walk(7), b"{", line("nobody"), *walk(9)[14:]]
+
+
+def sent(keeping: Keeping, lines: list[bytes]) -> list[bytes]:
+    return [encoded(answer) for one in lines for answer in keeping.take(one)]
+
+
+def resumed(keeping: Keeping) -> list[bytes]:
+    return [encoded(answer) for answers in keeping.resume() for answer in answers]
+
+
+@pytest.fixture
+def live(tmp_path: Path) -> Live:
+    return small(tmp_path, decide_every=3.0)
+
+
+@pytest.mark.parametrize("end", [0, 1, 9, 15, len(LINES)])
+@pytest.mark.parametrize("kept", [("snapshot",), ("record",), ("snapshot", "record")], ids="-".join)
+def test_it_goes_on_from_what_it_left(tmp_path: Path, live: Live, end: int, kept: tuple[str, ...]) -> None:
+    whole = answered(live, LINES)
+    files: dict[str, Any] = {name: tmp_path / name for name in kept}
+    ticks = itertools.count()
+    # With a record a snapshot is now and then, without at every line.
+    every = 4.0 if "record" in kept else 0.0
+    before = Keeping(live, **files, every=every, clock=lambda: float(next(ticks)))
+    first = sent(before, LINES[:end])
+    if "record" in kept:  # the system closes the file of whom it ends
+        before._record.close()  # type: ignore[union-attr]
+        with (tmp_path / "record").open("ab") as file:
+            file.write(b'{"sensor": 1, "ti')
+    after = Keeping(live, **files)
+    again = resumed(after)
+    assert first[len(first) - len(again) :] == again
+    assert first + sent(after, LINES[end:]) == whole
+    after.close()
+    if "record" in kept:
+        assert (tmp_path / "record").read_bytes() == b"".join(one + b"\n" for one in LINES)
+    if "snapshot" in kept:
+        assert Keeping(live, snapshot=tmp_path / "snapshot").state.num_lines == len(LINES)
+
+
+def test_a_record_replays_to_the_same_bytes(tmp_path: Path, live: Live) -> None:
+    keeping = Keeping(live, record=tmp_path / "record")
+    splitter = LineSplitter(MOST_BYTES)
+    came = b"\r\n".join([*LINES[:5], b"", b"x" * (2 * MOST_BYTES), b"\xff\x00", *LINES[5:]])
+    first = sent(keeping, [*splitter.feed(came), *splitter.rest()])
+    keeping.close()
+    again = LineSplitter(MOST_BYTES)
+    assert answered(live, again.feed((tmp_path / "record").read_bytes())) == first
+    assert (tmp_path / "record").stat().st_size < 1.1 * MOST_BYTES
+
+
+def test_files_of_others_are_refused(tmp_path: Path, live: Live) -> None:
+    keeping = Keeping(live, of="this", snapshot=tmp_path / "a", record=tmp_path / "r")
+    sent(keeping, LINES[:4])
+    keeping.close()
+    with pytest.raises(InputError, match="expected a snapshot of the same sensors and options; got one of others"):
+        Keeping(live, of="that", snapshot=tmp_path / "a")
+    (tmp_path / "r").write_bytes(b"{}\n")
+    with pytest.raises(InputError, match="expected at least the 4 lines that the snapshot has taken; got 1"):
+        resumed(short := Keeping(live, of="this", snapshot=tmp_path / "a", record=tmp_path / "r"))
+    short.close()
+    (tmp_path / "a").write_bytes(b"PK")
+    with pytest.raises(InputError, match="expected a snapshot; it is damaged"):
+        Keeping(live, snapshot=tmp_path / "a")
+    with pytest.raises(InputError, match="expected a file that can be written"):
+        Keeping(live, record=tmp_path / "no" / "r")
+
+
+def test_a_snapshot_that_cannot_be_written_is_told_and_ends_nothing(tmp_path: Path, live: Live) -> None:
+    told = list[str]()
+    keeping = Keeping(live, snapshot=tmp_path / "no" / "a", every=0.0, tell=told.append)
+    assert sent(keeping, LINES[:3]) == answered(live, LINES[:3])
+    assert len(told) == 3
+    assert "expected a file that can be written" in told[0]

@@ -1,0 +1,240 @@
+"""Lines of scans in, lines of estimates and plans out: what LateScans says of the same scans, whatever else comes."""
+
+from __future__ import annotations
+
+import gc
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from live.examples import SYNCHRONOUS, answered, line, small, walk, write_live
+from vedette.errors import InputError
+from vedette.live import MOST_BYTES, Live, live_of
+from vedette.recorded import Conventions, Origin, Site, parse_scans
+from vedette.recorded.reports import read_table
+from vedette.scenarios.build import build_experiment
+from vedette.scenarios.of_recording import scenario_of_sensors
+from vedette.tracking import LateScans, SensorScan
+
+
+def test_the_estimates_are_those_of_the_same_scans_read_from_a_file(tmp_path: Path) -> None:
+    lines = write_live(tmp_path, seconds=60.0)
+    known = scenario_of_sensors(tmp_path / "radars.yaml")
+    model = known.scenario.model
+    experiment, origin = build_experiment(known.scenario), Origin(-1.1171, 50.7865)
+    sites = [Site(s.name or "", s.measurement.kind, s.pose) for s in model.sensors]
+    conventions = Conventions({"sensor": "radar", "bearing": "brg_deg"}, {}, "north")
+    recorded = parse_scans(read_table(tmp_path / "scans.csv"), sites, conventions, origin)
+    late = LateScans(experiment.tracker, experiment.poses)
+    timeline, wanted = late.initial(), []
+    first = float(experiment.times[0])
+    for time, scans, poses in zip(recorded.times.tolist(), recorded.scans, recorded.poses, strict=True):
+        for s, scan in enumerate(scans):
+            if scan is not None:
+                at = time + recorded.start - (recorded.start - first)
+                timeline, _ = late.take(timeline, [SensorScan(s, at, scan, poses[s])])
+                wanted.append(experiment.estimate(timeline.state.fused, timeline.state.step))
+    answers = [json.loads(answer) for answer in answered(live_of(known), lines)]
+    assert len(answers) == len(wanted) == len(lines)
+    for answer, estimate in zip(answers, wanted, strict=True):
+        tracks = answer["tracks"]
+        assert [track["label"] for track in tracks] == [f"{a}.{b}" for a, b in estimate.labels.tolist()]
+        assert [[t["x"], t["y"], t["vx"], t["vy"]] for t in tracks] == estimate.means.tolist()
+        stds = np.sqrt(np.diagonal(estimate.covs, axis1=1, axis2=2)).tolist()
+        assert [track["std"] for track in tracks] == stds
+        assert [track["existence"] for track in tracks] == estimate.existence.tolist()
+        degrees = [[track["lon"], track["lat"]] for track in tracks]
+        np.testing.assert_array_equal(np.reshape(degrees, (-1, 2)), origin.to_degrees(estimate.means[:, :2]))
+    assert len(answers[-1]["tracks"]) == 3
+    assert answers[0]["utc"] == "2016-01-12T13:02:24.184Z"
+    assert answers[-1]["time"] == pytest.approx(recorded.start + recorded.times[-1], abs=1e-6)
+
+
+def test_any_order_of_arrival_ends_in_the_same_tracks(tmp_path: Path) -> None:
+    live, lines = small(tmp_path), walk(12)
+    *_, last = map(json.loads, answered(live, lines))
+    for seed in range(3):
+        order = [0, *(1 + np.random.default_rng(seed).permutation(len(lines) - 1))]
+        *_, other = map(json.loads, answered(live, [lines[i] for i in order]))
+        assert other["tracks"] == last["tracks"] != []
+        assert (other["late"] > 0, other["dropped"]) == (True, 0)
+
+
+BAD: list[tuple[bytes, str]] = [
+    (b"{", "line 3: expected a JSON object; it is damaged"),
+    (b"\xff{}", "line 3: expected a JSON object; it is damaged"),
+    (b"[" * 100_000, "line 3: expected a JSON object; it is damaged: it is nested too deeply"),
+    (b"3", "line 3: expected a JSON object; got 3"),
+    (b" " * 3 + b"x" * MOST_BYTES, f"line 3: expected at most {MOST_BYTES} bytes"),
+    (b'{"sensor": 1, "sensor": 2}', "'sensor' stands there twice"),
+    (b'{"sensor": 1, "time": NaN, "measurements": []}', "NaN is no number"),
+    (b'{"sensor": 1, "time": 1e999, "measurements": []}', "too large a number"),
+    (b'{"sensor": 1, "time": 2}', "line 3, measurements: expected it in every line; got none"),
+    (line(1, 2.0, [], speed=3), "line 3: expected keys among sensor, time, measurements, pose; got 'speed'"),
+    (line("radar", 2.0), "line 3, sensor: expected one of 'sensor 1', 'sensor 2', or its number from 1; got 'radar'"),
+    (line(0, 2.0), "or its number from 1; got 0"),
+    (line(True, 2.0), "or its number from 1; got True"),
+    (line(1, None), "line 3, time: expected seconds, or a text in ISO 8601; got None"),
+    (line(1, "noon"), "line 3, row 1, column 'time': expected an ISO 8601 time; got 'noon'"),
+    (line(1, "2016-01-12T13:02:24Z"), "line 3, time: expected seconds, as before"),
+    (line(1, 1e13), "column 'time': expected a finite number of seconds"),
+    (line(1, 2.0, {"x": 1}), "line 3, measurements: expected a list of [x, y]"),
+    (line(1, 2.0, [[1.0, 2.0], [1.0]]), "line 3, measurements[1]: expected numbers [x, y]; got [1.0]"),
+    (line(1, 2.0, [[1.0, "2"]]), "line 3, measurements[0]: expected numbers [x, y]"),
+    (line(1, 2.0, [[1.0, None]]), "line 3, measurements[0]: expected numbers [x, y]"),
+    (line(1, 2.0, [[1.0, True]]), "line 3, measurements[0]: expected numbers [x, y]"),
+    (line(1, 2.0, [[1.0, 1e12]]), "line 3, row 1, column 'y': expected a number from -1e+09 to 1e+09"),
+    (line(1, 2.0, [[0.0, 0.0]] * 2001), "line 3, measurements: expected at most 2000 of a scan; got 2001"),
+    (line(1, 2.0, [], pose=[1.0, 2.0]), "line 3, pose: expected numbers [x, y, heading_rad], or lon and lat"),
+    (line(1, 2.0, [], pose=[0.0] * 4), "line 3, pose: expected numbers"),
+    (line(1, 2.0, [], pose=[0.0, 0.0, 90.0]), "column 'pose.heading_rad': expected a number from -6.28319"),
+    (line(1, 2.0, [], pose={"lat": 1.0}), "line 3, pose: expected lon, lat and, if it is known, heading_deg; got lat"),
+    (line(1, 2.0, [], pose={"lon": "a", "lat": 1}), "line 3, pose.lon: expected a number; got a"),
+    (line(1, 2.0, [], pose={"lon": 1, "lat": 1}), "line 3: expected an origin"),
+    (line(1, 2.0, [], pose={"lon": 1, "lat": 1, "heading_deg": 0}), "expected bearings: north"),
+    (line(1, 0.0, [[500.0, 500.0]]), "line 3: scan of sensor 0 at 0 s: expected one scan of a sensor at a time"),
+    (
+        line(1, 1e6),
+        "expected at most 60 s after the latest, or 3 scans in a row that agree (10 of one sensor); got 1e+06 s",
+    ),
+]
+
+
+@pytest.mark.parametrize(("bad", "words"), BAD, ids=range(len(BAD)))
+def test_a_bad_line_is_told_and_the_loop_goes_on_as_if_it_had_not_come(tmp_path: Path, bad: bytes, words: str) -> None:
+    live, lines = small(tmp_path), walk(1)
+    state = live.initial()
+    for one in lines:
+        state, _ = live.take(state, one)
+    after, (answer,) = live.take(state, bad)
+    assert words in answer["error"]
+    assert answer["error"].startswith("line 3")
+    assert (after.num_errors, after.num_lines, after.timeline) == (1, 3, state.timeline)
+    good = line(1, 1.0, [[4.0, 51.0]])
+    assert live.take(after, good)[1][0]["tracks"] == live.take(state, good)[1][0]["tracks"]
+
+
+def test_what_a_part_of_ones_own_raises_is_told(tmp_path: Path) -> None:
+    live = small(tmp_path)
+
+    def fails(density: Any, step: int) -> Any:
+        raise RuntimeError("no estimate today")
+
+    broken = Live(live.late, live.sites, fails, live.conventions)
+    state, (answer,) = broken.take(broken.initial(), line())
+    assert answer["error"].startswith("line 1: RuntimeError: no estimate today")
+    assert state.timeline.num_taken == 0
+
+
+def test_a_wrong_clock_is_not_believed_but_all_clocks_are(tmp_path: Path) -> None:
+    live = small(tmp_path, ahead=10.0)
+    lines = [line(1, 0.0), line(1, 500.0), line(1, 501.0), line(2, 1.0), line(1, 502.0), line(1, 503.0)]
+    answers = [json.loads(answer) for answer in answered(live, [*lines, line(1, 2.0), line(2, 3.0)])]
+    assert ["error" in answer for answer in answers] == [False, True, True, False, True, True, False, False]
+    assert [answer["time"] for answer in answers if "time" in answer] == [0.0, 1.0, 2.0, 3.0]
+    # After a silence of all, what several say is believed, and what one says again and again.
+    both = [line(1 + k % 2, 500.0 + k) for k in range(4)]
+    told = [json.loads(answer) for answer in answered(live, [line(1, 0.0), *both])]
+    assert [answer.get("time") for answer in told] == [0.0, None, None, 502.0, 503.0]
+    alone = [line(1, 500.0 + k) for k in range(11)]
+    told = [json.loads(answer) for answer in answered(live, [line(1, 0.0), *alone])]
+    assert [answer.get("time") for answer in told] == [0.0, *[None] * 9, 509.0, 510.0]
+    # Those who say another time each agree on nothing.
+    apart = [line(1 + k % 2, 500.0 + 100.0 * k) for k in range(12)]
+    assert sum("error" in json.loads(answer) for answer in answered(live, [line(1, 0.0), *apart])) == 12
+
+
+def test_plans_come_after_all_scans_of_their_time(tmp_path: Path) -> None:
+    live, lines = small(tmp_path, decide_every=5.0), walk(12)
+    answers = [json.loads(answer) for answer in answered(live, lines)]
+    plans = {answer["line"]: answer["plan"] for answer in answers if "plan" in answer}
+    assert {number: plan["time"] for number, plan in plans.items()} == {12: 5.0, 22: 10.0}
+    state = live.initial()
+    for one in lines[:12]:
+        state, _ = live.take(state, one)
+    assert live.planner is not None
+    belief = state.timeline.state
+    plan = live.planner.plan(belief, state.timeline.poses, rng=np.random.default_rng(0))
+    told = [action["heading_deg"] for action in plans[12]["actions"]]
+    assert told == [float(row[0]) for row in plan.chosen_actions]
+    assert plans[12]["expected_rewards"][0]["mean"] == plan.expected_rewards[0][0]
+    assert plans[12]["why"] == str(plan.explain())
+    assert [action["sensor"] for action in plans[12]["actions"]] == ["sensor 1", "sensor 2"]
+    # One sensor is silent: its scans are not waited for when another's are later.
+    alone = [json.loads(answer) for answer in answered(live, lines[::2])]
+    assert [answer["plan"]["time"] for answer in alone if "plan" in answer] == [6.0, 11.0]
+
+
+def test_the_decision_times_of_a_scenario_are_kept(tmp_path: Path) -> None:
+    text = SYNCHRONOUS + "time: {num_steps: 20, start: 0.0}\ncontrol: {decision_steps: [4, 8]}\n"
+    answers = [json.loads(answer) for answer in answered(small(tmp_path, text), walk(12))]
+    assert [answer["plan"]["time"] for answer in answers if "plan" in answer] == [3.0, 7.0]
+    still = [json.loads(answer) for answer in answered(small(tmp_path, text, planner="still"), walk(12))]
+    assert not any("plan" in answer for answer in still)
+
+
+def test_a_plan_that_cannot_be_made_costs_no_scan(tmp_path: Path) -> None:
+    live = small(tmp_path, decide_every=5.0)
+
+    class Fails:
+        name = "fails"
+
+        def plan(self, *_: Any, **__: Any) -> Any:
+            raise RuntimeError("no idea")
+
+    broken = Live(live.late, live.sites, live.estimate, live.conventions, planner=Fails(), decide_every=5.0)  # type: ignore[arg-type]
+    answers = [json.loads(answer) for answer in answered(broken, walk(8))]
+    (error,) = (answer["error"] for answer in answers if "error" in answer)
+    assert error.startswith("line 12, plan at 5 s: RuntimeError: no idea (test_loop.py, line ")
+    assert sum("tracks" in answer for answer in answers) == 16
+
+
+def test_units_and_bearings_are_those_of_the_file(tmp_path: Path) -> None:
+    polar = SYNCHRONOUS.replace("kind: position", "kind: bearing_range")
+    noise = polar.replace("std: [10.0, 10.0]", "std: [0.01, 10.0]")
+    plain = small(tmp_path, noise)
+    compass = small(tmp_path, noise + "recording: {bearings: north, units: {bearing: deg, range: km}}\n")
+    for k in range(3):
+        east = [line(1, float(k), [[0.25 * np.pi, 500.0]], pose=[1.0, 2.0, 0.5])]
+        north = [line(1, float(k), [[45.0, 0.5]], pose=[1.0, 2.0, 0.5 * np.pi - 0.5])]
+        one, other = (
+            live.take(live.initial(), lines[0])[0].timeline for live, lines in ((plain, east), (compass, north))
+        )
+        for timelines in (one, other):
+            np.testing.assert_allclose(timelines.instants[0].scans[0].measurements, [[0.25 * np.pi, 500.0]], rtol=1e-12)
+            np.testing.assert_allclose(timelines.poses[0], [1.0, 2.0, 0.5], rtol=1e-12)
+
+
+@pytest.mark.parametrize("num", [2_000, pytest.param(10_000, marks=pytest.mark.slow)])
+def test_many_scans_leave_no_more_behind_than_a_few(tmp_path: Path, num: int) -> None:
+    live = small(tmp_path, window=5.0)
+    state, counts = live.initial(), []
+    for k in range(num):
+        state, _ = live.take(state, line(1 + k % 2, 0.5 * k, [[0.0, 50.0]] if k % 3 else []))
+        if k in (999, num - 1):
+            gc.collect()
+            counts.append((len(gc.get_objects()), len(state.timeline.instants)))
+    assert counts[1][1] == counts[0][1] == 11
+    assert abs(counts[1][0] - counts[0][0]) < 200
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("sensors: []\n", "expected a region, as no scan has yet said where targets may be"),
+        ("- 1\n", "expected a mapping with `sensors`"),
+        ("recording: {bearings: up}\nregion: 1\n", "bearings: expected east or north; got up"),
+        ("recording: {units: {range: mile}}\nregion: 1\n", "units.range: expected one of m, km, nmi; got mile"),
+    ],
+)
+def test_a_file_that_cannot_serve_is_told(tmp_path: Path, text: str, words: str) -> None:
+    with pytest.raises(InputError, match=words.replace("(", r"\(")):
+        small(tmp_path, text)
+
+
+def test_who_knows_the_targets_does_not_decide(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="expected one that does not know the targets; got oracle"):
+        small(tmp_path, decide_every=5.0, planner="oracle")

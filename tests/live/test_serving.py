@@ -1,0 +1,151 @@
+"""Lines out of bytes, and clients that nobody can keep from their answers."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections.abc import Awaitable, Callable
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from vedette.errors import InputError
+from vedette.live import LineSplitter, Server, serving
+
+
+@given(st.lists(st.binary(max_size=12).map(lambda b: b.replace(b"\n", b"x")), max_size=8), st.data())
+def test_lines_do_not_depend_on_how_bytes_come(lines: list[bytes], data: st.DataObject) -> None:
+    whole = b"\n".join(lines)
+    splitter, found, place = LineSplitter(5), list[bytes](), 0
+    while place < len(whole):
+        size = data.draw(st.integers(1, 7))
+        found += splitter.feed(whole[place : place + size])
+        place += size
+    found += splitter.rest()
+    assert found == [cut for one in lines if (cut := one[:6].strip())]
+
+
+class Client:
+    def __init__(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        self.reader, self.writer = reader, writer
+
+    async def send(self, text: bytes) -> None:
+        self.writer.write(text)
+        await self.writer.drain()
+
+    async def answer(self) -> Any:
+        line = await self.reader.readline()
+        return json.loads(line) if line else None
+
+    async def hears(self, wanted: dict[str, str]) -> None:
+        """Waits for an answer; there may be others before it."""
+        while (came := await self.answer()) != wanted:
+            assert came is not None
+
+
+def take(line: bytes) -> tuple[dict[str, Any], ...]:
+    return ({"error": "bad"},) if line == b"bad" else ({"line": line.decode()},)
+
+
+def served(scene: Callable[[Callable[[], Awaitable[Client]]], Awaitable[None]], token: str | None = None) -> list[str]:
+    """What was told in a scene of clients of one server."""
+    told, came = list[str](), list[Client]()
+
+    async def play() -> None:
+        server = await Server(take, token, told.append).listen("127.0.0.1", 0)
+
+        async def client() -> Client:
+            came.append(Client(*await asyncio.open_connection(*server.sockets[0].getsockname()[:2])))
+            return came[-1]
+
+        async with server:
+            await scene(client)
+            for each in came:
+                each.writer.transport.abort()
+            while len(asyncio.all_tasks()) > 1:
+                await asyncio.sleep(0.0)
+
+    asyncio.run(play())
+    return told
+
+
+def test_answers_go_to_all_and_errors_to_who_caused_them() -> None:
+    async def scene(client: Callable[[], Awaitable[Client]]) -> None:
+        one, other = await client(), await client()
+        await other.send(b"here\n")
+        assert await other.answer() == {"line": "here"}
+        await one.send(b"bad\nwo")
+        await one.hears({"error": "bad"})
+        await one.send(b"rd\n")
+        assert await one.answer() == {"line": "word"}
+        assert await other.answer() == {"line": "word"}
+        one.writer.write(b"last, without an end")
+        one.writer.write_eof()
+        assert await other.answer() == {"line": "last, without an end"}
+        other.writer.transport.abort()  # one that is gone is nobody's trouble
+        third = await client()
+        await third.send(b"on\n")
+        assert await third.answer() == {"line": "on"}
+
+    assert served(scene) == []
+
+
+@pytest.mark.parametrize(
+    "first",
+    [b'{"token": "guess"}\n', b'{"token": 3}\n', b"secret\n", b"[]\n", b'{"token": ', b"x" * 200_000, b"\xff\n"],
+    ids=range(7),
+)
+def test_without_the_token_nobody_enters(first: bytes) -> None:
+    async def scene(client: Callable[[], Awaitable[Client]]) -> None:
+        known, stranger = await client(), await client()
+        await known.send(b'{"token": "secret"}\nword\n')
+        assert await known.answer() == {"line": "word"}
+        stranger.writer.write(first)
+        stranger.writer.write_eof()
+        try:
+            assert "token" in (await stranger.answer())["error"]
+            assert await stranger.answer() is None
+        except ConnectionError:  # put out with bytes of its own unread
+            pass
+        await known.send(b"again\n")
+        assert await known.answer() == {"line": "again"}
+
+    assert ["had no token" in text for text in served(scene, "secret")] == [True]
+
+
+def test_one_client_too_many_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(serving, "MOST_CLIENTS", 1)
+
+    async def scene(client: Callable[[], Awaitable[Client]]) -> None:
+        one = await client()
+        await one.send(b"a\n")
+        await one.answer()
+        assert await (await client()).answer() == {"error": "expected at most 1 clients; got one more"}
+
+    served(scene)
+
+
+def test_who_does_not_read_is_put_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(serving, "MOST_UNREAD", 100_000)
+
+    async def scene(client: Callable[[], Awaitable[Client]]) -> None:
+        deaf, one = await client(), await client()
+        await deaf.send(b"a\n")
+        deaf.reader._transport.pause_reading()  # type: ignore[attr-defined]
+        word = b"w" * 50_000
+        for _ in range(1000):
+            await one.send(word + b"\n")
+            while (await one.answer())["line"] == "a":
+                pass
+
+    assert any("does not read its answers, and was put out" in text for text in served(scene))
+
+
+@pytest.mark.parametrize(("host", "token"), [("0.0.0.0", None), ("::", None), ("no.such.host.invalid", "secret")])
+def test_only_a_token_opens_it_to_others(host: str, token: str | None) -> None:
+    with pytest.raises(InputError, match="--listen: expected a"):
+        serving.check_address(host, token)
+    serving.check_address("127.0.0.1", None)
+    serving.check_address("0.0.0.0", "secret")
