@@ -2,10 +2,12 @@
 
 from vedette.recorded.cleaning import Cleaning, CleaningCounts, RecordedTrack
 from vedette.recorded.geography import Origin
-from vedette.recorded.scans import Conventions, RecordedScans, Site, parse_scans
+from vedette.recorded.instants import Bias, RecordedScans, Site, without_biases
+from vedette.recorded.scans import Conventions, parse_scans
 from vedette.recorded.targets import RecordedTargets
 
 __all__ = [
+    "Bias",
     "Cleaning",
     "CleaningCounts",
     "Conventions",
@@ -15,4 +17,5 @@ __all__ = [
     "RecordedTrack",
     "Site",
     "parse_scans",
+    "without_biases",
 ]
