@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from vedette.calibration.maximum import Maximum, covariance, maximise
 from vedette.calibration.parameters import Parameter, Problem
-from vedette.calibration.registration import BIASES, Pairs, matched, register
+from vedette.calibration.registration import BIASES, Pairs, linked, matched, register
 from vedette.kernels.base.types import Floats, Ints
 from vedette.recorded.instants import COMPONENTS
 
 _FAR = {"range": 300.0, "bearing": math.radians(3.0), "x": 300.0, "y": 300.0}  # of measurements, biases in them
 _NEARER = 3.0  # times the noise that was found, in the second round
 _QUANTILE = 1.959964  # of the normal distribution, 97.5 %
+_COMPARED = ("clock", "x", "y")  # with those of the first sensor
 _PART = 0.1  # of a parameter that lies where nothing is known: it cannot be found
 
 
@@ -63,11 +64,12 @@ def calibrate(problem: Problem, watch: Callable[[], None] = lambda: None) -> Cal
     said = problem.free([each.start for each in problem.parameters])
     unknown = np.array([each.unknown for each in problem.parameters])
     before = float(terms(said).sum())
-    start = _guess(problem, said, watch)
+    start, pairs = _guess(problem, said, watch)
     if not float(terms(start).sum()) > before:
         start = said
     maximum = maximise(terms, start, unknown, _blocks(problem.parameters))
-    return Calibration(_judged(problem, maximum, unknown), maximum.log_likelihood, before, maximum.converged)
+    apart = np.flatnonzero(~linked(pairs, len(problem.sites))).tolist()
+    return Calibration(_judged(problem, maximum, unknown, apart), maximum.log_likelihood, before, maximum.converged)
 
 
 def _blocks(parameters: tuple[Parameter, ...]) -> list[list[int]]:
@@ -81,8 +83,11 @@ def _blocks(parameters: tuple[Parameter, ...]) -> list[list[int]]:
     return blocks
 
 
-def _guess(problem: Problem, said: Floats, watch: Callable[[], None]) -> Floats:
-    """A first guess: tracks by noise as wide as biases may be, then by narrower noise, and what fits them."""
+def _guess(problem: Problem, said: Floats, watch: Callable[[], None]) -> tuple[Floats, Pairs]:
+    """A first guess, and what it was made from.
+
+    Tracks by noise as wide as biases may be, then by narrower noise, and what fits them.
+    """
     values, sites = problem.values(said), problem.sites
     far = np.array([[_FAR[name] for name in (*COMPONENTS[site.kind], *COMPONENTS[site.kind])[:2]] for site in sites])
     sensors = np.arange(len(sites))
@@ -102,7 +107,7 @@ def _guess(problem: Problem, said: Floats, watch: Callable[[], None]) -> Floats:
             values[i] += problem.parameters[i].per_si * found.biases[at]
         stds = np.minimum(stds, _NEARER * found.stds)
     values = _with_noise(problem, values, found.stds)
-    return problem.free(_with_counts(problem, values, pairs, sensors).tolist())
+    return problem.free(_with_counts(problem, values, pairs, sensors).tolist()), pairs
 
 
 def _period(problem: Problem) -> float:
@@ -134,14 +139,16 @@ def _with_counts(problem: Problem, values: Floats, pairs: Pairs, sensors: Ints) 
     return values
 
 
-def _judged(problem: Problem, maximum: Maximum, unknown: Floats) -> tuple[Found, ...]:
-    """Each parameter with its interval, or why it cannot be found."""
+def _judged(problem: Problem, maximum: Maximum, unknown: Floats, apart: Sequence[int]) -> tuple[Found, ...]:
+    """Each parameter with its interval, or why it cannot be found; apart: sensors without targets that others see."""
     cov, lost = covariance(maximum.information, unknown)
     found = []
     for i, (each, free) in enumerate(zip(problem.parameters, maximum.at.tolist(), strict=True)):
-        if lost[i, i] > _PART:
-            partners = [j for j in np.flatnonzero(np.abs(lost[i]) > _PART).tolist() if j != i]
-            found.append(Found(each, each.start, math.nan, math.nan, _why(problem, i, partners)))
+        partners = [j for j in np.flatnonzero(np.abs(lost[i]) > _PART).tolist() if j != i]
+        compared = each.sensor in apart and each.component in _COMPARED
+        if compared or lost[i, i] > _PART:
+            why = _why(problem, i, [] if compared else partners)
+            found.append(Found(each, each.start, math.nan, math.nan, why))
             continue
         reach = _QUANTILE * math.sqrt(cov[i, i])
         value, low, high = (each.from_free(x) for x in (free, free - reach, free + reach))

@@ -15,6 +15,7 @@ from vedette.kernels.base.types import Bools, Floats
 
 Terms = Callable[[Floats], Floats]  # the terms of the log likelihood, of all parameters on their scales
 _ENOUGH = 0.05  # of log likelihood that a further step promises
+_JUMPS = 0.5  # the same, where no step goes up: the terms may jump by so much
 _MOST_STEPS = 15
 _SHARES = (1.0, 0.5, 0.25, 0.1)  # of a step
 _STEP = 0.5  # of differences, in conditional standard deviations
@@ -53,10 +54,12 @@ def maximise(terms: Terms, start: Floats, unknown: Floats, blocks: Sequence[Sequ
         slope, products = scores.sum(axis=0), scores.T @ scores
         steps = _STEP / np.sqrt(np.diag(products) + unknown**-2.0)
         way = np.linalg.solve(products + np.diag(unknown**-2.0), slope)
-        if converged := bool(0.5 * slope @ way < _ENOUGH):
+        promised = float(0.5 * slope @ way)
+        if converged := promised < _ENOUGH:
             break
         at, found = _best(terms, at, way, highest)
         if found <= highest:
+            converged = promised < _JUMPS
             break
         highest = found
     slope, information = _second(terms, at, highest, 2.0 * steps, blocks)
@@ -106,12 +109,19 @@ def _refined(terms: Terms, at: Floats, highest: float, information: Floats, unkn
 
 
 def _best(terms: Terms, at: Floats, way: Floats, highest: float) -> tuple[Floats, float]:
-    """Where a share of a step leads that goes up; where none does, nowhere."""
+    """Where a share of a step leads that goes up, or several of them; where none does, nowhere.
+
+    Far from the maximum outer products make steps that are too short.
+    """
     for share in _SHARES:
         found = float(terms(at + share * way).sum())
         if found > highest:
-            return at + share * way, found
-    return at, highest
+            break
+    else:
+        return at, highest
+    while share >= 1.0 and (further := float(terms(at + 2.0 * share * way).sum())) > found:
+        share, found = 2.0 * share, further
+    return at + share * way, found
 
 
 def _scores(terms: Terms, at: Floats, steps: Floats) -> Floats:

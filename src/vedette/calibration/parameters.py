@@ -15,6 +15,7 @@ from vedette.recorded.instants import Bearings
 from vedette.tracking import Tracker
 
 Kind = Literal["bias", "noise", "detection", "clutter"]
+_AT_ONCE = 1e-6  # s; scans nearer than this are of one instant
 Scale = Literal["plain", "log", "logit"]
 
 
@@ -109,9 +110,16 @@ class Problem:
         counts = [sum(scans[s] is not None for scans in self.recording.scans) for s in range(len(self.sites))]
         places = np.concatenate([[0], np.cumsum(counts)])
         found, state = np.zeros(places[-1]), tracker.initial()
-        for time, scans, poses in zip(recording.times.tolist(), recording.scans, recording.poses, strict=True):
+        birth = tracker.targets.birth
+        at_once = birth.from_measurements is not None and birth.num_sites == 0 and birth.period is None
+        gaps = np.diff(recording.times, append=recording.times[-1]).tolist()
+        instants = zip(recording.times.tolist(), gaps, recording.scans, recording.poses, strict=True)
+        for time, gap, scans, poses in instants:
             state, info = tracker.step(state, list(scans), poses, time, rngs=rngs)
             scanning = [s for s, scan in enumerate(scans) if scan is not None]
             found[places[scanning[0]]] = sum(each.log_likelihood for each in info.filters) + more[scanning].sum()
             places[scanning] += 1
+            if at_once and gap > _AT_ONCE:
+                # When another sensor happens to scan next must not decide where those begin who are born here.
+                state, _ = tracker.step(state, [None] * len(scans), poses, math.nextafter(time, math.inf), rngs=rngs)
         return found

@@ -26,6 +26,7 @@ _HUBER = 1.5
 _ROUNDS = 10
 _SCANS_A_PIECE = 5  # of the slowest sensor
 _LEAST_PAIRS = 4  # of a piece
+_LEAST_SEEN = 3  # measurements of a target, by which a sensor has it in common with others
 _MAD = 1.4826  # standard deviation of normal numbers over the median of their sizes
 _POSITION, _SPEED = 1e4, 30.0  # m, m/s: what holds a piece of which measurements say too little
 
@@ -118,6 +119,17 @@ def _wrapped(gaps: Floats, kind: str) -> Floats:
     if COMPONENTS[kind][0] == "bearing":
         gaps[..., 0] = np.remainder(gaps[..., 0] + math.pi, 2.0 * math.pi) - math.pi
     return gaps
+
+
+def linked(pairs: Pairs, num_sensors: int) -> Bools:
+    """(num_sensors,) which sensors have targets in common with the first, or with others that have."""
+    counts = np.zeros((num_sensors, pairs.tracks.max(initial=-1) + 1), np.int64)
+    np.add.at(counts, (pairs.sensors, pairs.tracks), 1)
+    seen: Bools = counts >= _LEAST_SEEN
+    reached: Bools = np.arange(num_sensors) == 0
+    for _ in range(num_sensors):
+        reached = np.logical_or(reached, seen[:, seen[reached].any(axis=0)].any(axis=1))
+    return reached
 
 
 class Registration(NamedTuple):

@@ -28,7 +28,7 @@ _LIMITS = Limits(min_existence=1e-3)
 _DEGREE = 180.0 / math.pi
 # A standard deviation from which on nothing is known: of biases; of logarithms, of log-odds.
 _UNKNOWN = {"range": 1000.0, "bearing": 10.0, "clock": 5.0, "x": 1000.0, "y": 1000.0}
-_UNKNOWN_LOG, _UNKNOWN_ODDS = 1.0, 2.0
+_UNKNOWN_LOG, _UNKNOWN_ODDS = 1.0, 4.0
 _WIDER = 3.0  # times the region, along each axis: what is turned or shifted stays in it
 _LEAST_RATE, _SUREST = 0.01, 0.98  # to start from
 
