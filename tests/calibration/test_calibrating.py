@@ -190,8 +190,8 @@ def test_radars_without_common_targets_are_named(tmp_path: Path) -> None:
     )
     problem = problem_of(scenario_of_recording(tmp_path / "radars.yaml", tmp_path / "scans.csv").scenario)
     why = {(each.parameter.sensor, each.parameter.name): each.why for each in calibrate(problem).found}
-    for name in ((0, "bearing_deg"), (1, "bearing_deg"), (1, "clock")):
-        assert "no other sensor sees enough of the same targets" in why[name]
+    for one in ((0, "bearing_deg"), (1, "bearing_deg"), (1, "clock")):
+        assert "no other sensor sees enough of the same targets" in why[one]
     assert "rotation" in why[0, "bearing_deg"]
     assert "shift in time" in why[1, "clock"]
     assert why[0, "noise.std.1"] == ""
