@@ -164,7 +164,7 @@ def table(redraws: list[Redraw]) -> Iterator[str]:
     found, true, told = scores.mean(axis=0)
     share = scores[:, 0] / scores[:, 1] - 1.0
     yield f"Intervals that cover the truth: {total[0]} of {total[1]}, {total[0] / total[1]:.1%}."
-    yield f"OSPA, m: {found:.2f} with what was found, {true:.2f} with the truth, {told:.2f} with what was told; "
+    yield f"OSPA, m: {found:.2f} with what was found, {true:.2f} with the truth, {told:.2f} with what was told;"
     yield f"with what was found {share.mean():+.1%} against the truth, {share.min():+.1%} to {share.max():+.1%}."
     seconds, passes = np.mean([(each.seconds, each.passes) for each in redraws], axis=0)
     yield f"CPU time: {seconds:.0f} s a recording, {passes:.0f} passes of the filter."

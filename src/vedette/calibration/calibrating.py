@@ -11,7 +11,7 @@ import numpy as np
 from vedette.calibration.maximum import Maximum, covariance, maximise
 from vedette.calibration.parameters import Parameter, Problem
 from vedette.calibration.registration import BIASES, Pairs, linked, matched, register
-from vedette.kernels.base.types import Floats, Ints
+from vedette.kernels.base.types import Floats
 from vedette.recorded.instants import COMPONENTS
 
 _FAR = {"range": 300.0, "bearing": math.radians(3.0), "x": 300.0, "y": 300.0}  # of measurements, biases in them
@@ -90,7 +90,6 @@ def _guess(problem: Problem, said: Floats, watch: Callable[[], None]) -> tuple[F
     """
     values, sites = problem.values(said), problem.sites
     far = np.array([[_FAR[name] for name in (*COMPONENTS[site.kind], *COMPONENTS[site.kind])[:2]] for site in sites])
-    sensors = np.arange(len(sites))
     asked, unknown = np.zeros((len(sites), len(BIASES)), bool), np.ones((len(sites), len(BIASES)))
     places = {}
     for i, each in enumerate(problem.parameters):
@@ -107,7 +106,7 @@ def _guess(problem: Problem, said: Floats, watch: Callable[[], None]) -> tuple[F
             values[i] += problem.parameters[i].per_si * found.biases[at]
         stds = np.minimum(stds, _NEARER * found.stds)
     values = _with_noise(problem, values, found.stds)
-    return problem.free(_with_counts(problem, values, pairs, sensors).tolist()), pairs
+    return problem.free(_with_counts(problem, values, pairs).tolist()), pairs
 
 
 def _period(problem: Problem) -> float:
@@ -127,9 +126,9 @@ def _with_noise(problem: Problem, values: Floats, stds: Floats) -> Floats:
     return values
 
 
-def _with_counts(problem: Problem, values: Floats, pairs: Pairs, sensors: Ints) -> Floats:
+def _with_counts(problem: Problem, values: Floats, pairs: Pairs) -> Floats:
     """The values with probabilities of detection and clutter as tracks and measurements were matched."""
-    values, hits = values.copy(), np.bincount(pairs.sensors, minlength=len(sensors))
+    values, hits = values.copy(), np.bincount(pairs.sensors, minlength=len(problem.sites))
     for i, each in enumerate(problem.parameters):
         s = each.sensor
         if each.kind == "detection" and hits[s]:

@@ -38,8 +38,8 @@ def problem_of(scenario: Scenario, *, position: bool = False) -> Problem:
 
     Biases of range, bearing and clock, noise, probability of detection and rate of clutter: what each sensor has of
     these. The clock of the first sensor is what those of the others are compared with; where places are asked for, its
-    place and bearing are, too. The likelihood is that of an LMB filter
-    that takes the scans in turn, with the motion, survival and births of the scenario.
+    place and bearing are, too. The likelihood is that of an LMB filter that takes the scans in turn, with the motion,
+    survival and births of the scenario.
 
     Args:
         scenario: as of `vedette.scenarios.of_recording`.
