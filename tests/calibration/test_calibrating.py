@@ -197,6 +197,31 @@ def test_radars_without_common_targets_are_named(tmp_path: Path) -> None:
     assert why[0, "noise.std.1"] == ""
 
 
+def test_positions_are_compared_with_those_of_the_first_sensor(tmp_path: Path) -> None:
+    rng, rows, bias = np.random.default_rng(0), list[list[object]](), np.array([200.0, -100.0])
+    states = rng.uniform(-2000.0, 2000.0, (4, 4)) * [1.0, 1.0, 0.002, 0.002]
+    for name, period in (("a", 4.0), ("b", 5.0)):
+        for time in np.arange(1.0, 80.0, period).tolist():
+            for state in states:
+                place = state[:2] + time * state[2:] + (name == "b") * bias + rng.normal(0.0, 15.0, 2)
+                rows.append([time, name, *place.tolist()])
+    with (tmp_path / "scans.csv").open("w", newline="") as file:
+        csv.writer(file).writerows([["time", "sensor", "x", "y"], *rows])
+    (tmp_path / "sensors.yaml").write_text(
+        "sensor_defaults:\n  measurement: {kind: position}\n  noise: {kind: constant, std: [20.0, 20.0]}\n"
+        "  detection: {kind: constant, probability: 0.9}\n"
+        "sensors:\n  - {name: a, position: [0, 0]}\n  - {name: b, position: [3000, 0]}\n" + MOTION,
+        "utf-8",
+    )
+    problem = problem_of(scenario_of_recording(tmp_path / "sensors.yaml", tmp_path / "scans.csv").scenario)
+    found = {(each.parameter.sensor, each.parameter.name): each for each in calibrate(problem).found}
+    assert (0, "x") not in found
+    for name, truth in (("x", 200.0), ("y", -100.0)):
+        one = found[1, name]
+        assert abs(one.value - truth) < 0.8 * (one.high - one.low)
+        assert one.high - one.low < 40.0
+
+
 def test_places_are_asked_of_the_others_alone(tmp_path: Path) -> None:
     scenario = recorded(tmp_path, 30.0).scenario
     plain, asked = (

@@ -111,8 +111,9 @@ def _print(rows: list[dict[str, Any]], calibration: Calibration, position: bool)
     others = {row["parameter"] for row in rows if row["sensor"] != rows[0]["sensor"]}
     if "clock" in others:
         say("clocks are against that of the first sensor, as a shift of all times changes nothing")
-    if position and "x" in others:
-        say("places and bearings are against those of the first sensor, as a shift or turn of all changes nothing")
+    if "x" in others - {row["parameter"] for row in rows if row["sensor"] == rows[0]["sensor"]}:
+        what = "places and bearings" if position else "positions"
+        say(f"{what} are against those of the first sensor, as a shift or turn of all changes nothing")
     if not calibration.converged:
         note("the search did not come to an end: what was found may not be the maximum")
     say(f"log likelihood {calibration.before:.1f} as said, {calibration.log_likelihood:.1f} as found")

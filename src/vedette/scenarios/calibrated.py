@@ -37,9 +37,9 @@ def problem_of(scenario: Scenario, *, position: bool = False) -> Problem:
     """The sensors of a recording as parameters to be found.
 
     Biases of range, bearing and clock, noise, probability of detection and rate of clutter: what each sensor has of
-    these. The clock of the first sensor is what those of the others are compared with; where places are asked for, its
-    place and bearing are, too. The likelihood is that of an LMB filter that takes the scans in turn, with the motion,
-    survival and births of the scenario.
+    these. The clock of the first sensor is what those of the others are compared with; of sensors that all measure
+    positions, what it measures is; where places are asked for, its place and bearing are. The likelihood is that of an
+    LMB filter that takes the scans in turn, with the motion, survival and births of the scenario.
 
     Args:
         scenario: as of `vedette.scenarios.of_recording`.
@@ -50,10 +50,11 @@ def problem_of(scenario: Scenario, *, position: bool = False) -> Problem:
     recording = model.recording.model_copy(update={"biases": {}}).build(model, folder)
     sites, section = tuple(sites_of(model)), model.recording
     said = [section.biases[site.name].build() if site.name in section.biases else Bias() for site in sites]
-    parameters = list[Parameter]()
+    parameters, only_positions = list[Parameter](), all(site.kind == "position" for site in sites)
     for s, sensor in enumerate(model.sensors):
         if any(scans[s] is not None for scans in recording.scans):
-            parameters += _biases(s, sensor, said[s], section.bearings == "north", position)
+            clockwise = section.bearings == "north"
+            parameters += _biases(s, sensor, said[s], clockwise, position, only_positions)
             parameters += _of_models(s, sensor)
     targets = shared_targets([sensor.filter for sensor in build_sensors(scenario)])
     region, method = model.region.build(), model.filter.gaussian_method
@@ -85,12 +86,16 @@ def _widened(region: Region) -> Region:
     return Region(*sides)
 
 
-def _biases(s: int, sensor: Sensor, said: Bias, clockwise: bool, position: bool) -> Iterator[Parameter]:
+def _biases(
+    s: int, sensor: Sensor, said: Bias, clockwise: bool, position: bool, only_positions: bool
+) -> Iterator[Parameter]:
     """Of what a sensor measures, of its clock, and where asked of its place."""
     components = COMPONENTS[sensor.measurement.kind]
     asked = [*components]
     if s > 0:  # a shift in time of all changes nothing, nor does one in space, nor a turn
         asked += ["clock", *(("x", "y") if position and "x" not in components else ())]
+    elif only_positions:
+        asked = []
     elif position and "bearing" in components:
         asked.remove("bearing")
     for name in asked:
