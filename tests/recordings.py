@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import datetime
 import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -28,10 +29,20 @@ sensors:
 """
 
 
-def write_recording(folder: Path, *, seconds: float = 120.0, seed: int = 0) -> None:
-    """scans.csv, truth.csv and radars.yaml: ISO times, nautical miles, compass bearings, the boat's own places."""
+def write_recording(
+    folder: Path,
+    *,
+    seconds: float = 120.0,
+    seed: int = 0,
+    biases: Mapping[str, tuple[float, float, float]] | None = None,
+) -> None:
+    """scans.csv, truth.csv and radars.yaml: ISO times, nautical miles, compass bearings, the boat's own places.
+
+    biases: of a radar in range, m, bearing, deg clockwise, and clock, s.
+    """
     rng, rows = np.random.default_rng(seed), list[list[Any]]()
     for name, (place, period) in RADARS.items():
+        far, turned, ahead = (biases or {}).get(name, (0.0, 0.0, 0.0))
         for time in np.arange(rng.uniform(0.0, period), seconds, period).tolist():
             own = np.array(place) + (np.array([-4.0, 2.0]) * time if name == "boat" else 0.0)
             seen = SHIPS[rng.random(len(SHIPS)) < 0.95]
@@ -44,9 +55,10 @@ def write_recording(folder: Path, *, seconds: float = 120.0, seed: int = 0) -> N
             lon, lat = ORIGIN.to_degrees([own])[0].tolist()
             told = (lon, lat)
             found = [
-                [f"{r / 1852.0:.6f}", f"{math.degrees(b) % 360.0:.4f}"] for r, b in zip(ranges, bearings, strict=True)
+                [f"{max(r + far, 0.0) / 1852.0:.6f}", f"{(math.degrees(b) + turned) % 360.0:.4f}"]
+                for r, b in zip(ranges, bearings, strict=True)
             ]
-            rows += [[_iso(time), name, *one, *told] for one in found or [["", ""]]]
+            rows += [[_iso(time + ahead), name, *one, *told] for one in found or [["", ""]]]
     rows.sort(key=lambda row: row[0])
     _write(folder / "scans.csv", ["time", "radar", "range_nmi", "brg_deg", "own_lon", "own_lat"], rows)
     rows = []

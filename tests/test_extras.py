@@ -15,6 +15,7 @@ from pathlib import Path
 import pytest
 import typer
 
+from recordings import write_recording
 from vedette.cli import app
 from vedette.extras import EXTRA_OF
 
@@ -55,6 +56,7 @@ LIGHT = [
     ["schema"],
     ["run", "linear-10", "--planner", "still"],
     ["live", "--sensors", "bay.yaml"],
+    ["calibrate", "scans.csv", "--sensors", "radars.yaml"],
 ]
 HEAVY = {
     ("show", "linear-10", "--out", "picture.png"): ("matplotlib", "report"),
@@ -134,6 +136,7 @@ def test_a_tracking_loop_with_a_plan_needs_no_extra(tmp_path: Path) -> None:
 
 
 def test_light_commands_need_no_extra(tmp_path: Path) -> None:
+    write_recording(tmp_path, seconds=20.0)
     for command, (status, _, error, exception) in zip(LIGHT, outcomes(LIGHT, tmp_path), strict=True):
         assert (status, exception) == (0, "None"), f"{command}: {error}"
 

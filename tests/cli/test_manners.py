@@ -56,6 +56,10 @@ CALLS: list[tuple[tuple[str, ...], set[str]]] = [
     (("results", "run"), {"decisions", "ospa", "written"}),
     (("track", "scans.csv", "--sensors", "radars.yaml", "--out", "tracked"), {"ospa", "assumed", "skipped", "folder"}),
     (("live", "--sensors", "short.yaml"), {"lines", "errors", "scans", "dropped"}),
+    (
+        ("calibrate", "scans.csv", "--sensors", "radars.yaml", "--out", "found.yaml"),
+        {"found", "log_likelihood", "written"},
+    ),
     (("campaign", "spec.toml", "--dry-run"), {"cells", "compared", "warnings"}),
     (("campaign", "spec.toml", "--workers", "1"), {"folder", "finished", "failed"}),
     (("results", "trial-results", "--export", "tables"), {"comparisons", "missing", "written"}),
@@ -82,7 +86,7 @@ def test_json_is_one_document_and_quiet_is_silence(place: Path) -> None:
             assert Path(path).exists()
     for words in LISTS:
         assert json.loads(call(*words, "--json").stdout)
-    again = {"init", "generate", "crowd", "run", "track"}
+    again = {"init", "generate", "crowd", "run", "track", "calibrate"}
     for words, _ in CALLS:
         replaced = ("--overwrite",) if words[0] in again else ()
         result = call(*words, *replaced, "--quiet")

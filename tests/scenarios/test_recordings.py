@@ -14,7 +14,7 @@ from recordings import ORIGIN, RADARS, SHIPS, write_recording
 from vedette.errors import InputError, ScenarioError
 from vedette.evaluation.runs import run_scenario
 from vedette.evaluation.track_table import table_of_run, write_tracks
-from vedette.recorded import Conventions, Origin, RecordedScans, Site, parse_scans, table_of
+from vedette.recorded import Bias, Conventions, Origin, RecordedScans, Site, parse_scans, table_of
 from vedette.recorded.reports import Table
 from vedette.scenarios import load_scenario
 from vedette.scenarios.dumping import dump_scenario
@@ -315,3 +315,32 @@ def test_tracks_are_written_as_others_read_them(folder: Path) -> None:
         write_tracks(folder / "tracks.txt", columns)
     with pytest.raises(InputError, match="expected tracks in longitude and latitude"):
         write_tracks(folder / "t.geojson", {name: cells for name, cells in columns.items() if name != "lon_deg"})
+
+
+@pytest.mark.parametrize(("bearings", "turn"), [("north", -1.0), ("east", 1.0)])
+def test_biases_are_taken_off_as_rows_are_read(bearings: Any, turn: float) -> None:
+    values = [(1.0, "north", 900.0, 30.0, 5.0), (2.0, "south", 500.0, 10.0, 6.0), (2.5, "north", 40.0, 181.0, 7.0)]
+    rows = [dict(zip(("time", "sensor", "range", "bearing_deg", "own_x"), each, strict=True)) for each in values]
+    rows = [{**row, "own_y": 0.0} for row in rows]
+    bias = Bias(range=100.0, bearing=math.radians(2.0), clock=1.25, x=3.0, y=-4.0)
+    found, plain = parsed(rows, bearings=bearings, biases={"north": bias}), parsed(rows, bearings=bearings)
+    assert found.start == -0.25
+    np.testing.assert_allclose(found.times, [0.0, 1.5, 2.25])
+    first, second, third = found.scans
+    assert (first[1], second[1], third[0]) == (None, None, None)
+    for before, after, distance in ((plain.scans[0][0], first[0], 800.0), (plain.scans[2][0], second[0], 1.0)):
+        assert before is not None
+        assert after is not None
+        assert after[0, 1] == distance  # no range falls below a metre
+        turned = math.remainder(before[0, 0] - after[0, 0], 2.0 * math.pi)
+        assert turned == pytest.approx(turn * math.radians(2.0), abs=1e-12)
+    np.testing.assert_array_equal(np.asarray(third[1]), np.asarray(plain.scans[1][1]))
+    np.testing.assert_allclose(found.poses[1], [[4.0, 4.0, 0.0], [100.0, 0.0, 0.0]])
+    np.testing.assert_allclose(found.poses[2], [[4.0, 4.0, 0.0], [6.0, 0.0, 0.0]])
+
+
+def test_biases_of_nobody_and_of_no_number_are_refused() -> None:
+    with pytest.raises(InputError, match=r"Bias\.clock: expected a finite number"):
+        Bias(clock=math.nan)
+    with pytest.raises(InputError, match=r"biases: expected sensors among 'north', 'south'; got z"):
+        parsed(biases={"z": Bias()})

@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from vedette import __version__
+from vedette.cli.calibrating import calibrate
 from vedette.cli.campaign import campaign
 from vedette.cli.errors import Commands
 from vedette.cli.live import live
@@ -53,6 +54,7 @@ app.command()(speaking(schema))
 app.command()(speaking(run))
 app.command()(speaking(track))
 app.command()(speaking(live))
+app.command()(speaking(calibrate))
 app.command()(speaking(reproduce))
 app.command()(speaking(campaign))
 app.command()(speaking(results))

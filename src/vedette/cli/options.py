@@ -25,3 +25,19 @@ Workers = Annotated[
 Trust = Annotated[
     bool, typer.Option("--trust", help="Run code that a scenario names also where others may have written it.")
 ]
+BAD_ROWS = ("refuse", "skip")
+SensorsFile = Annotated[
+    Path, typer.Option("--sensors", metavar="FILE", help="YAML file about the sensors: where they are, what they see.")
+]
+Speed = Annotated[
+    float,
+    typer.Option("--speed", min=0.001, help="m/s that targets hardly exceed, where motion or births are not said."),
+]
+BadRows = Annotated[
+    str,
+    typer.Option(
+        "--bad-rows",
+        help="refuse (default) or skip rows that cannot be read.",
+        autocompletion=completing.one_of(*BAD_ROWS),
+    ),
+]

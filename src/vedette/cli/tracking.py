@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from vedette.cli.compiling import compiling
-from vedette.cli.completing import one_of
 from vedette.cli.documents import run_document
 from vedette.cli.errors import named_options, usage_error
-from vedette.cli.options import Overwrite, Trust
+from vedette.cli.options import BAD_ROWS, BadRows, Overwrite, SensorsFile, Speed, Trust
 from vedette.cli.output import console, note, publish, say
 from vedette.cli.running import Approval, compile_if_cold, end_stopped, interruptible, print_run
 from vedette.cli.scenario_files import warn
@@ -22,19 +21,16 @@ from vedette.text import counted
 
 if TYPE_CHECKING:
     from vedette.scenarios import Scenario
+    from vedette.scenarios.of_recording import OfRecording
     from vedette.simulation.records import RunRecord
 
-_BAD_ROWS = ("refuse", "skip")
 _SHOWN_ROWS = 5
 _LASTING = 10  # estimates of a track that is more than a moment's
 
 
 def track(
     scans: Annotated[Path, typer.Argument(metavar="SCANS", help="CSV or Parquet file with a row a measurement.")],
-    sensors: Annotated[
-        Path,
-        typer.Option("--sensors", metavar="FILE", help="YAML file about the sensors: where they are, what they see."),
-    ],
+    sensors: SensorsFile,
     truth: Annotated[
         Path | None, typer.Option("--truth", metavar="FILE", help="The targets' own reports, to be scored against.")
     ] = None,
@@ -43,41 +39,22 @@ def track(
         typer.Option("--out", metavar="DIR", help="Folder for results, tracks, figures; none: only print."),
     ] = None,
     overwrite: Overwrite = False,
-    speed: Annotated[
-        float,
-        typer.Option("--speed", min=0.001, help="m/s that targets hardly exceed, where motion or births are not said."),
-    ] = 10.0,
-    bad_rows: Annotated[
-        str,
-        typer.Option(
-            "--bad-rows", help="refuse (default) or skip rows that cannot be read.", autocompletion=one_of(*_BAD_ROWS)
-        ),
-    ] = "refuse",
+    speed: Speed = 10.0,
+    bad_rows: BadRows = "refuse",
     trust: Trust = False,
 ) -> None:
     """Track recorded scans: estimates, whole tracks, health, figures; with the targets' reports, errors too."""
     from vedette.evaluation.runs import run_scenario
     from vedette.evaluation.track_table import table_of_run, write_tracks
     from vedette.scenarios.dumping import dump_scenario
-    from vedette.scenarios.of_recording import scenario_of_recording
     from vedette.simulation.loop import RunInterrupted, RunStopped
     from vedette.simulation.storage import check_free, save_run
 
-    if bad_rows not in _BAD_ROWS:
-        raise usage_error(f"expected one of {', '.join(_BAD_ROWS)}; got {bad_rows!r}", "--bad-rows")
     if out is not None:
         need("vedette track --out", "matplotlib", "pyarrow")
         with named_options({"directory": "--out"}):
             check_free(out, overwrite)
-    scenario, recording, assumed = scenario_of_recording(sensors, scans, truth, speed=speed, bad_rows=bad_rows)
-    Approval(trust)(scenario)
-    warn(scenario)
-    for text in recording.skipped[:_SHOWN_ROWS]:
-        note(f"skipped: {text}")
-    if len(recording.skipped) > _SHOWN_ROWS:
-        note(f"skipped: {len(recording.skipped) - _SHOWN_ROWS} more rows")
-    for text in assumed:
-        note(f"not said, so {text}")
+    scenario, recording, assumed = read_recording(sensors, scans, truth, speed=speed, bad_rows=bad_rows, trust=trust)
     with interruptible("nothing was written"):
         compile_if_cold(scenario)
         try:
@@ -102,6 +79,26 @@ def track(
         say(f"wrote {out}")
     document = run_document(record, scenario.model.ospa.unit)
     publish({**document, "assumed": assumed, "skipped": recording.skipped, "folder": out, "written": written})
+
+
+def read_recording(
+    sensors: Path, scans: Path, truth: Path | None, *, speed: float, bad_rows: str, trust: bool
+) -> OfRecording:
+    """The scenario of recorded scans; tells what was left out, what is assumed and which code it runs."""
+    from vedette.scenarios.of_recording import scenario_of_recording
+
+    if bad_rows not in BAD_ROWS:
+        raise usage_error(f"expected one of {', '.join(BAD_ROWS)}; got {bad_rows!r}", "--bad-rows")
+    found = scenario_of_recording(sensors, scans, truth, speed=speed, bad_rows=bad_rows)
+    Approval(trust)(found.scenario)
+    warn(found.scenario)
+    for text in found.recording.skipped[:_SHOWN_ROWS]:
+        note(f"skipped: {text}")
+    if len(found.recording.skipped) > _SHOWN_ROWS:
+        note(f"skipped: {len(found.recording.skipped) - _SHOWN_ROWS} more rows")
+    for text in found.assumed:
+        note(f"not said, so {text}")
+    return found
 
 
 @contextmanager

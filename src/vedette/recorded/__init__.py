@@ -2,11 +2,13 @@
 
 from vedette.recorded.cleaning import Cleaning, CleaningCounts, RecordedTrack
 from vedette.recorded.geography import Origin
+from vedette.recorded.instants import Bias, RecordedScans, Site, without_biases
 from vedette.recorded.reports import read_table, table_of
-from vedette.recorded.scans import Conventions, RecordedScans, Site, parse_scans
+from vedette.recorded.scans import Conventions, parse_scans
 from vedette.recorded.targets import RecordedTargets
 
 __all__ = [
+    "Bias",
     "Cleaning",
     "CleaningCounts",
     "Conventions",
@@ -18,4 +20,5 @@ __all__ = [
     "parse_scans",
     "read_table",
     "table_of",
+    "without_biases",
 ]

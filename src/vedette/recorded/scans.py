@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
@@ -13,9 +13,18 @@ from vedette.errors import InputError
 from vedette.kernels.base.types import Floats
 from vedette.models.arguments import reject
 from vedette.recorded.geography import Origin
+from vedette.recorded.instants import (
+    COMPONENTS,
+    Bearings,
+    Bias,
+    Look,
+    RecordedScans,
+    Site,
+    in_order,
+    without_biases,
+)
 from vedette.recorded.reports import FARTHEST, LATEST, Table, column_names, is_number, number, seconds
 from vedette.text import shown
-from vedette.tracking import SensorScan
 
 # What a row may say: the quantity, and the units that the end of a column's name may give it.
 _LENGTHS = {"m": 1.0, "km": 1000.0, "nmi": 1852.0}
@@ -39,30 +48,6 @@ _MOST = {
     **dict.fromkeys(("lat", "own_lat"), 90.0),
     **dict.fromkeys(("bearing", "own_heading"), 2.0 * math.pi),
 }
-# Components of a measurement of a kind, by their quantities.
-COMPONENTS = {
-    "bearing_range": ("bearing", "range"),
-    "bearing_only": ("bearing",),
-    "range_only": ("range",),
-    "position": ("x", "y"),
-}
-
-Bearings = Literal["east", "north"]
-
-
-@dataclass(frozen=True, slots=True)
-class Site:
-    """A sensor of a recording.
-
-    Attributes:
-        name: as the rows name it; its number, from 1, will do too.
-        kind: of its measurements, a key of `COMPONENTS`.
-        pose: [px, py, heading_rad, ...] where the rows do not say.
-    """
-
-    name: str
-    kind: str
-    pose: tuple[float, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,6 +62,7 @@ class Conventions:
             counter-clockwise, as the library has them.
         gather: s; rows of a sensor within this time after its first make one scan, at the mean of their times.
         bad_rows: whether a row that cannot be read is refused or left out, and counted.
+        biases: by the name of a sensor what its rows say too much; it is taken off as they are read.
 
     Raises:
         InputError: a quantity, unit or word of another kind, or a time below 0.
@@ -87,13 +73,14 @@ class Conventions:
     bearings: Bearings | None = None
     gather: float = 0.0
     bad_rows: Literal["refuse", "skip"] = "refuse"
+    biases: Mapping[str, Bias] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         known = ("time", "sensor", *QUANTITIES)
-        for field, given in (("columns", self.columns), ("units", self.units)):
+        for where, given in (("columns", self.columns), ("units", self.units)):
             for name in given:
                 if name not in known:
-                    raise reject(field, f"quantities among {', '.join(known)}", name)
+                    raise reject(where, f"quantities among {', '.join(known)}", name)
         for name, unit in self.units.items():
             if unit not in QUANTITIES.get(name, {}):
                 raise reject(f"units.{name}", f"one of {', '.join(QUANTITIES.get(name, ())) or 'none'}", unit)
@@ -103,39 +90,6 @@ class Conventions:
             raise reject("bad_rows", "refuse or skip", self.bad_rows)
         if not 0.0 <= self.gather < math.inf:
             raise reject("gather", "seconds, at least 0", self.gather)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class RecordedScans:
-    """Scans at the instants at which any sensor scanned.
-
-    Attributes:
-        times: (num_instants,) s after the first, increasing.
-        start: s; the recorded time of the first: since 1970 UTC where times were dates.
-        is_utc: whether they were.
-        scans: for each instant one a sensor: (num, meas_dim) measurements as filters take them; None: it did not scan.
-        poses: (num_instants, num_sensors, 3 or more), each sensor where it was when it scanned last.
-        skipped: what was wrong with the rows that were left out.
-    """
-
-    times: Floats
-    start: float
-    is_utc: bool
-    scans: tuple[tuple[Floats | None, ...], ...]
-    poses: Floats
-    skipped: tuple[str, ...] = ()
-
-    def arrivals(self) -> Iterator[SensorScan]:
-        """Every scan by itself, in order of time, as `LateScans` takes them; times as of `times`."""
-        for time, scans, poses in zip(self.times.tolist(), self.scans, self.poses, strict=True):
-            for s, scan in enumerate(scans):
-                if scan is not None:
-                    yield SensorScan(s, time, scan, poses[s])
-
-    @property
-    def num_measurements(self) -> int:
-        """Of all scans."""
-        return sum(len(scan) for scans in self.scans for scan in scans if scan is not None)
 
 
 def parse_scans(
@@ -154,11 +108,18 @@ def parse_scans(
     Raises:
         InputError: names the file, row, column, what was expected and what came.
     """
+    for name in conventions.biases:
+        if name not in {site.name for site in sites}:
+            raise reject("biases", f"sensors among {', '.join(shown(site.name) for site in sites)}", name)
     rows = _Rows(table, sites, conventions, origin)
     found, skipped = rows.read()
     if not found:
         raise InputError(f"{table.source}: expected at least one row that can be read; got none of {len(table.rows)}")
-    return _at_instants(found, sites, conventions.gather, rows.is_utc, skipped)
+    recording = _at_instants(found, sites, conventions.gather, rows.is_utc, skipped)
+    if not conventions.biases:
+        return recording
+    biases = [conventions.biases.get(site.name, Bias()) for site in sites]
+    return without_biases(recording, sites, biases, conventions.bearings)
 
 
 @dataclass(frozen=True, slots=True)
@@ -315,24 +276,16 @@ def _at_instants(
     rows: list[_Row], sites: Sequence[Site], gather: float, is_utc: bool, skipped: tuple[str, ...]
 ) -> RecordedScans:
     """Rows of one sensor and time as a scan, scans of one time as an instant."""
-    scans: dict[float, dict[int, list[_Row]]] = {}
-    for s in range(len(sites)):
+    looks = []
+    for s, site in enumerate(sites):
         own = sorted((row for row in rows if row.sensor == s), key=lambda row: row.time)
         for group in _groups(own, gather):
             time = math.fsum(row.time for row in group) / len(group) if gather > 0.0 else group[0].time
-            scans.setdefault(time, {})[s] = group
-    times = sorted(scans)
-    longest = max(len(site.pose) for site in sites)
-    poses, at = np.zeros((len(times), len(sites), longest)), np.zeros((len(sites), longest))
+            looks.append(Look(time, s, _scan(group, site), np.array(group[-1].pose)))
+    first = np.zeros((len(sites), max(len(site.pose) for site in sites)))
     for s, site in enumerate(sites):
-        at[s, : len(site.pose)] = site.pose
-    found = []
-    for k, time in enumerate(times):
-        for s, group in scans[time].items():
-            at[s, : len(group[-1].pose)] = group[-1].pose
-        poses[k] = at
-        found.append(tuple(_scan(scans[time][s], sites[s]) if s in scans[time] else None for s in range(len(sites))))
-    return RecordedScans(np.array(times) - times[0], times[0], is_utc, tuple(found), poses, skipped)
+        first[s, : len(site.pose)] = site.pose
+    return in_order(looks, first, 0.0, is_utc, skipped)
 
 
 def _is_empty(cell: Any) -> bool:

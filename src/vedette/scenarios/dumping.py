@@ -30,11 +30,15 @@ def dump_scenario(model: ScenarioModel, *, folder: Path | None = None) -> str:
         model: its sections.
         folder: what the files that it names are relative to; with it, the text can be kept anywhere.
     """
+    return dump_data(model.model_dump(mode="json"), folder)
+
+
+def dump_data(data: Any, folder: Path | None = None) -> str:
+    """YAML text of plain data of a scenario, of which nothing is checked; folder: as of `dump_scenario`."""
     yaml = YAML(typ="rt", pure=True)
     yaml.width = 10_000
     yaml.indent(mapping=2, sequence=4, offset=2)
     out = io.StringIO()
-    data = model.model_dump(mode="json")
     yaml.dump(_laid_out(data if folder is None else _anchored(data, folder.resolve())), out)
     return out.getvalue()
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -13,8 +14,26 @@ from vedette.scenarios.faults import Finding, describe
 from vedette.scenarios.sections.base import NonNegative, Section, attempt
 
 if TYPE_CHECKING:
-    from vedette.recorded import RecordedScans
+    from vedette.recorded import Bias, RecordedScans, Site
     from vedette.scenarios.sections.scenario import ScenarioModel
+
+
+class BiasSection(Section):
+    """What the rows of a sensor say too much, which is taken off as they are read."""
+
+    range: float = Field(default=0.0, description="Of ranges [m].")
+    bearing_deg: float = Field(
+        default=0.0, description="Of bearings, clockwise where these are from the north, else counter-clockwise [deg]."
+    )
+    clock: float = Field(default=0.0, description="Of times: how far its clock is ahead [s].")
+    x: float = Field(default=0.0, description="Of where it is said to be, or of positions that it measures, east [m].")
+    y: float = Field(default=0.0, description="The same, north [m].")
+
+    def build(self) -> Bias:
+        """In SI units."""
+        from vedette.recorded import Bias
+
+        return Bias(self.range, math.radians(self.bearing_deg), self.clock, self.x, self.y)
 
 
 class RecordingSection(Section):
@@ -45,18 +64,27 @@ class RecordingSection(Section):
         default="refuse", description="Whether a row that cannot be read is an error, or left out and told of [-]."
     )
 
+    biases: dict[str, BiasSection] = Field(default={}, description="By sensor, as `vedette calibrate` finds them [-].")
+
     def build(self, world: ScenarioModel, folder: Path) -> RecordedScans:
         """The scans. Raises `InputError` for a file that cannot be read, naming row and column."""
-        from vedette.recorded import Conventions, Site, parse_scans
+        from vedette.recorded import Conventions, parse_scans
         from vedette.recorded.reports import read_table
 
-        sites = [
-            Site(name, sensor.measurement.kind, sensor.pose)
-            for name, sensor in zip(world.sensor_names, world.sensors, strict=True)
-        ]
-        conventions = Conventions(self.columns, self.units, self.bearings, self.gather, self.bad_rows)
+        biases = {name: bias.build() for name, bias in self.biases.items()}
+        conventions = Conventions(self.columns, self.units, self.bearings, self.gather, self.bad_rows, biases)
         origin = None if world.origin is None else world.origin.build()
-        return parse_scans(read_table(folder / self.path), sites, conventions, origin)
+        return parse_scans(read_table(folder / self.path), sites_of(world), conventions, origin)
+
+
+def sites_of(world: ScenarioModel) -> list[Site]:
+    """The sensors of a recording."""
+    from vedette.recorded import Site
+
+    return [
+        Site(name, sensor.measurement.kind, sensor.pose)
+        for name, sensor in zip(world.sensor_names, world.sensors, strict=True)
+    ]
 
 
 def recording_findings(world: ScenarioModel, folder: Path) -> Iterator[Finding]:
@@ -79,4 +107,4 @@ def _content(section: RecordingSection, world: ScenarioModel, folder: Path) -> I
         yield ("recording",), "scans that can be read", str(error)
 
 
-__all__ = ["RecordingSection", "recording_findings"]
+__all__ = ["BiasSection", "RecordingSection", "recording_findings", "sites_of"]

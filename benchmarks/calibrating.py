@@ -1,0 +1,195 @@
+"""How well recordings alone say what their sensors are like.
+
+    python benchmarks/calibrating.py [--scene ships|aircraft] [--redraws N] [--seconds S] [--assumed-motion]
+    python benchmarks/calibrating.py --write docs/calibration.md
+
+Three radars of 5, 8 and 11 s, one of them on a boat, see six ships or aircraft for ten minutes; they have biases of up
+to 300 m, 2 degrees and 0.5 s, none of which anybody knows, and noise and clutter are told wrongly. Each redraw is a
+recording of its own: other targets, noise, clutter. It is calibrated, and tracked with what was found, with
+the truth, and with what was told. Prints for each parameter the truth, the mean and spread of what was found, the
+greatest error, and how many of the intervals of 95 % cover the truth; then OSPA. Equal arguments print equal tables,
+but for the times.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import csv
+import math
+import tempfile
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from pages import write_between
+
+from vedette.calibration import Calibration, calibrate
+from vedette.evaluation.runs import run_scenario
+from vedette.scenarios.calibrated import calibrated_text, problem_of
+from vedette.scenarios.of_recording import scenario_of_recording
+
+RADARS = {"Calshot": ((-3000.0, -3000.0), 5.0), "Ryde": ((3500.0, -2500.0), 8.0), "boat": ((0.0, 3500.0), 11.0)}
+BIASES = {
+    "Calshot": {"range": 300.0, "bearing_deg": -1.0},
+    "Ryde": {"range": -150.0, "bearing_deg": 2.0, "clock": 0.5},
+    "boat": {"range": 100.0, "bearing_deg": -1.5, "clock": -0.5},
+}
+MODELS = {
+    "noise.sigma_range": 20.0,
+    "noise.sigma_bearing_deg": math.degrees(0.012),
+    "detection.probability": 0.9,
+    "clutter.rate": 4.0,
+}
+TOLD = """recording: {bearings: north%s}
+%sospa: {cutoff: %s}
+sensor_defaults:
+  measurement: {kind: bearing_range}
+  noise: {kind: range_dependent, sigma_range: %s, eta_range: 0.0, sigma_bearing_deg: %s, eta_bearing: 0.0}
+  detection: {kind: constant, probability: %s}
+  clutter: {kind: region, rate: %s}
+sensors:
+  - {name: Calshot, position: [-3000.0, -3000.0]}
+  - {name: Ryde, position: [3500.0, -2500.0]}
+  - {name: boat, position: [0.0, 3500.0]}
+"""
+TARGETS = 6
+
+
+class Scene(NamedTuple):
+    """m/s of targets along each axis at most; m of where they are half way, and of clutter; m of OSPA's cutoff."""
+
+    speed: float
+    within: float
+    half_side: float
+    cutoff: float
+
+
+SCENES = {"ships": Scene(8.0, 4000.0, 7000.0, 200.0), "aircraft": Scene(80.0, 8000.0, 32000.0, 1000.0)}
+MOTION = "motion: {kind: constant_velocity, sigma_v: 0.05}\n"
+
+
+def write_scans(folder: Path, scene: Scene, seconds: float, seed: int, motion: str = MOTION) -> None:
+    """scans.csv, truth.csv, and what is told and what is true of the sensors: told.yaml, true.yaml."""
+    rng, within, speed = np.random.default_rng(seed), scene.within, scene.speed
+    middles = [(rng.uniform(-within, within, 2), rng.uniform(-speed, speed, 2)) for _ in range(TARGETS)]
+    ships = [(x - 0.5 * seconds * v, v) for x, v in middles]
+    rows, half_side = list[list[Any]](), scene.half_side
+    for name, (place, period) in RADARS.items():
+        bias = BIASES[name]
+        for at in np.arange(rng.uniform(0.0, period), seconds, period).tolist():
+            own = np.array(place) + (np.array([4.0, -3.0]) * at if name == "boat" else 0.0)
+            offsets = [x + v * at - own for x, v in ships if rng.random() < MODELS["detection.probability"]]
+            false = [rng.uniform(-half_side, half_side, 2) - own for _ in range(rng.poisson(MODELS["clutter.rate"]))]
+            stds = [MODELS["noise.sigma_range"], math.radians(MODELS["noise.sigma_bearing_deg"])]
+            for i, (dx, dy) in enumerate([*offsets, *false]):
+                noise = rng.normal(0.0, stds) if i < len(offsets) else np.zeros(2)
+                distance = max(math.hypot(dx, dy) + noise[0] + bias["range"], 0.0)
+                angle = math.degrees(math.atan2(dx, dy) + noise[1]) + bias["bearing_deg"]
+                rows.append([at + bias.get("clock", 0.0), name, distance, angle % 360.0, *own])
+            if not offsets and not false:
+                rows.append([at + bias.get("clock", 0.0), name, "", "", *own])
+    rows.sort(key=lambda row: row[0])
+    header = ["time", "sensor", "range_m", "bearing_deg", "own_x", "own_y"]
+    _write(folder / "scans.csv", header, rows)
+    told = [[t, f"ship {i}", *(x + v * t)] for i, (x, v) in enumerate(ships) for t in np.arange(0.0, seconds + 20, 10)]
+    _write(folder / "truth.csv", ["time", "id", "x", "y"], told)
+    (folder / "told.yaml").write_text(TOLD % ("", motion, scene.cutoff, 30.0, 1.0, 0.8, 6.0))
+    biases = ", ".join(f"{name}: {{{', '.join(f'{k}: {v}' for k, v in one.items())}}}" for name, one in BIASES.items())
+    (folder / "true.yaml").write_text(TOLD % (f", biases: {{{biases}}}", motion, scene.cutoff, *MODELS.values()))
+
+
+def _write(path: Path, header: list[str], rows: list[list[Any]]) -> None:
+    with path.open("w", newline="") as file:
+        csv.writer(file).writerows([header, *rows])
+
+
+class Redraw(NamedTuple):
+    """What was found; mean OSPA, m, with it, with the truth, with what was told; CPU s and passes of the filter."""
+
+    calibration: Calibration
+    ospa: tuple[float, float, float]
+    seconds: float
+    passes: int
+
+
+def redraw(folder: Path, scene: Scene, seconds: float, seed: int, motion: str = MOTION) -> Redraw:
+    """One recording, calibrated and tracked."""
+    write_scans(folder, scene, seconds, seed, motion)
+    scans = folder / "scans.csv"
+    begun, passes = time.process_time(), [0]
+    scenario = scenario_of_recording(folder / "told.yaml", scans, speed=scene.speed).scenario
+
+    def watch() -> None:
+        passes[0] += 1
+
+    calibration = calibrate(problem_of(scenario), watch)
+    spent = time.process_time() - begun
+    text = calibrated_text(scenario, folder / "told.yaml", calibration, folder)
+    (folder / "found.yaml").write_text(text, "utf-8")
+    scores = []
+    for name in ("found", "true", "told"):
+        at = folder / f"{name}.yaml"
+        tracked = scenario_of_recording(at, scans, folder / "truth.csv", speed=scene.speed).scenario
+        scores.append(float(np.nanmean(run_scenario(tracked, "still", seed=0).ospa[:, 0])))
+    return Redraw(calibration, (scores[0], scores[1], scores[2]), spent, passes[0])
+
+
+def true_value(radar: str, kind: str, name: str) -> float:
+    """Of a parameter."""
+    return BIASES[radar].get(name, 0.0) if kind == "bias" else MODELS[name]
+
+
+def table(redraws: list[Redraw]) -> Iterator[str]:
+    """The lines of the tables."""
+    yield "| parameter | truth | mean found | root mean square error | said (mean) | greatest error | covered |"
+    yield "| --- | ---: | ---: | ---: | ---: | ---: | ---: |"
+    total = [0, 0]
+    for i, first in enumerate(redraws[0].calibration.found):
+        radar, name = list(RADARS)[first.parameter.sensor], first.parameter.name
+        truth = true_value(radar, first.parameter.kind, name)
+        all_found = [each.calibration.found[i] for each in redraws]
+        found = [each for each in all_found if not each.why]
+        values = np.array([each.value for each in found])
+        said = np.mean([(each.high - each.low) / 3.92 for each in found])
+        covered = sum(each.low <= truth <= each.high for each in found)
+        total = [total[0] + covered, total[1] + len(found)]
+        rms, most = math.sqrt(np.mean((values - truth) ** 2)), np.abs(values - truth).max()
+        cells = [f"{radar}, {name}", f"{truth:.3g}", f"{values.mean():.4g}", f"{rms:.2g}", f"{said:.2g}", f"{most:.2g}"]
+        yield "| " + " | ".join([*cells, f"{covered} of {len(all_found)}"]) + " |"
+    yield ""
+    scores = np.array([each.ospa for each in redraws])
+    found, true, told = scores.mean(axis=0)
+    share = scores[:, 0] / scores[:, 1] - 1.0
+    yield f"Intervals that cover the truth: {total[0]} of {total[1]}, {total[0] / total[1]:.1%}."
+    yield f"OSPA, m: {found:.2f} with what was found, {true:.2f} with the truth, {told:.2f} with what was told;"
+    yield f"with what was found {share.mean():+.1%} against the truth, {share.min():+.1%} to {share.max():+.1%}."
+    seconds, passes = np.mean([(each.seconds, each.passes) for each in redraws], axis=0)
+    yield f"CPU time: {seconds:.0f} s a recording, {passes:.0f} passes of the filter."
+
+
+def main() -> None:
+    """Read the arguments and print."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--scene", choices=SCENES, default="ships")
+    parser.add_argument("--redraws", type=int, default=20)
+    parser.add_argument("--seconds", type=float, default=600.0)
+    parser.add_argument("--assumed-motion", action="store_true", help="let the motion be taken from the speed")
+    parser.add_argument("--seed", type=int, default=0, help="of the first redraw")
+    parser.add_argument("--write", type=Path)
+    given = parser.parse_args()
+    redraws, motion = list[Redraw](), "" if given.assumed_motion else MOTION
+    with tempfile.TemporaryDirectory() as folder, contextlib.suppress(KeyboardInterrupt):
+        for number in range(given.seed, given.seed + given.redraws):
+            redraws.append(redraw(Path(folder), SCENES[given.scene], given.seconds, number, motion))
+    what = f"{len(redraws)} recordings of {given.seconds:g} s of {given.scene}."
+    lines = [*table(redraws), "", what]
+    print("\n".join(lines))
+    if given.write is not None:
+        write_between(given.write, f"calibrating.py --scene {given.scene}", "\n".join(lines))
+
+
+if __name__ == "__main__":
+    main()

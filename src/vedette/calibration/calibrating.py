@@ -1,0 +1,171 @@
+"""The sensors of a recording by maximum likelihood: a first guess, the maximum, and what cannot be found."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from vedette.calibration.maximum import Maximum, covariance, maximise
+from vedette.calibration.parameters import Parameter, Problem
+from vedette.calibration.registration import BIASES, Pairs, linked, matched, register
+from vedette.kernels.base.types import Floats
+from vedette.recorded.instants import COMPONENTS
+
+_FAR = {"range": 300.0, "bearing": math.radians(3.0), "x": 300.0, "y": 300.0}  # of measurements, biases in them
+_NEARER = 3.0  # times the noise that was found, in the second round
+_QUANTILE = 1.959964  # of the normal distribution, 97.5 %
+_COMPARED = ("clock", "x", "y")  # with those of the first sensor
+_PART = 0.1  # of a parameter that lies where nothing is known: it cannot be found
+
+
+class Found(NamedTuple):
+    """What was found of a parameter.
+
+    value, low, high: with the interval that covers it 95 times of 100. why: why it cannot be found; empty where it is.
+    """
+
+    parameter: Parameter
+    value: float
+    low: float
+    high: float
+    why: str
+
+
+class Calibration(NamedTuple):
+    """What was found of all parameters.
+
+    log_likelihood, before: of the recording, as found and as it was said. converged: whether the search came to an end.
+    """
+
+    found: tuple[Found, ...]
+    log_likelihood: float
+    before: float
+    converged: bool
+
+
+def calibrate(problem: Problem, watch: Callable[[], None] = lambda: None) -> Calibration:
+    """The maximum of the likelihood of a recording over what its sensors may be like.
+
+    Args:
+        problem: the recording and the parameters.
+        watch: called whenever the recording was tracked once more.
+
+    Raises:
+        VedetteError: a filter that cannot take the recording.
+    """
+
+    def terms(free: Floats) -> Floats:
+        watch()
+        return problem.log_likelihoods(free)
+
+    said = problem.free([each.start for each in problem.parameters])
+    unknown = np.array([each.unknown for each in problem.parameters])
+    before = float(terms(said).sum())
+    start, pairs = _guess(problem, said, watch)
+    if not float(terms(start).sum()) > before:
+        start = said
+    maximum = maximise(terms, start, unknown, _blocks(problem.parameters))
+    apart = np.flatnonzero(~linked(pairs, len(problem.sites))).tolist()
+    return Calibration(_judged(problem, maximum, unknown, apart), maximum.log_likelihood, before, maximum.converged)
+
+
+def _blocks(parameters: tuple[Parameter, ...]) -> list[list[int]]:
+    """Who may depend on whom: all biases; and of a sensor noise, detection and clutter.
+
+    Between biases and the rest the information is 0 where measurements are Gaussian.
+    """
+    blocks = [[i for i, each in enumerate(parameters) if each.kind == "bias"]]
+    for s in sorted({each.sensor for each in parameters}):
+        blocks.append([i for i, each in enumerate(parameters) if each.kind != "bias" and each.sensor == s])
+    return blocks
+
+
+def _guess(problem: Problem, said: Floats, watch: Callable[[], None]) -> tuple[Floats, Pairs]:
+    """A first guess, and what it was made from.
+
+    Tracks by noise as wide as biases may be, then by narrower noise, and what fits them.
+    """
+    values, sites = problem.values(said), problem.sites
+    far = np.array([[_FAR[name] for name in (*COMPONENTS[site.kind], *COMPONENTS[site.kind])[:2]] for site in sites])
+    asked, unknown = np.zeros((len(sites), len(BIASES)), bool), np.ones((len(sites), len(BIASES)))
+    places = {}
+    for i, each in enumerate(problem.parameters):
+        if each.kind == "bias":
+            at = each.sensor, BIASES.index(each.component)
+            places[i], asked[at], unknown[at] = at, True, each.unknown / abs(each.per_si)
+    stds = far
+    for _ in range(3):
+        recording = problem.without_biases(values)
+        watch()
+        pairs = matched(problem.tracker(_with_noise(problem, values, stds))[0], recording, sites, stds)
+        found = register(pairs, sites, asked, unknown, stds, _period(problem))
+        for i, at in places.items():
+            values[i] += problem.parameters[i].per_si * found.biases[at]
+        stds = np.minimum(stds, _NEARER * found.stds)
+    values = _with_noise(problem, values, found.stds)
+    return problem.free(_with_counts(problem, values, pairs).tolist()), pairs
+
+
+def _period(problem: Problem) -> float:
+    """s; between scans of the slowest sensor."""
+    recording = problem.recording
+    nums = [sum(scans[s] is not None for scans in recording.scans) for s in range(len(problem.sites))]
+    return max(1e-3, float(recording.times[-1])) / max(1, min(num for num in nums if num))
+
+
+def _with_noise(problem: Problem, values: Floats, stds: Floats) -> Floats:
+    """The values with noise of these standard deviations, (num_sensors, 2)."""
+    values = values.copy()
+    for i, each in enumerate(problem.parameters):
+        if each.kind == "noise":
+            component = COMPONENTS[problem.sites[each.sensor].kind].index(each.component)
+            values[i] = abs(each.per_si) * stds[each.sensor, component]
+    return values
+
+
+def _with_counts(problem: Problem, values: Floats, pairs: Pairs) -> Floats:
+    """The values with probabilities of detection and clutter as tracks and measurements were matched."""
+    values, hits = values.copy(), np.bincount(pairs.sensors, minlength=len(problem.sites))
+    for i, each in enumerate(problem.parameters):
+        s = each.sensor
+        if each.kind == "detection" and hits[s]:
+            values[i] = min(max(hits[s] / (hits[s] + pairs.missed[s]), 0.05), 0.98)
+        elif each.kind == "clutter" and pairs.scans[s]:
+            values[i] = max(pairs.false[s] / pairs.scans[s], 0.01)
+    return values
+
+
+def _judged(problem: Problem, maximum: Maximum, unknown: Floats, apart: Sequence[int]) -> tuple[Found, ...]:
+    """Each parameter with its interval, or why it cannot be found; apart: sensors without targets that others see."""
+    cov, lost = covariance(maximum.information, unknown)
+    found = []
+    for i, (each, free) in enumerate(zip(problem.parameters, maximum.at.tolist(), strict=True)):
+        partners = [j for j in np.flatnonzero(np.abs(lost[i]) > _PART).tolist() if j != i]
+        compared = each.sensor in apart and each.component in _COMPARED
+        if compared or lost[i, i] > _PART:
+            why = _why(problem, i, [] if compared else partners)
+            found.append(Found(each, each.start, math.nan, math.nan, why))
+            continue
+        reach = _QUANTILE * math.sqrt(cov[i, i])
+        value, low, high = (each.from_free(x) for x in (free, free - reach, free + reach))
+        found.append(Found(each, value, low, high, ""))
+    return tuple(found)
+
+
+def _why(problem: Problem, i: int, partners: list[int]) -> str:
+    """Why a parameter cannot be found, by those that cannot be told from it."""
+    own = problem.parameters[i]
+    names = [f"{problem.parameters[j].name} of {problem.sites[problem.parameters[j].sensor].name}" for j in partners]
+    others = {problem.parameters[j].sensor for j in partners} - {own.sensor}
+    if own.kind != "bias":
+        return "the recording says next to nothing of it"
+    if not others:
+        alone = len(problem.sites) == 1
+        what = {"bearing": "a rotation", "clock": "a shift in time"}.get(own.component, "a shift")
+        told = "there is no other sensor" if alone else "no other sensor sees enough of the same targets"
+        beside = f" (with {', '.join(names)})" if names else ""
+        return f"{told} to tell it{beside} from {what} of all that this one sees"
+    return f"it cannot be told apart from {', '.join(names)}: together they move all that is seen"

@@ -1,0 +1,146 @@
+"""Where a log likelihood of many terms is greatest, and how surely.
+
+Steps are by the outer products of the terms' scores (Berndt, Hall, Hall, Hausman 1974), which need no second
+differences and are the information where the model holds; what is said in the end is by second differences.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from vedette.kernels.base.types import Bools, Floats
+
+Terms = Callable[[Floats], Floats]  # the terms of the log likelihood, of all parameters on their scales
+_ENOUGH = 0.05  # of log likelihood that a further step promises
+_JUMPS = 0.5  # the same, where no step goes up: the terms may jump by so much
+_MOST_STEPS = 15
+_SHARES = (1.0, 0.5, 0.25, 0.1)  # of a step
+_STEP = 0.5  # of differences, in conditional standard deviations
+_TELLING = 4.0  # eigenvalue of the information, in units of what is unknown, above which a direction is known
+_REFINEMENTS = 3
+_ALIKE = 1.5  # the curvature found over a step and the one it was chosen by
+
+
+class Maximum(NamedTuple):
+    """Of p parameters on their scales.
+
+    at: (p,) where. log_likelihood: there. information: (p, p) minus its second derivatives there. converged: whether
+    a further step promises next to nothing.
+    """
+
+    at: Floats
+    log_likelihood: float
+    information: Floats
+    converged: bool
+
+
+def maximise(terms: Terms, start: Floats, unknown: Floats, blocks: Sequence[Sequence[int]]) -> Maximum:
+    """The greatest sum of terms near a start.
+
+    Args:
+        terms: (num_terms,) of parameters (p,).
+        start: (p,).
+        unknown: (p,) size of each parameter; a direction in which the terms hardly change over such a size is not
+            followed.
+        blocks: parameters between whom second derivatives are taken; they are 0 between others.
+    """
+    at, steps = start.copy(), 0.01 * unknown
+    highest, converged = float(terms(at).sum()), False
+    for _ in range(_MOST_STEPS):
+        scores = _scores(terms, at, steps)
+        slope, products = scores.sum(axis=0), scores.T @ scores
+        steps = _STEP / np.sqrt(np.diag(products) + unknown**-2.0)
+        way = np.linalg.solve(products + np.diag(unknown**-2.0), slope)
+        promised = float(0.5 * slope @ way)
+        if converged := promised < _ENOUGH:
+            break
+        at, found = _best(terms, at, way, highest)
+        if found <= highest:
+            converged = promised < _JUMPS
+            break
+        highest = found
+    slope, information = _second(terms, at, highest, 2.0 * steps, blocks)
+    at, highest = _best(terms, at, covariance(information, unknown)[0] @ slope, highest)
+    return Maximum(at, highest, _refined(terms, at, highest, information, unknown), converged)
+
+
+def covariance(information: Floats, unknown: Floats) -> tuple[Floats, Floats]:
+    """What an information says: (p, p) the covariance within what it can tell, and (p, p) the projector onto what not.
+
+    Args:
+        information: (p, p).
+        unknown: (p,) standard deviation of each parameter from which on nothing is known of it. The projector is of
+            parameters in these units: its diagonal is the share of each that is not known, and beside the diagonal
+            stands which of them cannot be told apart.
+    """
+    values, vectors = _spectrum(information, unknown)
+    known: Bools = values > _TELLING
+    sure, lost = vectors[:, known], vectors[:, ~known]
+    scale = np.outer(unknown, unknown)
+    return scale * ((sure / values[known]) @ sure.T), lost @ lost.T
+
+
+def _spectrum(information: Floats, unknown: Floats) -> tuple[Floats, Floats]:
+    """Eigenvalues and eigenvectors for parameters in units of `unknown`."""
+    scaled = information * np.outer(unknown, unknown)
+    values, vectors = np.linalg.eigh(0.5 * (scaled + scaled.T))
+    return values, vectors
+
+
+def _refined(terms: Terms, at: Floats, highest: float, information: Floats, unknown: Floats) -> Floats:
+    """(p, p) the information with each of its eigenvalues by differences over that direction's standard deviation.
+
+    What few parameters in common leave open is small beside what each says alone, and by differences over steps of
+    each alone is lost in their errors.
+    """
+    values, vectors = _spectrum(information, unknown)
+    for i in range(len(values)):
+        for _ in range(_REFINEMENTS):
+            chosen = max(values[i], 1.0)
+            way = unknown * vectors[:, i] / np.sqrt(chosen)
+            sides = float(terms(at + way).sum()) + float(terms(at - way).sum())
+            values[i] = chosen * (2.0 * highest - sides)
+            if chosen / _ALIKE < values[i] < chosen * _ALIKE or max(values[i], chosen) <= 1.0:
+                break
+    return np.asarray((vectors * values) @ vectors.T / np.outer(unknown, unknown))
+
+
+def _best(terms: Terms, at: Floats, way: Floats, highest: float) -> tuple[Floats, float]:
+    """Where a share of a step leads that goes up, or several of them; where none does, nowhere.
+
+    Far from the maximum outer products make steps that are too short.
+    """
+    for share in _SHARES:
+        found = float(terms(at + share * way).sum())
+        if found > highest:
+            break
+    else:
+        return at, highest
+    while share >= 1.0 and (further := float(terms(at + 2.0 * share * way).sum())) > found:
+        share, found = 2.0 * share, further
+    return at + share * way, found
+
+
+def _scores(terms: Terms, at: Floats, steps: Floats) -> Floats:
+    """(num_terms, p) derivatives of each term by central differences."""
+    ways = np.diag(steps)
+    found = [(terms(at + way) - terms(at - way)) / (2.0 * step) for way, step in zip(ways, steps, strict=True)]
+    return np.stack(found, axis=1)
+
+
+def _second(
+    terms: Terms, at: Floats, highest: float, steps: Floats, blocks: Sequence[Sequence[int]]
+) -> tuple[Floats, Floats]:
+    """(p,) slope and (p, p) minus the second derivatives, by central differences over `steps`."""
+    ways = np.diag(steps)
+    up = np.array([float(terms(at + way).sum()) for way in ways])
+    down = np.array([float(terms(at - way).sum()) for way in ways])
+    bend = up + down - 2.0 * highest
+    second = np.diag(bend)
+    for i, j in {(i, j) for block in blocks for i in block for j in block if i < j}:
+        both = float(terms(at + ways[i] + ways[j]).sum()) + float(terms(at - ways[i] - ways[j]).sum())
+        second[i, j] = second[j, i] = 0.5 * (both - 2.0 * highest - bend[i] - bend[j])
+    return (up - down) / (2.0 * steps), -second / np.outer(steps, steps)

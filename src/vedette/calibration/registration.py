@@ -1,0 +1,256 @@
+"""A first guess of what sensors are like: tracks, what each sensor measured of them, and the biases that fit best.
+
+The biases and straight pieces of the tracks are fitted together to the measurements that were matched with tracks, by
+least squares with Huber's weights; noise, detection and clutter are then read off what fits and what does not.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from vedette.densities import as_lmb, track_moments
+from vedette.kernels.base.types import Bools, Floats, Ints
+from vedette.recorded import RecordedScans, Site
+from vedette.recorded.instants import COMPONENTS
+from vedette.tracking import Tracker
+
+BIASES = ("range", "bearing", "clock", "x", "y")  # of each sensor, in this order, SI, bearings counter-clockwise
+_SURE = 0.5  # existence of a track that measurements are matched with
+_GATE = 4.0  # standard deviations
+_HUBER = 1.5
+_ROUNDS = 10
+_SCANS_A_PIECE = 5  # of the slowest sensor
+_LEAST_PAIRS = 4  # of a piece
+_LEAST_SEEN = 3  # measurements of a target, by which a sensor has it in common with others
+_MAD = 1.4826  # standard deviation of normal numbers over the median of their sizes
+_POSITION, _SPEED = 1e4, 30.0  # m, m/s: what holds a piece of which measurements say too little
+
+
+class Pairs(NamedTuple):
+    """Measurements that were matched with tracks.
+
+    times: (n,) s. sensors, tracks: (n,) numbers. measured: (n, 2), NaN where there is no second component. poses:
+    (n, 2) of the sensors. states: (n, 4) of the tracks, predicted. missed, false, scans: (num_sensors,) tracks without
+    a measurement, measurements without a track, and scans.
+    """
+
+    times: Floats
+    sensors: Ints
+    tracks: Ints
+    measured: Floats
+    poses: Floats
+    states: Floats
+    missed: Ints
+    false: Ints
+    scans: Ints
+
+
+def matched(tracker: Tracker, recording: RecordedScans, sites: Sequence[Site], stds: Floats) -> Pairs:
+    """What a tracker's tracks and the scans have in common.
+
+    Args:
+        tracker: of the sensors; draws nothing.
+        recording: without the biases that are known.
+        sites: the sensors.
+        stds: (num_sensors, 2) by which measurements may lie beside tracks.
+    """
+    rngs = (np.random.default_rng(0),) * len(sites)
+    state, rows, numbers = tracker.initial(), list[tuple[float | int, ...]](), dict[tuple[int, ...], int]()
+    counts = np.zeros((3, len(sites)), np.int64)
+    for time, scans, poses in zip(recording.times.tolist(), recording.scans, recording.poses, strict=True):
+        lmb = as_lmb(state.fused)
+        sure = lmb.existence > _SURE
+        means = track_moments(lmb.tracks)[0][sure, :4]
+        if state.time is not None:
+            means[:, :2] += (time - state.time) * means[:, 2:]
+        labels = [numbers.setdefault(tuple(label), len(numbers)) for label in lmb.tracks.labels[sure].tolist()]
+        for s, scan in enumerate(scans):
+            if scan is None:
+                continue
+            pairs = _assigned(scan, means[:, :2] - poses[s, :2], poses[s, :2], sites[s].kind, stds[s])
+            counts[:, s] += len(means) - len(pairs), len(scan) - len(pairs), 1
+            for i, j in pairs:
+                measured = (*scan[i].tolist(), math.nan)[:2]
+                rows.append((time, s, labels[j], *measured, *poses[s, :2].tolist(), *means[j].tolist()))
+        state = tracker.step(state, list(scans), poses, time, rngs=rngs)[0]
+    table = np.array(rows, np.float64).reshape(len(rows), 11)
+    whole = table[:, 1:3].astype(np.int64)
+    return Pairs(table[:, 0], whole[:, 0], whole[:, 1], table[:, 3:5], table[:, 5:7], table[:, 7:], *counts)
+
+
+def _assigned(scan: Floats, offsets: Floats, place: Floats, kind: str, stds: Floats) -> list[tuple[int, int]]:
+    """Measurements and tracks that belong together, each at most once, none beyond the gate."""
+    if not len(scan) or not len(offsets):
+        return []
+    predicted = _measured_of(offsets, place, kind)
+    gaps = _wrapped(scan[:, None, :] - predicted[None], kind) / stds[: scan.shape[1]]
+    costs = np.minimum((gaps**2).sum(axis=2), _GATE**2)
+    found = linear_sum_assignment(costs)
+    return [(i, j) for i, j in zip(*(each.tolist() for each in found), strict=True) if costs[i, j] < _GATE**2]
+
+
+def _measured_of(offsets: Floats, places: Floats, kind: str) -> Floats:
+    """(n, components) of targets at offsets from sensors at places."""
+    values = {
+        "bearing": np.arctan2(offsets[:, 1], offsets[:, 0]),
+        "range": np.hypot(offsets[:, 0], offsets[:, 1]),
+        "x": (offsets + places)[:, 0],
+        "y": (offsets + places)[:, 1],
+    }
+    return np.stack([values[component] for component in COMPONENTS[kind]], axis=1)
+
+
+def _slopes(offsets: Floats, kind: str) -> Floats:
+    """(n, components, 2) derivatives of `_measured_of`."""
+    x, y = offsets.T
+    square = np.maximum(x * x + y * y, 1.0)
+    distance, one, none = np.sqrt(square), np.ones(len(x)), np.zeros(len(x))
+    values = {"bearing": (-y / square, x / square), "range": (x / distance, y / distance)}
+    values |= {"x": (one, none), "y": (none, one)}
+    return np.stack([np.stack(values[component], axis=1) for component in COMPONENTS[kind]], axis=1)
+
+
+def _wrapped(gaps: Floats, kind: str) -> Floats:
+    if COMPONENTS[kind][0] == "bearing":
+        gaps[..., 0] = np.remainder(gaps[..., 0] + math.pi, 2.0 * math.pi) - math.pi
+    return gaps
+
+
+def linked(pairs: Pairs, num_sensors: int) -> Bools:
+    """(num_sensors,) which sensors have targets in common with the first, or with others that have."""
+    counts = np.zeros((num_sensors, pairs.tracks.max(initial=-1) + 1), np.int64)
+    np.add.at(counts, (pairs.sensors, pairs.tracks), 1)
+    seen: Bools = counts >= _LEAST_SEEN
+    reached: Bools = np.arange(num_sensors) == 0
+    for _ in range(num_sensors):
+        reached = np.logical_or(reached, seen[:, seen[reached].any(axis=0)].any(axis=1))
+    return reached
+
+
+class Registration(NamedTuple):
+    """Biases (num_sensors, 5) as `BIASES`, and (num_sensors, 2) standard deviations of what they leave."""
+
+    biases: Floats
+    stds: Floats
+
+
+def register(
+    pairs: Pairs, sites: Sequence[Site], asked: Bools, unknown: Floats, stds: Floats, period: float
+) -> Registration:
+    """The biases that fit best, with the straight pieces of the tracks.
+
+    Args:
+        pairs: what is to be fitted.
+        sites: the sensors.
+        asked: (num_sensors, 5) which biases may be other than 0, as `BIASES`.
+        unknown: (num_sensors, 5) sizes of biases by which what cannot be found is held at 0.
+        stds: (num_sensors, 2) of the measurements, to begin with.
+        period: s, of the slowest sensor.
+    """
+    biases = np.zeros(asked.shape)
+    pieces, middles, states = _pieces(pairs, _SCANS_A_PIECE * period)
+    for _ in range(_ROUNDS):
+        residuals, own, of_bias = _linearised(pairs, sites, biases, pieces, middles, states)
+        spreads = _spreads(residuals, pairs.sensors, pieces, stds)[pairs.sensors]
+        rows = _Rows(residuals, own, of_bias * asked[pairs.sensors][:, None], spreads, pairs.sensors, pieces)
+        change, changes = _solved(rows, biases, unknown, len(middles))
+        biases, states = biases + change, states + changes
+    residuals, _, _ = _linearised(pairs, sites, biases, pieces, middles, states)
+    return Registration(biases, _spreads(residuals, pairs.sensors, pieces, stds))
+
+
+class _Rows(NamedTuple):
+    """Linear equations: residuals (n, 2), what they lose by the states of pieces and by biases, their standard
+    deviations (n, 2), and the sensor and the piece of each.
+    """
+
+    residuals: Floats
+    own: Floats
+    of_bias: Floats
+    stds: Floats
+    sensors: Ints
+    pieces: Ints
+
+
+def _pieces(pairs: Pairs, length: float) -> tuple[Ints, Floats, Floats]:
+    """(n,) number of the piece of a track that each pair is of, -1: of none; their middles, s, and states there."""
+    keys = np.stack([pairs.tracks, np.floor(pairs.times / length).astype(np.int64)], axis=1)
+    _, pieces, counts = np.unique(keys, axis=0, return_inverse=True, return_counts=True)
+    numbers = np.where(counts >= _LEAST_PAIRS, np.cumsum(counts >= _LEAST_PAIRS) - 1, -1)
+    pieces = numbers[pieces.ravel()]
+    middles, states = np.zeros(numbers.max(initial=-1) + 1), np.zeros((numbers.max(initial=-1) + 1, 4))
+    for w in range(len(middles)):
+        own = pieces == w
+        middles[w] = pairs.times[own].mean()
+        moved = pairs.states[own]
+        moved[:, :2] += (middles[w] - pairs.times[own])[:, None] * moved[:, 2:]
+        states[w] = moved.mean(axis=0)
+    return pieces, middles, states
+
+
+def _linearised(
+    pairs: Pairs, sites: Sequence[Site], biases: Floats, pieces: Ints, middles: Floats, states: Floats
+) -> tuple[Floats, Floats, Floats]:
+    """(n, 2) residuals, and what they lose by (n, 2, 4) the states of the pieces and (n, 2, 5) the sensor's biases."""
+    num = len(pairs.times)
+    residuals, own, of_bias = np.zeros((num, 2)), np.zeros((num, 2, 4)), np.zeros((num, 2, 5))
+    for s, site in enumerate(sites):
+        rows = np.flatnonzero((pairs.sensors == s) & (pieces >= 0))
+        if not len(rows):
+            continue
+        names, bias = COMPONENTS[site.kind], dict(zip(BIASES, biases[s].tolist(), strict=True))
+        piece = states[pieces[rows]]
+        after = (pairs.times[rows] - bias["clock"] - middles[pieces[rows]])[:, None]
+        moves = 0.0 if site.kind == "position" else biases[s, 3:]
+        offsets = piece[:, :2] + after * piece[:, 2:] - (pairs.poses[rows] - moves)
+        slopes, dim = _slopes(offsets, site.kind), len(names)
+        predicted = _measured_of(offsets, pairs.poses[rows] - moves, site.kind)
+        predicted += [bias[name] for name in names]
+        residuals[rows, :dim] = _wrapped(pairs.measured[rows, :dim] - predicted, site.kind)
+        own[rows, :dim] = np.concatenate([slopes, after[..., None] * slopes], axis=2)
+        of_bias[rows, :dim, 2] = -(slopes @ piece[:, 2:, None])[..., 0]
+        if site.kind != "position":
+            of_bias[rows, :dim, 3:] = slopes
+        for i, name in enumerate(names):
+            of_bias[rows, i, BIASES.index(name)] = 1.0
+    return residuals, own, of_bias
+
+
+def _spreads(residuals: Floats, sensors: Ints, pieces: Ints, stds: Floats) -> Floats:
+    """(num_sensors, 2) robust standard deviations of residuals, at most those given; those where too few say."""
+    found = stds.copy()
+    for s in range(len(stds)):
+        own = residuals[(sensors == s) & (pieces >= 0)]
+        if len(own) >= _LEAST_PAIRS:
+            found[s] = np.clip(_MAD * np.median(np.abs(own), axis=0), 0.01 * stds[s], stds[s])
+    return found
+
+
+def _solved(rows: _Rows, biases: Floats, unknown: Floats, num_pieces: int) -> tuple[Floats, Floats]:
+    """Changes of the biases and of the states of the pieces, which are eliminated first, each piece by itself."""
+    num, size = biases.shape
+    hold = unknown.ravel() ** -2.0
+    left, right = np.diag(hold), -hold * biases.ravel()
+    prior, parts = np.diag([_POSITION**-2.0] * 2 + [_SPEED**-2.0] * 2), []
+    sizes = np.abs(rows.residuals) / rows.stds
+    weights = np.minimum(1.0, _HUBER / np.maximum(sizes, _HUBER)) / rows.stds**2
+    for w in range(num_pieces):
+        of = np.flatnonzero(rows.pieces == w)
+        all_biases = np.zeros((len(of), 2, num, size))
+        all_biases[np.arange(len(of)), :, rows.sensors[of]] = rows.of_bias[of]
+        biased, own = all_biases.reshape(-1, num * size), rows.own[of].reshape(-1, 4)
+        weight, residual = weights[of].reshape(-1, 1), rows.residuals[of].reshape(-1)
+        inner, cross = own.T @ (weight * own) + prior, own.T @ (weight * biased)
+        slope = (weight * own).T @ residual
+        gain = np.linalg.solve(inner, np.column_stack([cross, slope]))
+        left += biased.T @ (weight * biased) - cross.T @ gain[:, :-1]
+        right += (weight * biased).T @ residual - cross.T @ gain[:, -1]
+        parts.append(gain)
+    change = np.asarray(np.linalg.solve(left, right), np.float64)
+    changes = np.array([gain[:, -1] - gain[:, :-1] @ change for gain in parts], np.float64)
+    return change.reshape(num, size), changes.reshape(num_pieces, 4)

@@ -1,0 +1,169 @@
+"""Recorded scans in order of time, and what becomes of them without the biases of the sensors."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, fields
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from vedette.kernels.base.types import Floats
+from vedette.models.arguments import reject
+from vedette.tracking import SensorScan
+
+Bearings = Literal["east", "north"]
+
+# Components of a measurement of a kind, by their quantities.
+COMPONENTS = {
+    "bearing_range": ("bearing", "range"),
+    "bearing_only": ("bearing",),
+    "range_only": ("range",),
+    "position": ("x", "y"),
+}
+
+_LEAST_RANGE = 1.0  # m; what a bias leaves of a range
+
+
+@dataclass(frozen=True, slots=True)
+class Site:
+    """A sensor of a recording.
+
+    Attributes:
+        name: as the rows name it; its number, from 1, will do too.
+        kind: of its measurements, a key of `COMPONENTS`.
+        pose: [px, py, heading_rad, ...] where the rows do not say.
+    """
+
+    name: str
+    kind: str
+    pose: tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Bias:
+    """What the rows of a sensor say too much.
+
+    Attributes:
+        range: m; ranges that would be below 1 m without it are taken as 1 m.
+        bearing: rad, in the rows' own direction: clockwise where bearings are from the north.
+        clock: s; how far its times are ahead.
+        x, y: m; of where the sensor is said to be, or of the positions that it measures.
+
+    Raises:
+        InputError: a number that is not finite.
+    """
+
+    range: float = 0.0
+    bearing: float = 0.0
+    clock: float = 0.0
+    x: float = 0.0
+    y: float = 0.0
+
+    def __post_init__(self) -> None:
+        for each in fields(self):
+            if not math.isfinite(value := getattr(self, each.name)):
+                raise reject(f"Bias.{each.name}", "a finite number", value)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RecordedScans:
+    """Scans at the instants at which any sensor scanned.
+
+    Attributes:
+        times: (num_instants,) s after the first, increasing.
+        start: s; the recorded time of the first: since 1970 UTC where times were dates.
+        is_utc: whether they were.
+        scans: for each instant one a sensor: (num, meas_dim) measurements as filters take them; None: it did not scan.
+        poses: (num_instants, num_sensors, 3 or more), each sensor where it was when it scanned last.
+        skipped: what was wrong with the rows that were left out.
+    """
+
+    times: Floats
+    start: float
+    is_utc: bool
+    scans: tuple[tuple[Floats | None, ...], ...]
+    poses: Floats
+    skipped: tuple[str, ...] = ()
+
+    def arrivals(self) -> Iterator[SensorScan]:
+        """Every scan by itself, in order of time, as `LateScans` takes them; times as of `times`."""
+        for time, scans, poses in zip(self.times.tolist(), self.scans, self.poses, strict=True):
+            for s, scan in enumerate(scans):
+                if scan is not None:
+                    yield SensorScan(s, time, scan, poses[s])
+
+    @property
+    def num_measurements(self) -> int:
+        """Of all scans."""
+        return sum(len(scan) for scans in self.scans for scan in scans if scan is not None)
+
+
+class Look(NamedTuple):
+    """A scan of one sensor: when, which, (num, meas_dim) what it measured and (3 or more,) from where."""
+
+    time: float
+    sensor: int
+    scan: Floats
+    pose: Floats
+
+
+def in_order(
+    looks: Iterable[Look], poses: Floats, start: float, is_utc: bool, skipped: tuple[str, ...]
+) -> RecordedScans:
+    """The scans of a recording, those of one time as an instant.
+
+    Args:
+        looks: in any order, at most one of a sensor at a time.
+        poses: (num_sensors, 3 or more) the sensors before they first scan.
+        start: of the times of the looks, see `RecordedScans`.
+        is_utc, skipped: as of `RecordedScans`.
+    """
+    instants: dict[float, dict[int, Look]] = {}
+    for look in looks:
+        instants.setdefault(look.time, {})[look.sensor] = look
+    times, at = np.array(sorted(instants)), poses.copy()
+    found, places = [], np.empty((len(times), *poses.shape))
+    for k, time in enumerate(times.tolist()):
+        for s, look in instants[time].items():
+            at[s, : len(look.pose)] = look.pose
+        places[k] = at
+        found.append(tuple(instants[time][s].scan if s in instants[time] else None for s in range(len(poses))))
+    return RecordedScans(times - times[0], start + float(times[0]), is_utc, tuple(found), places, skipped)
+
+
+def without_biases(
+    recording: RecordedScans, sites: Sequence[Site], biases: Sequence[Bias], bearings: Bearings | None
+) -> RecordedScans:
+    """The recording as sensors without these biases would have made it.
+
+    Args:
+        recording: as it was.
+        sites: the sensors.
+        biases: one a sensor.
+        bearings: from where the rows count bearings, whose direction a bearing's bias has.
+    """
+    looks = []
+    for time, scans, poses in zip(recording.times.tolist(), recording.scans, recording.poses, strict=True):
+        for s, scan in enumerate(scans):
+            if scan is not None:
+                looks.append(_without_bias(Look(time, s, scan, poses[s]), sites[s].kind, biases[s], bearings))
+    return in_order(looks, recording.poses[0], recording.start, recording.is_utc, recording.skipped)
+
+
+def _without_bias(look: Look, kind: str, bias: Bias, bearings: Bearings | None) -> Look:
+    if bias == Bias():
+        return look
+    turn = -bias.bearing if bearings == "north" else bias.bearing
+    own = {"bearing": turn, "range": bias.range, "x": bias.x, "y": bias.y}
+    scan = look.scan - [own[component] for component in COMPONENTS[kind]]
+    pose = look.pose.copy()
+    for i, component in enumerate(COMPONENTS[kind]):
+        if component == "range":
+            scan[:, i] = np.maximum(scan[:, i], _LEAST_RANGE)
+        elif component == "bearing":
+            scan[:, i] = np.remainder(scan[:, i] + math.pi, 2.0 * math.pi) - math.pi
+    if kind != "position":
+        pose[:2] -= bias.x, bias.y
+    return Look(look.time - bias.clock, look.sensor, scan, pose)

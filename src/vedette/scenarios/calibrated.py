@@ -1,0 +1,179 @@
+"""What a file about sensors says of them, as parameters to be found; and the file with what was found."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from pathlib import Path as FilePath
+
+import numpy as np
+
+from vedette.calibration import Calibration, Parameter, Problem
+from vedette.filters import Limits, SequentialLmbFilter, shared_targets
+from vedette.kernels.base.types import Floats
+from vedette.models import Region, SensorModel
+from vedette.plausible import told_elsewhere
+from vedette.reading import read_text
+from vedette.recorded import Bias
+from vedette.recorded.instants import COMPONENTS
+from vedette.scenarios.build import build_sensors
+from vedette.scenarios.dumping import dump_data
+from vedette.scenarios.loading import Scenario
+from vedette.scenarios.sections.recording import sites_of
+from vedette.scenarios.sections.sensors import Sensor
+from vedette.scenarios.yaml_reader import MOST_BYTES, read_yaml
+from vedette.tracking import Central, Tracker
+
+_LIMITS = Limits(min_existence=1e-3)
+_DEGREE = 180.0 / math.pi
+# A standard deviation from which on nothing is known: of biases; of logarithms, of log-odds.
+_UNKNOWN = {"range": 1000.0, "bearing": 10.0, "clock": 5.0, "x": 1000.0, "y": 1000.0}
+_UNKNOWN_LOG, _UNKNOWN_ODDS = 1.0, 4.0
+_WIDER = 3.0  # times the region, along each axis: what is turned or shifted stays in it
+_LEAST_RATE, _SUREST = 0.01, 0.98  # to start from
+
+
+def problem_of(scenario: Scenario, *, position: bool = False) -> Problem:
+    """The sensors of a recording as parameters to be found.
+
+    Biases of range, bearing and clock, noise, probability of detection and rate of clutter: what each sensor has of
+    these. The clock of the first sensor is what those of the others are compared with; of sensors that all measure
+    positions, what it measures is; where places are asked for, its place and bearing are. The likelihood is that of an
+    LMB filter that takes the scans in turn, with the motion, survival and births of the scenario.
+
+    Args:
+        scenario: as of `vedette.scenarios.of_recording`.
+        position: whether biases of the other sensors' own places are asked for, too.
+    """
+    model, folder = scenario.model, scenario.folder
+    assert model.recording is not None
+    recording = model.recording.model_copy(update={"biases": {}}).build(model, folder)
+    sites, section = tuple(sites_of(model)), model.recording
+    said = [section.biases[site.name].build() if site.name in section.biases else Bias() for site in sites]
+    parameters, only_positions = list[Parameter](), all(site.kind == "position" for site in sites)
+    for s, sensor in enumerate(model.sensors):
+        if any(scans[s] is not None for scans in recording.scans):
+            clockwise = section.bearings == "north"
+            parameters += _biases(s, sensor, said[s], clockwise, position, only_positions)
+            parameters += _of_models(s, sensor)
+    targets = shared_targets([sensor.filter for sensor in build_sensors(scenario)])
+    region, method = model.region.build(), model.filter.gaussian_method
+
+    wide = _widened(region)
+
+    def tracker(values: Floats) -> tuple[Tracker, Floats]:
+        known, more = list[SensorModel](), np.zeros(len(model.sensors))
+        with told_elsewhere():
+            for sensor in _with_values(model.sensors, parameters, values.tolist()):
+                # The density of clutter must not end where a bias that is tried may take a measurement.
+                widens = sensor.clutter.kind == "region"
+                if widens:
+                    clutter = sensor.clutter.model_copy(update={"rate": _WIDER**2 * sensor.clutter.rate})
+                    more[len(known)] = clutter.rate - sensor.clutter.rate
+                    sensor = sensor.model_copy(update={"clutter": clutter})
+                known.append(sensor.build(wide if widens else region, method, folder, model.filter.detection_at))
+        return Central(SequentialLmbFilter(targets, tuple(known), _LIMITS)), more
+
+    return Problem(recording, sites, section.bearings, tuple(said), tuple(parameters), tracker)
+
+
+def _widened(region: Region) -> Region:
+    """The region with the same middle."""
+    sides = []
+    for low, high in ((region.x_min, region.x_max), (region.y_min, region.y_max)):
+        middle, reach = 0.5 * (low + high), 0.5 * _WIDER * (high - low)
+        sides += [middle - reach, middle + reach]
+    return Region(*sides)
+
+
+def _biases(
+    s: int, sensor: Sensor, said: Bias, clockwise: bool, position: bool, only_positions: bool
+) -> Iterator[Parameter]:
+    """Of what a sensor measures, of its clock, and where asked of its place."""
+    components = COMPONENTS[sensor.measurement.kind]
+    asked = [*components]
+    if s > 0:  # a shift in time of all changes nothing, nor does one in space, nor a turn
+        asked += ["clock", *(("x", "y") if position and "x" not in components else ())]
+    elif only_positions:
+        asked = []
+    elif position and "bearing" in components:
+        asked.remove("bearing")
+    for name in asked:
+        turns = name == "bearing"
+        per_si = (-_DEGREE if clockwise else _DEGREE) if turns else 1.0
+        start = getattr(said, name) * abs(per_si)
+        called, unit = ("bearing_deg", "deg") if turns else (name, "s" if name == "clock" else "m")
+        yield Parameter(s, "bias", name, called, unit, start, per_si, "plain", _UNKNOWN[name])
+
+
+def _of_models(s: int, sensor: Sensor) -> Iterator[Parameter]:
+    """Of noise, detection and clutter what the sections have numbers for."""
+    noise, components = sensor.noise, COMPONENTS[sensor.measurement.kind]
+    for i, component in enumerate(components):
+        unit, per_si, name = "rad" if component == "bearing" else "m", 1.0, ""
+        if noise.kind == "range_dependent":
+            name = f"sigma_{component}"
+            if component == "bearing":
+                name, unit, per_si = "sigma_bearing_deg", "deg", _DEGREE
+            start = getattr(noise, name)
+        elif noise.kind in ("constant", "by_axis"):
+            name, start = f"std.{i}", noise.std[i]
+        if name:
+            yield Parameter(s, "noise", component, f"noise.{name}", unit, start, per_si, "log", _UNKNOWN_LOG)
+    if (probability := getattr(sensor.detection, "probability", None)) is not None:
+        start = min(max(probability, 1.0 - _SUREST), _SUREST)
+        yield Parameter(s, "detection", "", "detection.probability", "", start, 1.0, "logit", _UNKNOWN_ODDS)
+    if (rate := getattr(sensor.clutter, "rate", None)) is not None:
+        start = max(rate, _LEAST_RATE)
+        yield Parameter(s, "clutter", "", "clutter.rate", "a scan", start, 1.0, "log", _UNKNOWN_LOG)
+
+
+def _with_values(
+    sensors: Sequence[Sensor], parameters: Sequence[Parameter], values: Sequence[float]
+) -> tuple[Sensor, ...]:
+    """The sections of the sensors with these values of what is not a bias."""
+    found = list(sensors)
+    for each, value in zip(parameters, values, strict=True):
+        if each.kind != "bias":
+            part = getattr(found[each.sensor], each.kind)
+            _, name, *at = each.name.split(".")
+            own = getattr(part, name)
+            items = [value if str(i) in at else item for i, item in enumerate(own)] if at else value
+            part = part.model_copy(update={name: items})
+            found[each.sensor] = found[each.sensor].model_copy(update={each.kind: part})
+    return tuple(found)
+
+
+def calibrated_text(scenario: Scenario, sensors: FilePath, calibration: Calibration, folder: FilePath) -> str:
+    """The file about the sensors with what was found in it: biases in `recording`, the rest at each sensor.
+
+    What was not found stays as it was; comments are lost.
+
+    Args:
+        scenario: of the recording.
+        sensors: the file that it was made with.
+        calibration: what was found.
+        folder: where the new file is to stand; elsewhere than the old one, files that it names get absolute paths.
+    """
+    said = dict(read_yaml(read_text(sensors, "file about sensors", MOST_BYTES), str(sensors)).data)
+    known = scenario.model.recording
+    assert known is not None
+    biases = {name: bias.model_dump(exclude_defaults=True) for name, bias in known.biases.items()}
+    parameters = [each.parameter for each in calibration.found]
+    values = [_rounded(each.value) for each in calibration.found]
+    names = scenario.model.sensor_names
+    for each, value in zip(calibration.found, values, strict=True):
+        if each.parameter.kind == "bias" and not each.why:
+            biases.setdefault(names[each.parameter.sensor], {})[each.parameter.name] = value
+    said["recording"] = {**said.get("recording", {}), "biases": biases}
+    sections = _with_values(scenario.model.sensors, parameters, values)
+    said["sensors"] = [
+        {**own, **{kind: getattr(section, kind).model_dump(mode="json") for kind in ("noise", "detection", "clutter")}}
+        for own, section in zip(said["sensors"], sections, strict=True)
+    ]
+    return dump_data(said, None if folder.resolve() == sensors.parent.resolve() else sensors.parent)
+
+
+def _rounded(value: float) -> float:
+    """To seven digits, far beyond what is known."""
+    return float(f"{value:.7g}")

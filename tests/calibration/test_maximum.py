@@ -1,0 +1,77 @@
+"""The search for a maximum, against linear regression, whose maximum and information are known in closed form."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from vedette.calibration.maximum import covariance, maximise
+from vedette.kernels.base.types import Floats
+
+TRUTH = np.array([3.0, -2.0, 0.5])
+UNKNOWN = np.array([100.0, 50.0, 20.0])
+
+
+def design(seed: int, num: int = 400) -> tuple[Floats, Floats]:
+    """(num, 3) what was measured by, and (num,) what came."""
+    rng = np.random.default_rng(seed)
+    factors = rng.normal(size=(num, 3)) * [1.0, 0.3, 2.0]
+    return factors, factors @ TRUTH + rng.normal(size=num)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_regression_is_solved_and_its_information_found(seed: int) -> None:
+    factors, came = design(seed)
+    found = maximise(lambda x: -0.5 * (came - factors @ x) ** 2, np.zeros(3), UNKNOWN, [[0, 1, 2]])
+    best = np.linalg.lstsq(factors, came, rcond=None)[0]
+    exact = factors.T @ factors
+    assert found.converged
+    np.testing.assert_allclose(found.at, best, atol=1e-6)
+    np.testing.assert_allclose(found.information, exact, rtol=1e-6, atol=1e-5)
+    cov, lost = covariance(found.information, UNKNOWN)
+    np.testing.assert_allclose(cov, np.linalg.inv(exact), rtol=1e-5, atol=1e-9)
+    np.testing.assert_array_equal(lost, np.zeros((3, 3)))
+
+
+def test_a_direction_that_changes_nothing_is_named_and_not_followed() -> None:
+    factors, came = design(0)
+    factors[:, 1] = factors[:, 0]  # only the sum of the first two can be found
+    came = factors @ TRUTH
+    found = maximise(lambda x: -0.5 * (came - factors @ x) ** 2, np.zeros(3), np.full(3, 50.0), [[0, 1, 2]])
+    cov, lost = covariance(found.information, np.full(3, 50.0))
+    np.testing.assert_allclose(lost, [[0.5, -0.5, 0.0], [-0.5, 0.5, 0.0], [0.0, 0.0, 0.0]], atol=1e-4)
+    assert found.at[0] + found.at[1] == pytest.approx(1.0, abs=1e-4)
+    assert found.at[0] == pytest.approx(found.at[1], abs=1e-3)
+    summed = np.array([1.0, 1.0, 0.0])
+    reduced = factors[:, [0, 2]]
+    assert summed @ cov @ summed == pytest.approx(np.linalg.inv(reduced.T @ reduced)[0, 0], rel=1e-3)
+
+
+def test_small_jumps_hide_neither_the_maximum_nor_what_few_say_in_common() -> None:
+    factors, came = design(1)
+    factors[:, 1] = 0.3 * factors[:, 0] + 1e-4 * factors[:, 1]
+
+    def terms(x: Floats) -> Floats:
+        jumps = 1e-5 * np.sign(np.sin(1e5 * x.sum()))
+        return -0.5 * (came - factors @ x) ** 2 + jumps / len(came)
+
+    found = maximise(terms, np.zeros(3), np.full(3, 10.0), [[0, 1, 2]])
+    cov, lost = covariance(found.information, np.full(3, 10.0))
+    # The first two cannot be told apart; the third is as sure as if they were one.
+    assert np.diag(lost)[:2].sum() == pytest.approx(1.0, abs=1e-3)
+    reduced = factors[:, [0, 2]]
+    assert cov[2, 2] == pytest.approx(np.linalg.inv(reduced.T @ reduced)[1, 1], rel=0.05)
+
+
+def test_blocks_that_do_not_depend_on_each_other_need_no_second_differences() -> None:
+    factors, came = design(2)
+    calls = []
+
+    def terms(x: Floats) -> Floats:
+        calls.append(x)
+        first = -0.5 * (came - factors[:, 0] * x[0] - factors[:, 1] * x[1]) ** 2
+        return np.concatenate([first, -0.5 * (came - 2.0 * x[2]) ** 2])
+
+    found = maximise(terms, np.zeros(3), UNKNOWN, [[0, 1], [2]])
+    np.testing.assert_allclose(found.information[2], [0.0, 0.0, 4.0 * len(came)], rtol=1e-6, atol=1e-4)
+    assert found.at[2] == pytest.approx(came.mean() / 2.0, abs=1e-6)

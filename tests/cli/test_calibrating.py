@@ -1,0 +1,81 @@
+"""vedette calibrate: what it prints and writes, what it refuses, and that Ctrl-C leaves nothing behind."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner, Result
+
+from recordings import write_recording
+from vedette.calibration import Problem
+from vedette.cli import app
+
+
+@pytest.fixture
+def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    write_recording(tmp_path, seconds=60.0, biases={"boat": (300.0, 2.0, 0.0)})
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def call(*words: str) -> Result:
+    return CliRunner().invoke(app, list(words), env={"COLUMNS": "120"})
+
+
+def test_what_is_found_is_printed_and_its_file_is_tracked_with(place: Path) -> None:
+    result = call("calibrate", "scans.csv", "--sensors", "radars.yaml", "--out", "new/found.yaml")
+    assert result.exit_code == 0, result.output
+    assert "boat" in result.stdout
+    assert "noise.sigma_bearing_deg" in result.stdout
+    assert "clocks are against that of the first sensor" in result.stdout
+    assert "wrote new/found.yaml" in result.stdout
+    scores = []
+    for sensors in ("radars.yaml", "new/found.yaml"):
+        tracked = call("track", "scans.csv", "--sensors", sensors, "--truth", "truth.csv")
+        assert tracked.exit_code == 0, tracked.output
+        scores.append(float(tracked.stdout.split("mean OSPA ")[1].split(" ")[0]))
+    assert scores[1] < scores[0]
+
+
+def test_what_is_there_is_not_overwritten_unasked(place: Path) -> None:
+    result = call("calibrate", "scans.csv", "--sensors", "radars.yaml", "--out", "radars.yaml")
+    assert (result.exit_code, result.stderr) == (1, "radars.yaml: already there; --overwrite replaces it\n")
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("absent.csv", "--sensors", "radars.yaml"), "absent.csv: no such file"),
+        (("scans.csv", "--sensors", "absent.yaml"), "absent.yaml: no such file"),
+        (("radars.yaml", "--sensors", "radars.yaml"), "expected a .csv or .parquet file"),
+    ],
+)
+def test_files_that_are_not_there_are_told(place: Path, words: tuple[str, ...], message: str) -> None:
+    result = call("calibrate", *words)
+    assert result.exit_code == 1
+    assert message in result.stderr
+
+
+def test_a_bias_of_nobody_is_refused_by_name(place: Path) -> None:
+    text = (place / "radars.yaml").read_text("utf-8")
+    (place / "radars.yaml").write_text(text.replace("bearings: north", "bearings: north, biases: {Cowes: {range: 1}}"))
+    result = call("calibrate", "scans.csv", "--sensors", "radars.yaml")
+    assert result.exit_code == 1
+    assert "biases: expected sensors among 'Calshot', 'boat'; got Cowes" in result.stderr
+
+
+def test_interrupted_it_leaves_nothing(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    calls = []
+
+    def interrupted(problem: Problem, free: object) -> None:
+        calls.append(free)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Problem, "log_likelihoods", interrupted)
+    before = set(place.iterdir())
+    result = call("calibrate", "scans.csv", "--sensors", "radars.yaml", "--out", "found.yaml")
+    assert result.exit_code == 130
+    assert "interrupted: nothing was written" in result.stderr
+    assert len(calls) == 1
+    assert set(place.iterdir()) == before
