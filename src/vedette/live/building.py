@@ -7,7 +7,7 @@ from vedette.errors import InputError
 from vedette.live.loop import Live
 from vedette.models.arguments import reject
 from vedette.recorded import Site
-from vedette.recorded.scans import COMPONENTS
+from vedette.recorded.instants import COMPONENTS
 from vedette.scenarios.build import build_experiment, build_planner
 from vedette.scenarios.of_recording import OfSensors
 from vedette.tracking import LateScans
