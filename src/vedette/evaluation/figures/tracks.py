@@ -135,7 +135,10 @@ def _reach(records: Sequence[RunRecord]) -> float:
 
 
 def _positions(record: RunRecord) -> Floats:
-    return np.concatenate([record.truth.states[:, :2], record.poses[:, :, :2].reshape(-1, 2)])
+    """(n, 2) of targets, or where nobody knows these of estimates, and of sensors, m."""
+    known = record.truth.states[:, :2]
+    targets = [known] if len(known) else [estimate.means[:, :2] for estimate in record.estimates]
+    return np.concatenate([*targets, record.poses[:, :, :2].reshape(-1, 2)])
 
 
 def _draw_truth(axes: Axes, record: RunRecord, scale: float) -> None:
@@ -225,9 +228,11 @@ def _add_legend(figure: Figure, record: RunRecord, scene: Scene, shade: str = ""
     shades = [colour(index) for index in range(3)] if by_label else [shade or colour(0)]
     moved = bool((record.poses[:, :, :2] != record.poses[0, :, :2]).any())
     path: Any = {"linestyle": (0, (2.5, 1)), "linewidth": 1.6} if moved else {"linestyle": ""}
-    shown: dict[str, Any] = {
-        "target start": Line2D([], [], marker="o", **open_marker),
-        "target end": Line2D([], [], marker="^", **open_marker),
+    shown: dict[str, Any] = {}
+    if len(record.truth.ids):
+        shown["target start"] = Line2D([], [], marker="o", **open_marker)
+        shown["target end"] = Line2D([], [], marker="^", **open_marker)
+    shown |= {
         "estimates, by label" if by_label else "estimates": tuple(
             Line2D([], [], linestyle="", marker=".", color=each) for each in shades
         ),

@@ -1,5 +1,6 @@
 // One scan of a run in the plane. Of many sensors there is no room for the names; the pointer tells them.
 const MOST_NAMED = 20;
+const UNKNOWN = -1; // what is behind a measurement that was recorded
 const clipped = (name, most) => (name.length > most ? `${name.slice(0, most - 1)}\u2026` : name);
 function drawScene(canvas, run, step, show) {
   const { context, width, height } = prepared(canvas);
@@ -98,9 +99,10 @@ function drawMeasurements(context, run, view, step, s) {
   const [x, y] = run.poses[step][s];
   const kind = run.sensors[s].kind;
   for (const [origin, u, v] of (run.scans[step] ?? [])[s] ?? []) {
+    const weight = origin === UNKNOWN ? 0.5 : origin ? 1 : 0;
     context.strokeStyle = origin ? colours.ink : colours.grey;
-    context.globalAlpha = origin ? 0.95 : 0.6;
-    context.lineWidth = origin ? 1.6 : 1;
+    context.globalAlpha = 0.6 + 0.35 * weight;
+    context.lineWidth = 1 + 0.6 * weight;
     if (kind === "ray") {
       const reach = 2 * extentOf(run) * view.scale;
       line(context, view.x(x), view.y(y), view.x(x) + reach * Math.cos(u), view.y(y) - reach * Math.sin(u));
@@ -109,7 +111,7 @@ function drawMeasurements(context, run, view, step, s) {
       context.arc(view.x(x), view.y(y), Math.max(u, 0) * view.scale, 0, 2 * Math.PI);
       context.stroke();
     } else if (kind !== "none") {
-      const size = origin ? 4 : 2.5;
+      const size = 2.5 + 1.5 * weight;
       line(context, view.x(u) - size, view.y(v) - size, view.x(u) + size, view.y(v) + size);
       line(context, view.x(u) - size, view.y(v) + size, view.x(u) + size, view.y(v) - size);
     }

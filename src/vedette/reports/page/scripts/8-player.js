@@ -10,17 +10,20 @@ function startReplay(root) {
   function draw() {
     state.view = drawScene(part("scene"), run(), state.step, show());
     drawRewards(part("rewards"), run(), state.step);
-    drawErrors(part("errors"), run(), state.step);
+    if (run().known) drawErrors(part("errors"), run(), state.step);
     tell();
   }
 
   function tell() {
     const { times, truth, estimates, ospa, ospa_unit } = run();
-    const [total, localisation, cardinality] = ospa[state.step];
     const time = +times[state.step].toFixed(3);
-    const errors = `OSPA ${total.toFixed(1)}${ospa_unit && ` ${ospa_unit}`} (localisation ${localisation.toFixed(1)}, cardinality ${cardinality.toFixed(1)})`;
-    const counts = `${truth[state.step].length} targets, ${estimates[state.step].length} estimates`;
-    part("summary").textContent = `t = ${time} s: ${counts}, ${errors}`;
+    const words = [`${estimates[state.step].length} estimates`];
+    if (run().known) {
+      const [total, localisation, cardinality] = ospa[state.step];
+      words.unshift(`${truth[state.step].length} targets`);
+      words.push(`OSPA ${total.toFixed(1)}${ospa_unit && ` ${ospa_unit}`} (localisation ${localisation.toFixed(1)}, cardinality ${cardinality.toFixed(1)})`);
+    }
+    part("summary").textContent = `t = ${time} s: ${words.join(", ")}`;
     part("decision").textContent = decisionText();
     part("reward-title").textContent = run().reward ? `Reward (${run().reward})` : "Reward";
     tellWhy(part, run(), decisionAt(run(), state.step));
@@ -73,6 +76,8 @@ function startReplay(root) {
     part("scrubber").max = last();
     part("rewards").hidden = !run().decisions.some((decision) => decision.curves.length);
     part("nothing").hidden = run().scans.length > 0;
+    for (const name of ["errors", "errors-title"]) part(name).hidden = !run().known;
+    for (const name of ["reward-title", "decision", "why-title", "why-not"]) part(name).hidden = !run().decisions.length;
     go(Math.min(state.step, last()));
   }
 
