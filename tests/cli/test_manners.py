@@ -55,6 +55,8 @@ CALLS: list[tuple[tuple[str, ...], set[str]]] = [
     (("run", "short.yaml", "--planner", "still", "--out", "run"), {"decisions", "ospa", "seconds", "health", "folder"}),
     (("results", "run"), {"decisions", "ospa", "written"}),
     (("track", "scans.csv", "--sensors", "radars.yaml", "--out", "tracked"), {"ospa", "assumed", "skipped", "folder"}),
+    (("report", "tracked"), {"page", "figures"}),
+    (("video", "run", "--out", "run.gif", "--fps", "2", "--size", "200"), {"video", "frames", "seconds"}),
     (("campaign", "spec.toml", "--dry-run"), {"cells", "compared", "warnings"}),
     (("campaign", "spec.toml", "--workers", "1"), {"folder", "finished", "failed"}),
     (("results", "trial-results", "--export", "tables"), {"comparisons", "missing", "written"}),

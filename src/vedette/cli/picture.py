@@ -8,11 +8,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Ellipse, Patch, Wedge
+from matplotlib.patches import Ellipse, Patch
 from matplotlib.ticker import MaxNLocator
 
 from vedette.evaluation.figures.labels import drawn_text
-from vedette.evaluation.figures.scene import draw_zones, name_offsets, zone_handles
+from vedette.evaluation.figures.scene import draw_field, draw_zones, name_offsets, zone_handles
 from vedette.evaluation.figures.style import (
     COLUMN_WIDTH,
     GREY,
@@ -25,7 +25,7 @@ from vedette.evaluation.figures.style import (
 )
 from vedette.kernels.base.types import Floats
 from vedette.scenarios import Scenario
-from vedette.scenarios.views import FieldOfView, field_of_view, zones
+from vedette.scenarios.views import field_of_view, zones
 from vedette.simulation import Truth
 
 _MARGIN = 0.04  # of the drawn extent
@@ -100,16 +100,11 @@ def _draw_sensors(axes: Axes, scenario: Scenario, scale: float) -> None:
             _draw_heading(axes, place, np.radians(sensor.heading_deg))
         field = field_of_view(sensor)
         if field is not None and np.isfinite(field.reach):
-            _draw_field(axes, place, field, scale)
+            draw_field(axes, place, field, scale)
         axes.plot(*place, marker="s", markersize=6, color=INK, zorder=5)
         paper = {"boxstyle": "square,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.75}
         style: dict[str, Any] = {"textcoords": "offset points", "fontsize": 7, "zorder": 4.5, "bbox": paper}
         axes.annotate(drawn_text(name), place, **offset, **style)
-
-
-def _draw_field(axes: Axes, place: tuple[float, float], field: FieldOfView, scale: float) -> None:
-    sides = np.degrees([field.middle - field.half_width, field.middle + field.half_width])
-    axes.add_patch(Wedge(place, field.reach * scale, *sides, facecolor=GREY, alpha=0.15, linewidth=0, zorder=1))
 
 
 def _draw_heading(axes: Axes, place: tuple[float, float], heading: float) -> None:

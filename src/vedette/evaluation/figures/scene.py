@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.patches import Patch, Polygon
+from matplotlib.patches import Patch, Polygon, Wedge
 
 from vedette.evaluation.figures.labels import drawn_text
 from vedette.evaluation.figures.style import GREY, INK
 from vedette.kernels.base.types import Floats
 from vedette.scenarios import Scenario
 from vedette.scenarios.sections.planners import STRATEGIES, NamedIndependent, NamedJoint, NamedLookahead
-from vedette.scenarios.views import HOLE, INSIDE, NO_GO, REGION, Zone, zones
+from vedette.scenarios.views import HOLE, INSIDE, NO_GO, REGION, FieldOfView, Zone, zones
 from vedette.text import elided
 
 _NEAR = 0.1  # of the extent of a figure
@@ -88,6 +88,13 @@ def draw_zones(axes: Axes, drawn: Sequence[Zone], scale: float) -> None:
     """Draw zones into axes, in metres times `scale`."""
     for zone in drawn:
         axes.add_patch(Polygon(scale * np.array(zone.corners), zorder=1.5, **{"fill": False, **_ZONES[zone.kind]}))
+
+
+def draw_field(axes: Axes, place: tuple[float, float], field: FieldOfView, scale: float) -> Patch:
+    """Shade what a sensor sees, at a place that is in metres times `scale` already."""
+    sides = np.degrees([field.middle - field.half_width, field.middle + field.half_width])
+    wedge = Wedge(place, field.reach * scale, *sides, facecolor=GREY, alpha=0.15, linewidth=0, zorder=1)
+    return axes.add_patch(wedge)
 
 
 def zone_handles(drawn: Sequence[Zone]) -> Iterator[Patch]:
