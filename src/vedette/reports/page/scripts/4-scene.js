@@ -2,9 +2,9 @@
 const MOST_NAMED = 20;
 const UNKNOWN = -1; // what is behind a measurement that was recorded
 const clipped = (name, most) => (name.length > most ? `${name.slice(0, most - 1)}\u2026` : name);
-function drawScene(canvas, run, step, show) {
+function drawScene(canvas, run, step, show, camera, ghost) {
   const { context, width, height } = prepared(canvas);
-  const view = viewOf(run, width, height);
+  const view = viewOf(run, width, height, camera);
   if (view.scale <= 0) return view; // not laid out yet
   drawAxes(context, run, view, width, height);
   context.save();
@@ -14,11 +14,32 @@ function drawScene(canvas, run, step, show) {
   drawZones(context, run, view);
   if (show.measurements) run.sensors.forEach((_, s) => drawMeasurements(context, run, view, step, s));
   if (show.trails) drawTrails(context, run, view, step);
+  if (ghost) drawGhost(context, ghost, view, Math.min(step, ghost.times.length - 1));
   run.sensors.forEach((_, s) => drawSensor(context, run, view, step, s));
   run.truth[step].forEach((target) => drawTarget(context, view, target, show));
   run.estimates[step].forEach((estimate) => drawEstimate(context, run, view, estimate, show));
+  drawScale(context, view);
   context.restore();
   return view;
+}
+
+// Another run with the same luck, hollow: where its sensors are and went (squares), and its estimates (diamonds).
+function drawGhost(context, run, view, step) {
+  context.strokeStyle = colours.ink;
+  context.lineWidth = 1.2;
+  context.globalAlpha = 0.6;
+  context.setLineDash([1, 3]);
+  run.sensors.forEach((_, s) => polyline(context, view, run.poses.slice(0, step + 1).map((poses) => poses[s])));
+  context.setLineDash([]);
+  for (const [x, y] of run.poses[step]) context.strokeRect(view.x(x) - 6.5, view.y(y) - 6.5, 13, 13);
+  for (const [, x, y] of run.estimates[step]) {
+    const [px, py] = [view.x(x), view.y(y)];
+    context.beginPath();
+    [[0, -7], [7, 0], [0, 7], [-7, 0]].forEach(([dx, dy]) => context.lineTo(px + dx, py + dy));
+    context.closePath();
+    context.stroke();
+  }
+  context.globalAlpha = 1;
 }
 
 // The region, and where sensors may not go (hatched) or must stay.
