@@ -17,7 +17,15 @@ from vedette.errors import InputError
 from vedette.evaluation.comparison import Comparison
 from vedette.evaluation.figures.labels import drawn_text, short_label
 from vedette.evaluation.figures.ospa import draw_ospa
-from vedette.evaluation.figures.scene import Scene, draw_zones, name_offsets, zone_handles
+from vedette.evaluation.figures.scene import (
+    Scene,
+    draw_field,
+    draw_zones,
+    field_handles,
+    label_axes,
+    name_offsets,
+    zone_handles,
+)
 from vedette.evaluation.figures.style import (
     COLUMN_WIDTH,
     GREY,
@@ -29,6 +37,7 @@ from vedette.evaluation.figures.style import (
     styled,
 )
 from vedette.kernels.base.types import Floats, Ints
+from vedette.scenarios.views import field_of_view
 from vedette.simulation.records import Decision, RunRecord
 
 LARGE = 5000.0  # m, beyond which axes are in kilometres
@@ -114,20 +123,19 @@ def draw_tracks(axes: Axes, record: RunRecord, scale: float, scene: Scene, shade
     for sensor in range(record.num_sensors):
         _draw_sensor(axes, record, sensor, scale, scene)
     axes.set_aspect("equal")
-    axes.set_xlabel("x (m)" if scale == 1.0 else "x (km)")
 
 
 def frame_tracks(axes: Axes, records: Sequence[RunRecord], scale: float, scene: Scene) -> None:
     """Limits, shared by all panels, of a square around everything but a stray estimate; a label on the y axis."""
     points = np.concatenate([scene.corners, *(_positions(record) for record in records)]) * scale
     low, high = points.min(axis=0), points.max(axis=0)
-    axes.set_ylabel("y (m)" if scale == 1.0 else "y (km)")
     reach = 0.55 * max(float((high - low).max()), np.finfo(float).eps)
     middle = (low + high) / 2.0
     axes.set_xlim(middle[0] - reach, middle[0] + reach)
     axes.set_ylim(middle[1] - reach, middle[1] + reach)
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
+    label_axes(axes, scale, scene.origin if len(records) == 1 else None)
 
 
 def reach_of(records: Sequence[RunRecord]) -> float:
@@ -172,6 +180,9 @@ def recur(labels: Ints) -> bool:
 
 def _draw_sensor(axes: Axes, record: RunRecord, sensor: int, scale: float, scene: Scene) -> None:
     path = record.poses[:, sensor, :2] * scale
+    field = field_of_view(scene.sensors[sensor], record.poses[0, sensor].tolist()) if scene.sensors else None
+    if field is not None and np.isfinite(field.reach):
+        draw_field(axes, _point(path[0]), field, scale)
     axes.plot(path[:, 0], path[:, 1], color=GREY, linewidth=1.6, linestyle=(0, (2.5, 1)), zorder=5)
     if record.num_sensors > _MOST_NAMED:
         axes.plot(*path[0], marker="s", color=INK, markerfacecolor=GREY, markersize=4, markeredgewidth=0.5, zorder=6)
@@ -248,6 +259,9 @@ def add_legend(figure: Figure, record: RunRecord, scene: Scene, shade: str = "",
         shown["measurement"] = Line2D([], [], linestyle="", marker="x", color=INK, markersize=4)
     elif 0 < len(record.decisions) <= _MOST_DECISIONS and record.num_sensors <= _MOST_NAMED:
         shown["decision"] = Line2D([], [], linestyle="", marker="$\\rightarrow$", color=INK, markersize=8)
+    shown |= {
+        str(patch.get_label()): patch for patch in field_handles(scene.sensors, "" if is_video else ", first scan")
+    }
     shown |= {str(patch.get_label()): patch for patch in zone_handles(scene.zones)}
     columns = legend_columns(list(shown), width=figure.get_figwidth())
     by_parts = {tuple: HandlerTuple(ndivide=None, pad=0.0)}

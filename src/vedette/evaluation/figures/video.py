@@ -128,7 +128,6 @@ class _Drawing:
         self.figure.set_layout_engine("constrained", h_pad=0.08)  # as in `tracks_figure`
         self._axes: Axes = self.figure.subplots()
         self._axes.set_aspect("equal")
-        self._axes.set_xlabel("x (m)" if self._scale == 1.0 else "x (km)")
         draw_zones(self._axes, self._scene.zones, self._scale)
         frame_tracks(self._axes, [record], self._scale, self._scene)
         add_legend(self.figure, record, self._scene, is_video=True)

@@ -1,5 +1,6 @@
 // One scan of a run in the plane. Of many sensors there is no room for the names; the pointer tells them.
 const MOST_NAMED = 20;
+const HOLE = "hole of a no-go zone";
 const UNKNOWN = -1; // what is behind a measurement that was recorded
 const clipped = (name, most) => (name.length > most ? `${name.slice(0, most - 1)}\u2026` : name);
 function drawScene(canvas, run, step, show, camera, ghost) {
@@ -27,7 +28,7 @@ function drawScene(canvas, run, step, show, camera, ghost) {
 function drawGhost(context, run, view, step) {
   context.strokeStyle = colours.ink;
   context.lineWidth = 1.2;
-  context.globalAlpha = 0.6;
+  context.globalAlpha = 0.8;
   context.setLineDash([1, 3]);
   run.sensors.forEach((_, s) => polyline(context, view, run.poses.slice(0, step + 1).map((poses) => poses[s])));
   context.setLineDash([]);
@@ -44,29 +45,29 @@ function drawGhost(context, run, view, step) {
 
 // The region, and where sensors may not go (hatched) or must stay.
 function drawZones(context, run, view) {
-  for (const [kind, corners] of run.zones) {
+  run.zones.forEach(([kind, corners], place) => {
+    if (kind === HOLE) return; // drawn with its zone
+    const rest = run.zones.slice(place + 1);
+    const holes = rest.slice(0, rest.findIndex(([other]) => other !== HOLE) >>> 0).map(([, hole]) => hole);
     context.lineWidth = 1;
     context.strokeStyle = kind === "region" ? colours.grey : colours.ink;
     context.setLineDash({ region: [5, 4], "no-go zone": [] }[kind] ?? [8, 3, 2, 3]);
-    polygon(context, view, corners);
-    if (kind === "hole of a no-go zone") {
-      context.fillStyle = colours.paper;
-      context.setLineDash([]);
-      context.fill();
-    }
+    polygons(context, view, [corners, ...holes]);
     context.stroke();
     context.setLineDash([]);
     if (kind === "no-go zone") hatch(context, view);
+  });
+}
+
+function polygons(context, view, rings) {
+  context.beginPath();
+  for (const ring of rings) {
+    ring.forEach(([x, y], place) => (place ? context.lineTo(view.x(x), view.y(y)) : context.moveTo(view.x(x), view.y(y))));
+    context.closePath();
   }
 }
 
-function polygon(context, view, corners) {
-  context.beginPath();
-  corners.forEach(([x, y], place) => (place ? context.lineTo(view.x(x), view.y(y)) : context.moveTo(view.x(x), view.y(y))));
-  context.closePath();
-}
-
-// Fill the polygon that was just drawn with slanted lines.
+// Fill the polygons that were just drawn, but for their holes, with slanted lines.
 function hatch(context, view) {
   const { width, height } = view.inner;
   context.save();
