@@ -13,6 +13,7 @@ from matplotlib.ticker import MaxNLocator
 
 from vedette.evaluation.figures.labels import drawn_text
 from vedette.evaluation.figures.scene import (
+    bounded_field,
     draw_field,
     draw_zones,
     field_handles,
@@ -31,7 +32,7 @@ from vedette.evaluation.figures.style import (
 )
 from vedette.kernels.base.types import Floats
 from vedette.scenarios import Scenario
-from vedette.scenarios.views import field_of_view, zones
+from vedette.scenarios.views import zones
 from vedette.simulation import Truth
 
 _MARGIN = 0.04  # of the drawn extent
@@ -103,8 +104,8 @@ def _draw_sensors(axes: Axes, scenario: Scenario, scale: float) -> None:
         place = (sensor.position[0] * scale, sensor.position[1] * scale)
         if sensor.platform.top_speed > 0.0:
             _draw_heading(axes, place, np.radians(sensor.heading_deg))
-        field = field_of_view(sensor)
-        if field is not None and np.isfinite(field.reach):
+        field = bounded_field(sensor)
+        if field is not None:
             draw_field(axes, place, field, scale)
         axes.plot(*place, marker="s", markersize=6, color=INK, zorder=5)
         paper = {"boxstyle": "square,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.75}

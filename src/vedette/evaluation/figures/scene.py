@@ -52,6 +52,10 @@ class Scene:
         """What a sensor is called in a figure."""
         return drawn_text(elided(self.names[sensor], 20)) if self.names else f"sensor {sensor + 1}"
 
+    def field(self, sensor: int, pose: Floats) -> FieldOfView | None:
+        """What a sensor sees at a pose; None where that has no edge, or nobody knows."""
+        return bounded_field(self.sensors[sensor], pose) if sensor < len(self.sensors) else None
+
     def reward_title(self, of: str = "Reward") -> str:
         """`Reward (CS divergence)`."""
         return f"{of} ({self.reward})" if self.reward else of
@@ -112,6 +116,12 @@ def _turning(corners: Sequence[tuple[float, float]], *, left: bool) -> Floats:
     return np.asarray(ring if (area > 0.0) == left else ring[::-1])
 
 
+def bounded_field(sensor: Sensor, pose: Floats | None = None) -> FieldOfView | None:
+    """What a sensor sees at a pose, or where it starts; None where that has no edge."""
+    field = field_of_view(sensor, None if pose is None else pose.tolist())
+    return field if field is not None and np.isfinite(field.reach) else None
+
+
 def draw_field(axes: Axes, place: tuple[float, float], field: FieldOfView, scale: float) -> Patch:
     """Shade what a sensor sees, at a place that is in metres times `scale` already."""
     sides = np.degrees([field.middle - field.half_width, field.middle + field.half_width])
@@ -156,8 +166,7 @@ def _line(start: Floats, end: Floats) -> Callable[[Any], Any]:
 
 def field_handles(sensors: Sequence[Sensor], when: str = "") -> Iterator[Patch]:
     """What the shade of `draw_field` means, for a legend, if a sensor's view has an edge."""
-    fields = [field_of_view(sensor) for sensor in sensors]
-    if any(field is not None and np.isfinite(field.reach) for field in fields):
+    if any(bounded_field(sensor) is not None for sensor in sensors):
         yield Patch(color=GREY, alpha=0.15, linewidth=0, label=f"field of view{when}")
 
 

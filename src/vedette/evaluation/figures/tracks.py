@@ -37,7 +37,6 @@ from vedette.evaluation.figures.style import (
     styled,
 )
 from vedette.kernels.base.types import Floats, Ints
-from vedette.scenarios.views import field_of_view
 from vedette.simulation.records import Decision, RunRecord
 
 LARGE = 5000.0  # m, beyond which axes are in kilometres
@@ -180,8 +179,8 @@ def recur(labels: Ints) -> bool:
 
 def _draw_sensor(axes: Axes, record: RunRecord, sensor: int, scale: float, scene: Scene) -> None:
     path = record.poses[:, sensor, :2] * scale
-    field = field_of_view(scene.sensors[sensor], record.poses[0, sensor].tolist()) if scene.sensors else None
-    if field is not None and np.isfinite(field.reach):
+    field = scene.field(sensor, record.poses[0, sensor])
+    if field is not None:
         draw_field(axes, _point(path[0]), field, scale)
     axes.plot(path[:, 0], path[:, 1], color=GREY, linewidth=1.6, linestyle=(0, (2.5, 1)), zorder=5)
     if record.num_sensors > _MOST_NAMED:

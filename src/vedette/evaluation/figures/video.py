@@ -24,7 +24,6 @@ from vedette.evaluation.scans import LIE, Scans, code_of_sensors, in_plane, scan
 from vedette.files import write_whole
 from vedette.kernels.base.types import Floats, Ints
 from vedette.scenarios import Scenario
-from vedette.scenarios.views import field_of_view
 from vedette.simulation.records import RunRecord
 from vedette.simulation.scans import CLUTTER, Scan
 
@@ -194,8 +193,8 @@ class _Drawing:
         offsets = name_offsets(record.poses[step, :, :2], reach_of([record]))
         for s, (section, pose) in enumerate(zip(model.sensors, record.poses[step], strict=True)):
             place = (float(pose[0]) * self._scale, float(pose[1]) * self._scale)
-            field = field_of_view(section, pose.tolist())
-            if field is not None and np.isfinite(field.reach):
+            field = self._scene.field(s, pose)
+            if field is not None:
                 self._add(draw_field(self._axes, place, field, self._scale))
             path = record.poses[: step + 1, s, :2] * self._scale
             self._add(self._axes.plot(*path.T, color=GREY, linewidth=1.2, linestyle=(0, (2.5, 1)), zorder=3)[0])
