@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from PIL import Image
+from PIL.GifImagePlugin import GifImageFile
 from typer.testing import CliRunner, Result
 
 from recordings import write_recording
@@ -41,7 +41,7 @@ def test_a_gif_has_the_size_and_the_length_that_were_asked_for(runs: Path, tmp_p
     assert result.exit_code == 0, result.output
     assert result.stdout.strip() == f"wrote {out}: 10 frames, 2.0 s"
     assert [path.name for path in out.parent.iterdir()] == ["run.gif"]
-    with Image.open(out) as image:
+    with GifImageFile(out) as image:
         lasts = []
         for frame in range(image.n_frames):
             image.seek(frame)

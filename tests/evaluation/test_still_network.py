@@ -136,7 +136,7 @@ def test_zones_and_names_are_drawn(scenario: Scenario, records: dict[str, list[R
         drawn = [patch for patch in axes.patches if isinstance(patch, PathPatch)]
         assert len(drawn) == 3
         assert [patch.get_hatch() for patch in drawn] == [None, "////", None]
-        np.testing.assert_allclose(drawn[1].get_path().vertices[:4], POLYGON)
+        np.testing.assert_allclose(np.asarray(drawn[1].get_path().vertices)[:4], np.array(POLYGON))
         (low, high), (bottom, top) = axes.get_xlim(), axes.get_ylim()
         assert all(low < x < high and bottom < y < top for x, y in POLYGON)
         assert {text.get_text() for text in axes.texts} >= set(NAMES)
