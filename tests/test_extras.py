@@ -62,6 +62,7 @@ HEAVY = {
     ("show", "linear-10", "--out", "picture.png"): ("matplotlib", "report"),
     ("run", "linear-10", "--planner", "still", "--out", "run"): ("matplotlib and pyarrow", "report"),
     ("track", "scans.csv", "--sensors", "radars.yaml", "--out", "run"): ("matplotlib and pyarrow", "report"),
+    ("video", "there", "--out", "run.gif"): ("matplotlib and pyarrow", "report"),
     ("campaign", "spec.toml"): ("pyarrow", "campaigns"),
     ("results", "there"): ("pyarrow", "campaigns"),
     ("upgrade", "there"): ("pyarrow", "campaigns"),

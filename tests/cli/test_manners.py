@@ -60,6 +60,8 @@ CALLS: list[tuple[tuple[str, ...], set[str]]] = [
         ("calibrate", "scans.csv", "--sensors", "radars.yaml", "--out", "found.yaml"),
         {"found", "log_likelihood", "written"},
     ),
+    (("report", "tracked"), {"page", "figures"}),
+    (("video", "run", "--out", "run.gif", "--fps", "2", "--size", "200"), {"video", "frames", "seconds"}),
     (("campaign", "spec.toml", "--dry-run"), {"cells", "compared", "warnings"}),
     (("campaign", "spec.toml", "--workers", "1"), {"folder", "finished", "failed"}),
     (("results", "trial-results", "--export", "tables"), {"comparisons", "missing", "written"}),

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from matplotlib.patches import Polygon
+from matplotlib.patches import PathPatch, Wedge
 
 from evaluation.still_network import NAMES, POLYGON, STILL_NETWORK
 from evaluation.synthetic import ACTIONS, make_plan, make_record
@@ -28,13 +28,17 @@ from vedette.evaluation.figures import (
     scene_of,
     tracks_figure,
 )
+from vedette.evaluation.figures.scene import draw_zones
 from vedette.evaluation.figures.style import COLOURS, colour, sensor_looks
 from vedette.evaluation.runs import run_scenario
 from vedette.platforms import Actions
+from vedette.recorded import Origin
 from vedette.scenarios import Scenario, load_scenario
 from vedette.scenarios.overrides import with_fields
+from vedette.scenarios.views import HOLE, NO_GO, Zone
 from vedette.simulation.records import RunRecord
 
+SECTOR = {"kind": "limited_sector", "probability": 0.9, "max_range": 700.0, "half_width_deg": 60.0}
 STILL = Actions((), np.empty((1, 0)))
 
 
@@ -129,14 +133,50 @@ def test_zones_and_names_are_drawn(scenario: Scenario, records: dict[str, list[R
     picture = scenario_figure(scenario, truth_of(scenario))
     for figure in (tracks, picture):
         (axes,) = figure.axes
-        drawn = [patch for patch in axes.patches if isinstance(patch, Polygon)]
+        drawn = [patch for patch in axes.patches if isinstance(patch, PathPatch)]
         assert len(drawn) == 3
         assert [patch.get_hatch() for patch in drawn] == [None, "////", None]
-        np.testing.assert_allclose(drawn[1].get_xy()[:-1], POLYGON)
+        np.testing.assert_allclose(np.asarray(drawn[1].get_path().vertices)[:4], np.array(POLYGON))
         (low, high), (bottom, top) = axes.get_xlim(), axes.get_ylim()
         assert all(low < x < high and bottom < y < top for x, y in POLYGON)
         assert {text.get_text() for text in axes.texts} >= set(NAMES)
         assert {"region", "no-go zone", "sensors stay inside"} <= texts(figure)
+
+
+def test_a_hole_is_cut_out_whichever_way_round_it_is_given() -> None:
+    outer, hole = (((-a, -a), (a, -a), (a, a), (-a, a)) for a in (9.0, 3.0))
+    for corners in (outer, outer[::-1]):
+        for inner in (hole, hole[::-1]):
+            figure = Figure(figsize=(2.0, 2.0), dpi=100)
+            axes = figure.add_axes((0.0, 0.0, 1.0, 1.0), xlim=(-10.0, 10.0), ylim=(-10.0, 10.0))
+            draw_zones(axes, (Zone(NO_GO, corners), Zone(HOLE, inner)), 1.0)
+            canvas = FigureCanvasAgg(figure)
+            canvas.draw()
+            dark = np.asarray(canvas.buffer_rgba())[:, :, 0] < 200
+            assert not dark[75:125, 75:125].any()
+            assert dark[20:60, 20:180].mean() > 0.05
+
+
+def test_fields_and_degrees_are_drawn() -> None:
+    changes = {"origin": {"lon": -1.2, "lat": 50.7}, "sensors.*.detection": SECTOR}
+    scene = with_fields(load_scenario("paper-a"), changes)
+    record = run_scenario(scene, "still", seed=0)
+    figure = tracks_figure(record, scene=scene_of(scene, "still"))
+    (axes,) = figure.axes
+    wedges = [patch for patch in axes.patches if isinstance(patch, Wedge)]
+    assert [wedge.r for wedge in wedges] == [700.0, 700.0]
+    for wedge, pose in zip(wedges, record.poses[0], strict=True):
+        np.testing.assert_allclose(wedge.center, pose[:2])
+        np.testing.assert_allclose((wedge.theta1 + wedge.theta2) / 2.0, np.degrees(pose[2]))
+    figure.draw_without_rendering()
+    east, north = axes.child_axes
+    origin = Origin(-1.2, 50.7)
+    middle = np.mean([axes.get_xlim(), axes.get_ylim()], axis=1)
+    low, high = (origin.to_degrees([[x, middle[1]]])[0, 0] for x in axes.get_xlim())
+    np.testing.assert_allclose(east.get_xlim(), (low, high), atol=1e-6)
+    low, high = (origin.to_degrees([[middle[0], y]])[0, 1] for y in axes.get_ylim())
+    np.testing.assert_allclose(north.get_ylim(), (low, high), atol=1e-6)
+    assert (east.get_xlabel(), north.get_ylabel()) == ("longitude (\N{DEGREE SIGN})", "latitude (\N{DEGREE SIGN})")
 
 
 def test_one_colour_has_one_meaning_beside_the_errors(scenario: Scenario, records: dict[str, list[RunRecord]]) -> None:

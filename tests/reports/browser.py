@@ -28,6 +28,8 @@ os.dup2(events, 4)
 os.execv(sys.argv[3], sys.argv[3:])
 """
 _KEYS = {" ": (32, "Space", " "), "ArrowRight": (39, "ArrowRight", ""), "ArrowLeft": (37, "ArrowLeft", "")}
+_KEYS |= {"ArrowUp": (38, "ArrowUp", ""), "ArrowDown": (40, "ArrowDown", "")}
+_KEYS |= {"+": (187, "Equal", "+"), "-": (189, "Minus", "-"), "0": (48, "Digit0", "0")}
 _KEYS |= {"Home": (36, "Home", ""), "End": (35, "End", ""), "Tab": (9, "Tab", "")}
 
 
@@ -172,10 +174,30 @@ class Page:
         )
         return float(x), float(y)
 
-    def press(self, key: str) -> None:
+    def wheel(self, x: float, y: float, by: float) -> None:
+        """Turn the mouse's wheel at a place in the window; below 0: away from the hand."""
+        self.call("Input.dispatchMouseEvent", type="mouseWheel", x=x, y=y, deltaX=0, deltaY=by)
+
+    def drag(self, x: float, y: float, dx: float, dy: float) -> None:
+        """Press the mouse's button at a place in the window, move it in steps, and let it go."""
+        self.call("Input.dispatchMouseEvent", type="mousePressed", x=x, y=y, button="left", clickCount=1)
+        for share in (0.3, 0.7, 1.0):
+            place = {"x": x + share * dx, "y": y + share * dy}
+            self.call("Input.dispatchMouseEvent", type="mouseMoved", button="left", buttons=1, **place)
+        self.call("Input.dispatchMouseEvent", type="mouseReleased", x=x + dx, y=y + dy, button="left", clickCount=1)
+
+    def pinch(self, x: float, y: float, before: float, after: float) -> None:
+        """Put two fingers side by side around a place in the window, so many pixels from it, and move them apart."""
+        self.call("Emulation.setTouchEmulationEnabled", enabled=True, maxTouchPoints=2)
+        for kind, apart in (("touchStart", before), ("touchMove", (before + after) / 2), ("touchMove", after)):
+            points = [{"x": x - apart, "y": y, "id": 0}, {"x": x + apart, "y": y, "id": 1}]
+            self.call("Input.dispatchTouchEvent", type=kind, touchPoints=points)
+        self.call("Input.dispatchTouchEvent", type="touchEnd", touchPoints=[])
+
+    def press(self, key: str, *, shift: bool = False) -> None:
         """Press and release a key, wherever the focus is."""
         code, name, text = _KEYS[key]
-        common = {"key": key, "code": name, "windowsVirtualKeyCode": code}
+        common = {"key": key, "code": name, "windowsVirtualKeyCode": code, "modifiers": 8 if shift else 0}
         self.call("Input.dispatchKeyEvent", type="keyDown" if text else "rawKeyDown", text=text, **common)
         self.call("Input.dispatchKeyEvent", type="keyUp", **common)
 

@@ -18,6 +18,7 @@ from vedette.cli.running import run
 from vedette.cli.scenario_files import check, crowd, generate, init, list_, schema
 from vedette.cli.show import show
 from vedette.cli.tracking import track
+from vedette.cli.video import video
 
 app = typer.Typer(
     cls=Commands,
@@ -59,4 +60,5 @@ app.command()(speaking(reproduce))
 app.command()(speaking(campaign))
 app.command()(speaking(results))
 app.command()(speaking(report))
+app.command()(speaking(video))
 app.command()(speaking(upgrade))

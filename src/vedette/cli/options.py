@@ -16,7 +16,9 @@ ScenarioName = Annotated[
 SceneFile = Annotated[
     Path | None, typer.Argument(help="File to write, or a folder; none: a file named after the scene.")
 ]
-ResultsFolder = Annotated[Path, typer.Argument(metavar="DIR", help="Results folder of a campaign, finished or not.")]
+ResultsFolder = Annotated[
+    Path, typer.Argument(metavar="DIR", help="Results folder of a campaign, finished or not; or of a single run.")
+]
 Overwrite = Annotated[bool, typer.Option("--overwrite", "--force", help="Replace what is there.")]
 Seed = Annotated[int, typer.Option("--seed", min=0, help="Seed; with the run number it fixes every random number.")]
 Workers = Annotated[

@@ -8,14 +8,21 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Ellipse, Patch, Wedge
+from matplotlib.patches import Ellipse, Patch
 from matplotlib.ticker import MaxNLocator
 
 from vedette.evaluation.figures.labels import drawn_text
-from vedette.evaluation.figures.scene import draw_zones, name_offsets, zone_handles
+from vedette.evaluation.figures.scene import (
+    bounded_field,
+    draw_field,
+    draw_zones,
+    field_handles,
+    label_axes,
+    name_offsets,
+    zone_handles,
+)
 from vedette.evaluation.figures.style import (
     COLUMN_WIDTH,
-    GREY,
     INK,
     colour,
     legend_columns,
@@ -25,7 +32,7 @@ from vedette.evaluation.figures.style import (
 )
 from vedette.kernels.base.types import Floats
 from vedette.scenarios import Scenario
-from vedette.scenarios.views import FieldOfView, field_of_view, zones
+from vedette.scenarios.views import zones
 from vedette.simulation import Truth
 
 _MARGIN = 0.04  # of the drawn extent
@@ -36,7 +43,7 @@ _KILOMETRES_FROM = 4000.0  # m of extent
 def scenario_figure(scenario: Scenario, truth: Truth) -> Figure:
     """Region, tracks (circle: start, triangle: end), sensors (square, with the initial heading) and birth sites."""
     low, high = _extent(scenario, truth)
-    scale, unit = (1e-3, "km") if float((high - low).max()) > _KILOMETRES_FROM else (1.0, "m")
+    scale = 1e-3 if float((high - low).max()) > _KILOMETRES_FROM else 1.0
     aspect = float((high[1] - low[1]) / (high[0] - low[0]))
     figure = new_figure(float(np.clip(COLUMN_WIDTH * 0.85 * aspect, 1.5, 2.5 * COLUMN_WIDTH)) + 0.7)
     axes = figure.subplots()
@@ -49,8 +56,7 @@ def scenario_figure(scenario: Scenario, truth: Truth) -> Figure:
     axes.set_ylim(low[1] * scale, high[1] * scale)
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_major_locator(MaxNLocator(6, steps=[1, 2, 5, 10]))
-    axes.set_xlabel(f"x ({unit})")
-    axes.set_ylabel(f"y ({unit})")
+    label_axes(axes, scale, None if scenario.model.origin is None else scenario.model.origin.build())
     axes.set_title(drawn_text(scenario.name), pad=14)  # above the names of sensors at the upper edge
     handles = [*_legend(scenario), *zone_handles(zones(scenario.model))]
     columns = legend_columns([str(handle.get_label()) for handle in handles])
@@ -98,18 +104,13 @@ def _draw_sensors(axes: Axes, scenario: Scenario, scale: float) -> None:
         place = (sensor.position[0] * scale, sensor.position[1] * scale)
         if sensor.platform.top_speed > 0.0:
             _draw_heading(axes, place, np.radians(sensor.heading_deg))
-        field = field_of_view(sensor)
-        if field is not None and np.isfinite(field.reach):
-            _draw_field(axes, place, field, scale)
+        field = bounded_field(sensor)
+        if field is not None:
+            draw_field(axes, place, field, scale)
         axes.plot(*place, marker="s", markersize=6, color=INK, zorder=5)
         paper = {"boxstyle": "square,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.75}
         style: dict[str, Any] = {"textcoords": "offset points", "fontsize": 7, "zorder": 4.5, "bbox": paper}
         axes.annotate(drawn_text(name), place, **offset, **style)
-
-
-def _draw_field(axes: Axes, place: tuple[float, float], field: FieldOfView, scale: float) -> None:
-    sides = np.degrees([field.middle - field.half_width, field.middle + field.half_width])
-    axes.add_patch(Wedge(place, field.reach * scale, *sides, facecolor=GREY, alpha=0.15, linewidth=0, zorder=1))
 
 
 def _draw_heading(axes: Axes, place: tuple[float, float], heading: float) -> None:
@@ -119,17 +120,18 @@ def _draw_heading(axes: Axes, place: tuple[float, float], heading: float) -> Non
 
 
 def _legend(scenario: Scenario) -> list[Line2D | Patch]:
-    fields = [field_of_view(sensor) for sensor in scenario.model.sensors]
-    has_fields = any(field is not None and np.isfinite(field.reach) for field in fields)
     target: dict[str, Any] = {"color": INK, "linewidth": 1.0}
-    return [
+    ends = [
         Line2D([], [], marker="o", markerfacecolor="white", markersize=4.5, label="target start", **target),
         Line2D([], [], marker="^", markersize=5, label="target end", **target),
+    ]
+    return [
+        *(ends if scenario.model.targets.kind != "unknown" else []),
         Line2D([], [], linestyle="", marker="s", markersize=6, color=INK, label="sensor"),
         *(
             [Line2D([], [], linestyle="", marker="+", color=INK, label="birth site, 2 std")]
             if scenario.model.birth.sites
             else []
         ),
-        *([Patch(color=GREY, alpha=0.15, linewidth=0, label="field of view")] if has_fields else []),
+        *field_handles(scenario.model.sensors),
     ]

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from vedette.cli.output import console
@@ -14,6 +16,17 @@ if TYPE_CHECKING:
 _SHOWN_FAILURES = 3
 _LOG_SECONDS = 600.0
 _ROOM_FOR_BAR = 90
+
+
+@contextmanager
+def bar(what: str, total: int | None = None) -> Iterator[Callable[..., None]]:
+    """A bar on a terminal, told how much is done, and of how much unless that is known."""
+    from rich.progress import Progress
+
+    screen = console(stderr=True)
+    with Progress(console=screen, disable=not screen.is_terminal, transient=True) as shown:
+        task = shown.add_task(what, total=total)
+        yield lambda done, of=total: shown.update(task, completed=done, total=of)
 
 
 class CampaignProgress:

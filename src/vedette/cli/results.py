@@ -37,33 +37,84 @@ def report(
     ] = None,
     runs: Annotated[
         str | None,
-        typer.Option("--runs", metavar="CELL:RUN,...", help="Runs to replay; else the typical one of each strategy."),
+        typer.Option(
+            "--runs", metavar="CELL:RUN,...", help="Runs of a campaign to replay; else a typical one a strategy."
+        ),
     ] = None,
     trust: Annotated[
         bool, typer.Option("--trust", help="Run code that the scenarios of the results name, to draw measurements.")
     ] = False,
 ) -> None:
-    """Report on a campaign: one page that opens anywhere, with tables, figures and a replay of runs."""
+    """Report on a campaign or a run: one page that opens anywhere, with tables, figures and a replay of runs."""
     need("vedette report", "jinja2", "matplotlib", "pyarrow")
+    from vedette.simulation.storage import holds_run
+
     replays = None if runs is None else [_cell_and_run(text) for text in runs.split(",")]
+    is_run = holds_run(folder)
+    if is_run and runs is not None:
+        raise usage_error(f"expected of a campaign; {folder} holds a single run", "--runs")
     page = out or folder / "report.html"
     with interruptible("what is not yet written is missing; the same command writes it all anew"):
-        from vedette.campaigns.results import open_results
-        from vedette.reports import code_in_replays, write_figures, write_report
-
-        results = open_results(folder)
-        with named_options({"path": "--out", "replays": "--runs", "cell": "--runs"}):
-            write_report(results, page, replays=replays, trust=trust)
-        say(f"wrote {page}")
-        unmeasured = () if trust else code_in_replays(results)
-        if unmeasured:
-            note(f"without measurements, as drawing them runs {', '.join(unmeasured)}: --trust allows it")
-        written: Sequence[Path] = ()
-        if figures is not None:
-            with named_options({"path": "--figures"}):
-                written = write_figures(results, figures)
-            say(f"wrote {len(written)} files to {figures}")
+        written, unmeasured = (
+            _report_run(folder, page, figures, trust)
+            if is_run
+            else _report_campaign(folder, page, figures, replays, trust)
+        )
     publish({"page": page, "figures": written, "without_measurements_of": unmeasured})
+
+
+Reported = tuple[Sequence[Path], Sequence[str]]
+
+
+def _report_campaign(
+    folder: Path, page: Path, figures: Path | None, replays: list[tuple[str, int]] | None, trust: bool
+) -> Reported:
+    """The figures that were written, and code that was not run."""
+    from vedette.campaigns.results import open_results
+    from vedette.reports import code_in_replays, write_figures, write_report
+
+    results = open_results(folder)
+    with named_options({"path": "--out", "replays": "--runs", "cell": "--runs"}):
+        write_report(results, page, replays=replays, trust=trust)
+    unmeasured = () if trust else code_in_replays(results)
+    _tell_page(page, unmeasured)
+    return _figures(figures, lambda path: write_figures(results, path)), unmeasured
+
+
+def _report_run(folder: Path, page: Path, figures: Path | None, trust: bool) -> Reported:
+    from vedette.evaluation.scans import code_of_sensors
+    from vedette.reports import write_run_figures, write_run_report
+    from vedette.simulation.storage import read_manifest
+
+    record, scenario = saved_run(folder)
+    with named_options({"path": "--out"}):
+        write_run_report(record, scenario, page, manifest=read_manifest(folder), trust=trust)
+    unmeasured = () if trust else code_of_sensors(scenario)
+    _tell_page(page, unmeasured)
+    return _figures(figures, lambda path: write_run_figures(record, scenario, path)), unmeasured
+
+
+def _tell_page(page: Path, unmeasured: Sequence[str]) -> None:
+    say(f"wrote {page}")
+    if unmeasured:
+        note(f"without measurements, as drawing them runs {', '.join(unmeasured)}: --trust allows it")
+
+
+def _figures(folder: Path | None, write: Callable[[Path], Sequence[Path]]) -> Sequence[Path]:
+    if folder is None:
+        return ()
+    with named_options({"path": "--figures"}):
+        written = write(folder)
+    say(f"wrote {len(written)} files to {folder}")
+    return written
+
+
+def saved_run(folder: Path) -> tuple[RunRecord, Scenario]:
+    """A saved run and its scenario. Raises `VedetteError` for a folder that does not hold both."""
+    from vedette.scenarios import load_scenario
+    from vedette.simulation.storage import SCENARIO, load_run
+
+    return load_run(folder), load_scenario(folder / SCENARIO)
 
 
 def _cell_and_run(text: str) -> tuple[str, int]:
@@ -97,9 +148,7 @@ _FORMATS = ("parquet", "csv", "netcdf")
 
 
 def results(
-    folder: Annotated[
-        Path, typer.Argument(metavar="DIR", help="Results folder of a campaign, finished or not; or of a single run.")
-    ],
+    folder: ResultsFolder,
     export: Annotated[
         Path | None, typer.Option("--export", metavar="DIR", help="Folder for the results as files of other tools.")
     ] = None,

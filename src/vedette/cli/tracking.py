@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -13,7 +11,8 @@ from vedette.cli.compiling import compiling
 from vedette.cli.documents import run_document
 from vedette.cli.errors import named_options, usage_error
 from vedette.cli.options import BAD_ROWS, BadRows, Overwrite, SensorsFile, Speed, Trust
-from vedette.cli.output import console, note, publish, say
+from vedette.cli.output import note, publish, say
+from vedette.cli.progress import bar
 from vedette.cli.running import Approval, compile_if_cold, end_stopped, interruptible, print_run
 from vedette.cli.scenario_files import warn
 from vedette.extras import need
@@ -58,7 +57,7 @@ def track(
     with interruptible("nothing was written"):
         compile_if_cold(scenario)
         try:
-            with compiling(), _progress(len(recording.times)) as watch:
+            with compiling(), bar("scans", len(recording.times)) as watch:
                 record = run_scenario(scenario, "still", seed=0, watch=watch)
         except (RunStopped, RunInterrupted) as error:
             end_stopped(error, "nothing was written")
@@ -99,17 +98,6 @@ def read_recording(
     for text in found.assumed:
         note(f"not said, so {text}")
     return found
-
-
-@contextmanager
-def _progress(num_scans: int) -> Iterator[Callable[[int], None]]:
-    """A bar on a terminal, told of every scan that is done."""
-    from rich.progress import Progress
-
-    screen = console(stderr=True)
-    with Progress(console=screen, disable=not screen.is_terminal, transient=True) as bar:
-        task = bar.add_task("scans", total=num_scans)
-        yield lambda step: bar.update(task, completed=step)
 
 
 def _summary(record: RunRecord) -> str:

@@ -1,4 +1,4 @@
-"""The runs of a campaign, gathered by what is compared."""
+"""The runs of a campaign, gathered by what is compared; and a single run, compared with nothing."""
 
 from __future__ import annotations
 
@@ -17,7 +17,9 @@ from vedette.evaluation import Comparison, RunMetrics
 from vedette.evaluation.comparison import scored
 from vedette.evaluation.figures.scene import Scene, scene_of
 from vedette.evaluation.figures.style import strategy_label
+from vedette.evaluation.runs import measure_run
 from vedette.kernels.base.types import Bools
+from vedette.scenarios import Scenario
 from vedette.scenarios.sections.tracking import UNLABELLED
 from vedette.simulation.records import RunRecord
 from vedette.text import unused
@@ -121,6 +123,28 @@ def _group(results: CampaignResults, cells: tuple[Cell, ...], name: str, title: 
     return Group(name, title, tuple(strategies), missing, comparison, reason)
 
 
+def group_of_run(record: RunRecord, scenario: Scenario) -> Group:
+    """A run as a group of its own; compared with nothing, and measured where somebody knows the targets.
+
+    Raises:
+        InputError: a run of other sensors than the scenario has.
+    """
+    if record.num_sensors != (number := len(scenario.model.sensors)):
+        raise InputError(f"run: expected the {number} sensors of its scenario; got {record.num_sensors}")
+    settings = {"scenario": record.scenario, "planner": record.planner}
+    cell = Cell(_file_part(record.planner) or "run", settings, scenario, record.planner)
+    is_known = scenario.model.targets.kind != "unknown"
+    metrics = (measure_run(record, scenario),) if is_known else ()
+    strategy = Strategy(cell, record.planner, 1, (record,), metrics)
+    comparison, reason = None, "nobody knows the targets"
+    if is_known:
+        try:
+            comparison = scored(scenario, {strategy.label: [record]}, {strategy.label: metrics})
+        except InputError as error:  # such as a run that stopped before the scans that count
+            reason = str(error)
+    return Group("run", record.scenario, (strategy,), (), comparison, "" if comparison is not None else reason)
+
+
 def varying_axes(campaign: Campaign) -> tuple[str, ...]:
     """Axes with several values, the compared one left out."""
     return tuple(axis for axis, values in campaign.axes.items() if len(values) > 1 and axis != campaign.compare)
@@ -175,4 +199,8 @@ def _title(campaign: Campaign, cell: Cell) -> str:
 
 def _slug(campaign: Campaign, shared: Mapping[str, Any]) -> str:
     parts = [str(value) for axis, value in shared.items() if axis in varying_axes(campaign)]
-    return re.sub(r"[^A-Za-z0-9.]+", "-", "-".join(parts)).strip("-.") or "all"
+    return _file_part("-".join(parts)) or "all"
+
+
+def _file_part(name: str) -> str:
+    return re.sub(r"[^A-Za-z0-9.]+", "-", name).strip("-.")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -15,30 +14,27 @@ from vedette.evaluation import choices_of, match_run
 from vedette.evaluation.actions import action_axis, choice_words
 from vedette.evaluation.comparison import Choice
 from vedette.evaluation.figures.rewards import best_over_others, best_over_pair, first_pair
+from vedette.evaluation.scans import LIE, code_of_sensors, in_plane, scans_of_record
 from vedette.kernels.base.types import Floats
 from vedette.reports.groups import Strategy
 from vedette.reports.why import why_data
 from vedette.scenarios import Scenario
-from vedette.scenarios.build import build_scan_times, build_true_sensors, drop_outs
 from vedette.scenarios.sections.sensors import Sensor as SensorSection
-from vedette.scenarios.trust import code_of
 from vedette.scenarios.views import field_of_view
-from vedette.simulation.loop import scans_of_run
 from vedette.simulation.records import Decision, RunRecord
-from vedette.simulation.replay import scans_of_sensors
 from vedette.simulation.scans import Scan
-from vedette.simulation.true_sensors import scanning
 
 _DIGITS = 4  # of an extent that positions are kept to: well under a pixel
+_ANGLE_DIGITS = 4
 _SIGMAS = 2.0
 
 
 def replay_data(strategy: Strategy, record: RunRecord, group: str, *, trust: bool) -> dict[str, Any]:
     """Everything that the page shows of a run, as data for JSON; positions rounded to what can be seen.
 
-    Measurements are drawn again by the sensors' models; where a sensor gives no place in the plane, or the models
-    cannot be had, they are left out. Without `trust` they are left out too where drawing them would run code that the
-    scenario names.
+    Measurements are those of the recording, or drawn again by the sensors' models; where a sensor gives no place in the
+    plane, or they cannot be had, they are left out. Without `trust` they are left out too where drawing them would run
+    code that the scenario names. Where nobody knows the targets there are no errors.
     """
     scenario = strategy.cell.scenario
     extent = _extent(record, scenario)
@@ -46,6 +42,7 @@ def replay_data(strategy: Strategy, record: RunRecord, group: str, *, trust: boo
     scene, names, sections = strategy.scene, scenario.model.sensor_names, scenario.model.sensors
     sensors = [_sensor(name, section) for name, section in zip(names, sections, strict=True)]
     has_velocity = scenario.model.motion.kind != "custom"
+    is_known, origin = scenario.model.targets.kind != "unknown", scenario.model.origin
     axes = dict[str, dict[str, Any]]()
     decisions = [_decision(*each, axes, names) for each in zip(record.decisions, choices_of(record), strict=True)]
     return {
@@ -64,8 +61,11 @@ def replay_data(strategy: Strategy, record: RunRecord, group: str, *, trust: boo
             [_pose(pose, section, places) for pose, section in zip(poses, sections, strict=True)]
             for poses in record.poses
         ],
-        "scans": _scans(record, scenario, [sensor["kind"] for sensor in sensors], places, trust),
-        "ospa": [_rounded(parts, 2) for parts in record.ospa],
+        "scans": _scans(record, scenario, places, trust),
+        "recorded": scenario.model.recording is not None,
+        "known": is_known,
+        "origin": None if origin is None else [origin.lon, origin.lat],
+        "ospa": [_rounded(parts, 2) for parts in record.ospa] if is_known else [],
         "ospa_unit": scenario.model.ospa.unit,
         "axes": list(axes.values()),
         "reward": scene.reward,
@@ -88,8 +88,7 @@ def _extent(record: RunRecord, scenario: Scenario) -> tuple[float, float, float,
 
 def _sensor(name: str, section: SensorSection) -> dict[str, Any]:
     """What a sensor sees, for drawing: how a measurement lies in the plane, and its field where that has an edge."""
-    kinds = {"bearing_range": "point", "position": "position", "bearing_only": "ray", "range_only": "circle"}
-    found: dict[str, Any] = {"name": name, "kind": kinds.get(section.measurement.kind, "none")}
+    found: dict[str, Any] = {"name": name, "kind": LIE.get(section.measurement.kind, "none")}
     if section.detection.kind in ("limited_range", "limited_sector", "soft_sector"):
         found["range"] = section.detection.max_range
     if section.detection.kind in ("limited_sector", "soft_sector"):
@@ -152,35 +151,16 @@ def _ellipse(cov: Floats, places: int) -> list[float]:
     return [*_rounded(semi[::-1], places), round(math.atan2(axes[1, 1], axes[0, 1]), 3)]
 
 
-def code_of_sensors(scenario: Scenario) -> tuple[str, ...]:
-    """Code that drawing the measurements of a scenario would run."""
-    return tuple(
-        dict.fromkeys(
-            name
-            for sensor in scenario.model.sensors
-            for section in (sensor.measurement, sensor.noise, sensor.detection, sensor.clutter, sensor.truth)
-            if section is not None
-            for name in code_of(section)
-        )
-    )
+def _scans(record: RunRecord, scenario: Scenario, places: int, trust: bool) -> list[list[list[list[float]]]]:
+    """For each scan, for each sensor, its measurements: the target behind it (0: clutter, -1: unknown), where it lies.
 
-
-def _scans(
-    record: RunRecord, scenario: Scenario, kinds: Sequence[str], places: int, trust: bool
-) -> list[list[list[list[float]]]]:
-    """For each scan, for each sensor, its measurements: the target behind it (0: clutter), and where it lies.
-
-    Empty where the models of the scenario cannot be had.
+    Empty where the models of the scenario, or its recording, cannot be had.
     """
-    if all(kind == "none" for kind in kinds) or (code_of_sensors(scenario) and not trust):
+    kinds = [sensor.measurement.kind for sensor in scenario.model.sensors]
+    if not LIE.keys() & set(kinds) or (code_of_sensors(scenario) and not trust):
         return []
-    model = scenario.model
-    region, method = model.region.build(), model.filter.gaussian_method
     try:
-        sensors = [section.build(region, method, scenario.folder) for section in model.sensors]
-        true, times = build_true_sensors(scenario, sensors), build_scan_times(scenario)
-        scans_at = scans_of_run(times, drop_outs(scenario), record.num_scans, record.seed, record.run)
-        scans = scans_of_sensors(record, len(true), partial(scanning, true, scans_at))
+        scans = scans_of_record(record, scenario)
     except VedetteError:
         return []
     return [
@@ -190,21 +170,11 @@ def _scans(
 
 
 def _measurements(scan: Scan | None, kind: str, pose: Floats, places: int) -> list[list[float]]:
-    found: list[list[float]] = []
-    if scan is None:
-        return found
-    for origin, measurement in zip(scan.origins.tolist(), scan.measurements, strict=True):
-        if kind == "point":
-            bearing, distance = measurement[:2]
-            place = pose[:2] + distance * np.array([math.cos(bearing), math.sin(bearing)])
-            found.append([origin + 1, *_rounded(place, places)])
-        elif kind == "position":
-            found.append([origin + 1, *_rounded(measurement[:2], places)])
-        elif kind == "ray":
-            found.append([origin + 1, round(float(measurement[0]), 4)])
-        elif kind == "circle":
-            found.append([origin + 1, round(float(measurement[0]), places)])
-    return found
+    if scan is None or kind not in LIE:
+        return []
+    digits = _ANGLE_DIGITS if LIE[kind] == "ray" else places
+    lie = in_plane(scan.measurements, kind, pose)
+    return [[origin + 1, *_rounded(place, digits)] for origin, place in zip(scan.origins.tolist(), lie, strict=True)]
 
 
 def _decision(

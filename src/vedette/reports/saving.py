@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Iterable
 from pathlib import Path
 
 from vedette.campaigns.results import CampaignResults
@@ -11,8 +12,10 @@ from vedette.evaluation.figures import overview_figure, save_figure
 from vedette.evaluation.tables import decisions_markdown, strategy_csv, strategy_markdown
 from vedette.files import write_whole
 from vedette.kernels.base.types import Floats
-from vedette.reports.drawings import group_drawings, sweep_drawings, typical_records
-from vedette.reports.groups import Group, gather
+from vedette.reports.drawings import Drawing, group_drawings, sweep_drawings, typical_records
+from vedette.reports.groups import Group, gather, group_of_run
+from vedette.scenarios import Scenario
+from vedette.simulation.records import RunRecord
 
 MARKDOWN, CSV = "summary.md", "summary.csv"
 
@@ -54,26 +57,41 @@ def write_figures(results: CampaignResults, path: str | Path) -> tuple[Path, ...
     Raises:
         InputError: the folder cannot be written.
     """
-    folder = Path(path)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"path: expected a folder to write figures into; got {folder}: {error.strerror}") from error
+    folder = _made(path)
     written: list[Path] = []
     errors: dict[str, Floats] = {}
     several = len(results.campaign.groups()) > 1
     for group in gather(results):
         errors.update(run_errors(group))
         prefix = f"{group.name}-" if several else ""
-        for drawing in group_drawings(group):
-            written += save_figure(drawing.figure, folder / _file_name(f"{prefix}{drawing.name}"))
+        written += _save(group_drawings(group), folder, prefix)
         if group.comparison is not None:  # beside one another what the page has apart
             first, record = typical_records(group)[0]
             overview = overview_figure(record, group.comparison, strategy=first.label, scene=first.scene)
             written += save_figure(overview, folder / _file_name(f"{prefix}overview"))
-    for drawing in sweep_drawings(results.campaign, errors):
-        written += save_figure(drawing.figure, folder / _file_name(drawing.name))
-    return tuple(written)
+    return (*written, *_save(sweep_drawings(results.campaign, errors), folder))
+
+
+def write_run_figures(record: RunRecord, scenario: Scenario, path: str | Path) -> tuple[Path, ...]:
+    """As `write_figures`, every figure of the report of a single run."""
+    return tuple(_save(group_drawings(group_of_run(record, scenario)), _made(path)))
+
+
+def _made(path: str | Path) -> Path:
+    folder = Path(path)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"path: expected a folder to write figures into; got {folder}: {error.strerror}") from error
+    return folder
+
+
+def _save(drawings: Iterable[Drawing], folder: Path, prefix: str = "") -> list[Path]:
+    return [
+        file
+        for drawing in drawings
+        for file in save_figure(drawing.figure, folder / _file_name(f"{prefix}{drawing.name}"))
+    ]
 
 
 def _file_name(name: str) -> str:

@@ -19,6 +19,7 @@ from markupsafe import Markup
 from vedette.campaigns.results import CampaignResults
 from vedette.errors import InputError
 from vedette.evaluation.figures.labels import elided_names
+from vedette.evaluation.scans import code_of_sensors
 from vedette.files import write_whole
 from vedette.kernels.base.types import Floats
 from vedette.reports.claims import Claim, all_pairs, claims
@@ -26,7 +27,7 @@ from vedette.reports.drawings import Drawing, error_drawings, group_drawings, sw
 from vedette.reports.groups import Group, axis_label, gather
 from vedette.reports.health import group_health, health_table
 from vedette.reports.origin import spec_toml, versions_table
-from vedette.reports.replay import code_of_sensors, replay_data
+from vedette.reports.replay import replay_data
 from vedette.reports.saving import run_errors
 from vedette.reports.svg import inline_png, inline_svg
 from vedette.reports.tables import Table, cost_table, decision_table, error_table, measure_table
@@ -89,20 +90,36 @@ def write_report(
     """
     _check_replays(results, replays or ())
     target = Path(path)
-    _make_room(target)
+    make_room(target)
     sections: list[_Section] = []
-    runs: list[str] = []
+    runs: list[dict[str, Any]] = []
     errors: dict[str, Floats] = {}
     for number, group in enumerate(gather(results)):
         errors.update(run_errors(group))
         is_brief = sum(section.size for section in sections) > MAX_FIGURE_BYTES
-        sections.append(_section(group, f"g{number}", is_brief))
-        runs += [_json(data) for data in _replays(results, group, replays, trust)]
+        sections.append(section_of(group, f"g{number}", is_brief))
+        runs += _replays(results, group, replays, trust)
     sweeps = _drawn(tuple(sweep_drawings(results.campaign, errors)), "sweep")
     kept = _within(runs, MAX_REPLAY_BYTES) if replays is None else runs
     untrusted = () if trust else code_in_replays(results)
-    page = _render(results, sections, sweeps, kept, len(runs) - len(kept), untrusted)
-    _write(target, page)
+    campaign = results.campaign
+    page = render(
+        "report.html",
+        kept,
+        left_out=len(runs) - len(kept),
+        untrusted=untrusted,
+        campaign=campaign,
+        folder=shlex.quote(campaign.default_folder),
+        compared=axis_label(campaign.compare),
+        sections=sections,
+        sweeps=sweeps,
+        finished=sum(len(results.finished(cell.name)) for cell in campaign.cells),
+        failures=results.failures(),
+        planned=campaign.total,
+        spec=spec_toml(campaign.spec),
+        versions=versions_table(results.manifest),
+    )
+    write_page(target, page)
 
 
 def code_in_replays(results: CampaignResults) -> tuple[str, ...]:
@@ -128,7 +145,7 @@ def _spans(runs: Sequence[int]) -> str:
     return ", ".join(" to ".join(map(str, span)) for span in spans) or "there is none yet"
 
 
-def _make_room(path: Path) -> None:
+def make_room(path: Path) -> None:
     """Make the folders above the page, before the work that a bad place would waste."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -142,7 +159,8 @@ def _misplaced(path: Path, error: OSError) -> InputError:
     return InputError(f"path: expected a place to write a report; got {path}: {error.strerror}")
 
 
-def _section(group: Group, prefix: str, is_brief: bool) -> _Section:
+def section_of(group: Group, prefix: str, is_brief: bool = False) -> _Section:
+    """What a page shows of a group; `prefix` is unique on the page."""
     named = {
         "Errors": error_table(group),
         "Other measures": measure_table(group),
@@ -197,13 +215,13 @@ def _replays(
     ]
 
 
-def _within(texts: Sequence[str], most: int) -> list[str]:
-    """The texts that fit within a number of bytes, the first ones first."""
+def _within(runs: Sequence[dict[str, Any]], most: int) -> list[dict[str, Any]]:
+    """The runs that fit within a number of bytes, the first ones first."""
     kept, size = [], 0
-    for text in texts:
-        size += len(text)
+    for run in runs:
+        size += len(_json(run))
         if size <= most:
-            kept.append(text)
+            kept.append(run)
     return kept
 
 
@@ -213,15 +231,8 @@ def _json(data: Any) -> str:
     return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
 
 
-def _render(
-    results: CampaignResults,
-    sections: Sequence[_Section],
-    sweeps: Sequence[tuple[Drawing, Markup]],
-    runs: Sequence[str],
-    left_out: int,
-    untrusted: Sequence[str],
-) -> str:
-    campaign = results.campaign
+def render(template: str, replays: Sequence[dict[str, Any]], **told: Any) -> str:
+    """A page of `template`, with runs that can be replayed and what else the template tells."""
     script = _script()
     environment = Environment(
         loader=PackageLoader("vedette.reports", "page"),
@@ -230,25 +241,13 @@ def _render(
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    finished = sum(len(results.finished(cell.name)) for cell in campaign.cells)
-    return environment.get_template("report.html").render(
-        campaign=campaign,
-        folder=shlex.quote(campaign.default_folder),
-        compared=axis_label(campaign.compare),
-        sections=sections,
-        sweeps=sweeps,
-        finished=finished,
-        failures=results.failures(),
-        planned=campaign.total,
-        replays=[json.loads(run) for run in runs],
-        replay_json=Markup("[" + ",".join(runs) + "]"),  # safe inside an element: see `_json`
-        left_out=left_out,
-        untrusted=untrusted,
-        spec=spec_toml(campaign.spec),
-        versions=versions_table(results.manifest),
+    return environment.get_template(template).render(
+        replays=replays,
+        replay_json=Markup(_json(replays)),  # safe inside an element: see `_json`
         style=Markup((_FILES / "report.css").read_text("utf-8")),
         script=Markup(script),
         script_hash=base64.b64encode(hashlib.sha256(script.encode()).digest()).decode(),
+        **{"left_out": 0, "sections": (), **told},
     )
 
 
@@ -257,7 +256,8 @@ def _script() -> str:
     return "(() => {\n" + "\n".join(file.read_text("utf-8") for file in files if file.name.endswith(".js")) + "})();\n"
 
 
-def _write(path: Path, page: str) -> None:
+def write_page(path: Path, page: str) -> None:
+    """Write a page, whole or not at all."""
     try:
         write_whole(path, lambda file: file.write(page.encode()))
     except OSError as error:

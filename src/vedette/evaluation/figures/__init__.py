@@ -1,6 +1,7 @@
 """The paper's figures, drawn with Matplotlib objects alone: no display, no global state.
 
 Every function returns a `matplotlib.figure.Figure`; `save_figure` writes it as PDF, SVG and PNG.
+`write_video` shows a run scan by scan.
 """
 
 from vedette.extras import need
@@ -18,6 +19,7 @@ from vedette.evaluation.figures.scene import Scene, scene_of
 from vedette.evaluation.figures.style import png_bytes, save_figure, svg_text
 from vedette.evaluation.figures.sweep import SweepCurve, sweep_figure
 from vedette.evaluation.figures.tracks import overview_figure, tracks_figure
+from vedette.evaluation.figures.video import write_video
 
 __all__ = [
     "Scene",
@@ -36,4 +38,5 @@ __all__ = [
     "svg_text",
     "sweep_figure",
     "tracks_figure",
+    "write_video",
 ]

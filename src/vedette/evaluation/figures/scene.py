@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.patches import Patch, Polygon
+from matplotlib.patches import Patch, PathPatch, Wedge
+from matplotlib.path import Path
+from matplotlib.ticker import MaxNLocator, ScalarFormatter
 
 from vedette.evaluation.figures.labels import drawn_text
 from vedette.evaluation.figures.style import GREY, INK
 from vedette.kernels.base.types import Floats
+from vedette.recorded import Origin
 from vedette.scenarios import Scenario
 from vedette.scenarios.sections.planners import STRATEGIES, NamedIndependent, NamedJoint, NamedLookahead
-from vedette.scenarios.views import HOLE, INSIDE, NO_GO, REGION, Zone, zones
+from vedette.scenarios.sections.sensors import Sensor
+from vedette.scenarios.views import HOLE, INSIDE, NO_GO, REGION, FieldOfView, Zone, field_of_view, zones
 from vedette.text import elided
 
 _NEAR = 0.1  # of the extent of a figure
@@ -23,7 +27,6 @@ _ZONES: dict[str, dict[str, Any]] = {
     REGION: {"edgecolor": GREY, "linewidth": 0.8, "linestyle": "--"},
     INSIDE: {"edgecolor": INK, "linewidth": 0.8, "linestyle": "-."},
     NO_GO: {"edgecolor": GREY, "linewidth": 0.8, "hatch": "////"},
-    HOLE: {"edgecolor": GREY, "linewidth": 0.8, "fill": True, "facecolor": "white"},
 }
 
 
@@ -35,15 +38,23 @@ class Scene:
         names: of the sensors.
         reward: what the rewards are, with their unit, such as "CS divergence"; nothing where it is not known.
         zones: of the plane.
+        sensors: what they see.
+        origin: where (0, 0) is on the Earth; None: nobody knows.
     """
 
     names: tuple[str, ...] = ()
     reward: str = ""
     zones: tuple[Zone, ...] = ()
+    sensors: tuple[Sensor, ...] = ()
+    origin: Origin | None = None
 
     def name(self, sensor: int) -> str:
         """What a sensor is called in a figure."""
         return drawn_text(elided(self.names[sensor], 20)) if self.names else f"sensor {sensor + 1}"
+
+    def field(self, sensor: int, pose: Floats) -> FieldOfView | None:
+        """What a sensor sees at a pose; None where that has no edge, or nobody knows."""
+        return bounded_field(self.sensors[sensor], pose) if sensor < len(self.sensors) else None
 
     def reward_title(self, of: str = "Reward") -> str:
         """`Reward (CS divergence)`."""
@@ -68,7 +79,8 @@ def scene_of(scenario: Scenario, planner: str) -> Scene:
         words = (own.reward or model.control.reward).words
     elif planner in STRATEGIES:
         words = model.control.reward.words
-    return Scene(model.sensor_names, words, zones(model))
+    origin = None if model.origin is None else model.origin.build()
+    return Scene(model.sensor_names, words, zones(model), model.sensors, origin)
 
 
 def name_offsets(places: Floats, extent: float) -> list[dict[str, Any]]:
@@ -85,9 +97,77 @@ def name_offsets(places: Floats, extent: float) -> list[dict[str, Any]]:
 
 
 def draw_zones(axes: Axes, drawn: Sequence[Zone], scale: float) -> None:
-    """Draw zones into axes, in metres times `scale`."""
+    """Draw zones into axes, in metres times `scale`; holes are cut out of the zones that they follow."""
+    shown: list[tuple[str, list[Path]]] = []
     for zone in drawn:
-        axes.add_patch(Polygon(scale * np.array(zone.corners), zorder=1.5, **{"fill": False, **_ZONES[zone.kind]}))
+        ring = Path(scale * _turning(zone.corners, left=zone.kind != HOLE), closed=True)
+        if zone.kind == HOLE:
+            shown[-1][1].append(ring)
+        else:
+            shown.append((zone.kind, [ring]))
+    for kind, rings in shown:
+        axes.add_patch(PathPatch(Path.make_compound_path(*rings), zorder=1.5, fill=False, **_ZONES[kind]))
+
+
+def _turning(corners: Sequence[tuple[float, float]], *, left: bool) -> Floats:
+    """Corners in an order that goes round to the left, or to the right, closed: a hole turns against its zone."""
+    ring = np.array([*corners, corners[0]])
+    area = float((ring[:-1, 0] * ring[1:, 1] - ring[1:, 0] * ring[:-1, 1]).sum())
+    return np.asarray(ring if (area > 0.0) == left else ring[::-1])
+
+
+def bounded_field(sensor: Sensor, pose: Floats | None = None) -> FieldOfView | None:
+    """What a sensor sees at a pose, or where it starts; None where that has no edge."""
+    field = field_of_view(sensor, None if pose is None else pose.tolist())
+    return field if field is not None and np.isfinite(field.reach) else None
+
+
+def draw_field(axes: Axes, place: tuple[float, float], field: FieldOfView, scale: float) -> Patch:
+    """Shade what a sensor sees, at a place that is in metres times `scale` already."""
+    sides = np.degrees([field.middle - field.half_width, field.middle + field.half_width])
+    wedge = Wedge(place, field.reach * scale, *sides, facecolor=GREY, alpha=0.15, linewidth=0, zorder=1)
+    return axes.add_patch(wedge)
+
+
+def label_axes(axes: Axes, scale: float, origin: Origin | None) -> None:
+    """Say what the axes are; with an origin, longitude and latitude stand at the other sides.
+
+    These are those along lines through the middle of the axes, whose limits must be set.
+    """
+    unit = "m" if scale == 1.0 else "km"
+    axes.set_xlabel(f"x ({unit})")
+    axes.set_ylabel(f"y ({unit})")
+    if origin is None:
+        return
+    limits = np.array([axes.get_xlim(), axes.get_ylim()])
+    middle = limits.mean(axis=1)
+    for k, (side, name) in enumerate((("top", "longitude"), ("right", "latitude"))):
+        ends = np.array([middle, middle])
+        ends[:, k] = limits[k]
+        degrees = origin.to_degrees(ends / scale)[:, k]
+        if not degrees[0] < degrees[1]:  # over a pole, or where longitudes begin anew
+            continue
+        there, back = _line(limits[k], degrees), _line(degrees, limits[k])
+        functions = (there, back)
+        second = axes.secondary_yaxis("right", functions) if k else axes.secondary_xaxis("top", functions)
+        axis = second.xaxis if k == 0 else second.yaxis
+        axis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
+        axis.set_major_formatter(ScalarFormatter(useOffset=False))
+        axis.set_label_text(f"{name} (\N{DEGREE SIGN})")
+        second.tick_params(labelsize=6, colors=GREY, width=0.4)
+        axis.label.set(color=GREY, fontsize=7)
+        second.spines[side].set(visible=True, color=GREY, linewidth=0.4)
+
+
+def _line(start: Floats, end: Floats) -> Callable[[Any], Any]:
+    slope = float((end[1] - end[0]) / (start[1] - start[0]))
+    return lambda value: end[0] + slope * (np.asarray(value) - start[0])
+
+
+def field_handles(sensors: Sequence[Sensor], when: str = "") -> Iterator[Patch]:
+    """What the shade of `draw_field` means, for a legend, if a sensor's view has an edge."""
+    if any(bounded_field(sensor) is not None for sensor in sensors):
+        yield Patch(color=GREY, alpha=0.15, linewidth=0, label=f"field of view{when}")
 
 
 def zone_handles(drawn: Sequence[Zone]) -> Iterator[Patch]:

@@ -17,7 +17,15 @@ from vedette.errors import InputError
 from vedette.evaluation.comparison import Comparison
 from vedette.evaluation.figures.labels import drawn_text, short_label
 from vedette.evaluation.figures.ospa import draw_ospa
-from vedette.evaluation.figures.scene import Scene, draw_zones, name_offsets, zone_handles
+from vedette.evaluation.figures.scene import (
+    Scene,
+    draw_field,
+    draw_zones,
+    field_handles,
+    label_axes,
+    name_offsets,
+    zone_handles,
+)
 from vedette.evaluation.figures.style import (
     COLUMN_WIDTH,
     GREY,
@@ -31,9 +39,9 @@ from vedette.evaluation.figures.style import (
 from vedette.kernels.base.types import Floats, Ints
 from vedette.simulation.records import Decision, RunRecord
 
-_LARGE = 5000.0  # m, beyond which axes are in kilometres
+LARGE = 5000.0  # m, beyond which axes are in kilometres
 _TITLE_PAD = 14  # points, above the names of sensors at the upper edge
-_SENSOR_MARKERS = "sDpP*X"
+SENSOR_MARKERS = "sDpP*X"
 _MOST_NAMED, _MOST_DECISIONS = 8, 12  # sensors whose names, and decisions whose numbers, there is room for
 
 
@@ -60,12 +68,12 @@ def tracks_figure(*records: RunRecord, titles: Sequence[str] | None = None, scen
     figure = new_figure(width / len(records) + 0.4, width=width)
     figure.set_layout_engine("constrained", h_pad=0.08)  # equal axes are fitted last, and would push titles off the top
     panels = figure.subplots(1, len(records), sharex=True, sharey=True, squeeze=False)[0]
-    scale = 1e-3 if _reach(records) > _LARGE else 1.0
+    scale = 1e-3 if reach_of(records) > LARGE else 1.0
     for panel, record, name in zip(panels, records, names, strict=True):
         draw_tracks(panel, record, scale, scene)
         panel.set_title(drawn_text(name), pad=_TITLE_PAD)
     frame_tracks(panels[0], records, scale, scene)
-    _add_legend(figure, records[0], scene)
+    add_legend(figure, records[0], scene)
     return figure
 
 
@@ -90,7 +98,7 @@ def overview_figure(
         raise InputError(f"strategy: expected one of {', '.join(comparison.strategies)}; got {strategy!r}")
     figure = new_figure(TEXT_WIDTH / 2 + 0.1, width=TEXT_WIDTH)
     left, right = figure.subplots(1, 2)
-    scale = 1e-3 if _reach([record]) > _LARGE else 1.0
+    scale = 1e-3 if reach_of([record]) > LARGE else 1.0
     shade = colour(comparison.strategies.index(strategy))
     draw_tracks(left, record, scale, scene, shade)
     frame_tracks(left, [record], scale, scene)
@@ -102,7 +110,7 @@ def overview_figure(
     # Above the panel, where it hides no curve.
     columns = legend_columns([str(label) for label in right.get_legend_handles_labels()[1]])
     right.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=columns, frameon=False)
-    _add_legend(figure, record, scene, shade)
+    add_legend(figure, record, scene, shade)
     return figure
 
 
@@ -114,28 +122,31 @@ def draw_tracks(axes: Axes, record: RunRecord, scale: float, scene: Scene, shade
     for sensor in range(record.num_sensors):
         _draw_sensor(axes, record, sensor, scale, scene)
     axes.set_aspect("equal")
-    axes.set_xlabel("x (m)" if scale == 1.0 else "x (km)")
 
 
 def frame_tracks(axes: Axes, records: Sequence[RunRecord], scale: float, scene: Scene) -> None:
     """Limits, shared by all panels, of a square around everything but a stray estimate; a label on the y axis."""
     points = np.concatenate([scene.corners, *(_positions(record) for record in records)]) * scale
     low, high = points.min(axis=0), points.max(axis=0)
-    axes.set_ylabel("y (m)" if scale == 1.0 else "y (km)")
     reach = 0.55 * max(float((high - low).max()), np.finfo(float).eps)
     middle = (low + high) / 2.0
     axes.set_xlim(middle[0] - reach, middle[0] + reach)
     axes.set_ylim(middle[1] - reach, middle[1] + reach)
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
+    label_axes(axes, scale, scene.origin if len(records) == 1 else None)
 
 
-def _reach(records: Sequence[RunRecord]) -> float:
+def reach_of(records: Sequence[RunRecord]) -> float:
+    """Extent of targets and sensors of runs, m."""
     return float(max(np.ptp(_positions(record), axis=0).max() for record in records))
 
 
 def _positions(record: RunRecord) -> Floats:
-    return np.concatenate([record.truth.states[:, :2], record.poses[:, :, :2].reshape(-1, 2)])
+    """(n, 2) of targets, or where nobody knows these of estimates, and of sensors, m."""
+    known = record.truth.states[:, :2]
+    targets = [known] if len(known) else [estimate.means[:, :2] for estimate in record.estimates]
+    return np.concatenate([*targets, record.poses[:, :, :2].reshape(-1, 2)])
 
 
 def _draw_truth(axes: Axes, record: RunRecord, scale: float) -> None:
@@ -149,7 +160,7 @@ def _draw_truth(axes: Axes, record: RunRecord, scale: float) -> None:
 def _draw_estimates(axes: Axes, record: RunRecord, scale: float, shade: str) -> None:
     labels = np.concatenate([estimate.labels for estimate in record.estimates])
     points = np.concatenate([estimate.means[:, :2] for estimate in record.estimates]) * scale
-    if not shade and _recur(labels):
+    if not shade and recur(labels):
         distinct, of_estimate = np.unique(labels, axis=0, return_inverse=True)
         groups = [points[of_estimate.ravel() == index] for index in range(len(distinct))]
     else:
@@ -161,22 +172,25 @@ def _draw_estimates(axes: Axes, record: RunRecord, scale: float, shade: str) -> 
         )  # fmt: skip
 
 
-def _recur(labels: Ints) -> bool:
+def recur(labels: Ints) -> bool:
     """Whether a label is there twice or more; each is there once where a filter has none."""
     return len(np.unique(labels, axis=0)) < len(labels)
 
 
 def _draw_sensor(axes: Axes, record: RunRecord, sensor: int, scale: float, scene: Scene) -> None:
     path = record.poses[:, sensor, :2] * scale
+    field = scene.field(sensor, record.poses[0, sensor])
+    if field is not None:
+        draw_field(axes, _point(path[0]), field, scale)
     axes.plot(path[:, 0], path[:, 1], color=GREY, linewidth=1.6, linestyle=(0, (2.5, 1)), zorder=5)
     if record.num_sensors > _MOST_NAMED:
         axes.plot(*path[0], marker="s", color=INK, markerfacecolor=GREY, markersize=4, markeredgewidth=0.5, zorder=6)
         return
-    marker = _SENSOR_MARKERS[sensor % len(_SENSOR_MARKERS)]
+    marker = SENSOR_MARKERS[sensor % len(SENSOR_MARKERS)]
     axes.plot(*path[0], marker=marker, color=INK, markerfacecolor=GREY, markersize=9, zorder=6)
     paper = {"boxstyle": "square,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.75}
     style: dict[str, Any] = {"textcoords": "offset points", "fontsize": 7, "zorder": 9, "bbox": paper}
-    offset = name_offsets(record.poses[0, :, :2], _reach([record]))[sensor]
+    offset = name_offsets(record.poses[0, :, :2], reach_of([record]))[sensor]
     axes.annotate(scene.name(sensor), _point(path[0]), **offset, **style)
     if len(record.decisions) > _MOST_DECISIONS:
         return
@@ -188,7 +202,7 @@ def _draw_sensor(axes: Axes, record: RunRecord, sensor: int, scale: float, scene
         ahead = 13.0 * _direction(decision, sensor)
         if ahead.any():
             axes.annotate("", place, xytext=_point(ahead), textcoords="offset points", arrowprops=arrow, zorder=7)
-        _draw_field(axes, decision, sensor, 0.12 * _reach([record]), scale)
+        _draw_field(axes, decision, sensor, 0.12 * reach_of([record]), scale)
         axes.plot(*place, marker="o", markersize=6.0, color=INK, markerfacecolor="white", markeredgewidth=0.7, zorder=8)
         axes.annotate(str(number), place, ha="center", va="center_baseline", fontsize=5, zorder=9)
 
@@ -217,24 +231,36 @@ def _point(values: Floats) -> tuple[float, float]:
     return float(values[0]), float(values[1])
 
 
-def _add_legend(figure: Figure, record: RunRecord, scene: Scene, shade: str = "") -> None:
-    """What the marks mean, below the axes; estimates that are coloured by label have a mark of several colours."""
+def add_legend(figure: Figure, record: RunRecord, scene: Scene, shade: str = "", *, is_video: bool = False) -> None:
+    """What the marks mean, below the axes; estimates that are coloured by label have a mark of several colours.
+
+    In a video a target has one mark, where it is; measurements have one, and there are no decisions.
+    """
     open_marker: dict[str, Any] = {"color": INK, "markerfacecolor": "white", "markersize": 4.5, "linewidth": 0.9}
     labels = np.concatenate([estimate.labels for estimate in record.estimates])
-    by_label = not shade and _recur(labels)
+    by_label = not shade and recur(labels)
     shades = [colour(index) for index in range(3)] if by_label else [shade or colour(0)]
     moved = bool((record.poses[:, :, :2] != record.poses[0, :, :2]).any())
     path: Any = {"linestyle": (0, (2.5, 1)), "linewidth": 1.6} if moved else {"linestyle": ""}
-    shown: dict[str, Any] = {
-        "target start": Line2D([], [], marker="o", **open_marker),
-        "target end": Line2D([], [], marker="^", **open_marker),
+    shown: dict[str, Any] = {}
+    if len(record.truth.ids) and is_video:
+        shown["target"] = Line2D([], [], marker="o", **open_marker)
+    elif len(record.truth.ids):
+        shown["target start"] = Line2D([], [], marker="o", **open_marker)
+        shown["target end"] = Line2D([], [], marker="^", **open_marker)
+    shown |= {
         "estimates, by label" if by_label else "estimates": tuple(
             Line2D([], [], linestyle="", marker=".", color=each) for each in shades
         ),
         "sensor, path" if moved else "sensor": Line2D([], [], marker="s", color=GREY, markersize=4.5, **path),
     }
-    if 0 < len(record.decisions) <= _MOST_DECISIONS and record.num_sensors <= _MOST_NAMED:
+    if is_video:
+        shown["measurement"] = Line2D([], [], linestyle="", marker="x", color=INK, markersize=4)
+    elif 0 < len(record.decisions) <= _MOST_DECISIONS and record.num_sensors <= _MOST_NAMED:
         shown["decision"] = Line2D([], [], linestyle="", marker="$\\rightarrow$", color=INK, markersize=8)
+    shown |= {
+        str(patch.get_label()): patch for patch in field_handles(scene.sensors, "" if is_video else ", first scan")
+    }
     shown |= {str(patch.get_label()): patch for patch in zone_handles(scene.zones)}
     columns = legend_columns(list(shown), width=figure.get_figwidth())
     by_parts = {tuple: HandlerTuple(ndivide=None, pad=0.0)}

@@ -1,18 +1,20 @@
 // Between metres in the plane and pixels on the canvas; axes around it.
 const MARGIN = { left: 52, right: 12, top: 10, bottom: 36 };
 
-function viewOf(run, width, height) {
+function viewOf(run, width, height, camera) {
   const [xMin, xMax, yMin, yMax] = run.extent;
   const inner = { width: width - MARGIN.left - MARGIN.right, height: height - MARGIN.top - MARGIN.bottom };
-  const scale = 0.96 * Math.min(inner.width / (xMax - xMin), inner.height / (yMax - yMin));
+  const scale = 0.96 * camera.zoom * Math.min(inner.width / (xMax - xMin), inner.height / (yMax - yMin));
   const middle = { x: MARGIN.left + inner.width / 2, y: MARGIN.top + inner.height / 2 };
+  const [east, north] = [camera.east ?? (xMin + xMax) / 2, camera.north ?? (yMin + yMax) / 2]; // in the middle
   return {
     scale,
     inner,
-    x: (metresEast) => middle.x + (metresEast - (xMin + xMax) / 2) * scale,
-    y: (metresNorth) => middle.y - (metresNorth - (yMin + yMax) / 2) * scale,
-    east: (x) => (xMin + xMax) / 2 + (x - middle.x) / scale,
-    north: (y) => (yMin + yMax) / 2 - (y - middle.y) / scale,
+    middle,
+    x: (metresEast) => middle.x + (metresEast - east) * scale,
+    y: (metresNorth) => middle.y - (metresNorth - north) * scale,
+    east: (x) => east + (x - middle.x) / scale,
+    north: (y) => north - (y - middle.y) / scale,
   };
 }
 
@@ -54,6 +56,23 @@ function drawAxes(context, run, view, width, height) {
   context.textBaseline = "middle";
   context.fillText(`y (${unit.name})`, 0, 0);
   context.restore();
+}
+
+// A length in the lower right corner, with its unit.
+function drawScale(context, view) {
+  const power = 10 ** Math.floor(Math.log10(110 / view.scale));
+  const length = [5, 2, 1].map((factor) => factor * power).find((size) => size * view.scale <= 110);
+  const [right, bottom] = [MARGIN.left + view.inner.width - 12, MARGIN.top + view.inner.height - 12];
+  const left = right - length * view.scale;
+  for (const [shade, thick] of [[colours.paper, 5], [colours.ink, 2]]) {
+    context.strokeStyle = shade;
+    context.lineWidth = thick;
+    context.beginPath();
+    [[left, -5], [left, 0], [right, 0], [right, -5]].forEach(([x, up]) => context.lineTo(x, bottom + up));
+    context.stroke();
+  }
+  const text = length >= 1000 ? `${+(length / 1000).toPrecision(3)} km` : `${+length.toPrecision(3)} m`;
+  mark(context, text, (left + right) / 2, bottom - 10, colours.ink);
 }
 
 function line(context, x1, y1, x2, y2) {

@@ -1,9 +1,11 @@
 // One scan of a run in the plane. Of many sensors there is no room for the names; the pointer tells them.
 const MOST_NAMED = 20;
+const HOLE = "hole of a no-go zone";
+const UNKNOWN = -1; // what is behind a measurement that was recorded
 const clipped = (name, most) => (name.length > most ? `${name.slice(0, most - 1)}\u2026` : name);
-function drawScene(canvas, run, step, show) {
+function drawScene(canvas, run, step, show, camera, ghost) {
   const { context, width, height } = prepared(canvas);
-  const view = viewOf(run, width, height);
+  const view = viewOf(run, width, height, camera);
   if (view.scale <= 0) return view; // not laid out yet
   drawAxes(context, run, view, width, height);
   context.save();
@@ -13,38 +15,59 @@ function drawScene(canvas, run, step, show) {
   drawZones(context, run, view);
   if (show.measurements) run.sensors.forEach((_, s) => drawMeasurements(context, run, view, step, s));
   if (show.trails) drawTrails(context, run, view, step);
+  if (ghost) drawGhost(context, ghost, view, Math.min(step, ghost.times.length - 1));
   run.sensors.forEach((_, s) => drawSensor(context, run, view, step, s));
   run.truth[step].forEach((target) => drawTarget(context, view, target, show));
   run.estimates[step].forEach((estimate) => drawEstimate(context, run, view, estimate, show));
+  drawScale(context, view);
   context.restore();
   return view;
 }
 
+// Another run with the same luck, hollow: where its sensors are and went (squares), and its estimates (diamonds).
+function drawGhost(context, run, view, step) {
+  context.strokeStyle = colours.ink;
+  context.lineWidth = 1.2;
+  context.globalAlpha = 0.8;
+  context.setLineDash([1, 3]);
+  run.sensors.forEach((_, s) => polyline(context, view, run.poses.slice(0, step + 1).map((poses) => poses[s])));
+  context.setLineDash([]);
+  for (const [x, y] of run.poses[step]) context.strokeRect(view.x(x) - 6.5, view.y(y) - 6.5, 13, 13);
+  for (const [, x, y] of run.estimates[step]) {
+    const [px, py] = [view.x(x), view.y(y)];
+    context.beginPath();
+    [[0, -7], [7, 0], [0, 7], [-7, 0]].forEach(([dx, dy]) => context.lineTo(px + dx, py + dy));
+    context.closePath();
+    context.stroke();
+  }
+  context.globalAlpha = 1;
+}
+
 // The region, and where sensors may not go (hatched) or must stay.
 function drawZones(context, run, view) {
-  for (const [kind, corners] of run.zones) {
+  run.zones.forEach(([kind, corners], place) => {
+    if (kind === HOLE) return; // drawn with its zone
+    const rest = run.zones.slice(place + 1);
+    const holes = rest.slice(0, rest.findIndex(([other]) => other !== HOLE) >>> 0).map(([, hole]) => hole);
     context.lineWidth = 1;
     context.strokeStyle = kind === "region" ? colours.grey : colours.ink;
     context.setLineDash({ region: [5, 4], "no-go zone": [] }[kind] ?? [8, 3, 2, 3]);
-    polygon(context, view, corners);
-    if (kind === "hole of a no-go zone") {
-      context.fillStyle = colours.paper;
-      context.setLineDash([]);
-      context.fill();
-    }
+    polygons(context, view, [corners, ...holes]);
     context.stroke();
     context.setLineDash([]);
     if (kind === "no-go zone") hatch(context, view);
+  });
+}
+
+function polygons(context, view, rings) {
+  context.beginPath();
+  for (const ring of rings) {
+    ring.forEach(([x, y], place) => (place ? context.lineTo(view.x(x), view.y(y)) : context.moveTo(view.x(x), view.y(y))));
+    context.closePath();
   }
 }
 
-function polygon(context, view, corners) {
-  context.beginPath();
-  corners.forEach(([x, y], place) => (place ? context.lineTo(view.x(x), view.y(y)) : context.moveTo(view.x(x), view.y(y))));
-  context.closePath();
-}
-
-// Fill the polygon that was just drawn with slanted lines.
+// Fill the polygons that were just drawn, but for their holes, with slanted lines.
 function hatch(context, view) {
   const { width, height } = view.inner;
   context.save();
@@ -98,9 +121,10 @@ function drawMeasurements(context, run, view, step, s) {
   const [x, y] = run.poses[step][s];
   const kind = run.sensors[s].kind;
   for (const [origin, u, v] of (run.scans[step] ?? [])[s] ?? []) {
+    const weight = origin === UNKNOWN ? 0.5 : origin ? 1 : 0;
     context.strokeStyle = origin ? colours.ink : colours.grey;
-    context.globalAlpha = origin ? 0.95 : 0.6;
-    context.lineWidth = origin ? 1.6 : 1;
+    context.globalAlpha = 0.6 + 0.35 * weight;
+    context.lineWidth = 1 + 0.6 * weight;
     if (kind === "ray") {
       const reach = 2 * extentOf(run) * view.scale;
       line(context, view.x(x), view.y(y), view.x(x) + reach * Math.cos(u), view.y(y) - reach * Math.sin(u));
@@ -109,7 +133,7 @@ function drawMeasurements(context, run, view, step, s) {
       context.arc(view.x(x), view.y(y), Math.max(u, 0) * view.scale, 0, 2 * Math.PI);
       context.stroke();
     } else if (kind !== "none") {
-      const size = origin ? 4 : 2.5;
+      const size = 2.5 + 1.5 * weight;
       line(context, view.x(u) - size, view.y(v) - size, view.x(u) + size, view.y(v) + size);
       line(context, view.x(u) - size, view.y(v) + size, view.x(u) + size, view.y(v) - size);
     }

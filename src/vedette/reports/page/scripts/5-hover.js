@@ -26,10 +26,10 @@ function describeTarget(run, target, east, north, velocity) {
 }
 
 function describeEstimate(run, [label, east, north, existence, long, short, , target, error]) {
-  const of = target ? `${metres(error, run)} from target ${target}` : "false: no target is matched";
+  const of = target ? `${metres(error, run)} from target ${target}; ` : run.known ? "false: no target is matched; " : "";
   const at = `${metres(east, run)}, ${metres(north, run)}`;
   const size = `2\u03c3 ${metres(long, run)} by ${metres(short, run)}`;
-  return `estimate${run.labelled ? ` ${label}` : ""}: ${of}; existence ${existence.toFixed(3)}; at ${at}; ${size}`;
+  return `estimate${run.labelled ? ` ${label}` : ""}: ${of}existence ${existence.toFixed(3)}; at ${at}; ${size}`;
 }
 
 function measurementsAt(run, step, view, x, y) {
@@ -38,7 +38,7 @@ function measurementsAt(run, step, view, x, y) {
     const [east, north] = run.poses[step][s];
     const [px, py] = [view.x(east), view.y(north)];
     for (const [origin, u, v] of (run.scans[step] ?? [])[s] ?? []) {
-      const what = origin ? `detection of target ${origin}` : "clutter";
+      const what = origin === UNKNOWN ? "measurement" : origin ? `detection of target ${origin}` : "clutter";
       if (distanceTo(kind, view, x, y, px, py, u, v) <= REACH / 2) {
         found.push(`${what} of ${name}: ${describeMeasurement(run, kind, east, north, u, v)}`);
       }

@@ -1,26 +1,30 @@
 // The state of the replay, its controls, and the words beside the picture.
 function startReplay(root) {
   const part = (name) => root.querySelector(`[data-part="${name}"]`);
-  const state = { run: 0, step: 0, playing: false, speed: 5, view: null, pointer: null };
+  const state = { run: 0, step: 0, playing: false, speed: 5, view: null, pointer: null, ghost: null };
   const show = () => Object.fromEntries([...root.querySelectorAll("[data-show]")].map((box) => [box.dataset.show, box.checked]));
 
   const run = () => runs[state.run];
   const last = () => run().times.length - 1;
+  const camera = cameraOf(part("scene"), run, () => draw());
 
   function draw() {
-    state.view = drawScene(part("scene"), run(), state.step, show());
+    state.view = drawScene(part("scene"), run(), state.step, show(), camera.aim(state.step), state.ghost);
     drawRewards(part("rewards"), run(), state.step);
-    drawErrors(part("errors"), run(), state.step);
+    if (run().known) drawErrors(part("errors"), run(), state.step);
     tell();
   }
 
   function tell() {
     const { times, truth, estimates, ospa, ospa_unit } = run();
-    const [total, localisation, cardinality] = ospa[state.step];
     const time = +times[state.step].toFixed(3);
-    const errors = `OSPA ${total.toFixed(1)}${ospa_unit && ` ${ospa_unit}`} (localisation ${localisation.toFixed(1)}, cardinality ${cardinality.toFixed(1)})`;
-    const counts = `${truth[state.step].length} targets, ${estimates[state.step].length} estimates`;
-    part("summary").textContent = `t = ${time} s: ${counts}, ${errors}`;
+    const words = [`${estimates[state.step].length} estimates`];
+    if (run().known) {
+      const [total, localisation, cardinality] = ospa[state.step];
+      words.unshift(`${truth[state.step].length} targets`);
+      words.push(`OSPA ${total.toFixed(1)}${ospa_unit && ` ${ospa_unit}`} (localisation ${localisation.toFixed(1)}, cardinality ${cardinality.toFixed(1)})`);
+    }
+    part("summary").textContent = `t = ${time} s: ${words.join(", ")}`;
     part("decision").textContent = decisionText();
     part("reward-title").textContent = run().reward ? `Reward (${run().reward})` : "Reward";
     tellWhy(part, run(), decisionAt(run(), state.step));
@@ -29,6 +33,8 @@ function startReplay(root) {
     part("scrubber").setAttribute("aria-valuetext", `step ${state.step + 1} of ${last() + 1}, ${time} s`);
     part("play").textContent = state.playing ? "Pause" : "Play";
     Object.assign(root.dataset, { step: state.step, run: state.run, playing: state.playing, speed: state.speed });
+    root.dataset.zoom = +camera.camera.zoom.toFixed(3);
+    part("follow").value = camera.camera.follow;
     tellPointer();
     if (part("values").open) fillValues();
   }
@@ -51,6 +57,17 @@ function startReplay(root) {
     const found = underPointer();
     part("hover").textContent = found.join("\n") || "Point at a target, an estimate, a sensor, a measurement or a reward.";
     root.dataset.hover = found.length;
+    tellPlace();
+  }
+
+  // Where the pointer is, or else what is in the middle of the scene.
+  function tellPlace() {
+    const { pointer, view } = state;
+    if (!view || view.scale <= 0) return;
+    const { x, y } = pointer?.part === "scene" ? pointer : view.middle;
+    const [east, north] = [view.east(x), view.north(y)];
+    const words = [`${metres(east, run())}, ${metres(north, run())}`, degreesOf(run(), east, north)].filter(Boolean);
+    part("place").textContent = `${pointer?.part === "scene" ? "Pointer" : "Middle"}: ${words.join("; ")}`;
   }
 
   function fillValues() {
@@ -67,12 +84,34 @@ function startReplay(root) {
     draw();
   }
 
+  // Fill a field with choices, none of them first; what was chosen stays if it is still there.
+  function offer(field, choices) {
+    const chosen = field.value;
+    field.replaceChildren(...[["", "nothing"], ...choices].map(([value, text]) => new Option(text, value)));
+    field.value = choices.some(([value]) => value === chosen) ? chosen : "";
+    field.parentElement.hidden = !choices.length;
+  }
+
+  function haunt() {
+    state.ghost = runs[part("ghost").value || -1] ?? null;
+    part("ghost-key").hidden = !state.ghost;
+  }
+
   function choose(index) {
+    if (runs[index].group !== run().group) Object.assign(camera.camera, { zoom: 1, east: null, north: null });
     state.run = index;
     state.playing = false;
+    offer(part("follow"), followable(run()));
+    camera.camera.follow = part("follow").value;
+    const paired = runs.map((each, place) => [String(place), each]).filter(([place, each]) =>
+      Number(place) !== index && each.group === run().group && each.run === run().run);
+    offer(part("ghost"), paired.map(([place, { strategy }]) => [place, clipped(strategy, 30)]));
+    haunt();
     part("scrubber").max = last();
     part("rewards").hidden = !run().decisions.some((decision) => decision.curves.length);
     part("nothing").hidden = run().scans.length > 0;
+    for (const name of ["errors", "errors-title"]) part(name).hidden = !run().known;
+    for (const name of ["reward-title", "decision", "why-title", "why-not"]) part(name).hidden = !run().decisions.length;
     go(Math.min(state.step, last()));
   }
 
@@ -106,6 +145,14 @@ function startReplay(root) {
     ArrowLeft: () => step(-1),
     Home: () => step(-Infinity),
     End: () => step(Infinity),
+    "+": () => camera.zoomBy(1.5),
+    "=": () => camera.zoomBy(1.5),
+    "-": () => camera.zoomBy(1 / 1.5),
+    0: () => camera.reset(),
+    "shift ArrowRight": () => camera.pan(-PAN, 0),
+    "shift ArrowLeft": () => camera.pan(PAN, 0),
+    "shift ArrowUp": () => camera.pan(0, PAN),
+    "shift ArrowDown": () => camera.pan(0, -PAN),
   };
 
   part("play").addEventListener("click", () => play(!state.playing));
@@ -118,15 +165,24 @@ function startReplay(root) {
     before = null;
     tell();
   });
+  part("zoom-in").addEventListener("click", () => camera.zoomBy(1.5));
+  part("zoom-out").addEventListener("click", () => camera.zoomBy(1 / 1.5));
+  part("reset").addEventListener("click", camera.reset);
+  part("follow").addEventListener("change", (event) => camera.follow(event.target.value));
+  part("ghost").addEventListener("change", () => {
+    haunt();
+    draw();
+  });
   root.querySelectorAll("[data-show]").forEach((box) => box.addEventListener("change", draw));
   part("values").addEventListener("toggle", tell);
   root.addEventListener("keydown", (event) => {
     // Fields and buttons keep the keys that are theirs; a slider has no use for the space bar.
     const own = event.target.closest("select, input, button, summary");
     const isFree = event.key === " " && own?.type === "range";
-    if ((own && !isFree) || event.ctrlKey || event.metaKey || event.altKey || !(event.key in keys)) return;
+    const key = event.shiftKey && event.key.startsWith("Arrow") ? `shift ${event.key}` : event.key;
+    if ((own && !isFree) || event.ctrlKey || event.metaKey || event.altKey || !(key in keys)) return;
     event.preventDefault();
-    keys[event.key]();
+    keys[key]();
   });
   for (const name of ["scene", "rewards"]) {
     const follow = (event) => {

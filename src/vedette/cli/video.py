@@ -1,0 +1,52 @@
+"""The command that shows a run as a video."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from vedette.cli.errors import named_options, usage_error
+from vedette.cli.output import note, publish, say
+from vedette.cli.progress import bar
+from vedette.cli.results import saved_run
+from vedette.cli.running import interruptible
+from vedette.extras import need
+from vedette.text import counted
+
+
+def video(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Results folder of a single run.")],
+    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="A .mp4 file (by ffmpeg) or a .gif file.")],
+    fps: Annotated[float, typer.Option("--fps", min=0.1, max=120.0, help="Frames a second.")] = 10.0,
+    speed: Annotated[
+        float | None, typer.Option("--speed", min=1e-3, help="Seconds of the run in a second of the video.")
+    ] = None,
+    seconds: Annotated[
+        float | None,
+        typer.Option("--seconds", min=0.1, help="Length of the video; else a fifth of a second a scan, 2 to 60 s."),
+    ] = None,
+    size: Annotated[int, typer.Option("--size", min=200, max=4000, help="Width in pixels.")] = 800,
+    trust: Annotated[
+        bool, typer.Option("--trust", help="Run code that the scenario of the run names, to draw measurements.")
+    ] = False,
+) -> None:
+    """Show a run as a video: targets, estimates, sensors and measurements, scan by scan."""
+    if speed is not None and seconds is not None:
+        raise usage_error("expected one of --speed and --seconds; got both", "--speed")
+    need("vedette video", "matplotlib", "pyarrow")
+    from vedette.evaluation.figures import write_video
+    from vedette.evaluation.scans import code_of_sensors
+
+    with interruptible("nothing was written"):
+        record, scenario = saved_run(folder)
+        if speed is not None:
+            seconds = float(record.times[-1] - record.times[0]) / speed
+        with bar("frames") as watch, named_options({"path": "--out", "seconds": "--seconds"}):
+            number = write_video(record, scenario, out, fps=fps, seconds=seconds, size=size, trust=trust, watch=watch)
+    unmeasured = () if trust else code_of_sensors(scenario)
+    if unmeasured:
+        note(f"without measurements, as drawing them runs {', '.join(unmeasured)}: --trust allows it")
+    say(f"wrote {out}: {counted(number, 'frame')}, {number / fps:.1f} s")
+    publish({"video": out, "frames": number, "seconds": number / fps, "without_measurements_of": unmeasured})

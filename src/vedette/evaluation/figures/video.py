@@ -1,0 +1,244 @@
+"""A run as a video: targets, estimates, sensors and measurements scan by scan, as on the page of a report."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+from matplotlib.patches import Circle, Ellipse
+
+from vedette.errors import InputError, VedetteError
+from vedette.evaluation.figures.labels import drawn_text, short_label
+from vedette.evaluation.figures.scene import draw_field, draw_zones, name_offsets, scene_of
+from vedette.evaluation.figures.style import COLUMN_WIDTH, GREY, INK, colour, new_figure, styled
+from vedette.evaluation.figures.tracks import LARGE, SENSOR_MARKERS, add_legend, frame_tracks, reach_of, recur
+from vedette.evaluation.scans import LIE, Scans, code_of_sensors, in_plane, scans_of_record
+from vedette.files import write_whole
+from vedette.kernels.base.types import Floats, Ints
+from vedette.scenarios import Scenario
+from vedette.simulation.records import RunRecord
+from vedette.simulation.scans import CLUTTER, Scan
+
+if TYPE_CHECKING:
+    from matplotlib.animation import AbstractMovieWriter
+
+ENDINGS = (".mp4", ".gif")
+SCANS_PER_SECOND = 5.0
+_SHORTEST, _LONGEST = 2.0, 60.0  # s, of a video whose length nobody said
+_MOST_FRAMES = {".mp4": 20_000, ".gif": 1000}  # those of a GIF are all in memory
+_SIGMAS = 2.0
+_MOST_NAMED = 12  # estimates whose labels, and sensors whose names, there is room for
+
+
+@styled
+def write_video(
+    record: RunRecord,
+    scenario: Scenario,
+    path: Path,
+    *,
+    fps: float = 10.0,
+    seconds: float | None = None,
+    size: int = 800,
+    trust: bool = False,
+    watch: Callable[[int, int], None] | None = None,
+) -> int:
+    """Write a run as a video, whole or not at all; gives back the number of its frames.
+
+    A frame shows the last scan at its time: true targets (rings) and where they went, estimates by label with their
+    ellipses of two standard deviations, sensors with what they see and measured. Measurements are those of
+    `scans_of_record`; they are left out where those cannot be had.
+
+    Args:
+        record: the run.
+        scenario: that it is of.
+        path: a file that ends with .mp4 (ffmpeg writes it) or .gif.
+        fps: frames a second.
+        seconds: length; None: a fifth of a second for each scan, from two seconds to a minute.
+        size: width in pixels.
+        trust: run the code that the scenario names, to draw measurements.
+        watch: told the number of every frame that is drawn, and of all.
+
+    Raises:
+        InputError: another ending, more frames than there can be, a file that cannot be written; or no ffmpeg, or one
+            that fails.
+    """
+    ending = path.suffix.lower()
+    writer = _writer(ending, path, fps)
+    if seconds is None:
+        seconds = min(max(record.num_scans / SCANS_PER_SECOND, _SHORTEST), _LONGEST)
+    number = max(1, round(seconds * fps))
+    if number > _MOST_FRAMES[ending]:
+        raise InputError(f"seconds: expected at most {_MOST_FRAMES[ending]} frames of a {ending} file; got {number}")
+    times = np.linspace(record.times[0], record.times[-1], number) if number > 1 else record.times[:1]
+    steps = np.searchsorted(record.times, times, side="right") - 1
+    drawing = _Drawing(record, scenario, trust)
+    with tempfile.TemporaryDirectory(prefix="vedette-video-", ignore_cleanup_errors=True) as folder:
+        made = Path(folder) / f"video{ending}"
+        try:
+            with writer.saving(drawing.figure, str(made), size / drawing.figure.get_figwidth()):
+                for frame, step in enumerate(steps.tolist(), start=1):
+                    drawing.show(step)
+                    writer.grab_frame()
+                    if watch is not None:
+                        watch(frame, number)
+        except (subprocess.CalledProcessError, BrokenPipeError) as error:
+            if isinstance(error.__context__, KeyboardInterrupt):  # which went to ffmpeg, too
+                raise KeyboardInterrupt from None
+            told = str(getattr(error, "stderr", None) or error).strip().splitlines()[-1:]
+            raise InputError(f"{path}: expected ffmpeg to write it; it failed: {' '.join(told)}") from error
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            with made.open("rb") as video:
+                write_whole(path, lambda file: shutil.copyfileobj(video, file))
+        except OSError as error:
+            raise InputError(f"path: expected a place to write a video; got {path}: {error.strerror}") from error
+    return number
+
+
+def _writer(ending: str, path: Path, fps: float) -> AbstractMovieWriter:
+    from matplotlib.animation import FFMpegWriter, PillowWriter  # here, as no other figure needs it
+
+    if ending not in ENDINGS:
+        raise InputError(f"path: expected a file that ends with {' or '.join(ENDINGS)}; got {path}")
+    if ending == ".gif":
+        return PillowWriter(fps=fps)  # type: ignore[arg-type]
+    if not FFMpegWriter.isAvailable():
+        raise InputError(f"path: expected ffmpeg, which writes {path}; it is not installed (a .gif needs none)")
+    return FFMpegWriter(fps=fps, metadata={"title": path.stem})  # type: ignore[arg-type]
+
+
+class _Drawing:
+    """One figure whose axes show one scan after another."""
+
+    def __init__(self, record: RunRecord, scenario: Scenario, trust: bool) -> None:
+        self._record, self._scenario = record, scenario
+        self._scans = _scans(record, scenario, trust)
+        self._scene = scene_of(scenario, record.planner)
+        self._scale = 1e-3 if reach_of([record]) > LARGE else 1.0
+        self.figure = new_figure(COLUMN_WIDTH + 0.75)
+        self.figure.set_layout_engine("constrained", h_pad=0.08)  # as in `tracks_figure`
+        self._axes: Axes = self.figure.subplots()
+        self._axes.set_aspect("equal")
+        draw_zones(self._axes, self._scene.zones, self._scale)
+        frame_tracks(self._axes, [record], self._scale, self._scene)
+        add_legend(self.figure, record, self._scene, is_video=True)
+        labels = np.concatenate([estimate.labels for estimate in record.estimates])
+        self._places = _places(labels) if recur(labels) else {}
+        self._shown: list[Artist] = []
+        self._step = -1
+        self.show(0)
+        self.figure.draw_without_rendering()
+        self.figure.set_layout_engine("none")  # every frame alike
+
+    def show(self, step: int) -> None:
+        """Show a scan in place of the one before."""
+        if step == self._step:
+            return
+        for artist in self._shown:
+            artist.remove()
+        self._step, self._shown = step, []
+        name = drawn_text(short_label(self._record.planner))
+        self._axes.set_title(f"{name}, run {self._record.run}: t = {self._record.times[step]:.1f} s")
+        self._draw_sensors(step)
+        self._draw_truth(step)
+        self._draw_estimates(step)
+
+    def _add(self, artist: Artist) -> None:
+        self._shown.append(artist)
+
+    def _draw_truth(self, step: int) -> None:
+        truth = self._record.truth
+        until = int(truth.offsets[step + 1])
+        ids, places = truth.ids[:until], truth.states[:until, :2] * self._scale
+        paths = [places[ids == target] for target in np.unique(ids)]
+        self._add(self._axes.add_collection(LineCollection(paths, colors=INK, linewidths=0.9, zorder=2)))
+        _, states = truth.at(step)
+        style: dict[str, Any] = {"marker": "o", "color": INK, "markerfacecolor": "white", "markersize": 5}
+        self._add(self._axes.plot(*(states[:, :2].T * self._scale), linestyle="", zorder=4, **style)[0])
+
+    def _draw_estimates(self, step: int) -> None:
+        past = self._record.estimates[: step + 1]
+        points = np.concatenate([estimate.means[:, :2] for estimate in past]) * self._scale
+        shades = [self._shade(label) for estimate in past for label in estimate.labels.tolist()]
+        if shades:
+            self._add(
+                self._axes.scatter(points[:, 0], points[:, 1], s=2.5, c=shades, alpha=0.5, linewidths=0, zorder=3)
+            )
+        now = past[-1]
+        for label, mean, cov in zip(now.labels.tolist(), now.means, now.covs, strict=True):
+            shade, place = self._shade(label), (float(mean[0]) * self._scale, float(mean[1]) * self._scale)
+            variances, axes_of = np.linalg.eigh(cov[:2, :2])
+            width, height = 2.0 * _SIGMAS * np.sqrt(np.maximum(variances, 0.0)) * self._scale
+            angle = float(np.degrees(np.arctan2(axes_of[1, 0], axes_of[0, 0])))
+            ellipse = Ellipse(place, width, height, angle=angle, color=shade, fill=False, linewidth=0.8, zorder=5)
+            self._add(self._axes.add_patch(ellipse))
+            self._add(self._axes.plot(*place, marker=".", color=shade, markersize=5, zorder=6)[0])
+            if self._places and len(now.labels) <= _MOST_NAMED:
+                style: dict[str, Any] = {"textcoords": "offset points", "fontsize": 6, "color": shade, "zorder": 7}
+                self._add(self._axes.annotate(".".join(map(str, label)), place, xytext=(4, -8), **style))
+
+    def _shade(self, label: list[int]) -> str:
+        return colour(self._places.get(tuple(label), 0))
+
+    def _draw_sensors(self, step: int) -> None:
+        record, model = self._record, self._scenario.model
+        offsets = name_offsets(record.poses[step, :, :2], reach_of([record]))
+        for s, (section, pose) in enumerate(zip(model.sensors, record.poses[step], strict=True)):
+            place = (float(pose[0]) * self._scale, float(pose[1]) * self._scale)
+            field = self._scene.field(s, pose)
+            if field is not None:
+                self._add(draw_field(self._axes, place, field, self._scale))
+            path = record.poses[: step + 1, s, :2] * self._scale
+            self._add(self._axes.plot(*path.T, color=GREY, linewidth=1.2, linestyle=(0, (2.5, 1)), zorder=3)[0])
+            marker = SENSOR_MARKERS[s % len(SENSOR_MARKERS)]
+            style: dict[str, Any] = {"marker": marker, "color": INK, "markerfacecolor": GREY, "markersize": 6}
+            self._add(self._axes.plot(*place, zorder=8, **style)[0])
+            if record.num_sensors <= _MOST_NAMED:
+                text: dict[str, Any] = {"textcoords": "offset points", "fontsize": 6, "zorder": 9}
+                self._add(self._axes.annotate(self._scene.name(s), place, **offsets[s], **text))
+            scan = self._scans[step][s] if self._scans else None
+            if scan is not None and section.measurement.kind in LIE:
+                self._draw_scan(scan, section.measurement.kind, pose)
+
+    def _draw_scan(self, scan: Scan, kind: str, pose: Floats) -> None:
+        """Crosses, rays or circles; those of targets in ink, clutter in grey."""
+        lie = in_plane(scan.measurements, kind, pose) * (1.0 if LIE[kind] == "ray" else self._scale)
+        for is_clutter in (False, True):
+            mine = lie[(scan.origins == CLUTTER) == is_clutter]
+            style: dict[str, Any] = {"color": GREY if is_clutter else INK, "alpha": 0.7, "zorder": 2.5}
+            place = pose[:2] * self._scale
+            if LIE[kind] == "ray":
+                ends = place + 2.0 * reach_of([self._record]) * self._scale * np.column_stack(
+                    [np.cos(mine), np.sin(mine)]
+                )
+                rays = [np.stack([place, end]) for end in ends]
+                self._add(self._axes.add_collection(LineCollection(rays, linewidths=0.5, **style), autolim=False))
+            elif LIE[kind] == "circle":
+                for radius in mine[:, 0].tolist():
+                    circle = Circle((float(place[0]), float(place[1])), max(radius, 0.0), fill=False, lw=0.5, **style)
+                    self._add(self._axes.add_patch(circle))
+            else:
+                size = 2.5 if is_clutter else 4.0
+                self._add(self._axes.plot(*mine.T, linestyle="", marker="x", markersize=size, mew=0.7, **style)[0])
+
+
+def _scans(record: RunRecord, scenario: Scenario, trust: bool) -> Scans:
+    """The scans of a run; none where they cannot be had, or not without the code of somebody's own."""
+    if code_of_sensors(scenario) and not trust:
+        return ()
+    try:
+        return scans_of_record(record, scenario)
+    except VedetteError:
+        return ()
+
+
+def _places(labels: Ints) -> dict[tuple[int, ...], int]:
+    return {tuple(label): place for place, label in enumerate(np.unique(labels, axis=0).tolist())}

@@ -1,0 +1,59 @@
+"""The report of a single run: the page of a campaign's report, of one strategy in one setting."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from vedette.evaluation.scans import code_of_sensors
+from vedette.reports.groups import group_of_run
+from vedette.reports.replay import replay_data
+from vedette.reports.tables import Table
+from vedette.reports.writing import make_room, render, section_of, write_page
+from vedette.scenarios import Scenario
+from vedette.simulation.records import RunRecord
+
+
+def write_run_report(
+    record: RunRecord,
+    scenario: Scenario,
+    path: str | Path,
+    *,
+    manifest: Mapping[str, Any] | None = None,
+    trust: bool = False,
+) -> None:
+    """Write the report of one run as one HTML file that needs nothing else; the same run gives the same bytes.
+
+    Of recorded scans the replay has those of the recording. Where nobody knows the targets there are no errors.
+
+    Args:
+        record: the run.
+        scenario: that it is of.
+        path: of the file; its folder is made.
+        manifest: of the run's folder, which has the versions that it was made with; None: they are not told.
+        trust: run the code that the scenario names, to draw measurements (see `write_report`).
+
+    Raises:
+        InputError: a run of other sensors than the scenario has, or a file that cannot be written.
+    """
+    target = Path(path)
+    make_room(target)
+    group = group_of_run(record, scenario)
+    (strategy,) = group.strategies
+    page = render(
+        "run.html",
+        [{**replay_data(strategy, record, group.title, trust=trust), "typical": False}],
+        record=record,
+        strategy=strategy.name,
+        section=section_of(group, "g0"),
+        untrusted=() if trust else code_of_sensors(scenario),
+        described=scenario.model.description,
+        versions=None if manifest is None else _versions(manifest),
+    )
+    write_page(target, page)
+
+
+def _versions(manifest: Mapping[str, Any]) -> Table:
+    rows = tuple((str(name), str(number)) for name, number in manifest["versions"].items())
+    return Table("With what the run was made.", ("Part", "Version"), rows, is_words=True)
