@@ -39,7 +39,7 @@ def write_live(folder: Path, **options: Any) -> list[bytes]:
     with (folder / "scans.csv").open(newline="") as file:
         for row in csv.DictReader(file):
             pose = {"lon": float(row["own_lon"]), "lat": float(row["own_lat"])}
-            scan = {"sensor": row["radar"], "time": row["time"], "measurements": [], "pose": pose}
+            scan: dict[str, Any] = {"sensor": row["radar"], "time": row["time"], "measurements": [], "pose": pose}
             found = lines.setdefault((row["time"], row["radar"]), scan)
             if row["brg_deg"]:
                 found["measurements"].append([float(row["brg_deg"]), float(row["range_nmi"])])

@@ -185,7 +185,7 @@ def test_a_plan_that_cannot_be_made_costs_no_scan(tmp_path: Path) -> None:
         def plan(self, *_: Any, **__: Any) -> Any:
             raise RuntimeError("no idea")
 
-    broken = Live(live.late, live.sites, live.estimate, live.conventions, planner=Fails(), decide_every=5.0)  # type: ignore[arg-type]
+    broken = Live(live.late, live.sites, live.estimate, live.conventions, planner=Fails(), decide_every=5.0)
     answers = [json.loads(answer) for answer in answered(broken, walk(8))]
     (error,) = (answer["error"] for answer in answers if "error" in answer)
     assert error.startswith("line 12, plan at 5 s: RuntimeError: no idea (test_loop.py, line ")

@@ -76,7 +76,8 @@ class RecordedScans:
         start: s; the recorded time of the first: since 1970 UTC where times were dates.
         is_utc: whether they were.
         scans: for each instant one a sensor: (num, meas_dim) measurements as filters take them; None: it did not scan.
-        poses: (num_instants, num_sensors, 3 or more), each sensor where it was when it scanned last.
+        poses: (num_instants, num_sensors, 3 or more), each sensor where it was when it scanned last, or will be when it
+            first does.
         skipped: what was wrong with the rows that were left out.
     """
 
@@ -116,7 +117,7 @@ def in_order(
 
     Args:
         looks: in any order, at most one of a sensor at a time.
-        poses: (num_sensors, 3 or more) the sensors before they first scan.
+        poses: (num_sensors, 3 or more) the sensors that never scan.
         start: of the times of the looks, see `RecordedScans`.
         is_utc, skipped: as of `RecordedScans`.
     """
@@ -124,6 +125,9 @@ def in_order(
     for look in looks:
         instants.setdefault(look.time, {})[look.sensor] = look
     times, at = np.array(sorted(instants)), poses.copy()
+    for time in reversed(times.tolist()):  # before its first scan a sensor was where it then is
+        for s, look in instants[time].items():
+            at[s, : len(look.pose)] = look.pose
     found, places = [], np.empty((len(times), *poses.shape))
     for k, time in enumerate(times.tolist()):
         for s, look in instants[time].items():

@@ -48,7 +48,7 @@ def scenario_of_recording(
 
     Args:
         sensors: a YAML file with `sensors`, and whatever else of a scenario is known: `origin`, `recording` (columns,
-            units, conventions), `motion`, `survival`, `birth`, `filter`, `fusion`, ...; decisions are left out.
+            units, conventions), `motion`, `survival`, `birth`, `filter`, `fusion`, ...; of `control` the constraints.
         scans: the CSV or Parquet file of the scans.
         truth: the file of the targets' own reports; None: as the file about sensors says, or unknown.
         speed: m/s that targets hardly exceed; motion and births go by it where nothing is said of them.
@@ -60,7 +60,9 @@ def scenario_of_recording(
     """
     document = _document(sensors)
     said = {key: value for key, value in document.data.items() if key not in ("control", "planners", "time")}
-    own = said.get("recording")
+    control, own = document.data.get("control"), said.get("recording")
+    if isinstance(control, Mapping) and "constraints" in control:  # zones are drawn
+        said["control"] = {"constraints": control["constraints"]}
     said.setdefault("name", scans.stem)
     said["recording"] = {
         **(own if isinstance(own, Mapping) else {}),
