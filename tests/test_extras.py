@@ -183,7 +183,7 @@ def test_only_a_scheduler_needs_the_extra_of_clusters(tmp_path: Path) -> None:
         ("import vedette.reports", "jinja2 and matplotlib and pyarrow", "report"),
         ("import vedette.campaigns", "pyarrow", "campaigns"),
         ("from vedette.simulation.arrow import write_table; write_table({}, None)", "pyarrow", "campaigns"),
-        ("from vedette.recorded.reports import read_table; read_table('a.parquet')", "pyarrow", "campaigns"),
+        ("from vedette.recorded.tables import read_table; read_table('a.parquet')", "pyarrow", "campaigns"),
     ],
 )
 def test_the_library_names_the_extra_too(program: str, names: str, extra: str, tmp_path: Path) -> None:

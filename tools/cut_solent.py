@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from vedette.recorded.cleaning import longest_reachable
 from vedette.recorded.geography import Origin
-from vedette.recorded.reports import seconds
+from vedette.recorded.tables import seconds
 
 Path2D = NDArray[np.float64]  # (n, 3): time in s, x east and y north in m
 

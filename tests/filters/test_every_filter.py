@@ -143,7 +143,7 @@ BAD_ARGUMENTS: list[tuple[str, list[Any], str]] = [
         [np.zeros(2), np.zeros((1, 3)), [0.0, 0.0, math.nan], [math.inf, 0.0, 0.0], None, "x"],
         r"poses?(\[0\])?: expected .*; got",
     ),
-    ("dt", [0.0, -1.0, math.nan, math.inf, True, np.ones(2), "1", None], r"dt: expected a .*number.*; got"),
+    ("dt", [-1.0, math.nan, math.inf, True, np.ones(2), "1", None], r"dt: expected a .*number.*; got"),
     (
         "number",
         [1.5, None, True, "1", 0, -1, 2**63, np.uint64(2**63)],

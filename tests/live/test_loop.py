@@ -14,7 +14,7 @@ from live.examples import SYNCHRONOUS, answered, line, small, walk, write_live
 from vedette.errors import InputError
 from vedette.live import MOST_BYTES, Live, live_of
 from vedette.recorded import Conventions, Origin, Site, parse_scans
-from vedette.recorded.reports import read_table
+from vedette.recorded.tables import read_table
 from vedette.scenarios.build import build_experiment
 from vedette.scenarios.of_recording import scenario_of_sensors
 from vedette.tracking import LateScans, SensorScan

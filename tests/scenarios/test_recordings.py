@@ -15,7 +15,7 @@ from vedette.errors import InputError, ScenarioError
 from vedette.evaluation.runs import run_scenario
 from vedette.evaluation.track_table import table_of_run, write_tracks
 from vedette.recorded import Bias, Conventions, Origin, RecordedScans, Site, parse_scans, table_of
-from vedette.recorded.reports import Table
+from vedette.recorded.tables import Table
 from vedette.scenarios import load_scenario
 from vedette.scenarios.dumping import dump_scenario
 from vedette.scenarios.of_recording import scenario_of_recording

@@ -14,7 +14,7 @@ from recordings import ORIGIN, SHIPS
 from vedette.errors import InputError
 from vedette.evaluation.runs import run_scenario
 from vedette.recorded import Origin, RecordedTargets
-from vedette.recorded.reports import read_table
+from vedette.recorded.tables import read_table
 from vedette.scenarios.of_recording import scenario_of_recording
 
 CATS: Any = manifest["CATS"]

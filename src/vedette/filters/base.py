@@ -12,7 +12,7 @@ import numpy as np
 
 from vedette.densities import LMB, Labelled
 from vedette.errors import InputError
-from vedette.filters.inputs import births_for, blame_model, check_belief, check_scan, nobody
+from vedette.filters.inputs import births_for, blame_model, check_belief, check_scan, no_time, nobody
 from vedette.filters.limits import Limits
 from vedette.filters.protocols import FilterInfo
 from vedette.kernels.association.truncation import Truncation
@@ -196,7 +196,7 @@ class LabelledFilter(SingleSensorFilter, OfKind[BeliefT]):
         self, dt: Any, scan: Floats, pose: Any, step: Any, prior: BeliefT, births: LMB | None
     ) -> StepInputs:
         """As `_inputs`; at the prior's own time those of an update."""
-        if dt == 0.0:
+        if no_time(dt):
             return self._update_inputs(scan, pose)
         return self._inputs(scan, pose, dt, step, prior, births)
 

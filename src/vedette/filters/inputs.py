@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache, lru_cache
+from numbers import Real
 from pathlib import Path
 from traceback import walk_tb
 from typing import Any, TypeVar
@@ -114,6 +115,11 @@ def births_for(
         if newest >= born.tracks.labels[:, 0].min():
             raise reject("step", f"a step after those of the labels in the belief, of which the last is {newest}", step)
     return born.to_kernel()
+
+
+def no_time(dt: Any) -> bool:
+    """Whether it is the number 0; what is no number is told of where it is taken."""
+    return not isinstance(dt, bool) and isinstance(dt, Real) and dt == 0.0
 
 
 @cache

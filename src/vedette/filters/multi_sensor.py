@@ -12,7 +12,7 @@ import numpy as np
 from vedette.densities import LMB, Labelled
 from vedette.errors import InputError
 from vedette.filters.base import NO_POSE, NO_SCAN, BeliefT, OfKind, SensorStep, blind_sensor
-from vedette.filters.inputs import births_for, check_belief, check_scan, model_errors, nobody
+from vedette.filters.inputs import births_for, check_belief, check_scan, model_errors, no_time, nobody
 from vedette.filters.limits import Limits
 from vedette.filters.protocols import FilterInfo
 from vedette.kernels.base.types import Bools, Floats, Lmb, Motion, ScanInput
@@ -109,7 +109,7 @@ class MultiSensorFilter(OfKind[BeliefT]):
         """
         taken = self._checked_scans(scans, poses, rng)
         prior = check_belief(belief, self.kind, self.targets.state_dim)
-        if dt == 0.0:
+        if no_time(dt):
             return self._updated(prior, nobody(self.targets.state_dim), taken, 0.0, f"step {step}")
         period = positive("dt", dt)
         born = births_for(self.targets.birth, period, step, prior, births)

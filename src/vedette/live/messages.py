@@ -11,7 +11,7 @@ from vedette.models.arguments import reject
 from vedette.reading import parse_json, said
 from vedette.recorded import Conventions, Origin, Site, parse_scans
 from vedette.recorded.instants import COMPONENTS
-from vedette.recorded.reports import Table, is_number
+from vedette.recorded.tables import Table, is_number
 from vedette.text import shown
 from vedette.tracking import SensorScan
 

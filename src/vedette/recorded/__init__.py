@@ -1,10 +1,11 @@
 """What was recorded in the world: reports of targets and their cleaning, scans of sensors, longitude and latitude."""
 
 from vedette.recorded.cleaning import Cleaning, CleaningCounts, RecordedTrack
+from vedette.recorded.conventions import Conventions
 from vedette.recorded.geography import Origin
 from vedette.recorded.instants import Bias, RecordedScans, Site, without_biases
-from vedette.recorded.reports import read_table, table_of
-from vedette.recorded.scans import Conventions, parse_scans
+from vedette.recorded.scans import parse_scans
+from vedette.recorded.tables import read_table, table_of
 from vedette.recorded.targets import RecordedTargets
 
 __all__ = [

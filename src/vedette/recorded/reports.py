@@ -1,35 +1,18 @@
-"""Recorded positions of real targets: CSV and Parquet files, and tables in memory, as checked arrays."""
+"""Recorded positions of real targets: columns of a table as checked arrays."""
 
 from __future__ import annotations
 
-import csv
-import numbers
-import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from datetime import UTC, datetime
-from decimal import Decimal
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from vedette.errors import InputError
-from vedette.extras import need
 from vedette.kernels.base.types import Floats, Ints
-from vedette.recorded.foreign import AIS_ENDINGS, ASTERIX_ENDINGS, read_ais, read_asterix
 from vedette.recorded.geography import Origin
-from vedette.text import elided, printable, shown
+from vedette.recorded.tables import FARTHEST, Table
 
-# Beyond these, differences and speeds of reports mean nothing.
-FARTHEST = 1e9  # m, m/s
-LATEST = 1e12  # s
 _SAME_TIME = 1e-6  # s; two reports of one target nearer in time than this are one
-# Larger files would fill the memory before anything could be said of them.
-_MOST_BYTES = 500_000_000
-_MOST_REPORTS = 5_000_000
-_MOST_NAMES = 20
-ENDINGS = (".csv", ".parquet", *AIS_ENDINGS, *ASTERIX_ENDINGS)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,177 +38,6 @@ class Reports:
     origin_deg: tuple[float, float] | None
     bounds_deg: tuple[tuple[float, float], tuple[float, float]] | None = None
     repeats: tuple[tuple[int, int], ...] = ()
-
-
-@dataclass(frozen=True, slots=True)
-class Table:
-    """Columns as they came, the row number of each entry in its file, and a name for messages.
-
-    bearings: from where the format counts them, "north" or "east"; None: it does not say.
-    """
-
-    columns: Mapping[str, Sequence[Any]]
-    rows: Sequence[int]
-    source: str
-    bearings: str | None = None
-
-    def column(self, name: str) -> Sequence[Any]:
-        """The cells of a column, or an error that says which there are."""
-        if name not in self.columns:
-            have = column_names(self.columns) or "none"
-            raise InputError(f"{self.source}: expected a column {shown(name)}; got columns {have}")
-        return self.columns[name]
-
-    def fault(self, index: int, name: str, expected: str) -> InputError:
-        """An error that names file, row and column of a cell."""
-        place = f"{self.source}, row {self.rows[index]}, column {shown(name)}"
-        return InputError(f"{place}: expected {expected}; got {shown(self.columns[name][index])}")
-
-    def numbers(self, name: str, largest: float) -> Floats:
-        """A column of numbers of at most that size."""
-        cells = self.column(name)
-        values = np.empty(len(cells))
-        for i, cell in enumerate(cells):
-            try:
-                values[i] = number(cell)
-            except (TypeError, ValueError, OverflowError):
-                raise self.fault(i, name, "a finite number") from None
-        if not np.isfinite(values).all():
-            raise self.fault(int(np.argmin(np.isfinite(values))), name, "a finite number")
-        if (wrong := np.abs(values) > largest).any():
-            raise self.fault(int(np.argmax(wrong)), name, f"a number from {-largest:g} to {largest:g}")
-        return values
-
-    def times(self, name: str) -> Floats:
-        """A column of numbers of seconds, or of ISO 8601 times."""
-        cells = self.column(name)
-        if not len(cells) or is_number(cells[0]):
-            return self.numbers(name, LATEST)
-        values = np.empty(len(cells))
-        for i, cell in enumerate(cells):
-            try:
-                values[i] = seconds(cell)
-            except (TypeError, ValueError, OverflowError):
-                raise self.fault(i, name, "an ISO 8601 time") from None
-            if not abs(values[i]) <= LATEST:  # a number, infinite or not, among times
-                raise self.fault(i, name, "an ISO 8601 time")
-        return values
-
-    def labels(self, name: str) -> list[str]:
-        """A column of names or numbers, none empty."""
-        labels = ["" if cell is None else str(cell).strip() for cell in self.column(name)]
-        if "" in labels:
-            raise self.fault(labels.index(""), name, "a name or number")
-        return labels
-
-
-def table_of(frame: Any, source: str = "table") -> Table:
-    """A table of columns in memory: a mapping, or a data frame of pandas or Polars; rows count from 1 in messages.
-
-    Raises `InputError` for something else, or columns of different lengths.
-    """
-    names = frame if isinstance(frame, Mapping) else getattr(frame, "columns", None)
-    if names is None or isinstance(names, str):
-        raise InputError(f"{source}: expected columns by name, or a data frame; got {type(frame).__name__}")
-    columns = {str(name): list(frame[name]) for name in names}
-    lengths = {name: len(cells) for name, cells in columns.items()}
-    if len(set(lengths.values())) > 1:
-        raise InputError(f"{source}: expected columns of one length; got {shown(str(lengths))}")
-    return Table(columns, range(1, max(lengths.values(), default=0) + 1), source)
-
-
-def column_names(names: Iterable[str]) -> str:
-    """Names of columns in a message."""
-    listed = [elided(printable(name)) for name in names]
-    return ", ".join(listed[:_MOST_NAMES]) + (f" and {len(listed) - _MOST_NAMES} more" * (len(listed) > _MOST_NAMES))
-
-
-def number(cell: Any) -> float:
-    """A number, or text of one as every program writes it. Raises `TypeError` or `ValueError` for anything else."""
-    if isinstance(cell, str):
-        if "_" in cell or not cell.isascii():  # Python reads 1_000 and digits of any script
-            raise ValueError(cell)
-    elif isinstance(cell, bool) or not isinstance(cell, numbers.Real | Decimal):
-        raise TypeError(cell)
-    return float(cell)
-
-
-def is_number(cell: Any) -> bool:
-    """Whether `number` takes it."""
-    try:
-        number(cell)
-    except (TypeError, ValueError, OverflowError):
-        return False
-    return True
-
-
-def seconds(time: Any) -> float:
-    """A number, or the seconds from 1970 UTC to an ISO 8601 time or `datetime`; without a zone it is taken as UTC."""
-    if is_number(time):
-        return number(time)
-    moment = time if isinstance(time, datetime) else datetime.fromisoformat(str(time).strip())
-    return (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()
-
-
-def read_table(path: str | Path) -> Table:
-    """A .csv file with a header line, a .parquet file, AIS messages (.nmea, .ais) or radar plots (.ast, .asterix).
-
-    Raises:
-        MissingPackageError: what reads it is not installed.
-        InputError: not there, another ending, not readable as what it says it is, rows not as long as the header.
-    """
-    file = Path(path)
-    named = elided(printable(str(file)), 200)
-    if file.suffix.lower() not in ENDINGS:
-        raise InputError(f"{named}: expected a file that ends with {', '.join(ENDINGS)}")
-    if not os.path.isfile(file):  # a name can be too long, or hold what no name can: for pathlib, an error
-        raise InputError(f"{named}: no such file; expected a table of records")
-    if (size := file.stat().st_size) > _MOST_BYTES:
-        raise InputError(f"{named}: expected a file of at most {_MOST_BYTES} bytes; got {size}")
-    if file.suffix.lower() in AIS_ENDINGS:
-        return Table(*read_ais(file), str(file))
-    if file.suffix.lower() in ASTERIX_ENDINGS:
-        return Table(*read_asterix(file), str(file), "north")
-    return _read_csv(file) if file.suffix.lower() == ".csv" else _read_parquet(file)
-
-
-def _read_csv(file: Path) -> Table:
-    try:
-        with file.open(encoding="utf-8-sig", newline="") as lines:
-            reader = csv.reader(lines, strict=True)
-            header = [name.strip() for name in next(reader, [])]
-            rows = [(reader.line_num, cells) for cells in reader if cells]
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise InputError(f"{file}: cannot be read as CSV in UTF-8: {_reason(error)}") from error
-    if len(set(header)) != len(header):
-        raise InputError(f"{file}, row 1: expected each column name once; got {column_names(header)}")
-    for line, cells in rows:
-        if len(cells) != len(header):
-            raise InputError(f"{file}, row {line}: expected {len(header)} cells, as in the header; got {len(cells)}")
-    columns = {name: [cells[i] for _, cells in rows] for i, name in enumerate(header)}
-    return Table(columns, [line for line, _ in rows], str(file))
-
-
-def _read_parquet(file: Path) -> Table:
-    need(f"{file}, which is a Parquet file,", "pyarrow")
-    from pyarrow import ArrowException, parquet  # here, as most programs never need it
-
-    try:
-        with parquet.ParquetFile(file) as source:
-            if source.metadata.num_rows > _MOST_REPORTS:
-                raise InputError(f"{file}: expected at most {_MOST_REPORTS} rows; got {source.metadata.num_rows}")
-            table = source.read()
-        columns = {name: table.column(name).to_pylist() for name in dict.fromkeys(table.column_names)}
-    except InputError:
-        raise
-    except (OSError, ValueError, KeyError, OverflowError, ArrowException) as error:
-        raise InputError(f"{file}: cannot be read as Parquet: {_reason(error)}") from error
-    return Table(columns, range(1, table.num_rows + 1), str(file))
-
-
-def _reason(error: Exception) -> str:
-    """What another library says of a file, on one line."""
-    return elided(printable(" ".join(str(error).split())), 300)
 
 
 def parse_reports(

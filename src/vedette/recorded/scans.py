@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any, Literal
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats
 from vedette.models.arguments import reject
+from vedette.recorded.conventions import ANGLES, MOST, OTHER_NAMES, QUANTITIES, Conventions
 from vedette.recorded.geography import Origin
 from vedette.recorded.instants import (
     COMPONENTS,
-    Bearings,
     Bias,
     Look,
     RecordedScans,
@@ -23,73 +23,8 @@ from vedette.recorded.instants import (
     in_order,
     without_biases,
 )
-from vedette.recorded.reports import FARTHEST, LATEST, Table, column_names, is_number, number, seconds
+from vedette.recorded.tables import FARTHEST, LATEST, Table, column_names, is_number, number, seconds
 from vedette.text import shown
-
-# What a row may say: the quantity, and the units that the end of a column's name may give it.
-_LENGTHS = {"m": 1.0, "km": 1000.0, "nmi": 1852.0}
-_ANGLES = {"rad": 1.0, "deg": math.pi / 180.0}
-QUANTITIES: dict[str, Mapping[str, float]] = {
-    "range": _LENGTHS,
-    "bearing": _ANGLES,
-    "x": _LENGTHS,
-    "y": _LENGTHS,
-    "lon": {"deg": 1.0},
-    "lat": {"deg": 1.0},
-    "own_x": _LENGTHS,
-    "own_y": _LENGTHS,
-    "own_lon": {"deg": 1.0},
-    "own_lat": {"deg": 1.0},
-    "own_heading": _ANGLES,
-}
-_OTHER_NAMES = {"lon": ("longitude",), "lat": ("latitude",), "time": ("time_s", "time_utc"), "range": ("distance",)}
-_MOST = {
-    **dict.fromkeys(("lon", "own_lon"), 360.0),
-    **dict.fromkeys(("lat", "own_lat"), 90.0),
-    **dict.fromkeys(("bearing", "own_heading"), 2.0 * math.pi),
-}
-
-
-@dataclass(frozen=True, slots=True)
-class Conventions:
-    """How the rows are to be read.
-
-    Attributes:
-        columns: name in the table of a quantity, where it differs: {"time": "Time", "sensor": "radar", ...}.
-        units: unit of a quantity ("m", "km", "nmi"; "deg", "rad"), where its column's name does not end with it, as
-            `range_km` and `bearing_deg` do. Lengths are else in m; angles must say.
-        bearings: from where bearings and headings are counted: "north", clockwise, as a compass has them; or "east",
-            counter-clockwise, as the library has them.
-        gather: s; rows of a sensor within this time after its first make one scan, at the mean of their times.
-        bad_rows: whether a row that cannot be read is refused or left out, and counted.
-        biases: by the name of a sensor what its rows say too much; it is taken off as they are read.
-
-    Raises:
-        InputError: a quantity, unit or word of another kind, or a time below 0.
-    """
-
-    columns: Mapping[str, str]
-    units: Mapping[str, str]
-    bearings: Bearings | None = None
-    gather: float = 0.0
-    bad_rows: Literal["refuse", "skip"] = "refuse"
-    biases: Mapping[str, Bias] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        known = ("time", "sensor", *QUANTITIES)
-        for where, given in (("columns", self.columns), ("units", self.units)):
-            for name in given:
-                if name not in known:
-                    raise reject(where, f"quantities among {', '.join(known)}", name)
-        for name, unit in self.units.items():
-            if unit not in QUANTITIES.get(name, {}):
-                raise reject(f"units.{name}", f"one of {', '.join(QUANTITIES.get(name, ())) or 'none'}", unit)
-        if self.bearings not in ("east", "north", None):
-            raise reject("bearings", "east or north", self.bearings)
-        if self.bad_rows not in ("refuse", "skip"):
-            raise reject("bad_rows", "refuse or skip", self.bad_rows)
-        if not 0.0 <= self.gather < math.inf:
-            raise reject("gather", "seconds, at least 0", self.gather)
 
 
 def parse_scans(
@@ -100,7 +35,7 @@ def parse_scans(
     A row whose measured cells are all empty says that the sensor scanned and found nothing.
 
     Args:
-        table: see `vedette.recorded.reports.read_table`.
+        table: see `vedette.recorded.tables.read_table`.
         sites: the sensors, in the order of the tracker's.
         conventions: how rows are read.
         origin: of longitudes and latitudes.
@@ -150,7 +85,7 @@ class _Rows:
 
     def _plain(self, quantity: str) -> str:
         """The column of time or sensor."""
-        names = (self.conventions.columns.get(quantity, quantity), *_OTHER_NAMES.get(quantity, ()))
+        names = (self.conventions.columns.get(quantity, quantity), *OTHER_NAMES.get(quantity, ()))
         for name in names:
             if name in self.table.columns:
                 return name
@@ -162,7 +97,7 @@ class _Rows:
         if (named := self.conventions.columns.get(quantity)) is not None:
             self.table.column(named)
             return named, self._unit(quantity, named, units)
-        for stem in (quantity, *_OTHER_NAMES.get(quantity, ())):
+        for stem in (quantity, *OTHER_NAMES.get(quantity, ())):
             for name in (stem, *(f"{stem}_{unit}" for unit in units)):
                 if name in self.table.columns:
                     return name, self._unit(quantity, name, units)
@@ -171,7 +106,7 @@ class _Rows:
     def _unit(self, quantity: str, name: str, units: Mapping[str, float]) -> float:
         given = self.conventions.units.get(quantity)
         ends = [unit for unit in units if name.endswith(f"_{unit}")]
-        if given is None and not ends and units is _ANGLES:
+        if given is None and not ends and units is ANGLES:
             wanted = f"a unit of {quantity}: a column {quantity}_deg or {quantity}_rad, or units: {{{quantity}: deg}}"
             raise InputError(f"{self.table.source}, column {shown(name)}: expected {wanted}; got none")
         return units[given or (ends[0] if ends else next(iter(units)))]
@@ -236,7 +171,7 @@ class _Rows:
             value = math.nan
         if not math.isfinite(value):
             raise self.table.fault(i, name, "a finite number")
-        most = _MOST.get(quantity, FARTHEST)
+        most = MOST.get(quantity, FARTHEST)
         if abs(value) > most * (1.0 + 1e-9) or (quantity == "range" and value < 0.0):
             limits = f"from {0 if quantity == 'range' else -most / unit:g} to {most / unit:g}"
             raise self.table.fault(i, name, f"a number {limits}")

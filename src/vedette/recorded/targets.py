@@ -13,7 +13,8 @@ from numpy.typing import ArrayLike
 from vedette.errors import InputError
 from vedette.models.arguments import real, reject
 from vedette.recorded.cleaning import Cleaning, CleaningCounts, RecordedTrack
-from vedette.recorded.reports import Reports, parse_reports, read_table, seconds, table_of
+from vedette.recorded.reports import Reports, parse_reports
+from vedette.recorded.tables import read_table, seconds, table_of
 from vedette.simulation.truth import TIME_TOLERANCE, Truth, scan_times
 
 

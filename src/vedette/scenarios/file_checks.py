@@ -32,7 +32,7 @@ def recorded_findings(model: ScenarioModel, folder: FilePath) -> Iterator[Findin
     if not isinstance(recorded, RecordedTargets):
         return
     file = folder / recorded.path
-    from vedette.recorded.reports import ENDINGS
+    from vedette.recorded.tables import ENDINGS
 
     if file.suffix.lower() not in ENDINGS:
         wanted = f"a file that ends with {', '.join(ENDINGS)}"
@@ -68,7 +68,7 @@ def _columns(recorded: RecordedTargets, file: FilePath) -> Iterator[Finding]:
     except (OSError, csv.Error) as error:
         yield ("targets", "path"), "a readable CSV file", f"{describe(recorded.path)}: {error}"
         return
-    from vedette.recorded.reports import column_names
+    from vedette.recorded.tables import column_names
 
     given, shown = recorded.columns.given(), column_names(header)
     for key, name in given.items():

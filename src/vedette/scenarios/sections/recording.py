@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Iterator
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -14,7 +16,7 @@ from vedette.scenarios.faults import Finding, describe
 from vedette.scenarios.sections.base import NonNegative, Section, attempt
 
 if TYPE_CHECKING:
-    from vedette.recorded import Bias, RecordedScans, Site
+    from vedette.recorded import Bias, Origin, RecordedScans, Site
     from vedette.scenarios.sections.scenario import ScenarioModel
 
 
@@ -67,14 +69,32 @@ class RecordingSection(Section):
     biases: dict[str, BiasSection] = Field(default={}, description="By sensor, as `vedette calibrate` finds them [-].")
 
     def build(self, world: ScenarioModel, folder: Path) -> RecordedScans:
-        """The scans. Raises `InputError` for a file that cannot be read, naming row and column."""
-        from vedette.recorded import Conventions, parse_scans
-        from vedette.recorded.reports import read_table
+        """The scans; a file that stays as it was is read once.
 
-        biases = {name: bias.build() for name, bias in self.biases.items()}
-        conventions = Conventions(self.columns, self.units, self.bearings, self.gather, self.bad_rows, biases)
+        Raises `InputError` for a file that cannot be read, naming row and column.
+        """
+        file = folder / self.path
+        try:
+            state = os.stat(file)
+        except (OSError, ValueError):
+            state = None
         origin = None if world.origin is None else world.origin.build()
-        return parse_scans(read_table(folder / self.path), sites_of(world), conventions, origin)
+        changed = state and (state.st_mtime_ns, state.st_size)
+        return _read(str(file), changed, self.model_dump_json(), tuple(sites_of(world)), origin)
+
+
+@lru_cache(maxsize=4)
+def _read(
+    file: str, changed: tuple[int, int] | None, section: str, sites: tuple[Site, ...], origin: Origin | None
+) -> RecordedScans:
+    """The scans of a file as it was when it last changed, read as a section says, in JSON as mappings have no hash."""
+    from vedette.recorded import Conventions, parse_scans
+    from vedette.recorded.tables import read_table
+
+    own = RecordingSection.model_validate_json(section)
+    biases = {name: bias.build() for name, bias in own.biases.items()}
+    conventions = Conventions(own.columns, own.units, own.bearings, own.gather, own.bad_rows, biases)
+    return parse_scans(read_table(file), sites, conventions, origin)
 
 
 def sites_of(world: ScenarioModel) -> list[Site]:

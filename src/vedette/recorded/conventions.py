@@ -1,0 +1,76 @@
+"""In which units and from where whoever wrote the rows of a recording counts."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+from vedette.models.arguments import reject
+from vedette.recorded.instants import Bearings, Bias
+
+# What a row may say: the quantity, and the units that the end of a column's name may give it.
+LENGTHS = {"m": 1.0, "km": 1000.0, "nmi": 1852.0}
+ANGLES = {"rad": 1.0, "deg": math.pi / 180.0}
+QUANTITIES: dict[str, Mapping[str, float]] = {
+    "range": LENGTHS,
+    "bearing": ANGLES,
+    "x": LENGTHS,
+    "y": LENGTHS,
+    "lon": {"deg": 1.0},
+    "lat": {"deg": 1.0},
+    "own_x": LENGTHS,
+    "own_y": LENGTHS,
+    "own_lon": {"deg": 1.0},
+    "own_lat": {"deg": 1.0},
+    "own_heading": ANGLES,
+}
+OTHER_NAMES = {"lon": ("longitude",), "lat": ("latitude",), "time": ("time_s", "time_utc"), "range": ("distance",)}
+MOST = {
+    **dict.fromkeys(("lon", "own_lon"), 360.0),
+    **dict.fromkeys(("lat", "own_lat"), 90.0),
+    **dict.fromkeys(("bearing", "own_heading"), 2.0 * math.pi),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Conventions:
+    """How the rows are to be read.
+
+    Attributes:
+        columns: name in the table of a quantity, where it differs: {"time": "Time", "sensor": "radar", ...}.
+        units: unit of a quantity ("m", "km", "nmi"; "deg", "rad"), where its column's name does not end with it, as
+            `range_km` and `bearing_deg` do. Lengths are else in m; angles must say.
+        bearings: from where bearings and headings are counted: "north", clockwise, as a compass has them; or "east",
+            counter-clockwise, as the library has them.
+        gather: s; rows of a sensor within this time after its first make one scan, at the mean of their times.
+        bad_rows: whether a row that cannot be read is refused or left out, and counted.
+        biases: by the name of a sensor what its rows say too much; it is taken off as they are read.
+
+    Raises:
+        InputError: a quantity, unit or word of another kind, or a time below 0.
+    """
+
+    columns: Mapping[str, str]
+    units: Mapping[str, str]
+    bearings: Bearings | None = None
+    gather: float = 0.0
+    bad_rows: Literal["refuse", "skip"] = "refuse"
+    biases: Mapping[str, Bias] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        known = ("time", "sensor", *QUANTITIES)
+        for where, given in (("columns", self.columns), ("units", self.units)):
+            for name in given:
+                if name not in known:
+                    raise reject(where, f"quantities among {', '.join(known)}", name)
+        for name, unit in self.units.items():
+            if unit not in QUANTITIES.get(name, {}):
+                raise reject(f"units.{name}", f"one of {', '.join(QUANTITIES.get(name, ())) or 'none'}", unit)
+        if self.bearings not in ("east", "north", None):
+            raise reject("bearings", "east or north", self.bearings)
+        if self.bad_rows not in ("refuse", "skip"):
+            raise reject("bad_rows", "refuse or skip", self.bad_rows)
+        if not 0.0 <= self.gather < math.inf:
+            raise reject("gather", "seconds, at least 0", self.gather)
