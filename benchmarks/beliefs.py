@@ -27,8 +27,9 @@ import itertools
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from calibration import BOUNDS, ENOUGH, SEED, Calibration, Case, calibration, cases
 from pages import write_between
+
+from calibration import BOUNDS, ENOUGH, SEED, Calibration, Case, calibration, cases
 
 
 def bin_table(found: Calibration) -> Iterator[str]:

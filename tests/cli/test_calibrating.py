@@ -48,7 +48,7 @@ def test_what_is_there_is_not_overwritten_unasked(place: Path) -> None:
     [
         (("absent.csv", "--sensors", "radars.yaml"), "absent.csv: no such file"),
         (("scans.csv", "--sensors", "absent.yaml"), "absent.yaml: no such file"),
-        (("radars.yaml", "--sensors", "radars.yaml"), "expected a .csv or .parquet file"),
+        (("radars.yaml", "--sensors", "radars.yaml"), "expected a file that ends with .csv, .parquet"),
     ],
 )
 def test_files_that_are_not_there_are_told(place: Path, words: tuple[str, ...], message: str) -> None:

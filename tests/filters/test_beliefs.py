@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from calibration import ENOUGH, NUM_STEPS, Calibration, PriorTargets, calibration, cases
 
+from calibration import ENOUGH, NUM_STEPS, Calibration, PriorTargets, calibration, cases
 from vedette.models import BirthModel, TargetModel, constant_survival, constant_velocity
 
 NUM_SITES = 2
