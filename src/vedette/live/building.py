@@ -6,10 +6,10 @@ from vedette.control import KnowsTruth
 from vedette.errors import InputError
 from vedette.live.loop import Live
 from vedette.models.arguments import reject
-from vedette.recorded import Site
 from vedette.recorded.instants import COMPONENTS
 from vedette.scenarios.build import build_experiment, build_planner
 from vedette.scenarios.of_recording import OfSensors
+from vedette.scenarios.sections.recording import sites_of
 from vedette.tracking import LateScans
 
 
@@ -39,10 +39,7 @@ def live_of(
             knows the targets.
     """
     model = known.scenario.model
-    sites = tuple(
-        Site(name, sensor.measurement.kind, sensor.pose)
-        for name, sensor in zip(model.sensor_names, model.sensors, strict=True)
-    )
+    sites = tuple(sites_of(model))
     for site in sites:
         if site.kind not in COMPONENTS:
             raise reject(f"sensor {site.name}", f"measurements of kind {', '.join(COMPONENTS)}", site.kind)
