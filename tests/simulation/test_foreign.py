@@ -13,7 +13,7 @@ from pyais import encode_dict
 from recordings import ORIGIN, SHIPS
 from vedette.errors import InputError
 from vedette.evaluation.runs import run_scenario
-from vedette.recorded import Origin, RecordedTargets
+from vedette.recorded import Bias, Conventions, Origin, RecordedTargets, Site, parse_scans
 from vedette.recorded.tables import read_table
 from vedette.scenarios.of_recording import scenario_of_recording
 
@@ -81,6 +81,16 @@ def test_radars_say_what_they_see(tmp_path: Path) -> None:
     assert table.columns["range_nmi"] == [10.0, 3.25]
     np.testing.assert_allclose(table.columns["bearing_deg"], [45.0, 271.0], atol=360.0 / 2**16)
     assert (table.columns["time"], table.bearings) == ([46941.5, 46942.0], "north")
+
+
+def test_biases_of_a_radar_count_as_its_bearings_do(tmp_path: Path) -> None:
+    """Clockwise, as the format says without the conventions."""
+    (tmp_path / "radar.ast").write_bytes(plot(0.0, 5.0, 92.0))
+    site = Site("1/2", "bearing_range", (0.0, 0.0, 0.0))
+    bias = {"1/2": Bias(bearing=np.radians(2.0))}
+    found = parse_scans(read_table(tmp_path / "radar.ast"), [site], Conventions({}, {}, biases=bias))
+    assert found.scans[0][0] is not None
+    np.testing.assert_allclose(found.scans[0][0][0, 0], 0.0, atol=2.0 * np.pi / 2**16)
 
 
 def test_midnight_is_passed(tmp_path: Path) -> None:

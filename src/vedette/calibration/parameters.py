@@ -11,7 +11,6 @@ import numpy as np
 
 from vedette.kernels.base.types import Floats
 from vedette.recorded import Bias, RecordedScans, Site, without_biases
-from vedette.recorded.instants import Bearings
 from vedette.tracking import Tracker
 
 Kind = Literal["bias", "noise", "detection", "clutter"]
@@ -66,7 +65,6 @@ class Problem:
     Attributes:
         recording: as it was made, biases in it.
         sites: the sensors.
-        bearings: from where its rows count bearings.
         biases: of each sensor, where no parameter says otherwise.
         parameters: what is to be found.
         tracker: one for sensors as these values of the parameters say, which draws no random numbers; and
@@ -75,7 +73,6 @@ class Problem:
 
     recording: RecordedScans
     sites: tuple[Site, ...]
-    bearings: Bearings | None
     biases: tuple[Bias, ...]
     parameters: tuple[Parameter, ...]
     tracker: Callable[[Floats], tuple[Tracker, Floats]]
@@ -96,7 +93,7 @@ class Problem:
                 # The bearing of a `Bias` has the rows' direction, as its parameter has.
                 change = {each.component: value / abs(each.per_si)}
                 biases[each.sensor] = replace(biases[each.sensor], **change)
-        return without_biases(self.recording, self.sites, biases, self.bearings)
+        return without_biases(self.recording, self.sites, biases)
 
     def log_likelihoods(self, free: Floats) -> Floats:
         """(num_scans,) what each scan of each sensor adds to the log likelihood, whatever order they are in.

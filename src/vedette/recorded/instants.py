@@ -79,6 +79,7 @@ class RecordedScans:
         poses: (num_instants, num_sensors, 3 or more), each sensor where it was when it scanned last, or will be when it
             first does.
         skipped: what was wrong with the rows that were left out.
+        bearings: from where the rows counted bearings, whose direction a bearing's bias has; None: there were none.
     """
 
     times: Floats
@@ -87,6 +88,7 @@ class RecordedScans:
     scans: tuple[tuple[Floats | None, ...], ...]
     poses: Floats
     skipped: tuple[str, ...] = ()
+    bearings: Bearings | None = None
 
     def arrivals(self) -> Iterator[SensorScan]:
         """Every scan by itself, in order of time, as `LateScans` takes them; times as of `times`."""
@@ -111,7 +113,12 @@ class Look(NamedTuple):
 
 
 def in_order(
-    looks: Iterable[Look], poses: Floats, start: float, is_utc: bool, skipped: tuple[str, ...]
+    looks: Iterable[Look],
+    poses: Floats,
+    start: float,
+    is_utc: bool,
+    skipped: tuple[str, ...],
+    bearings: Bearings | None,
 ) -> RecordedScans:
     """The scans of a recording, those of one time as an instant.
 
@@ -119,7 +126,7 @@ def in_order(
         looks: in any order, at most one of a sensor at a time.
         poses: (num_sensors, 3 or more) the sensors that never scan.
         start: of the times of the looks, see `RecordedScans`.
-        is_utc, skipped: as of `RecordedScans`.
+        is_utc, skipped, bearings: as of `RecordedScans`.
     """
     instants: dict[float, dict[int, Look]] = {}
     for look in looks:
@@ -134,26 +141,25 @@ def in_order(
             at[s, : len(look.pose)] = look.pose
         places[k] = at
         found.append(tuple(instants[time][s].scan if s in instants[time] else None for s in range(len(poses))))
-    return RecordedScans(times - times[0], start + float(times[0]), is_utc, tuple(found), places, skipped)
+    return RecordedScans(times - times[0], start + float(times[0]), is_utc, tuple(found), places, skipped, bearings)
 
 
-def without_biases(
-    recording: RecordedScans, sites: Sequence[Site], biases: Sequence[Bias], bearings: Bearings | None
-) -> RecordedScans:
+def without_biases(recording: RecordedScans, sites: Sequence[Site], biases: Sequence[Bias]) -> RecordedScans:
     """The recording as sensors without these biases would have made it.
 
     Args:
         recording: as it was.
         sites: the sensors.
         biases: one a sensor.
-        bearings: from where the rows count bearings, whose direction a bearing's bias has.
     """
     looks = []
     for time, scans, poses in zip(recording.times.tolist(), recording.scans, recording.poses, strict=True):
         for s, scan in enumerate(scans):
             if scan is not None:
-                looks.append(_without_bias(Look(time, s, scan, poses[s]), sites[s].kind, biases[s], bearings))
-    return in_order(looks, recording.poses[0], recording.start, recording.is_utc, recording.skipped)
+                look = Look(time, s, scan, poses[s])
+                looks.append(_without_bias(look, sites[s].kind, biases[s], recording.bearings))
+    told = recording.start, recording.is_utc, recording.skipped, recording.bearings
+    return in_order(looks, recording.poses[0], *told)
 
 
 def _without_bias(look: Look, kind: str, bias: Bias, bearings: Bearings | None) -> Look:

@@ -50,11 +50,11 @@ def parse_scans(
     found, skipped = rows.read()
     if not found:
         raise InputError(f"{table.source}: expected at least one row that can be read; got none of {len(table.rows)}")
-    recording = _at_instants(found, sites, conventions.gather, rows.is_utc, skipped)
+    recording = _at_instants(found, rows, skipped)
     if not conventions.biases:
         return recording
     biases = [conventions.biases.get(site.name, Bias()) for site in sites]
-    return without_biases(recording, sites, biases, conventions.bearings)
+    return without_biases(recording, sites, biases)
 
 
 @dataclass(frozen=True, slots=True)
@@ -207,11 +207,9 @@ class _Rows:
         return x, y
 
 
-def _at_instants(
-    rows: list[_Row], sites: Sequence[Site], gather: float, is_utc: bool, skipped: tuple[str, ...]
-) -> RecordedScans:
+def _at_instants(rows: list[_Row], how: _Rows, skipped: tuple[str, ...]) -> RecordedScans:
     """Rows of one sensor and time as a scan, scans of one time as an instant."""
-    looks = []
+    looks, sites, gather = [], how.sites, how.conventions.gather
     for s, site in enumerate(sites):
         own = sorted((row for row in rows if row.sensor == s), key=lambda row: row.time)
         for group in _groups(own, gather):
@@ -220,7 +218,7 @@ def _at_instants(
     first = np.zeros((len(sites), max(len(site.pose) for site in sites)))
     for s, site in enumerate(sites):
         first[s, : len(site.pose)] = site.pose
-    return in_order(looks, first, 0.0, is_utc, skipped)
+    return in_order(looks, first, 0.0, how.is_utc, skipped, how.bearings)
 
 
 def _is_empty(cell: Any) -> bool:

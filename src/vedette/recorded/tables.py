@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from decimal import Decimal
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -40,7 +40,7 @@ class Table:
     columns: Mapping[str, Sequence[Any]]
     rows: Sequence[int]
     source: str
-    bearings: str | None = None
+    bearings: Literal["east", "north"] | None = None
 
     def column(self, name: str) -> Sequence[Any]:
         """The cells of a column, or an error that says which there are."""

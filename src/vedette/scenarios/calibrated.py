@@ -53,7 +53,7 @@ def problem_of(scenario: Scenario, *, position: bool = False) -> Problem:
     parameters, only_positions = list[Parameter](), all(site.kind == "position" for site in sites)
     for s, sensor in enumerate(model.sensors):
         if any(scans[s] is not None for scans in recording.scans):
-            clockwise = section.bearings == "north"
+            clockwise = recording.bearings == "north"
             parameters += _biases(s, sensor, said[s], clockwise, position, only_positions)
             parameters += _of_models(s, sensor)
     targets = shared_targets([sensor.filter for sensor in build_sensors(scenario)])
@@ -74,7 +74,7 @@ def problem_of(scenario: Scenario, *, position: bool = False) -> Problem:
                 known.append(sensor.build(wide if widens else region, method, folder, model.filter.detection_at))
         return Central(SequentialLmbFilter(targets, tuple(known), _LIMITS)), more
 
-    return Problem(recording, sites, section.bearings, tuple(said), tuple(parameters), tracker)
+    return Problem(recording, sites, tuple(said), tuple(parameters), tracker)
 
 
 def _widened(region: Region) -> Region:
