@@ -43,7 +43,7 @@ MODELS = {
     "detection.probability": 0.9,
     "clutter.rate": 4.0,
 }
-TOLD = """recording: {bearings: north%s}
+TOLD = """recording: {bearings: north}
 %sospa: {cutoff: %s}
 sensor_defaults:
   measurement: {kind: bearing_range}
@@ -51,9 +51,9 @@ sensor_defaults:
   detection: {kind: constant, probability: %s}
   clutter: {kind: region, rate: %s}
 sensors:
-  - {name: Calshot, position: [-3000.0, -3000.0]}
-  - {name: Ryde, position: [3500.0, -2500.0]}
-  - {name: boat, position: [0.0, 3500.0]}
+  - {name: Calshot, position: [-3000.0, -3000.0], bias: {%s}}
+  - {name: Ryde, position: [3500.0, -2500.0], bias: {%s}}
+  - {name: boat, position: [0.0, 3500.0], bias: {%s}}
 """
 TARGETS = 6
 
@@ -96,9 +96,9 @@ def write_scans(folder: Path, scene: Scene, seconds: float, seed: int, motion: s
     _write(folder / "scans.csv", header, rows)
     told = [[t, f"ship {i}", *(x + v * t)] for i, (x, v) in enumerate(ships) for t in np.arange(0.0, seconds + 20, 10)]
     _write(folder / "truth.csv", ["time", "id", "x", "y"], told)
-    (folder / "told.yaml").write_text(TOLD % ("", motion, scene.cutoff, 30.0, 1.0, 0.8, 6.0))
-    biases = ", ".join(f"{name}: {{{', '.join(f'{k}: {v}' for k, v in one.items())}}}" for name, one in BIASES.items())
-    (folder / "true.yaml").write_text(TOLD % (f", biases: {{{biases}}}", motion, scene.cutoff, *MODELS.values()))
+    (folder / "told.yaml").write_text(TOLD % (motion, scene.cutoff, 30.0, 1.0, 0.8, 6.0, "", "", ""))
+    biases = [", ".join(f"{name}: {value}" for name, value in one.items()) for one in BIASES.values()]
+    (folder / "true.yaml").write_text(TOLD % (motion, scene.cutoff, *MODELS.values(), *biases))
 
 
 def _write(path: Path, header: list[str], rows: list[list[Any]]) -> None:

@@ -149,7 +149,7 @@ def test_the_file_that_comes_out_reads_back_with_all_that_was_in_it(
     assert again.recording.columns == {"sensor": "radar", "bearing": "brg_deg"}
     for each in calibration.found:
         sensor, (kind, *rest) = again.sensors[each.parameter.sensor], each.parameter.name.split(".")
-        holder = getattr(sensor, kind) if rest else again.recording.biases[again.sensor_names[each.parameter.sensor]]
+        holder = getattr(sensor, kind if rest else "bias")
         assert getattr(holder, rest[0] if rest else kind) == pytest.approx(each.value, rel=1e-6)
     # What was found is where it begins: it is said already.
     problem = problem_of(scenario_of_recording(folder / "found.yaml", folder / "scans.csv").scenario)

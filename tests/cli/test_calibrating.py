@@ -57,12 +57,13 @@ def test_files_that_are_not_there_are_told(place: Path, words: tuple[str, ...], 
     assert message in result.stderr
 
 
-def test_a_bias_of_nobody_is_refused_by_name(place: Path) -> None:
+def test_a_bias_of_what_is_not_measured_is_refused(place: Path) -> None:
     text = (place / "radars.yaml").read_text("utf-8")
-    (place / "radars.yaml").write_text(text.replace("bearings: north", "bearings: north, biases: {Cowes: {range: 1}}"))
+    measured = "bias: {range: 1.0}, measurement: {kind: bearing_only}"
+    (place / "radars.yaml").write_text(text.replace("{name: Calshot,", f"{{name: Calshot, {measured},"))
     result = call("calibrate", "scans.csv", "--sensors", "radars.yaml")
     assert result.exit_code == 1
-    assert "biases: expected sensors among 'Calshot', 'boat'; got Cowes" in result.stderr
+    assert "sensors[0].bias.range: expected 0, as no range is measured (bearing_only), got 1.0" in result.stderr
 
 
 def test_interrupted_it_leaves_nothing(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:

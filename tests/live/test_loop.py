@@ -63,6 +63,19 @@ def test_any_order_of_arrival_ends_in_the_same_tracks(tmp_path: Path) -> None:
         assert (other["late"] > 0, other["dropped"]) == (True, 0)
 
 
+def test_a_bias_is_taken_off_what_lines_say(tmp_path: Path) -> None:
+    (tmp_path / "biased").mkdir()
+    biased = SYNCHRONOUS.replace("position: [0.0, 0.0]}", "position: [0.0, 0.0], bias: {x: 30.0, y: -5.0, clock: 1.0}}")
+    plain, told = [], []
+    for k in range(5):
+        plain += [line(1, float(k), [[4.0 * k, 50.0]]), line(2, float(k), [[4.0 * k, 51.0]])]
+        told += [line(1, k + 1.0, [[4.0 * k + 30.0, 45.0]]), line(2, float(k), [[4.0 * k, 51.0]])]
+    wanted = [json.loads(answer) for answer in answered(small(tmp_path), plain)]
+    found = [json.loads(answer) for answer in answered(small(tmp_path / "biased", biased), told)]
+    assert found == wanted
+    assert found[-1]["tracks"]
+
+
 BAD: list[tuple[bytes, str]] = [
     (b"{", "line 3: expected a JSON object; it is damaged"),
     (b"\xff{}", "line 3: expected a JSON object; it is damaged"),

@@ -13,7 +13,8 @@ from pyais import encode_dict
 from recordings import ORIGIN, SHIPS
 from vedette.errors import InputError
 from vedette.evaluation.runs import run_scenario
-from vedette.recorded import Bias, Conventions, Origin, RecordedTargets, Site, parse_scans
+from vedette.models import Bias
+from vedette.recorded import Conventions, Origin, RecordedTargets, Site, parse_scans
 from vedette.recorded.tables import read_table
 from vedette.scenarios.of_recording import scenario_of_recording
 
@@ -86,9 +87,8 @@ def test_radars_say_what_they_see(tmp_path: Path) -> None:
 def test_biases_of_a_radar_count_as_its_bearings_do(tmp_path: Path) -> None:
     """Clockwise, as the format says without the conventions."""
     (tmp_path / "radar.ast").write_bytes(plot(0.0, 5.0, 92.0))
-    site = Site("1/2", "bearing_range", (0.0, 0.0, 0.0))
-    bias = {"1/2": Bias(bearing=np.radians(2.0))}
-    found = parse_scans(read_table(tmp_path / "radar.ast"), [site], Conventions({}, {}, biases=bias))
+    site = Site("1/2", "bearing_range", (0.0, 0.0, 0.0), Bias(bearing=np.radians(2.0)))
+    found = parse_scans(read_table(tmp_path / "radar.ast"), [site], Conventions({}, {}))
     assert found.scans[0][0] is not None
     np.testing.assert_allclose(found.scans[0][0][0, 0], 0.0, atol=2.0 * np.pi / 2**16)
 

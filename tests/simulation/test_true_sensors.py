@@ -10,8 +10,11 @@ import pytest
 
 from vedette import models
 from vedette.errors import InputError
+from vedette.recorded import Site, without_biases
+from vedette.recorded.instants import Look, in_order
 from vedette.scenarios import load_scenario
 from vedette.scenarios.build import build_experiment
+from vedette.scenarios.overrides import with_fields
 from vedette.simulation import CLUTTER, Experiment, TrueSensor, simulate_scan
 from vedette.simulation.loop import simulate
 from vedette.simulation.replay import scans_of
@@ -54,6 +57,38 @@ def test_the_first_scan_may_be_of_its_own():
     assert len(simulate_scan(NEAR_THE_EDGE, POSE, true, rng=np.random.default_rng(1)).origins) == 400
 
 
+@pytest.mark.parametrize("kind", ["position", "bearing_range"])
+def test_what_a_bias_adds_is_what_reading_takes_off(kind):
+    """Biased scans without their biases are those of a sensor that has none, from where it is in truth."""
+    rng = np.random.default_rng(4)
+    states = np.column_stack([rng.uniform(-300.0, 300.0, (50, 2)), rng.uniform(-9.0, 9.0, (50, 2))])
+    measured = {"range": 30.0, "bearing": 0.1} if kind == "bearing_range" else {}
+    bias = models.Bias(clock=0.5, x=20.0, y=-10.0, **measured)
+    model = sensor(kind, detection=models.limited_range(1.0, 250.0))
+    scan = simulate_scan(states, POSE, TrueSensor(model, bias=bias), rng=np.random.default_rng(1))
+    recording = in_order([Look(7.0, 0, scan.measurements, POSE)], POSE[np.newaxis], 0.0, False, (), "east")
+    read = without_biases(recording, [Site("radar", kind, tuple(POSE), bias)])
+    earlier, true_pose = states.copy(), read.poses[0, 0]
+    earlier[:, :2] -= 0.5 * states[:, 2:]
+    plain = simulate_scan(earlier, true_pose, model, rng=np.random.default_rng(1))
+    assert 10 < len(plain.origins) < 50
+    np.testing.assert_array_equal(scan.origins, plain.origins)
+    np.testing.assert_allclose(true_pose, POSE if kind == "position" else POSE - [20.0, -10.0, 0.0])
+    np.testing.assert_allclose(np.asarray(read.scans[0][0]), plain.measurements, rtol=0.0, atol=1e-12)
+    assert read.start == 6.5
+
+
+def test_what_filters_take_off_is_no_bias_any_more():
+    scenario = load_scenario("paper-e")
+    said: dict[str, Any] = {"sensors.0.bias.range": 20.0, "sensors.0.bias.clock": 0.5}
+    said["sensors.1.bias.bearing_deg"] = 1.0
+    assert build_experiment(with_fields(scenario, said)).true_sensors == ()
+    true = {"sensors.0.truth": {"bias": {"range": 50.0}}, "sensors.1.truth": {"bias": {"bearing_deg": 3.0}}}
+    first, second = build_experiment(with_fields(scenario, said | true)).true_sensors
+    assert first.bias == models.Bias(range=30.0, clock=-0.5)
+    assert second.bias.bearing == pytest.approx(np.radians(2.0))
+
+
 def test_bad_true_sensors_are_named():
     bearing = models.SensorModel(
         models.bearing_only(),
@@ -67,6 +102,8 @@ def test_bad_true_sensors_are_named():
         TrueSensor(bearing, detection_of="both")
     with pytest.raises(InputError, match="first_detection: expected a DetectionModel or None; got 1"):
         TrueSensor(bearing, first_detection=1.0)  # type: ignore[arg-type]
+    with pytest.raises(InputError, match=r"bias.range: expected 0, as no range is measured; got 3"):
+        TrueSensor(bearing, bias=models.Bias(range=3.0))
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 
 from vedette.kernels.base.types import Floats
-from vedette.recorded import Bias, RecordedScans, Site, without_biases
+from vedette.recorded import RecordedScans, Site, without_biases
 from vedette.tracking import Tracker
 
 Kind = Literal["bias", "noise", "detection", "clutter"]
@@ -25,7 +25,7 @@ class Parameter:
     Attributes:
         sensor: its number, from 0.
         kind: what it is of.
-        component: what of: of a bias a field of `vedette.recorded.Bias`, of noise a component of the measurement.
+        component: what of: of a bias a field of `vedette.models.Bias`, of noise a component of the measurement.
         name: as the file about sensors has it: "range", "noise.sigma_range".
         unit: "m", "deg", "s", "".
         start: what it is taken for before anything is known.
@@ -64,8 +64,7 @@ class Problem:
 
     Attributes:
         recording: as it was made, biases in it.
-        sites: the sensors.
-        biases: of each sensor, where no parameter says otherwise.
+        sites: the sensors, with their biases where no parameter says otherwise.
         parameters: what is to be found.
         tracker: one for sensors as these values of the parameters say, which draws no random numbers; and
             (num_sensors,) what is to be added to its log likelihood for each scan.
@@ -73,7 +72,6 @@ class Problem:
 
     recording: RecordedScans
     sites: tuple[Site, ...]
-    biases: tuple[Bias, ...]
     parameters: tuple[Parameter, ...]
     tracker: Callable[[Floats], tuple[Tracker, Floats]]
 
@@ -87,13 +85,13 @@ class Problem:
 
     def without_biases(self, values: Floats) -> RecordedScans:
         """The recording as sensors without such biases would have made it."""
-        biases = list(self.biases)
+        sites = list(self.sites)
         for each, value in zip(self.parameters, values.tolist(), strict=True):
             if each.kind == "bias":
                 # The bearing of a `Bias` has the rows' direction, as its parameter has.
-                change = {each.component: value / abs(each.per_si)}
-                biases[each.sensor] = replace(biases[each.sensor], **change)
-        return without_biases(self.recording, self.sites, biases)
+                own, change = sites[each.sensor], {each.component: value / abs(each.per_si)}
+                sites[each.sensor] = replace(own, bias=replace(own.bias, **change))
+        return without_biases(self.recording, sites)
 
     def log_likelihoods(self, free: Floats) -> Floats:
         """(num_scans,) what each scan of each sensor adds to the log likelihood, whatever order they are in.

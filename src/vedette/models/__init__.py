@@ -1,5 +1,6 @@
 """How targets move and what a sensor at a place sees of them; all of it functions that a user can write too."""
 
+from vedette.models.bias import Bias
 from vedette.models.birth import BirthModel, MeasurementBirth
 from vedette.models.clutter import ClutterModel, ClutterSampler, measurement_space_clutter
 from vedette.models.detection import (
@@ -28,6 +29,7 @@ from vedette.models.undetected import UndetectedModel
 
 __all__ = [
     "MAX_PROB_DETECTION",
+    "Bias",
     "BirthModel",
     "CellGrid",
     "ClutterModel",

@@ -38,7 +38,8 @@ def _places(measurements: Floats, pose: Floats) -> Floats:
 def position() -> MeasurementModel:
     """z = [px, py] of the target in m, in the frame of the region; the sensor's pose plays no part."""
     angular = np.array([False, False])
-    return MeasurementModel(2, _position, np.empty(0), _position_jacobian, angular, _places, is_linear=True)
+    functions = _position, np.empty(0), _position_jacobian
+    return MeasurementModel(2, *functions, angular, _places, is_linear=True, components=("x", "y"))
 
 
 def angular_flags(name: str, angular: Sequence[bool] | Bools, meas_dim: int) -> Bools:
@@ -77,6 +78,7 @@ class MeasurementModel:
         places: plain function of (n, meas_dim) measurements and a pose: the (n, 2) positions where they were taken of a
             target; None where a measurement does not say where. Births from measurements need it.
         is_linear: whether measurements are linear in the state: a Jacobian then serves however wide a Gaussian is.
+        components: what they are, as `Bias` names it: "bearing", "range", "x", "y"; () where they have no such names.
 
     Raises:
         InputError: a function of another kind, a bad dimension or parameter, a wrong number of angular flags.
@@ -90,9 +92,12 @@ class MeasurementModel:
     places: Callable[[Floats, Floats], Floats] | None = None
     least: Floats = field(default_factory=lambda: np.empty(0))
     is_linear: bool = False
+    components: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         dimension("MeasurementModel.meas_dim", self.meas_dim)
+        if self.components and len(self.components) != self.meas_dim:
+            raise reject("MeasurementModel.components", f"{self.meas_dim} names, or none", self.components)
         require_kind("MeasurementModel.function", self.function, "measurement")
         if self.jacobian is not None:
             require_kind("MeasurementModel.jacobian", self.jacobian, "measurement_jacobian")

@@ -3,13 +3,12 @@
 from vedette.recorded.cleaning import Cleaning, CleaningCounts, RecordedTrack
 from vedette.recorded.conventions import Conventions
 from vedette.recorded.geography import Origin
-from vedette.recorded.instants import Bias, RecordedScans, Site, without_biases
+from vedette.recorded.instants import RecordedScans, Site, without_biases
 from vedette.recorded.scans import parse_scans
 from vedette.recorded.tables import read_table, table_of
 from vedette.recorded.targets import RecordedTargets
 
 __all__ = [
-    "Bias",
     "Cleaning",
     "CleaningCounts",
     "Conventions",

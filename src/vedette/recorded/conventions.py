@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Literal
 
 from vedette.models.arguments import reject
-from vedette.recorded.instants import Bearings, Bias
+from vedette.recorded.instants import Bearings
 
 # What a row may say: the quantity, and the units that the end of a column's name may give it.
 LENGTHS = {"m": 1.0, "km": 1000.0, "nmi": 1852.0}
@@ -46,7 +46,6 @@ class Conventions:
             counter-clockwise, as the library has them.
         gather: s; rows of a sensor within this time after its first make one scan, at the mean of their times.
         bad_rows: whether a row that cannot be read is refused or left out, and counted.
-        biases: by the name of a sensor what its rows say too much; it is taken off as they are read.
 
     Raises:
         InputError: a quantity, unit or word of another kind, or a time below 0.
@@ -57,7 +56,6 @@ class Conventions:
     bearings: Bearings | None = None
     gather: float = 0.0
     bad_rows: Literal["refuse", "skip"] = "refuse"
-    biases: Mapping[str, Bias] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         known = ("time", "sensor", *QUANTITIES)

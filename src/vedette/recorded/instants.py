@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 import numpy as np
 
 from vedette.kernels.base.types import Floats
-from vedette.models.arguments import reject
+from vedette.models import Bias
+from vedette.models.bias import LEAST_RANGE, NO_BIAS
 from vedette.tracking import SensorScan
 
 Bearings = Literal["east", "north"]
@@ -23,8 +24,6 @@ COMPONENTS = {
     "position": ("x", "y"),
 }
 
-_LEAST_RANGE = 1.0  # m; what a bias leaves of a range
-
 
 @dataclass(frozen=True, slots=True)
 class Site:
@@ -34,37 +33,14 @@ class Site:
         name: as the rows name it; its number, from 1, will do too.
         kind: of its measurements, a key of `COMPONENTS`.
         pose: [px, py, heading_rad, ...] where the rows do not say.
+        bias: what the rows say too much, which is taken off as they are read; ranges that would be below 1 m without it
+            are taken as 1 m.
     """
 
     name: str
     kind: str
     pose: tuple[float, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class Bias:
-    """What the rows of a sensor say too much.
-
-    Attributes:
-        range: m; ranges that would be below 1 m without it are taken as 1 m.
-        bearing: rad, in the rows' own direction: clockwise where bearings are from the north.
-        clock: s; how far its times are ahead.
-        x, y: m; of where the sensor is said to be, or of the positions that it measures.
-
-    Raises:
-        InputError: a number that is not finite.
-    """
-
-    range: float = 0.0
-    bearing: float = 0.0
-    clock: float = 0.0
-    x: float = 0.0
-    y: float = 0.0
-
-    def __post_init__(self) -> None:
-        for each in fields(self):
-            if not math.isfinite(value := getattr(self, each.name)):
-                raise reject(f"Bias.{each.name}", "a finite number", value)
+    bias: Bias = NO_BIAS
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -144,26 +120,20 @@ def in_order(
     return RecordedScans(times - times[0], start + float(times[0]), is_utc, tuple(found), places, skipped, bearings)
 
 
-def without_biases(recording: RecordedScans, sites: Sequence[Site], biases: Sequence[Bias]) -> RecordedScans:
-    """The recording as sensors without these biases would have made it.
-
-    Args:
-        recording: as it was.
-        sites: the sensors.
-        biases: one a sensor.
-    """
+def without_biases(recording: RecordedScans, sites: Sequence[Site]) -> RecordedScans:
+    """The recording as its sensors would have made it without their biases."""
     looks = []
     for time, scans, poses in zip(recording.times.tolist(), recording.scans, recording.poses, strict=True):
         for s, scan in enumerate(scans):
             if scan is not None:
                 look = Look(time, s, scan, poses[s])
-                looks.append(_without_bias(look, sites[s].kind, biases[s], recording.bearings))
+                looks.append(_without_bias(look, sites[s].kind, sites[s].bias, recording.bearings))
     told = recording.start, recording.is_utc, recording.skipped, recording.bearings
     return in_order(looks, recording.poses[0], *told)
 
 
 def _without_bias(look: Look, kind: str, bias: Bias, bearings: Bearings | None) -> Look:
-    if bias == Bias():
+    if bias == NO_BIAS:
         return look
     turn = -bias.bearing if bearings == "north" else bias.bearing
     own = {"bearing": turn, "range": bias.range, "x": bias.x, "y": bias.y}
@@ -171,7 +141,7 @@ def _without_bias(look: Look, kind: str, bias: Bias, bearings: Bearings | None) 
     pose = look.pose.copy()
     for i, component in enumerate(COMPONENTS[kind]):
         if component == "range":
-            scan[:, i] = np.maximum(scan[:, i], _LEAST_RANGE)
+            scan[:, i] = np.maximum(scan[:, i], LEAST_RANGE)
         elif component == "bearing":
             scan[:, i] = np.remainder(scan[:, i] + math.pi, 2.0 * math.pi) - math.pi
     if kind != "position":

@@ -12,11 +12,11 @@ import numpy as np
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats
 from vedette.models.arguments import reject
+from vedette.models.bias import NO_BIAS
 from vedette.recorded.conventions import ANGLES, MOST, OTHER_NAMES, QUANTITIES, Conventions
 from vedette.recorded.geography import Origin
 from vedette.recorded.instants import (
     COMPONENTS,
-    Bias,
     Look,
     RecordedScans,
     Site,
@@ -43,18 +43,12 @@ def parse_scans(
     Raises:
         InputError: names the file, row, column, what was expected and what came.
     """
-    for name in conventions.biases:
-        if name not in {site.name for site in sites}:
-            raise reject("biases", f"sensors among {', '.join(shown(site.name) for site in sites)}", name)
     rows = _Rows(table, sites, conventions, origin)
     found, skipped = rows.read()
     if not found:
         raise InputError(f"{table.source}: expected at least one row that can be read; got none of {len(table.rows)}")
     recording = _at_instants(found, rows, skipped)
-    if not conventions.biases:
-        return recording
-    biases = [conventions.biases.get(site.name, Bias()) for site in sites]
-    return without_biases(recording, sites, biases)
+    return without_biases(recording, sites) if any(site.bias != NO_BIAS for site in sites) else recording
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,10 +11,9 @@ import numpy as np
 from vedette.calibration import Calibration, Parameter, Problem
 from vedette.filters import Limits, SequentialLmbFilter, shared_targets
 from vedette.kernels.base.types import Floats
-from vedette.models import Region, SensorModel
+from vedette.models import Bias, Region, SensorModel
 from vedette.plausible import told_elsewhere
 from vedette.reading import read_text
-from vedette.recorded import Bias
 from vedette.recorded.instants import COMPONENTS
 from vedette.scenarios.build import build_sensors
 from vedette.scenarios.dumping import dump_data
@@ -47,14 +46,13 @@ def problem_of(scenario: Scenario, *, position: bool = False) -> Problem:
     """
     model, folder = scenario.model, scenario.folder
     assert model.recording is not None
-    recording = model.recording.model_copy(update={"biases": {}}).build(model, folder)
-    sites, section = tuple(sites_of(model)), model.recording
-    said = [section.biases[site.name].build() if site.name in section.biases else Bias() for site in sites]
+    recording = model.recording.build(model, folder, as_told=True)
+    sites = tuple(sites_of(model))
     parameters, only_positions = list[Parameter](), all(site.kind == "position" for site in sites)
     for s, sensor in enumerate(model.sensors):
         if any(scans[s] is not None for scans in recording.scans):
             clockwise = recording.bearings == "north"
-            parameters += _biases(s, sensor, said[s], clockwise, position, only_positions)
+            parameters += _biases(s, sensor, sites[s].bias, clockwise, position, only_positions)
             parameters += _of_models(s, sensor)
     targets = shared_targets([sensor.filter for sensor in build_sensors(scenario)])
     region, method = model.region.build(), model.filter.gaussian_method
@@ -74,7 +72,7 @@ def problem_of(scenario: Scenario, *, position: bool = False) -> Problem:
                 known.append(sensor.build(wide if widens else region, method, folder, model.filter.detection_at))
         return Central(SequentialLmbFilter(targets, tuple(known), _LIMITS)), more
 
-    return Problem(recording, sites, tuple(said), tuple(parameters), tracker)
+    return Problem(recording, sites, tuple(parameters), tracker)
 
 
 def _widened(region: Region) -> Region:
@@ -145,7 +143,7 @@ def _with_values(
 
 
 def calibrated_text(scenario: Scenario, sensors: FilePath, calibration: Calibration, folder: FilePath) -> str:
-    """The file about the sensors with what was found in it: biases in `recording`, the rest at each sensor.
+    """The file about the sensors with what was found in it at each.
 
     What was not found stays as it was; comments are lost.
 
@@ -156,20 +154,19 @@ def calibrated_text(scenario: Scenario, sensors: FilePath, calibration: Calibrat
         folder: where the new file is to stand; elsewhere than the old one, files that it names get absolute paths.
     """
     said = dict(read_yaml(read_text(sensors, "file about sensors", MOST_BYTES), str(sensors)).data)
-    known = scenario.model.recording
-    assert known is not None
-    biases = {name: bias.model_dump(exclude_defaults=True) for name, bias in known.biases.items()}
+    biases = [sensor.bias.model_dump(exclude_defaults=True) for sensor in scenario.model.sensors]
     parameters = [each.parameter for each in calibration.found]
     values = [_rounded(each.value) for each in calibration.found]
-    names = scenario.model.sensor_names
     for each, value in zip(calibration.found, values, strict=True):
         if each.parameter.kind == "bias" and not each.why:
-            biases.setdefault(names[each.parameter.sensor], {})[each.parameter.name] = value
-    said["recording"] = {**said.get("recording", {}), "biases": biases}
+            biases[each.parameter.sensor][each.parameter.name] = value
     sections = _with_values(scenario.model.sensors, parameters, values)
     said["sensors"] = [
-        {**own, **{kind: getattr(section, kind).model_dump(mode="json") for kind in ("noise", "detection", "clutter")}}
-        for own, section in zip(said["sensors"], sections, strict=True)
+        {
+            **{**own, "bias": bias},
+            **{kind: getattr(section, kind).model_dump(mode="json") for kind in ("noise", "detection", "clutter")},
+        }
+        for own, section, bias in zip(said["sensors"], sections, biases, strict=True)
     ]
     return dump_data(said, None if folder.resolve() == sensors.parent.resolve() else sensors.parent)
 

@@ -13,6 +13,7 @@ from vedette.errors import ModelError
 from vedette.kernels.base.types import Floats, Ints
 from vedette.models import SensorModel
 from vedette.models.arguments import float_array, generator, pose_vector, reject
+from vedette.models.bias import LEAST_RANGE
 from vedette.models.measurement import wrap_angular
 from vedette.simulation.true_sensors import TrueSensor
 from vedette.tracking import Stages
@@ -65,8 +66,10 @@ def simulate_scan(
     if names.shape != (num,):
         raise reject("ids", f"{num} ids, one a target", names.tolist())
     luck = rng.uniform(size=num)
-    measured = _noisy_measurements(model, states, pose, rng.standard_normal((num, model.meas_dim)))
-    seen = luck < _probabilities(model, _detected_at(true, states, pose, measured), pose)
+    states, at = _shown(true, states, pose)
+    measured = _noisy_measurements(model, states, at, rng.standard_normal((num, model.meas_dim)))
+    seen = luck < _probabilities(model, _detected_at(true, states, at, measured), at)
+    measured = _biased(true, measured)
     clutter = model.clutter.sample(pose, model.measurement, state_dim=states.shape[1], rng=rng)
     measurements = np.concatenate([measured, clutter])
     origins = np.concatenate([names, np.full(len(clutter), CLUTTER)]).astype(np.int64)
@@ -116,6 +119,31 @@ def simulate_scans(
         with stages.timing("scans", s):
             scans.append(None if sensor is None else simulate_scan(truth_states, pose, sensor, ids=ids, rng=rng))
     return tuple(scans)
+
+
+def _shown(sensor: TrueSensor, states: Floats, pose: Floats) -> tuple[Floats, Floats]:
+    """The targets' states at the time by the world's clock, and where the sensor is in truth."""
+    bias = sensor.bias
+    if bias.clock and states.shape[1] >= 4:
+        states = states.copy()
+        states[:, :2] -= bias.clock * states[:, 2:4]
+    if "x" not in sensor.model.measurement.components and (bias.x or bias.y):
+        pose = pose.copy()
+        pose[:2] -= bias.x, bias.y
+    return states, pose
+
+
+def _biased(sensor: TrueSensor, measured: Floats) -> Floats:
+    """What the sensor says of what it has measured."""
+    model = sensor.model.measurement
+    offsets = [getattr(sensor.bias, name) for name in model.components]
+    if not any(offsets):
+        return measured
+    said = wrap_angular(measured + offsets, model.angular)
+    for i, name in enumerate(model.components):
+        if name == "range":
+            said[:, i] = np.maximum(said[:, i], LEAST_RANGE)
+    return said
 
 
 def _detected_at(sensor: TrueSensor, states: Floats, pose: Floats, measured: Floats) -> Floats:

@@ -7,8 +7,9 @@ from dataclasses import dataclass, replace
 
 from vedette.errors import InputError
 from vedette.kernels.base.types import Bools
-from vedette.models import DetectionModel, SensorModel
+from vedette.models import Bias, DetectionModel, SensorModel
 from vedette.models.arguments import one_of, reject
+from vedette.models.bias import NO_BIAS
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -20,14 +21,18 @@ class TrueSensor:
         first_detection: its detection at its first scan alone; None: as at the others.
         detection_of: where its probability of detection is taken: at the target's true "state", or at the position that
             the "measurement" gives (`MeasurementModel.places`), noise included (the rest of the state stays).
+        bias: what its scans say too much. What a clock ahead says of now is of a little earlier: where targets were by
+            their velocities.
 
     Raises:
-        InputError: a part of another type; detection of the measurement where that gives no position.
+        InputError: a part of another type; detection of the measurement where that gives no position; a bias of what is
+            not measured.
     """
 
     model: SensorModel
     first_detection: DetectionModel | None = None
     detection_of: str = "state"
+    bias: Bias = NO_BIAS
 
     def __post_init__(self) -> None:
         if not isinstance(self.model, SensorModel):
@@ -38,6 +43,11 @@ class TrueSensor:
         if self.detection_of == "measurement" and self.model.measurement.places is None:
             expected = "state, as only a position or a bearing with a range say where a target was measured"
             raise reject("TrueSensor.detection_of", expected, self.detection_of)
+        if not isinstance(self.bias, Bias):
+            raise reject("TrueSensor.bias", "a Bias", self.bias)
+        for name in ("range", "bearing"):
+            if getattr(self.bias, name) and name not in self.model.measurement.components:
+                raise reject(f"TrueSensor.bias.{name}", f"0, as no {name} is measured", getattr(self.bias, name))
 
     def at_first_scan(self) -> TrueSensor:
         """The sensor as it is at its first scan."""

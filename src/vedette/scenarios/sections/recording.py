@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import math
 import os
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -16,26 +16,8 @@ from vedette.scenarios.faults import Finding, describe
 from vedette.scenarios.sections.base import NonNegative, Section, attempt
 
 if TYPE_CHECKING:
-    from vedette.recorded import Bias, Origin, RecordedScans, Site
+    from vedette.recorded import Origin, RecordedScans, Site
     from vedette.scenarios.sections.scenario import ScenarioModel
-
-
-class BiasSection(Section):
-    """What the rows of a sensor say too much, which is taken off as they are read."""
-
-    range: float = Field(default=0.0, description="Of ranges [m].")
-    bearing_deg: float = Field(
-        default=0.0, description="Of bearings, clockwise where these are from the north, else counter-clockwise [deg]."
-    )
-    clock: float = Field(default=0.0, description="Of times: how far its clock is ahead [s].")
-    x: float = Field(default=0.0, description="Of where it is said to be, or of positions that it measures, east [m].")
-    y: float = Field(default=0.0, description="The same, north [m].")
-
-    def build(self) -> Bias:
-        """In SI units."""
-        from vedette.recorded import Bias
-
-        return Bias(self.range, math.radians(self.bearing_deg), self.clock, self.x, self.y)
 
 
 class RecordingSection(Section):
@@ -66,10 +48,8 @@ class RecordingSection(Section):
         default="refuse", description="Whether a row that cannot be read is an error, or left out and told of [-]."
     )
 
-    biases: dict[str, BiasSection] = Field(default={}, description="By sensor, as `vedette calibrate` finds them [-].")
-
-    def build(self, world: ScenarioModel, folder: Path) -> RecordedScans:
-        """The scans; a file that stays as it was is read once.
+    def build(self, world: ScenarioModel, folder: Path, *, as_told: bool = False) -> RecordedScans:
+        """The scans, without the sensors' biases unless as they were told; a file that stays as it was is read once.
 
         Raises `InputError` for a file that cannot be read, naming row and column.
         """
@@ -78,9 +58,14 @@ class RecordingSection(Section):
             state = os.stat(file)
         except (OSError, ValueError):
             state = None
+        from vedette.models.bias import NO_BIAS
+
         origin = None if world.origin is None else world.origin.build()
         changed = state and (state.st_mtime_ns, state.st_size)
-        return _read(str(file), changed, self.model_dump_json(), tuple(sites_of(world)), origin)
+        sites = sites_of(world)
+        if as_told:
+            sites = [replace(site, bias=NO_BIAS) for site in sites]
+        return _read(str(file), changed, self.model_dump_json(), tuple(sites), origin)
 
 
 @lru_cache(maxsize=4)
@@ -92,8 +77,7 @@ def _read(
     from vedette.recorded.tables import read_table
 
     own = RecordingSection.model_validate_json(section)
-    biases = {name: bias.build() for name, bias in own.biases.items()}
-    conventions = Conventions(own.columns, own.units, own.bearings, own.gather, own.bad_rows, biases)
+    conventions = Conventions(own.columns, own.units, own.bearings, own.gather, own.bad_rows)
     return parse_scans(read_table(file), sites, conventions, origin)
 
 
@@ -102,7 +86,7 @@ def sites_of(world: ScenarioModel) -> list[Site]:
     from vedette.recorded import Site
 
     return [
-        Site(name, sensor.measurement.kind, sensor.pose)
+        Site(name, sensor.measurement.kind, sensor.pose, sensor.bias.build())
         for name, sensor in zip(world.sensor_names, world.sensors, strict=True)
     ]
 
@@ -127,4 +111,4 @@ def _content(section: RecordingSection, world: ScenarioModel, folder: Path) -> I
         yield ("recording",), "scans that can be read", str(error)
 
 
-__all__ = ["BiasSection", "RecordingSection", "recording_findings", "sites_of"]
+__all__ = ["RecordingSection", "recording_findings", "sites_of"]

@@ -16,15 +16,21 @@ from vedette.scenarios.sections.derived import Part, derived, one_of
 if TYPE_CHECKING:  # with the models comes the compiler, which a check does without
     from vedette.models import NoiseModel
 
-# Components of each kind of measurement, and those that are angles.
-_COMPONENTS = {"bearing_range": (2, (0,)), "bearing_only": (1, (0,)), "range_only": (1, ()), "position": (2, ())}
+# Components of each kind of measurement.
+COMPONENTS = {
+    "bearing_range": ("bearing", "range"),
+    "bearing_only": ("bearing",),
+    "range_only": ("range",),
+    "position": ("x", "y"),
+}
 # Kinds of measurement that do not say where a target is.
 WITHOUT_PLACE = ("bearing_only", "range_only")
 
 
 def components(measurement: Measurement) -> tuple[int | None, tuple[int, ...]]:
     """Number of components of a measurement, None of one of the user's own; and which of them are known as angles."""
-    return _COMPONENTS.get(measurement.kind, (None, ()))
+    names = COMPONENTS.get(measurement.kind, ())
+    return len(names) or None, tuple(i for i, name in enumerate(names) if name == "bearing")
 
 
 class RangeDependentNoise(Section):

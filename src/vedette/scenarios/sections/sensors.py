@@ -1,12 +1,11 @@
-"""Sections about the sensors: where they are, how they move, what they see, and what they are in truth."""
+"""Sections about the sensors: where they are, how they move, what they see, and when."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from pydantic import Field, create_model
@@ -28,7 +27,6 @@ from vedette.scenarios.sections.base import (
 from vedette.scenarios.sections.derived import of_kind
 from vedette.scenarios.sections.platforms import AnyPlatform
 from vedette.scenarios.sections.sensing import (
-    WITHOUT_PLACE,
     Clutter,
     Detection,
     Measurement,
@@ -36,80 +34,14 @@ from vedette.scenarios.sections.sensing import (
     clutter_box_findings,
     clutter_findings,
     noise_findings,
-    same_measurement_findings,
 )
+from vedette.scenarios.sections.true_sensors import BiasSection, TrueSensor, built_parts
 
 if TYPE_CHECKING:  # with the models comes the compiler, which a check does without
     from vedette.kernels.base.types import Bools
     from vedette.models import Region, SensorModel
     from vedette.scenarios.sections.world import Time
     from vedette.simulation import TrueSensor as TrueSensorModel
-
-
-def built_parts(section: Any, like: Measurement, region: Region, folder: Path, known: Any = None) -> dict[str, Any]:
-    """What a section says of measurement, noise, detection and clutter, by these names.
-
-    like: the measurement that noise and clutter are for. known: the measurement model where the section names none.
-    """
-    measured = known if section.measurement is None else section.measurement.build(folder)
-    given = {"measurement": measured, "angular": measured.angular, "kind": like.kind, "region": region}
-    found = {
-        name: part.build(folder, **given)
-        for name in ("noise", "detection", "clutter")
-        if (part := getattr(section, name)) is not None
-    }
-    return {"measurement": measured, **found}
-
-
-class TrueSensor(Section):
-    """The sensor that is simulated; what it does not say is as the filters know it."""
-
-    measurement: Measurement | None = Field(default=None, description="What it measures [-].")
-    noise: Noise | None = Field(default=None, description="Measurement noise [-].")
-    detection: Detection | None = Field(default=None, description="Probability of detection [-].")
-    clutter: Clutter | None = Field(default=None, description="False measurements [-].")
-    first_detection: Detection | None = Field(
-        default=None, description="Probability of detection at its first scan alone; none: as at the others [-]."
-    )
-    detection_of: Literal["state", "measurement"] = Field(
-        default="state",
-        description="Where the probability of detection is taken: at the target's true state, or at the position that "
-        "was measured of it, noise included (of a position or bearing_range measurement) [-].",
-    )
-
-    def findings_beside(self, known: Measurement) -> Iterator[Finding]:
-        """What is wrong with it beside the measurement that the filters know."""
-        if self.measurement is not None:
-            yield from same_measurement_findings(self.measurement, known, ("truth", "measurement"))
-        measurement = self._like(known)
-        if self.noise is not None:
-            yield from noise_findings(measurement, self.noise, ("truth", "noise"))
-        if self.clutter is not None:
-            yield from clutter_findings(measurement, self.clutter, ("truth", "clutter"))
-            yield from clutter_box_findings(measurement, self.clutter, ("truth", "clutter"))
-        if self.detection_of == "measurement" and measurement.kind in WITHOUT_PLACE:
-            wanted = f"state, as a {measurement.kind} measurement does not say where the target is"
-            yield ("truth", "detection_of"), wanted, describe(self.detection_of)
-
-    def _like(self, known: Measurement) -> Measurement:
-        """What noise and clutter are for: the filters' kind, which a measurement of the user's own stands in for."""
-        return known if self.measurement is None or known.kind != "custom" else self.measurement
-
-    def build(self, known: SensorModel, measurement: Measurement, region: Region, folder: Path) -> TrueSensorModel:
-        """The sensor, beside the filters' model and their section of the measurement.
-
-        Raises:
-            InputError: a custom model that cannot be had, or parts that do not fit together.
-        """
-        from vedette.simulation.true_sensors import TrueSensor as Made
-
-        like = self._like(measurement)
-        parts = built_parts(self, like, region, folder, known.measurement)
-        with told_elsewhere():
-            # The filters' method may need a Jacobian; nothing is filtered with this model.
-            model = replace(known, method="auto", **parts)
-        first = None if self.first_detection is None else self.first_detection.build(folder)
-        return Made(model, first, self.detection_of)
 
 
 class ScanTimes(Section):
@@ -179,6 +111,10 @@ class Sensor(Section):
     detection: Detection = Field(default=of_kind("gaussian"), description="Probability of detection [-].")
     clutter: Clutter = Field(default=of_kind("region"), description="False measurements [-].")
 
+    bias: BiasSection = Field(
+        default=BiasSection(),
+        description="What its scans say too much, taken off before filters see them; `vedette calibrate` finds it [-].",
+    )
     truth: TrueSensor | None = Field(
         default=None,
         description="What it is in truth, where the filters' model of it differs [-].",
@@ -203,6 +139,11 @@ class Sensor(Section):
     @check
     def _clutter_is_a_box(self) -> Iterator[Finding]:
         yield from clutter_box_findings(self.measurement, self.clutter, ("clutter",))
+
+    @check
+    def _bias_is_of_what_is_measured(self) -> Iterator[Finding]:
+        for path, wanted, came in self.bias.findings_beside(self.measurement):
+            yield ("bias", *path), wanted, came
 
     @check
     def _truth_is_of_one_kind_with_the_model(self) -> Iterator[Finding]:
@@ -234,7 +175,7 @@ class Sensor(Section):
 
         if self.truth is None:
             return Made(known)
-        return self.truth.build(known, self.measurement, region, folder)
+        return self.truth.build(known, self.measurement, self.bias, region, folder)
 
 
 if TYPE_CHECKING:

@@ -1,0 +1,134 @@
+"""Sections about what a sensor is in truth, and what its scans say too much."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from pydantic import Field
+
+from vedette.plausible import told_elsewhere
+from vedette.scenarios.faults import Finding, describe
+from vedette.scenarios.sections.base import Section
+from vedette.scenarios.sections.sensing import (
+    COMPONENTS,
+    WITHOUT_PLACE,
+    Clutter,
+    Detection,
+    Measurement,
+    Noise,
+    clutter_box_findings,
+    clutter_findings,
+    noise_findings,
+    same_measurement_findings,
+)
+
+if TYPE_CHECKING:  # with the models comes the compiler, which a check does without
+    from vedette.models import Bias, Region, SensorModel
+    from vedette.simulation import TrueSensor as TrueSensorModel
+
+
+def built_parts(section: Any, like: Measurement, region: Region, folder: Path, known: Any = None) -> dict[str, Any]:
+    """What a section says of measurement, noise, detection and clutter, by these names.
+
+    like: the measurement that noise and clutter are for. known: the measurement model where the section names none.
+    """
+    measured = known if section.measurement is None else section.measurement.build(folder)
+    given = {"measurement": measured, "angular": measured.angular, "kind": like.kind, "region": region}
+    found = {
+        name: part.build(folder, **given)
+        for name in ("noise", "detection", "clutter")
+        if (part := getattr(section, name)) is not None
+    }
+    return {"measurement": measured, **found}
+
+
+class BiasSection(Section):
+    """What the scans of a sensor say too much."""
+
+    range: float = Field(default=0.0, description="Of ranges [m].")
+    bearing_deg: float = Field(
+        default=0.0,
+        description="Of bearings, clockwise where recorded or live scans count them from the north, else "
+        "counter-clockwise [deg].",
+    )
+    clock: float = Field(default=0.0, description="Of times: how far its clock is ahead [s].")
+    x: float = Field(default=0.0, description="Of where it is said to be, or of positions that it measures, east [m].")
+    y: float = Field(default=0.0, description="The same, north [m].")
+
+    def findings_beside(self, measurement: Measurement) -> Iterator[Finding]:
+        """What is wrong with it where a sensor measures so."""
+        measured = COMPONENTS.get(measurement.kind, ())
+        for name, component in (("range", "range"), ("bearing_deg", "bearing")):
+            if getattr(self, name) and component not in measured:
+                yield (name,), f"0, as no {component} is measured ({measurement.kind})", describe(getattr(self, name))
+
+    def build(self) -> Bias:
+        """In SI units."""
+        from vedette.models import Bias
+
+        return Bias(self.range, math.radians(self.bearing_deg), self.clock, self.x, self.y)
+
+
+class TrueSensor(Section):
+    """The sensor that is simulated; what it does not say is as the filters know it."""
+
+    measurement: Measurement | None = Field(default=None, description="What it measures [-].")
+    noise: Noise | None = Field(default=None, description="Measurement noise [-].")
+    detection: Detection | None = Field(default=None, description="Probability of detection [-].")
+    clutter: Clutter | None = Field(default=None, description="False measurements [-].")
+    bias: BiasSection | None = Field(
+        default=None, description="What its scans say too much; none: what the filters take off [-]."
+    )
+    first_detection: Detection | None = Field(
+        default=None, description="Probability of detection at its first scan alone; none: as at the others [-]."
+    )
+    detection_of: Literal["state", "measurement"] = Field(
+        default="state",
+        description="Where the probability of detection is taken: at the target's true state, or at the position that "
+        "was measured of it, noise included (of a position or bearing_range measurement) [-].",
+    )
+
+    def findings_beside(self, known: Measurement) -> Iterator[Finding]:
+        """What is wrong with it beside the measurement that the filters know."""
+        if self.measurement is not None:
+            yield from same_measurement_findings(self.measurement, known, ("truth", "measurement"))
+        if self.bias is not None:
+            for path, wanted, came in self.bias.findings_beside(known):
+                yield ("truth", "bias", *path), wanted, came
+        measurement = self._like(known)
+        if self.noise is not None:
+            yield from noise_findings(measurement, self.noise, ("truth", "noise"))
+        if self.clutter is not None:
+            yield from clutter_findings(measurement, self.clutter, ("truth", "clutter"))
+            yield from clutter_box_findings(measurement, self.clutter, ("truth", "clutter"))
+        if self.detection_of == "measurement" and measurement.kind in WITHOUT_PLACE:
+            wanted = f"state, as a {measurement.kind} measurement does not say where the target is"
+            yield ("truth", "detection_of"), wanted, describe(self.detection_of)
+
+    def _like(self, known: Measurement) -> Measurement:
+        """What noise and clutter are for: the filters' kind, which a measurement of the user's own stands in for."""
+        return known if self.measurement is None or known.kind != "custom" else self.measurement
+
+    def build(
+        self, known: SensorModel, measurement: Measurement, bias: BiasSection, region: Region, folder: Path
+    ) -> TrueSensorModel:
+        """The sensor, beside the filters' model, their section of the measurement, and what they take off.
+
+        Raises:
+            InputError: a custom model that cannot be had, or parts that do not fit together.
+        """
+        from vedette.models.bias import NO_BIAS
+        from vedette.simulation.true_sensors import TrueSensor as Made
+
+        like = self._like(measurement)
+        parts = built_parts(self, like, region, folder, known.measurement)
+        with told_elsewhere():
+            # The filters' method may need a Jacobian; nothing is filtered with this model.
+            model = replace(known, method="auto", **parts)
+        first = None if self.first_detection is None else self.first_detection.build(folder)
+        left = NO_BIAS if self.bias is None else self.bias.build() - bias.build()
+        return Made(model, first, self.detection_of, left)
