@@ -37,6 +37,7 @@ from vedette.tracking import (
     BeliefNetwork,
     Central,
     CentralFilter,
+    Delayed,
     Distributed,
     Network,
     ScanNetwork,
@@ -117,7 +118,7 @@ def _check_own(scenario: Scenario, section: Sensor, sensor: SensorModel, local: 
     if born and sensor.measurement.places is None and isinstance(measured, Custom):
         wanted = f"{measured.function} to give a measurement with `places`, as targets are born of measurements"
         raise NotGiven(measured, "function", wanted, "one without")
-    waits = section.scans.drop_out or not section.scans.build(model.time).all()
+    waits = section.scans.drop_out or section.scans.late or not section.scans.build(model.time).all()
     waits = waits or (model.network is not None and model.network.delay)
     if isinstance(model.filter, CustomFilter) and (born or waits) and not isinstance(local, TwoStepFilter):
         why = "targets are born of measurements" if born else "it must predict without a scan"
@@ -148,6 +149,9 @@ def build_scan_times(scenario: Scenario) -> Bools:
 def _tracker(scenario: Scenario, filters: tuple[Filter, ...]) -> Tracker:
     """What follows the targets that are found, and where the scenario has them those that are not."""
     section, found = scenario.model.undetected, _tracker_of_found(scenario, filters)
+    lates = {s: sensor.scans.late.build() for s, sensor in enumerate(scenario.model.sensors) if sensor.scans.late}
+    if lates:
+        found = Delayed(found, lates)
     return found if section is None else Searching(found, section.build(scenario.model.region))
 
 

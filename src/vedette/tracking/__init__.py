@@ -3,6 +3,7 @@
 from vedette.tracking.base import Stages, State, Tracker, TrackerInfo, stage_of
 from vedette.tracking.belief_network import BeliefNetwork
 from vedette.tracking.central import Central, CentralFilter
+from vedette.tracking.delayed import Delay, Delayed
 from vedette.tracking.distributed import Distributed
 from vedette.tracking.late import Instant, LateInfo, LateScans, SensorScan, Timeline
 from vedette.tracking.network import Network
@@ -14,6 +15,8 @@ __all__ = [
     "BeliefNetwork",
     "Central",
     "CentralFilter",
+    "Delay",
+    "Delayed",
     "Distributed",
     "Instant",
     "LateInfo",

@@ -205,13 +205,17 @@ class LateScans:
         Raises:
             InputError: a time before the latest instant.
         """
+        return self.predicted(timeline, time)[0]
+
+    def predicted(self, timeline: Timeline, time: float) -> tuple[State, TrackerInfo]:
+        """As `at`, with what the tracker reports of it."""
         state, now = timeline.state, real("time", time)
-        if state.time == now:
-            return state
+        if state.time == now and timeline.instants:
+            return state, timeline.instants[-1].info
         if state.time is not None and now < state.time:
             raise reject("time", f"one from {state.time:g} s on, the latest of all scans that came", now)
         nothing = [None] * len(self._start)
-        return self.tracker.step(state, nothing, timeline.poses, now, rngs=self._streams(state.step + 1))[0]
+        return self.tracker.step(state, nothing, timeline.poses, now, rngs=self._streams(state.step + 1))
 
     def _checked(self, scan: SensorScan) -> SensorScan:
         """The scan with arrays of its own, so that what is worked again is what came."""

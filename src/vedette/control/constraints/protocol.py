@@ -35,6 +35,14 @@ class Situation(NamedTuple):
             return self.courses[sensor][:, :, :2]
         return with_start(self.courses[sensor][:, :, :2], self.poses[sensor, :2])
 
+    def is_fixed(self, sensor: int) -> bool:
+        """Whether no course of a sensor takes it anywhere; not where `poses` is not known."""
+        return self.poses is not None and bool((self.courses[sensor][:, :, :2] == self.poses[sensor, :2]).all())
+
+    def of_movable(self, values: Floats) -> tuple[Floats, ...]:
+        """As `split`, but 0 for sensors that go nowhere: a radar may stand on land that is forbidden to boats."""
+        return tuple(np.zeros_like(own) if self.is_fixed(s) else own for s, own in enumerate(self.split(values)))
+
     def split(self, values: _Values) -> tuple[_Values, ...]:
         """Values of all sensors' courses (sum of num_courses,), one sensor's after another's, as an array a sensor."""
         ends = list(accumulate(len(own) for own in self.courses))

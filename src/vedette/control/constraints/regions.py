@@ -16,7 +16,7 @@ from vedette.models.region import tell_degrees
 
 @dataclass(frozen=True, slots=True)
 class StayInside(Alone):
-    """Every platform stays inside a rectangle, its edge included, at all times of the horizon.
+    """Every platform that moves stays inside a rectangle, its edge included, at all times of the horizon.
 
     Attributes:
         region: the rectangle.
@@ -47,14 +47,14 @@ class StayInside(Alone):
         places = np.concatenate([own[:, :, :2] for own in situation.courses])
         low, high = self.region.corners.min(axis=0), self.region.corners.max(axis=0)
         beyond = np.maximum(np.maximum(low - places, places - high), 0.0)
-        return situation.split(np.asarray(np.hypot(beyond[..., 0], beyond[..., 1]).mean(axis=1)))
+        return situation.of_movable(np.asarray(np.hypot(beyond[..., 0], beyond[..., 1]).mean(axis=1)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class KeepOut(Alone):
     """No platform enters a region: neither at the times of the horizon nor on the straight way between two of them.
 
-    The way from where it is now counts where it is not inside already.
+    The way from where it is now counts where it is not inside already. One that cannot move at all may be where it is.
 
     Attributes:
         area: a `Region`, or the corners (num_corners, 2) of a polygon in order, m, 3 or more; one that crosses itself
@@ -101,7 +101,7 @@ class KeepOut(Alone):
             inside[:, 0] = False
         depths = np.where(inside, _distances(ways, edges), 0.0).mean(axis=1)
         touched = inside.any(axis=1) | crosses.any(axis=1)
-        return situation.split(np.where(touched, np.maximum(depths, np.finfo(float).tiny), 0.0))
+        return situation.of_movable(np.where(touched, np.maximum(depths, np.finfo(float).tiny), 0.0))
 
 
 def _polygon(name: str, given: Any) -> Floats:

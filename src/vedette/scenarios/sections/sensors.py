@@ -19,6 +19,7 @@ from vedette.scenarios.sections.base import (
     NonNegative,
     Point,
     Positive,
+    Probability,
     Section,
     Share,
     Step,
@@ -42,6 +43,31 @@ if TYPE_CHECKING:  # with the models comes the compiler, which a check does with
     from vedette.models import Region, SensorModel
     from vedette.scenarios.sections.world import Time
     from vedette.simulation import TrueSensor as TrueSensorModel
+    from vedette.tracking import Delay
+
+
+class LateSection(Section):
+    """Scans that come late, and are put in their places when they do."""
+
+    share: Probability = Field(default=1.0, description="Probability that a scan is late [-].")
+    up_to: Positive = Field(description="By how much, uniform from 0 [s].")
+    start: float | None = Field(default=None, description="Scans taken before come at once; none: none does [s].")
+    end: float | None = Field(default=None, description="Scans taken after it come at once; none: none does [s].")
+    window: NonNegative | None = Field(
+        default=None, description="A scan that is later than this is lost; none: none is [s]."
+    )
+
+    @check
+    def _in_order(self) -> Iterator[Finding]:
+        if self.start is not None and self.end is not None and self.start > self.end:
+            yield ("end",), f"a time from start on, {self.start:g} s", describe(self.end)
+
+    def build(self) -> Delay:
+        """What a tracker delays its scans by."""
+        from vedette.tracking import Delay
+
+        given = {name: value for name, value in self.model_dump().items() if value is not None}
+        return Delay(**given)
 
 
 class ScanTimes(Section):
@@ -59,6 +85,7 @@ class ScanTimes(Section):
         default=None,
         description="Probability that a scan does not take place, of which decisions know nothing; none: all do [-].",
     )
+    late: LateSection | None = Field(default=None, description="How its scans come late; none: all at once [-].")
 
     @check
     def _within_the_first_round(self) -> Iterator[Finding]:
