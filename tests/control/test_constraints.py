@@ -153,6 +153,21 @@ def test_a_thin_area_is_not_jumped_over() -> None:
     assert allowed.tolist() == [True, True]
 
 
+@pytest.mark.parametrize("constraint", [KeepOut(CORNERS), StayInside(models.Region(900.0, 999.0, 900.0, 999.0))])
+def test_what_cannot_move_may_be_where_it_is(constraint: Constraint) -> None:
+    """A radar on the shore; a boat beside it that can go, or stop, is asked."""
+    pose = np.array([*CORNERS.mean(axis=0), 0.0])
+    still = np.tile(pose, (2, len(TIMES), 1))
+    moving = still.copy()
+    moving[1, -1, 0] += 1e-6
+    (radar, boat) = constraint.courses(Situation((still, moving), TIMES, poses=np.stack([pose, pose])))
+    assert radar.all()
+    assert not boat.any()
+    scene = Situation((still,), TIMES, poses=pose[np.newaxis])
+    assert mask_of([constraint], scene).notes == ()
+    assert not constraint.courses(Situation((still,), TIMES))[0].any()  # nothing is known of where it is
+
+
 def test_one_time_is_one_place() -> None:
     places = np.array([[[0.0, 0.0]], [[500.0, 0.0]], [[90.0, 70.0]]])
     (allowed,) = KeepOut(CORNERS).courses(Situation((places,), TIMES[:1]))
