@@ -196,7 +196,7 @@ def test_completion_knows_what_there_is(place: Path) -> None:
         (("reproduce", "short.yaml", "--planners", "jdm,o"), ["jdm,oracle", "jdm,own"]),
         (("reproduce", "deciding-six"), ["deciding-six-cameras"]),
         (("campaign", "sp"), ["spec.toml"]),
-        (("init", "--from", "sol"), ["solent"]),
+        (("init", "--from", "sol"), ["solent", "solent-patrol"]),
         (("results", "--format", "n"), ["netcdf"]),
         (("generate", "--pattern", "c"), ["crowd"]),
     ],

@@ -161,6 +161,14 @@ def test_init_brings_recorded_data_and_its_licence_along(tmp_path: Path) -> None
     assert "MIT License" in (tmp_path / "solent.csv.README.md").read_text(encoding="utf-8")
 
 
+def test_init_brings_every_file_along_that_a_scenario_names(tmp_path: Path) -> None:
+    assert vedette("init", str(tmp_path), "--from", "solent-patrol").exit_code == 0
+    model = load_scenario(tmp_path / "scenario.yaml").model
+    assert model.control == load_scenario("solent-patrol").model.control
+    names = ["scenario.yaml", "solent-land.geojson", "solent.csv", "solent.csv.README.md", "vedette.schema.json"]
+    assert sorted(file.name for file in tmp_path.iterdir()) == names
+
+
 @pytest.mark.parametrize("taken", ["scenario.yaml", "solent.csv"])
 def test_init_never_overwrites_without_force(taken: str, tmp_path: Path) -> None:
     (tmp_path / taken).write_text("mine", encoding="utf-8")

@@ -82,7 +82,7 @@ def test_the_picture_has_every_track_sensor_and_site(name: str) -> None:
     assert (markers.count("o"), markers.count("^")) == (num_targets, num_targets)
     assert markers.count("s") == len(scenario.model.sensors)
     assert markers.count("+") == len(scenario.model.birth.sites)
-    unit = "km" if name in ("polar-10", "solent", "shore-radar", "three-radars") else "m"
+    unit = "km" if name in ("polar-10", "solent", "solent-patrol", "shore-radar", "three-radars") else "m"
     assert (axes.get_xlabel(), axes.get_ylabel()) == (f"x ({unit})", f"y ({unit})")
 
 

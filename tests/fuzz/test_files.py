@@ -60,7 +60,9 @@ DATA = {name: read_yaml(text, name).data for name, text in TEXTS.items()}
 def folder(tmp_path: Path) -> Path:
     """A folder for scenario files, with the data that they name."""
     (tmp_path / "data").mkdir()
-    shutil.copy(next(iter(list_builtin().values())).parents[1] / "data" / "solent.csv", tmp_path / "data")
+    data = next(iter(list_builtin().values())).parents[1] / "data"
+    for name in ("solent.csv", "solent-land.geojson"):
+        shutil.copy(data / name, tmp_path / "data")
     (tmp_path / "scenarios").mkdir()
     (tmp_path / "scenarios" / "ships.csv").write_text(SHIPS)
     return tmp_path / "scenarios"

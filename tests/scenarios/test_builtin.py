@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from scenarios.minimal import kinds
+from vedette.control import KeepOut, Situation
 from vedette.scenarios import list_builtin, load_scenario
-from vedette.scenarios.build import build_targets
+from vedette.scenarios.build import build_experiment, build_targets
 from vedette.scenarios.loading import Scenario
 from vedette.scenarios.sections import ScenarioModel, Section
 from vedette.scenarios.sections.platforms import Courses
@@ -19,6 +20,7 @@ from vedette.scenarios.sections.sensing import Clutter, Detection, Measurement, 
 from vedette.scenarios.sections.targets import RecordedTargets, ScriptedTargets
 from vedette.scenarios.sections.world import Motion
 from vedette.simulation import Truth
+from vedette.tracking import Delayed
 
 LAYOUTS: dict[str, dict[str, Any]] = {
     "paper-a": {
@@ -67,6 +69,7 @@ def test_they_are_all_there_and_valid() -> None:
         "six-cameras",
         "sixteen-views",
         "solent",
+        "solent-patrol",
         "three-positions",
         "three-radars",
         "two-searchers",
@@ -188,6 +191,19 @@ def test_solent_has_three_to_twelve_real_ships_under_way_at_every_scan() -> None
     assert (alive.min(), alive.max()) == (3, 10)
     assert np.abs(truth.states[:, :2]).max() <= 3000.0
     assert np.hypot(truth.states[:, 2], truth.states[:, 3]).max() < 20.0
+
+
+def test_the_land_of_the_patrol_has_no_ship_on_it_and_the_boats_off_it() -> None:
+    scenario = load_scenario("solent-patrol")
+    constraints = scenario.model.control.build_constraints(scenario.folder)
+    zones = [constraint for constraint in constraints if isinstance(constraint, KeepOut)]
+    assert len(zones) == 2
+    places = truth_of(scenario).states[:, :2]
+    starts = np.array([sensor.position for sensor in scenario.model.sensors[1:]])
+    for zone in zones:
+        way = np.concatenate([places, starts])[:, np.newaxis]
+        assert zone.courses(Situation((way,), np.ones(1)))[0].all()  # type: ignore[arg-type]
+    assert isinstance(build_experiment(scenario).tracker, Delayed)
 
 
 def test_the_ships_come_with_their_origin_and_licence() -> None:

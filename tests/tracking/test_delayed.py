@@ -30,7 +30,7 @@ class Loop:
         truth = experiment.targets.truth(np.arange(1.0, STEPS + 1.0), rng=np.random.default_rng(1))
         own = [np.random.default_rng((2, s)) for s in range(experiment.num_sensors)]
         self.times = truth.times.tolist()
-        self.poses: list[Floats] = [experiment.poses + [3.0 * k, 0.0, 0.0] for k in range(STEPS)]
+        self.poses: list[Floats] = [experiment.poses + np.array([3.0 * k, 0.0, 0.0]) for k in range(STEPS)]
         self.scans: list[list[Any]] = []
         for k, poses in enumerate(self.poses):
             scans = simulate_scans(truth.at(k)[1], poses, experiment.sensors_at(k + 1), rngs=own)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -153,16 +154,14 @@ def _with_schema(text: str) -> str:
 def _starting_files(scenario: Scenario, target: Path) -> dict[Path, str]:
     """The text of a built-in scenario for `target`; beside it its data, if it has any, and where they come from."""
     from vedette.scenarios import list_builtin
-    from vedette.scenarios.sections.targets import RecordedTargets
 
     text = list_builtin()[scenario.name].read_text(encoding="utf-8")
-    files: dict[Path, str] = {}
-    if isinstance(targets := scenario.model.targets, RecordedTargets):
-        data = scenario.folder / targets.path
-        text = text.replace(targets.path, data.name)
-        files[target.with_name(data.name)] = data.read_text(encoding="utf-8")
-        files[target.with_name(f"{data.name}.README.md")] = data.with_name("README.md").read_text(encoding="utf-8")
-    return {target: _with_schema(text), **files}
+    names = dict.fromkeys(re.findall(r"\.\./data/([\w.-]+)", text))
+    files = {target.with_name(name): (scenario.folder / "../data" / name).read_text(encoding="utf-8") for name in names}
+    if names:
+        about = (scenario.folder / "../data/README.md").read_text(encoding="utf-8")
+        files[target.with_name(f"{next(iter(names))}.README.md")] = about
+    return {target: _with_schema(text.replace("../data/", "")), **files}
 
 
 def check(

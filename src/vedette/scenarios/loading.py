@@ -49,7 +49,7 @@ class Scenario:
 
 def list_builtin() -> dict[str, FilePath]:
     """Names of the scenarios that come with the library, and their files."""
-    return {file.stem: file for file in sorted(BUILTIN_FOLDER.glob("*.yaml"))}
+    return {file.stem: file for file in sorted(BUILTIN_FOLDER.glob("*.yaml"), key=lambda file: file.stem)}
 
 
 def place_fault(document: Document, told: Told) -> Fault:

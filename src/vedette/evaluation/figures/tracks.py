@@ -40,6 +40,7 @@ from vedette.kernels.base.types import Floats, Ints
 from vedette.simulation.records import Decision, RunRecord
 
 LARGE = 5000.0  # m, beyond which axes are in kilometres
+_MANY_SCANS = 200  # from which on estimates are drawn smaller
 _TITLE_PAD = 14  # points, above the names of sensors at the upper edge
 SENSOR_MARKERS = "sDpP*X"
 _MOST_NAMED, _MOST_DECISIONS = 8, 12  # sensors whose names, and decisions whose numbers, there is room for
@@ -165,9 +166,10 @@ def _draw_estimates(axes: Axes, record: RunRecord, scale: float, shade: str) -> 
         groups = [points[of_estimate.ravel() == index] for index in range(len(distinct))]
     else:
         groups = [points]
+    size = 3.2 * min(1.0, (_MANY_SCANS / record.num_scans) ** 0.5)
     for index, mine in enumerate(groups):
         axes.plot(
-            mine[:, 0], mine[:, 1], linestyle="", marker=".", markersize=3.2, color=shade or colour(index), alpha=0.8,
+            mine[:, 0], mine[:, 1], linestyle="", marker=".", markersize=size, color=shade or colour(index), alpha=0.8,
             zorder=3,
         )  # fmt: skip
 
