@@ -51,7 +51,7 @@ BIASES: dict[str, dict[str, float]] = {
     "boat 2": {"range": 60.0, "bearing_deg": -1.5, "clock": -0.5},
 }
 # What is told of every radar, none of it true.
-TOLD_NOISE = {
+TOLD_NOISE: Data = {
     "kind": "range_dependent",
     "sigma_range": 30.0,
     "eta_range": 0.0,
@@ -59,6 +59,8 @@ TOLD_NOISE = {
     "eta_bearing": 0.0,
 }
 TOLD_PROBABILITY, TOLD_RATE = 0.8, 8.0
+WORDS = {"range": "range, m", "bearing_deg": "bearing, degrees", "clock": "clock, s"}
+WORDS |= {"sigma_range": "range, m", "sigma_bearing_deg": "bearing, degrees"}
 STRATEGIES = ("jdm", "idm", "nearest", "assigned", "centroid", "random", "fixed", "oracle")
 RECORDED = 600.0  # s
 PEER = Path(__file__).with_name("solent_peer.py").resolve()
@@ -174,20 +176,24 @@ def picture(folder: Path) -> None:
 
 
 def calibration_table(folder: Path) -> Iterator[str]:
-    """What was found of the biases."""
-    found = read_yaml((folder / "calibrated.yaml").read_text("utf-8"), "calibrated.yaml").data["sensors"]
-    yield "| radar | bias | truth | found |"
-    yield "| --- | --- | ---: | ---: |"
-    for own in found:
-        for name, value in BIASES[own["name"]].items():
-            unit = {"range": "m", "bearing_deg": "deg", "clock": "s"}[name]
-            cells = [
-                own["name"],
-                name.removesuffix("_deg"),
-                f"{value:g} {unit}",
-                f"{own['bias'].get(name, 0.0):.2f} {unit}",
-            ]
-            yield "| " + " | ".join(cells) + " |"
+    """What was found of the radars, beside what is true."""
+    sensors = read_yaml((folder / "calibrated.yaml").read_text("utf-8"), "calibrated.yaml").data["sensors"]
+    truth = {own.name: own for own in load_scenario("solent-patrol").model.sensors}
+    yield "| radar | parameter | told | truth | found |"
+    yield "| --- | --- | ---: | ---: | ---: |"
+    for found in sensors:
+        name, rows = found["name"], list[tuple[str, float, float, float]]()
+        for key, value in BIASES[name].items():
+            rows.append((f"bias, {WORDS[key]}", 0.0, value, found["bias"].get(key, 0.0)))
+        for key in ("sigma_range", "sigma_bearing_deg"):
+            rows.append((f"noise, {WORDS[key]}", TOLD_NOISE[key], getattr(truth[name].noise, key), found["noise"][key]))
+        own, probability = truth[name], found["detection"]["probability"]
+        rows.append(("detection", TOLD_PROBABILITY, own.detection.model_dump()["probability"], probability))
+        rows.append(
+            ("false measurements a scan", TOLD_RATE, own.clutter.model_dump()["rate"], found["clutter"]["rate"])
+        )
+        for words, *numbers in rows:
+            yield f"| {name} | {words} | " + " | ".join(f"{number:.3g}" for number in numbers) + " |"
 
 
 def table_of(folder: Path, name: str) -> Iterator[str]:
@@ -274,11 +280,15 @@ def main() -> None:
     if not (folder / "tracks.geojson").exists():
         show(folder)
     picture(folder)
-    peers = [] if given.peers_python is None else ["", *peer_table(folder, given.peers_python, given.peer_runs)]
-    lines = [*calibration_table(folder), "", *table_of(folder, "biases"), "", *table_of(folder, "strategies"), *peers]
-    print("\n".join(lines))
-    if given.write is not None:
-        write_between(given.write, "solent.py", "\n".join(lines))
+    tables = {"calibrate": calibration_table(folder)}
+    tables |= {name: table_of(folder, name) for name in ("biases", "strategies")}
+    if given.peers_python is not None:
+        tables["peers"] = peer_table(folder, given.peers_python, given.peer_runs)
+    for name, lines in tables.items():
+        text = "\n".join(lines)
+        print(f"\n{text}", flush=True)
+        if given.write is not None:
+            write_between(given.write, f"solent.py {name}", text)
 
 
 if __name__ == "__main__":
