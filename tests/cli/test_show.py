@@ -100,3 +100,11 @@ def test_a_faulty_scenario_is_told_without_a_traceback(tmp_path: Path) -> None:
     result = show(str(file))
     assert (result.exit_code, result.stdout) == (1, "")
     assert result.stderr == f'{file}:4:44: motion.sigma_v: expected a number, got "quick"\n'
+
+
+def test_zones_biases_and_late_scans_are_told_in_a_few_words() -> None:
+    lines = " ".join(show("solent-patrol").stdout.split())
+    assert "constraint keep_out, polygon of 21 corners" in lines
+    assert "constraint stay_inside, x -3000 to 3000 m, y -3000 to 3000 m" in lines
+    assert "boat 2: late share 0.8, up_to 30 s, start 600 s, end 1200 s" in lines
+    assert "origin lon -1.1171 deg, lat 50.7865 deg" in lines

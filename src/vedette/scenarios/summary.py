@@ -13,6 +13,7 @@ from vedette.scenarios.sections.control import Control
 from vedette.scenarios.sections.fusion import OF_SCANS, AnyFusion, CustomFusion
 from vedette.scenarios.sections.sensors import Sensor
 from vedette.scenarios.sections.tracking import AnyFilter, Filter
+from vedette.scenarios.sections.true_sensors import BiasSection
 from vedette.scenarios.sections.undetected import UndetectedSection
 from vedette.scenarios.sections.world import RegionSection
 from vedette.text import counted
@@ -67,6 +68,7 @@ def facts(model: ScenarioModel) -> list[tuple[str, str]]:
     end = time.start + (time.num_steps - 1) * time.step_period
     return [
         ("scans", f"{time.num_steps}, every {time.step_period:g} s from {time.start:g} to {end:g} s"),
+        *(() if model.origin is None else (("origin", settings(model.origin)),)),
         ("region", _bounds(region)),
         ("motion", settings(model.motion)),
         ("survival", settings(model.survival)),
@@ -80,7 +82,7 @@ def facts(model: ScenarioModel) -> list[tuple[str, str]]:
         ("horizon", f"{counted(model.horizon[0], 'step')} of {model.horizon[1]:g} s"),
         ("reward", f"{settings(control.reward)}, {_samples(control)}"),
         ("search", settings(control.search)),
-        *(("constraint", settings(section)) for section in control.constraints),
+        *(("constraint", _constraint(section)) for section in control.constraints),
         ("pseudo-scans", f"{control.ideal_measurements} measurements"),
         ("OSPA", settings(model.ospa)),
         *((f"planner {name}", settings(section)) for name, section in model.planners.items()),
@@ -100,6 +102,16 @@ def _samples(control: Control) -> str:
 
 def _bounds(region: RegionSection) -> str:
     return f"x {region.x_min:g} to {region.x_max:g} m, y {region.y_min:g} to {region.y_max:g} m"
+
+
+def _constraint(section: Section) -> str:
+    """Its settings; of an area where it is, or how many corners it has."""
+    area, polygon = getattr(section, "region", None), getattr(section, "polygon", None)
+    words = settings(section if polygon is None else section.model_copy(update={"polygon": (), "holes": ()}))
+    if polygon is not None:
+        words += f", polygon of {len(polygon)} corners"
+        words += f", {counted(len(holes), 'hole')}" if (holes := getattr(section, "holes", ())) else ""
+    return words if area is None else f"{words}, {_bounds(area)}"
 
 
 def _undetected(section: UndetectedSection) -> str:
@@ -164,12 +176,14 @@ def sensing(sensor: Sensor) -> list[tuple[str, str]]:
 
 
 def _in_truth(sensor: Sensor) -> list[tuple[str, str]]:
-    """Where a sensor is not what the filters take it for, and when it scans if not at every step."""
+    """Its bias, where it is not what the filters take it for, and when it scans if not at every step."""
     found, truth = [], sensor.truth
+    if sensor.bias != BiasSection():
+        found.append(("bias", settings(sensor.bias)))
     if truth is not None:
         parts = {name: getattr(truth, name) for name in type(truth).model_fields}
         sections = [(name, value) for name, value in parts.items() if isinstance(value, Section)]
-        found = [(f"true {name.replace('_', ' ')}", settings(value)) for name, value in sections]
+        found += [(f"true {name.replace('_', ' ')}", settings(value)) for name, value in sections]
         found += [("detection of", "the measurement")] if truth.detection_of == "measurement" else []
     scans = sensor.scans
     if scans.period is not None:
@@ -178,4 +192,6 @@ def _in_truth(sensor: Sensor) -> list[tuple[str, str]]:
         found.append(("scans", f"every {scans.every} steps from step {scans.first}"))
     if sensor.scans.drop_out:
         found.append(("drop-outs", f"{sensor.scans.drop_out:g} of its scans"))
+    if sensor.scans.late is not None:
+        found.append(("late", settings(sensor.scans.late)))
     return found
