@@ -73,9 +73,10 @@ def test_after_a_kill_it_goes_on_and_the_record_replays_to_the_same_bytes(place:
 @pytest.mark.parametrize(
     ("words", "status", "message"),
     [
-        (("--listen", "here"), 2, "expected HOST:PORT; got 'here'"),
-        (("--listen", "127.0.0.1:70000"), 2, "expected HOST:PORT"),
-        (("--listen", "0.0.0.0:0"), 1, "--listen: expected a loopback address such as 127.0.0.1, or --token"),
+        (("--listen", "here"), 2, "expected stdin, tcp://HOST:PORT or ws://HOST:PORT; got 'here'"),
+        (("--listen", "tcp://127.0.0.1:70000"), 2, "expected stdin, tcp://HOST:PORT"),
+        (("--listen", "tcp://0.0.0.0:0"), 1, "--listen: expected a loopback address such as 127.0.0.1, or --token"),
+        (("--listen", "stdin", "--listen", "ws://0.0.0.0:0"), 1, "expected a loopback address such as 127.0.0.1"),
         (("--planner", "best"), 2, "expected one of"),
         (("--decide-every", "5", "--planner", "oracle"), 1, "expected one that does not know the targets"),
         (("--snapshot", "small.yaml"), 1, "small.yaml: expected a snapshot"),

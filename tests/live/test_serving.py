@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vedette.errors import InputError
-from vedette.live import LineSplitter, Server, serving
+from vedette.live import Exchange, LineSplitter, TcpServer, serving
 
 
 @given(st.lists(st.binary(max_size=12).map(lambda b: b.replace(b"\n", b"x")), max_size=8), st.data())
@@ -54,7 +54,7 @@ def served(scene: Callable[[Callable[[], Awaitable[Client]]], Awaitable[None]], 
     told, came = list[str](), list[Client]()
 
     async def play() -> None:
-        server = await Server(take, token, told.append).listen("127.0.0.1", 0)
+        server = await TcpServer(Exchange(take, token, told.append)).listen("127.0.0.1", 0)
 
         async def client() -> Client:
             came.append(Client(*await asyncio.open_connection(*server.sockets[0].getsockname()[:2])))

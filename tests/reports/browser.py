@@ -118,15 +118,17 @@ class Browser:
         message: dict[str, Any] = json.loads(text)
         return message
 
-    def open(self, path: Path, *, width: int = 1280, height: int = 900, dark: bool = False, query: str = "") -> Page:
-        """Load a file into a new tab, with a query in its address."""
+    def open(
+        self, path: Path | str, *, width: int = 1280, height: int = 900, dark: bool = False, query: str = ""
+    ) -> Page:
+        """Load a file, or what is at an address, into a new tab, with a query in its address."""
         return Page(self, path, width, height, dark, query)
 
 
 class Page:
-    """A tab with a file in it."""
+    """A tab with a page in it."""
 
-    def __init__(self, browser: Browser, path: Path, width: int, height: int, dark: bool, query: str) -> None:
+    def __init__(self, browser: Browser, path: Path | str, width: int, height: int, dark: bool, query: str) -> None:
         self._browser = browser
         target = browser.call("Target.createTarget", url="about:blank")["targetId"]
         self._session: str = browser.call("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
@@ -139,7 +141,7 @@ class Page:
         )  # fmt: skip
         scheme = {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}
         self.call("Emulation.setEmulatedMedia", features=[scheme])
-        self.url = path.resolve().as_uri() + (f"?{query}" if query else "")
+        self.url = (path if isinstance(path, str) else path.resolve().as_uri()) + (f"?{query}" if query else "")
         self.call("Page.setLifecycleEventsEnabled", enabled=True)
         browser.wait_for_load(self.call("Page.navigate", url=self.url)["loaderId"])
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import hashlib
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
@@ -18,11 +19,11 @@ from vedette.cli.options import Seed, Trust
 from vedette.cli.output import note, publish, say
 from vedette.cli.running import Approval, check_planner, compile_if_cold, interruptible
 from vedette.cli.scenario_files import warn
+from vedette.extras import need
 
 if TYPE_CHECKING:
     from vedette.live import Keeping
-
-_CHUNK = 1 << 16
+    from vedette.reports.live import LiveScreen
 
 
 def live(
@@ -55,12 +56,17 @@ def live(
         Path | None, typer.Option("--record", metavar="FILE", help="Keeps the lines as they came, and is gone on from.")
     ] = None,
     listen: Annotated[
-        str | None,
-        typer.Option("--listen", metavar="HOST:PORT", help="Take lines from TCP clients, not from standard input."),
+        list[str] | None,
+        typer.Option(
+            "--listen",
+            metavar="WHERE",
+            help="Where lines come from, several times if need be: stdin (if nothing is said), tcp://HOST:PORT, or "
+            "ws://HOST:PORT, where a page shows what is believed, too.",
+        ),
     ] = None,
     token: Annotated[
         str | None,
-        typer.Option("--token", envvar="VEDETTE_TOKEN", help="What clients must send first; a must beyond loopback."),
+        typer.Option("--token", envvar="VEDETTE_TOKEN", help="What clients must know; a must beyond loopback."),
     ] = None,
     seed: Seed = 0,
     trust: Trust = False,
@@ -70,9 +76,12 @@ def live(
     from vedette.live.serving import check_address
     from vedette.scenarios.of_recording import scenario_of_sensors
 
-    address = None if listen is None else _address(listen)
-    if address is not None:
-        check_address(address[0], token)
+    places = [_place(each) for each in listen or ["stdin"]]
+    for place in places:
+        if place.kind != "stdin":
+            check_address(place.host, token)
+    if any(place.kind == "ws" for place in places):
+        need("vedette live --listen ws://", "websockets", "jinja2", "matplotlib", "pyarrow")
     known = scenario_of_sensors(sensors, speed=speed, decide_every=decide_every)
     check_planner(known.scenario, planner, "--planner")
     Approval(trust)(known.scenario)
@@ -80,6 +89,12 @@ def live(
     for text in known.assumed:
         note(f"not said, so {text}")
     loop = live_of(known, planner, window=window, ahead=ahead, decide_every=decide_every, seed=seed)
+    screen = None
+    if any(place.kind == "ws" for place in places):
+        from vedette.reports.live import LiveScreen
+
+        screen = LiveScreen(known.scenario, loop, lambda: keeping.state)
+        loop = screen.live
     options = (window, ahead, speed, planner if loop.planner else "", decide_every, seed)
     of = hashlib.sha256(repr(options).encode() + sensors.read_bytes()).hexdigest()
     with interruptible("what came is kept where --snapshot or --record say so"):
@@ -89,20 +104,28 @@ def live(
             with compiling():
                 for answers in keeping.resume():
                     _say(answers)
-                if address is None:
-                    _from_input(keeping)
-                else:
-                    asyncio.run(_from_clients(keeping, address, token))
+                asyncio.run(_listen(keeping, screen, places, token))
         finally:
             keeping.close()
     publish(_document(keeping))
 
 
-def _address(listen: str) -> tuple[str, int]:
-    host, _, port = listen.rpartition(":")
-    if not host or not port.isdecimal() or int(port) > 65535:
-        raise usage_error(f"expected HOST:PORT; got {listen!r}", "--listen")
-    return host.strip("[]"), int(port)
+class _Place(NamedTuple):
+    """Where lines come from: stdin, tcp or ws, and of what address."""
+
+    kind: str
+    host: str = ""
+    port: int = 0
+
+
+def _place(listen: str) -> _Place:
+    if listen == "stdin":
+        return _Place(listen)
+    kind, _, address = listen.rpartition("://")
+    host, _, port = address.rstrip("/").rpartition(":")
+    if kind not in ("tcp", "ws") or not host or not port.isdecimal() or int(port) > 65535:
+        raise usage_error(f"expected stdin, tcp://HOST:PORT or ws://HOST:PORT; got {listen!r}", "--listen")
+    return _Place(kind, host.strip("[]"), int(port))
 
 
 def _say(answers: Iterable[dict[str, Any]]) -> None:
@@ -112,33 +135,37 @@ def _say(answers: Iterable[dict[str, Any]]) -> None:
         say(encoded(answer).decode(), nl=False)
 
 
-def _from_input(keeping: Keeping) -> None:
-    from vedette.live import MOST_BYTES, LineSplitter
-
-    splitter = LineSplitter(MOST_BYTES)
-    source: Any = sys.stdin.buffer
-    while data := source.read1(_CHUNK):
-        for line in splitter.feed(data):
-            _say(keeping.take(line))
-    for line in splitter.rest():
-        _say(keeping.take(line))
-
-
-async def _from_clients(keeping: Keeping, address: tuple[str, int], token: str | None) -> None:
-    from vedette.live import Server
+async def _listen(keeping: Keeping, screen: LiveScreen | None, places: Sequence[_Place], token: str | None) -> None:
+    """Take lines until standard input ends, or for ever where there are clients: Ctrl-C ends it, and waits for none."""
+    from vedette.live import Exchange, TcpServer, lines_of
 
     def take(line: bytes) -> Iterable[dict[str, Any]]:
         answers = keeping.take(line)
         _say(answers)
+        if screen is not None:
+            screen.note(answers)
         return answers
 
-    server = await Server(take, token, note).listen(*address)
-    host, port = server.sockets[0].getsockname()[:2]
-    note(f"listens on {host}:{port}")
-    try:
-        await asyncio.Event().wait()  # for ever: Ctrl-C ends it, and waits for no client
-    finally:
-        server.close()
+    exchange = Exchange(take, token, note)
+    async with contextlib.AsyncExitStack() as servers:
+        for place in places:
+            if place.kind == "tcp":
+                server: Any = await TcpServer(exchange).listen(place.host, place.port)
+            elif screen is not None and place.kind == "ws":
+                from vedette.live.web import WebServer
+
+                server = await WebServer(exchange, screen, place.host).listen(place.port)
+            else:
+                continue
+            servers.callback(server.close)
+            host, port = server.sockets[0].getsockname()[:2]
+            at = f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
+            note(f"listens on {place.kind}://{at}" + (f"; the page is http://{at}/" if place.kind == "ws" else ""))
+        if any(place.kind == "stdin" for place in places):
+            async for line in lines_of(sys.stdin.buffer):
+                await exchange.answer(line, None)
+        if any(place.kind != "stdin" for place in places):
+            await asyncio.Event().wait()
 
 
 def _document(keeping: Keeping) -> dict[str, Any]:

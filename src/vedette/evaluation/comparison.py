@@ -9,6 +9,7 @@ from typing import TypeAlias
 
 import numpy as np
 
+from vedette.control import Plan
 from vedette.errors import InputError
 from vedette.evaluation.actions import Row, rounded
 from vedette.evaluation.metrics import RunMetrics
@@ -178,11 +179,12 @@ def typical_run(comparison: Comparison, strategy: str, records: Sequence[RunReco
 
 def choices_of(record: RunRecord) -> tuple[Choice, ...]:
     """What each decision of a run chose, rounded."""
-    plans = [decision.plan for decision in record.decisions]
-    return tuple(
-        tuple(rounded(own.columns, row) for own, row in zip(plan.actions, plan.chosen_actions, strict=True))
-        for plan in plans
-    )
+    return tuple(choice_of(decision.plan) for decision in record.decisions)
+
+
+def choice_of(plan: Plan) -> Choice:
+    """What a plan chose, rounded."""
+    return tuple(rounded(own.columns, row) for own, row in zip(plan.actions, plan.chosen_actions, strict=True))
 
 
 def _check_paired(name: str, records: Sequence[RunRecord], other: str, reference: Sequence[RunRecord]) -> None:

@@ -4,16 +4,31 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
 from vedette.errors import InputError
 from vedette.kernels.base.types import Bools, Floats
-from vedette.simulation.records import RunRecord
+from vedette.simulation.health import Health
 from vedette.text import counted
 
 # From here on what was cut off is more than a trifle.
 _MUCH = 0.01
+
+
+class Reported(Protocol):
+    """What has a health, such as the record of a run."""
+
+    @property
+    def num_sensors(self) -> int:
+        """That are reported."""
+        ...
+
+    @property
+    def health(self) -> Health:
+        """What the filters and the fusion reported."""
+        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +74,7 @@ class HealthSummary:
     sensors: tuple[str, ...]
 
 
-def summarise_health(records: Sequence[RunRecord], sensors: Sequence[str] = ()) -> HealthSummary:
+def summarise_health(records: Sequence[Reported], sensors: Sequence[str] = ()) -> HealthSummary:
     """The reports of runs with the same sensors, which are called `sensors`, or else `sensor 1` and so on.
 
     Raises `InputError` for no run or other numbers of sensors.
@@ -98,14 +113,14 @@ def summarise_health(records: Sequence[RunRecord], sensors: Sequence[str] = ()) 
     )
 
 
-def health_line(record: RunRecord, sensors: Sequence[str] = ()) -> str:
+def health_line(record: Reported, sensors: Sequence[str] = ()) -> str:
     """A run's health in a line: `health: all exact`, or what was cut off, missing or left out."""
     health = summarise_health([record], sensors)
     statements = _statements(health, lambda share: f"{round(share * health.num_scans)} of {health.num_scans} scans")
     return f"health: {'; '.join(text for text, _ in statements) or 'all exact'}"
 
 
-def health_findings(records: Sequence[RunRecord], sensors: Sequence[str] = ()) -> tuple[str, ...]:
+def health_findings(records: Sequence[Reported], sensors: Sequence[str] = ()) -> tuple[str, ...]:
     """What of the health of some runs may have cost accuracy, in words; none where nothing did."""
     statements = _statements(summarise_health(records, sensors), lambda share: f"{percent(share)} of the scans")
     return tuple(text for text, is_much in statements if is_much)

@@ -10,12 +10,10 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from vedette.errors import InputError
+from vedette.live.lines import CHUNK, LineSplitter
 from vedette.live.loop import Answer, Live, LiveState
 from vedette.live.messages import MOST_BYTES
-from vedette.live.serving import LineSplitter
 from vedette.tracking import load_snapshot, save_snapshot
-
-_CHUNK = 1 << 16
 
 
 class Keeping:
@@ -122,7 +120,7 @@ def _opened(path: Path) -> BinaryIO:
 def _lines(file: BinaryIO) -> Iterator[bytes]:
     """The whole lines of a record."""
     splitter = LineSplitter(MOST_BYTES)
-    while chunk := file.read(_CHUNK):
+    while chunk := file.read(CHUNK):
         yield from splitter.feed(chunk)
 
 
@@ -130,7 +128,7 @@ def _cut(file: BinaryIO) -> None:
     """Behind the last whole line, without what was half written when the loop ended."""
     size = end = file.seek(0, os.SEEK_END)
     while end > 0:
-        start = max(end - _CHUNK, 0)
+        start = max(end - CHUNK, 0)
         file.seek(start)
         place = file.read(end - start).rfind(b"\n")
         if place >= 0:

@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 
 from vedette.control.plan import Plan
+from vedette.densities import Estimate
 from vedette.errors import VedetteError
-from vedette.evaluation import choices_of, match_run
+from vedette.evaluation import match_run
 from vedette.evaluation.actions import action_axis, choice_words
-from vedette.evaluation.comparison import Choice
+from vedette.evaluation.comparison import choice_of
 from vedette.evaluation.figures.rewards import best_over_others, best_over_pair, first_pair
 from vedette.evaluation.scans import LIE, code_of_sensors, in_plane, scans_of_record
 from vedette.kernels.base.types import Floats
@@ -38,34 +39,34 @@ def replay_data(strategy: Strategy, record: RunRecord, group: str, *, trust: boo
     """
     scenario = strategy.cell.scenario
     extent = _extent(record, scenario)
-    places = max(0, _DIGITS - math.floor(math.log10(max(extent[1] - extent[0], extent[3] - extent[2]))))
+    places = places_of(extent)
     scene, names, sections = strategy.scene, scenario.model.sensor_names, scenario.model.sensors
-    sensors = [_sensor(name, section) for name, section in zip(names, sections, strict=True)]
+    sensors = [drawn_sensor(name, section) for name, section in zip(names, sections, strict=True)]
     has_velocity = scenario.model.motion.kind != "custom"
     is_known, origin = scenario.model.targets.kind != "unknown", scenario.model.origin
     axes = dict[str, dict[str, Any]]()
-    decisions = [_decision(*each, axes, names) for each in zip(record.decisions, choices_of(record), strict=True)]
+    decisions = [drawn_decision(each, axes, names) for each in record.decisions]
     return {
         "cell": strategy.cell.name,
         "group": group,
         "strategy": strategy.name,
         "run": record.run,
         "labelled": strategy.has_labels,
-        "extent": _rounded(extent, places),
-        "zones": [[zone.kind, [_rounded(corner, places) for corner in zone.corners]] for zone in scene.zones],
+        "extent": rounded_to(extent, places),
+        "zones": [[zone.kind, [rounded_to(corner, places) for corner in zone.corners]] for zone in scene.zones],
         "sensors": sensors,
-        "times": _rounded(record.times, 6),
+        "times": rounded_to(record.times, 6),
         "truth": [_targets(record, scan, places, has_velocity) for scan in range(record.num_scans)],
         "estimates": _estimates(record, scenario, places),
         "poses": [
-            [_pose(pose, section, places) for pose, section in zip(poses, sections, strict=True)]
+            [drawn_pose(pose, section, places) for pose, section in zip(poses, sections, strict=True)]
             for poses in record.poses
         ],
         "scans": _scans(record, scenario, places, trust),
         "recorded": scenario.model.recording is not None,
         "known": is_known,
         "origin": None if origin is None else [origin.lon, origin.lat],
-        "ospa": [_rounded(parts, 2) for parts in record.ospa] if is_known else [],
+        "ospa": [rounded_to(parts, 2) for parts in record.ospa] if is_known else [],
         "ospa_unit": scenario.model.ospa.unit,
         "axes": list(axes.values()),
         "reward": scene.reward,
@@ -73,8 +74,14 @@ def replay_data(strategy: Strategy, record: RunRecord, group: str, *, trust: boo
     }
 
 
-def _rounded(values: Any, places: int) -> list[float]:
+def rounded_to(values: Any, places: int) -> list[float]:
+    """Numbers as a page has them."""
     return [round(float(value), places) for value in values]
+
+
+def places_of(extent: Sequence[float]) -> int:
+    """Digits behind the point that a pixel can show."""
+    return max(0, _DIGITS - math.floor(math.log10(max(extent[1] - extent[0], extent[3] - extent[2]))))
 
 
 def _extent(record: RunRecord, scenario: Scenario) -> tuple[float, float, float, float]:
@@ -86,7 +93,7 @@ def _extent(record: RunRecord, scenario: Scenario) -> tuple[float, float, float,
     return x_min, x_max, y_min, y_max
 
 
-def _sensor(name: str, section: SensorSection) -> dict[str, Any]:
+def drawn_sensor(name: str, section: SensorSection) -> dict[str, Any]:
     """What a sensor sees, for drawing: how a measurement lies in the plane, and its field where that has an edge."""
     found: dict[str, Any] = {"name": name, "kind": LIE.get(section.measurement.kind, "none")}
     if section.detection.kind in ("limited_range", "limited_sector", "soft_sector"):
@@ -96,12 +103,12 @@ def _sensor(name: str, section: SensorSection) -> dict[str, Any]:
     return found
 
 
-def _pose(pose: Floats, section: SensorSection, places: int) -> list[float]:
+def drawn_pose(pose: Floats, section: SensorSection, places: int) -> list[float]:
     """Place and heading; of a camera its field of view, too: middle and half width in rad, reach in m."""
-    found = [*_rounded(pose[:2], places), round(float(pose[2]), 4)]
+    found = [*rounded_to(pose[:2], places), round(float(pose[2]), 4)]
     if section.detection.kind == "camera":
         field = field_of_view(section, pose.tolist())
-        found += [] if field is None else [*_rounded(field[:2], 4), round(field.reach, places)]
+        found += [] if field is None else [*rounded_to(field[:2], 4), round(field.reach, places)]
     return found
 
 
@@ -109,7 +116,7 @@ def _targets(record: RunRecord, scan: int, places: int, has_velocity: bool) -> l
     """For each target its number from 1, its position, and its velocity where that is what the state goes on with."""
     ids, states = record.truth.at(scan)
     return [
-        [target + 1, *_rounded(state[:2], places), *(_rounded(state[2:4], 2) if has_velocity else [])]
+        [target + 1, *rounded_to(state[:2], places), *(rounded_to(state[2:4], 2) if has_velocity else [])]
         for target, state in zip(ids.tolist(), states, strict=True)
     ]
 
@@ -137,18 +144,22 @@ def _estimates(record: RunRecord, scenario: Scenario, places: int) -> list[list[
         rows: list[list[Any]] = []
         for place, label in enumerate(estimate.labels.tolist()):
             partner = partners.get((scan, *label, *estimate.means[place, :2].tolist()), (0, 0.0))
-            ellipse = _ellipse(estimate.covs[place, :2, :2], places)
-            position = _rounded(estimate.means[place, :2], places)
-            existence = round(float(estimate.existence[place]), 4)
-            rows.append([f"{label[0]}.{label[1]}", *position, existence, *ellipse, *partner])
+            rows.append([*drawn_estimate(estimate, place, places), *partner])
         found.append(rows)
     return found
+
+
+def drawn_estimate(estimate: Estimate, place: int, places: int) -> list[Any]:
+    """Label, position, existence and ellipse (semi-axes in m, angle in rad) of one of the targets of an estimate."""
+    born, number = estimate.labels[place].tolist()
+    position, existence = rounded_to(estimate.means[place, :2], places), round(float(estimate.existence[place]), 4)
+    return [f"{born}.{number}", *position, existence, *_ellipse(estimate.covs[place, :2, :2], places)]
 
 
 def _ellipse(cov: Floats, places: int) -> list[float]:
     variances, axes = np.linalg.eigh(cov)
     semi = _SIGMAS * np.sqrt(np.maximum(variances, 0.0))
-    return [*_rounded(semi[::-1], places), round(math.atan2(axes[1, 1], axes[0, 1]), 3)]
+    return [*rounded_to(semi[::-1], places), round(math.atan2(axes[1, 1], axes[0, 1]), 3)]
 
 
 def _scans(record: RunRecord, scenario: Scenario, places: int, trust: bool) -> list[list[list[list[float]]]]:
@@ -164,26 +175,26 @@ def _scans(record: RunRecord, scenario: Scenario, places: int, trust: bool) -> l
     except VedetteError:
         return []
     return [
-        [_measurements(scan, kind, pose, places) for scan, kind, pose in zip(sensors, kinds, poses, strict=True)]
+        [drawn_measurements(scan, kind, pose, places) for scan, kind, pose in zip(sensors, kinds, poses, strict=True)]
         for sensors, poses in zip(scans, record.poses, strict=True)
     ]
 
 
-def _measurements(scan: Scan | None, kind: str, pose: Floats, places: int) -> list[list[float]]:
+def drawn_measurements(scan: Scan | None, kind: str, pose: Floats, places: int) -> list[list[float]]:
+    """The target behind each measurement of a scan (0: clutter, -1: unknown), and where it lies in the plane."""
     if scan is None or kind not in LIE:
         return []
     digits = _ANGLE_DIGITS if LIE[kind] == "ray" else places
     lie = in_plane(scan.measurements, kind, pose)
-    return [[origin + 1, *_rounded(place, digits)] for origin, place in zip(scan.origins.tolist(), lie, strict=True)]
+    return [[origin + 1, *rounded_to(place, digits)] for origin, place in zip(scan.origins.tolist(), lie, strict=True)]
 
 
-def _decision(
-    decision: Decision, choice: Choice, axes: dict[str, dict[str, Any]], names: Sequence[str]
-) -> dict[str, Any]:
+def drawn_decision(decision: Decision, axes: dict[str, dict[str, Any]], names: Sequence[str]) -> dict[str, Any]:
+    """A decision with its rewards, whose axes are put into `axes`, and why it was taken."""
     plan = decision.plan
     return {
         "scan": decision.step - 1,
-        "actions": choice_words(choice),
+        "actions": choice_words(choice_of(plan)),
         "notes": plan.notes,
         "curves": _curves(plan, axes),
         "map": _map(plan),
@@ -207,7 +218,7 @@ def _curves(plan: Plan, axes: dict[str, dict[str, Any]]) -> list[dict[str, Any]]
             axis = {
                 "axis": along.title(),
                 "numeric": along.is_numeric,
-                "places": _rounded(along.places[order], 1),
+                "places": rounded_to(along.places[order], 1),
                 "labels": [along.labels[i] for i in order],
                 "ticks": [along.ticks[i] for i in order],
             }

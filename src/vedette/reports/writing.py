@@ -231,9 +231,11 @@ def _json(data: Any) -> str:
     return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
 
 
-def render(template: str, replays: Sequence[dict[str, Any]], **told: Any) -> str:
-    """A page of `template`, with runs that can be replayed and what else the template tells."""
-    script = _script()
+def render(
+    template: str, replays: Sequence[dict[str, Any]], *, scripts: Sequence[str] = ("scripts",), **told: Any
+) -> str:
+    """A page of `template`, with runs that can be replayed, folders of scripts, and what else the template tells."""
+    script = _script(scripts)
     environment = Environment(
         loader=PackageLoader("vedette.reports", "page"),
         autoescape=True,
@@ -247,12 +249,12 @@ def render(template: str, replays: Sequence[dict[str, Any]], **told: Any) -> str
         style=Markup((_FILES / "report.css").read_text("utf-8")),
         script=Markup(script),
         script_hash=base64.b64encode(hashlib.sha256(script.encode()).digest()).decode(),
-        **{"left_out": 0, "sections": (), **told},
+        **{"left_out": 0, "sections": (), "live": False, **told},
     )
 
 
-def _script() -> str:
-    files = sorted((_FILES / "scripts").iterdir(), key=lambda file: file.name)
+def _script(folders: Sequence[str]) -> str:
+    files = [file for each in folders for file in sorted((_FILES / each).iterdir(), key=lambda file: file.name)]
     return "(() => {\n" + "\n".join(file.read_text("utf-8") for file in files if file.name.endswith(".js")) + "})();\n"
 
 

@@ -1,9 +1,8 @@
 // The runs that can be replayed, and numbers as a reader wants them.
 const runs = JSON.parse(document.getElementById("runs").textContent);
 // Curves of rewards whose actions are the same share their axis.
-for (const run of runs) {
-  for (const { curves } of run.decisions) curves.forEach((curve) => Object.assign(curve, run.axes[curve.along]));
-}
+const joined = ({ curves }, axes) => curves.forEach((curve) => Object.assign(curve, axes[curve.along]));
+for (const run of runs) run.decisions.forEach((decision) => joined(decision, run.axes));
 
 const minus = (text) => text.replaceAll("-", "\u2212");
 const fixed = (value, digits) => minus(value.toFixed(digits));
@@ -16,6 +15,12 @@ const unitOf = (run) => (extentOf(run) > 5000 ? { name: "km", metres: 1000 } : {
 // Distances with the digits that the size of the scene deserves.
 const metres = (value, run) => (unitOf(run).metres === 1000 ? `${fixed(value / 1000, 2)} km` : `${fixed(value, 1)} m`);
 
+// A time of a run by its clock: seconds, or where times are dates the time of day.
+function clock(run, time) {
+  if (time === null) return "no scan yet";
+  return run.utc ? `${new Date(1000 * time).toISOString().slice(0, 19).replace("T", " ")} UTC` : `${+time.toFixed(3)} s`;
+}
+
 const labelsOf = new Map();
 // The place of a label among all labels of its run, which gives its colour; all alike where labels do not last.
 function placeOfLabel(run, label) {
@@ -26,7 +31,9 @@ function placeOfLabel(run, label) {
     all.sort((a, b) => key(a)[0] - key(b)[0] || key(a)[1] - key(b)[1]);
     labelsOf.set(run, new Map(all.map((text, place) => [text, place])));
   }
-  return labelsOf.get(run).get(label);
+  const places = labelsOf.get(run);
+  if (!places.has(label)) places.set(label, places.size); // one that came while the run went on
+  return places.get(label);
 }
 
 // The last decision at or before a scan, or undefined.

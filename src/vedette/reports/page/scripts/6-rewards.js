@@ -44,8 +44,8 @@ function drawHeatScale(context, x, top, size, low, high) {
   context.fillStyle = colours.grey;
   context.textAlign = "left";
   context.textBaseline = "middle";
-  context.fillText(high.toPrecision(3), x + 11, top + 6);
-  context.fillText(low.toPrecision(3), x + 11, top + size - 6);
+  context.fillText(short(high), x + 11, top + 6);
+  context.fillText(short(low), x + 11, top + size - 6);
 }
 
 function labelMap(context, map, left, top, size, names) {

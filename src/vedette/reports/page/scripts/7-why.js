@@ -84,7 +84,7 @@ function tellWhy(part, run, decision) {
   if (explained === key) return;
   explained = key;
   const why = decision?.why;
-  part("why-title").textContent = decision ? `Why the decision at ${+run.times[decision.scan].toFixed(3)} s` : "Why a decision";
+  part("why-title").textContent = decision ? `Why the decision at ${clock(run, run.times[decision.scan])}` : "Why a decision";
   part("why-not").textContent = whyNot(decision);
   part("why").hidden = !why;
   if (!why) return;

@@ -5,6 +5,7 @@ function startReplay(root) {
   const show = () => Object.fromEntries([...root.querySelectorAll("[data-show]")].map((box) => [box.dataset.show, box.checked]));
 
   const run = () => runs[state.run];
+  const { live } = runs[0]; // frames come while it is shown; to play is to stay at the latest
   const last = () => run().times.length - 1;
   const camera = cameraOf(part("scene"), run, () => draw());
 
@@ -17,21 +18,21 @@ function startReplay(root) {
 
   function tell() {
     const { times, truth, estimates, ospa, ospa_unit } = run();
-    const time = +times[state.step].toFixed(3);
+    const time = clock(run(), times[state.step]);
     const words = [`${estimates[state.step].length} estimates`];
     if (run().known) {
       const [total, localisation, cardinality] = ospa[state.step];
       words.unshift(`${truth[state.step].length} targets`);
       words.push(`OSPA ${total.toFixed(1)}${ospa_unit && ` ${ospa_unit}`} (localisation ${localisation.toFixed(1)}, cardinality ${cardinality.toFixed(1)})`);
     }
-    part("summary").textContent = `t = ${time} s: ${words.join(", ")}`;
+    part("summary").textContent = `t = ${time}: ${words.join(", ")}`;
     part("decision").textContent = decisionText();
     part("reward-title").textContent = run().reward ? `Reward (${run().reward})` : "Reward";
     tellWhy(part, run(), decisionAt(run(), state.step));
     part("scene").setAttribute("aria-label", `${run().strategy}, run ${run().run}, ${part("summary").textContent}`);
     part("scrubber").value = state.step;
-    part("scrubber").setAttribute("aria-valuetext", `step ${state.step + 1} of ${last() + 1}, ${time} s`);
-    part("play").textContent = state.playing ? "Pause" : "Play";
+    part("scrubber").setAttribute("aria-valuetext", `step ${state.step + 1} of ${last() + 1}, ${time}`);
+    part("play").textContent = state.playing ? "Pause" : live ? "Follow" : "Play";
     Object.assign(root.dataset, { step: state.step, run: state.run, playing: state.playing, speed: state.speed });
     root.dataset.zoom = +camera.camera.zoom.toFixed(3);
     part("follow").value = camera.camera.follow;
@@ -43,7 +44,7 @@ function startReplay(root) {
     const decision = decisionAt(run(), state.step);
     if (!decision) return "No decision yet.";
     const without = decision.curves.length ? "" : ", without rewards";
-    return `Decision at ${+run().times[decision.scan].toFixed(3)} s${without}: ${minus(decision.actions)}.${decision.notes.map((note) => ` ${note}.`).join("")}`;
+    return `Decision at ${clock(run(), run().times[decision.scan])}${without}: ${minus(decision.actions)}.${decision.notes.map((note) => ` ${note}.`).join("")}`;
   }
 
   function underPointer() {
@@ -80,7 +81,7 @@ function startReplay(root) {
 
   function go(step) {
     state.step = bounded(step, 0, last());
-    if (state.step === last()) state.playing = false;
+    if (state.step === last() && !live) state.playing = false;
     draw();
   }
 
@@ -107,17 +108,33 @@ function startReplay(root) {
       Number(place) !== index && each.group === run().group && each.run === run().run);
     offer(part("ghost"), paired.map(([place, { strategy }]) => [place, clipped(strategy, 30)]));
     haunt();
+    reveal();
+    go(Math.min(state.step, last()));
+  }
+
+  // What the run has is shown.
+  function reveal() {
     part("scrubber").max = last();
     part("rewards").hidden = !run().decisions.some((decision) => decision.curves.length);
     part("nothing").hidden = run().scans.length > 0;
     for (const name of ["errors", "errors-title"]) part(name).hidden = !run().known;
     for (const name of ["reward-title", "decision", "why-title", "why-not"]) part(name).hidden = !run().decisions.length;
-    go(Math.min(state.step, last()));
   }
 
-  let before = null;
+  // More of the run has come, and of the oldest steps some have gone.
+  function arrived(dropped) {
+    state.step = state.playing ? last() : bounded(state.step - dropped, 0, last());
+    if (document.activeElement !== part("follow")) offer(part("follow"), followable(run()));
+    reveal();
+    pending ||= requestAnimationFrame(() => {
+      pending = 0;
+      draw();
+    });
+  }
+
+  let [before, pending] = [null, 0];
   function tick(now) {
-    if (!state.playing) return;
+    if (!state.playing || live) return;
     if (before === null) before = now;
     const due = Math.floor(((now - before) / 1000) * state.speed);
     if (due > 0) {
@@ -128,7 +145,8 @@ function startReplay(root) {
   }
 
   function play(wanted) {
-    if (wanted && state.step === last()) state.step = 0;
+    if (live && wanted) state.step = last();
+    else if (wanted && state.step === last()) state.step = 0;
     state.playing = wanted;
     before = null;
     draw();
@@ -206,7 +224,8 @@ function startReplay(root) {
   window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
   readColours();
   choose(0);
+  return { arrived, play };
 }
 
 const replay = document.getElementById("replay");
-if (replay && runs.length) startReplay(replay);
+if (replay && runs.length && !runs[0].live) startReplay(replay);

@@ -1,0 +1,66 @@
+"""Lines out of bytes of whatever source, in bounded memory."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import os
+import threading
+from collections.abc import AsyncIterator
+from typing import Any
+
+from vedette.live.messages import MOST_BYTES
+
+CHUNK = 1 << 16
+
+
+class LineSplitter:
+    """Lines of bytes as they come, in bounded memory: of a longer line no more than `most + 1` bytes are kept."""
+
+    def __init__(self, most: int) -> None:
+        self._most, self._part = most, bytearray()
+
+    def feed(self, data: bytes) -> list[bytes]:
+        """The lines that these bytes end, stripped; without empty ones."""
+        found = []
+        *ended, last = data.split(b"\n")
+        for piece in ended:
+            self._keep(piece)
+            found.append(bytes(self._part).strip())
+            self._part.clear()
+        self._keep(last)
+        return [line for line in found if line]
+
+    def rest(self) -> list[bytes]:
+        """The last line, where it has no end."""
+        return self.feed(b"\n")
+
+    def _keep(self, piece: bytes) -> None:
+        self._part += piece[: self._most + 1 - len(self._part)]
+
+
+async def lines_of(source: Any) -> AsyncIterator[bytes]:
+    """The lines of a binary file such as standard input, which is read ahead by one chunk."""
+    loop, chunks = asyncio.get_running_loop(), asyncio.Queue[bytes](1)
+    try:  # what is buffered would be locked for as long as nothing comes, even at the end of the process
+        number = source.fileno()
+    except OSError:
+        number = None
+
+    def read() -> None:
+        with contextlib.suppress(RuntimeError, asyncio.CancelledError):  # the loop has ended
+            data = b"-"
+            while data:
+                data = source.read(CHUNK) if number is None else os.read(number, CHUNK)
+                asyncio.run_coroutine_threadsafe(chunks.put(data), loop).result()
+
+    threading.Thread(target=read, daemon=True).start()
+    splitter = LineSplitter(MOST_BYTES)
+    while data := await chunks.get():
+        for line in splitter.feed(data):
+            yield line
+    for line in splitter.rest():
+        yield line
+
+
+__all__ = ["CHUNK", "LineSplitter", "lines_of"]

@@ -1,0 +1,192 @@
+"""WebSocket clients that send lines, and web pages that show what is believed, at one address.
+
+`ws://HOST:PORT/` takes a line, or several, a message, and answers as TCP does; `http://HOST:PORT/` is the page, which
+is told of what is on the screen by `/page`. Browsers let any web page open sockets to this machine: who comes from
+another page, or by another name of this machine, is refused.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from http import HTTPStatus
+from typing import Protocol
+from urllib.parse import parse_qs, urlsplit
+
+from websockets.asyncio.connection import broadcast
+from websockets.asyncio.server import Server, ServerConnection, serve
+from websockets.datastructures import Headers, MultipleValuesError
+from websockets.exceptions import ConnectionClosed
+from websockets.http11 import Request, Response
+
+from vedette.live.lines import LineSplitter
+from vedette.live.messages import MOST_BYTES
+from vedette.live.serving import MOST_CLIENTS, Exchange, is_loopback, taken
+from vedette.simulation.loop import cause_of
+
+FRAMES_PER_SECOND = 10.0
+_LOG = logging.getLogger("vedette.live.web")
+_LOG.addHandler(logging.NullHandler())  # what goes wrong with a client is told, without a traceback
+_HEADERS = {
+    "Content-Type": "text/html; charset=utf-8",
+    "Cache-Control": "no-store",
+    "Referrer-Policy": "no-referrer",
+    "X-Content-Type-Options": "nosniff",
+    "X-Frame-Options": "DENY",
+}
+
+
+class Screen(Protocol):
+    """What pages show."""
+
+    page: bytes
+
+    def frame(self) -> bytes:
+        """What is on the screen now, as JSON."""
+        ...
+
+
+class _WebClient:
+    def __init__(self, socket: ServerConnection) -> None:
+        self._socket, self.name = socket, _name(socket)
+        self.unread, self.abort = socket.transport.get_write_buffer_size, socket.transport.abort
+
+    def send(self, text: bytes) -> None:
+        broadcast([self._socket], text, text=True)
+
+
+class WebServer:
+    """Sockets and pages of an exchange.
+
+    What is on the screen is worked out at most ten times a second, for all pages at once and only where there are any;
+    a page gets the next when it has said that it has the last, so that a slow one misses some, and is told how many.
+
+    Args:
+        exchange: takes the lines.
+        screen: what pages show.
+        host: by which they may call this machine, beside names of loopback; where a token is needed, by any.
+    """
+
+    def __init__(self, exchange: Exchange, screen: Screen, host: str) -> None:
+        self._exchange, self._screen, self._host = exchange, screen, host
+        self._frame, self._num_drawn, self._num_lines, self._num_pages = b"null", 0, 0, 0
+        self._drawn = asyncio.Condition()
+
+    async def listen(self, port: int) -> Server:
+        """Raises `InputError` for an address that cannot be had."""
+        try:
+            server = await serve(
+                self._meet,
+                self._host,
+                port,
+                process_request=self._refused_or_page,
+                max_size=MOST_BYTES,
+                max_queue=4,
+                compression=None,
+                logger=_LOG,
+            )
+        except OSError as error:
+            raise taken(error) from None
+        self._drawing = asyncio.create_task(self._draw())
+        return server
+
+    def _refused_or_page(self, socket: ServerConnection, request: Request) -> Response | None:
+        """What is answered in place of opening a socket."""
+        address = urlsplit(request.path)
+        if (fault := self._foreign(request)) is not None:
+            self._exchange.tell(f"{_name(socket)} was refused: {fault}")
+            return socket.respond(HTTPStatus.FORBIDDEN, f"{fault}\n")
+        if not self._exchange.is_token(_token(request, address.query)):
+            self._exchange.tell(f"{_name(socket)} had no token")
+            return socket.respond(HTTPStatus.UNAUTHORIZED, "expected ?token=... in the address; got none, or another\n")
+        if address.path not in ("/", "/page"):
+            return socket.respond(HTTPStatus.NOT_FOUND, "expected /; got another address\n")
+        if "Upgrade" in request.headers:
+            return None
+        page = self._screen.page
+        headers = Headers(_HEADERS | {"Content-Length": str(len(page)), "Connection": "close"})
+        return Response(HTTPStatus.OK, "OK", headers, page)
+
+    def _foreign(self, request: Request) -> str | None:
+        """How another web page, or another name of this machine, shows."""
+        try:
+            host, origin = request.headers.get("Host", ""), request.headers.get("Origin")
+            name = urlsplit(f"//{host}").hostname or ""
+            page = None if origin is None else urlsplit(origin).netloc
+        except (MultipleValuesError, ValueError):
+            return "expected one Host and at most one Origin; got others"
+        if not (self._exchange.needs_token or name in ("localhost", self._host) or is_loopback(name)):
+            return f"expected {self._host} or localhost as the host; got {name!r}"
+        return None if page in (None, host) else f"expected no page but the one from here; got one of {origin!r}"
+
+    async def _meet(self, socket: ServerConnection) -> None:
+        assert socket.request is not None
+        client, is_page = _WebClient(socket), urlsplit(socket.request.path).path == "/page"
+        try:
+            if not self._exchange.open():
+                await socket.close(1013, f"expected at most {MOST_CLIENTS} clients; got one more")
+            elif is_page:
+                await self._show(socket)
+            else:
+                self._exchange.enter(client)
+                await self._serve(socket, client)
+        except ConnectionClosed as error:
+            if error.sent is not None and error.sent.code == 1009:
+                self._exchange.tell(f"{client.name} sent a message of more than {MOST_BYTES} bytes, and was put out")
+        finally:
+            self._exchange.leave(client)
+
+    async def _serve(self, socket: ServerConnection, client: _WebClient) -> None:
+        async for message in socket:
+            splitter = LineSplitter(MOST_BYTES)
+            data = message.encode() if isinstance(message, str) else message
+            for line in [*splitter.feed(data), *splitter.rest()]:
+                await self._exchange.answer(line, client)
+
+    async def _show(self, socket: ServerConnection) -> None:
+        """Frames to a page; the latest each time that it has the one before."""
+        drawn, shown, skipped = self._num_drawn, None, 0
+        self._num_pages += 1
+        self._exchange.changed.set()  # draw what is there now
+        try:
+            while True:
+                await self._beyond(drawn)
+                drawn, before, shown = self._num_drawn, shown, self._num_lines
+                skipped += 0 if before is None else max(0, shown - before - 1)
+                await socket.send(b'{"skipped":%d,"frame":%b}' % (skipped, self._frame), text=True)
+                await socket.recv()
+        finally:
+            self._num_pages -= 1
+
+    async def _beyond(self, drawn: int) -> None:
+        """Wait for a frame after so many."""
+        async with self._drawn:
+            await self._drawn.wait_for(lambda: self._num_drawn > drawn)
+
+    async def _draw(self) -> None:
+        """The frames of all pages; one that cannot be had is told, and the next is another."""
+        while True:
+            await self._exchange.changed.wait()
+            self._exchange.changed.clear()
+            if not self._num_pages:
+                continue
+            try:
+                self._frame = self._screen.frame()
+            except Exception as error:
+                self._exchange.tell(f"no frame for the pages: {cause_of(error)}")
+            async with self._drawn:
+                self._num_drawn, self._num_lines = self._num_drawn + 1, self._exchange.num_taken
+                self._drawn.notify_all()
+            await asyncio.sleep(1.0 / FRAMES_PER_SECOND)
+
+
+def _name(socket: ServerConnection) -> str:
+    return "{}:{}".format(*socket.remote_address[:2])
+
+
+def _token(request: Request, query: str) -> str | None:
+    kind, _, given = request.headers.get("Authorization", "").partition(" ")
+    return given if kind == "Bearer" else parse_qs(query).get("token", [None])[0]
+
+
+__all__ = ["Screen", "WebServer"]

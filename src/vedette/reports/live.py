@@ -1,0 +1,201 @@
+"""The page of a loop that goes on: the replay, given what is believed now in place of a run."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from vedette.control import Plan, Planner
+from vedette.evaluation.figures.scene import scene_of
+from vedette.evaluation.health import health_line
+from vedette.evaluation.scans import UNKNOWN
+from vedette.kernels.base.types import Floats
+from vedette.live import Answer, Live, LiveState
+from vedette.reports.replay import (
+    drawn_decision,
+    drawn_estimate,
+    drawn_measurements,
+    drawn_pose,
+    drawn_sensor,
+    places_of,
+    rounded_to,
+)
+from vedette.reports.writing import render
+from vedette.scenarios import Scenario
+from vedette.scenarios.sections.tracking import UNLABELLED
+from vedette.simulation.health import Health
+from vedette.simulation.records import Decision
+from vedette.simulation.scans import Scan
+from vedette.tracking import State, Timeline
+
+_HEALTH_OF = 100  # of the latest scans
+_STEPS_OF_EXTENT = 10.0
+
+
+@dataclass(slots=True)
+class Remembering:
+    """A planner that remembers its last plan, and says what the planner says that it asks."""
+
+    planner: Planner
+    last: Plan | None = None
+    num_plans: int = 0
+
+    @property
+    def name(self) -> str:
+        """Of the planner."""
+        return self.planner.name
+
+    def plan(self, state: State, poses: Floats, *, rng: np.random.Generator) -> Plan:
+        """The planner's."""
+        self.last = self.planner.plan(state, poses, rng=rng)
+        self.num_plans += 1
+        return self.last
+
+
+@dataclass(frozen=True, slots=True)
+class _Reported:
+    num_sensors: int
+    health: Health
+
+
+class LiveScreen:
+    """What the pages of a loop show.
+
+    Args:
+        scenario: of the loop.
+        live: the loop; its planner is asked by way of `live` of this screen, so that plans are seen.
+        state: says how far the loop is.
+
+    Attributes:
+        live: the loop to be run.
+        page: the HTML, with the sensors and the zones, but no scan.
+    """
+
+    def __init__(self, scenario: Scenario, live: Live, state: Callable[[], LiveState]) -> None:
+        self._scenario, self._state = scenario, state
+        self._planner = None if live.planner is None else Remembering(live.planner)
+        self.live = live if self._planner is None else replace(live, planner=self._planner)
+        self._fault = ""
+        self._decided: tuple[Plan | None, dict[str, Any] | None] = (None, None)
+        model = scenario.model
+        self._names, self._sections = model.sensor_names, model.sensors
+        strategy = "" if live.planner is None else live.planner.name
+        scene = scene_of(scenario, strategy)
+        run = {
+            "live": True,
+            "strategy": strategy or "no decisions",
+            "group": model.name,
+            "run": 0,
+            "labelled": model.filter.kind not in UNLABELLED,
+            "zones": [[zone.kind, [rounded_to(corner, 3) for corner in zone.corners]] for zone in scene.zones],
+            "sensors": [drawn_sensor(*each) for each in zip(self._names, self._sections, strict=True)],
+            "recorded": True,
+            "known": False,
+            "origin": None if model.origin is None else [model.origin.lon, model.origin.lat],
+            "ospa_unit": "",
+            "reward": scene.reward,
+            "typical": False,
+            **{name: [] for name in ("times", "truth", "estimates", "poses", "scans", "ospa", "axes", "decisions")},
+        }
+        run["scene"] = self._scene = hashlib.sha256(json.dumps(run).encode()).hexdigest()[:16]
+        self.page = render("live.html", [run], scripts=("scripts", "live"), name=model.name, untrusted=()).encode()
+
+    def note(self, answers: Iterable[Answer]) -> None:
+        """The last line that was not taken is told."""
+        for answer in answers:
+            self._fault = answer.get("error", self._fault)
+
+    def frame(self) -> bytes:
+        """What is believed now, as JSON."""
+        state = self._state()
+        timeline = state.timeline
+        belief, poses = timeline.state, timeline.poses
+        time = None if state.start is None or belief.time is None else belief.time + state.start
+        found = None if time is None else self.live.estimate(belief.fused, belief.step)
+        extent = self._extent(poses[:, :2], np.empty((0, 2)) if found is None else found.means[:, :2])
+        places = places_of(extent)
+        frame = {
+            "scene": self._scene,
+            "time": time,
+            "utc": state.is_utc,
+            "extent": rounded_to(extent, places),
+            "estimates": []
+            if found is None
+            else [[*drawn_estimate(found, i, places), 0, 0.0] for i in range(len(found.labels))],
+            "poses": [drawn_pose(*each, places) for each in zip(poses, self._sections, strict=True)],
+            "scans": self._scans(timeline, places),
+            "decision": self._told_decision(poses),
+            "health": self._health(timeline),
+            "silence": self._silence(state),
+            "fault": self._fault,
+            "counts": {
+                "lines": state.num_lines,
+                "not taken": state.num_errors,
+                "scans": timeline.num_taken,
+                "late": timeline.num_late,
+                "too late": timeline.num_dropped,
+                "repeated": timeline.num_repeated,
+            },
+        }
+        return json.dumps(frame, allow_nan=False, separators=(",", ":")).encode()
+
+    def _extent(self, *places: Floats) -> tuple[float, float, float, float]:
+        """x_min, x_max, y_min, y_max, m, of the region and what lies beyond, in steps that leave the view at rest."""
+        region = self._scenario.model.region
+        low, high = np.array([region.x_min, region.y_min]), np.array([region.x_max, region.y_max])
+        points = np.concatenate([low[np.newaxis], high[np.newaxis], *places])
+        points = points[np.isfinite(points).all(axis=1)]
+        step = float((high - low).max()) / _STEPS_OF_EXTENT
+        below, above = (np.maximum(0.0, low - points).max(axis=0), np.maximum(0.0, points - high).max(axis=0))
+        (x_min, y_min), (x_max, y_max) = low - step * np.ceil(below / step), high + step * np.ceil(above / step)
+        return float(x_min), float(x_max), float(y_min), float(y_max)
+
+    def _scans(self, timeline: Timeline, places: int) -> list[list[list[float]]]:
+        """The measurements of the latest instant."""
+        if not timeline.instants:
+            return [[] for _ in self._sections]
+        latest = timeline.instants[-1]
+        scans = [latest.scans.get(s) for s in range(len(self._sections))]
+        drawn = (
+            None if scan is None else Scan(scan.measurements, np.full(len(scan.measurements), UNKNOWN))
+            for scan in scans
+        )
+        return [
+            drawn_measurements(scan, section.measurement.kind, pose, places)
+            for scan, section, pose in zip(drawn, self._sections, latest.poses, strict=True)
+        ]
+
+    def _told_decision(self, poses: Floats) -> dict[str, Any] | None:
+        if self._planner is None:
+            return None
+        plan = self._planner.last
+        if plan is not None and plan is not self._decided[0]:
+            axes = dict[str, dict[str, Any]]()
+            told = drawn_decision(Decision(1, 0.0, poses, plan.settled(explained=True)), axes, self._names)
+            self._decided = (plan, {**told, "axes": list(axes.values()), "number": self._planner.num_plans})
+        return self._decided[1]
+
+    def _health(self, timeline: Timeline) -> str:
+        """What the filters and the fusion had to leave out of late."""
+        latest = timeline.instants[-_HEALTH_OF:]
+        if not latest:
+            return ""
+        health = Health.unreported(len(latest), len(self._sections))
+        for place, instant in enumerate(latest):
+            health.note_filters(place, instant.info.filters)
+            health.note_fusion(place, instant.info.fusion)
+        return health_line(_Reported(len(self._sections), health), self._names).removeprefix("health: ")
+
+    def _silence(self, state: LiveState) -> list[float | None]:
+        """s of each sensor since its latest scan, by the clock of the scans; None before its first."""
+        newest = state.timeline.newest or 0.0
+        return [None if math.isinf(last) else round(newest - last, 3) for last in state.latest]
+
+
+__all__ = ["LiveScreen", "Remembering"]

@@ -1,0 +1,152 @@
+"""The page of a live loop in a real browser: what comes is drawn, what is lost is said, and no other page gets in."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+from typing import IO, Any
+
+import pytest
+from websockets.sync.client import connect
+
+from cli.test_live import PROGRAM, WAIT, WORDS
+from live.examples import SYNCHRONOUS, line, walk
+from reports.browser import Browser, Page, chromium
+from reports.test_browser import ink, state, text, wait_until
+
+CHROMIUM = chromium()
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no chromium or chrome on PATH to open the page in")
+OPTIONS = ("--decide-every", "4", "--planner", "idm")
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    assert CHROMIUM is not None
+    with Browser(CHROMIUM) as running:
+        yield running
+
+
+class Loop:
+    """`vedette live` in a process of its own, at a port of its own or one that is told."""
+
+    def __init__(self, folder: Path, port: int = 0, *options: str) -> None:
+        listen = (*OPTIONS, "--listen", f"ws://127.0.0.1:{port}", *options)
+        words = [*PROGRAM, *WORDS, *listen, "--snapshot", "state", "--every", "0", "--record", "came"]
+        self.process = subprocess.Popen(words, cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+        errors: IO[bytes] | None = self.process.stderr
+        assert errors is not None
+        told = b""
+        while b"listens on ws://" not in told:
+            told = errors.readline()
+            assert told, "it ended"
+        self.port = int(told.split(b";")[0].rpartition(b":")[2])
+        self.page = f"http://127.0.0.1:{self.port}/"
+
+    def send(self, lines: list[bytes]) -> list[Any]:
+        """Lines of which each has one answer, or a plan besides; all the answers."""
+        found = list[bytes | str]()
+        with connect(f"ws://127.0.0.1:{self.port}/", proxy=None) as socket:
+            for one in lines:
+                socket.send(one)
+            while sum(b"plan" not in answer for answer in map(_bytes, found)) < len(lines):
+                found.append(socket.recv(WAIT))
+        return found
+
+    def kill(self) -> None:
+        self.process.kill()
+        self.process.communicate()
+
+
+def _bytes(answer: bytes | str) -> bytes:
+    return answer.encode() if isinstance(answer, str) else answer
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / "small.yaml").write_text(SYNCHRONOUS, "utf-8")
+    return tmp_path
+
+
+def told(page: Page, words: str, part: str) -> None:
+    """Wait until a part of the page says this."""
+    wait_until(page, f"document.querySelector('[data-part={part}]')?.textContent.includes({json.dumps(words)})")
+
+
+def test_it_draws_what_comes_and_outlives_a_kill(browser: Browser, folder: Path) -> None:
+    loop, lines = Loop(folder), walk(12)
+    try:
+        page = browser.open(loop.page, width=1400)
+        told(page, "Connected", "link")
+        told(page, "no scan yet: 0 estimates", "summary")
+        loop.send(lines[:12])
+        told(page, "t = 5 s: 1 estimates", "summary")
+        told(page, "Decision at", "decision")
+        assert ink(page, "scene") > 20
+        assert "health" in text(page, "health").lower()
+        assert page.evaluate("document.querySelectorAll('[data-part=sensors] tr').length") == 2
+        page.click("[data-part=play]")
+        page.click("[data-part=back]")
+        before = state(page)["step"]
+        (error,) = loop.send([line(1, "never")])
+        assert "error" in json.loads(error)
+        loop.send(lines[12:16])
+        told(page, "lines: 17, not taken: 1", "counts")
+        told(page, "line 13", "fault")
+        assert (state(page)["step"], text(page, "play")) == (before, "Follow")
+        page.click("[data-part=play]")
+        told(page, "t = 7 s: 1 estimates", "summary")
+        assert page.complaints() == []
+        assert page.requests() == [page.url]
+        late = browser.open(loop.page, width=390)
+        told(late, "t = 7 s: 1 estimates", "summary")
+        assert late.evaluate("document.documentElement.scrollWidth") <= 390
+        loop.kill()
+        told(page, "Disconnected since", "link")
+        assert state(page)["connected"] == "false"
+        loop = Loop(folder, loop.port)
+        told(page, "Connected", "link")
+        page.call("Page.bringToFront")  # what nobody sees is not drawn
+        loop.send(lines[16:])
+        told(page, "t = 11 s: 1 estimates", "summary")
+        assert int(page.evaluate("document.querySelector('[data-part=scrubber]').max")) >= 3  # what was drawn is kept
+    finally:
+        loop.kill()
+    words = [*PROGRAM, *WORDS, *OPTIONS]
+    came = (folder / "came").read_bytes()
+    assert came.splitlines() == [*lines[:12], line(1, "never"), *lines[12:]]
+    first, again = (subprocess.run(words, input=came, cwd=folder, capture_output=True, timeout=WAIT) for _ in range(2))
+    assert first.stdout == again.stdout
+    assert json.loads(first.stdout.splitlines()[-1])["time"] == 11.0
+
+
+def test_a_page_from_elsewhere_gets_no_socket(browser: Browser, folder: Path) -> None:
+    loop = Loop(folder)
+    try:
+        script = "new WebSocket('ws://127.0.0.1:PORT/PATH')".replace("PORT", str(loop.port))
+        (folder / "foreign.html").write_text(
+            "<!doctype html><title>foreign</title><script>"
+            + "".join(
+                f"Object.assign({script.replace('PATH', path)}, {{onopen: () => document.title += ' open', "
+                "onclose: () => document.title += ' closed'});"
+                for path in ("", "page")
+            )
+            + "</script>",
+            "utf-8",
+        )
+        page = browser.open(folder / "foreign.html")
+        wait_until(page, "document.title === 'foreign closed closed'")
+        loop.send(walk(1))
+    finally:
+        loop.kill()
+
+
+def test_the_page_wants_the_token_and_passes_it_on(browser: Browser, folder: Path) -> None:
+    loop = Loop(folder, 0, "--token", "secret")
+    try:
+        assert browser.open(loop.page).evaluate("document.querySelector('#replay')") is None
+        page = browser.open(loop.page, query="token=secret")
+        told(page, "Connected", "link")
+    finally:
+        loop.kill()
