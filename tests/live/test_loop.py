@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -221,6 +222,32 @@ def test_units_and_bearings_are_those_of_the_file(tmp_path: Path) -> None:
             np.testing.assert_allclose(timelines.poses[0], [1.0, 2.0, 0.5], rtol=1e-12)
 
 
+NO_REGION = "".join(SYNCHRONOUS.splitlines(keepends=True)[2:])
+LIMITED = "{kind: limited_range, max_range: 600.0, probability: 0.9}"
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("{kind: constant, probability: 0.9}", LIMITED),
+        ("{kind: region, rate: 1.0}", "{kind: around_sensor, radius: 600.0}"),
+    ],
+)
+@pytest.mark.parametrize("births", [True, False])
+def test_without_a_region_it_is_as_far_as_the_sensors_see(tmp_path: Path, old: str, new: str, births: bool) -> None:
+    text = NO_REGION if births else re.sub("birth: .*\n", "", NO_REGION)
+    text = text.replace(old, new)
+    said = text + "region: {x_min: -600.0, x_max: 700.0, y_min: -600.0, y_max: 600.0}\n"
+    found = answered(small(tmp_path, text), walk(8))
+    assert found == answered(small(tmp_path, said), walk(8))
+    assert len(json.loads(found[-1])["tracks"]) == 1
+    words = scenario_of_sensors(tmp_path / "small.yaml").assumed
+    assert not any(each.startswith("region") for each in words)  # it was said
+    (tmp_path / "small.yaml").write_text(text, "utf-8")
+    words = scenario_of_sensors(tmp_path / "small.yaml").assumed
+    assert any(each.startswith("region: x from -600 to 700 m, y from -600 to 600 m, as far as") for each in words)
+
+
 @pytest.mark.parametrize("num", [2_000, pytest.param(10_000, marks=pytest.mark.slow)])
 def test_many_scans_leave_no_more_behind_than_a_few(tmp_path: Path, num: int) -> None:
     live = small(tmp_path, window=5.0)
@@ -237,7 +264,7 @@ def test_many_scans_leave_no_more_behind_than_a_few(tmp_path: Path, num: int) ->
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("sensors: []\n", "expected a region, as no scan has yet said where targets may be"),
+        (NO_REGION, "expected a region, or of sensor 1 `detection: {max_range: ...}`"),
         ("- 1\n", "expected a mapping with `sensors`"),
         ("recording: {bearings: up}\nregion: 1\n", "bearings: expected east or north; got up"),
         ("recording: {units: {range: mile}}\nregion: 1\n", "units.range: expected one of m, km, nmi; got mile"),

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 def live(
     sensors: Annotated[
         Path,
-        typer.Option("--sensors", metavar="FILE", help="YAML file about the sensors and the region, or a scenario."),
+        typer.Option("--sensors", metavar="FILE", help="YAML file about the sensors, or a scenario."),
     ],
     window: Annotated[float, typer.Option("--window", min=0.001, help="s that a scan may be late.")] = 30.0,
     ahead: Annotated[

@@ -15,6 +15,8 @@ from vedette.reading import read_text
 from vedette.recorded import Conventions, RecordedScans
 from vedette.scenarios.loading import Scenario, diagnose
 from vedette.scenarios.sections import ScenarioModel
+from vedette.scenarios.sections.sensors import Sensor
+from vedette.scenarios.views import field_of_view
 from vedette.scenarios.yaml_reader import MOST_BYTES, Document, read_yaml
 
 # What a file about sensors need not say; a scenario must.
@@ -99,14 +101,15 @@ def scenario_of_sensors(sensors: FilePath, *, speed: float = 10.0, decide_every:
     """The scenario of scans that are to come.
 
     Args:
-        sensors: a YAML file as of `scenario_of_recording`, in which `region` must stand, or a whole scenario. Of
-            `recording` the units and bearings count, and of `targets` nothing.
+        sensors: a YAML file as of `scenario_of_recording`, or a whole scenario. Of `recording` the units and bearings
+            count, and of `targets` nothing. Without `region` it is as far as the sensors see.
         speed: m/s, likewise.
         decide_every: s from one decision to the next, in place of the times that `control` says; the horizon is as
             long, unless `control` says another.
 
     Raises:
-        InputError: a file that is not there, units or bearings that are none, no region.
+        InputError: a file that is not there, units or bearings that are none, no region where nothing says how far
+            a sensor sees.
         ScenarioError: with every fault of the file.
     """
     document = _document(sensors)
@@ -114,19 +117,45 @@ def scenario_of_sensors(sensors: FilePath, *, speed: float = 10.0, decide_every:
     own = document.data.get("recording")
     own = own if isinstance(own, Mapping) else {}
     conventions = Conventions({}, own.get("units") or {}, own.get("bearings"))
-    if "region" not in said:
-        raise InputError(f"{sensors}: expected a region, as no scan has yet said where targets may be; got none")
     words = list[str]()
     told = {**_STAND_INS, "name": sensors.stem, **said, "targets": {"kind": "scripted", "tracks": []}}
     told |= _assumed_motion(said, speed, words)
     if decide_every is not None:
         told |= _endless(told, decide_every)
-    model = _model(document, {"birth": _measured_birth(100.0, speed, _state_dim(said)), **told}, sensors)
+    told.setdefault("birth", _measured_birth(100.0, speed, _state_dim(said)))  # until its deviations can be said
+    model = _model(document, told, sensors)
+    if "region" not in said:
+        told["region"] = _reached(model, sensors, words)
+        model = _model(document, told, sensors)
     if "birth" not in said:
         side = max(model.region.x_max - model.region.x_min, model.region.y_max - model.region.y_min)
         measured = [[np.array([[0.0, side / 4.0]])]] * len(model.sensors)
         model = _model(document, {**told, **_assumed_birth(model, measured, sensors.parent, speed, words)}, sensors)
     return OfSensors(Scenario(model, sensors), conventions, tuple(words))
+
+
+def _reached(model: ScenarioModel, sensors: FilePath, words: list[str]) -> dict[str, float]:
+    """The region of what the sensors see from where they are; raises where nothing says how far."""
+    corners = list[Floats]()
+    for name, sensor in zip(model.sensor_names, model.sensors, strict=True):
+        reach = _reach(sensor)
+        if reach is None:
+            wanted = (
+                f"a region, or of {name} `detection: {{max_range: ...}}` or `clutter: {{kind: around_sensor, ...}}`"
+            )
+            raise InputError(f"{sensors}: expected {wanted}, as nothing says how far it sees; got none of them")
+        corners += [np.array(sensor.position) - reach, np.array(sensor.position) + reach]
+    region = _box(np.array(corners), 0.0)
+    words.append(f"region: {_in_words(region)}, as far as the sensors see from where they are first")
+    return region
+
+
+def _reach(sensor: Sensor) -> float | None:
+    """m that a sensor sees, where its detection or its clutter has an edge."""
+    view, clutter = field_of_view(sensor), sensor.clutter
+    if view is not None:
+        return view.reach
+    return (clutter.radius or clutter.half_side) if clutter.kind == "around_sensor" else None
 
 
 def _endless(said: Mapping[str, Any], decide_every: float) -> dict[str, Any]:
@@ -167,7 +196,7 @@ def _assumed(
     words = list[str]()
     if "region" not in said:
         told["region"] = region = _extent(model, recording)
-        words.append("region: x from {x_min:g} to {x_max:g} m, y from {y_min:g} to {y_max:g} m".format(**region))
+        words.append(f"region: {_in_words(region)}")
     told |= _assumed_motion(said, speed, words)
     if "birth" not in said:
         measured = [
@@ -257,12 +286,21 @@ def _places(model: ScenarioModel, recording: RecordedScans) -> Floats:
 def _extent(model: ScenarioModel, recording: RecordedScans) -> dict[str, float]:
     """A rectangle around all that was measured, and the sensors."""
     places = np.concatenate([_places(model, recording), recording.poses[:, :, :2].reshape(-1, 2)])
-    low, high = places.min(axis=0), places.max(axis=0)
-    if (high - low).max() <= 0.0:
+    if np.ptp(places, axis=0).max() <= 0.0:
         raise InputError("region: expected it in the file about sensors, as what they measure says no places; got none")
-    margin = _MARGIN * float((high - low).max())
+    return _box(places, _MARGIN)
+
+
+def _box(places: Floats, share: float) -> dict[str, float]:
+    """The rectangle of places, with a margin of a share of its longer side."""
+    low, high = places.min(axis=0), places.max(axis=0)
+    margin = share * float((high - low).max())
     (x_min, y_min), (x_max, y_max) = np.floor(low - margin).tolist(), np.ceil(high + margin).tolist()
     return {"x_min": x_min, "x_max": x_max, "y_min": y_min, "y_max": y_max}
+
+
+def _in_words(region: Mapping[str, float]) -> str:
+    return "x from {x_min:g} to {x_max:g} m, y from {y_min:g} to {y_max:g} m".format(**region)
 
 
 def _spread(model: ScenarioModel, measured: Sequence[Sequence[Floats]], folder: FilePath) -> float:
