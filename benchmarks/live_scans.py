@@ -6,9 +6,10 @@
 Sensors of a generated scene (`vedette generate`) scan every second, all at one time (`together`) or each at its own
 part of the second (`apart`); every line is taken by `vedette.live.Live.take` and its answers made lines, in wall time
 of this process, the reading of the JSON included, without pipe or network. A line after which a plan is due is counted
-under plans: its time is from the line to the plan, with the explanation. The first run is not counted. What is printed
+under plans: its time is from the line to the plan, with the explanation; what it took of processors, all threads
+together, is more than that on an idle machine, and less on a busy one. The first run is not counted. What is printed
 are quantiles over all lines of all runs, and the lines a second that were taken without plans. Sensors see 250 m
-(`limited`) or all of the region (`full`).
+(`limited`) or all of the region (`full`). Decisions are made to the end, and with the limit of `--plan-within`.
 """
 
 from __future__ import annotations
@@ -33,15 +34,15 @@ from vedette.simulation.experiment import Experiment
 from vedette.simulation.loop import SCANS, TRUTH, run_stream, sensor_streams
 from vedette.simulation.scans import simulate_scans
 
-DECIDE_EVERY = 5.0  # s
+DECIDE_EVERY, WITHIN = 5.0, 0.05  # s
 SEED = 5
 
 
-def scene(sensors: int, targets: int, view: Any, folder: Path) -> tuple[Experiment, Live]:
+def scene(sensors: int, targets: int, view: Any, folder: Path, within: float | None = None) -> tuple[Experiment, Live]:
     """What is simulated, and the loop that takes it."""
     path = folder / "scene.yaml"
     path.write_text(scene_text(GeneratedScene(num_sensors=sensors, num_targets=targets, view=view)), "utf-8")
-    known = scenario_of_sensors(path, decide_every=DECIDE_EVERY)
+    known = scenario_of_sensors(path, decide_every=DECIDE_EVERY, plan_within=within)
     return build_experiment(load_scenario(path)), live_of(known, decide_every=DECIDE_EVERY)
 
 
@@ -60,12 +61,12 @@ def lines(experiment: Experiment, run: int, scans: int, apart: bool) -> Iterator
                 yield json.dumps({**told, "measurements": seen.tolist()}).encode()
 
 
-def timed(live: Live, sent: list[bytes]) -> tuple[list[float], list[float], list[int]]:
-    """Milliseconds to estimates and to plans, and how many targets were estimated."""
+def timed(live: Live, sent: list[bytes]) -> tuple[list[float], list[float], list[float], list[int]]:
+    """Milliseconds to estimates and to plans, those of processors, and how many targets were estimated."""
     state = live.initial()
-    estimates, plans, tracks = list[float](), list[float](), list[int]()
+    estimates, plans, processor, tracks = list[float](), list[float](), list[float](), list[int]()
     for line in sent:
-        begun = time.perf_counter()
+        begun, used = time.perf_counter(), time.process_time()
         state, answers = live.take(state, line)
         for answer in answers:
             encoded(answer)
@@ -73,21 +74,25 @@ def timed(live: Live, sent: list[bytes]) -> tuple[list[float], list[float], list
         if "error" in answers[-1]:
             raise SystemExit(answers[-1]["error"])
         (plans if "plan" in answers[-1] else estimates).append(spent)
+        if "plan" in answers[-1]:
+            processor.append(1e3 * (time.process_time() - used))
         tracks.append(len(answers[0]["tracks"]))
-    return estimates, plans, tracks
+    return estimates, plans, processor, tracks
 
 
 def table(sensors: int, targets: int, scans: int, runs: int) -> Iterator[str]:
     """The lines of the table."""
-    yield "| view, scans | targets found | to estimates, p50, ms | p99 | to a plan, p50, ms | p99 | scans a second |"
-    yield "| --- | ---: | ---: | ---: | ---: | ---: | ---: |"
-    for view, apart in itertools.product(("limited", "full"), (False, True)):
+    names = ("to estimates, p50, ms", "p99", "to a plan, p50, ms", "p99", "of processors, p50, ms", "p99")
+    yield "| view, scans, limit | targets found | " + " | ".join([*names, "scans a second"]) + " |"
+    yield "| --- |" + " ---: |" * 8
+    for view, apart, within in itertools.product(("limited", "full"), (False, True), (None, WITHIN)):
         with tempfile.TemporaryDirectory() as folder:
-            experiment, live = scene(sensors, targets, view, Path(folder))
+            experiment, live = scene(sensors, targets, view, Path(folder), within)
         found = [timed(live, list(lines(experiment, run, scans, apart))) for run in range(runs + 1)][1:]
-        estimates, plans, tracks = ([value for each in found for value in each[i]] for i in range(3))
-        cells = [f"{view}, {'apart' if apart else 'together'}", f"{np.median(tracks):.0f}"]
-        cells += [f"{np.quantile(values, q):.1f}" for values in (estimates, plans) for q in (0.5, 0.99)]
+        estimates, plans, processor, tracks = ([value for each in found for value in each[i]] for i in range(4))
+        limit = "none" if within is None else f"{within:g} s"
+        cells = [f"{view}, {'apart' if apart else 'together'}, {limit}", f"{np.median(tracks):.0f}"]
+        cells += [f"{np.quantile(values, q):.1f}" for values in (estimates, plans, processor) for q in (0.5, 0.99)]
         yield "| " + " | ".join([*cells, f"{1e3 * len(estimates) / sum(estimates):.0f}"]) + " |"
     yield ""
     yield f"{sensors} sensors, {targets} targets, {runs} runs of {scans} s, a plan every {DECIDE_EVERY:g} s."

@@ -28,11 +28,12 @@ def run_chunks(work: Callable[[int, int], None], num_items: int, num_threads: in
     if num_workers == 1:
         pieces.run()
     else:
-        with ThreadPoolExecutor(num_workers) as pool:
+        with ThreadPoolExecutor(num_workers - 1) as pool:  # this thread works, too: to start one takes a millisecond
             running = set[Future[None]]()
             try:
-                while len(running) < num_workers:
+                while len(running) < num_workers - 1:
                     running.add(pool.submit(pieces.run))
+                pieces.run()
                 while running:  # without an end, a wait could not be interrupted everywhere
                     finished, running = wait(running, timeout=_WAIT_TIME)
                     for one in finished:

@@ -17,6 +17,7 @@ from vedette.control import (
     AutomaticSearch,
     CauchySchwarzReward,
     CoordinateAscent,
+    CrossEntropy,
     ExhaustiveSearch,
     ExpectedLossReward,
     IndependentPlanner,
@@ -122,6 +123,41 @@ def test_automatic_search_goes_on_while_the_bound_is_loose() -> None:
             found[kind] += int(rewards[best] == rewards.max())
     assert found[None] == found["tight"] < 26
     assert found["loose"] >= 38
+
+
+@pytest.mark.parametrize(
+    ("search", "once"),
+    [
+        (CoordinateAscent(40), CoordinateAscent(0)),
+        (AutomaticSearch(), CoordinateAscent(0)),
+        (CrossEntropy(20), CrossEntropy(20, max_rounds=1)),
+    ],
+)
+def test_a_search_that_is_late_ends_with_the_best_so_far(search: JointSearch, once: JointSearch) -> None:
+    """One ascent, or round, is always made; in time, nothing is as if there were no limit."""
+    rewards = np.random.default_rng(3).random((6,) * 4)
+    late, least, free, timely = (Table(rewards) for _ in range(4))
+    found = search.search(late.problem()._replace(late=lambda: True, bound=lambda: 9.0), rng=rng())
+    assert found == once.search(least.problem(), rng=rng())
+    assert late.asked == least.asked
+    unlimited = search.search(free.problem()._replace(bound=lambda: 9.0), rng=rng())
+    assert unlimited == search.search(timely.problem()._replace(late=lambda: False, bound=lambda: 9.0), rng=rng())
+    assert free.asked == timely.asked
+    assert len(free.asked) > len(late.asked)
+    assert rewards[unlimited] >= rewards[found] == max(rewards[one] for one in late.asked)
+
+
+def test_a_plan_says_that_its_search_ran_out_of_time() -> None:
+    example = situation("lmb", 3, platform=COURSES)
+    plans = [
+        joint_plan(replace(example, settings=replace(example.settings, max_seconds=seconds)), CoordinateAscent(9))
+        for seconds in (None, 1e6, 1e-9)
+    ]
+    words = "the search ended with the best that it had found, as 1e-09 s were over"
+    assert [words in plan.notes for plan in plans] == [False, False, True]
+    assert plans[0].chosen == plans[1].chosen
+    np.testing.assert_array_equal(plans[0].tables[0].mean, plans[1].tables[0].mean)
+    assert np.isfinite(plans[2].tables[0].mean).sum() < np.isfinite(plans[0].tables[0].mean).sum()
 
 
 def test_many_sensors_do_with_two_restarts() -> None:

@@ -48,6 +48,10 @@ def live(
         float | None,
         typer.Option("--decide-every", metavar="S", min=0.001, help="s between decisions; none: as `control` says."),
     ] = None,
+    plan_within: Annotated[
+        float | None,
+        typer.Option("--plan-within", metavar="S", min=0.001, help="s after which a decision takes the best so far."),
+    ] = None,
     snapshot: Annotated[
         Path | None, typer.Option("--snapshot", metavar="FILE", help="Keeps the state, and is gone on from.")
     ] = None,
@@ -82,7 +86,7 @@ def live(
             check_address(place.host, token)
     if any(place.kind == "ws" for place in places):
         need("vedette live --listen ws://", "websockets", "jinja2", "matplotlib", "pyarrow")
-    known = scenario_of_sensors(sensors, speed=speed, decide_every=decide_every)
+    known = scenario_of_sensors(sensors, speed=speed, decide_every=decide_every, plan_within=plan_within)
     check_planner(known.scenario, planner, "--planner")
     Approval(trust)(known.scenario)
     warn(known.scenario)
@@ -95,7 +99,7 @@ def live(
 
         screen = LiveScreen(known.scenario, loop, lambda: keeping.state)
         loop = screen.live
-    options = (window, ahead, speed, planner if loop.planner else "", decide_every, seed)
+    options = (window, ahead, speed, planner if loop.planner else "", decide_every, plan_within, seed)
     of = hashlib.sha256(repr(options).encode() + sensors.read_bytes()).hexdigest()
     with interruptible("what came is kept where --snapshot or --record say so"):
         compile_if_cold(known.scenario)

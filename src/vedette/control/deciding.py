@@ -35,6 +35,20 @@ _SEARCHED = 2 * FIRST_ROUND
 _BLOCK = 250
 
 
+@dataclass(slots=True)
+class Deadline:
+    """Whether the seconds after a moment on the clock are over; and whether somebody has been told so."""
+
+    began: float
+    seconds: float | None
+    has_passed: bool = False
+
+    def __call__(self) -> bool:
+        """Asked now."""
+        self.has_passed = self.seconds is not None and time.perf_counter() - self.began >= self.seconds
+        return self.has_passed
+
+
 @dataclass(slots=True, eq=False)
 class Rounds:
     """Fresh samples, round after round, and an account of all.
@@ -44,20 +58,20 @@ class Rounds:
         evaluator: the first one, of all courses, whose account is that of all.
         num_samples: so many were drawn.
         rng: draws them.
-        began: s on the clock, when the decision was asked for.
+        deadline: of searches and rounds.
     """
 
     preparation: Preparation
     evaluator: Evaluator
     num_samples: int
     rng: np.random.Generator
-    began: float
+    deadline: Deadline
 
     @classmethod
     def begin(cls, preparation: Preparation, num_samples: int, *, rng: np.random.Generator) -> Rounds:
         """With an evaluator of all courses on so many samples."""
-        began = time.perf_counter()
-        return cls(preparation, preparation.evaluator(num_samples, rng=rng), num_samples, rng, began)
+        deadline = Deadline(time.perf_counter(), preparation.settings.max_seconds)
+        return cls(preparation, preparation.evaluator(num_samples, rng=rng), num_samples, rng, deadline)
 
     def _run(self, races: Sequence[Race]) -> Literal["max_samples", "max_seconds"] | None:
         """Rounds until all races are over, or why they were stopped before; the first round is always run."""
@@ -67,8 +81,7 @@ class Rounds:
             num = going[0].num_samples
             if num >= most:
                 return "max_samples"
-            late = settings.max_seconds is not None and time.perf_counter() - self.began >= settings.max_seconds
-            if late and num > 0:
+            if num > 0 and self.deadline():
                 return "max_seconds"
             self._run_one(going, next_total(num, most) - num)
         return None
@@ -123,7 +136,9 @@ def decide_jointly(
     rounds = Rounds.begin(preparation, size if races else settings.num_samples, rng=rng)
     evaluator, keeps = rounds.evaluator, races and num_joint <= _MOST_OF_ALL
     evidence = Evidence(evaluator, tuple(range(len(preparation.options))), evaluator.joint(), keeps=keeps)
-    best = searched(search, evidence, mask, rng=rng)
+    best = searched(search, evidence, mask, late=rounds.deadline, rng=rng)
+    if rounds.deadline.has_passed:
+        notes = (*notes, f"the search ended with the best that it had found, as {settings.max_seconds:g} s were over")
     curve = evidence.curve()
     if not races:
         parts, bound = (Part.together(evidence, best),), bound_of(evidence, best)

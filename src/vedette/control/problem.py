@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -25,13 +25,22 @@ from vedette.threads import run_chunks
 
 
 def searched(
-    search: JointSearch, evidence: Evidence, mask: Mask | None, *, rng: np.random.Generator
+    search: JointSearch,
+    evidence: Evidence,
+    mask: Mask | None,
+    *,
+    late: Callable[[], bool] | None = None,
+    rng: np.random.Generator,
 ) -> tuple[int, ...]:
     """The joint action that a search chooses, which the evidence then holds with the lines through it.
 
+    late: see `JointProblem`.
+
     Raises `InputError` for what is no joint action.
     """
-    choice = check_choice("search", search.search(joint_problem(evidence, mask), rng=rng), evidence.shape)
+    choice = check_choice(
+        "search", search.search(joint_problem(evidence, mask)._replace(late=late), rng=rng), evidence.shape
+    )
     note_lines(evidence, choice, mask)
     return choice
 

@@ -74,8 +74,9 @@ class PlanningSettings:
         indifference: with `confidence`: a reward short of the best by this share of it is good enough; 0.01 is one per
             cent of the magnitude of the best mean reward.
         max_samples: with `confidence`: samples after which the decision is taken as it stands.
-        max_seconds: with `confidence`: time after which it is taken likewise, at the end of a round of samples; the
-            first is always made. What a seed gives then depends on the speed of the machine; none: no limit [s].
+        max_seconds: time after which it is taken likewise, at the end of a round of samples, the first of which is
+            always made; and after which a search of rounds or restarts ends with the best that it has found, one at
+            the least. What a seed gives then depends on the speed of the machine; none: no limit [s].
         limits: caps of the pseudo-updates, which are ranked, not Gibbs sampled, whatever the filter does. Every label
             set of the prior keeps its heaviest hypothesis beyond these caps, and an LMB keeps all its labels. Tracks
             that are mixtures are replaced by one Gaussian of their moments beforehand.

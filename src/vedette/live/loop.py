@@ -194,7 +194,8 @@ class Live:
             ]
             rewards = [{"mean": mean, "standard_error": error} for mean, error in plan.expected_rewards]
             told = {**self._told(state, now), "planner": plan.planner, "actions": actions}
-            return after, {"line": state.num_lines, "plan": {**told, "expected_rewards": rewards, "why": _why(plan)}}
+            told |= {"expected_rewards": rewards, "notes": plan.notes}
+            return after, {"line": state.num_lines, "plan": {**told, "why": _why(plan)}}
         except Exception as error:  # as above; the scan was taken
             told = {"line": state.num_lines, "error": f"line {state.num_lines}, plan at {now:g} s: {cause_of(error)}"}
             return replace(after, num_errors=after.num_errors + 1), told

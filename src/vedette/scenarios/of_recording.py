@@ -97,7 +97,9 @@ class OfSensors(NamedTuple):
     assumed: tuple[str, ...]
 
 
-def scenario_of_sensors(sensors: FilePath, *, speed: float = 10.0, decide_every: float | None = None) -> OfSensors:
+def scenario_of_sensors(
+    sensors: FilePath, *, speed: float = 10.0, decide_every: float | None = None, plan_within: float | None = None
+) -> OfSensors:
     """The scenario of scans that are to come.
 
     Args:
@@ -106,6 +108,7 @@ def scenario_of_sensors(sensors: FilePath, *, speed: float = 10.0, decide_every:
         speed: m/s, likewise.
         decide_every: s from one decision to the next, in place of the times that `control` says; the horizon is as
             long, unless `control` says another.
+        plan_within: s after which the search of a decision ends, in place of `control.max_seconds`.
 
     Raises:
         InputError: a file that is not there, units or bearings that are none, no region where nothing says how far
@@ -122,6 +125,8 @@ def scenario_of_sensors(sensors: FilePath, *, speed: float = 10.0, decide_every:
     told |= _assumed_motion(said, speed, words)
     if decide_every is not None:
         told |= _endless(told, decide_every)
+    if plan_within is not None:
+        told["control"] = {**(told.get("control") or {}), "max_seconds": plan_within}
     told.setdefault("birth", _measured_birth(100.0, speed, _state_dim(said)))  # until its deviations can be said
     model = _model(document, told, sensors)
     if "region" not in said:

@@ -58,7 +58,11 @@ def first_starts(known: Known, num_restarts: int, *, rng: np.random.Generator) -
 def ascents(known: Known, starts: Sequence[Joint]) -> list[Joint]:
     """The ends of ascents, which are known then, and so is the first start."""
     climb = known.problem.ascend
-    ends = [_ascend(known, start) if climb is None else known.allowed(climb(start)) for start in starts]
+    ends = list[Joint]()
+    for start in starts:
+        if ends and known.is_late():
+            break
+        ends.append(_ascend(known, start) if climb is None else known.allowed(climb(start)))
     known.rewards([starts[0], *ends])
     return ends
 
@@ -101,6 +105,8 @@ class AutomaticSearch:
         known = Known(problem)
         ascents(known, first_starts(known, _NUM_RESTARTS, rng=rng))
         more = _FIRST_TRIES // sum(problem.shape) - _NUM_RESTARTS
+        if known.is_late():
+            return known.best()
         if more > 0 and problem.bound is not None and _may_be_far(max(known.values.values()), problem.bound()):
             ascents(known, known.drawn(more, rng=rng))
         return known.best()

@@ -59,7 +59,8 @@ class CrossEntropy:
             order = np.argsort(-known.rewards(drawn), kind="stable")
             elite = np.array([drawn[i] for i in order[:num_elite].tolist()])
             probabilities += self.smoothing * (_shares(elite, probabilities.shape[1]) - probabilities)
-            if len(known.values) == num_known or (probabilities.max(axis=1) >= _DEGENERATE).all():
+            is_settled = len(known.values) == num_known or (probabilities.max(axis=1) >= _DEGENERATE).all()
+            if is_settled or known.is_late():
                 break
             drawn = []
         return known.best()

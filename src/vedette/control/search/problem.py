@@ -48,6 +48,8 @@ class JointProblem(NamedTuple):
         starts from does. None: the search ascends itself.
     partial: as `evaluate`, where -1 says that a sensor does not scan. None: not to be had.
     bound: what no joint action has a larger mean reward than; inf where that is not known. None: not to be had.
+    late: whether the time for the decision is over: a search of rounds or restarts ends then, with the best that it has
+        found, one ascent or round at the least. None: it never is.
     """
 
     shape: tuple[int, ...]
@@ -58,6 +60,7 @@ class JointProblem(NamedTuple):
     ascend: Callable[[tuple[int, ...]], tuple[int, ...]] | None = None
     partial: Callable[[Ints], Floats] | None = None
     bound: Callable[[], float] | None = None
+    late: Callable[[], bool] | None = None
 
 
 @runtime_checkable
@@ -92,6 +95,10 @@ class Known:
         self._allowed: Joint | None = None
         if problem.mask is not None:
             self.mask, self._allowed = opened(problem.mask)
+
+    def is_late(self) -> bool:
+        """Whether a search is to end."""
+        return self.problem.late is not None and self.problem.late()
 
     def rewards(self, joint_actions: Sequence[Joint]) -> Floats:
         """(num,) of joint actions; those not yet known are evaluated, all at once."""

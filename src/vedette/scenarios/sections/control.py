@@ -117,7 +117,7 @@ class Control(Derived):
     @check
     def _confidence_beside_what_belongs_to_it(self) -> Iterator[Finding]:
         if self.confidence is None:
-            for name, default in (("indifference", 0.0), ("max_samples", 2000), ("max_seconds", None)):
+            for name, default in (("indifference", 0.0), ("max_samples", 2000)):
                 value = getattr(self, name)
                 if value != default:
                     yield (name,), "confidence beside it, such as 0.95", describe(value)
