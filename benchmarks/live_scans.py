@@ -34,7 +34,7 @@ from vedette.simulation.experiment import Experiment
 from vedette.simulation.loop import SCANS, TRUTH, run_stream, sensor_streams
 from vedette.simulation.scans import simulate_scans
 
-DECIDE_EVERY, WITHIN = 5.0, 0.05  # s
+DECIDE_EVERY, WITHIN = 5.0, 0.03  # s
 SEED = 5
 
 
