@@ -52,7 +52,7 @@ function startLive(root, run) {
     part("sensors").replaceChildren(...run.sensors.map(({ name }, s) => {
       const row = element("tr");
       const before = silence[s] === null ? "none yet" : fixed(silence[s], 1);
-      row.append(element("th", "", name), element("td", "", before), element("td", "", String(scans[s].length)));
+      row.append(element("th", "", name), element("td", "", before), element("td", "", silence[s] === 0 ? String(scans[s].length) : "no scan"));
       return row;
     }));
     part("health").textContent = health && `Health over the latest scans: ${health}.`;
