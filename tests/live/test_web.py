@@ -34,12 +34,12 @@ class Numbered:
         return b'{"number":%d}' % self.num
 
 
-def served(scene: Scene, token: str | None = None, screen: Any = None) -> list[str]:
+def served(scene: Scene, token: str | None = None, screen: Any = None, answers: Any = take) -> list[str]:
     """What was told in a scene of clients of one server."""
     told, came = list[str](), list[ClientConnection]()
 
     async def play() -> None:
-        server = await WebServer(Exchange(take, token, told.append), screen or Numbered(), "127.0.0.1").listen(0)
+        server = await WebServer(Exchange(answers, token, told.append), screen or Numbered(), "127.0.0.1").listen(0)
         host, port = server.sockets[0].getsockname()[:2]
 
         async def client(path: str = "/", **options: Any) -> ClientConnection:
@@ -152,6 +152,20 @@ def test_a_message_too_long_ends_who_sent_it_alone() -> None:
 
     (text,) = served(scene)
     assert "sent a message of more than 1000000 bytes, and was put out" in text
+
+
+def test_what_cannot_be_taken_at_all_is_told() -> None:
+    def fail(line: bytes) -> tuple[dict[str, Any], ...]:
+        raise OSError("no space left")
+
+    async def scene(address: str, client: Connect) -> None:
+        one = await client()
+        await one.send("word")
+        with pytest.raises(ConnectionClosed):
+            await one.recv()
+
+    (text,) = served(scene, answers=fail)
+    assert "was put out: OSError: no space left" in text
 
 
 def test_who_does_not_read_is_put_out(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -133,6 +133,8 @@ class WebServer:
         except ConnectionClosed as error:
             if error.sent is not None and error.sent.code == 1009:
                 self._exchange.tell(f"{client.name} sent a message of more than {MOST_BYTES} bytes, and was put out")
+        except Exception as error:  # such as a record that cannot be written
+            self._exchange.tell(f"{client.name} was put out: {cause_of(error)}")
         finally:
             self._exchange.leave(client)
 
