@@ -14,7 +14,7 @@ from vedette.cli import app
 
 @pytest.fixture
 def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    write_recording(tmp_path, seconds=60.0, biases={"boat": (300.0, 2.0, 0.0)})
+    write_recording(tmp_path, seconds=120.0, biases={"boat": (300.0, 2.0, 0.0)})
     monkeypatch.chdir(tmp_path)
     return tmp_path
 

@@ -63,16 +63,32 @@ def problem_of(scenario: Scenario, *, position: bool = False) -> Problem:
         known, more = list[SensorModel](), np.zeros(len(model.sensors))
         with told_elsewhere():
             for sensor in _with_values(model.sensors, parameters, values.tolist()):
-                # The density of clutter must not end where a bias that is tried may take a measurement.
-                widens = sensor.clutter.kind == "region"
-                if widens:
-                    clutter = sensor.clutter.model_copy(update={"rate": _WIDER**2 * sensor.clutter.rate})
-                    more[len(known)] = clutter.rate - sensor.clutter.rate
-                    sensor = sensor.model_copy(update={"clutter": clutter})
-                known.append(sensor.build(wide if widens else region, method, folder, model.filter.detection_at))
+                changes = _wider_clutter(sensor)
+                within = wide if sensor.clutter.kind == "region" else region
+                more[len(known)] = changes.get("rate", 0.0) - sensor.clutter.rate if changes else 0.0
+                sensor = sensor.model_copy(update={"clutter": sensor.clutter.model_copy(update=changes)})
+                known.append(sensor.build(within, method, folder, model.filter.detection_at))
         return Central(SequentialLmbFilter(targets, tuple(known), _LIMITS)), more
 
     return Problem(recording, sites, tuple(parameters), tracker)
+
+
+def _wider_clutter(sensor: Sensor) -> dict[str, float]:
+    """What makes the clutter of a sensor reach farther, at the same density.
+
+    It must not end where a bias that is tried, or noise at the edge of what is seen, may take a measurement: there it
+    would be certain that no clutter is, and the likelihood would jump.
+    """
+    clutter = sensor.clutter
+    if clutter.kind == "region":
+        return {"rate": _WIDER**2 * clutter.rate}
+    if clutter.kind != "around_sensor":
+        return {}
+    size = "radius" if clutter.radius is not None else "half_side"
+    wider = {"rate": _WIDER**2 * clutter.rate, size: _WIDER * getattr(clutter, size)}
+    if size == "radius":  # of a part of a square the area hangs on the heading
+        wider |= {"rate": wider["rate"] * 180.0 / clutter.half_width_deg, "half_width_deg": 180.0}
+    return wider
 
 
 def _widened(region: Region) -> Region:

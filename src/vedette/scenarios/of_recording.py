@@ -219,8 +219,9 @@ def _assumed_motion(said: Mapping[str, Any], speed: float, words: list[str]) -> 
     """How targets move and live, where it is not said."""
     told: dict[str, Any] = {}
     if "motion" not in said:
-        told["motion"] = {"kind": "constant_velocity", "sigma_v": speed / 20.0}
-        words.append(f"motion: constant_velocity, sigma_v {speed / 20.0:g} m/s^2 (speed {speed:g} m/s)")
+        # Held over the times between scans of several sensors, it would be the less the more often some of them scans.
+        told["motion"] = {"kind": "constant_velocity", "sigma_v": speed / 20.0, "acceleration": "continuous"}
+        words.append(f"motion: constant_velocity, sigma_v {speed / 20.0:g} m/s^1.5, continuous (speed {speed:g} m/s)")
     if "survival" not in said:
         told["survival"] = {"kind": "constant", "probability": 1.0 - _LOST_PER_SECOND, "period": 1.0}
         words.append(f"survival: {1.0 - _LOST_PER_SECOND:g} a second")

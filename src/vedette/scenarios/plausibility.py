@@ -127,10 +127,19 @@ def _per_scan(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
 
 
 def _held(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
-    """Horizons whose steps are longer than those of tracking, over which accelerations are held."""
+    """Accelerations that are held over steps of any length, by which targets spread less the shorter these are."""
     motion, scans = model.motion, model.horizon[1] / model.time.step_period
-    held = getattr(motion, "acceleration", "held") == "held" and getattr(motion, "sigma_v", 0.0) > 0.0
-    if held and model.decision_steps and scans >= _MANY_SCANS:
+    if getattr(motion, "acceleration", "continuous") != "held" or not getattr(motion, "sigma_v", 0.0):
+        return
+    uneven = [name for name, sensor in zip(model.sensor_names, model.sensors, strict=True) if sensor.scans.late]
+    if model.recording is not None or uneven:
+        why = f"{uneven[0]} has late scans" if uneven else "scans are recorded"
+        yield (
+            ("motion", "acceleration"),
+            f"it is held from one scan to the next of any sensor, and {why}: targets spread the less the more scans "
+            "there are in between, and clocks cannot be found; say continuous",
+        )
+    if model.decision_steps and scans >= _MANY_SCANS:
         yield (
             ("control", "horizon_period"),
             f"pseudo-updates are {scans:.3g} scans apart: motion.sigma_v is held over each such step, so that plans "

@@ -69,9 +69,8 @@ def simulate_scan(
     states, at = _shown(true, states, pose)
     measured = _noisy_measurements(model, states, at, rng.standard_normal((num, model.meas_dim)))
     seen = luck < _probabilities(model, _detected_at(true, states, at, measured), at)
-    measured = _biased(true, measured)
-    clutter = model.clutter.sample(pose, model.measurement, state_dim=states.shape[1], rng=rng)
-    measurements = np.concatenate([measured, clutter])
+    clutter = model.clutter.sample(at, model.measurement, state_dim=states.shape[1], rng=rng)
+    measurements = _biased(true, np.concatenate([measured, clutter]))
     origins = np.concatenate([names, np.full(len(clutter), CLUTTER)]).astype(np.int64)
     order = np.argsort(rng.uniform(size=len(measurements)))
     kept = order[np.concatenate([seen, np.ones(len(clutter), np.bool_)])[order]]
