@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path as FilePath
 
 import numpy as np
@@ -11,7 +12,7 @@ import numpy as np
 from vedette.calibration import Calibration, Parameter, Problem
 from vedette.filters import Limits, SequentialLmbFilter, shared_targets
 from vedette.kernels.base.types import Floats
-from vedette.models import Bias, Region, SensorModel
+from vedette.models import Bias, Region, SensorModel, TargetModel
 from vedette.plausible import told_elsewhere
 from vedette.reading import read_text
 from vedette.recorded.instants import COMPONENTS
@@ -54,7 +55,7 @@ def problem_of(scenario: Scenario, *, position: bool = False) -> Problem:
             clockwise = recording.bearings == "north"
             parameters += _biases(s, sensor, sites[s].bias, clockwise, position, only_positions)
             parameters += _of_models(s, sensor)
-    targets = shared_targets([sensor.filter for sensor in build_sensors(scenario)])
+    targets = _born_at_once(shared_targets([sensor.filter for sensor in build_sensors(scenario)]), recording.times)
     region, method = model.region.build(), model.filter.gaussian_method
 
     wide = _widened(region)
@@ -71,6 +72,19 @@ def problem_of(scenario: Scenario, *, position: bool = False) -> Problem:
         return Central(SequentialLmbFilter(targets, tuple(known), _LIMITS)), more
 
     return Problem(recording, sites, tuple(parameters), tracker)
+
+
+def _born_at_once(targets: TargetModel, times: Floats) -> TargetModel:
+    """The targets, with as many births from measurements as their period has, whenever the next scan comes.
+
+    Of births within a period there are the more the later it comes, and it would make clocks likelier for that.
+    """
+    birth = targets.birth
+    if birth.period is None or birth.from_measurements is None or len(times) < 2:
+        return targets
+    share = float(times[-1] - times[0]) / (len(times) - 1) / birth.period
+    measured = replace(birth.from_measurements, expected=share * birth.from_measurements.expected)
+    return replace(targets, birth=replace(birth, period=None, from_measurements=measured))
 
 
 def _wider_clutter(sensor: Sensor) -> dict[str, float]:
