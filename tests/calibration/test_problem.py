@@ -55,7 +55,9 @@ def test_clutter_has_its_density_beyond_what_is_seen(tmp_path: Path, clutter: st
 
 
 def test_births_do_not_hang_on_when_the_next_scan_comes(tmp_path: Path) -> None:
-    born = "birth: {sites: [], period: 2.0, from_measurements: {expected: 0.2, max_existence: 0.02, std: [9, 9, 5, 5]}}\n"
+    born = (
+        "birth: {sites: [], period: 2.0, from_measurements: {expected: 0.2, max_existence: 0.02, std: [9, 9, 5, 5]}}\n"
+    )
     found, (tracker, _), known = problem(tmp_path, "{kind: region, rate: 2.0}", born)
     own, said = tracker.targets.birth, known[0].filter.targets.birth
     times = found.recording.times
