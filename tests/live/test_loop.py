@@ -211,13 +211,13 @@ def test_units_and_bearings_are_those_of_the_file(tmp_path: Path) -> None:
     noise = polar.replace("std: [10.0, 10.0]", "std: [0.01, 10.0]")
     plain = small(tmp_path, noise)
     compass = small(tmp_path, noise + "recording: {bearings: north, units: {bearing: deg, range: km}}\n")
+    own = small(tmp_path, noise.replace("sensor_defaults:", "sensor_defaults:\n  compass: true"))
     for k in range(3):
-        east = [line(1, float(k), [[0.25 * np.pi, 500.0]], pose=[1.0, 2.0, 0.5])]
-        north = [line(1, float(k), [[45.0, 0.5]], pose=[1.0, 2.0, 0.5 * np.pi - 0.5])]
-        one, other = (
-            live.take(live.initial(), lines[0])[0].timeline for live, lines in ((plain, east), (compass, north))
-        )
-        for timelines in (one, other):
+        east = line(1, float(k), [[0.25 * np.pi, 500.0]], pose=[1.0, 2.0, 0.5])
+        north = line(1, float(k), [[45.0, 0.5]], pose=[1.0, 2.0, 0.5 * np.pi - 0.5])
+        metres = line(1, float(k), [[45.0, 500.0]], pose=[1.0, 2.0, 0.5 * np.pi - 0.5])
+        for live, sent in ((plain, east), (compass, north), (own, metres)):
+            timelines = live.take(live.initial(), sent)[0].timeline
             np.testing.assert_allclose(timelines.instants[0].scans[0].measurements, [[0.25 * np.pi, 500.0]], rtol=1e-12)
             np.testing.assert_allclose(timelines.poses[0], [1.0, 2.0, 0.5], rtol=1e-12)
 

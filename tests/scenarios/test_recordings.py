@@ -14,13 +14,16 @@ import pytest
 from recordings import ORIGIN, RADARS, SHIPS, write_recording
 from vedette.errors import InputError, ScenarioError
 from vedette.evaluation.runs import run_scenario
+from vedette.evaluation.scans import scan_table, scans_of_record
 from vedette.evaluation.track_table import table_of_run, write_tracks
 from vedette.models import Bias
 from vedette.recorded import Conventions, Origin, RecordedScans, Site, parse_scans, table_of
-from vedette.recorded.tables import Table
+from vedette.recorded.tables import Table, read_table
 from vedette.scenarios import load_scenario
 from vedette.scenarios.dumping import dump_scenario
 from vedette.scenarios.of_recording import scenario_of_recording
+from vedette.scenarios.overrides import with_fields
+from vedette.scenarios.sections.recording import sites_of
 
 SITES = (Site("north", "bearing_range", (0.0, 0.0, 0.0)), Site("south", "bearing_range", (100.0, 0.0, 0.0)))
 ROWS = [
@@ -362,3 +365,97 @@ def test_biases_are_taken_off_as_rows_are_read(bearings: Any, turn: float) -> No
 def test_biases_of_no_number_are_refused() -> None:
     with pytest.raises(InputError, match=r"Bias\.clock: expected a finite number"):
         Bias(clock=math.nan)
+
+
+def test_a_sensor_with_a_compass_tells_degrees_from_the_north() -> None:
+    site = Site("radar", "bearing_range", (0.0, 0.0, 0.0), compass=True)
+    told = [[0.0, 10.0], [90.0, 20.0], [225.0, 30.0], [359.0, 40.0]]
+    measured = site.measured(told)
+    np.testing.assert_allclose(measured[:, 0], np.radians([90.0, 0.0, -135.0, 91.0]), atol=1e-15)
+    np.testing.assert_allclose(site.told(measured), told, atol=1e-12)
+    plain = Site("radar", "bearing_range", (0.0, 0.0, 0.0))
+    np.testing.assert_array_equal(plain.told(plain.measured(told)), told)
+    with pytest.raises(InputError, match="told: expected"):
+        site.measured([[1.0]])
+
+
+@pytest.mark.parametrize(
+    ("name", "conventions", "bearing"),
+    [
+        ("bearing", {}, 60.0),
+        ("bearing_deg", {}, 60.0),
+        ("bearing", {"bearings": "east"}, 30.0),  # what a file says of itself comes first
+        ("bearing", {"units": {"bearing": "rad"}}, math.degrees(math.pi / 2.0 - 0.5)),
+    ],
+)
+def test_rows_of_a_compass_need_say_nothing(name: str, conventions: Any, bearing: float) -> None:
+    sites = [Site("radar", "bearing_range", (0.0, 0.0, 0.0), compass=True)]
+    value = 0.5 if "units" in conventions else 30.0
+    row = {"time": 0.0, "sensor": "radar", "range": 5.0, name: value}
+    found = parsed([row], sites, **{"bearings": None, **conventions})
+    assert found.scans[0][0] is not None
+    assert math.degrees(found.scans[0][0][0, 0]) == pytest.approx(bearing, abs=1e-12)
+    assert found.bearings == (conventions.get("bearings", "north"),)
+
+
+def test_each_sensor_tells_bearings_in_its_own_way() -> None:
+    sites = [Site("a", "bearing_only", (0.0, 0.0, 0.0), compass=True), Site("b", "bearing_only", (0.0, 0.0, 0.0))]
+    rows = [{"time": 0.0, "sensor": name, "bearing_deg": 30.0} for name in "ab"]
+    with pytest.raises(InputError, match="column 'bearing_deg': expected bearings: north"):
+        parsed(rows, sites, bearings=None)
+    with pytest.raises(InputError, match="expected a unit of bearing"):
+        parsed([{"time": 0.0, "sensor": name, "bearing": 30.0} for name in "ab"], sites, bearings=None)
+    biased = [Site("a", "bearing_only", (0.0, 0.0, 0.0), Bias(bearing=0.1), compass=True)]
+    found = parsed(rows[:1], biased, bearings=None)
+    assert found.scans[0][0] is not None  # clockwise, as it tells them
+    assert found.scans[0][0][0, 0] == pytest.approx(math.radians(60.0) + 0.1, abs=1e-12)
+
+
+@pytest.mark.parametrize("compass", ["all", "one", "none"])
+def test_simulated_scans_are_written_as_they_are_read(tmp_path: Path, compass: str) -> None:
+    """A run's scans, written and read again, are those that were drawn."""
+    changes: dict[str, Any] = {
+        "time.num_steps": 5,
+        "control.decision_steps": [2],
+        "ospa.from_step": 1,
+        "ospa.to_step": 5,
+    }
+    changes |= {f"sensors.{s}.compass": True for s in {"all": (0, 1), "one": (1,), "none": ()}[compass]}
+    scenario = with_fields(load_scenario("paper-a"), changes)
+    record = run_scenario(scenario, "random", seed=3)
+    columns = scan_table(record, scenario)
+    assert ("bearing_deg" in columns) == (compass == "all")
+    write_tracks(tmp_path / "scans.csv", columns)
+    write_tracks(tmp_path / "scans.parquet", columns)
+    told: Any = None if compass == "all" else "east"
+    for name in ("scans.csv", "scans.parquet"):
+        table = read_table(tmp_path / name)
+        found = parse_scans(table, sites_of(scenario.model), Conventions({}, {}, told))
+        np.testing.assert_allclose(found.times, record.times - record.times[0])
+        np.testing.assert_allclose(found.poses[..., :2], record.poses[..., :2], atol=1e-9)
+        np.testing.assert_allclose(np.cos(found.poses[..., 2] - record.poses[..., 2]), 1.0)
+        for scans, expected in zip(found.scans, scans_of_record(record, scenario), strict=True):
+            for scan, drawn in zip(scans, expected, strict=True):
+                assert scan is not None
+                assert drawn is not None
+                np.testing.assert_allclose(scan, drawn.measurements, rtol=1e-12, atol=1e-12)
+
+
+def test_a_scenario_says_that_its_sensors_have_a_compass(folder: Path) -> None:
+    text = (folder / "radars.yaml").read_text("utf-8").replace("bearings: north", "gather: 0.0")
+    text = text.replace("sensor_defaults:\n", "sensor_defaults:\n  compass: true\n")
+    (folder / "radars.yaml").write_text(text, "utf-8")
+    made = scenario_of_recording(folder / "radars.yaml", folder / "scans.csv")
+    (folder / "north.yaml").write_text(
+        text.replace("  compass: true\n", "").replace("gather: 0.0", "bearings: north"), "utf-8"
+    )
+    said = scenario_of_recording(folder / "north.yaml", folder / "scans.csv")
+    for one, other in zip(made.recording.scans, said.recording.scans, strict=True):
+        for scan, expected in zip(one, other, strict=True):
+            assert (scan is None) == (expected is None)
+            if scan is not None:
+                np.testing.assert_array_equal(scan, np.asarray(expected))
+    wrong = text.replace("{kind: bearing_range}", "{kind: custom, function: 'absent.py:f'}")
+    (folder / "radars.yaml").write_text(wrong, "utf-8")
+    with pytest.raises(ScenarioError, match=r"compass: expected false, as nobody knows which component"):
+        scenario_of_recording(folder / "radars.yaml", folder / "scans.csv")

@@ -66,7 +66,7 @@ def test_what_a_bias_adds_is_what_reading_takes_off(kind):
     bias = models.Bias(clock=0.5, x=20.0, y=-10.0, **measured)
     model = sensor(kind, detection=models.limited_range(1.0, 250.0))
     scan = simulate_scan(states, POSE, TrueSensor(model, bias=bias), rng=np.random.default_rng(1))
-    recording = in_order([Look(7.0, 0, scan.measurements, POSE)], POSE[np.newaxis], 0.0, False, (), "east")
+    recording = in_order([Look(7.0, 0, scan.measurements, POSE)], POSE[np.newaxis], 0.0, False, (), ("east",))
     read = without_biases(recording, [Site("radar", kind, tuple(POSE), bias)])
     earlier, true_pose = states.copy(), read.poses[0, 0]
     earlier[:, :2] -= 0.5 * states[:, 2:]

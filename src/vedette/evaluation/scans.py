@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats
+from vedette.models.arguments import reject
+from vedette.recorded.instants import COMPONENTS, turned
 from vedette.scenarios import Scenario
 from vedette.scenarios.build import build_scan_times, build_true_sensors, drop_outs
-from vedette.scenarios.sections.recording import RecordingSection
+from vedette.scenarios.sections.recording import RecordingSection, sites_of
 from vedette.scenarios.trust import code_of
 from vedette.simulation.loop import scans_of_run
 from vedette.simulation.records import RunRecord
@@ -64,6 +66,44 @@ def _recorded(record: RunRecord, section: RecordingSection, scenario: Scenario) 
         tuple(None if scan is None else Scan(scan, np.full(len(scan), UNKNOWN)) for scan in scans)
         for scans in recording.scans[: record.num_scans]
     )
+
+
+def scan_table(record: RunRecord, scenario: Scenario) -> dict[str, list[Any]]:
+    """The scans of a run by columns, a row a measurement, as `vedette.recorded.parse_scans` reads them.
+
+    `time`, `sensor`, what the sensors measure (`bearing_deg`, `range_m`, `x_m`, `y_m`), and where they were (`own_x_m`,
+    `own_y_m`, `own_heading_deg`). Angles are degrees clockwise from the north where every sensor with a bearing has a
+    compass; else they are `bearing_rad` and `own_heading_rad` from the east, which a reader must be told
+    (`bearings: east`). What biases the scenario knows of are taken off.
+
+    Raises:
+        VedetteError: as of `scans_of_record`, or measurements of a kind that rows cannot tell.
+    """
+    sites = sites_of(scenario.model)
+    for site in sites:
+        if site.kind not in COMPONENTS:
+            raise reject(f"sensor {site.name}", f"measurements of kind {', '.join(COMPONENTS)}", site.kind)
+    told = [site for site in sites if "bearing" in COMPONENTS[site.kind]]
+    compass = bool(told) and all(site.compass for site in told)
+    unit = "deg" if compass else "rad"
+    names = {"bearing": f"bearing_{unit}", "range": "range_m", "x": "x_m", "y": "y_m"}
+    wanted = dict.fromkeys(names[name] for site in sites for name in COMPONENTS[site.kind])
+    table: dict[str, list[Any]] = {
+        name: [] for name in ("time", "sensor", *wanted, "own_x_m", "own_y_m", f"own_heading_{unit}")
+    }
+    for time, scans, poses in zip(record.times.tolist(), scans_of_record(record, scenario), record.poses, strict=True):
+        for site, scan, pose in zip(sites, scans, poses, strict=True):
+            if scan is None:
+                continue
+            heading = float(np.degrees(turned(pose[2], "north")) % 360.0) if compass else float(pose[2])
+            of_all = {"time": time, "sensor": site.name, "own_x_m": pose[0], "own_y_m": pose[1]}
+            of_all[f"own_heading_{unit}"] = heading
+            columns = [names[name] for name in COMPONENTS[site.kind]]
+            for row in (site.told(scan.measurements) if compass else scan.measurements).tolist() or [()]:
+                cells = {**of_all, **dict(zip(columns, row, strict=False))}
+                for name, column in table.items():
+                    column.append(cells.get(name))
+    return table
 
 
 def in_plane(measurements: Floats, kind: str, pose: Floats) -> Floats:

@@ -94,6 +94,8 @@ def table_of_run(record: RunRecord, scenario: Scenario) -> dict[str, list[Any]]:
 def write_tracks(path: Path, table: Mapping[str, Sequence[Any]]) -> None:
     """Write a track table as its file's ending says: .csv, .parquet or .geojson. It appears whole or not at all.
 
+    A table of scans can be written, too, as .csv or .parquet.
+
     GeoJSON has a feature a track, a line through its places in longitude and latitude (a point where there is one),
     with its label, its target, and times and existence place by place.
 
@@ -136,7 +138,7 @@ def _parquet(table: Mapping[str, Sequence[Any]]) -> bytes:
     import pyarrow as pa
     from pyarrow import parquet
 
-    texts = {"utc", "label", "target"}
+    texts = {"utc", "label", "target", "sensor"}
     arrays = {name: pa.array(cells, pa.string() if name in texts else pa.float64()) for name, cells in table.items()}
     content = io.BytesIO()
     parquet.write_table(pa.table(arrays), content, compression="zstd")

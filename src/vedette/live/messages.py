@@ -33,9 +33,10 @@ def read_message(
     """The scan that a line tells of.
 
     `{"sensor": name or number from 1, "time": s or ISO 8601, "measurements": [[...], ...], "pose": ...}`: measurements
-    as `vedette.recorded.scans.COMPONENTS` has them, in rad and m unless `conventions.units` says another; angles count
-    as `conventions.bearings` says, else from the east. The pose, which may be left out, is `[x, y, heading_rad, ...]`,
-    or `{"lon": , "lat": , "heading_deg": }`, whose heading may be left out and else needs `bearings`.
+    as `vedette.recorded.scans.COMPONENTS` has them, in rad (of a sensor with a compass in degrees) and m unless
+    `conventions.units` says another; angles count as `conventions.bearings` says, else as the sensor tells them. The
+    pose, which may be left out, is `[x, y, heading_rad, ...]`, or `{"lon": , "lat": , "heading_deg": }`, whose heading
+    may be left out and else needs `bearings` or a compass.
 
     Args:
         line: of UTF-8 text.
@@ -54,13 +55,16 @@ def read_message(
         raise reject(f"{place}, time", "seconds, or a text in ISO 8601", time)
     rows = _rows(data["measurements"], f"{place}, measurements", site)
     pose, more = _pose(data.get("pose"), f"{place}, pose", site)
-    if "pose.heading_deg" not in pose and conventions.bearings is None:
+    if "pose.heading_deg" not in pose and conventions.bearings is None and not site.compass:
         conventions = replace(conventions, bearings="east")
     num, names = max(len(rows), 1), COMPONENTS[site.kind]
     columns: dict[str, list[Any]] = {"time": [time] * num, "sensor": [site.name] * num}
     columns |= {name: [row[j] for row in rows] if rows else [None] for j, name in enumerate(names)}
     columns |= {name: [value] * num for name, value in pose.items()}
-    units = {"bearing": "rad", **{name: unit for name, unit in conventions.units.items() if name in names}}
+    units = {
+        "bearing": "deg" if site.compass else "rad",
+        **{name: unit for name, unit in conventions.units.items() if name in names},
+    }
     named = {_OF_POSE[name]: name for name in pose}
     read = parse_scans(
         Table(columns, range(1, num + 1), place), [site], replace(conventions, columns=named, units=units), origin

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from vedette.kernels.base.types import Floats
 from vedette.models import Bias
+from vedette.models.arguments import float_array
 from vedette.models.bias import LEAST_RANGE, NO_BIAS
 from vedette.tracking import SensorScan
 
@@ -25,6 +27,16 @@ COMPONENTS = {
 }
 
 
+def turned(angles: ArrayLike, bearings: Bearings | None) -> Floats:
+    """Angles (rad) counted from the north, clockwise, as those from the east, counter-clockwise, or back again.
+
+    In [-pi, pi]; those that are from the east already are only brought there.
+    """
+    given = np.asarray(angles, np.float64)
+    found = math.pi / 2.0 - given if bearings == "north" else given
+    return np.asarray(found - 2.0 * math.pi * np.rint(found / (2.0 * math.pi)))
+
+
 @dataclass(frozen=True, slots=True)
 class Site:
     """A sensor of a recording.
@@ -35,12 +47,35 @@ class Site:
         pose: [px, py, heading_rad, ...] where the rows do not say.
         bias: what the rows say too much, which is taken off as they are read; ranges that would be below 1 m without it
             are taken as 1 m.
+        compass: whether it tells bearings in degrees clockwise from the north, where the rows say nothing else.
     """
 
     name: str
     kind: str
     pose: tuple[float, ...]
     bias: Bias = NO_BIAS
+    compass: bool = False
+
+    def measured(self, told: ArrayLike) -> Floats:
+        """(num, meas_dim) measurements as filters take them but for the bias, of the same as the sensor tells them.
+
+        Raises:
+            InputError: another shape, or numbers that are not finite.
+        """
+        found = float_array("told", told, (None, len(COMPONENTS[self.kind])))
+        return self._with_bearings(found, lambda angles: turned(np.radians(angles), "north"))
+
+    def told(self, measured: ArrayLike) -> Floats:
+        """The inverse of `measured`; degrees from 0 to 360."""
+        found = float_array("measured", measured, (None, len(COMPONENTS[self.kind])))
+        return self._with_bearings(found, lambda angles: np.degrees(turned(angles, "north")) % 360.0)
+
+    def _with_bearings(self, measurements: Floats, change: Callable[[Floats], Floats]) -> Floats:
+        if not self.compass or "bearing" not in COMPONENTS[self.kind]:
+            return measurements
+        found, place = measurements.copy(), COMPONENTS[self.kind].index("bearing")
+        found[:, place] = change(found[:, place])
+        return found
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,7 +90,8 @@ class RecordedScans:
         poses: (num_instants, num_sensors, 3 or more), each sensor where it was when it scanned last, or will be when it
             first does.
         skipped: what was wrong with the rows that were left out.
-        bearings: from where the rows counted bearings, whose direction a bearing's bias has; None: there were none.
+        bearings: for each sensor, from where its rows counted bearings, whose direction a bearing's bias has; None: it
+            has none.
     """
 
     times: Floats
@@ -63,8 +99,8 @@ class RecordedScans:
     is_utc: bool
     scans: tuple[tuple[Floats | None, ...], ...]
     poses: Floats
-    skipped: tuple[str, ...] = ()
-    bearings: Bearings | None = None
+    skipped: tuple[str, ...]
+    bearings: tuple[Bearings | None, ...]
 
     def arrivals(self) -> Iterator[SensorScan]:
         """Every scan by itself, in order of time, as `LateScans` takes them; times as of `times`."""
@@ -94,7 +130,7 @@ def in_order(
     start: float,
     is_utc: bool,
     skipped: tuple[str, ...],
-    bearings: Bearings | None,
+    bearings: tuple[Bearings | None, ...],
 ) -> RecordedScans:
     """The scans of a recording, those of one time as an instant.
 
@@ -127,7 +163,7 @@ def without_biases(recording: RecordedScans, sites: Sequence[Site]) -> RecordedS
         for s, scan in enumerate(scans):
             if scan is not None:
                 look = Look(time, s, scan, poses[s])
-                looks.append(_without_bias(look, sites[s].kind, sites[s].bias, recording.bearings))
+                looks.append(_without_bias(look, sites[s].kind, sites[s].bias, recording.bearings[s]))
     told = recording.start, recording.is_utc, recording.skipped, recording.bearings
     return in_order(looks, recording.poses[0], *told)
 

@@ -17,10 +17,12 @@ from vedette.recorded.conventions import ANGLES, MOST, OTHER_NAMES, QUANTITIES, 
 from vedette.recorded.geography import Origin
 from vedette.recorded.instants import (
     COMPONENTS,
+    Bearings,
     Look,
     RecordedScans,
     Site,
     in_order,
+    turned,
     without_biases,
 )
 from vedette.recorded.tables import FARTHEST, LATEST, Table, column_names, is_number, number, seconds
@@ -64,7 +66,7 @@ class _Rows:
 
     def __init__(self, table: Table, sites: Sequence[Site], conventions: Conventions, origin: Origin | None) -> None:
         self.table, self.sites, self.conventions, self.origin = table, sites, conventions, origin
-        self.bearings = conventions.bearings or table.bearings
+        self.bearings = tuple(conventions.bearings or ("north" if site.compass else table.bearings) for site in sites)
         self._columns: dict[str, tuple[str, float]] = {}
         for quantity, units in QUANTITIES.items():
             if (found := self._found(quantity, units)) is not None:
@@ -101,9 +103,16 @@ class _Rows:
         given = self.conventions.units.get(quantity)
         ends = [unit for unit in units if name.endswith(f"_{unit}")]
         if given is None and not ends and units is ANGLES:
+            if self._told_by_compass(quantity):
+                return ANGLES["deg"]
             wanted = f"a unit of {quantity}: a column {quantity}_deg or {quantity}_rad, or units: {{{quantity}: deg}}"
             raise InputError(f"{self.table.source}, column {shown(name)}: expected {wanted}; got none")
         return units[given or (ends[0] if ends else next(iter(units)))]
+
+    def _told_by_compass(self, quantity: str) -> bool:
+        """Whether all sensors that have an angle tell it in degrees, as a compass does."""
+        sites = [site for site in self.sites if quantity != "bearing" or "bearing" in COMPONENTS.get(site.kind, ())]
+        return bool(sites) and all(site.compass for site in sites)
 
     def _check(self) -> None:
         """That the table has what the sensors measure, and says how."""
@@ -117,7 +126,10 @@ class _Rows:
                     wanted = f"a column of {quantity}, as sensor {shown(site.name)} measures {site.kind}"
                     raise InputError(f"{self.table.source}: expected {wanted}; got columns {have}")
         angles = {"bearing", "own_heading"} & set(self._columns)
-        if angles and self.bearings is None:
+        if angles and any(
+            bearings is None and ("own_heading" in angles or "bearing" in COMPONENTS[site.kind])
+            for site, bearings in zip(self.sites, self.bearings, strict=True)
+        ):
             wanted = "bearings: north (clockwise, a compass) or east (counter-clockwise)"
             name = shown(self._columns[min(angles)][0])
             raise InputError(f"{self.table.source}, column {name}: expected {wanted}; got none")
@@ -142,8 +154,8 @@ class _Rows:
         if label not in self._numbers:
             names = ", ".join(shown(site.name) for site in self.sites)
             raise self.table.fault(i, self._sensor, f"a sensor among {names}, or its number from 1")
-        site = self.sites[self._numbers[label]]
-        return _Row(self._seconds(i), self._numbers[label], self._measured(i, site), self._pose(i, site))
+        s = self._numbers[label]
+        return _Row(self._seconds(i), s, self._measured(i, s), self._pose(i, s))
 
     def _seconds(self, i: int) -> float:
         """The time of a row, all as dates or all as numbers."""
@@ -157,7 +169,7 @@ class _Rows:
             raise self.table.fault(i, self._time, wanted)
         return time
 
-    def _value(self, i: int, quantity: str) -> float:
+    def _value(self, i: int, quantity: str, bearings: Bearings | None = None) -> float:
         name, unit = self._columns[quantity]
         try:
             value = unit * number(self.table.columns[name][i])
@@ -170,29 +182,31 @@ class _Rows:
             limits = f"from {0 if quantity == 'range' else -most / unit:g} to {most / unit:g}"
             raise self.table.fault(i, name, f"a number {limits}")
         if quantity in ("bearing", "own_heading"):
-            turned = math.pi / 2.0 - value if self.bearings == "north" else value
-            return math.remainder(turned, 2.0 * math.pi)
+            return float(turned(value, bearings))
         return value
 
-    def _measured(self, i: int, site: Site) -> tuple[float, ...] | None:
+    def _measured(self, i: int, s: int) -> tuple[float, ...] | None:
         """As filters take it; None of a scan that found nothing."""
+        site = self.sites[s]
         quantities: tuple[str, ...] = COMPONENTS[site.kind]
         if site.kind == "position" and "lon" in self._columns:
             quantities = ("lon", "lat")
         cells = [self.table.columns[self._columns[quantity][0]][i] for quantity in quantities]
         if all(map(_is_empty, cells)):
             return None
-        values = [self._value(i, quantity) for quantity in quantities]
+        values = [self._value(i, quantity, self.bearings[s]) for quantity in quantities]
         return self._plane(values) if quantities[0] == "lon" else tuple(values)
 
-    def _pose(self, i: int, site: Site) -> tuple[float, ...]:
+    def _pose(self, i: int, s: int) -> tuple[float, ...]:
         """Where the sensor was, as far as the row says."""
+        site = self.sites[s]
         place: tuple[float, ...] = site.pose[:2]
         if {"own_lon", "own_lat"} <= set(self._columns):
             place = self._plane([self._value(i, "own_lon"), self._value(i, "own_lat")])
         elif {"own_x", "own_y"} <= set(self._columns):
             place = self._value(i, "own_x"), self._value(i, "own_y")
-        heading = self._value(i, "own_heading") if "own_heading" in self._columns else site.pose[2]
+        has_heading = "own_heading" in self._columns
+        heading = self._value(i, "own_heading", self.bearings[s]) if has_heading else site.pose[2]
         return (*place, heading, *site.pose[3:])
 
     def _plane(self, degrees: Sequence[float]) -> tuple[float, ...]:

@@ -52,7 +52,7 @@ def problem_of(scenario: Scenario, *, position: bool = False) -> Problem:
     parameters, only_positions = list[Parameter](), all(site.kind == "position" for site in sites)
     for s, sensor in enumerate(model.sensors):
         if any(scans[s] is not None for scans in recording.scans):
-            clockwise = recording.bearings == "north"
+            clockwise = recording.bearings[s] == "north"
             parameters += _biases(s, sensor, sites[s].bias, clockwise, position, only_positions)
             parameters += _of_models(s, sensor)
     targets = _born_at_once(shared_targets([sensor.filter for sensor in build_sensors(scenario)]), recording.times)

@@ -39,7 +39,7 @@ class RecordingSection(Section):
     bearings: Literal["east", "north"] | None = Field(
         default=None,
         description="From where bearings and headings count: north, clockwise (a compass), or east, counter-clockwise; "
-        "none: there are none [-].",
+        "none: as each sensor tells them (compass), or there are none [-].",
     )
     gather: NonNegative = Field(
         default=0.0, description="Rows of a sensor within this time after its first are one scan [s]."
@@ -86,7 +86,7 @@ def sites_of(world: ScenarioModel) -> list[Site]:
     from vedette.recorded import Site
 
     return [
-        Site(name, sensor.measurement.kind, sensor.pose, sensor.bias.build())
+        Site(name, sensor.measurement.kind, sensor.pose, sensor.bias.build(), sensor.compass)
         for name, sensor in zip(world.sensor_names, world.sensors, strict=True)
     ]
 

@@ -134,6 +134,11 @@ class Sensor(Section):
         "or under the first of its actions [-].",
     )
     measurement: Measurement = Field(default=of_kind("bearing_range"), description="What it measures [-].")
+    compass: bool = Field(
+        default=False,
+        description="Whether it tells bearings as a compass does, in degrees clockwise from the north: in recordings "
+        "and lines that say nothing else, and where scans are written; else in radians from the east [-].",
+    )
     noise: Noise = Field(default=of_kind("range_dependent"), description="Measurement noise [-].")
     detection: Detection = Field(default=of_kind("gaussian"), description="Probability of detection [-].")
     clutter: Clutter = Field(default=of_kind("region"), description="False measurements [-].")
@@ -154,6 +159,11 @@ class Sensor(Section):
         kinds = [section.kind for section in (self.detection, *true) if section is not None]
         if "camera" in kinds and len(self.pose) < 5:
             yield ("platform",), "a camera, as its detection is a camera's", self.platform.kind
+
+    @check
+    def _a_compass_tells_bearings(self) -> Iterator[Finding]:
+        if self.compass and self.measurement.kind == "custom":
+            yield ("compass",), "false, as nobody knows which component of a custom measurement is a bearing", "true"
 
     @check
     def _noise_fits(self) -> Iterator[Finding]:
