@@ -19,6 +19,7 @@ EXTRA_OF = {
     "xarray": "xarray",
     "asterix": "readers",
     "pyais": "readers",
+    "rosbags": "readers",
     "websockets": "live",
 }
 

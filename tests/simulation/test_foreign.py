@@ -98,6 +98,41 @@ def test_midnight_is_passed(tmp_path: Path) -> None:
     assert read_table(tmp_path / "radar.ast").columns["time"] == [86399.5, 86400.5, 86404.5]
 
 
+def track(time: float, lon: float, lat: float, number: int = 7, velocity: tuple[float, float] | None = None) -> bytes:
+    category = CATS[62][-1]
+    said: dict[str, Any] = {
+        "010": (("SAC", 1), ("SIC", 9)),
+        "070": ((time, "s")),
+        "040": number,
+        "105": (("LAT", (lat, "°")), ("LON", (lon, "°"))),
+    }
+    if velocity is not None:
+        said["185"] = (("VX", (velocity[0], "m/s")), ("VY", (velocity[1], "m/s")))
+    block: bytes = category.create([category.cv_uap.cv_record.create(said)]).unparse().to_bytes()
+    return block
+
+
+def test_tracks_of_a_system_are_scans_of_positions_and_reports(tmp_path: Path) -> None:
+    lon, lat = ORIGIN.to_degrees([[300.0, -400.0]])[0].tolist()
+    content = b"".join(track(86399.0 + k - 86400.0 * (k > 0), lon, lat, 7, (4.0, -3.0)) for k in range(2))
+    (tmp_path / "system.ast").write_bytes(content)
+    site = Site("1/9", "position", (0.0, 0.0, 0.0))
+    found = parse_scans(read_table(tmp_path / "system.ast"), [site], Conventions({}, {}), ORIGIN)
+    assert found.times.tolist() == [0.0, 1.0]
+    assert found.scans[1][0] is not None
+    np.testing.assert_allclose(found.scans[1][0], [[300.0, -400.0]], atol=1.0)  # 180 / 2^25 degrees
+    (tmp_path / "both.ast").write_bytes(plot(86399.0, 5.0, 10.0) + content + track(2.0, lon, lat, 8))
+    assert read_table(tmp_path / "both.ast").columns["range_nmi"] == [5.0]
+    table = read_table(tmp_path / "both.ast", reports=True)
+    assert (table.columns["id"], table.columns["time"]) == (["7", "7", "8"], [86399.0, 86400.0, 86402.0])
+    assert "vx" not in table.columns  # the last does not say
+    targets = RecordedTargets.from_file(tmp_path / "system.ast", origin_deg=(ORIGIN.longitude_deg, ORIGIN.latitude_deg))
+    np.testing.assert_array_equal(targets.tracks[0].velocities, [[4.0, -3.0]] * 2)
+    (tmp_path / "plots.ast").write_bytes(plot(1.0, 5.0, 10.0))
+    with pytest.raises(InputError, match=r"plots.ast: expected tracks of category 062; got none"):
+        read_table(tmp_path / "plots.ast", reports=True)
+
+
 def test_plots_are_tracked(tmp_path: Path) -> None:
     rng, content = np.random.default_rng(0), b""
     for time in np.arange(0.0, 100.0, 4.0).tolist():
@@ -128,8 +163,9 @@ def test_plots_are_tracked(tmp_path: Path) -> None:
     [
         ("a.nmea", b"nothing\n", "a.nmea: expected AIS positions with times in tag blocks; got none"),
         ("a.ast", b"\x30\x00", "a.ast: expected ASTERIX data blocks; got other bytes"),
+        ("a.ast", b"\x3e\x00\x05\xff\xff", "a.ast: expected records of category 062 in data block 1"),
         ("a.ast", b"\x30\x00\x05\xff\xff", "a.ast: expected records of category 048 in data block 1"),
-        ("a.asterix", b"", "a.asterix: expected plots of category 048; got none"),
+        ("a.asterix", b"", "a.asterix: expected plots of category 048 or tracks of category 062; got none"),
     ],
 )
 def test_other_bytes_are_refused(tmp_path: Path, name: str, content: bytes, message: str) -> None:

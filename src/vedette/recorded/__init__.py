@@ -2,6 +2,7 @@
 
 from vedette.recorded.cleaning import Cleaning, CleaningCounts, RecordedTrack
 from vedette.recorded.conventions import Conventions
+from vedette.recorded.detections import table_of_detections
 from vedette.recorded.geography import Origin
 from vedette.recorded.instants import RecordedScans, Site, without_biases
 from vedette.recorded.scans import parse_scans
@@ -20,5 +21,6 @@ __all__ = [
     "parse_scans",
     "read_table",
     "table_of",
+    "table_of_detections",
     "without_biases",
 ]

@@ -1,4 +1,4 @@
-"""Recordings in the formats of others, as tables: AIS messages of ships (NMEA 0183), and radar plots (ASTERIX)."""
+"""Recordings in the formats of others, as tables: AIS messages of ships (NMEA 0183), plots and tracks (ASTERIX)."""
 
 from __future__ import annotations
 
@@ -16,7 +16,8 @@ ASTERIX_ENDINGS = (".ast", ".asterix")
 _KNOT = 1852.0 / 3600.0  # m/s
 _HALF_DAY = 43_200.0  # s
 _NO_SPEED, _NO_COURSE = 102.3, 360.0  # what AIS says where a ship does not know
-_MONOPULSE_PLOTS = 48  # category of what a rotating radar sees; others are passed over
+_PLOTS, _TRACKS = 48, 62  # categories of what a rotating radar sees, and of what a tracker has made of such
+_DEGREE = "\N{DEGREE SIGN}"
 
 Columns = dict[str, list[Any]]
 
@@ -78,58 +79,80 @@ def _velocity(said: dict[str, Any]) -> tuple[float, float] | None:
     return _KNOT * speed * math.sin(angle), _KNOT * speed * math.cos(angle)
 
 
-def read_asterix(file: Path) -> tuple[Columns, list[int]]:
-    """Plots of rotating radars, category 048: `time`, `sensor` ("SAC/SIC"), `range_nmi`, `bearing_deg` from north.
+def read_asterix(file: Path, *, reports: bool = False) -> tuple[Columns, list[int]]:
+    """Plots of rotating radars, category 048, or tracks of a system, category 062; a sensor is "SAC/SIC".
 
-    Times are seconds from midnight UTC of the first plot's day; ranges are slant ranges. Other categories, and records
-    without a plot, are passed over. Returns the columns and the number of each record.
+    Of plots `time`, `sensor`, `range_nmi` (slant), `bearing_deg` from the north. Of tracks, where there are no plots or
+    `reports` are asked for, `time`, `sensor`, `longitude`, `latitude`, and what targets have: `id` (the number of the
+    track), and `vx`, `vy` where every one says them. Times are seconds from midnight UTC of the first one's day. Other
+    categories, and records without a time and place, are passed over. Returns the columns and the number of each
+    record.
 
     Raises:
         MissingPackageError: libasterix is not installed.
-        InputError: bytes that are no ASTERIX, or no plots in them.
+        InputError: bytes that are no ASTERIX, or no plots and tracks in them.
     """
     need(f"{file}, which is an ASTERIX file,", "asterix")
-    columns: Columns = {"time": [], "sensor": [], "range_nmi": [], "bearing_deg": []}
-    numbers, days = list[int](), 0.0
-    for number, plot in enumerate(_plots(file), start=1):
-        if plot is None:
+    found: dict[int, tuple[list[dict[str, Any]], list[int]]] = {_PLOTS: ([], []), _TRACKS: ([], [])}
+    days = dict.fromkeys(found, 0.0)
+    for number, (category, record) in enumerate(_records(file), start=1):
+        row = _plot(record) if category == _PLOTS else _track(record)
+        if row is None:
             continue
-        time, radar, reach, azimuth = plot
-        if columns["time"] and time + days < columns["time"][-1] - _HALF_DAY:  # midnight
-            days += 2.0 * _HALF_DAY
-        for name, value in zip(columns, (time + days, radar, reach, azimuth), strict=True):
-            columns[name].append(value)
+        rows, numbers = found[category]
+        if rows and row["time"] + days[category] < rows[-1]["time"] - _HALF_DAY:  # midnight
+            days[category] += 2.0 * _HALF_DAY
+        rows.append({**row, "time": row["time"] + days[category]})
         numbers.append(number)
+    rows, numbers = found[_TRACKS if reports or not found[_PLOTS][0] else _PLOTS]
     if not numbers:
-        raise InputError(f"{file}: expected plots of category 048; got none")
-    return columns, numbers
+        raise InputError(
+            f"{file}: expected {'' if reports else 'plots of category 048 or '}tracks of category 062; got none"
+        )
+    columns: Columns = {name: [row[name] for row in rows] for name in rows[0]}
+    return {name: cells for name, cells in columns.items() if name not in ("vx", "vy") or None not in cells}, numbers
 
 
-def _plots(file: Path) -> Iterator[tuple[float, str, float, float] | None]:
-    """Of every record of category 048 its plot: time of day, radar, range and azimuth; None of one without."""
+def _records(file: Path) -> Iterator[tuple[int, Any]]:
+    """Category and content of every plot and track."""
     from asterix.base import Bits, RawDatablock
     from asterix.generated import manifest
 
     editions: Any = manifest["CATS"]
-    category = editions[_MONOPULSE_PLOTS][-1]  # the newest
     blocks = RawDatablock.parse(Bits.from_bytes(file.read_bytes()))
     if isinstance(blocks, ValueError):
         raise InputError(f"{file}: expected ASTERIX data blocks; got other bytes")
     for place, block in enumerate(blocks, start=1):
-        if block.get_category() != _MONOPULSE_PLOTS:
+        if (category := block.get_category()) not in (_PLOTS, _TRACKS):
             continue
-        records = category.cv_uap.parse(block.get_raw_records())
+        records = editions[category][-1].cv_uap.parse(block.get_raw_records())  # by the newest edition
         if isinstance(records, ValueError):
-            wanted = f"records of category 048 in data block {place}"
+            wanted = f"records of category {category:03} in data block {place}"
             raise InputError(f"{file}: expected {wanted}; got {shown(str(records))}")
-        yield from map(_plot, records)
+        yield from ((category, record) for record in records)
 
 
-def _plot(record: Any) -> tuple[float, str, float, float] | None:
+def _plot(record: Any) -> dict[str, Any] | None:
     source, time, polar = (record.get_item(name) for name in ("010", "140", "040"))
     if source is None or time is None or polar is None:
         return None
+    reach, azimuth = _quantity(polar, "RHO", "NM"), _quantity(polar, "THETA", _DEGREE)
+    return {**_source(source, time), "range_nmi": reach, "bearing_deg": azimuth}
+
+
+def _track(record: Any) -> dict[str, Any] | None:
+    source, time, place, number, velocity = (record.get_item(name) for name in ("010", "070", "105", "040", "185"))
+    if source is None or time is None or place is None or number is None:
+        return None
+    lon, lat = _quantity(place, "LON", _DEGREE), _quantity(place, "LAT", _DEGREE)
+    speeds = {name.lower(): None if velocity is None else _quantity(velocity, name, "m/s") for name in ("VX", "VY")}
+    return {**_source(source, time), "longitude": lon, "latitude": lat, "id": str(number.variation.as_uint()), **speeds}
+
+
+def _source(source: Any, time: Any) -> dict[str, Any]:
     radar = "/".join(str(source.variation.get_item(name).as_uint()) for name in ("SAC", "SIC"))
-    reach = polar.variation.get_item("RHO").variation.content.as_quantity("NM")
-    azimuth = polar.variation.get_item("THETA").variation.content.as_quantity("\N{DEGREE SIGN}")
-    return time.variation.content.as_quantity("s"), radar, reach, azimuth
+    return {"time": time.variation.content.as_quantity("s"), "sensor": radar}
+
+
+def _quantity(item: Any, name: str, unit: str) -> float:
+    return float(item.variation.get_item(name).variation.content.as_quantity(unit))

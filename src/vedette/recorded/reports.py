@@ -10,6 +10,7 @@ import numpy as np
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats, Ints
 from vedette.recorded.geography import Origin
+from vedette.recorded.opensky import is_opensky, of_opensky
 from vedette.recorded.tables import FARTHEST, Table
 
 _SAME_TIME = 1e-6  # s; two reports of one target nearer in time than this are one
@@ -50,7 +51,7 @@ def parse_reports(
     """Reports out of a table with columns time, id and x, y or longitude, latitude; vx, vy where there are any.
 
     Args:
-        table: see `read_table`.
+        table: see `read_table`; state vectors of OpenSky are known by their columns where `columns` names none.
         columns: names in the table where they differ: {"time": "Time", "id": "MMSI", ...}. Naming a longitude and
             latitude makes the record geographic; otherwise x, y are used if they are there.
         origin_deg: longitude and latitude of (0, 0) for a geographic record; for another it is an error.
@@ -60,6 +61,8 @@ def parse_reports(
         InputError: names the file, row, column, what was expected and what came.
     """
     given = dict(columns or {})
+    if not given and is_opensky(table.columns):
+        table, given = of_opensky(table)
     if unknown := set(given) - {"time", "id", "x", "y", "longitude", "latitude", "vx", "vy"}:
         raise InputError(f"columns: expected time, id, x, y, longitude, latitude, vx or vy; got {', '.join(unknown)}")
     times, labels = table.times(given.get("time", "time")), table.labels(given.get("id", "id"))

@@ -17,6 +17,7 @@ import numpy as np
 from vedette.errors import InputError
 from vedette.extras import need
 from vedette.kernels.base.types import Floats
+from vedette.recorded.bags import BAG_ENDINGS, read_bag
 from vedette.recorded.foreign import AIS_ENDINGS, ASTERIX_ENDINGS, read_ais, read_asterix
 from vedette.text import elided, printable, shown
 
@@ -27,7 +28,7 @@ LATEST = 1e12  # s
 _MOST_BYTES = 500_000_000
 _MOST_REPORTS = 5_000_000
 _MOST_NAMES = 20
-ENDINGS = (".csv", ".parquet", *AIS_ENDINGS, *ASTERIX_ENDINGS)
+ENDINGS = (".csv", ".parquet", *AIS_ENDINGS, *ASTERIX_ENDINGS, *BAG_ENDINGS)
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,8 +141,14 @@ def seconds(time: Any) -> float:
     return (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()
 
 
-def read_table(path: str | Path) -> Table:
-    """A .csv file with a header line, a .parquet file, AIS messages (.nmea, .ais) or radar plots (.ast, .asterix).
+def read_table(path: str | Path, *, reports: bool = False) -> Table:
+    """A .csv file with a header line, or a .parquet file; or as `foreign` and `bags` have it.
+
+    These are AIS messages (.nmea, .ais), plots and tracks of radars (.ast, .asterix), and ROS 2 bags (.db3, .mcap).
+
+    Args:
+        path: of the file.
+        reports: whether positions that targets report are asked for, of a file that may have scans, too.
 
     Raises:
         MissingPackageError: what reads it is not installed.
@@ -158,7 +165,9 @@ def read_table(path: str | Path) -> Table:
     if file.suffix.lower() in AIS_ENDINGS:
         return Table(*read_ais(file), str(file))
     if file.suffix.lower() in ASTERIX_ENDINGS:
-        return Table(*read_asterix(file), str(file), "north")
+        return Table(*read_asterix(file, reports=reports), str(file), "north")
+    if file.suffix.lower() in BAG_ENDINGS:
+        return Table(*read_bag(file, reports=reports), str(file))
     return _read_csv(file) if file.suffix.lower() == ".csv" else _read_parquet(file)
 
 

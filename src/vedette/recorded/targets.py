@@ -78,7 +78,7 @@ class RecordedTargets:
             InputError: names the file, row, column, what was expected and what came.
         """
         reports = parse_reports(
-            read_table(path), columns=columns, origin_deg=origin_deg, usual_origin_deg=usual_origin_deg
+            read_table(path, reports=True), columns=columns, origin_deg=origin_deg, usual_origin_deg=usual_origin_deg
         )
         return cls(reports, time_origin, cleaning or Cleaning())
 

@@ -68,8 +68,11 @@ def _columns(recorded: RecordedTargets, file: FilePath) -> Iterator[Finding]:
     except (OSError, csv.Error) as error:
         yield ("targets", "path"), "a readable CSV file", f"{describe(recorded.path)}: {error}"
         return
+    from vedette.recorded.opensky import is_opensky
     from vedette.recorded.tables import column_names
 
+    if not recorded.columns.given() and is_opensky(header):
+        return
     given, shown = recorded.columns.given(), column_names(header)
     for key, name in given.items():
         if name not in header:

@@ -1,0 +1,78 @@
+"""Recordings of ROS 2 (rosbag2), as tables: detections that have positions, and what receivers say of themselves."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from typing import Any
+
+from vedette.errors import InputError
+from vedette.extras import need
+from vedette.text import elided, printable
+
+BAG_ENDINGS = (".db3", ".mcap")
+_POSES, _POINT, _FIX = "geometry_msgs/msg/PoseArray", "geometry_msgs/msg/PointStamped", "sensor_msgs/msg/NavSatFix"
+_FIRST_DATE = 1e8  # s since 1970; smaller stamps are seconds of a simulation
+
+
+def read_bag(file: Path, *, reports: bool) -> tuple[dict[str, list[Any]], list[int]]:
+    """Messages of a bag, each at the time of its header.
+
+    Of `PoseArray` and `PointStamped` their positions, in metres in the plane of the scenario: `time`, `sensor` (the
+    topic), `x`, `y`; an array without poses is a scan that found nothing. With `reports`, of `NavSatFix` the positions
+    of who sent them: `time`, `id` (the topic), `longitude`, `latitude`; without a fix they are passed over. Other
+    messages are, too. Returns the columns and the number of each row's message among these.
+
+    Raises:
+        MissingPackageError: rosbags is not installed.
+        InputError: no bag, a damaged one, or no such messages in it.
+    """
+    need(f"{file}, which is a ROS 2 bag,", "rosbags")
+    kinds = (_FIX,) if reports else (_POSES, _POINT)
+    rows = list[tuple[int, float, str, Any]]()
+    try:
+        for number, (topic, message) in enumerate(_messages(file, kinds), start=1):
+            stamp = message.header.stamp
+            for place in _places(message):
+                rows.append((number, stamp.sec + 1e-9 * stamp.nanosec, topic, place))
+    except Exception as error:  # whatever a damaged bag makes of the packages that read it
+        said = elided(printable(" ".join(str(error).split())), 200)
+        raise InputError(f"{file}: expected a ROS 2 bag; it cannot be read: {type(error).__name__}: {said}") from error
+    if not rows:
+        raise InputError(f"{file}: expected messages {' or '.join(kinds)}; got none")
+    dates = min(row[1] for row in rows) > _FIRST_DATE
+    columns: dict[str, list[Any]] = {
+        "time": [_date(row[1]) if dates else row[1] for row in rows],
+        "id" if reports else "sensor": [row[2] for row in rows],
+        "longitude" if reports else "x": [row[3][0] for row in rows],
+        "latitude" if reports else "y": [row[3][1] for row in rows],
+    }
+    return columns, [row[0] for row in rows]
+
+
+def _messages(file: Path, kinds: tuple[str, ...]) -> Any:
+    """Topic and content of every message of these kinds, in order of time."""
+    from rosbags.highlevel import AnyReader
+    from rosbags.typesys import Stores, get_typestore
+
+    # Of these messages all distributions have the same; bags that define their own messages are read by those.
+    with AnyReader([file], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
+        wanted = [connection for connection in reader.connections if connection.msgtype in kinds]
+        if wanted:
+            for connection, _, raw in reader.messages(connections=wanted):
+                yield connection.topic, reader.deserialize(raw, connection.msgtype)
+
+
+def _places(message: Any) -> list[tuple[float | None, float | None]]:
+    if message.__msgtype__ == _FIX:
+        return [(message.longitude, message.latitude)] if message.status.status >= 0 else []
+    if message.__msgtype__ == _POINT:
+        return [(message.point.x, message.point.y)]
+    return [(pose.position.x, pose.position.y) for pose in message.poses] or [(None, None)]
+
+
+def _date(stamp: float) -> datetime:
+    return datetime.fromtimestamp(0, UTC) + timedelta(seconds=stamp)
+
+
+__all__ = ["BAG_ENDINGS", "read_bag"]

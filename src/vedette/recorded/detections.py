@@ -1,0 +1,104 @@
+"""Detections of Stone Soup as a table of scans; nothing of it is imported."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from vedette.errors import InputError
+from vedette.models.arguments import reject
+from vedette.recorded.tables import Table
+from vedette.text import shown
+
+_COLUMNS = {"bearing": "bearing_rad", "range": "range_m", "x": "x_m", "y": "y_m", "lon": "lon_deg", "lat": "lat_deg"}
+Place: TypeAlias = tuple[float, float]
+
+
+def table_of_detections(
+    reader: Iterable[tuple[Any, Iterable[Any]]], quantities: Sequence[str | None], *, sensor: str | None = None
+) -> Table:
+    """The rows of what a `DetectionReader`, a simulator or a list of the same yields, for `parse_scans`.
+
+    Bearings are Stone Soup's: from the east, in rad; where the detection's `measurement_model` has a
+    `translation_offset` and a `rotation_offset`, of a sensor that was there, and turned so far.
+
+    Args:
+        reader: pairs of a time (a `datetime`; without a zone it is taken as UTC) and a set of detections, each with a
+            `state_vector`. A set without any is a scan that found nothing, where `sensor` says whose; it was
+            where that sensor last said.
+        quantities: of the elements of the state vector, such as ("bearing", "range"): bearing, range, x, y, lon or
+            lat; None: an element that is not taken.
+        sensor: that all are of; None: each says so in its `metadata["sensor"]`.
+
+    Raises:
+        InputError: names the scan, the detection and its attribute, what was expected and what came.
+    """
+    for quantity in quantities:
+        if quantity is not None and quantity not in _COLUMNS:
+            raise reject("quantities", f"None and names among {', '.join(_COLUMNS)}", quantity)
+    columns: dict[str, list[Any]] = {"time": [], "sensor": []}
+    columns |= {_COLUMNS[name]: [] for name in quantities if name is not None}
+    places, numbers = list[Place | None](), list[int]()
+    for number, pair in enumerate(reader, start=1):
+        time, found = _pair(pair, number)
+        rows = [_row(each, quantities, sensor, f"scan {number}, detection {k}") for k, each in found]
+        if not rows and sensor is not None:
+            rows = [(sensor, (), None)]
+        for name, values, own in sorted(rows, key=lambda row: row[:2]):  # a set has no order of its own
+            for column, cell in zip(columns, (time, name, *(values or [None] * len(columns))), strict=False):
+                columns[column].append(cell)
+            places.append(own if values or not places else places[-1])
+            numbers.append(number)
+    known = [k for k, place in enumerate(places) if place is not None]
+    if known:
+        cells = list(columns.values())[2]  # of scans of nothing before all others
+        places[: known[0]] = [places[known[0]] if cell is None else None for cell in cells[: known[0]]]
+        if None in places:
+            wanted = "a measurement_model with a translation_offset, as others have"
+            raise InputError(f"detections, scan {numbers[places.index(None)]}: expected {wanted}; got none")
+        columns |= {f"own_{axis}": [place[k] for place in places if place] for k, axis in enumerate("xy")}
+    return Table(columns, numbers, "detections", "east")
+
+
+def _pair(pair: Any, number: int) -> tuple[Any, list[tuple[int, Any]]]:
+    try:
+        time, found = pair
+        return time, list(enumerate(found, start=1))
+    except (TypeError, ValueError):
+        raise InputError(f"detections, scan {number}: expected a time and detections; got {shown(str(pair))}") from None
+
+
+def _row(
+    detection: Any, quantities: Sequence[str | None], sensor: str | None, place: str
+) -> tuple[str, tuple[float, ...], Place | None]:
+    """Sensor, what is taken of the state vector, and where the sensor was."""
+    name = sensor
+    if name is None:
+        told = getattr(detection, "metadata", None) or {}
+        if "sensor" not in told:
+            raise InputError(f"detections, {place}, metadata: expected a sensor, as no other is named; got none")
+        name = str(told["sensor"])
+    vector = getattr(detection, "state_vector", None)
+    try:
+        elements = [float(element) for element in np.ravel(np.asarray(vector, dtype=object))]
+    except (TypeError, ValueError):
+        elements = []
+    if len(elements) != len(quantities) or not np.isfinite(elements).all():
+        wanted = f"{len(quantities)} finite numbers ({', '.join(map(str, quantities))})"
+        raise InputError(f"detections, {place}, state_vector: expected {wanted}; got {shown(str(vector))}")
+    model = getattr(detection, "measurement_model", None)
+    offset, rotation = (getattr(model, f"{of}_offset", None) for of in ("translation", "rotation"))
+    if "bearing" in quantities and rotation is not None:
+        place_of = quantities.index("bearing")
+        elements[place_of] = math.remainder(elements[place_of] + float(np.ravel(rotation)[-1]), 2.0 * math.pi)
+    values = tuple(element for quantity, element in zip(quantities, elements, strict=True) if quantity is not None)
+    if offset is None or not {"bearing", "range"} & set(quantities):
+        return name, values, None
+    east, north = (float(element) for element in np.ravel(np.asarray(offset, dtype=object))[:2])
+    return name, values, (east, north)
+
+
+__all__ = ["table_of_detections"]

@@ -1,0 +1,57 @@
+"""Tables of state vectors of the OpenSky Network: what aircraft report of themselves by ADS-B."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+from vedette.recorded.tables import FARTHEST, Table
+
+_POSITION = ("icao24", "lat", "lon")
+_VELOCITY = ("velocity", "heading")
+_EMPTY = ("", "null", "none", "nan", r"\n")
+
+
+def is_opensky(columns: Iterable[str]) -> bool:
+    """Whether these are the columns of state vectors."""
+    return {"time", *_POSITION} <= set(columns)
+
+
+def of_opensky(table: Table) -> tuple[Table, dict[str, str]]:
+    """State vectors as reports of aircraft, and which of the columns are what `parse_reports` asks for.
+
+    State vectors say every second what was last heard: rows without a position, and those that repeat one, are left
+    out, and the time is that of the position (`lastposupdate`) where every row has one. Velocities are `velocity`
+    (m/s over ground) along `heading` (degrees clockwise from the north) where every row has both.
+
+    Raises:
+        InputError: names the file, row, column, what was expected and what came.
+    """
+    kept = [i for i in range(len(table.rows)) if all(_is_there(table, name, i) for name in _POSITION)]
+    time = "lastposupdate" if _are_there(table, ("lastposupdate",), kept) else "time"
+    first: dict[tuple[str, str], int] = {}
+    for i in kept:
+        first.setdefault((str(table.columns["icao24"][i]), str(table.columns[time][i])), i)
+    kept = list(first.values())
+    columns = {name: [cells[i] for i in kept] for name, cells in table.columns.items()}
+    found = Table(columns, [table.rows[i] for i in kept], table.source)
+    names = {"time": time, "id": "icao24", "longitude": "lon", "latitude": "lat"}
+    if not _are_there(table, _VELOCITY, kept):
+        return found, names
+    speed, heading = found.numbers("velocity", FARTHEST), np.radians(found.numbers("heading", 360.0))
+    columns |= {"vx": (speed * np.sin(heading)).tolist(), "vy": (speed * np.cos(heading)).tolist()}
+    return found, {**names, "vx": "vx", "vy": "vy"}
+
+
+def _are_there(table: Table, names: Iterable[str], rows: list[int]) -> bool:
+    return all(name in table.columns and all(_is_there(table, name, i) for i in rows) for name in names)
+
+
+def _is_there(table: Table, name: str, row: int) -> bool:
+    cell: Any = table.columns[name][row]
+    return cell is not None and cell == cell and str(cell).strip().lower() not in _EMPTY
+
+
+__all__ = ["is_opensky", "of_opensky"]
