@@ -38,6 +38,38 @@ def test_scans_become_tracks_results_and_a_picture(place: Path) -> None:
     assert (told.exit_code, "mean OSPA" in told.stdout) == (0, True)
 
 
+@pytest.mark.parametrize(
+    "words",
+    ["results run", "report run", "video run --out a.gif", "check run/scenario.yaml", "show run/scenario.yaml",
+     "run run/scenario.yaml"],
+)  # fmt: skip
+@pytest.mark.parametrize("name", ["scans.csv", "truth.csv"])
+def test_a_recording_that_is_gone_or_another_is_told_by_every_command(tracked: Path, words: str, name: str) -> None:
+    file = tracked / name
+    content = file.read_bytes()
+    is_enough = words == "results run"  # what was found is in the folder
+    for changed, message in (
+        (content.replace(b"1", b"2", 1), "got another ("),
+        (None, "no such file"),
+    ):
+        if changed is None:
+            file.unlink()
+        else:
+            file.write_bytes(changed)
+        told = CliRunner().invoke(app, words.split(), env={"COLUMNS": "400"})
+        assert told.exit_code == (0 if is_enough else 1), told.output
+        for part in (name, message, "scenario.yaml:"):
+            assert part in (told.stdout if words.startswith("check") else told.stderr)
+    file.write_bytes(content)
+    assert CliRunner().invoke(app, ["check", "run/scenario.yaml"]).exit_code == 0
+
+
+@pytest.fixture
+def tracked(place: Path) -> Path:
+    assert call("scans.csv", "--sensors", "radars.yaml", "--truth", "truth.csv", "--out", "run").exit_code == 0
+    return place
+
+
 def test_without_truth_no_error_is_told(place: Path) -> None:
     result = call("scans.csv", "--sensors", "radars.yaml")
     assert result.exit_code == 0, result.output

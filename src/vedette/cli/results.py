@@ -195,13 +195,14 @@ def results(
 
 
 def _scenario_of(folder: Path) -> Scenario | None:
-    """That of a saved run; None where it is not kept beside it, or cannot be read."""
+    """That of a saved run; None where it is not kept beside it, or cannot be read, which is told."""
     from vedette.scenarios import load_scenario
     from vedette.simulation.storage import SCENARIO
 
     try:
         return load_scenario(folder / SCENARIO)
-    except VedetteError:
+    except VedetteError as error:
+        note(f"without its scenario: {error}")
         return None
 
 

@@ -110,7 +110,7 @@ def run(
     """Run a scenario once: tracks, decisions with their rewards, errors, figures."""
     from vedette.evaluation.runs import run_scenario
     from vedette.scenarios import load_scenario
-    from vedette.scenarios.dumping import dump_scenario
+    from vedette.scenarios.dumping import dump_kept
     from vedette.simulation.loop import RunInterrupted, RunStopped
     from vedette.simulation.storage import check_free, save_run
 
@@ -135,7 +135,7 @@ def run(
         print_run(record, loaded)
         kept = out if stop is None or not _holds_whole_run(out) else None
         if kept is not None:
-            save_run(record, kept, scenario_text=dump_scenario(loaded.model, folder=loaded.folder), overwrite=overwrite)
+            save_run(record, kept, scenario_text=dump_kept(loaded), overwrite=overwrite)
     publish({**run_document(record, loaded.model.ospa.unit), "folder": kept})
     if stop is not None and kept is None:
         end_stopped(stop, "nothing was written" if out is None else f"{out} keeps the whole run that was there")

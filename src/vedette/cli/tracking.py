@@ -45,7 +45,7 @@ def track(
     """Track recorded scans: estimates, whole tracks, health, figures; with the targets' reports, errors too."""
     from vedette.evaluation.runs import run_scenario
     from vedette.evaluation.track_table import table_of_run, write_tracks
-    from vedette.scenarios.dumping import dump_scenario
+    from vedette.scenarios.dumping import dump_kept
     from vedette.simulation.loop import RunInterrupted, RunStopped
     from vedette.simulation.storage import check_free, save_run
 
@@ -67,8 +67,7 @@ def track(
         table = table_of_run(record, scenario)
         written: list[Path] = []
         if out is not None:
-            text = dump_scenario(scenario.model, folder=scenario.folder)
-            save_run(record, out, scenario_text=text, overwrite=overwrite)
+            save_run(record, out, scenario_text=dump_kept(scenario), overwrite=overwrite)
             for ending in (".csv", ".geojson") if scenario.model.origin is not None else (".csv",):
                 write_tracks(out / "tracks" / f"tracks{ending}", table)
                 written.append(out / "tracks" / f"tracks{ending}")

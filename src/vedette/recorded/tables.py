@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import hashlib
 import numbers
 import os
 from collections.abc import Iterable, Mapping, Sequence
@@ -169,6 +170,24 @@ def read_table(path: str | Path, *, reports: bool = False) -> Table:
     if file.suffix.lower() in BAG_ENDINGS:
         return Table(*read_bag(file, reports=reports), str(file))
     return _read_csv(file) if file.suffix.lower() == ".csv" else _read_parquet(file)
+
+
+def check_unchanged(path: str | Path, sha256: str | None) -> None:
+    """That a file is the one of which somebody kept the SHA-256, in hexadecimal digits; None: nobody did.
+
+    Raises `InputError` where it is another; of one that is gone, whoever reads it says so.
+    """
+    if sha256 is None or not os.path.isfile(path):
+        return
+    if (found := sha256_of(path)) != sha256:
+        wanted = f"the file of which sha256 was kept ({sha256[:12]}...)"
+        raise InputError(f"{path}: expected {wanted}; got another ({found[:12]}...), as it was changed since")
+
+
+def sha256_of(path: str | Path) -> str:
+    """Of the bytes of a file, in hexadecimal digits. Raises `OSError` where it cannot be read."""
+    with Path(path).open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def _read_csv(file: Path) -> Table:

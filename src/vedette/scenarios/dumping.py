@@ -5,18 +5,22 @@ from __future__ import annotations
 import io
 import re
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
 from ruamel.yaml.scalarstring import DoubleQuotedScalarString
 
+from vedette.recorded.tables import sha256_of
 from vedette.scenarios.sections import ScenarioModel, Section
 from vedette.scenarios.sections.base import sections_in
 from vedette.scenarios.sections.custom import Custom
 from vedette.scenarios.sections.recording import RecordingSection
 from vedette.scenarios.sections.targets import RecordedTargets
 from vedette.scenarios.yaml_reader import plain_scalar
+
+if TYPE_CHECKING:
+    from vedette.scenarios.loading import Scenario
 
 _LONGEST_LINE = 100
 # What stays without quotes: words of letters, digits, dots and dashes that YAML 1.2 takes for nothing else.
@@ -31,6 +35,15 @@ def dump_scenario(model: ScenarioModel, *, folder: Path | None = None) -> str:
         folder: what the files that it names are relative to; with it, the text can be kept anywhere.
     """
     return dump_data(model.model_dump(mode="json"), folder)
+
+
+def dump_kept(scenario: Scenario) -> str:
+    """YAML text of a scenario that is kept beside its run: with the SHA-256 of its recordings, which may be changed."""
+    data = _anchored(scenario.model.model_dump(mode="json"), scenario.folder.resolve())
+    for section in (data["recording"], data["targets"]):
+        if section is not None and "sha256" in section:
+            section["sha256"] = sha256_of(section["path"])
+    return dump_data(data)
 
 
 def dump_data(data: Any, folder: Path | None = None) -> str:

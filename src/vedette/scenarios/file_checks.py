@@ -20,10 +20,13 @@ from vedette.scenarios.sections import ScenarioModel
 from vedette.scenarios.sections.base import attempt, is_whole
 from vedette.scenarios.sections.custom import Custom, customs
 from vedette.scenarios.sections.targets import RecordedTargets
+from vedette.text import elided, printable
+
+_LONGEST_PATH = 200
 
 
 def _absent(file: str) -> str:
-    return f"{describe(file)}: no such file"
+    return f'"{elided(printable(file), _LONGEST_PATH)}": no such file'
 
 
 def recorded_findings(model: ScenarioModel, folder: FilePath) -> Iterator[Finding]:

@@ -6,6 +6,7 @@ Each field's description ends with its unit in brackets; [-] is a number without
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import cache
 from inspect import isfunction
@@ -75,6 +76,12 @@ def _word(value: str) -> str:
     return value
 
 
+def _digest(value: str) -> str:
+    if not re.fullmatch(r"[0-9a-f]{64}", value):
+        raise expected("64 hexadecimal digits, 0 to 9 and a to f")
+    return value
+
+
 def _not_tiny(value: float) -> float:
     if 0.0 < value < _SMALLEST:
         raise expected(f"a number of at least {_SMALLEST:g}")
@@ -93,6 +100,8 @@ def _too_large(value: Any, path: tuple[str | int, ...]) -> tuple[str | int, ...]
 
 Whole = Annotated[int, BeforeValidator(_whole)]
 Name = Annotated[str, AfterValidator(_word)]
+Sha256 = Annotated[str, AfterValidator(_digest)]
+SHA256_FIELD = "SHA-256 that the file must have, as it is kept beside a run of it; none: any [-]."
 # By the names of `vedette.models.fields`, and within what is of sense in a file.
 Count = Annotated[Whole, Field(ge=1, le=1_000_000_000)]
 Natural = Annotated[Whole, Field(ge=0)]

@@ -13,7 +13,7 @@ from pydantic import Field
 
 from vedette.errors import InputError
 from vedette.scenarios.faults import Finding, describe
-from vedette.scenarios.sections.base import NonNegative, Section, attempt
+from vedette.scenarios.sections.base import SHA256_FIELD, NonNegative, Section, Sha256, attempt
 
 if TYPE_CHECKING:
     from vedette.recorded import Origin, RecordedScans, Site
@@ -28,6 +28,7 @@ class RecordingSection(Section):
     """
 
     path: str = Field(min_length=1, description="CSV or Parquet file, relative to the scenario file [-].")
+    sha256: Sha256 | None = Field(default=None, description=SHA256_FIELD)
     columns: dict[str, str] = Field(
         default={},
         description="Names of the columns of time, sensor, range, bearing, x, y, lon, lat, own_x, own_y, own_lon, "
@@ -74,9 +75,10 @@ def _read(
 ) -> RecordedScans:
     """The scans of a file as it was when it last changed, read as a section says, in JSON as mappings have no hash."""
     from vedette.recorded import Conventions, parse_scans
-    from vedette.recorded.tables import read_table
+    from vedette.recorded.tables import check_unchanged, read_table
 
     own = RecordingSection.model_validate_json(section)
+    check_unchanged(file, own.sha256)
     conventions = Conventions(own.columns, own.units, own.bearings, own.gather, own.bad_rows)
     return parse_scans(read_table(file), sites, conventions, origin)
 

@@ -13,7 +13,17 @@ from pydantic import Field
 
 from vedette.errors import InputError
 from vedette.scenarios.faults import Finding, describe
-from vedette.scenarios.sections.base import Point, Positive, Probability, Reals, Section, Step, check
+from vedette.scenarios.sections.base import (
+    SHA256_FIELD,
+    Point,
+    Positive,
+    Probability,
+    Reals,
+    Section,
+    Sha256,
+    Step,
+    check,
+)
 from vedette.scenarios.sections.derived import Derived, derived
 from vedette.scenarios.sections.world import RegionSection, grouped_order
 
@@ -114,12 +124,13 @@ class Columns(Section):
         return {key: name for key in type(self).model_fields if (name := getattr(self, key)) is not None}
 
 
-@derived("vedette.recorded.cleaning:Cleaning", first=("path", "columns", "time_origin", "origin_deg"))
+@derived("vedette.recorded.cleaning:Cleaning", first=("path", "sha256", "columns", "time_origin", "origin_deg"))
 class RecordedTargets(Derived):
     """Targets from a CSV or Parquet file of reports: time, which target, where. Interpolated at the scans."""
 
     kind: Literal["recorded"] = Field(default="recorded", description="Kind of targets [-].")
     path: str = Field(min_length=1, description="CSV or Parquet file, relative to the scenario file [-].")
+    sha256: Sha256 | None = Field(default=None, description=SHA256_FIELD)
     columns: Columns = Field(default=Columns(), description="Names of its columns [-].")
     time_origin: float | str | None = Field(
         default=None, description="Recorded time of the first scan, a number or ISO 8601; none: the earliest [s]."
@@ -161,7 +172,9 @@ def _read(
 ) -> RecordedSource:
     from vedette.recorded import Cleaning
     from vedette.recorded import RecordedTargets as RecordedSource
+    from vedette.recorded.tables import check_unchanged
 
+    check_unchanged(file, section.sha256)
     edges = region.build()
     return RecordedSource.from_file(
         file,
