@@ -20,6 +20,7 @@ EXTRA_OF = {
     "asterix": "readers",
     "pyais": "readers",
     "rosbags": "readers",
+    "mcap": "formats",
     "websockets": "live",
 }
 

@@ -70,6 +70,18 @@ def tracked(place: Path) -> Path:
     return place
 
 
+def test_tracks_are_written_in_the_formats_that_are_asked_for(place: Path) -> None:
+    words = ("scans.csv", "--sensors", "radars.yaml", "--out", "out")
+    result = call(*words, *(word for name in ("czml", "mcap", "parquet") for word in ("--format", name)))
+    assert result.exit_code == 0, result.output
+    assert {path.name for path in (place / "out/tracks").iterdir()} == {
+        f"tracks.{name}" for name in ("czml", "mcap", "parquet")
+    }
+    other = call(*words, "--overwrite", "--format", "kml")
+    assert (other.exit_code, "expected one of csv, geojson, parquet, czml, mcap; got kml" in other.stderr) == (2, True)
+    assert call(*words[:3], "--format", "csv").exit_code == 2
+
+
 def test_without_truth_no_error_is_told(place: Path) -> None:
     result = call("scans.csv", "--sensors", "radars.yaml")
     assert result.exit_code == 0, result.output

@@ -333,10 +333,68 @@ def test_tracks_are_written_as_others_read_them(folder: Path) -> None:
     long = [each for each in features if len(each["properties"]["time_s"]) > 10]
     assert sorted(each["properties"]["target"] for each in long) == ["ship 0", "ship 1", "ship 2"]
     assert all(each["geometry"]["type"] == "LineString" for each in long)
-    with pytest.raises(InputError, match=r"expected a file that ends with .csv, .parquet, .geojson; got .txt"):
+    with pytest.raises(
+        InputError, match=r"expected a file that ends with .csv, .parquet, .geojson, .czml, .mcap; got .txt"
+    ):
         write_tracks(folder / "tracks.txt", columns)
-    with pytest.raises(InputError, match="expected tracks in longitude and latitude"):
-        write_tracks(folder / "t.geojson", {name: cells for name, cells in columns.items() if name != "lon_deg"})
+    for ending in ("geojson", "czml", "mcap"):
+        with pytest.raises(InputError, match="expected tracks in longitude and latitude"):
+            write_tracks(folder / f"t.{ending}", {name: cells for name, cells in columns.items() if name != "lon_deg"})
+
+
+def rows_of(columns: Mapping[str, Any]) -> dict[tuple[str, float], tuple[float, float]]:
+    """Longitude and latitude by label and time, to a millisecond."""
+    names = ("label", "time_s", "lon_deg", "lat_deg")
+    return {(label, round(t, 3)): (lon, lat) for label, t, lon, lat in zip(*map(columns.get, names), strict=True)}
+
+
+def test_a_globe_has_the_tracks_at_their_times(folder: Path) -> None:
+    import datetime
+    import json
+
+    made = scenario_of_recording(folder / "radars.yaml", folder / "scans.csv", folder / "truth.csv")
+    columns = table_of_run(run_scenario(made.scenario, "still", seed=0), made.scenario)
+    write_tracks(folder / "tracks.czml", columns)
+    head, *packets = json.loads((folder / "tracks.czml").read_text("utf-8"))
+    assert (head["id"], head["version"]) == ("document", "1.0")
+    assert head["clock"]["interval"] == f"{min(columns['utc'])}/{max(columns['utc'])}"
+    found: dict[tuple[str, float], tuple[float, float]] = {}
+    for packet in packets:
+        start = datetime.datetime.fromisoformat(packet["position"]["epoch"]).timestamp()
+        places = np.reshape(packet["position"]["cartographicDegrees"], (-1, 4))
+        assert (places[:, 3] == 0.0).all()
+        assert packet["availability"].startswith(packet["position"]["epoch"])
+        found |= {(packet["id"], start + time): (lon, lat) for time, lon, lat, _ in places.tolist()}
+    expected = rows_of(columns)
+    assert len(found) == len(expected)
+    for (label, time), place in found.items():
+        near = next(at for name, at in expected if name == label and abs(at - time) < 2e-3)
+        np.testing.assert_allclose(place, expected[label, near], atol=1e-7)
+    assert {"ship 0", "ship 1", "ship 2"} <= {packet["name"] for packet in packets}
+
+
+def test_a_log_has_the_tracks_at_their_times(folder: Path) -> None:
+    import json
+
+    reader = pytest.importorskip("mcap.reader")  # which is not there for the newest Python
+    made = scenario_of_recording(folder / "radars.yaml", folder / "scans.csv", folder / "truth.csv")
+    columns = table_of_run(run_scenario(made.scenario, "still", seed=0), made.scenario)
+    write_tracks(folder / "tracks.mcap", columns)
+    first = (folder / "tracks.mcap").read_bytes()
+    write_tracks(folder / "tracks.mcap", columns)
+    assert (folder / "tracks.mcap").read_bytes() == first
+    found = {}
+    with (folder / "tracks.mcap").open("rb") as file:
+        for schema, channel, message in reader.make_reader(file, validate_crcs=True).iter_messages():
+            told = json.loads(message.data)
+            assert schema.name == "foxglove.LocationFix"
+            assert told["timestamp"]["sec"] * 10**9 + told["timestamp"]["nsec"] == message.log_time
+            label = channel.topic.removeprefix("/tracks/")
+            found[label, round(message.log_time / 1e9, 3)] = told["longitude"], told["latitude"]
+            row = columns["label"].index(label)
+            if columns["time_s"][row] == message.log_time / 1e9:
+                assert told["position_covariance"][0] == columns["std_x_m"][row] ** 2
+    assert found == rows_of(columns)
 
 
 @pytest.mark.parametrize(("bearings", "turn"), [("north", -1.0), ("east", 1.0)])

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from vedette.cli.compiling import compiling
+from vedette.cli.completing import one_of
 from vedette.cli.documents import run_document
 from vedette.cli.errors import named_options, usage_error
 from vedette.cli.options import BAD_ROWS, BadRows, Overwrite, SensorsFile, Speed, Trust
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from vedette.scenarios.of_recording import OfRecording
     from vedette.simulation.records import RunRecord
 
+FORMATS = ("csv", "geojson", "parquet", "czml", "mcap")
 _SHOWN_ROWS = 5
 _LASTING = 10  # estimates of a track that is more than a moment's
 
@@ -38,6 +40,15 @@ def track(
         typer.Option("--out", metavar="DIR", help="Folder for results, tracks, figures; none: only print."),
     ] = None,
     overwrite: Overwrite = False,
+    formats: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--format",
+            metavar="NAME",
+            help="Of the tracks: csv and geojson (default), parquet, czml, mcap; may be repeated.",
+            autocompletion=one_of(*FORMATS),
+        ),
+    ] = None,
     speed: Speed = 10.0,
     bad_rows: BadRows = "refuse",
     trust: Trust = False,
@@ -49,6 +60,11 @@ def track(
     from vedette.simulation.loop import RunInterrupted, RunStopped
     from vedette.simulation.storage import check_free, save_run
 
+    for name in formats or ():
+        if name not in FORMATS:
+            raise usage_error(f"expected one of {', '.join(FORMATS)}; got {name}", "--format")
+    if formats and out is None:
+        raise usage_error("expected with --out, which names the folder", "--format")
     if out is not None:
         need("vedette track --out", "matplotlib", "pyarrow")
         with named_options({"directory": "--out"}):
@@ -68,9 +84,10 @@ def track(
         written: list[Path] = []
         if out is not None:
             save_run(record, out, scenario_text=dump_kept(scenario), overwrite=overwrite)
-            for ending in (".csv", ".geojson") if scenario.model.origin is not None else (".csv",):
-                write_tracks(out / "tracks" / f"tracks{ending}", table)
-                written.append(out / "tracks" / f"tracks{ending}")
+            usual = ("csv", "geojson") if scenario.model.origin is not None else ("csv",)
+            for name in dict.fromkeys(formats or usual):
+                write_tracks(out / "tracks" / f"tracks.{name}", table)
+                written.append(out / "tracks" / f"tracks.{name}")
     if out is not None:
         with interruptible(f"wrote {out}, but not all of its figures"):
             _draw(record, scenario, out)

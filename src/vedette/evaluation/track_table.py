@@ -1,13 +1,10 @@
-"""Estimated tracks for the programs of others: named columns, longitude and latitude, UTC; CSV, Parquet, GeoJSON."""
+"""Estimated tracks for the programs of others: named columns, longitude and latitude, UTC; in files of five formats."""
 
 from __future__ import annotations
 
 import csv
 import io
-import json
-from collections import defaultdict
 from collections.abc import Mapping, Sequence
-from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
@@ -15,14 +12,12 @@ import numpy as np
 
 from vedette.errors import InputError
 from vedette.evaluation.metrics.matching import match_run
+from vedette.evaluation.track_formats import czml, geojson, mcap, utc_text
 from vedette.extras import need
 from vedette.files import write_whole
 from vedette.recorded import Origin
 from vedette.scenarios import Scenario
 from vedette.simulation.records import RunRecord
-
-ENDINGS = (".csv", ".parquet", ".geojson")
-_EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 
 
 def track_table(
@@ -92,21 +87,19 @@ def table_of_run(record: RunRecord, scenario: Scenario) -> dict[str, list[Any]]:
 
 
 def write_tracks(path: Path, table: Mapping[str, Sequence[Any]]) -> None:
-    """Write a track table as its file's ending says: .csv, .parquet or .geojson. It appears whole or not at all.
+    """Write a track table as its file's ending says: .csv, .parquet, .geojson, .czml or .mcap.
 
-    A table of scans can be written, too, as .csv or .parquet.
-
-    GeoJSON has a feature a track, a line through its places in longitude and latitude (a point where there is one),
-    with its label, its target, and times and existence place by place.
+    It appears whole or not at all; what the last three have is in `vedette.evaluation.track_formats`. A table of scans
+    can be written, too, as .csv or .parquet.
 
     Raises:
-        InputError: another ending, a file that cannot be written, or GeoJSON of tracks without longitudes.
+        InputError: another ending, a file that cannot be written, or tracks without longitudes in the last three.
+        MissingPackageError: what writes the format is not installed.
     """
     ending = path.suffix.lower()
     if ending not in ENDINGS:
         raise InputError(f"{path}: expected a file that ends with {', '.join(ENDINGS)}; got {ending or 'none'}")
-    makers = {".csv": _csv, ".parquet": _parquet, ".geojson": _geojson}
-    content = makers[ending](table)
+    content = _MAKERS[ending](table)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         write_whole(path, lambda file: file.write(content))
@@ -118,11 +111,6 @@ def _name(target: int | None, names: Sequence[str]) -> str | None:
     if target is None:
         return None
     return names[target] if target < len(names) else str(target + 1)
-
-
-def utc_text(time: float) -> str:
-    """Seconds since 1970 as ISO 8601, to the millisecond."""
-    return (_EPOCH + timedelta(seconds=time)).isoformat(timespec="milliseconds").replace("+00:00", "Z")
 
 
 def _csv(table: Mapping[str, Sequence[Any]]) -> bytes:
@@ -145,28 +133,7 @@ def _parquet(table: Mapping[str, Sequence[Any]]) -> bytes:
     return content.getvalue()
 
 
-def _geojson(table: Mapping[str, Sequence[Any]]) -> bytes:
-    if "lon_deg" not in table:
-        raise InputError("GeoJSON: expected tracks in longitude and latitude, by an origin of the scenario; got metres")
-    tracks = defaultdict(list)
-    for row, label in enumerate(table["label"]):
-        tracks[label].append(row)
-    features = []
-    for label, rows in tracks.items():
-        places = [[round(table["lon_deg"][row], 7), round(table["lat_deg"][row], 7)] for row in rows]
-        line = {"type": "LineString", "coordinates": places}
-        geometry = line if len(places) > 1 else {"type": "Point", "coordinates": places[0]}
-        told = {"label": label, "target": _most_common([table["target"][row] for row in rows])}
-        for name in ("time_s", "utc", "existence"):
-            if name in table:
-                told[name] = [table[name][row] for row in rows]
-        features.append({"type": "Feature", "geometry": geometry, "properties": told})
-    return json.dumps({"type": "FeatureCollection", "features": features}).encode()
-
-
-def _most_common(names: Sequence[str | None]) -> str | None:
-    found = [name for name in names if name is not None]
-    return max(sorted(set(found)), key=found.count) if found else None
-
+_MAKERS = {".csv": _csv, ".parquet": _parquet, ".geojson": geojson, ".czml": czml, ".mcap": mcap}
+ENDINGS = tuple(_MAKERS)
 
 __all__ = ["ENDINGS", "table_of_run", "track_table", "utc_text", "write_tracks"]

@@ -1,0 +1,138 @@
+"""Whole tracks in the formats of programs that draw maps and globes and replay logs: GeoJSON, CZML, MCAP."""
+
+from __future__ import annotations
+
+import io
+import json
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from datetime import UTC, datetime, timedelta
+from typing import Any, TypeAlias
+
+from vedette.errors import InputError
+from vedette.extras import need
+
+Table: TypeAlias = Mapping[str, Sequence[Any]]
+_EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
+_DIGITS = 7  # of a degree: a centimetre
+# As Foxglove's map takes it; covariances are of east, north and up, row by row.
+_FIX = {
+    "type": "object",
+    "properties": {
+        "timestamp": {
+            "type": "object",
+            "title": "time",
+            "properties": {"sec": {"type": "integer"}, "nsec": {"type": "integer"}},
+        },
+        "frame_id": {"type": "string"},
+        "latitude": {"type": "number"},
+        "longitude": {"type": "number"},
+        "altitude": {"type": "number"},
+        "position_covariance": {"type": "array", "items": {"type": "number"}, "minItems": 9, "maxItems": 9},
+        "position_covariance_type": {"type": "integer"},
+        "existence": {"type": "number"},
+    },
+}
+_DIAGONAL_KNOWN = 2  # a kind of covariance: of these, what is on the diagonal counts
+
+
+def geojson(table: Table) -> bytes:
+    """A feature a track, a line through its places (a point where there is one), with times and existence by place."""
+    features = []
+    for label, rows in _tracks("GeoJSON", table).items():
+        places = [[table["lon_deg"][row], table["lat_deg"][row]] for row in rows]
+        places = [[round(degrees, _DIGITS) for degrees in place] for place in places]
+        line = {"type": "LineString", "coordinates": places}
+        geometry = line if len(places) > 1 else {"type": "Point", "coordinates": places[0]}
+        told: dict[str, Any] = {"label": label, "target": _most_common([table["target"][row] for row in rows])}
+        for name in ("time_s", "utc", "existence"):
+            if name in table:
+                told[name] = [table[name][row] for row in rows]
+        features.append({"type": "Feature", "geometry": geometry, "properties": told})
+    return json.dumps({"type": "FeatureCollection", "features": features}).encode()
+
+
+def czml(table: Table) -> bytes:
+    """A packet a track, for a globe: a point with its path, at height 0, named by its target or else its label.
+
+    Times that are no dates are taken as seconds since 1970.
+    """
+    packets: list[dict[str, Any]] = []
+    for label, rows in _tracks("CZML", table).items():
+        times = [table["time_s"][row] for row in rows]
+        places: list[float] = []
+        for row, time in zip(rows, times, strict=True):
+            degrees = [round(table[name][row], _DIGITS) for name in ("lon_deg", "lat_deg")]
+            places += [round(time - times[0], 6), *degrees, 0.0]
+        name = _most_common([table["target"][row] for row in rows]) or label
+        packets.append(
+            {
+                "id": label,
+                "name": name,
+                "availability": f"{utc_text(times[0])}/{utc_text(times[-1])}",
+                "position": {"epoch": utc_text(times[0]), "cartographicDegrees": places},
+                "point": {"pixelSize": 8},
+                "path": {"width": 2},
+                "label": {"text": name, "font": "12px sans-serif", "pixelOffset": {"cartesian2": [0, -16]}},
+            }
+        )
+    first, last = utc_text(min(table["time_s"], default=0.0)), utc_text(max(table["time_s"], default=0.0))
+    clock = {"currentTime": first, "interval": f"{first}/{last}"}
+    return json.dumps([{"id": "document", "name": "vedette", "version": "1.0", "clock": clock}, *packets]).encode()
+
+
+def mcap(table: Table) -> bytes:
+    """A channel a track, `/tracks/LABEL`, of messages `foxglove.LocationFix` in JSON, with the existence beside."""
+    tracks = _tracks("MCAP", table)
+    need("an MCAP file", "mcap")
+    from mcap.writer import Writer
+
+    content = io.BytesIO()
+    writer = Writer(content)
+    writer.start(library="vedette")
+    schema = writer.register_schema("foxglove.LocationFix", "jsonschema", json.dumps(_FIX).encode())
+    channels = {
+        row: (writer.register_channel(f"/tracks/{label}", "json", schema), label)
+        for label, rows in tracks.items()
+        for row in rows
+    }
+    for row, time in enumerate(table["time_s"]):  # of all tracks, in order of time
+        channel, label = channels[row]
+        nanoseconds = max(0, round(time * 1e9))  # a log begins in 1970
+        east, north = table["std_x_m"][row], table["std_y_m"][row]
+        message = {
+            "timestamp": {"sec": nanoseconds // 10**9, "nsec": nanoseconds % 10**9},
+            "frame_id": label,
+            "latitude": table["lat_deg"][row],
+            "longitude": table["lon_deg"][row],
+            "altitude": 0.0,
+            "position_covariance": [east * east, 0.0, 0.0, 0.0, north * north, 0.0, 0.0, 0.0, 0.0],
+            "position_covariance_type": _DIAGONAL_KNOWN,
+            "existence": table["existence"][row],
+        }
+        writer.add_message(channel, nanoseconds, json.dumps(message).encode(), nanoseconds)
+    writer.finish()  # type: ignore[no-untyped-call]
+    return content.getvalue()
+
+
+def _tracks(kind: str, table: Table) -> dict[str, list[int]]:
+    """Rows of every label, for a format of places on the Earth."""
+    if "lon_deg" not in table:
+        raise InputError(f"{kind}: expected tracks in longitude and latitude, by an origin of the scenario; got metres")
+    tracks = defaultdict(list)
+    for row, label in enumerate(table["label"]):
+        tracks[label].append(row)
+    return tracks
+
+
+def utc_text(time: float) -> str:
+    """Seconds since 1970 as ISO 8601, to the millisecond."""
+    return (_EPOCH + timedelta(seconds=time)).isoformat(timespec="milliseconds").replace("+00:00", "Z")
+
+
+def _most_common(names: Sequence[str | None]) -> str | None:
+    found = [name for name in names if name is not None]
+    return max(sorted(set(found)), key=found.count) if found else None
+
+
+__all__ = ["czml", "geojson", "mcap", "utc_text"]
