@@ -17,7 +17,7 @@ from vedette.scenarios import parse_scenario
 WORLD = r"""
 name: small -> nane: small
     1:1: name: expected a value, as it is required, got nothing
-    1:1: nane: expected one of birth, control, description, estimator, filter, format, fusion, metrics, motion, name, network, origin, ospa, planners, recording, region, sensor_defaults, sensors, survival, targets, time, undetected, got an unknown key (did you mean name?)
+    1:1: nane: expected one of birth, coastline, control, description, estimator, filter, format, fusion, metrics, motion, name, network, origin, ospa, planners, recording, region, sensor_defaults, sensors, survival, targets, time, undetected, got an unknown key (did you mean name?)
 name: small -> name: ''
     1:7: name: expected a name of one or more printable characters, got ""
 name: small -> name: small\nformat: 2

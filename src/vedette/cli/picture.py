@@ -48,7 +48,7 @@ def scenario_figure(scenario: Scenario, truth: Truth) -> Figure:
     figure = new_figure(float(np.clip(COLUMN_WIDTH * 0.85 * aspect, 1.5, 2.5 * COLUMN_WIDTH)) + 0.7)
     axes = figure.subplots()
     axes.set_aspect("equal")
-    draw_zones(axes, zones(scenario.model), scale)
+    draw_zones(axes, zones(scenario), scale)
     _draw_births(axes, scenario, scale)
     _draw_tracks(axes, truth, scale)
     _draw_sensors(axes, scenario, scale)
@@ -58,7 +58,7 @@ def scenario_figure(scenario: Scenario, truth: Truth) -> Figure:
         axis.set_major_locator(MaxNLocator(6, steps=[1, 2, 5, 10]))
     label_axes(axes, scale, None if scenario.model.origin is None else scenario.model.origin.build())
     axes.set_title(drawn_text(scenario.name), pad=14)  # above the names of sensors at the upper edge
-    handles = [*_legend(scenario), *zone_handles(zones(scenario.model))]
+    handles = [*_legend(scenario), *zone_handles(zones(scenario))]
     columns = legend_columns([str(handle.get_label()) for handle in handles])
     figure.legend(handles=handles, loc="outside lower center", ncols=columns)
     return figure

@@ -72,12 +72,14 @@ def _file(section: Section) -> str:
 
 
 def _anchored(value: Any, folder: Path) -> Any:
-    """The data with the files of recorded targets and of custom models as absolute paths."""
+    """The data with the files of recorded targets and of custom models as absolute paths; so is a coastline."""
     if isinstance(value, list):
         return [_anchored(item, folder) for item in value]
     if not isinstance(value, dict):
         return value
     anchored = {key: _anchored(item, folder) for key, item in value.items()}
+    if isinstance(value.get("coastline"), str):
+        anchored["coastline"] = str((folder / value["coastline"]).resolve())
     if value.get("kind") == "recorded" or {"path", "bad_rows"} <= set(value):
         anchored["path"] = str((folder / value["path"]).resolve())
     elif value.get("kind") == "custom" and ".py:" in value["function"]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from pathlib import Path as FilePath
 from typing import Any
 
@@ -15,6 +15,8 @@ from vedette.scenarios.sections.places import OriginSection
 
 _MOST_BYTES = 20_000_000
 _MOST_CORNERS = 50_000  # of all zones of a file: each is looked at for every course of every sensor
+
+_SIMPLE = ("Point", "MultiPoint", "LineString", "MultiLineString", "Polygon", "MultiPolygon")
 
 Ring = list[list[float]]
 
@@ -66,13 +68,13 @@ def _origin(data: Mapping[str, Any]) -> Origin:
 def _read(constraint: Mapping[str, Any], origin: Origin, folder: FilePath) -> list[list[Ring]]:
     """The outer ring of each polygon and then its holes, m."""
     name = constraint["geojson"]
-    if not isinstance(name, str) or not os.path.isfile(folder / name):
-        raise InputError(f"{describe(name)}: no such file")
-    try:
-        content = parse_json(read_text(folder / name, "GeoJSON file", _MOST_BYTES))
-    except ValueError as error:
-        raise InputError(f"{describe(name)}: {error}") from None
-    found = [[_in_metres(ring, origin, name) for ring in polygon] for polygon in _polygons(content, name) if polygon]
+    polygons = (
+        polygon
+        for geometry in geometries(name, folder)
+        for polygon in (geometry["coordinates"] if geometry["type"] == "MultiPolygon" else [geometry["coordinates"]])
+        if geometry["type"].endswith("Polygon")
+    )
+    found = [[_in_metres(ring, origin, name) for ring in listed(polygon)] for polygon in polygons if polygon]
     if not found:
         raise InputError(f"{describe(name)}: no polygon in it")
     if (number := sum(len(ring) for rings in found for ring in rings)) > _MOST_CORNERS:
@@ -80,23 +82,39 @@ def _read(constraint: Mapping[str, Any], origin: Origin, folder: FilePath) -> li
     return found
 
 
-def _polygons(content: Any, name: str) -> Iterator[Sequence[Any]]:
-    """The rings of every polygon, wherever in the file it is; lines and points are no zones."""
+def geometries(name: Any, folder: FilePath) -> Iterator[Mapping[str, Any]]:
+    """The points, lines and polygons of a GeoJSON file, wherever in it they are, with lists of coordinates.
+
+    Raises `InputError` for a name that is none, a file that is not there, or one that is no GeoJSON.
+    """
+    if not isinstance(name, str) or not os.path.isfile(folder / name):
+        raise InputError(f"{describe(name)}: no such file")
+    try:
+        content = parse_json(read_text(folder / name, "GeoJSON file", _MOST_BYTES))
+    except ValueError as error:
+        raise InputError(f"{describe(name)}: {error}") from None
+    return _within(content, name)
+
+
+def listed(value: Any) -> list[Any]:
+    """What should be a list; of anything else nothing."""
+    return value if isinstance(value, list) else []
+
+
+def _within(content: Any, name: str) -> Iterator[Mapping[str, Any]]:
     kind = content.get("type") if isinstance(content, Mapping) else None
     if kind == "FeatureCollection":
-        for feature in content.get("features") or ():
-            yield from _polygons(feature, name)
+        for feature in listed(content.get("features")):
+            yield from _within(feature, name)
     elif kind == "Feature":
         if content.get("geometry") is not None:
-            yield from _polygons(content["geometry"], name)
+            yield from _within(content["geometry"], name)
     elif kind == "GeometryCollection":
-        for geometry in content.get("geometries") or ():
-            yield from _polygons(geometry, name)
-    elif kind == "Polygon":
-        yield content.get("coordinates") or ()
-    elif kind == "MultiPolygon":
-        yield from content.get("coordinates") or ()
-    elif kind not in ("Point", "MultiPoint", "LineString", "MultiLineString"):
+        for geometry in listed(content.get("geometries")):
+            yield from _within(geometry, name)
+    elif kind in _SIMPLE:
+        yield {"type": kind, "coordinates": listed(content.get("coordinates"))}
+    else:
         raise InputError(f"{describe(name)}: no GeoJSON: type {describe(kind)}")
 
 
@@ -114,4 +132,4 @@ def _in_metres(ring: Any, origin: Origin, name: str) -> Ring:
     return corners
 
 
-__all__ = ["with_zones"]
+__all__ = ["geometries", "listed", "with_zones"]

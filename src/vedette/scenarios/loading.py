@@ -10,6 +10,7 @@ from typing import Any
 
 from vedette.errors import InputError, ScenarioError
 from vedette.reading import read_text
+from vedette.scenarios.coastline import coastline_findings
 from vedette.scenarios.diagnostics import UNKNOWN, read_section, suggestion
 from vedette.scenarios.faults import Fault, Path, Told, describe
 from vedette.scenarios.file_checks import recorded_findings, reference_findings
@@ -88,7 +89,8 @@ def diagnose(document: Document, folder: FilePath | None) -> tuple[ScenarioModel
     data, unread = with_zones(document.data, beside)
     model, told = read_section(ScenarioModel, data)
     told += unread
-    read = (recorded_findings(model, beside), recording_findings(model, beside), reference_findings(model, beside))
+    beside_it = (recorded_findings, recording_findings, reference_findings, coastline_findings)
+    read = (findings(model, beside) for findings in beside_it)
     for findings in read:
         told += [Told(*finding) for finding in attempt(findings)]
     faults += [place_fault(document, fault) for fault in told]

@@ -6,12 +6,14 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from vedette.scenarios.sections import ScenarioModel
+from vedette.scenarios.coastline import coastline
+from vedette.scenarios.loading import Scenario
 from vedette.scenarios.sections.deciding import KeepOut, StayInside
 from vedette.scenarios.sections.sensors import Sensor
 from vedette.scenarios.sections.world import RegionSection
 
 REGION, NO_GO, INSIDE, HOLE = "region", "no-go zone", "sensors stay inside", "hole of a no-go zone"
+COAST = "coastline"
 
 
 class FieldOfView(NamedTuple):
@@ -24,15 +26,20 @@ class FieldOfView(NamedTuple):
 
 
 class Zone(NamedTuple):
-    """A part of the plane, such as where no sensor may go: what it is, and its corners in order, m."""
+    """A part of the plane, such as where no sensor may go: what it is, and its corners in order, m.
+
+    Of a coastline they are a line, which ends where it ends.
+    """
 
     kind: str
     corners: tuple[tuple[float, float], ...]
 
 
-def zones(model: ScenarioModel) -> tuple[Zone, ...]:
-    """The region, and what constraints say of where sensors may be."""
-    found = [Zone(REGION, _corners(model.region))]
+def zones(scenario: Scenario) -> tuple[Zone, ...]:
+    """The coastline, the region, and what constraints say of where sensors may be."""
+    model = scenario.model
+    found = [Zone(COAST, line) for line in coastline(model, scenario.folder)]
+    found.append(Zone(REGION, _corners(model.region)))
     for section in model.control.constraints:
         if isinstance(section, StayInside):
             found.append(Zone(INSIDE, _corners(section.region)))

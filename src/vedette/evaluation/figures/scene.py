@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, PathPatch, Wedge
 from matplotlib.path import Path
 from matplotlib.ticker import MaxNLocator, ScalarFormatter
@@ -19,7 +21,7 @@ from vedette.recorded import Origin
 from vedette.scenarios import Scenario
 from vedette.scenarios.sections.planners import STRATEGIES, NamedIndependent, NamedJoint, NamedLookahead
 from vedette.scenarios.sections.sensors import Sensor
-from vedette.scenarios.views import HOLE, INSIDE, NO_GO, REGION, FieldOfView, Zone, field_of_view, zones
+from vedette.scenarios.views import COAST, HOLE, INSIDE, NO_GO, REGION, FieldOfView, Zone, field_of_view, zones
 from vedette.text import elided
 
 _NEAR = 0.1  # of the extent of a figure
@@ -27,6 +29,7 @@ _ZONES: dict[str, dict[str, Any]] = {
     REGION: {"edgecolor": GREY, "linewidth": 0.8, "linestyle": "--"},
     INSIDE: {"edgecolor": INK, "linewidth": 0.8, "linestyle": "-."},
     NO_GO: {"edgecolor": GREY, "linewidth": 0.8, "hatch": "////"},
+    COAST: {"edgecolor": GREY, "linewidth": 0.6},
 }
 
 
@@ -80,7 +83,7 @@ def scene_of(scenario: Scenario, planner: str) -> Scene:
     elif planner in STRATEGIES:
         words = model.control.reward.words
     origin = None if model.origin is None else model.origin.build()
-    return Scene(model.sensor_names, words, zones(model), model.sensors, origin)
+    return Scene(model.sensor_names, words, zones(scenario), model.sensors, origin)
 
 
 def name_offsets(places: Floats, extent: float) -> list[dict[str, Any]]:
@@ -99,7 +102,12 @@ def name_offsets(places: Floats, extent: float) -> list[dict[str, Any]]:
 def draw_zones(axes: Axes, drawn: Sequence[Zone], scale: float) -> None:
     """Draw zones into axes, in metres times `scale`; holes are cut out of the zones that they follow."""
     shown: list[tuple[str, list[Path]]] = []
+    coast = [scale * np.array(zone.corners) for zone in drawn if zone.kind == COAST]
+    style = {"colors": _ZONES[COAST]["edgecolor"], "linewidths": _ZONES[COAST]["linewidth"], "zorder": 1.2}
+    axes.add_collection(LineCollection(coast, **style), autolim=False)
     for zone in drawn:
+        if zone.kind == COAST:
+            continue
         ring = Path(scale * _turning(zone.corners, left=zone.kind != HOLE), closed=True)
         if zone.kind == HOLE:
             shown[-1][1].append(ring)
@@ -170,7 +178,10 @@ def field_handles(sensors: Sequence[Sensor], when: str = "") -> Iterator[Patch]:
         yield Patch(color=GREY, alpha=0.15, linewidth=0, label=f"field of view{when}")
 
 
-def zone_handles(drawn: Sequence[Zone]) -> Iterator[Patch]:
-    """What the zones mean, for a legend."""
+def zone_handles(drawn: Sequence[Zone]) -> Iterator[Patch | Line2D]:
+    """What the zones and the coastline mean, for a legend."""
     for kind in dict.fromkeys(zone.kind for zone in drawn if zone.kind != HOLE):
-        yield Patch(fill=False, label=kind, **_ZONES[kind])
+        if kind == COAST:
+            yield Line2D([], [], color=_ZONES[kind]["edgecolor"], linewidth=1.0, label=kind)
+        else:
+            yield Patch(fill=False, label=kind, **_ZONES[kind])

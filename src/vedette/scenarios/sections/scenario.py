@@ -72,6 +72,11 @@ class ScenarioModel(Section):
     origin: OriginSection | None = Field(
         default=None, description="Where x = y = 0 is on the Earth; none: nowhere, and all places are in metres [-]."
     )
+    coastline: str | None = Field(
+        default=None,
+        description="GeoJSON file of lines or polygons in longitude and latitude, which pictures show and nothing "
+        "obeys, relative to the scenario file; none: there is none [-].",
+    )
     region: RegionSection = Field(description="Surveillance region [-].")
     motion: Motion = Field(default=of_kind("constant_velocity"), description="How targets move [-].")
     survival: Survival = Field(default=of_kind("constant"), description="Whether they go on living [-].")

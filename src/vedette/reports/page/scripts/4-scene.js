@@ -47,6 +47,12 @@ function drawGhost(context, run, view, step) {
 function drawZones(context, run, view) {
   run.zones.forEach(([kind, corners], place) => {
     if (kind === HOLE) return; // drawn with its zone
+    if (kind === "coastline") {
+      context.lineWidth = 1;
+      context.strokeStyle = colours.grey;
+      polyline(context, view, corners);
+      return;
+    }
     const rest = run.zones.slice(place + 1);
     const holes = rest.slice(0, rest.findIndex(([other]) => other !== HOLE) >>> 0).map(([, hole]) => hole);
     context.lineWidth = 1;
