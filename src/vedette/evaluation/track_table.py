@@ -12,6 +12,7 @@ import numpy as np
 
 from vedette.errors import InputError
 from vedette.evaluation.metrics.matching import match_run
+from vedette.evaluation.told import told_by
 from vedette.evaluation.track_formats import czml, geojson, mcap, utc_text
 from vedette.extras import need
 from vedette.files import write_whole
@@ -76,13 +77,7 @@ def table_of_run(record: RunRecord, scenario: Scenario) -> dict[str, list[Any]]:
     """As `track_table`, with what the run's scenario says of place, time and targets."""
     model = scenario.model
     origin = None if model.origin is None else model.origin.build()
-    names: tuple[str, ...] = ()
-    start, is_utc = 0.0, False
-    if model.recording is not None:
-        recording = model.recording.build(model, scenario.folder)
-        start, is_utc = recording.start, recording.is_utc
-    if model.targets.kind == "recorded":
-        names = tuple(str(track.name) for track in model.targets.source(model, scenario.folder).tracks)
+    start, is_utc, names = told_by(record, scenario)
     return track_table(record, cutoff=model.ospa.cutoff, origin=origin, start=start, is_utc=is_utc, names=names)
 
 

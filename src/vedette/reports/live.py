@@ -98,6 +98,8 @@ class LiveScreen:
             "recorded": True,
             "known": False,
             "origin": None if model.origin is None else [model.origin.lon, model.origin.lat],
+            "utc": None,
+            "names": [],
             "ospa_unit": "",
             "reward": scene.reward,
             "typical": False,
@@ -123,7 +125,7 @@ class LiveScreen:
         frame = {
             "scene": self._scene,
             "time": time,
-            "utc": state.is_utc,
+            "utc": 0.0 if state.is_utc else None,
             "extent": rounded_to(extent, places),
             "estimates": []
             if found is None

@@ -16,6 +16,7 @@ from vedette.evaluation.actions import action_axis, choice_words
 from vedette.evaluation.comparison import choice_of
 from vedette.evaluation.figures.rewards import best_over_others, best_over_pair, first_pair
 from vedette.evaluation.scans import LIE, code_of_sensors, in_plane, scans_of_record
+from vedette.evaluation.told import told_by
 from vedette.kernels.base.types import Floats
 from vedette.reports.groups import Strategy
 from vedette.reports.why import why_data
@@ -44,6 +45,7 @@ def replay_data(strategy: Strategy, record: RunRecord, group: str, *, trust: boo
     sensors = [drawn_sensor(name, section) for name, section in zip(names, sections, strict=True)]
     has_velocity = scenario.model.motion.kind != "custom"
     is_known, origin = scenario.model.targets.kind != "unknown", scenario.model.origin
+    told = told_by(record, scenario)
     axes = dict[str, dict[str, Any]]()
     decisions = [drawn_decision(each, axes, names) for each in record.decisions]
     return {
@@ -65,6 +67,8 @@ def replay_data(strategy: Strategy, record: RunRecord, group: str, *, trust: boo
         "scans": _scans(record, scenario, places, trust),
         "recorded": scenario.model.recording is not None,
         "known": is_known,
+        "names": told.names,
+        "utc": told.start if told.is_utc else None,
         "origin": None if origin is None else [origin.lon, origin.lat],
         "ospa": [rounded_to(parts, 2) for parts in record.ospa] if is_known else [],
         "ospa_unit": scenario.model.ospa.unit,

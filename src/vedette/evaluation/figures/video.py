@@ -21,11 +21,14 @@ from vedette.evaluation.figures.scene import draw_field, draw_zones, name_offset
 from vedette.evaluation.figures.style import COLUMN_WIDTH, GREY, INK, colour, new_figure, styled
 from vedette.evaluation.figures.tracks import LARGE, SENSOR_MARKERS, add_legend, frame_tracks, reach_of, recur
 from vedette.evaluation.scans import LIE, Scans, code_of_sensors, in_plane, scans_of_record
+from vedette.evaluation.told import told_by
+from vedette.evaluation.track_formats import utc_text
 from vedette.files import write_whole
 from vedette.kernels.base.types import Floats, Ints
 from vedette.scenarios import Scenario
 from vedette.simulation.records import RunRecord
 from vedette.simulation.scans import CLUTTER, Scan
+from vedette.text import elided
 
 if TYPE_CHECKING:
     from matplotlib.animation import AbstractMovieWriter
@@ -121,7 +124,7 @@ class _Drawing:
     def __init__(self, record: RunRecord, scenario: Scenario, trust: bool) -> None:
         self._record, self._scenario = record, scenario
         self._scans = _scans(record, scenario, trust)
-        self._scene = scene_of(scenario, record.planner)
+        self._scene, self._told = scene_of(scenario, record.planner), told_by(record, scenario)
         self._scale = 1e-3 if reach_of([record]) > LARGE else 1.0
         self.figure = new_figure(COLUMN_WIDTH + 0.75)
         self.figure.set_layout_engine("constrained", h_pad=0.08)  # as in `tracks_figure`
@@ -146,7 +149,12 @@ class _Drawing:
             artist.remove()
         self._step, self._shown = step, []
         name = drawn_text(short_label(self._record.planner))
-        self._axes.set_title(f"{name}, run {self._record.run}: t = {self._record.times[step]:.1f} s")
+        time = float(self._record.times[step])
+        clock = f"t = {time:.1f} s"
+        if self._told.is_utc:
+            utc = utc_text(time + self._told.start)
+            clock = f"{utc[:10]} {utc[11:21]} UTC"
+        self._axes.set_title(f"{name}, run {self._record.run}: {clock}")
         self._draw_sensors(step)
         self._draw_truth(step)
         self._draw_estimates(step)
@@ -160,9 +168,16 @@ class _Drawing:
         ids, places = truth.ids[:until], truth.states[:until, :2] * self._scale
         paths = [places[ids == target] for target in np.unique(ids)]
         self._add(self._axes.add_collection(LineCollection(paths, colors=INK, linewidths=0.9, zorder=2)))
-        _, states = truth.at(step)
+        ids, states = truth.at(step)
         style: dict[str, Any] = {"marker": "o", "color": INK, "markerfacecolor": "white", "markersize": 5}
         self._add(self._axes.plot(*(states[:, :2].T * self._scale), linestyle="", zorder=4, **style)[0])
+        names = self._told.names if len(ids) <= _MOST_NAMED else ()
+        for target, state in zip(ids.tolist(), states, strict=True):
+            if target >= len(names):
+                continue
+            place = (float(state[0]) * self._scale, float(state[1]) * self._scale)
+            text: dict[str, Any] = {"textcoords": "offset points", "fontsize": 6, "ha": "center", "zorder": 7}
+            self._add(self._axes.annotate(drawn_text(elided(names[target], 20)), place, xytext=(0, 6), **text))
 
     def _draw_estimates(self, step: int) -> None:
         past = self._record.estimates[: step + 1]

@@ -15,10 +15,17 @@ const unitOf = (run) => (extentOf(run) > 5000 ? { name: "km", metres: 1000 } : {
 // Distances with the digits that the size of the scene deserves.
 const metres = (value, run) => (unitOf(run).metres === 1000 ? `${fixed(value / 1000, 2)} km` : `${fixed(value, 1)} m`);
 
-// A time of a run by its clock: seconds, or where times are dates the time of day.
+// What a target is called: as who recorded it does, or else by its number.
+const targetName = (run, target) => run.names[target - 1] ?? `target ${target}`;
+
+// A time of a run by its clock: seconds, in UTC too where a recording says it, or alone where times are dates.
 function clock(run, time) {
   if (time === null) return "no scan yet";
-  return run.utc ? `${new Date(1000 * time).toISOString().slice(0, 19).replace("T", " ")} UTC` : `${+time.toFixed(3)} s`;
+  const seconds = `${+time.toFixed(3)} s`;
+  if (run.utc === null) return seconds;
+  const text = new Date(1000 * (run.utc + time)).toISOString();
+  const utc = `${text.slice(0, 10)} ${text.slice(11, 21)} UTC`;
+  return run.utc ? `${utc} (t = ${seconds})` : utc;
 }
 
 const labelsOf = new Map();

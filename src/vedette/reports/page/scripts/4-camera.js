@@ -9,7 +9,7 @@ function followable(run) {
   const found = run.sensors.map(({ name }, s) => [`sensor ${s}`, clipped(name, 30)]);
   if (run.known) {
     const targets = [...new Set(run.truth.flat().map(([target]) => target))].sort((a, b) => a - b);
-    found.push(...targets.slice(0, MOST_FOLLOWED).map((target) => [`target ${target}`, `target ${target}`]));
+    found.push(...targets.slice(0, MOST_FOLLOWED).map((target) => [`target ${target}`, clipped(targetName(run, target), 30)]));
   } else if (run.labelled) {
     const lengths = new Map();
     for (const [label] of run.estimates.flat()) lengths.set(label, (lengths.get(label) ?? 0) + 1);
@@ -30,6 +30,7 @@ function placeOf(run, step, followed) {
 function cameraOf(canvas, run, redraw) {
   const camera = { zoom: 1, east: null, north: null, follow: "" };
   const view = () => viewOf(run(), canvas.clientWidth, canvas.clientHeight, camera);
+  let canvases = [];
 
   function reset() {
     Object.assign(camera, { zoom: 1, east: null, north: null, follow: "" });
@@ -72,40 +73,49 @@ function cameraOf(canvas, run, redraw) {
   function aim(step) {
     const place = camera.follow && placeOf(run(), step, camera.follow);
     if (place) [camera.east, camera.north] = place;
-    canvas.style.touchAction = camera.zoom > 1 ? "none" : "pan-y"; // the whole scene lets the page scroll
-    canvas.style.cursor = camera.zoom > 1 ? "grab" : "";
+    canvases = canvases.filter((each) => each.isConnected);
+    for (const { style } of canvases) {
+      style.touchAction = camera.zoom > 1 ? "none" : "pan-y"; // the whole scene lets the page scroll
+      style.cursor = camera.zoom > 1 ? "grab" : "";
+    }
     return camera;
   }
 
-  const places = new Map();
-  const at = (event) => {
-    const box = canvas.getBoundingClientRect();
-    return { x: event.clientX - box.left, y: event.clientY - box.top };
-  };
-  canvas.addEventListener("wheel", (event) => {
-    const pixels = event.deltaY * [1, 16, 400][event.deltaMode];
-    if (zoomBy(Math.exp(-pixels * 0.002), at(event))) event.preventDefault();
-  }, { passive: false });
-  canvas.addEventListener("pointerdown", (event) => {
-    if (event.button) return;
-    places.set(event.pointerId, at(event));
-    canvas.setPointerCapture(event.pointerId);
-  });
-  canvas.addEventListener("pointermove", (event) => {
-    const before = places.get(event.pointerId);
-    if (!before) return;
-    const now = at(event);
-    const other = [...places].find(([id]) => id !== event.pointerId)?.[1];
-    places.set(event.pointerId, now);
-    if (!other) pan(now.x - before.x, now.y - before.y);
-    else {
-      const apart = (place) => Math.max(10, Math.hypot(place.x - other.x, place.y - other.y));
-      pan((now.x - before.x) / 2, (now.y - before.y) / 2);
-      zoomBy(apart(now) / apart(before), { x: (now.x + other.x) / 2, y: (now.y + other.y) / 2 });
+  // Have the mouse and fingers move the plane on a canvas, one of the size of all others.
+  function attach(surface) {
+    canvases.push(surface);
+    const places = new Map();
+    const at = (event) => {
+      const box = surface.getBoundingClientRect();
+      return { x: event.clientX - box.left, y: event.clientY - box.top };
+    };
+    surface.addEventListener("wheel", (event) => {
+      const pixels = event.deltaY * [1, 16, 400][event.deltaMode];
+      if (zoomBy(Math.exp(-pixels * 0.002), at(event))) event.preventDefault();
+    }, { passive: false });
+    surface.addEventListener("pointerdown", (event) => {
+      if (event.button) return;
+      places.set(event.pointerId, at(event));
+      surface.setPointerCapture(event.pointerId);
+    });
+    surface.addEventListener("pointermove", (event) => {
+      const before = places.get(event.pointerId);
+      if (!before) return;
+      const now = at(event);
+      const other = [...places].find(([id]) => id !== event.pointerId)?.[1];
+      places.set(event.pointerId, now);
+      if (!other) pan(now.x - before.x, now.y - before.y);
+      else {
+        const apart = (place) => Math.max(10, Math.hypot(place.x - other.x, place.y - other.y));
+        pan((now.x - before.x) / 2, (now.y - before.y) / 2);
+        zoomBy(apart(now) / apart(before), { x: (now.x + other.x) / 2, y: (now.y + other.y) / 2 });
+      }
+    });
+    for (const name of ["pointerup", "pointercancel"]) {
+      surface.addEventListener(name, (event) => places.delete(event.pointerId));
     }
-  });
-  for (const name of ["pointerup", "pointercancel"]) {
-    canvas.addEventListener(name, (event) => places.delete(event.pointerId));
   }
-  return { camera, reset, zoomBy, pan, follow, aim };
+
+  attach(canvas);
+  return { camera, reset, zoomBy, pan, follow, aim, attach };
 }

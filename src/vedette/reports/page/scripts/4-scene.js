@@ -17,7 +17,7 @@ function drawScene(canvas, run, step, show, camera, ghost) {
   if (show.trails) drawTrails(context, run, view, step);
   if (ghost) drawGhost(context, ghost, view, Math.min(step, ghost.times.length - 1));
   run.sensors.forEach((_, s) => drawSensor(context, run, view, step, s));
-  run.truth[step].forEach((target) => drawTarget(context, view, target, show));
+  run.truth[step].forEach((target) => drawTarget(context, run, view, target, show));
   run.estimates[step].forEach((estimate) => drawEstimate(context, run, view, estimate, show));
   drawScale(context, view);
   context.restore();
@@ -175,13 +175,16 @@ function drawSensor(context, run, view, step, s) {
   if (run.sensors.length <= MOST_NAMED) mark(context, clipped(name, 20), px, py + (py + 24 < MARGIN.top + view.inner.height ? 17 : -17), colours.ink);
 }
 
-function drawTarget(context, view, [target, x, y], show) {
+function drawTarget(context, run, view, [target, x, y], show) {
   context.strokeStyle = colours.ink;
   context.fillStyle = colours.paper;
   context.lineWidth = 1.6;
   disc(context, view.x(x), view.y(y), 4);
   context.stroke();
-  if (show.labels) mark(context, `T${target}`, view.x(x) - 13, view.y(y) - 10, colours.ink);
+  if (!show.labels) return;
+  const name = run.names[target - 1];
+  if (name === undefined) mark(context, `T${target}`, view.x(x) - 13, view.y(y) - 10, colours.ink);
+  else mark(context, clipped(name, 20), view.x(x), view.y(y) - 13, colours.ink);
 }
 
 function drawEstimate(context, run, view, [label, x, y, , long, short, angle], show) {

@@ -22,11 +22,11 @@ function describeAt(run, step, view, x, y, show) {
 
 function describeTarget(run, target, east, north, velocity) {
   const speed = velocity.length > 1 ? `, speed ${fixed(Math.hypot(velocity[0], velocity[1]), 1)} m/s` : "";
-  return `target ${target}: at ${metres(east, run)}, ${metres(north, run)}${speed}`;
+  return `${targetName(run, target)}: at ${metres(east, run)}, ${metres(north, run)}${speed}`;
 }
 
 function describeEstimate(run, [label, east, north, existence, long, short, , target, error]) {
-  const of = target ? `${metres(error, run)} from target ${target}; ` : run.known ? "false: no target is matched; " : "";
+  const of = target ? `${metres(error, run)} from ${targetName(run, target)}; ` : run.known ? "false: no target is matched; " : "";
   const at = `${metres(east, run)}, ${metres(north, run)}`;
   const size = `2\u03c3 ${metres(long, run)} by ${metres(short, run)}`;
   return `estimate${run.labelled ? ` ${label}` : ""}: ${of}existence ${existence.toFixed(3)}; at ${at}; ${size}`;
@@ -38,7 +38,7 @@ function measurementsAt(run, step, view, x, y) {
     const [east, north] = run.poses[step][s];
     const [px, py] = [view.x(east), view.y(north)];
     for (const [origin, u, v] of (run.scans[step] ?? [])[s] ?? []) {
-      const what = origin === UNKNOWN ? "measurement" : origin ? `detection of target ${origin}` : "clutter";
+      const what = origin === UNKNOWN ? "measurement" : origin ? `detection of ${targetName(run, origin)}` : "clutter";
       if (distanceTo(kind, view, x, y, px, py, u, v) <= REACH / 2) {
         found.push(`${what} of ${name}: ${describeMeasurement(run, kind, east, north, u, v)}`);
       }

@@ -1,16 +1,22 @@
 // The state of the replay, its controls, and the words beside the picture.
 function startReplay(root) {
   const part = (name) => root.querySelector(`[data-part="${name}"]`);
-  const state = { run: 0, step: 0, playing: false, speed: 5, view: null, pointer: null, ghost: null };
+  const state = { run: 0, step: 0, playing: false, speed: 5, view: null, pointer: null, ghost: null, shown: null };
   const show = () => Object.fromEntries([...root.querySelectorAll("[data-show]")].map((box) => [box.dataset.show, box.checked]));
 
-  const run = () => runs[state.run];
+  const run = () => state.shown ?? runs[state.run];
   const { live } = runs[0]; // frames come while it is shown; to play is to stay at the latest
   const last = () => run().times.length - 1;
   const camera = cameraOf(part("scene"), run, () => draw());
+  const panels = panelsOf(part("panels"), (panel) => {
+    camera.attach(panel.canvas);
+    point(panel.canvas, panel);
+  });
 
   function draw() {
     state.view = drawScene(part("scene"), run(), state.step, show(), camera.aim(state.step), state.ghost);
+    panels.draw(run().times[state.step], show(), camera.camera);
+    part("caption").textContent = captionOf(run(), state.step);
     drawRewards(part("rewards"), run(), state.step);
     if (run().known) drawErrors(part("errors"), run(), state.step);
     tell();
@@ -25,7 +31,8 @@ function startReplay(root) {
       words.unshift(`${truth[state.step].length} targets`);
       words.push(`OSPA ${total.toFixed(1)}${ospa_unit && ` ${ospa_unit}`} (localisation ${localisation.toFixed(1)}, cardinality ${cardinality.toFixed(1)})`);
     }
-    part("summary").textContent = `t = ${time}: ${words.join(", ")}`;
+    const lead = run().utc === null && times[state.step] !== null ? "t = " : "";
+    part("summary").textContent = `${lead}${time}: ${words.join(", ")}`;
     part("decision").textContent = decisionText();
     part("reward-title").textContent = run().reward ? `Reward (${run().reward})` : "Reward";
     tellWhy(part, run(), decisionAt(run(), state.step));
@@ -49,6 +56,10 @@ function startReplay(root) {
 
   function underPointer() {
     const { pointer, view } = state;
+    if (pointer?.panel) {
+      const { panel, x, y } = pointer;
+      return panel.view ? describeAt(panel.run, panel.step, panel.view, x, y, show()) : [];
+    }
     if (pointer?.part === "scene") return describeAt(run(), state.step, view, pointer.x, pointer.y, show());
     if (!pointer) return [];
     return describeReward(part("rewards"), run(), decisionAt(run(), state.step), pointer.x, pointer.y);
@@ -98,9 +109,19 @@ function startReplay(root) {
     part("ghost-key").hidden = !state.ghost;
   }
 
+  // Other runs beside this one, in a plane that holds all of them.
+  function accompany() {
+    const others = part("beside").value.split(" ").filter(Boolean).map((place) => runs[place]);
+    state.shown = others.length ? inOnePlane(runs[state.run], others) : null;
+    panels.show(run(), others);
+    part("stage").classList.toggle("beside", panels.some());
+    part("caption").hidden = !panels.some();
+  }
+
   function choose(index) {
     if (runs[index].group !== run().group) Object.assign(camera.camera, { zoom: 1, east: null, north: null });
     state.run = index;
+    state.shown = null;
     state.playing = false;
     offer(part("follow"), followable(run()));
     camera.camera.follow = part("follow").value;
@@ -108,6 +129,8 @@ function startReplay(root) {
       Number(place) !== index && each.group === run().group && each.run === run().run);
     offer(part("ghost"), paired.map(([place, { strategy }]) => [place, clipped(strategy, 30)]));
     haunt();
+    offer(part("beside"), besides(paired));
+    accompany();
     reveal();
     go(Math.min(state.step, last()));
   }
@@ -191,6 +214,10 @@ function startReplay(root) {
     haunt();
     draw();
   });
+  part("beside").addEventListener("change", () => {
+    accompany();
+    draw();
+  });
   root.querySelectorAll("[data-show]").forEach((box) => box.addEventListener("change", draw));
   part("values").addEventListener("toggle", tell);
   root.addEventListener("keydown", (event) => {
@@ -202,19 +229,22 @@ function startReplay(root) {
     event.preventDefault();
     keys[key]();
   });
-  for (const name of ["scene", "rewards"]) {
+  // Have what is under the pointer on a canvas told: of a part of this run, or of a panel.
+  function point(canvas, panel, name = "scene") {
     const follow = (event) => {
-      const box = part(name).getBoundingClientRect();
-      state.pointer = { part: name, x: event.clientX - box.left, y: event.clientY - box.top };
+      const box = canvas.getBoundingClientRect();
+      state.pointer = { part: name, panel, x: event.clientX - box.left, y: event.clientY - box.top };
       tellPointer();
     };
-    part(name).addEventListener("pointermove", follow);
-    part(name).addEventListener("pointerdown", follow);
-    part(name).addEventListener("pointerleave", () => {
+    canvas.addEventListener("pointermove", follow);
+    canvas.addEventListener("pointerdown", follow);
+    canvas.addEventListener("pointerleave", () => {
       state.pointer = null;
       tellPointer();
     });
   }
+  point(part("scene"), null);
+  point(part("rewards"), null, "rewards");
 
   const redraw = () => {
     readColours();

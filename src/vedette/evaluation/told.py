@@ -1,0 +1,41 @@
+"""What a recording says of the clock of a run and of the names of its targets."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from vedette.scenarios import Scenario
+from vedette.simulation.records import RunRecord
+
+
+class Told(NamedTuple):
+    """Clock and names.
+
+    start: s, to be added to times of the run. is_utc: whether they are since 1970 then. names: of the targets, by id;
+    none where they were not recorded.
+    """
+
+    start: float
+    is_utc: bool
+    names: tuple[str, ...]
+
+
+def told_by(record: RunRecord, scenario: Scenario) -> Told:
+    """What the recordings of a run's scenario say; of another recording than the run's no clock.
+
+    Raises `InputError` where they cannot be read.
+    """
+    model = scenario.model
+    start, is_utc, names = 0.0, False, tuple[str, ...]()
+    if model.recording is not None:
+        recording = model.recording.build(model, scenario.folder)
+        if np.array_equal(recording.times[: record.num_scans], record.times):
+            start, is_utc = recording.start, recording.is_utc
+    if model.targets.kind == "recorded":
+        names = tuple(str(track.name) for track in model.targets.source(model, scenario.folder).tracks)
+    return Told(start, is_utc, names)
+
+
+__all__ = ["Told", "told_by"]
