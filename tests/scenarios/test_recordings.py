@@ -517,3 +517,27 @@ def test_a_scenario_says_that_its_sensors_have_a_compass(folder: Path) -> None:
     (folder / "radars.yaml").write_text(wrong, "utf-8")
     with pytest.raises(ScenarioError, match=r"compass: expected false, as nobody knows which component"):
         scenario_of_recording(folder / "radars.yaml", folder / "scans.csv")
+
+
+def test_a_bias_of_a_compass_is_the_same_simulated_and_read(tmp_path: Path) -> None:
+    """What a biased sensor is simulated to say becomes, read without the bias, what an honest one says."""
+    changes: dict[str, Any] = {
+        "time.num_steps": 3,
+        "control.decision_steps": [2],
+        "ospa.from_step": 1,
+        "ospa.to_step": 3,
+    }
+    changes |= {"sensors.*.compass": True, "sensors.*.noise": {"kind": "constant", "std": [1e-9, 1e-6]}}
+    biased = with_fields(load_scenario("paper-a"), {**changes, "sensors.*.truth": {"bias": {"bearing_deg": 5.0}}})
+    honest = with_fields(load_scenario("paper-a"), changes)
+    write_tracks(tmp_path / "scans.csv", scan_table(run_scenario(biased, "still", seed=3), biased))
+    known = with_fields(honest, {"sensors.*.bias.bearing_deg": 5.0})
+    found = parse_scans(read_table(tmp_path / "scans.csv"), sites_of(known.model), Conventions({}, {}))
+    drawn = scans_of_record(run_scenario(honest, "still", seed=3), honest)
+    for scans, expected in zip(found.scans, drawn, strict=True):
+        for scan, other in zip(scans, expected, strict=True):
+            assert scan is not None
+            assert other is not None
+            of_targets = other.origins >= 0
+            assert of_targets.any()
+            np.testing.assert_allclose(scan[of_targets], other.measurements[of_targets], rtol=1e-9, atol=1e-9)

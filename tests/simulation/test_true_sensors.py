@@ -87,6 +87,8 @@ def test_what_filters_take_off_is_no_bias_any_more():
     first, second = build_experiment(with_fields(scenario, said | true)).true_sensors
     assert first.bias == models.Bias(range=30.0, clock=-0.5)
     assert second.bias.bearing == pytest.approx(np.radians(2.0))
+    _, second = build_experiment(with_fields(scenario, said | true | {"sensors.1.compass": True})).true_sensors
+    assert second.bias.bearing == pytest.approx(-np.radians(2.0))  # a compass says it clockwise
 
 
 def test_bad_true_sensors_are_named():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -212,7 +213,9 @@ class Sensor(Section):
 
         if self.truth is None:
             return Made(known)
-        return self.truth.build(known, self.measurement, self.bias, region, folder)
+        made = self.truth.build(known, self.measurement, self.bias, region, folder)
+        # A compass says its bias clockwise; what is simulated is told from the east.
+        return replace(made, bias=replace(made.bias, bearing=-made.bias.bearing)) if self.compass else made
 
 
 if TYPE_CHECKING:

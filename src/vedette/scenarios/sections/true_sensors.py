@@ -52,8 +52,8 @@ class BiasSection(Section):
     range: float = Field(default=0.0, description="Of ranges [m].")
     bearing_deg: float = Field(
         default=0.0,
-        description="Of bearings, clockwise where recorded or live scans count them from the north, else "
-        "counter-clockwise [deg].",
+        description="Of bearings, clockwise of a sensor with a compass and where recorded or live scans count them "
+        "from the north, else counter-clockwise [deg].",
     )
     clock: float = Field(default=0.0, description="Of times: how far its clock is ahead [s].")
     x: float = Field(default=0.0, description="Of where it is said to be, or of positions that it measures, east [m].")
