@@ -88,6 +88,10 @@ def test_they_have_one_clock(page: Page, results: CampaignResults) -> None:
         choose(page, "scrubber", str(step))
         for caption, (name, ospa) in zip(captions(page), errors.items(), strict=True):
             assert caption.endswith(f"OSPA {ospa[step]:.1f} m"), (name, step)
+    pixels = "document.querySelector('[data-part=errors]').toDataURL()"
+    several = page.evaluate(pixels)
+    choose(page, "beside", "")
+    assert page.evaluate(pixels) != several  # without their curves
     choose(page, "run", "1")  # another one comes first; what stood beside is no choice of its
     assert state(page)["step"] == "25"
 

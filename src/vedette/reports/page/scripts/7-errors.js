@@ -22,24 +22,30 @@ function drawFrame(context, frame, label) {
   return { x, y };
 }
 
-function drawErrors(canvas, run, step) {
+// Of the run that is shown in ink, and of those beside it in the shades of their captions.
+function drawErrors(canvas, run, step, others) {
   const { context, width, height } = prepared(canvas);
   if (width < 150) return; // not laid out yet
   const total = run.ospa.map((parts) => parts[0]);
   const frame = {
     left: 40, right: width - 10, top: 8, bottom: height - 34,
-    x: [run.times[0], run.times.at(-1)], y: [0, Math.max(...total, 1)],
+    x: [run.times[0], run.times.at(-1)],
+    y: [0, Math.max(...total, ...others.flatMap((other) => other.run.ospa.map(([value]) => value)), 1)],
   };
   const { x, y } = drawFrame(context, frame, "time (s)");
   context.setLineDash([2, 3]);
   context.strokeStyle = colours.grey;
   for (const { scan } of run.decisions) line(context, x(run.times[scan]), frame.top, x(run.times[scan]), frame.bottom);
   context.setLineDash([]);
-  context.strokeStyle = colours.ink;
-  context.lineWidth = 1.6;
-  context.beginPath();
-  total.forEach((value, k) => context.lineTo(x(run.times[k]), y(value)));
-  context.stroke();
+  const curve = ({ times, ospa }, shade, width) => {
+    context.strokeStyle = shade;
+    context.lineWidth = width;
+    context.beginPath();
+    ospa.forEach(([value], k) => context.lineTo(x(times[k]), y(value)));
+    context.stroke();
+  };
+  others.forEach((other) => curve(other.run, colours[other.shade], 1.2));
+  curve(run, colours.ink, 1.6);
   context.fillStyle = colours.ink;
   disc(context, x(run.times[step]), y(total[step]), 4);
 }

@@ -25,12 +25,14 @@ function panelsOf(holder, attach) {
 
   function show(main, others) {
     for (const { box } of panels) box.remove();
-    panels = others.map((other) => {
+    panels = others.map((other, place) => {
       const [box, caption, canvas] = [element("div", "panel"), element("p", "note caption"), element("canvas")];
       canvas.setAttribute("role", "img");
       box.append(caption, canvas);
       holder.append(box);
-      const panel = { box, caption, canvas, run: { ...other, extent: main.extent }, step: 0, view: null };
+      const shade = SERIES[place];
+      caption.style.borderColor = `var(--${shade})`;
+      const panel = { box, caption, canvas, shade, run: { ...other, extent: main.extent }, step: 0, view: null };
       attach(panel);
       return panel;
     });
@@ -45,7 +47,7 @@ function panelsOf(holder, attach) {
     }
   }
 
-  return { show, draw, some: () => panels.length > 0 };
+  return { show, draw, all: () => panels };
 }
 
 function captionOf(run, step) {

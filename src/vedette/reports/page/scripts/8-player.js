@@ -18,7 +18,7 @@ function startReplay(root) {
     panels.draw(run().times[state.step], show(), camera.camera);
     part("caption").textContent = captionOf(run(), state.step);
     drawRewards(part("rewards"), run(), state.step);
-    if (run().known) drawErrors(part("errors"), run(), state.step);
+    if (run().known) drawErrors(part("errors"), run(), state.step, panels.all());
     tell();
   }
 
@@ -114,8 +114,8 @@ function startReplay(root) {
     const others = part("beside").value.split(" ").filter(Boolean).map((place) => runs[place]);
     state.shown = others.length ? inOnePlane(runs[state.run], others) : null;
     panels.show(run(), others);
-    part("stage").classList.toggle("beside", panels.some());
-    part("caption").hidden = !panels.some();
+    part("stage").classList.toggle("beside", others.length > 0);
+    part("caption").hidden = !others.length;
   }
 
   function choose(index) {
