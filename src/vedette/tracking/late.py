@@ -12,9 +12,8 @@ from typing import Any
 import numpy as np
 
 from vedette.errors import InputError
-from vedette.filters.inputs import check_scan
 from vedette.kernels.base.types import Floats
-from vedette.models.arguments import count, dimension, instance, pose_vector, positive, real, reject
+from vedette.models.arguments import as_array, count, dimension, instance, pose_vector, positive, real, reject
 from vedette.tracking.base import State, Tracker, TrackerInfo
 
 _TIME = attrgetter("time")
@@ -218,20 +217,20 @@ class LateScans:
         return self.tracker.step(state, nothing, timeline.poses, now, rngs=self._streams(state.step + 1))
 
     def _checked(self, scan: SensorScan) -> SensorScan:
-        """The scan with arrays of its own, so that what is worked again is what came."""
+        """The scan with arrays of its own, so that what is worked again is what came; measurements: of whatever shape.
+
+        What a scan of the sensor may hold is for the tracker to check, which does so whenever it takes it.
+        """
         instance("scan", scan, SensorScan)
-        num, sensors = len(self.tracker.sensors), self.tracker.sensors
+        num = len(self.tracker.sensors)
         if count("scan.sensor", scan.sensor) >= num:
             raise reject("scan.sensor", f"a whole number from 0 to {num - 1}", scan.sensor)
         name = f"scan of sensor {scan.sensor} at {real('scan.time', scan.time):g} s"
         pose = pose_vector(f"{name}, pose", scan.pose)
         if len(pose) > self._start.shape[1]:
             raise reject(f"{name}, pose", f"at most {self._start.shape[1]} numbers, as of poses", len(pose))
-        try:
-            check_scan(scan.measurements, sensors[scan.sensor])
-        except InputError as error:
-            raise InputError(f"{name}: {error}") from None
-        return SensorScan(int(scan.sensor), float(scan.time), np.array(scan.measurements, float), pose.copy())
+        measured = as_array(f"{name}: scan", scan.measurements, "fiu", "numbers in an array")
+        return SensorScan(int(scan.sensor), float(scan.time), np.array(measured, float), pose.copy())
 
     def _worked(
         self, timeline: Timeline, num_kept: int, came: dict[float, dict[int, SensorScan]]
@@ -249,7 +248,10 @@ class LateScans:
             for s, scan in due[time].items():
                 poses[s, : len(scan.pose)] = scan.pose
             measured = [due[time][s].measurements if s in due[time] else None for s in range(len(poses))]
-            state, info = self.tracker.step(state, measured, poses, time, rngs=self._streams(state.step + 1))
+            try:
+                state, info = self.tracker.step(state, measured, poses, time, rngs=self._streams(state.step + 1))
+            except InputError as error:
+                raise (_named(error, came[time]) if time in came else error) from None
             made.append(Instant(time, due[time], poses, state, info))
         return tuple(made)
 
@@ -269,6 +271,12 @@ class LateScans:
             return timeline
         last = timeline.instants[past - 1]
         return replace(timeline, settled=last.state, settled_poses=last.poses, instants=timeline.instants[past:])
+
+
+def _named(error: InputError, came: dict[int, SensorScan]) -> InputError:
+    """What a tracker refused, with the scans that had just come."""
+    names = [f"scan of sensor {s} at {scan.time:g} s" for s, scan in came.items()]
+    return InputError(f"{', '.join(names)}: {error}")
 
 
 def _place(timeline: Timeline, time: float) -> int:
