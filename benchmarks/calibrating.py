@@ -19,9 +19,9 @@ import csv
 import math
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from pages import write_between
@@ -56,6 +56,8 @@ sensors:
   - {name: boat, position: [0.0, 3500.0], bias: {%s}}
 """
 TARGETS = 6
+Drifts: TypeAlias = Mapping[str, Mapping[str, float]]
+Ships: TypeAlias = list[tuple[Any, Any]]
 
 
 class Scene(NamedTuple):
@@ -71,15 +73,21 @@ SCENES = {"ships": Scene(8.0, 4000.0, 7000.0, 200.0), "aircraft": Scene(80.0, 80
 MOTION = "motion: {kind: constant_velocity, sigma_v: 0.05}\n"
 
 
-def write_scans(folder: Path, scene: Scene, seconds: float, seed: int, motion: str = MOTION) -> None:
-    """scans.csv, truth.csv, and what is told and what is true of the sensors: told.yaml, true.yaml."""
+def write_scans(
+    folder: Path, scene: Scene, seconds: float, seed: int, motion: str = MOTION, drifts: Drifts | None = None
+) -> Ships:
+    """scans.csv, truth.csv, and what is told and what is true of the sensors: told.yaml, true.yaml.
+
+    drifts: of a radar's biases, a second. Returns the ships' positions at 0 s and their velocities.
+    """
     rng, within, speed = np.random.default_rng(seed), scene.within, scene.speed
     middles = [(rng.uniform(-within, within, 2), rng.uniform(-speed, speed, 2)) for _ in range(TARGETS)]
     ships = [(x - 0.5 * seconds * v, v) for x, v in middles]
     rows, half_side = list[list[Any]](), scene.half_side
     for name, (place, period) in RADARS.items():
-        bias = BIASES[name]
+        at_first, drift = BIASES[name], (drifts or {}).get(name, {})
         for at in np.arange(rng.uniform(0.0, period), seconds, period).tolist():
+            bias = {key: value + at * drift.get(key, 0.0) for key, value in at_first.items()}
             own = np.array(place) + (np.array([4.0, -3.0]) * at if name == "boat" else 0.0)
             offsets = [x + v * at - own for x, v in ships if rng.random() < MODELS["detection.probability"]]
             false = [rng.uniform(-half_side, half_side, 2) - own for _ in range(rng.poisson(MODELS["clutter.rate"]))]
@@ -99,6 +107,7 @@ def write_scans(folder: Path, scene: Scene, seconds: float, seed: int, motion: s
     (folder / "told.yaml").write_text(TOLD % (motion, scene.cutoff, 30.0, 1.0, 0.8, 6.0, "", "", ""))
     biases = [", ".join(f"{name}: {value}" for name, value in one.items()) for one in BIASES.values()]
     (folder / "true.yaml").write_text(TOLD % (motion, scene.cutoff, *MODELS.values(), *biases))
+    return ships
 
 
 def _write(path: Path, header: list[str], rows: list[list[Any]]) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -33,6 +34,11 @@ class Found(NamedTuple):
     high: float
     why: str
 
+    @property
+    def std(self) -> float:
+        """Standard deviation of a parameter whose scale is plain; NaN where it was not found."""
+        return (self.high - self.low) / (2.0 * _QUANTILE)
+
 
 class Calibration(NamedTuple):
     """What was found of all parameters.
@@ -46,30 +52,37 @@ class Calibration(NamedTuple):
     converged: bool
 
 
-def calibrate(problem: Problem, watch: Callable[[], None] = lambda: None) -> Calibration:
+def calibrate(
+    problem: Problem, watch: Callable[[], None] = lambda: None, only: Sequence[Parameter] | None = None
+) -> Calibration:
     """The maximum of the likelihood of a recording over what its sensors may be like.
 
     Args:
         problem: the recording and the parameters.
         watch: called whenever the recording was tracked once more.
+        only: the parameters that are found, while others are as they start; None: all.
 
     Raises:
         VedetteError: a filter that cannot take the recording.
     """
 
+    said = problem.free([each.start for each in problem.parameters])
+    own = [i for i, each in enumerate(problem.parameters) if only is None or each in only]
+    asked = replace(problem, parameters=tuple(problem.parameters[i] for i in own))
+
     def terms(free: Floats) -> Floats:
         watch()
-        return problem.log_likelihoods(free)
+        whole = said.copy()
+        whole[own] = free
+        return problem.log_likelihoods(whole)
 
-    said = problem.free([each.start for each in problem.parameters])
-    unknown = np.array([each.unknown for each in problem.parameters])
-    before = float(terms(said).sum())
-    start, pairs = _guess(problem, said, watch)
-    if not float(terms(start).sum()) > before:
-        start = said
-    maximum = maximise(terms, start, unknown, _blocks(problem.parameters))
+    unknown = np.array([each.unknown for each in asked.parameters])
+    before = float(terms(said[own]).sum())
+    guessed, pairs = _guess(problem, said, own, watch)
+    start = guessed[own] if float(terms(guessed[own]).sum()) > before else said[own]
+    maximum = maximise(terms, start, unknown, _blocks(asked.parameters))
     apart = np.flatnonzero(~linked(pairs, len(problem.sites))).tolist()
-    return Calibration(_judged(problem, maximum, unknown, apart), maximum.log_likelihood, before, maximum.converged)
+    return Calibration(_judged(asked, maximum, unknown, apart), maximum.log_likelihood, before, maximum.converged)
 
 
 def _blocks(parameters: tuple[Parameter, ...]) -> list[list[int]]:
@@ -83,8 +96,8 @@ def _blocks(parameters: tuple[Parameter, ...]) -> list[list[int]]:
     return blocks
 
 
-def _guess(problem: Problem, said: Floats, watch: Callable[[], None]) -> tuple[Floats, Pairs]:
-    """A first guess, and what it was made from.
+def _guess(problem: Problem, said: Floats, own: Sequence[int], watch: Callable[[], None]) -> tuple[Floats, Pairs]:
+    """A first guess, of `own` among the biases, and what it was made from.
 
     Tracks by noise as wide as biases may be, then by narrower noise, and what fits them.
     """
@@ -93,7 +106,7 @@ def _guess(problem: Problem, said: Floats, watch: Callable[[], None]) -> tuple[F
     asked, unknown = np.zeros((len(sites), len(BIASES)), bool), np.ones((len(sites), len(BIASES)))
     places = {}
     for i, each in enumerate(problem.parameters):
-        if each.kind == "bias":
+        if each.kind == "bias" and i in own:
             at = each.sensor, BIASES.index(each.component)
             places[i], asked[at], unknown[at] = at, True, each.unknown / abs(each.per_si)
     stds = far
