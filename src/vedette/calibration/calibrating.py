@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vedette.calibration.maximum import Maximum, covariance, maximise
+from vedette.calibration.maximum import covariance, maximise
 from vedette.calibration.parameters import Parameter, Problem
 from vedette.calibration.registration import BIASES, Pairs, linked, matched, register
 from vedette.kernels.base.types import Floats
@@ -44,12 +44,14 @@ class Calibration(NamedTuple):
     """What was found of all parameters.
 
     log_likelihood, before: of the recording, as found and as it was said. converged: whether the search came to an end.
+    rank: of the information, the number of directions of the parameters that the recording says something of.
     """
 
     found: tuple[Found, ...]
     log_likelihood: float
     before: float
     converged: bool
+    rank: int
 
 
 def calibrate(
@@ -81,8 +83,11 @@ def calibrate(
     guessed, pairs = _guess(problem, said, own, watch)
     start = guessed[own] if float(terms(guessed[own]).sum()) > before else said[own]
     maximum = maximise(terms, start, unknown, _blocks(asked.parameters))
-    apart = np.flatnonzero(~linked(pairs, len(problem.sites))).tolist()
-    return Calibration(_judged(asked, maximum, unknown, apart), maximum.log_likelihood, before, maximum.converged)
+    together = linked(pairs, len(problem.sites))
+    apart = np.flatnonzero(~together | (together.sum() == 1)).tolist()  # with nobody else, the first one is, too
+    cov, lost = covariance(maximum.information, unknown)
+    found, rank = _judged(asked, maximum.at, cov, lost, apart), len(own) - round(float(np.trace(lost)))
+    return Calibration(found, maximum.log_likelihood, before, maximum.converged, rank)
 
 
 def _blocks(parameters: tuple[Parameter, ...]) -> list[list[int]]:
@@ -151,15 +156,17 @@ def _with_counts(problem: Problem, values: Floats, pairs: Pairs) -> Floats:
     return values
 
 
-def _judged(problem: Problem, maximum: Maximum, unknown: Floats, apart: Sequence[int]) -> tuple[Found, ...]:
-    """Each parameter with its interval, or why it cannot be found; apart: sensors without targets that others see."""
-    cov, lost = covariance(maximum.information, unknown)
+def _judged(problem: Problem, at: Floats, cov: Floats, lost: Floats, apart: Sequence[int]) -> tuple[Found, ...]:
+    """Each parameter with its interval, or why it cannot be found.
+
+    cov, lost: as of `covariance`. apart: sensors without targets that others see.
+    """
     found = []
-    for i, (each, free) in enumerate(zip(problem.parameters, maximum.at.tolist(), strict=True)):
+    for i, (each, free) in enumerate(zip(problem.parameters, at.tolist(), strict=True)):
         partners = [j for j in np.flatnonzero(np.abs(lost[i]) > _PART).tolist() if j != i]
         compared = each.sensor in apart and each.component in _COMPARED
         if compared or lost[i, i] > _PART:
-            why = _why(problem, i, [] if compared else partners)
+            why = _why(problem, i, [] if compared else partners, each.sensor in apart)
             found.append(Found(each, each.start, math.nan, math.nan, why))
             continue
         reach = _QUANTILE * math.sqrt(cov[i, i])
@@ -168,17 +175,19 @@ def _judged(problem: Problem, maximum: Maximum, unknown: Floats, apart: Sequence
     return tuple(found)
 
 
-def _why(problem: Problem, i: int, partners: list[int]) -> str:
+def _why(problem: Problem, i: int, partners: list[int], is_apart: bool) -> str:
     """Why a parameter cannot be found, by those that cannot be told from it."""
     own = problem.parameters[i]
     names = [f"{problem.parameters[j].name} of {problem.sites[problem.parameters[j].sensor].name}" for j in partners]
-    others = {problem.parameters[j].sensor for j in partners} - {own.sensor}
     if own.kind != "bias":
         return "the recording says next to nothing of it"
-    if not others:
-        alone = len(problem.sites) == 1
+    if len(problem.sites) == 1 or is_apart:
         what = {"bearing": "a rotation", "clock": "a shift in time"}.get(own.component, "a shift")
+        alone = len(problem.sites) == 1
         told = "there is no other sensor" if alone else "no other sensor sees enough of the same targets"
         beside = f" (with {', '.join(names)})" if names else ""
         return f"{told} to tell it{beside} from {what} of all that this one sees"
-    return f"it cannot be told apart from {', '.join(names)}: together they move all that is seen"
+    if names:
+        return f"it cannot be told apart from {', '.join(names)}: together they move all that is seen"
+    still = own.component == "clock"
+    return f"what it sees with others {'hardly moves in so short a time' if still else 'says next to nothing of it'}"

@@ -75,7 +75,12 @@ def calibrate(
 
 def _document(calibration: Calibration, names: tuple[str, ...]) -> dict[str, Any]:
     likelihoods = {"log_likelihood": calibration.log_likelihood, "log_likelihood_before": calibration.before}
-    return {"found": _rows(calibration, names), **likelihoods, "converged": calibration.converged}
+    return {
+        "found": _rows(calibration, names),
+        **likelihoods,
+        "converged": calibration.converged,
+        "rank": calibration.rank,
+    }
 
 
 @contextmanager
@@ -133,11 +138,13 @@ def _print(windows: list[Window], names: tuple[str, ...], position: bool) -> Non
     others = {row["parameter"] for row in rows if row["sensor"] != rows[0]["sensor"]}
     if "clock" in others:
         say("clocks are against that of the first sensor, as a shift of all times changes nothing")
-    if "x" in others - {row["parameter"] for row in rows if row["sensor"] == rows[0]["sensor"]}:
-        what = "places and bearings" if position else "positions"
-        say(f"{what} are against those of the first sensor, as a shift or turn of all changes nothing")
+    if position or "x" in others - {row["parameter"] for row in rows if row["sensor"] == rows[0]["sensor"]}:
+        what, alone = "places and bearings" if position else "positions", "" if others else ", and there is no other"
+        say(f"{what} are against those of the first sensor, as a shift or turn of all changes nothing{alone}")
     for window in windows:
         calibration, part = window.calibration, f"from {window.begin:.0f} s on: " if several else ""
         if not calibration.converged:
             note(f"{part}the search did not come to an end: what was found may not be the maximum")
+        if any(each.why for each in calibration.found):
+            say(f"{part}the recording says something of {calibration.rank} of {len(calibration.found)} directions")
         say(f"{part}log likelihood {calibration.before:.1f} as said, {calibration.log_likelihood:.1f} as found")
