@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -232,7 +233,7 @@ def test_places_are_asked_of_the_others_alone(tmp_path: Path) -> None:
     assert asked == [(0, "range"), (1, "bearing_deg"), (1, "range"), (1, "clock"), (1, "x"), (1, "y")]
 
 
-def two_radars(folder: Path, targets: list[tuple[float, ...]], names: str = "ab") -> Problem:
+def two_radars(folder: Path, targets: Sequence[tuple[float, ...]], names: str = "ab") -> Problem:
     """Of targets (x, y, vx, vy); b is at (3000, 0), and said to be at (3080, -60); places are asked for."""
     rng, rows = np.random.default_rng(3), list[list[object]]()
     for name, at, period in (("a", 0.0, 4.0), ("b", 3000.0, 5.0))[: len(names)]:
