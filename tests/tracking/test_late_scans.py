@@ -41,6 +41,7 @@ TRACKERS: dict[str, dict[str, Any]] = {
     "radio beliefs": {**RADIO, "fusion": {"kind": "clmb", "feedback": True}, "filter": {"kind": "lmb"}},
     "consensus": {"fusion": {"kind": "parallel"}, "network": {"consensus_rounds": 2}, "filter": {"kind": "lmb"}},
 }
+DRAW = ("gibbs", "radio", "reach", "radio beliefs")
 WINDOW = 6.0
 
 
