@@ -159,3 +159,9 @@ def test_bad_parts_are_refused(problem: Problem) -> None:
     follower = BiasFollower(problem)
     with pytest.raises(InputError, match=r"scan.sensor: expected a whole number from 0 to 1; got 2"):
         follower.take(follower.initial(), SensorScan(2, 0.0, [[0.1, 500.0]], (1.0, 2.0, 0.0)))
+    with pytest.raises(InputError, match=r"scan of sensor 1 at 2 s: scan: expected an array of shape \(any, 2\)"):
+        follower.take(follower.initial(), SensorScan(1, 2.0, [[0.1, 500.0, 3.0]], (1.0, 2.0, 0.0)))
+    with pytest.raises(InputError, match="scan of sensor 1 at 2 s: scan: expected finite numbers"):
+        follower.take(follower.initial(), SensorScan(1, 2.0, [[0.1, math.nan]], (1.0, 2.0, 0.0)))
+    _, empty = follower.take(follower.initial(), SensorScan(1, 2.0, [], (1.0, 2.0, 0.0)))
+    assert empty.measurements.shape == (0, 2)

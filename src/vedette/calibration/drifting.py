@@ -13,9 +13,10 @@ import numpy as np
 from vedette.calibration.calibrating import Calibration, calibrate
 from vedette.calibration.parameters import Parameter, Problem
 from vedette.kernels.base.types import Floats
-from vedette.models.arguments import count, instance, positive, reject
-from vedette.recorded.instants import Look, in_order, without_bias
+from vedette.models.arguments import float_array, instance, positive
+from vedette.recorded.instants import COMPONENTS, Look, in_order, without_bias
 from vedette.tracking import SensorScan
+from vedette.tracking.late import name_of, own_scan
 
 _KEPT = 4.0  # windows for which what was found is remembered
 
@@ -134,12 +135,10 @@ class BiasFollower:
             The state with it, and the scan as the sensor would have made it without its biases, for a tracker.
 
         Raises:
-            InputError: a sensor that there is not.
+            InputError: a sensor that there is not, a time, a pose or measurements that no scan of it has.
             VedetteError: as of `calibrate`.
         """
-        instance("scan", scan, SensorScan)
-        if count("scan.sensor", scan.sensor) >= len(self.problem.sites):
-            raise reject("scan.sensor", f"a whole number from 0 to {len(self.problem.sites) - 1}", scan.sensor)
+        scan = self._checked(scan)
         newest = scan.time if state.newest is None else max(state.newest, scan.time)
         due = scan.time + self.window if state.newest is None else state.due
         scans = tuple(each for each in (*state.scans, scan) if each.time > newest - self.window)
@@ -149,11 +148,18 @@ class BiasFollower:
         return state, self.corrected(state, scan)
 
     def corrected(self, state: Followed, scan: SensorScan) -> SensorScan:
-        """The scan without the biases of its time, as they are known."""
-        site = self.problem.with_biases(self.biases(state, scan.time))[scan.sensor]
-        look = Look(scan.time, scan.sensor, np.asarray(scan.measurements, float), np.asarray(scan.pose, float))
+        """The scan without the biases of its time, as they are known; errors as of `take`."""
+        own = self._checked(scan)
+        site = self.problem.with_biases(self.biases(state, own.time))[own.sensor]
+        look = Look(own.time, own.sensor, own.measurements, own.pose)
         without = without_bias(look, site, self.problem.recording.bearings)
         return SensorScan(scan.sensor, without.time, without.scan, without.pose)
+
+    def _checked(self, scan: SensorScan) -> SensorScan:
+        own = own_scan(scan, len(self.problem.sites))
+        shape = None, len(COMPONENTS[self.problem.sites[own.sensor].kind])
+        measured = own.measurements if own.measurements.size else np.empty((0, shape[1]))
+        return replace(own, measurements=float_array(f"{name_of(own)}: scan", measured, shape))
 
     def biases(self, state: Followed, time: float) -> Floats:
         """(num_parameters,) the values of the parameters at a time, at most a window after the last that were found."""
@@ -175,10 +181,11 @@ class BiasFollower:
         """The state with what the last window says."""
         assert state.newest is not None
         recorded, start = self.problem.recording, min(scan.time for scan in state.scans)
-        looks = [
-            Look(s.time - start, s.sensor, np.asarray(s.measurements, float), np.asarray(s.pose)) for s in state.scans
-        ]
-        poses = np.array([site.pose[:3] for site in self.problem.sites])
+        looks = [Look(each.time - start, each.sensor, each.measurements, each.pose) for each in state.scans]
+        sites = self.problem.sites
+        poses = np.zeros((len(sites), max(map(len, [*(site.pose for site in sites), *(look.pose for look in looks)]))))
+        for s, site in enumerate(sites):
+            poses[s, : len(site.pose)] = site.pose
         window = in_order(looks, poses, start, recorded.is_utc, (), recorded.bearings)
         problem = replace(self.problem, recording=window, parameters=state.parameters)
         drifts = [each for each in state.parameters if each.kind == "bias" and each.component != "clock"]
